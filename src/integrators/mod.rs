@@ -1,0 +1,7 @@
+//! Ways to fly a problem, each returning the same [`Flight`].
+//!
+//! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
+
+pub mod outcome;
+
+pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};

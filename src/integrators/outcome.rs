@@ -1,0 +1,261 @@
+//! What every integrator returns: outcome, ordered events, end state, margin with its error bar, cost.
+
+use smallvec::SmallVec;
+use thiserror::Error;
+
+use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, State};
+
+/// How much of a flight to compute. What is not asked for is not computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Detail {
+    /// Outcome and end state only; events inside the flight are not listed.
+    End,
+    /// And every event.
+    #[default]
+    Events,
+    /// And every step.
+    Trajectory,
+}
+
+/// Work done for a flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Steps tried and thrown away.
+    pub rejected_steps: u64,
+    /// Evaluations of a stage's force. A Taylor step of order K counts K: one for each coefficient of the force.
+    pub force_evaluations: u64,
+}
+
+impl std::ops::AddAssign for Cost {
+    fn add_assign(&mut self, other: Self) {
+        self.steps += other.steps;
+        self.rejected_steps += other.rejected_steps;
+        self.force_evaluations += other.force_evaluations;
+    }
+}
+
+/// One row of a trajectory: a step's end or an event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Time, depth, velocity.
+    pub state: State,
+    /// Force [N] in the stage below.
+    pub force: f64,
+    /// Index of the stage that gives the force.
+    pub stage: usize,
+}
+
+/// The step limit of a fixed-step scheme, and whether the step kept it (theory section 5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepLimit {
+    /// Largest stable step [s]; infinite where there is no limit.
+    pub limit: f64,
+    /// Whether every step was within it.
+    pub stable: bool,
+}
+
+/// Events of a flight in time order; four fit without an allocation.
+pub type Events<S = f64> = SmallVec<[Event<S>; 4]>;
+
+/// A finished flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flight<S = f64> {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Index from 0 of the stage in which it ended.
+    pub stage: usize,
+    /// State at the end: at rest `X, T, 0`; perforated: exit depth, time of exit, V_r.
+    pub end: State<S>,
+    /// Events in time order; at one place crater-end, exit, rest.
+    pub events: Events<S>,
+    /// Exit margin W(exit)/V0², continued below zero for a stop ([`crate::physics::exit_energy`]).
+    ///
+    /// `None` without an exit depth, or at no impact speed.
+    pub exit_margin: Option<f64>,
+    /// Half-width of the error bar of the margin; the outcome is `Undecided` exactly when it is not exceeded.
+    pub exit_margin_error: Option<f64>,
+    /// Work done.
+    pub cost: Cost,
+    /// Every step and event, when asked for.
+    pub trajectory: Vec<Sample>,
+    /// Step limit, for schemes that have one.
+    pub step_limit: Option<StepLimit>,
+    /// What was not computed and why, one sentence each; filled when [`Detail::Events`] or more is asked for.
+    pub notes: Vec<String>,
+}
+
+impl<S: Scalar> Flight<S> {
+    /// State at the first event of `kind`, if it was reached.
+    pub fn at(&self, kind: EventKind) -> Option<State<S>> {
+        self.events.iter().find(|e| e.kind == kind).map(|e| e.state)
+    }
+
+    /// State at x = k d, if the flight reached it.
+    pub fn crater_end(&self) -> Option<State<S>> {
+        self.at(EventKind::CraterEnd)
+    }
+
+    /// Everything by value in `f64`.
+    pub fn values(&self) -> Flight {
+        Flight {
+            outcome: self.outcome,
+            stage: self.stage,
+            end: self.end.values(),
+            events: self.events.iter().map(|e| Event { kind: e.kind, state: e.state.values() }).collect(),
+            exit_margin: self.exit_margin,
+            exit_margin_error: self.exit_margin_error,
+            cost: self.cost,
+            trajectory: self.trajectory.clone(),
+            step_limit: self.step_limit,
+            notes: self.notes.clone(),
+        }
+    }
+}
+
+impl Flight {
+    /// A flight that never starts: at rest on the face (`V0 = 0`), or no target at all (exit depth 0).
+    ///
+    /// `None` for every other problem; integrators ask this first, so that none has to treat a vanishing scale.
+    pub fn at_once<S: Scalar>(problem: &Problem<S>) -> Option<Flight<S>> {
+        let start = State::at_impact(problem);
+        let through = problem.exit_depth.value() <= 0.0;
+        if !through && problem.impact_speed.value() > 0.0 {
+            return None;
+        }
+        let mut events = Events::new();
+        // Ends at the face itself (k d = 0 leaves no crater, but a user's stage may end at 0) are reached at once.
+        for (index, stage) in problem.stages.iter().enumerate() {
+            if stage.end.value() > 0.0 {
+                break;
+            }
+            events.push(Event { kind: EventKind::boundary(problem, index), state: start });
+        }
+        let stage = events.len().min(problem.stages.len() - 1);
+        if through {
+            events.push(Event { kind: EventKind::Exit, state: start });
+        }
+        if problem.impact_speed.value() <= 0.0 {
+            events.push(Event { kind: EventKind::Rest, state: start });
+        }
+        Some(Flight {
+            outcome: if through { Outcome::Perforated } else { problem.stop_in(stage) },
+            stage,
+            end: start,
+            events,
+            exit_margin: (through && problem.impact_speed.value() > 0.0).then_some(1.0),
+            exit_margin_error: (through && problem.impact_speed.value() > 0.0).then_some(0.0),
+            cost: Cost::default(),
+            trajectory: Vec::new(),
+            step_limit: None,
+            notes: vec!["no integration: the flight ends at impact".to_owned()],
+        })
+    }
+}
+
+/// Why an integration stopped without an answer.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum IntegrationError {
+    /// The step budget ran out before the flight ended.
+    #[error("no end of the flight within {max_steps} steps, stopped at {last}")]
+    StepBudgetSpent {
+        /// Steps allowed.
+        max_steps: u64,
+        /// State at the last step.
+        last: State,
+    },
+    /// A number stopped being finite.
+    #[error("{what} is not finite after {last}")]
+    NotFinite {
+        /// Which quantity.
+        what: &'static str,
+        /// Last finite state.
+        last: State,
+    },
+    /// The flight has no end: nothing stops the projectile and there is no far side, or both are only approached.
+    #[error("the flight never ends: {why}; reached {last}")]
+    NeverEnds {
+        /// What keeps it going.
+        why: &'static str,
+        /// State reached.
+        last: State,
+    },
+    /// The method cannot treat this problem: a mistake of the caller, exit code 2.
+    #[error("{method} cannot treat this scene: {why}")]
+    Refused {
+        /// Method name of the contract.
+        method: &'static str,
+        /// Reason and remedy.
+        why: String,
+    },
+    /// An option outside its domain: a mistake of the caller, exit code 2.
+    #[error("{option} = {value} is not allowed: {allowed}")]
+    BadOption {
+        /// Option name.
+        option: &'static str,
+        /// Value given.
+        value: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The library behind the method gave up.
+    #[error("{method} gave up after {last}: {cause}")]
+    SolverFailed {
+        /// Method name of the contract.
+        method: &'static str,
+        /// What the library said.
+        cause: String,
+        /// Last accepted state.
+        last: State,
+    },
+}
+
+impl IntegrationError {
+    /// Whether the request was at fault (exit code 2) and not the computation (exit code 1).
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Refused { .. } | Self::BadOption { .. })
+    }
+
+    /// Help for a person: what to change. Empty when the message says it all.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::StepBudgetSpent { .. } => "take a longer step or a looser tolerance, or another method",
+            Self::NotFinite { .. } => "check the scene for forces beyond the range of 64-bit numbers",
+            Self::NeverEnds { .. } => {
+                "give the target a thickness, or a last stage that resists at rest (static_force > 0)"
+            }
+            Self::SolverFailed { .. } => "loosen --rtol, or take another method",
+            _ => "",
+        }
+    }
+
+    /// State reached, where the error knows one.
+    pub fn last(&self) -> Option<State> {
+        match self {
+            Self::StepBudgetSpent { last, .. }
+            | Self::NotFinite { last, .. }
+            | Self::NeverEnds { last, .. }
+            | Self::SolverFailed { last, .. } => Some(*last),
+            _ => None,
+        }
+    }
+}
+
+/// A way to fly a problem.
+pub trait Integrator {
+    /// Name of the method in the contract.
+    fn name(&self) -> &'static str;
+
+    /// Formal order of the method; `None` where it varies or where the answer is exact.
+    fn order(&self) -> Option<u32> {
+        None
+    }
+
+    /// Integrates `problem` from impact to rest or exit.
+    ///
+    /// # Errors
+    /// [`IntegrationError`]: the method refuses the problem, or no end can be computed.
+    fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError>;
+}
