@@ -1,0 +1,27 @@
+//! `penetrode completions SHELL`: shell completion on standard output.
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use super::{Cli, CliError, Exit, output};
+
+/// Arguments of `completions`.
+#[derive(Args, Debug)]
+pub struct CompletionsArgs {
+    /// The shell.
+    #[arg(value_enum)]
+    pub shell: Shell,
+}
+
+impl CompletionsArgs {
+    /// Prints the completion script.
+    ///
+    /// # Errors
+    /// When standard output cannot be written.
+    pub fn run(&self) -> Result<Exit, CliError> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "penetrode", &mut script);
+        output::print_text(&String::from_utf8_lossy(&script)).map_err(CliError::stdout)?;
+        Ok(Exit::Success)
+    }
+}

@@ -1,0 +1,119 @@
+//! The options that choose and tune a method, shared by every command that flies.
+
+use clap::Args;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::CliError;
+use crate::integrators::central_difference::{Boundaries, VelocityAt};
+use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT};
+use crate::integrators::{Flight, StepLimit};
+use crate::physics::Problem;
+use crate::physics::scene_file::parse_time;
+
+/// Method and options.
+#[derive(Args, Clone, Debug, Default)]
+pub struct MethodArgs {
+    /// Method of integration.
+    #[arg(long, value_enum, default_value_t = MethodName::Taylor)]
+    pub method: MethodName,
+    /// Relative tolerance (diffsol methods and adaptive: 1e-10; taylor and energy: round-off).
+    #[arg(long, value_name = "R")]
+    pub rtol: Option<f64>,
+    /// Time step of central-difference, such as "1 us" or seconds; from the stages when left out.
+    #[arg(long, value_name = "TIME")]
+    pub dt: Option<String>,
+    /// Velocity in the drag of central-difference [default: lagged, as in the paper].
+    #[arg(long, value_enum)]
+    pub velocity: Option<VelocityAt>,
+    /// Where central-difference sees boundaries and rest [default: step-end, as in the paper].
+    #[arg(long, value_enum)]
+    pub events: Option<Boundaries>,
+}
+
+impl MethodArgs {
+    /// The options in SI units.
+    ///
+    /// # Errors
+    /// When the step is not a time.
+    pub fn options(&self) -> Result<MethodOptions, CliError> {
+        let dt = self
+            .dt
+            .as_deref()
+            .map(|text| {
+                parse_time(text).map_err(|cause| {
+                    CliError::usage(format!("--dt {text}: {cause}"), "write a time such as \"1 us\", or seconds")
+                })
+            })
+            .transpose()?;
+        Ok(MethodOptions { rtol: self.rtol, dt, velocity: self.velocity, events: self.events })
+    }
+
+    /// The method, ready to fly.
+    ///
+    /// # Errors
+    /// Options that the method does not use or that are out of range.
+    pub fn build(&self) -> Result<Method, CliError> {
+        Ok(Method::new(self.method, &self.options()?)?)
+    }
+}
+
+/// `method` in the JSON of a command.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct MethodJson {
+    /// Name of the method.
+    pub name: &'static str,
+    /// Relative tolerance; absent for fixed steps and closed forms, `null` for round-off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rtol: Option<Option<f64>>,
+    /// Time step [s] of a fixed-step scheme.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dt_s: Option<f64>,
+    /// Velocity in the drag of a fixed-step scheme.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<String>,
+    /// Boundary rule of a fixed-step scheme.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub events: Option<String>,
+    /// Step limit of a fixed-step scheme.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stability: Option<StabilityJson>,
+}
+
+/// Step limit of a fixed-step scheme (theory section 5).
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+pub struct StabilityJson {
+    /// Largest stable step [s]; `null` without a limit.
+    pub limit_s: Option<f64>,
+    /// Whether every step kept it.
+    pub stable: bool,
+}
+
+impl From<StepLimit> for StabilityJson {
+    fn from(limit: StepLimit) -> Self {
+        Self { limit_s: limit.limit.is_finite().then_some(limit.limit), stable: limit.stable }
+    }
+}
+
+impl MethodJson {
+    /// What was used for `problem`, and what `flight` says of its stability.
+    pub fn new(name: MethodName, options: &MethodOptions, problem: Option<&Problem>, flight: Option<&Flight>) -> Self {
+        let mut json =
+            Self { name: name.name(), rtol: None, dt_s: None, velocity: None, events: None, stability: None };
+        match name {
+            MethodName::CentralDifference => {
+                let velocity = options.velocity.unwrap_or_default();
+                let events = options.events.unwrap_or_default();
+                let scheme = crate::integrators::CentralDifference::new(options.dt, velocity, events);
+                json.dt_s = problem.map(|p| scheme.time_step(p)).or(options.dt);
+                json.velocity = Some(velocity.to_string());
+                json.events = Some(events.to_string());
+                json.stability = flight.and_then(|f| f.step_limit).map(StabilityJson::from);
+            }
+            MethodName::Taylor | MethodName::Energy => json.rtol = Some(options.rtol),
+            MethodName::ClosedForm => {}
+            _ => json.rtol = Some(Some(options.rtol.unwrap_or(RTOL_DEFAULT))),
+        }
+        json
+    }
+}

@@ -1,0 +1,238 @@
+//! The command line: one file per subcommand, exit codes in one place.
+
+pub mod batch;
+pub mod completions;
+pub mod critical;
+pub mod method_args;
+pub mod output;
+pub mod scene_json;
+pub mod schema;
+pub mod solve;
+
+use std::io;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use serde::Serialize;
+
+use crate::integrators::IntegrationError;
+use crate::physics::State;
+use crate::physics::scene_file::SceneError;
+
+/// How the program ended (contract, "Exit codes").
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All is well.
+    Success = 0,
+    /// The run failed.
+    Failed = 1,
+    /// Usage or input.
+    Usage = 2,
+    /// A criterion failed.
+    Criterion = 3,
+    /// Undecided.
+    Undecided = 4,
+    /// A required peer program is missing.
+    PeerMissing = 5,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// What a subcommand can fail with, each with its exit code.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// A scene that cannot be used: exit 2.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A request that cannot be served: exit 2.
+    #[error("{message}")]
+    Usage {
+        /// What is wrong.
+        message: String,
+        /// What to do.
+        help: String,
+    },
+    /// A computation without an answer: exit 1.
+    #[error("{message}")]
+    Run {
+        /// What happened.
+        message: String,
+        /// What to try.
+        help: String,
+        /// State reached, where there is one.
+        last: Option<State>,
+    },
+    /// A result that could not be written: exit 1.
+    #[error("cannot write {path}: {cause}")]
+    Write {
+        /// Where to.
+        path: String,
+        /// What the system said.
+        cause: io::Error,
+    },
+    /// A peer that could not be started: exit 5.
+    #[error("{0}")]
+    PeerMissing(String),
+}
+
+impl From<IntegrationError> for CliError {
+    fn from(error: IntegrationError) -> Self {
+        let (message, help) = (error.to_string(), error.help().to_owned());
+        if error.is_usage() {
+            Self::Usage { message, help }
+        } else {
+            Self::Run { message, help, last: error.last() }
+        }
+    }
+}
+
+impl CliError {
+    /// A mistake in the request.
+    pub fn usage(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Usage { message: message.into(), help: help.into() }
+    }
+
+    /// Standard output that could not be written.
+    pub fn stdout(cause: io::Error) -> Self {
+        Self::Write { path: "standard output".to_owned(), cause }
+    }
+
+    /// The exit code.
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Scene(_) | Self::Usage { .. } => Exit::Usage,
+            Self::Run { .. } | Self::Write { .. } => Exit::Failed,
+            Self::PeerMissing(_) => Exit::PeerMissing,
+        }
+    }
+
+    /// The message for a person, on standard error.
+    pub fn render(&self, color: bool) -> String {
+        match self {
+            Self::Scene(error) => error.render(color),
+            Self::Usage { message, help } | Self::Run { message, help, .. } => {
+                let mut text = format!("error: {message}\n");
+                if !help.is_empty() {
+                    text.push_str(&format!(" help: {help}\n"));
+                }
+                text
+            }
+            other => format!("error: {other}\n"),
+        }
+    }
+}
+
+/// The JSON verdict of a run that failed (exit 1).
+#[derive(Serialize)]
+struct FailureJson {
+    schema: String,
+    error: ErrorJson,
+}
+
+#[derive(Serialize)]
+struct ErrorJson {
+    message: String,
+    time_s: Option<f64>,
+    depth_m: Option<f64>,
+    velocity_m_s: Option<f64>,
+}
+
+/// penetrode: verify integrators of the equation of motion of a rigid projectile in concrete.
+///
+/// M dV/dt = -F(x, V); F = c x in the crater, P + Q V² in the tunnel, until rest or the far side. Every method's
+/// answer stands beside the exact one.
+#[derive(Parser, Debug)]
+#[command(name = "penetrode", version, max_term_width = 80, arg_required_else_help = true, after_help = EXIT_HELP)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_HELP: &str = "Exit codes: 0 all is well, 1 the run failed, 2 usage or input, 3 a criterion failed, \
+                         4 undecided, 5 a required peer program is missing.";
+
+/// The subcommands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// One flight: depth, times and velocities, beside the exact answer.
+    Solve(solve::SolveArgs),
+    /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
+    Critical(critical::CriticalArgs),
+    /// Many scenes from a table, one line of results each.
+    Batch(batch::BatchArgs),
+    /// JSON schema of what a command prints.
+    Schema(schema::SchemaArgs),
+    /// Shell completion.
+    Completions(completions::CompletionsArgs),
+}
+
+impl Command {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Solve(_) => "solve",
+            Self::Critical(_) => "critical",
+            Self::Batch(_) => "batch",
+            Self::Schema(_) => "schema",
+            Self::Completions(_) => "completions",
+        }
+    }
+
+    fn wants_json(&self) -> bool {
+        match self {
+            Self::Solve(args) => args.json,
+            Self::Critical(args) => args.json,
+            _ => false,
+        }
+    }
+
+    fn run(&self) -> Result<Exit, CliError> {
+        match self {
+            Self::Solve(args) => args.run(),
+            Self::Critical(args) => args.run(),
+            Self::Batch(args) => args.run(),
+            Self::Schema(args) => args.run(),
+            Self::Completions(args) => args.run(),
+        }
+    }
+}
+
+impl Cli {
+    /// Runs the command, reports an error on standard error, and says how it ended.
+    pub fn run(&self) -> Exit {
+        match self.command.run() {
+            Ok(exit) => exit,
+            Err(error) => {
+                if error.exit() == Exit::Failed && self.command.wants_json() {
+                    let last = match &error {
+                        CliError::Run { last, .. } => *last,
+                        _ => None,
+                    };
+                    let failure = FailureJson {
+                        schema: format!("penetrode/{}/1", self.command.name()),
+                        error: ErrorJson {
+                            message: error.to_string(),
+                            time_s: last.map(|s| s.time),
+                            depth_m: last.map(|s| s.depth),
+                            velocity_m_s: last.map(|s| s.velocity),
+                        },
+                    };
+                    // The message below still reaches the person if standard output is gone.
+                    let _ = output::print_json(&failure);
+                }
+                eprint!("{}", error.render(is_terminal_stderr()));
+                error.exit()
+            }
+        }
+    }
+}
+
+/// Whether standard error is a terminal that wants colour.
+fn is_terminal_stderr() -> bool {
+    use std::io::IsTerminal;
+    io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+}

@@ -1,0 +1,95 @@
+//! The scene and its stages in the JSON of a command.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::physics::{Concrete, CraterStiffness, Problem, Resistance, Scene, Stage};
+
+/// A stage as in the peer protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StageJson {
+    /// Static force p [N].
+    pub static_force_n: f64,
+    /// Stiffness s [N/m].
+    pub stiffness_n_m: f64,
+    /// Viscosity r [kg/s].
+    pub viscosity_kg_s: f64,
+    /// Drag q [kg/m].
+    pub drag_kg_m: f64,
+    /// End in x [m], from the impact face; `null` in the last stage.
+    pub end_m: Option<f64>,
+}
+
+impl From<&Stage> for StageJson {
+    fn from(stage: &Stage) -> Self {
+        Self {
+            static_force_n: stage.static_force,
+            stiffness_n_m: stage.stiffness,
+            viscosity_kg_s: stage.viscosity,
+            drag_kg_m: stage.drag,
+            end_m: stage.end.is_finite().then_some(stage.end),
+        }
+    }
+}
+
+/// The scene in SI units; what a scene of stages does not have is `null`.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "the contract names every field with its unit")]
+pub struct SceneJson {
+    pub title: Option<String>,
+    pub mass_kg: f64,
+    pub diameter_m: Option<f64>,
+    pub nose_factor: Option<f64>,
+    pub strength_pa: Option<f64>,
+    pub density_kg_m3: Option<f64>,
+    pub thickness_m: Option<f64>,
+    #[serde(rename = "S")]
+    pub static_factor: Option<f64>,
+    #[serde(rename = "B")]
+    pub inertia_factor: Option<f64>,
+    #[serde(rename = "k")]
+    pub crater_ratio: Option<f64>,
+    pub velocity_m_s: f64,
+    pub crater_stiffness_n_m: Option<f64>,
+    pub static_force_n: Option<f64>,
+    pub drag_kg_m: Option<f64>,
+    pub exit_depth_m: Option<f64>,
+    pub stages: Vec<StageJson>,
+}
+
+impl SceneJson {
+    /// `scene` as it resolved into `problem`.
+    pub fn new(scene: &Scene, problem: &Problem) -> Self {
+        let concrete = match &scene.resistance {
+            Resistance::Concrete(concrete) => Some(concrete),
+            Resistance::Stages(_) => None,
+        };
+        // A layered target has no strength of its own: its layers are in the stages.
+        let homogeneous = concrete.filter(|c| c.layers.is_empty());
+        let of = |get: fn(&Concrete) -> f64| concrete.map(get);
+        let crater_stiffness_n_m = problem.crater.map(|i| problem.stages[i].stiffness).or_else(|| {
+            concrete.and_then(|c| match c.crater_stiffness {
+                CraterStiffness::Given(value) => Some(value),
+                CraterStiffness::Continuous => None,
+            })
+        });
+        Self {
+            title: scene.title.clone(),
+            mass_kg: scene.mass,
+            diameter_m: of(|c| c.diameter),
+            nose_factor: of(|c| c.nose_factor),
+            strength_pa: homogeneous.map(|c| c.strength),
+            density_kg_m3: homogeneous.map(|c| c.density),
+            thickness_m: scene.thickness,
+            static_factor: homogeneous.map(|c| c.static_factor),
+            inertia_factor: of(|c| c.inertia_factor),
+            crater_ratio: of(|c| c.crater_ratio),
+            velocity_m_s: problem.impact_speed,
+            crater_stiffness_n_m,
+            static_force_n: homogeneous.map(Concrete::static_force),
+            drag_kg_m: homogeneous.map(Concrete::drag),
+            exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
+            stages: problem.stages.iter().map(StageJson::from).collect(),
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! `penetrode schema COMMAND`: the JSON schema of what a command prints.
+
+use clap::{Args, ValueEnum};
+use schemars::schema_for;
+
+use super::{CliError, Exit, critical, output, solve};
+
+/// Arguments of `schema`.
+#[derive(Args, Debug)]
+pub struct SchemaArgs {
+    /// The command whose JSON is described.
+    #[arg(value_enum)]
+    pub command: Documented,
+}
+
+/// Commands that print JSON.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Documented {
+    /// `solve --json`.
+    Solve,
+    /// `critical --json`.
+    Critical,
+}
+
+impl SchemaArgs {
+    /// Prints the schema.
+    ///
+    /// # Errors
+    /// When standard output cannot be written.
+    pub fn run(&self) -> Result<Exit, CliError> {
+        let schema = match self.command {
+            Documented::Solve => schema_for!(solve::SolveJson),
+            Documented::Critical => schema_for!(critical::CriticalJson),
+        };
+        output::print_json(&schema).map_err(CliError::stdout)?;
+        Ok(Exit::Success)
+    }
+}

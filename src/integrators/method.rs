@@ -1,0 +1,221 @@
+//! The methods by name, the options each takes, and one place that builds them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::central_difference::{Boundaries, CentralDifference, VelocityAt};
+use super::closed_form::ClosedForm;
+use super::energy::Energy;
+use super::outcome::{IntegrationError, Integrator};
+use super::taylor::Taylor;
+
+/// Names of the methods in the contract.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
+pub enum MethodName {
+    /// Adaptive high-order Taylor series, events by root isolation: the default.
+    #[default]
+    Taylor,
+    /// Explicit Runge-Kutta 5(4) of Tsitouras (diffsol).
+    Tsit45,
+    /// Variable-order backward differentiation (diffsol): implicit, for driven stages.
+    Bdf,
+    /// Singly diagonal implicit Runge-Kutta of order 4(3) (diffsol).
+    Esdirk34,
+    /// TR-BDF2 (diffsol): implicit, of order 2.
+    TrBdf2,
+    /// Explicit or implicit for each stage, from a stated indicator (diffsol).
+    Adaptive,
+    /// W = V² over depth, integrated.
+    Energy,
+    /// Fixed-step central difference, the paper's scheme (Eq. 6-8).
+    CentralDifference,
+    /// The exact solution, where one exists.
+    ClosedForm,
+}
+
+impl MethodName {
+    /// Every method, in the order of the contract.
+    pub const ALL: [Self; 9] = [
+        Self::Taylor,
+        Self::Tsit45,
+        Self::Bdf,
+        Self::Esdirk34,
+        Self::TrBdf2,
+        Self::Adaptive,
+        Self::Energy,
+        Self::CentralDifference,
+        Self::ClosedForm,
+    ];
+
+    /// Name in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Taylor => "taylor",
+            Self::Tsit45 => "tsit45",
+            Self::Bdf => "bdf",
+            Self::Esdirk34 => "esdirk34",
+            Self::TrBdf2 => "tr-bdf2",
+            Self::Adaptive => "adaptive",
+            Self::Energy => "energy",
+            Self::CentralDifference => "central-difference",
+            Self::ClosedForm => "closed-form",
+        }
+    }
+
+    /// Whether the method comes from the diffsol library.
+    pub fn needs_diffsol(self) -> bool {
+        matches!(self, Self::Tsit45 | Self::Bdf | Self::Esdirk34 | Self::TrBdf2 | Self::Adaptive)
+    }
+
+    /// Whether this build has the method.
+    pub fn is_built(self) -> bool {
+        cfg!(feature = "diffsol") || !self.needs_diffsol()
+    }
+}
+
+impl fmt::Display for MethodName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for MethodName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| {
+            let names: Vec<_> = Self::ALL.iter().map(|m| m.name()).collect();
+            format!("unknown method '{text}': choose from {}", names.join(", "))
+        })
+    }
+}
+
+/// Options of a method; each is refused by the methods that do not use it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MethodOptions {
+    /// Relative tolerance, for the diffsol methods and `adaptive` (1e-10), `taylor` and `energy` (round-off).
+    pub rtol: Option<f64>,
+    /// Time step [s], for `central-difference`; chosen from the stages when absent.
+    pub dt: Option<f64>,
+    /// Velocity in the force, for `central-difference`.
+    pub velocity: Option<VelocityAt>,
+    /// Boundary rule, for `central-difference`.
+    pub events: Option<Boundaries>,
+}
+
+/// Default relative tolerance of the diffsol methods and of `adaptive`.
+pub const RTOL_DEFAULT: f64 = 1e-10;
+
+/// Tolerances that any method is asked for.
+const RTOL_ALLOWED: std::ops::RangeInclusive<f64> = 1e-15..=0.1;
+
+/// A method with its options, ready to fly.
+#[derive(Clone, Debug)]
+pub enum Method {
+    /// See [`Taylor`].
+    Taylor(Taylor),
+    /// See [`super::diffsol::Diffsol`].
+    #[cfg(feature = "diffsol")]
+    Diffsol(super::diffsol::Diffsol),
+    /// See [`super::adaptive::Adaptive`].
+    #[cfg(feature = "diffsol")]
+    Adaptive(super::adaptive::Adaptive),
+    /// See [`Energy`].
+    Energy(Energy),
+    /// See [`CentralDifference`].
+    CentralDifference(CentralDifference),
+    /// See [`ClosedForm`].
+    ClosedForm(ClosedForm),
+}
+
+impl Method {
+    /// The method `name` with `options`.
+    ///
+    /// # Errors
+    /// [`IntegrationError::BadOption`] for an option that the method does not use or that is out of range,
+    /// [`IntegrationError::Refused`] for a method that this build lacks.
+    pub fn new(name: MethodName, options: &MethodOptions) -> Result<Self, IntegrationError> {
+        let is_fixed_step = name == MethodName::CentralDifference;
+        refuse_unless(is_fixed_step, "--dt", options.dt, "only central-difference has a fixed step")?;
+        refuse_unless(is_fixed_step, "--velocity", options.velocity, "only central-difference has this choice")?;
+        refuse_unless(is_fixed_step, "--events", options.events, "only central-difference has this choice")?;
+        let has_tolerance = !matches!(name, MethodName::CentralDifference | MethodName::ClosedForm);
+        refuse_unless(has_tolerance, "--rtol", options.rtol, "only adaptive methods have a tolerance")?;
+        if let Some(rtol) = options.rtol
+            && !RTOL_ALLOWED.contains(&rtol)
+        {
+            return Err(IntegrationError::BadOption {
+                option: "--rtol",
+                value: rtol.to_string(),
+                allowed: "a number from 1e-15 to 0.1",
+            });
+        }
+        if let Some(dt) = options.dt
+            && !(dt.is_finite() && dt > 0.0)
+        {
+            return Err(IntegrationError::BadOption {
+                option: "--dt",
+                value: dt.to_string(),
+                allowed: "a time above zero, such as 1us or 1e-6",
+            });
+        }
+        Ok(match name {
+            MethodName::Taylor => Self::Taylor(options.rtol.map_or_else(Taylor::default, Taylor::with_rtol)),
+            MethodName::Energy => Self::Energy(options.rtol.map_or_else(Energy::default, Energy::with_rtol)),
+            MethodName::ClosedForm => Self::ClosedForm(ClosedForm),
+            MethodName::CentralDifference => Self::CentralDifference(CentralDifference::new(
+                options.dt,
+                options.velocity.unwrap_or_default(),
+                options.events.unwrap_or_default(),
+            )),
+            #[cfg(feature = "diffsol")]
+            MethodName::Adaptive => {
+                Self::Adaptive(super::adaptive::Adaptive::new(options.rtol.unwrap_or(RTOL_DEFAULT)))
+            }
+            #[cfg(feature = "diffsol")]
+            MethodName::Tsit45 | MethodName::Bdf | MethodName::Esdirk34 | MethodName::TrBdf2 => {
+                use super::diffsol::{Diffsol, Scheme};
+                let scheme = match name {
+                    MethodName::Tsit45 => Scheme::Tsit45,
+                    MethodName::Bdf => Scheme::Bdf,
+                    MethodName::Esdirk34 => Scheme::Esdirk34,
+                    _ => Scheme::TrBdf2,
+                };
+                Self::Diffsol(Diffsol::new(scheme, options.rtol.unwrap_or(RTOL_DEFAULT)))
+            }
+            #[cfg(not(feature = "diffsol"))]
+            _ => {
+                return Err(IntegrationError::Refused {
+                    method: name.name(),
+                    why: "this build leaves out the diffsol library; build with `--features diffsol`".to_owned(),
+                });
+            }
+        })
+    }
+
+    /// The integrator inside.
+    pub fn integrator(&self) -> &(dyn Integrator + Sync) {
+        match self {
+            Self::Taylor(m) => m,
+            #[cfg(feature = "diffsol")]
+            Self::Diffsol(m) => m,
+            #[cfg(feature = "diffsol")]
+            Self::Adaptive(m) => m,
+            Self::Energy(m) => m,
+            Self::CentralDifference(m) => m,
+            Self::ClosedForm(m) => m,
+        }
+    }
+}
+
+fn refuse_unless<T: fmt::Debug>(
+    used: bool,
+    option: &'static str,
+    value: Option<T>,
+    allowed: &'static str,
+) -> Result<(), IntegrationError> {
+    match value {
+        Some(value) if !used => Err(IntegrationError::BadOption { option, value: format!("{value:?}"), allowed }),
+        _ => Ok(()),
+    }
+}

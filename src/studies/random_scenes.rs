@@ -1,0 +1,145 @@
+//! Random scenes from a seed, and how the closed form fares on a scene.
+
+use thiserror::Error;
+
+use super::quantity::Quantity;
+use super::random::Random;
+use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
+use crate::physics::reference::{self, ReferenceError, Source};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, ResolveError, Scene, groups};
+
+/// Draws scenes that cover the groups log-uniformly.
+///
+/// I from 1e-3 to 1e3, N from 0.1 to 1e6 or Q = 0, H/d from 0.1 to 30 or none, k from 0.1 to 10, d from 1 mm to 1 m,
+/// c continuous or given within a factor 4 of it.
+#[derive(Clone, Debug)]
+pub struct Generator {
+    random: Random,
+}
+
+impl Generator {
+    /// The scenes of part `name` of a study with `seed`.
+    pub fn new(seed: u64, name: &str) -> Self {
+        Self { random: Random::for_part(seed, name) }
+    }
+
+    /// The next scene, with an impact velocity.
+    pub fn next_scene(&mut self) -> Scene {
+        let random = &mut self.random;
+        let mut concrete = Concrete {
+            diameter: random.log_uniform(1e-3, 1.0),
+            nose_factor: random.log_uniform(0.05, 1.0),
+            strength: random.log_uniform(10e6, 150e6),
+            density: 0.0,
+            static_factor: random.log_uniform(4.0, 25.0),
+            inertia_factor: 1.0,
+            crater_ratio: random.log_uniform(0.1, 10.0),
+            crater_stiffness: CraterStiffness::Continuous,
+            layers: Vec::new(),
+        };
+        let mass = random.log_uniform(1e-3, 1e3);
+        if !random.chance(0.1) {
+            let geometry = random.log_uniform(0.1, 1e6);
+            concrete.density = groups::density_for(geometry, mass, &concrete);
+        }
+        let velocity = groups::impact_speed_for(random.log_uniform(1e-3, 1e3), mass, &concrete);
+        let thickness = (!random.chance(0.3)).then(|| concrete.diameter * random.log_uniform(0.1, 30.0));
+        if random.chance(0.3) {
+            let area = std::f64::consts::FRAC_PI_4 * concrete.diameter * concrete.diameter;
+            let about = area * concrete.static_factor * concrete.strength
+                / (concrete.crater_ratio * concrete.diameter);
+            concrete.crater_stiffness = CraterStiffness::Given(about * random.log_uniform(0.25, 4.0));
+        }
+        Scene {
+            title: None,
+            mass,
+            resistance: Resistance::Concrete(concrete),
+            thickness,
+            criterion: Criterion::FullDepth,
+            velocity: Some(velocity),
+        }
+    }
+}
+
+/// Errors of a flight in ulp over max(1, condition number), per quantity.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UlpErrors(pub Vec<(f64, Quantity)>);
+
+impl UlpErrors {
+    /// The largest; a NaN is the largest of all.
+    pub fn worst(&self) -> Option<(f64, Quantity)> {
+        self.0.iter().copied().max_by(|a, b| match (a.0.is_nan(), b.0.is_nan()) {
+            (true, false) => std::cmp::Ordering::Greater,
+            (false, true) => std::cmp::Ordering::Less,
+            _ => a.0.total_cmp(&b.0),
+        })
+    }
+}
+
+/// Why a scene has no comparison.
+#[derive(Clone, Debug, Error)]
+pub enum ComparisonError {
+    /// It does not resolve.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+    /// It has no closed form.
+    #[error(transparent)]
+    Integration(#[from] IntegrationError),
+    /// It has no reference.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The outcomes differ, and not within the error bar.
+    #[error("the closed form says {found}, the reference {exact}")]
+    Outcome {
+        /// Outcome found.
+        found: String,
+        /// Outcome of the reference.
+        exact: String,
+    },
+}
+
+/// The closed form of `scene` (from its numbers) against 50 digits, in ulp over max(1, condition number).
+///
+/// # Errors
+/// [`ComparisonError`].
+pub fn closed_form_errors(scene: &Scene) -> Result<UlpErrors, ComparisonError> {
+    let problem = scene.problem()?;
+    let flight = ClosedForm.fly(&problem, Detail::Events)?;
+    errors_of(scene, problem.impact_speed, &flight)
+}
+
+/// `flight` of `scene` against 50 digits from the scene's numbers, in ulp over max(1, condition number).
+///
+/// An undecided flight has no errors.
+///
+/// # Errors
+/// [`ComparisonError`].
+pub fn errors_of(scene: &Scene, impact_speed: f64, flight: &Flight) -> Result<UlpErrors, ComparisonError> {
+    let source = Source::Scene(scene, impact_speed);
+    let exact = reference::flight(source)?;
+    if flight.outcome == crate::physics::Outcome::Undecided {
+        return Ok(UlpErrors::default());
+    }
+    if !flight.outcome.agrees_with(exact.outcome) {
+        return Err(ComparisonError::Outcome { found: flight.outcome.to_string(), exact: exact.outcome.to_string() });
+    }
+    let conditions = reference::conditions(source)?;
+    let mut errors = Vec::new();
+    let mut add = |error: f64, condition: f64, quantity| {
+        errors.push((error.abs() / f64::EPSILON / condition.max(1.0), quantity));
+    };
+    add(exact.end.depth.relative_error(flight.end.depth), conditions.depth, Quantity::Depth);
+    add(exact.end.time.relative_error(flight.end.time), conditions.time, Quantity::Time);
+    add(
+        exact.end.velocity.error_over(flight.end.velocity, &exact.impact_speed),
+        conditions.velocity,
+        Quantity::Velocity,
+    );
+    if let (Some(found), Some(end)) = (flight.crater_end(), exact.crater_end()) {
+        let (time, velocity) =
+            (conditions.crater_end_time.unwrap_or(1.0), conditions.crater_end_velocity.unwrap_or(1.0));
+        add(end.time.relative_error(found.time), time, Quantity::CraterEndTime);
+        add(end.velocity.error_over(found.velocity, &exact.impact_speed), velocity, Quantity::CraterEndVelocity);
+    }
+    Ok(UlpErrors(errors))
+}

@@ -1,0 +1,169 @@
+//! Orders of convergence, with and without an exact answer.
+
+use super::super::claim::{Evidence, Measurement, NotMeasured, StepPattern};
+use super::super::verdict::Verdict;
+use super::Subject;
+use crate::integrators::{CentralDifference, Detail, Integrator, Steps};
+use crate::studies::convergence::{self, Ladder, QuantityStudy, STEPS_OVER_TIME};
+use crate::studies::error::{is_fixed, value_of};
+use crate::studies::grid_convergence::{GridValue, self_convergence as fit_values};
+use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit};
+use crate::studies::quantity::Quantity;
+use crate::studies::random::Random;
+
+/// Distance of the fitted order of the central difference from the order expected.
+pub(super) fn fixed_step(
+    subject: &Subject<'_>,
+    expected: f64,
+    pattern: StepPattern,
+    points: usize,
+) -> Result<Measurement, NotMeasured> {
+    let quantity = free_quantity(subject)?;
+    let exact = subject.yardstick()?;
+    let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.flight.end.time);
+    let seed = subject.context.seed;
+    let ladder = Ladder { from, to, points, seed };
+    let study = convergence::of_fixed_steps(
+        subject.scene,
+        &subject.problem,
+        (subject.claim.velocity, subject.claim.boundaries),
+        ladder,
+        quantity == Quantity::CriticalVelocity,
+        &|size| steps(pattern, size, seed),
+    )
+    .map_err(NotMeasured::broken)?
+    .into_iter()
+    .find(|study| study.quantity == quantity)
+    .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))?;
+    if study.formal != Some(expected) {
+        return Err(NotMeasured::broken(format!(
+            "the claim expects order {expected}, the formal order is {:?}: one of them is wrong",
+            study.formal
+        )));
+    }
+    judge(study, expected, "dt_s")
+}
+
+/// Distance of the slope of error against tolerance from 1.
+pub(super) fn proportionality(subject: &Subject<'_>, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
+    judge(tolerance_study(subject, from, to)?, 1.0, "rtol")
+}
+
+/// Distance of the slope of error against 1/evaluations from the order of the method.
+pub(super) fn work_order(subject: &Subject<'_>, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
+    let order = subject
+        .method(None)?
+        .integrator()
+        .order()
+        .ok_or_else(|| NotMeasured::skip("a method of variable order has no order against work"))?;
+    let mut study = tolerance_study(subject, from, to)?;
+    study.fit = study.work.take().ok_or_else(|| NotMeasured::broken("no work was counted"))?;
+    judge(study, f64::from(order), "1/evaluations")
+}
+
+/// Self-convergence from the values alone: distance of the extrapolated value from the exact one, over the
+/// uncertainty that the fit itself states.
+pub(super) fn self_convergence(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+    let quantity = free_quantity(subject)?;
+    let exact = subject.yardstick()?.flight;
+    let value = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one flight"))?;
+    let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
+    let ladder = Ladder { from: from * 10.0, to, points: 40, seed: subject.context.seed };
+    let mut grids = Vec::new();
+    for size in ladder.sizes() {
+        let scheme = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries);
+        let flight = scheme.fly(&subject.problem, Detail::Events).map_err(NotMeasured::broken)?;
+        grids.extend(value_of(quantity, &flight).map(|value| GridValue::new(size, value)));
+    }
+    let found = fit_values(&grids, FALSE_ALARM_LEVEL).map_err(NotMeasured::broken)?;
+    let [low, high] = found.limit_band;
+    let measurement = Measurement::new((found.limit - value).abs() / (0.5 * (high - low)));
+    let measurement = if found.behaviour.class() == Class::Converging {
+        measurement
+    } else {
+        measurement.verdict(Verdict::Undecided)
+    };
+    Ok(measurement.remark(format!("limit {} in [{low}, {high}]; {}; {}", found.limit, found.reason, found.rule)))
+}
+
+fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<QuantityStudy, NotMeasured> {
+    let quantity = free_quantity(subject)?;
+    if !subject.method_name().is_built() {
+        return Err(NotMeasured::skip(format!("this build leaves out {}", subject.method_name())));
+    }
+    let ladder = Ladder { from: to.min(from), to: to.max(from), points: 40, seed: subject.context.seed };
+    convergence::of_tolerances(&subject.problem, subject.method_name(), ladder)
+        .map_err(NotMeasured::broken)?
+        .into_iter()
+        .find(|study| study.quantity == quantity)
+        .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))
+}
+
+/// The claim's quantity, if the scene leaves it free.
+fn free_quantity(subject: &Subject<'_>) -> Result<Quantity, NotMeasured> {
+    let quantity = subject.quantity()?;
+    if quantity == Quantity::CriticalVelocity && !subject.problem.has_exit() {
+        return Err(NotMeasured::skip("a target without a far side has no critical velocity"));
+    }
+    if quantity != Quantity::CriticalVelocity && is_fixed(quantity, &subject.yardstick()?.flight) {
+        return Err(NotMeasured::skip("the scene fixes this quantity"));
+    }
+    Ok(quantity)
+}
+
+/// Steps of one run around `size`.
+fn steps(pattern: StepPattern, size: f64, seed: u64) -> Steps {
+    /// Entries after which a given sequence starts over: long enough to be no pattern of its own.
+    const ENTRIES: usize = 997;
+    match pattern {
+        StepPattern::Uniform => Steps::Uniform(size),
+        StepPattern::Alternating => Steps::Given(vec![size * 4.0 / 3.0, size * 2.0 / 3.0]),
+        StepPattern::Smooth => Steps::Given(
+            (0..ENTRIES)
+                .map(|i| size * (1.0 + 0.5 * (std::f64::consts::TAU * i as f64 / ENTRIES as f64).sin()))
+                .collect(),
+        ),
+        StepPattern::Random => {
+            let mut random = Random::for_part(seed, "unequal steps");
+            Steps::Given((0..ENTRIES).map(|_| size * random.uniform(0.5, 1.5)).collect())
+        }
+    }
+}
+
+/// Largest share of runs whose outcome may differ from the exact one before nothing is claimed.
+const LOST_SHARE_MAX: f64 = 0.2;
+
+fn judge(study: QuantityStudy, expected: f64, abscissa: &'static str) -> Result<Measurement, NotMeasured> {
+    let total = study.lost + study.fit.as_ref().map_or(0, |fit| fit.points.len());
+    let fit: OrderFit = match study.fit {
+        Ok(fit) => fit,
+        Err(error @ FitError::TooFewSteps { .. }) => {
+            return Ok(Measurement::new(f64::NAN).verdict(Verdict::Undecided).remark(error.to_string()));
+        }
+        Err(error) => return Err(NotMeasured::broken(error)),
+    };
+    let Some(line) = fit.line else {
+        return Ok(Measurement::new(f64::NAN).verdict(Verdict::Undecided).remark(fit.reason.clone()));
+    };
+    let distance = (line.order - expected).abs();
+    let half_width = 0.5 * (line.interval95[1] - line.interval95[0]);
+    let mut remark = format!(
+        "order {:.3} [{:.3}, {:.3}] from {} of {} runs, constant {:.3e}",
+        line.order,
+        line.interval95[0],
+        line.interval95[1],
+        fit.used(),
+        total,
+        line.error_constant
+    );
+    let mut measurement = Measurement::new(distance).resolution(half_width);
+    if fit.class != Class::Converging {
+        remark = format!("{}: {}; {remark}", fit.class.name(), fit.reason);
+        let verdict = if fit.class == Class::Diverging { Verdict::Failed } else { Verdict::Undecided };
+        measurement = measurement.verdict(verdict);
+    } else if study.lost as f64 > LOST_SHARE_MAX * total as f64 {
+        remark = format!("{} of {total} runs have another outcome; {remark}", study.lost);
+        measurement = measurement.verdict(Verdict::Undecided);
+    }
+    Ok(measurement.remark(remark).evidence(Evidence::Fit { abscissa, formal: expected, fit: Box::new(fit) }))
+}

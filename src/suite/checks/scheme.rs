@@ -1,0 +1,193 @@
+//! What the central difference must do at any step, and its error constants (theory section 5).
+
+use super::super::claim::{Measurement, NotMeasured};
+use super::super::verdict::Verdict;
+use super::Subject;
+use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, VelocityAt};
+use crate::physics::{Problem, Stage, State};
+use crate::studies::quantity::Quantity;
+
+/// Worst distance from the exact discrete solution, over its amplitude.
+///
+/// ```text
+/// crater:        x(i) = V0 dt sin(i th)/sin(th),  2 sin(th/2) = w dt
+/// tunnel, Q = 0: x(i) = V0 i dt - P (i dt)²/(2 M)
+/// ```
+///
+/// No velocity rule enters. `step` is w dt in the crater, dt over the time to rest in the tunnel.
+pub(super) fn discrete_solution(subject: &Subject<'_>, step: f64, steps: usize) -> Result<Measurement, NotMeasured> {
+    let problem = &subject.problem;
+    let Stage { static_force, stiffness, viscosity, drag, .. } = problem.stages[0];
+    if viscosity != 0.0 || drag != 0.0 {
+        return Err(NotMeasured::skip("the exact discrete solution has no velocity in the force"));
+    }
+    let v0 = problem.impact_speed;
+    let exact: Box<dyn Fn(usize) -> f64>;
+    let (dt, amplitude);
+    if static_force == 0.0 && stiffness > 0.0 {
+        let w = (stiffness / problem.mass).sqrt();
+        dt = step / w;
+        let angle = 2.0 * (0.5 * step).asin();
+        // Within round-off of the limit the amplitude grows without bound; it is the scale of the error.
+        amplitude = v0 * dt / angle.sin();
+        exact = Box::new(move |i| amplitude * (i as f64 * angle).sin());
+    } else if stiffness == 0.0 && static_force > 0.0 {
+        let deceleration = static_force / problem.mass;
+        dt = step * v0 / deceleration;
+        amplitude = 0.5 * v0 * v0 / deceleration;
+        exact = Box::new(move |i| {
+            let t = i as f64 * dt;
+            t * (v0 - 0.5 * deceleration * t)
+        });
+    } else {
+        return Err(NotMeasured::skip("neither a crater nor a constant force comes first"));
+    }
+    let states = CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd)
+        .free_states(problem, steps)
+        .map_err(NotMeasured::broken)?;
+    // The parabola turns back; its amplitude is the way flown so far where that is larger.
+    let scale = states.iter().map(|s| s.depth.abs()).fold(amplitude.abs(), f64::max);
+    let worst = worst_of(states.iter().enumerate().map(|(i, s)| (s.depth - exact(i)).abs() / scale));
+    Ok(Measurement::new(worst).remark(format!("{} steps of {dt:.3e} s", states.len())))
+}
+
+/// Largest of `errors`; NaN if one is.
+fn worst_of(errors: impl Iterator<Item = f64>) -> f64 {
+    errors.fold(0.0, |worst: f64, e| if e.is_nan() || worst.is_nan() { f64::NAN } else { worst.max(e) })
+}
+
+/// At rest in the crater `X(dt)/X - 1 -> (w dt)²/8` and `T(dt)/T - 1 -> -(w dt)²/24`, rest located.
+pub(super) fn crater_constant(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+    let problem = &subject.problem;
+    let exact = subject.yardstick()?.flight;
+    if problem.crater != Some(0) || exact.stage != 0 || exact.outcome.agrees_with(crate::physics::Outcome::Perforated) {
+        return Err(NotMeasured::skip("the flight does not come to rest in the crater"));
+    }
+    if subject.claim.boundaries == Boundaries::StepEnd {
+        return Err(NotMeasured::skip("step ends leave a depth error anywhere between 0 and (w dt)²/8"));
+    }
+    let w = (problem.stages[0].stiffness / problem.mass).sqrt();
+    // Richardson over two steps removes the next even power; what remains is (w dt)^4.
+    let ratio = |w_dt: f64| -> Result<f64, NotMeasured> {
+        let scheme = CentralDifference::uniform(w_dt / w, subject.claim.velocity, subject.claim.boundaries);
+        let flight = scheme.fly(problem, Detail::Events).map_err(NotMeasured::broken)?;
+        Ok(match subject.quantity()? {
+            Quantity::Depth => (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0,
+            Quantity::Time => (flight.end.time / exact.end.time - 1.0) / (w_dt * w_dt) * -24.0,
+            other => return Err(NotMeasured::skip(format!("no constant is known for {}", other.name()))),
+        })
+    };
+    // Rest falls at its own place in each step; the mean over several steps is what has the limit.
+    let steps = [0.010_3, 0.009_1, 0.008_7, 0.007_9, 0.007_1, 0.006_7];
+    let mut sum = 0.0;
+    for step in steps {
+        sum += ratio(step)?;
+    }
+    let mean = sum / steps.len() as f64;
+    Ok(Measurement::new((mean - 1.0).abs()).remark(format!("measured/predicted {mean:.6}")))
+}
+
+/// The lagged drag's error over dt against the modified equation `M V' = -F (1 + Q V dt/M)`:
+///
+/// ```text
+/// D = (V1 - V) - P (t - t1)/M,  the velocity lost to drag in the tunnel
+/// rest: X -> -D,  T -> -Q (X - k d)/M;      exit: V_r -> -(P + Q V_r²) D/(M V_r),  t -> D/V_r - Q (H - k d)/M
+/// ```
+pub(super) fn lagged_constant(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+    let problem = &subject.problem;
+    let claim = subject.claim;
+    if claim.velocity != VelocityAt::LaggedHalfStep {
+        return Err(NotMeasured::skip("only a lagged drag has this constant"));
+    }
+    let exact = subject.yardstick()?.flight;
+    let tunnel = match problem.stages.last() {
+        Some(stage) if subject.is_plain_concrete() && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0 => {
+            *stage
+        }
+        _ => return Err(NotMeasured::skip("the flight does not end in a tunnel with drag")),
+    };
+    let continuous = problem.crater.is_none_or(|i| {
+        let at = exact.crater_end().unwrap_or(exact.end);
+        let (left, right) = (problem.stages[i].force(at.depth, at.velocity), tunnel.force(at.depth, at.velocity));
+        (left - right).abs() <= 1e-9 * right.abs()
+    });
+    if !continuous && claim.boundaries != Boundaries::Landed {
+        return Err(NotMeasured::skip("after a jump that is not landed on, error/dt has no limit"));
+    }
+    let (p, q, mass) = (tunnel.static_force, tunnel.drag, problem.mass);
+    let entry = exact.crater_end().unwrap_or(State { time: 0.0, depth: 0.0, velocity: problem.impact_speed });
+    let end = exact.end;
+    let lost = (entry.velocity - end.velocity) - p * (end.time - entry.time) / mass;
+    let perforated = !exact.outcome.is_stop();
+    let predicted = match (claim.quantity, perforated) {
+        (Some(Quantity::Depth), false) => -lost,
+        (Some(Quantity::Time), false) => -q * (end.depth - entry.depth) / mass,
+        (Some(Quantity::Velocity), true) => {
+            -(p + q * end.velocity * end.velocity) * lost / (mass * end.velocity)
+        }
+        (Some(Quantity::Time), true) => lost / end.velocity - q * (end.depth - entry.depth) / mass,
+        _ => return Err(NotMeasured::skip("the scene fixes this quantity, or no constant is known for it")),
+    };
+    if claim.boundaries == Boundaries::StepEnd && claim.quantity != Some(Quantity::Depth) {
+        return Err(NotMeasured::skip("with step ends only the depth has a limit of error/dt"));
+    }
+    // error(dt)/dt = C + C' dt: extrapolated from a step and twice the step, averaged over steps without common ratio.
+    let error = |steps: f64| -> Result<f64, NotMeasured> {
+        let dt = end.time / steps;
+        let flight = CentralDifference::uniform(dt, claim.velocity, claim.boundaries)
+            .fly(problem, Detail::Events)
+            .map_err(NotMeasured::broken)?;
+        if !flight.outcome.agrees_with(exact.outcome) {
+            return Err(NotMeasured::broken("the scheme has another outcome at this step"));
+        }
+        let difference = match claim.quantity {
+            Some(Quantity::Depth) => flight.end.depth - end.depth,
+            Some(Quantity::Time) => flight.end.time - end.time,
+            _ => flight.end.velocity - end.velocity,
+        };
+        Ok(difference / dt)
+    };
+    let steps = [20_011.3, 23_003.7, 27_017.1, 31_019.9, 36_007.3, 41_011.7];
+    let mut sum = 0.0;
+    for count in steps {
+        sum += 2.0 * error(count)? - error(0.5 * count)?;
+    }
+    let measured = sum / steps.len() as f64;
+    Ok(Measurement::new((measured / predicted - 1.0).abs())
+        .remark(format!("error/dt {measured:.6e}, predicted {predicted:.6e}")))
+}
+
+/// Where growth sets in: |w dt - 2|/2, by bisection on the growth of the free crater motion over many steps.
+pub(super) fn stability_limit(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+    let crater = subject.problem.stages[0];
+    if crater.stiffness <= 0.0 {
+        return Err(NotMeasured::skip("a stage without stiffness has no step limit"));
+    }
+    let free = Problem { exit_depth: f64::INFINITY, ..subject.problem.clone() };
+    let w = (crater.stiffness / free.mass).sqrt();
+    let grows = |w_dt: f64| -> Result<bool, NotMeasured> {
+        let states = CentralDifference::uniform(w_dt / w, subject.claim.velocity, Boundaries::StepEnd)
+            .free_states(&free, 4000)
+            .map_err(NotMeasured::broken)?;
+        let reach = |part: &[State]| worst_of(part.iter().map(|s| s.depth.abs()));
+        let (early, late) = states.split_at(states.len() / 2);
+        // Bounded below the limit: the later half reaches no farther, but for the grid of its sampling. Linear growth
+        // at the limit doubles the reach.
+        let ratio = reach(late) / reach(early);
+        Ok(ratio.is_nan() || ratio > 1.5)
+    };
+    let (mut stable, mut unstable) = (1.0, 3.0);
+    if grows(stable)? || !grows(unstable)? {
+        return Ok(Measurement::new(f64::NAN).verdict(Verdict::Failed).remark("no limit between w dt = 1 and 3"));
+    }
+    for _ in 0..40 {
+        let middle = 0.5 * (stable + unstable);
+        if grows(middle)? {
+            unstable = middle;
+        } else {
+            stable = middle;
+        }
+    }
+    let limit = 0.5 * (stable + unstable);
+    Ok(Measurement::new((limit - 2.0).abs() / 2.0).remark(format!("growth sets in at w dt = {limit:.9}")))
+}

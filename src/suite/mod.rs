@@ -1,0 +1,11 @@
+//! Claims as data, how each is measured, and what they come to.
+
+pub mod checks;
+pub mod claim;
+#[expect(clippy::module_inception, reason = "the suite of the module suite is its main concept")]
+pub mod suite;
+pub mod verdict;
+
+pub use claim::{Check, Claim, Evidence, Judged, Measurement};
+pub use suite::{Scenes, Suite, summary};
+pub use verdict::{Counts, Verdict};

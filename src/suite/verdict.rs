@@ -1,0 +1,99 @@
+//! What a claim can come to, and how verdicts add up.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// What became of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Measured within its limit.
+    Passed,
+    /// Does not apply to the scene; does not count.
+    Skipped,
+    /// The measurement cannot decide: noise, round-off floor, inside an error bar.
+    Undecided,
+    /// Beyond its limit, or not a number.
+    Failed,
+}
+
+impl Verdict {
+    /// Name in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Skipped => "skipped",
+            Self::Undecided => "undecided",
+            Self::Failed => "failed",
+        }
+    }
+
+    /// `measured` against `limit`. What is not a number fails: it never passes.
+    pub fn of(measured: f64, limit: f64) -> Self {
+        if measured <= limit { Self::Passed } else { Self::Failed }
+    }
+}
+
+/// How many claims came to what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Counts {
+    /// Within their limits.
+    pub passed: usize,
+    /// Beyond them.
+    pub failed: usize,
+    /// Not decidable.
+    pub undecided: usize,
+    /// Not applicable.
+    pub skipped: usize,
+}
+
+impl Counts {
+    /// Counts the verdicts.
+    pub fn of(verdicts: impl IntoIterator<Item = Verdict>) -> Self {
+        let mut counts = Self::default();
+        for verdict in verdicts {
+            match verdict {
+                Verdict::Passed => counts.passed += 1,
+                Verdict::Failed => counts.failed += 1,
+                Verdict::Undecided => counts.undecided += 1,
+                Verdict::Skipped => counts.skipped += 1,
+            }
+        }
+        counts
+    }
+
+    /// The verdict of the whole: failed if a claim failed, else undecided if one is, else passed.
+    ///
+    /// A suite in which nothing was decided has shown nothing and is undecided.
+    pub fn verdict(&self) -> Verdict {
+        if self.failed > 0 {
+            Verdict::Failed
+        } else if self.undecided > 0 || self.passed == 0 {
+            Verdict::Undecided
+        } else {
+            Verdict::Passed
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_never_passes() {
+        assert_eq!(Verdict::of(f64::NAN, 1.0), Verdict::Failed);
+        assert_eq!(Verdict::of(f64::INFINITY, 1.0), Verdict::Failed);
+        assert_eq!(Verdict::of(1.0, f64::NAN), Verdict::Failed);
+        assert_eq!(Verdict::of(1.0, 1.0), Verdict::Passed);
+    }
+
+    #[test]
+    fn an_empty_suite_has_shown_nothing() {
+        assert_eq!(Counts::of([]).verdict(), Verdict::Undecided);
+        assert_eq!(Counts::of([Verdict::Skipped]).verdict(), Verdict::Undecided);
+        assert_eq!(Counts::of([Verdict::Passed, Verdict::Skipped]).verdict(), Verdict::Passed);
+        assert_eq!(Counts::of([Verdict::Passed, Verdict::Undecided]).verdict(), Verdict::Undecided);
+        assert_eq!(Counts::of([Verdict::Undecided, Verdict::Failed]).verdict(), Verdict::Failed);
+    }
+}
