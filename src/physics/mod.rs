@@ -2,11 +2,17 @@
 
 pub mod event;
 pub mod exit_energy;
+pub mod groups;
+pub mod nose;
 pub mod scalar;
 pub mod scene;
+pub mod scene_file;
+pub mod semi_empirical;
 pub mod stage;
+pub mod units;
 
 pub use event::{Event, EventKind, Outcome, State};
 pub use scalar::Scalar;
-pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Resistance, Scene};
+pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, ResolveError, Scene};
+pub use scene_file::SceneError;
 pub use stage::{Problem, Stage, Stages, Target};

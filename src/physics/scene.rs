@@ -1,8 +1,14 @@
 //! A scene: projectile, target, resistance and criterion in SI units, and the stages it resolves into.
 //!
-//! Reading a scene from a file is [`super::scene_file`]; here every number is already admissible.
+//! Reading a scene from a file is [`super::scene_file`]; here a scene may come from anywhere, a table or a sweep, so
+//! [`Scene::resolve`] checks every number again before a [`Problem`] leaves it.
 
-use super::stage::Stage;
+use std::f64::consts::FRAC_PI_4;
+
+use thiserror::Error;
+
+use super::semi_empirical;
+use super::stage::{Problem, Stage, Stages, Target};
 
 /// What the projectile meets.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,11 +26,11 @@ pub struct Concrete {
     pub diameter: f64,
     /// Nose factor N*, 0 to 1.
     pub nose_factor: f64,
-    /// Unconfined compressive strength fc [Pa].
+    /// Unconfined compressive strength fc [Pa]; with layers that of the layer just beyond k d.
     pub strength: f64,
-    /// Density rho [kg/m³].
+    /// Density rho [kg/m³]; with layers that of the layer just beyond k d.
     pub density: f64,
-    /// Static strength over fc, S (Eq. 14 when not given).
+    /// Static strength over fc, S (Eq. 14 when not given); with layers that of the layer just beyond k d.
     pub static_factor: f64,
     /// Inertia factor B.
     pub inertia_factor: f64,
@@ -66,7 +72,7 @@ pub enum Criterion {
     /// x = H, the paper's.
     #[default]
     FullDepth,
-    /// x = x_p(H), the penetration that perforates by the ACE/NDRC relation (theory section 4).
+    /// x = `x_p(H)`, the penetration that perforates by the ACE/NDRC relation (theory section 4).
     Ndrc,
 }
 
@@ -79,10 +85,665 @@ pub struct Scene {
     pub mass: f64,
     /// What it meets.
     pub resistance: Resistance,
-    /// Target thickness H [m]; `None` for a semi-infinite target.
+    /// Target thickness H [m], with layers their sum; `None` for a semi-infinite target.
     pub thickness: Option<f64>,
     /// When it counts as perforated.
     pub criterion: Criterion,
     /// Impact velocity V0 [m/s], where the scene gives one.
     pub velocity: Option<f64>,
+}
+
+/// The values that a number of a scene may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Range {
+    /// Any finite number.
+    Finite,
+    /// Finite and >= 0.
+    NotNegative,
+    /// Finite and > 0.
+    Positive,
+    /// 0 to 1, both included.
+    UnitInterval,
+    /// Finite and >= 0.5.
+    AtLeastHalf,
+}
+
+impl Range {
+    /// Whether `value` is allowed; NaN and the infinities never are.
+    pub fn contains(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Finite => true,
+                Self::NotNegative => value >= 0.0,
+                Self::Positive => value > 0.0,
+                Self::UnitInterval => (0.0..=1.0).contains(&value),
+                Self::AtLeastHalf => value >= 0.5,
+            }
+    }
+
+    /// What is allowed, for people: `a number > 0`.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Finite => "any finite number",
+            Self::NotNegative => "a number >= 0",
+            Self::Positive => "a number > 0",
+            Self::UnitInterval => "a number from 0 to 1",
+            Self::AtLeastHalf => "a number >= 0.5",
+        }
+    }
+}
+
+/// Why a scene has no equation of motion.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ResolveError {
+    /// A number outside its range.
+    #[error("{quantity} = {value} is not admissible: it must be {allowed}", allowed = .range.description())]
+    Inadmissible {
+        /// Which quantity, with its unit.
+        quantity: &'static str,
+        /// Value given.
+        value: f64,
+        /// What is allowed.
+        range: Range,
+    },
+    /// The scene gives no impact velocity, and none was asked for.
+    #[error("the scene gives no impact velocity")]
+    NoImpactSpeed,
+    /// The criterion `ndrc` on a scene without a diameter.
+    #[error("the criterion `ndrc` needs a projectile diameter, and a scene of stages has none")]
+    NoDiameter,
+    /// No stage at all.
+    #[error("the scene has no stage")]
+    NoStage,
+    /// A stage ends before the one in front of it.
+    #[error("stage {stage} ends at {end} m, before the stage in front of it ends at {previous} m")]
+    StageEndsFall {
+        /// Index of the stage, from 0.
+        stage: usize,
+        /// Its end [m].
+        end: f64,
+        /// End of the stage before it [m]; infinite when that has no end.
+        previous: f64,
+    },
+    /// The last stage ends inside the target.
+    #[error("the last stage ends at {end} m, inside the target")]
+    TargetGoesOn {
+        /// End of the last stage [m].
+        end: f64,
+    },
+    /// The thickness of a layered target is not the sum of its layers.
+    #[error("the layers sum up to {sum} m, the target's thickness says {thickness} m")]
+    LayersDoNotSumUp {
+        /// Sum of the layers [m]; infinite when the last has no end.
+        sum: f64,
+        /// Thickness of the target [m]; infinite when absent.
+        thickness: f64,
+    },
+    /// A coefficient overflows, or underflows to where its digits are lost.
+    #[error("{quantity} comes to {value}, beyond the range of 64-bit numbers")]
+    OutOfRange {
+        /// Which coefficient, with its unit.
+        quantity: &'static str,
+        /// What its formula gives.
+        value: f64,
+    },
+}
+
+impl ResolveError {
+    /// Whether the input was at fault (exit code 2) and not the computation (exit code 1).
+    pub fn is_usage(&self) -> bool {
+        !matches!(self, Self::OutOfRange { .. })
+    }
+
+    /// Help for a person: what to change.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Inadmissible { .. } => "give a value in the range",
+            Self::NoImpactSpeed => "add [impact] with velocity = \"300 m/s\"",
+            Self::NoDiameter => "take the criterion `full-depth`",
+            Self::NoStage => "give at least one stage",
+            Self::StageEndsFall { .. } => "order the stages by their ends, and leave out only the last end",
+            Self::TargetGoesOn { .. } => "leave out the end of the last stage, or end the target there",
+            Self::LayersDoNotSumUp { .. } => "leave out the thickness; it follows from the layers",
+            Self::OutOfRange { .. } => "check the units of the scene; its numbers lie too far apart",
+        }
+    }
+}
+
+fn admit(quantity: &'static str, value: f64, range: Range) -> Result<(), ResolveError> {
+    if range.contains(value) { Ok(()) } else { Err(ResolveError::Inadmissible { quantity, value, range }) }
+}
+
+/// `value`, unless it overflowed or, not being zero by its factors, fell below the normal numbers.
+fn representable(quantity: &'static str, value: f64, zero: bool) -> Result<f64, ResolveError> {
+    if value.is_normal() || (zero && value == 0.0) {
+        Ok(value)
+    } else {
+        Err(ResolveError::OutOfRange { quantity, value })
+    }
+}
+
+impl Concrete {
+    /// Crater depth k d [m].
+    pub fn crater_depth(&self) -> f64 {
+        self.crater_ratio * self.diameter
+    }
+
+    /// Whether S is the one of Eq. 14, so that it ought to follow when the strength is varied.
+    pub fn follows_eq14(&self) -> bool {
+        self.static_factor == semi_empirical::static_factor(self.strength)
+    }
+
+    /// Tunnel stage of one medium (Eq. 5): `P = (pi d²/4) S fc`, `Q = (pi d²/4) N* B rho`.
+    ///
+    /// The factors are paired so that no product overflows before the result does.
+    fn tunnel(&self, medium: &Layer, end: f64) -> Result<Stage, ResolveError> {
+        let d = self.diameter;
+        let static_force = FRAC_PI_4 * (medium.static_factor * d) * (medium.strength * d);
+        let no_force = medium.static_factor == 0.0 || medium.strength == 0.0;
+        let nose = self.nose_factor * self.inertia_factor;
+        let drag = FRAC_PI_4 * (nose * d) * (medium.density * d);
+        let no_drag = self.nose_factor == 0.0 || self.inertia_factor == 0.0 || medium.density == 0.0;
+        Ok(Stage {
+            static_force: representable("the static force P [N]", static_force, no_force)?,
+            stiffness: 0.0,
+            viscosity: medium.viscosity,
+            drag: representable("the drag Q [kg/m]", drag, no_drag)?,
+            end,
+        })
+    }
+
+    /// The media behind x = k d, as stages; never empty.
+    ///
+    /// Layer ends before k d are no boundaries of the force. A target no thicker than k d is continued by its last
+    /// layer, as a homogeneous one is by itself.
+    fn beyond_crater(&self) -> Result<Stages, ResolveError> {
+        let mut stages = Stages::new();
+        let Some((last, inner)) = self.layers.split_last() else {
+            let medium = Layer {
+                thickness: f64::INFINITY,
+                strength: self.strength,
+                density: self.density,
+                static_factor: self.static_factor,
+                viscosity: 0.0,
+            };
+            stages.push(self.tunnel(&medium, f64::INFINITY)?);
+            return Ok(stages);
+        };
+        let crater_depth = self.crater_depth();
+        let mut end = 0.0;
+        for layer in inner {
+            end += layer.thickness;
+            if end > crater_depth {
+                stages.push(self.tunnel(layer, end)?);
+            }
+        }
+        stages.push(self.tunnel(last, f64::INFINITY)?);
+        Ok(stages)
+    }
+
+    /// The stages at `impact_speed` [m/s], and the index of the crater's.
+    fn stages(&self, mass: f64, impact_speed: f64) -> Result<(Stages, Option<usize>), ResolveError> {
+        let mut stages = self.beyond_crater()?;
+        if self.crater_ratio == 0.0 {
+            return Ok((stages, None));
+        }
+        let depth = representable("the crater depth k d [m]", self.crater_depth(), false)?;
+        let stiffness = match self.crater_stiffness {
+            CraterStiffness::Given(stiffness) => stiffness,
+            CraterStiffness::Continuous => {
+                let beyond = &stages[0];
+                // c = M (P + Q V0²)/(k d (M + k d Q)), divided through by M.
+                let force = beyond.static_force + beyond.drag * impact_speed * impact_speed;
+                let stiffness = force / (1.0 + depth * (beyond.drag / mass)) / depth;
+                // No force at k d (an air gap there) leaves no force in the crater.
+                representable("the crater stiffness c [N/m]", stiffness, force == 0.0)?
+            }
+        };
+        stages.insert(0, Stage::crater(stiffness, depth));
+        Ok((stages, Some(0)))
+    }
+
+    fn check(&self, thickness: Option<f64>) -> Result<(), ResolveError> {
+        admit("the diameter d [m]", self.diameter, Range::Positive)?;
+        admit("the nose factor N*", self.nose_factor, Range::UnitInterval)?;
+        admit("the inertia factor B", self.inertia_factor, Range::NotNegative)?;
+        admit("the crater ratio k", self.crater_ratio, Range::NotNegative)?;
+        if let CraterStiffness::Given(stiffness) = self.crater_stiffness {
+            admit("the crater stiffness c [N/m]", stiffness, Range::Positive)?;
+        }
+        let Some((last, inner)) = self.layers.split_last() else {
+            admit("the strength fc [Pa]", self.strength, Range::Positive)?;
+            admit("the density rho [kg/m³]", self.density, Range::NotNegative)?;
+            return admit("the static factor S", self.static_factor, Range::Positive);
+        };
+        let mut sum = 0.0;
+        for layer in inner {
+            admit("a layer's thickness [m]", layer.thickness, Range::NotNegative)?;
+            layer.check()?;
+            sum += layer.thickness;
+        }
+        if last.thickness != f64::INFINITY {
+            admit("a layer's thickness [m]", last.thickness, Range::NotNegative)?;
+        }
+        last.check()?;
+        sum += last.thickness;
+        let thickness = thickness.unwrap_or(f64::INFINITY);
+        if sum == thickness { Ok(()) } else { Err(ResolveError::LayersDoNotSumUp { sum, thickness }) }
+    }
+}
+
+impl Layer {
+    fn check(&self) -> Result<(), ResolveError> {
+        admit("a layer's strength fc [Pa]", self.strength, Range::NotNegative)?;
+        admit("a layer's density rho [kg/m³]", self.density, Range::NotNegative)?;
+        admit("a layer's static factor S", self.static_factor, Range::NotNegative)?;
+        admit("a layer's viscosity r [kg/s]", self.viscosity, Range::NotNegative)
+    }
+}
+
+/// Stages given outright, the last without an end.
+fn outright(stages: &[Stage], exit_depth: f64) -> Result<Stages, ResolveError> {
+    let mut previous = 0.0;
+    for (index, stage) in stages.iter().enumerate() {
+        admit("a stage's static force p [N]", stage.static_force, Range::Finite)?;
+        admit("a stage's stiffness s [N/m]", stage.stiffness, Range::NotNegative)?;
+        admit("a stage's viscosity r [kg/s]", stage.viscosity, Range::NotNegative)?;
+        admit("a stage's drag q [kg/m]", stage.drag, Range::NotNegative)?;
+        // Written so that a NaN is caught, and so is any stage behind one without an end.
+        if !(stage.end >= previous && previous.is_finite()) {
+            return Err(ResolveError::StageEndsFall { stage: index, end: stage.end, previous });
+        }
+        previous = stage.end;
+    }
+    let mut stages: Stages = stages.iter().copied().collect();
+    let last = stages.last_mut().ok_or(ResolveError::NoStage)?;
+    if last.end < exit_depth {
+        return Err(ResolveError::TargetGoesOn { end: last.end });
+    }
+    // An end at or behind the exit is never crossed.
+    last.end = f64::INFINITY;
+    Ok(stages)
+}
+
+impl Scene {
+    /// The equation of motion at `impact_speed` [m/s]: stages and exit depth (theory section 1).
+    ///
+    /// ```text
+    /// crater  s = c until k d,   c = M (P + Q V0²)/(k d (M + k d Q)) or given
+    /// tunnel  p = P = (pi d²/4) S fc,   q = Q = (pi d²/4) N* B rho
+    /// ```
+    ///
+    /// The continuous c depends on the impact speed, so a scene resolves anew for each. `k = 0` leaves out the crater.
+    /// In layers P and Q of the crater's c are those of the layer that holds x = k d just beyond it. Coefficients are
+    /// accurate to 5 ulp.
+    ///
+    /// # Errors
+    /// [`ResolveError`]: a number of the scene or the speed is not admissible, or a coefficient leaves the range of
+    /// normal `f64` numbers. A problem never holds NaN, nor an infinity other than an absent end.
+    pub fn resolve(&self, impact_speed: f64) -> Result<Problem, ResolveError> {
+        admit("the impact speed V0 [m/s]", impact_speed, Range::NotNegative)?;
+        admit("the mass M [kg]", self.mass, Range::Positive)?;
+        let exit_depth = self.exit_depth()?;
+        let (stages, crater, target) = match &self.resistance {
+            Resistance::Stages(stages) => (outright(stages, exit_depth)?, None, Target::Stages),
+            Resistance::Concrete(concrete) => {
+                concrete.check(self.thickness)?;
+                let (stages, crater) = concrete.stages(self.mass, impact_speed)?;
+                let target = if concrete.layers.is_empty() { Target::CraterAndTunnel } else { Target::Stages };
+                (stages, crater, target)
+            }
+        };
+        Ok(Problem { mass: self.mass, impact_speed, exit_depth, stages, crater, target })
+    }
+
+    /// The equation of motion at the scene's own impact velocity.
+    ///
+    /// # Errors
+    /// [`ResolveError::NoImpactSpeed`] without one; else as [`Scene::resolve`].
+    pub fn problem(&self) -> Result<Problem, ResolveError> {
+        self.resolve(self.velocity.ok_or(ResolveError::NoImpactSpeed)?)
+    }
+
+    /// The same scene with impact velocity `velocity` [m/s].
+    #[must_use]
+    pub fn with_velocity(mut self, velocity: f64) -> Self {
+        self.velocity = Some(velocity);
+        self
+    }
+
+    /// The concrete of the scene; `None` for a scene of stages.
+    pub fn concrete(&self) -> Option<&Concrete> {
+        match &self.resistance {
+            Resistance::Concrete(concrete) => Some(concrete),
+            Resistance::Stages(_) => None,
+        }
+    }
+
+    /// Projectile diameter d [m]; `None` for a scene of stages.
+    pub fn diameter(&self) -> Option<f64> {
+        self.concrete().map(|concrete| concrete.diameter)
+    }
+
+    /// Static force P [N] just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
+    pub fn static_force(&self) -> Option<f64> {
+        Some(self.concrete()?.beyond_crater().ok()?[0].static_force)
+    }
+
+    /// Drag Q [kg/m] just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
+    pub fn drag(&self) -> Option<f64> {
+        Some(self.concrete()?.beyond_crater().ok()?[0].drag)
+    }
+
+    /// Depth that perforates [m]: H, or `x_p(H)` by the ACE/NDRC relation; infinite for a semi-infinite target.
+    ///
+    /// # Errors
+    /// [`ResolveError`]: the thickness or the diameter is not admissible, the criterion `ndrc` has no diameter to go
+    /// by, or the depth leaves the range of `f64`.
+    pub fn exit_depth(&self) -> Result<f64, ResolveError> {
+        let diameter = match (self.criterion, &self.resistance) {
+            (Criterion::FullDepth, _) => None,
+            (Criterion::Ndrc, Resistance::Concrete(concrete)) => Some(concrete.diameter),
+            (Criterion::Ndrc, Resistance::Stages(_)) => return Err(ResolveError::NoDiameter),
+        };
+        let Some(thickness) = self.thickness else { return Ok(f64::INFINITY) };
+        admit("the target's thickness H [m]", thickness, Range::NotNegative)?;
+        let Some(diameter) = diameter else { return Ok(thickness) };
+        admit("the diameter d [m]", diameter, Range::Positive)?;
+        let depth = diameter * semi_empirical::perforating_depth_ratio(thickness / diameter);
+        representable("the exit depth x_p [m]", depth, thickness == 0.0)
+    }
+
+    /// Why the exit depth is not to be trusted: the criterion `ndrc` beyond the range of its relation, H/d = 18.06.
+    pub fn exit_depth_warning(&self) -> Option<String> {
+        if self.criterion != Criterion::Ndrc {
+            return None;
+        }
+        let validity = semi_empirical::perforation_validity(self.thickness? / self.diameter()?);
+        (!validity.valid).then_some(validity.note)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a missing value is a failed test")]
+pub(crate) mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+    use crate::physics::nose::NoseShape;
+
+    /// Forrestal 1994, shot 14 (Li & Chen 2003, table 2).
+    pub(crate) fn concrete() -> Concrete {
+        Concrete {
+            diameter: 0.0269,
+            nose_factor: NoseShape::Ogive { caliber_radius_head: 2.0 }.factor(),
+            strength: 35.2e6,
+            density: 2370.0,
+            static_factor: 12.0,
+            inertia_factor: 1.0,
+            crater_ratio: 2.0,
+            crater_stiffness: CraterStiffness::Continuous,
+            layers: Vec::new(),
+        }
+    }
+
+    /// Forrestal 1994, shot 14, into a semi-infinite target.
+    pub(crate) fn scene() -> Scene {
+        scene_of(concrete())
+    }
+
+    fn scene_of(concrete: Concrete) -> Scene {
+        Scene {
+            title: None,
+            mass: 0.906,
+            resistance: Resistance::Concrete(concrete),
+            thickness: None,
+            criterion: Criterion::FullDepth,
+            velocity: Some(277.0),
+        }
+    }
+
+    fn stages_scene(stages: Vec<Stage>) -> Scene {
+        Scene { resistance: Resistance::Stages(stages), ..scene() }
+    }
+
+    fn layered(thicknesses: &[f64]) -> Scene {
+        let layers = thicknesses
+            .iter()
+            .enumerate()
+            .map(|(i, &thickness)| Layer {
+                thickness,
+                strength: 30e6 + 1e6 * i as f64,
+                density: 2000.0 + 100.0 * i as f64,
+                static_factor: 12.0,
+                viscosity: i as f64,
+            })
+            .collect();
+        let thickness = Some(thicknesses.iter().sum::<f64>()).filter(|sum| sum.is_finite());
+        Scene { thickness, ..scene_of(Concrete { layers, ..concrete() }) }
+    }
+
+    fn layer_force(strength: f64) -> f64 {
+        FRAC_PI_4 * 0.0269 * 0.0269 * 12.0 * strength
+    }
+
+    #[test]
+    fn concrete_resolves_into_crater_and_tunnel_with_force_continuous_at_the_crater_end() {
+        let problem = scene().problem().unwrap();
+        let [crater, tunnel] = problem.stages[..] else { panic!("{problem:?}") };
+        assert_eq!((problem.crater, problem.target), (Some(0), Target::CraterAndTunnel));
+        assert_eq!((crater.end, tunnel.end, problem.exit_depth), (0.0538, f64::INFINITY, f64::INFINITY));
+        // Energy over the crater: M V1² = M V0² - c (k d)².
+        let v1 = (277.0_f64.powi(2) - crater.stiffness * 0.0538 * 0.0538 / 0.906).sqrt();
+        assert_relative_eq!(crater.force(0.0538, v1), tunnel.force(0.0538, v1), max_relative = 1e-15);
+        assert_relative_eq!(tunnel.static_force, layer_force(35.2e6), max_relative = 5e-16);
+        assert_eq!(scene().static_force(), Some(tunnel.static_force));
+        assert_eq!(scene().drag(), Some(tunnel.drag));
+    }
+
+    #[test]
+    fn coefficients_lie_within_5_ulp_of_50_digits() {
+        // P, Q and c of the same f64 inputs in 60-digit decimal arithmetic.
+        let problem = scene().problem().unwrap();
+        let ulps = |value: f64, exact: f64| ((value - exact) / (exact.next_up() - exact)).abs();
+        assert!(ulps(problem.stages[1].static_force, 240_059.198_022_770_06) <= 5.0);
+        assert!(ulps(problem.stages[1].drag, 0.210_456_727_669_997_7) <= 5.0);
+        assert!(ulps(problem.stages[0].stiffness, 4_703_437.705_863_008) <= 5.0);
+    }
+
+    #[test]
+    fn depth_of_forrestal_shot_14_by_the_closed_form_is_6_215430() {
+        let problem = scene().problem().unwrap();
+        let [crater, tunnel] = problem.stages[..] else { panic!("{problem:?}") };
+        let (m, p, q, kd) = (problem.mass, tunnel.static_force, tunnel.drag, crater.end);
+        let v1_squared = (m * 277.0 * 277.0 - kd * p) / (m + kd * q);
+        let depth = kd + m / (2.0 * q) * (q * v1_squared / p).ln_1p();
+        assert!((depth / 0.0269 - 6.215_430).abs() < 5e-7, "{}", depth / 0.0269);
+    }
+
+    #[test]
+    fn continuous_crater_holds_for_a_stop_inside_it_and_depends_on_the_impact_speed() {
+        // Li & Chen (2003), Eq. 15a at I -> 0: X/d = sqrt(4 k I/pi (1 + k pi/(4N))).
+        let slow = scene().resolve(1e-6).unwrap();
+        let fast = scene().resolve(300.0).unwrap();
+        assert!(slow.stages[0].stiffness < fast.stages[0].stiffness);
+        let (p, q) = (slow.stages[1].static_force, slow.stages[1].drag);
+        assert_relative_eq!(slow.stages[0].stiffness, p / 0.0538 / (1.0 + 0.0538 * q / 0.906), max_relative = 1e-14);
+    }
+
+    #[test]
+    fn a_crater_of_no_depth_is_left_out() {
+        let problem = scene_of(Concrete { crater_ratio: 0.0, ..concrete() }).problem().unwrap();
+        assert_eq!((problem.stages.len(), problem.crater), (1, None));
+    }
+
+    #[test]
+    fn a_given_crater_stiffness_is_taken_as_it_is() {
+        let crater_stiffness = CraterStiffness::Given(8.48e6);
+        let problem = scene_of(Concrete { crater_stiffness, ..concrete() }).problem().unwrap();
+        assert_eq!(problem.stages[0].stiffness, 8.48e6);
+    }
+
+    #[test]
+    fn layer_ends_before_the_crater_end_are_no_boundaries() {
+        // k d = 53.8 mm lies in the third layer, 40 to 140 mm.
+        let problem = layered(&[0.01, 0.03, 0.1, 0.2]).problem().unwrap();
+        assert_eq!((problem.crater, problem.target), (Some(0), Target::Stages));
+        assert_eq!(problem.stages.iter().map(|s| s.end).collect::<Vec<_>>(), [0.0538, 0.14, f64::INFINITY]);
+        assert_relative_eq!(problem.exit_depth, 0.34, max_relative = 1e-15);
+        assert_relative_eq!(problem.stages[1].static_force, layer_force(32e6), max_relative = 1e-15);
+        assert_eq!(problem.stages[1].viscosity, 2.0);
+        let homogeneous = Concrete { strength: 32e6, density: 2200.0, ..concrete() };
+        let stiffness = scene_of(homogeneous).problem().unwrap().stages[0].stiffness;
+        assert_eq!(problem.stages[0].stiffness, stiffness);
+    }
+
+    #[test]
+    fn a_layer_that_ends_at_the_crater_end_does_not_hold_it() {
+        let problem = layered(&[0.0538, 0.1]).problem().unwrap();
+        assert_eq!(problem.stages.len(), 2);
+        assert_relative_eq!(problem.stages[1].static_force, layer_force(31e6), max_relative = 1e-15);
+    }
+
+    #[test]
+    fn a_layered_target_thinner_than_the_crater_is_continued_by_its_last_layer() {
+        let problem = layered(&[0.01, 0.02]).problem().unwrap();
+        assert_eq!((problem.stages.len(), problem.exit_depth), (2, 0.03));
+        assert_relative_eq!(problem.stages[1].static_force, layer_force(31e6), max_relative = 1e-15);
+    }
+
+    #[test]
+    fn an_air_gap_at_the_crater_end_leaves_no_force_there() {
+        let mut scene = layered(&[0.04, 0.1, f64::INFINITY]);
+        let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+        concrete.layers[1] = Layer { thickness: 0.1, strength: 0.0, density: 0.0, static_factor: 0.0, viscosity: 0.0 };
+        let problem = scene.problem().unwrap();
+        assert_eq!((problem.stages[0].stiffness, problem.stages[1].force(0.1, 300.0)), (0.0, 0.0));
+        assert!(problem.stages[2].static_force > 0.0);
+        assert!(!problem.has_exit());
+    }
+
+    #[test]
+    fn layers_that_do_not_sum_up_are_refused() {
+        let scene = Scene { thickness: Some(1.0), ..layered(&[0.1, 0.2]) };
+        assert!(matches!(scene.problem(), Err(ResolveError::LayersDoNotSumUp { thickness: 1.0, .. })));
+        assert!(matches!(
+            layered(&[0.1, f64::INFINITY, 0.2]).problem(),
+            Err(ResolveError::Inadmissible { quantity: "a layer's thickness [m]", .. })
+        ));
+    }
+
+    #[test]
+    fn stages_given_outright_stay_as_they_are() {
+        let stages = vec![Stage { end: 0.1, ..Stage::tunnel(-10.0, 0.5) }, Stage::tunnel(5.0, 0.0)];
+        let problem = stages_scene(stages.clone()).problem().unwrap();
+        assert_eq!(problem.stages.to_vec(), stages);
+        assert_eq!((problem.crater, problem.target), (None, Target::Stages));
+    }
+
+    #[test]
+    fn a_last_stage_that_ends_inside_the_target_is_refused_and_at_the_exit_has_no_end() {
+        let stages = vec![Stage { end: 0.4, ..Stage::tunnel(10.0, 0.5) }];
+        assert_eq!(stages_scene(stages.clone()).problem(), Err(ResolveError::TargetGoesOn { end: 0.4 }));
+        let ending = Scene { thickness: Some(0.4), ..stages_scene(stages) };
+        assert_eq!(ending.problem().unwrap().stages[0].end, f64::INFINITY);
+    }
+
+    #[test]
+    fn stage_ends_that_fall_are_refused_and_equal_ones_are_not() {
+        let at = |end: f64| Stage { end, ..Stage::tunnel(10.0, 0.5) };
+        assert!(stages_scene(vec![at(0.4), at(0.4), at(f64::INFINITY)]).problem().is_ok());
+        for ends in [[0.4, 0.3, f64::INFINITY], [0.4, f64::INFINITY, f64::INFINITY], [0.4, f64::NAN, f64::INFINITY]] {
+            let refused = stages_scene(ends.map(at).to_vec()).problem();
+            assert!(matches!(refused, Err(ResolveError::StageEndsFall { .. })), "{ends:?}: {refused:?}");
+        }
+        assert_eq!(stages_scene(Vec::new()).problem(), Err(ResolveError::NoStage));
+    }
+
+    #[test]
+    fn ndrc_ends_the_flight_at_the_perforating_depth() {
+        let slab = Scene { thickness: Some(0.269), criterion: Criterion::Ndrc, ..scene() };
+        assert_relative_eq!(slab.exit_depth().unwrap(), 0.0269 * 7.0, max_relative = 1e-15);
+        assert_eq!(slab.exit_depth_warning(), None);
+        let thick = Scene { thickness: Some(0.538), ..slab.clone() };
+        assert!(thick.exit_depth_warning().unwrap().contains("18.06"));
+        let open = Scene { thickness: None, ..slab.clone() };
+        assert_eq!(open.exit_depth(), Ok(f64::INFINITY));
+        let stages = Scene { resistance: Resistance::Stages(vec![Stage::tunnel(1.0, 0.0)]), ..slab };
+        assert_eq!(stages.exit_depth(), Err(ResolveError::NoDiameter));
+    }
+
+    #[test]
+    fn coefficients_beyond_the_range_of_numbers_are_refused_with_their_name() {
+        let refused = |concrete: Concrete, speed: f64| match scene_of(concrete).resolve(speed) {
+            Err(error @ ResolveError::OutOfRange { quantity, .. }) => {
+                assert!(!error.is_usage());
+                quantity
+            }
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(refused(concrete(), 1e160), "the crater stiffness c [N/m]");
+        assert_eq!(refused(Concrete { diameter: 1e-180, ..concrete() }, 1.0), "the static force P [N]");
+        assert_eq!(refused(Concrete { diameter: 1e160, ..concrete() }, 1.0), "the static force P [N]");
+        assert_eq!(refused(Concrete { density: 1e-306, ..concrete() }, 1.0), "the drag Q [kg/m]");
+        assert_eq!(refused(Concrete { crater_ratio: 1e-307, ..concrete() }, 1.0), "the crater depth k d [m]");
+        let thin = Scene { thickness: Some(1e300), criterion: Criterion::Ndrc, ..scene() };
+        let Resistance::Concrete(mut tiny) = thin.resistance.clone() else { unreachable!() };
+        tiny.diameter = 1e-100;
+        let thin = Scene { resistance: Resistance::Concrete(tiny), ..thin };
+        assert!(matches!(thin.exit_depth(), Err(ResolveError::OutOfRange { .. })));
+    }
+
+    #[test]
+    fn inadmissible_numbers_never_reach_a_problem() {
+        for speed in [-1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(scene().resolve(speed), Err(ResolveError::Inadmissible { .. })), "{speed}");
+        }
+        let no_speed = Scene { velocity: None, ..scene() };
+        assert_eq!(no_speed.problem(), Err(ResolveError::NoImpactSpeed));
+        assert_eq!(no_speed.with_velocity(3.0).problem().unwrap().impact_speed, 3.0);
+        for mass in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(Scene { mass, ..scene() }.problem(), Err(ResolveError::Inadmissible { .. })));
+        }
+        let faults: [fn(&mut Concrete); 9] = [
+            |c| c.diameter = 0.0,
+            |c| c.nose_factor = 1.5,
+            |c| c.strength = 0.0,
+            |c| c.density = -1.0,
+            |c| c.static_factor = f64::NAN,
+            |c| c.inertia_factor = -1.0,
+            |c| c.crater_ratio = f64::INFINITY,
+            |c| c.crater_stiffness = CraterStiffness::Given(0.0),
+            |c| c.crater_stiffness = CraterStiffness::Given(f64::NAN),
+        ];
+        for fault in faults {
+            let mut faulty = concrete();
+            fault(&mut faulty);
+            let refused = scene_of(faulty).problem();
+            assert!(matches!(refused, Err(ResolveError::Inadmissible { .. })), "{refused:?}");
+        }
+        let stage = |p: f64, s: f64, r: f64, q: f64| Stage {
+            static_force: p,
+            stiffness: s,
+            viscosity: r,
+            drag: q,
+            end: f64::INFINITY,
+        };
+        for faulty in [
+            stage(f64::NAN, 0.0, 0.0, 0.0),
+            stage(0.0, -1.0, 0.0, 0.0),
+            stage(0.0, 0.0, -1.0, 0.0),
+            stage(0.0, 0.0, 0.0, f64::INFINITY),
+        ] {
+            let refused = stages_scene(vec![faulty]).problem();
+            assert!(matches!(refused, Err(ResolveError::Inadmissible { .. })), "{refused:?}");
+        }
+    }
+
+    #[test]
+    fn a_scene_tells_whether_its_static_factor_is_the_one_of_eq_14() {
+        assert!(!concrete().follows_eq14());
+        assert!(Concrete { strength: 36e6, ..concrete() }.follows_eq14());
+    }
 }

@@ -1,0 +1,119 @@
+//! Which dimensionless groups a scene has, and which numbers give a scene a wanted group.
+//!
+//! ```text
+//! I = M V0²/(S fc d³),   N = M/(N* B rho d³),   H/d,   X/d,   E_c/(d³ fc)
+//! ```
+//!
+//! Source: Li & Chen (2003), Eq. 5-7, 13, 14. Eq. 13 of the paper prints N without N*, its nose being flat (N* = 1).
+
+use super::scene::{Concrete, Resistance, Scene};
+
+/// The groups of a scene of one concrete.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Groups {
+    /// Impact function I.
+    pub impact: f64,
+    /// Geometry function N; `None` without drag (Q = 0), where it is infinite.
+    pub geometry: Option<f64>,
+    /// Relative target thickness H/d; `None` for a semi-infinite target.
+    pub thickness_ratio: Option<f64>,
+    /// Johnson number rho V0²/fc.
+    pub johnson: f64,
+}
+
+impl Groups {
+    /// The groups of `scene` at `impact_speed` [m/s].
+    ///
+    /// `None` for a scene of stages, which has no diameter, and of layers, which has no one strength.
+    pub fn of(scene: &Scene, impact_speed: f64) -> Option<Self> {
+        let Resistance::Concrete(concrete) = &scene.resistance else { return None };
+        if !concrete.layers.is_empty() {
+            return None;
+        }
+        let d = concrete.diameter;
+        let speed_per_diameter = impact_speed / d;
+        let scaled_density = concrete.nose_factor * concrete.inertia_factor * concrete.density;
+        Some(Self {
+            // Squares of speed and cubes of length are shared out, so that neither overflows before the quotient.
+            impact: (scene.mass / d) * speed_per_diameter / (concrete.static_factor * concrete.strength)
+                * speed_per_diameter,
+            geometry: (scaled_density > 0.0).then(|| (scene.mass / d) / (scaled_density * d * d)),
+            thickness_ratio: scene.thickness.map(|thickness| thickness / d),
+            johnson: (concrete.density * impact_speed) * (impact_speed / concrete.strength),
+        })
+    }
+}
+
+/// Impact speed [m/s] at which a projectile of `mass` [kg] has the impact function `impact`: `d sqrt(I S fc d/M)`.
+pub fn impact_speed_for(impact: f64, mass: f64, concrete: &Concrete) -> f64 {
+    let d = concrete.diameter;
+    d * (impact * (concrete.static_factor * concrete.strength) * (d / mass)).sqrt()
+}
+
+/// Target density [kg/m³] at which a projectile of `mass` [kg] has the geometry function `geometry`:
+/// `M/(N N* B d³)`. Not finite without a nose factor or an inertia factor.
+pub fn density_for(geometry: f64, mass: f64, concrete: &Concrete) -> f64 {
+    let d = concrete.diameter;
+    (mass / d) / (geometry * concrete.nose_factor * concrete.inertia_factor * d * d)
+}
+
+/// `E/(d³ fc)` of an energy [J]: the ordinate of the paper's Figure 4.
+pub fn dimensionless_energy(energy: f64, concrete: &Concrete) -> f64 {
+    let d = concrete.diameter;
+    energy / d / (concrete.strength * d * d)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+    use crate::physics::scene::tests::{concrete, scene};
+
+    #[test]
+    fn groups_of_shot_14_are_those_published() {
+        // Li & Chen (2003), table 2: I = 8.455, N = 125.9, both rounded.
+        let scene = scene();
+        let groups = Groups::of(&scene, 277.0).unwrap();
+        assert_relative_eq!(groups.impact, 8.455, epsilon = 5e-4);
+        assert_relative_eq!(groups.geometry.unwrap(), 125.7, epsilon = 0.3);
+        assert_eq!(groups.thickness_ratio, None);
+    }
+
+    #[test]
+    fn johnson_number_is_impact_function_times_static_factor_over_mass_ratio() {
+        let scene = Scene { thickness: Some(0.0538), ..scene() };
+        let groups = Groups::of(&scene, 277.0).unwrap();
+        let concrete = concrete();
+        let mass_ratio = scene.mass / (concrete.density * concrete.diameter.powi(3));
+        assert_relative_eq!(groups.johnson, groups.impact * concrete.static_factor / mass_ratio, max_relative = 1e-15);
+        assert_relative_eq!(groups.thickness_ratio.unwrap(), 2.0, max_relative = 1e-15);
+    }
+
+    #[test]
+    fn a_wanted_group_is_the_group_one_gets() {
+        let mut wanted = scene();
+        let speed = impact_speed_for(3.5, wanted.mass, &concrete());
+        let density = density_for(17.0, wanted.mass, &concrete());
+        wanted.resistance = Resistance::Concrete(Concrete { density, ..concrete() });
+        let groups = Groups::of(&wanted, speed).unwrap();
+        assert_relative_eq!(groups.impact, 3.5, max_relative = 1e-15);
+        assert_relative_eq!(groups.geometry.unwrap(), 17.0, max_relative = 1e-15);
+    }
+
+    #[test]
+    fn geometry_function_is_absent_without_drag() {
+        let mut frictionless = scene();
+        frictionless.resistance = Resistance::Concrete(Concrete { density: 0.0, ..concrete() });
+        assert_eq!(Groups::of(&frictionless, 1.0).unwrap().geometry, None);
+    }
+
+    #[test]
+    fn critical_energy_over_strength_is_half_the_impact_function_times_static_factor() {
+        let scene = scene();
+        let impact = Groups::of(&scene, 277.0).unwrap().impact;
+        let energy = 0.5 * scene.mass * 277.0 * 277.0;
+        assert_relative_eq!(dimensionless_energy(energy, &concrete()), 12.0 * impact / 2.0, max_relative = 1e-15);
+    }
+}

@@ -1,0 +1,1097 @@
+//! Which scene a TOML file describes, and where and why a file describes none.
+//!
+//! Every refusal is a [`SceneError`]: it underlines the offending text and says what is allowed and what to do.
+//! Nothing is skipped or guessed: an unknown key is refused, so a misspelt optional one cannot be silently ignored.
+
+use std::fs::File;
+use std::io::Read;
+use std::ops;
+use std::path::Path;
+
+use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
+use thiserror::Error;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::nose::NoseShape;
+use super::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene};
+use super::semi_empirical;
+use super::stage::Stage;
+use super::units::{self, Dimension, QuantityError};
+
+/// The scenes of `verification/scenes`, by file name without its ending: the real input that the suite runs on.
+pub const SHIPPED: &[(&str, &str)] = &[
+    ("forrestal-1994-shot-14", include_str!("../../verification/scenes/forrestal-1994-shot-14.toml")),
+    ("paper-slab", include_str!("../../verification/scenes/paper-slab.toml")),
+    ("crater", include_str!("../../verification/scenes/crater.toml")),
+    ("tunnel", include_str!("../../verification/scenes/tunnel.toml")),
+    ("perforate", include_str!("../../verification/scenes/perforate.toml")),
+    ("graze", include_str!("../../verification/scenes/graze.toml")),
+    ("stiff", include_str!("../../verification/scenes/stiff.toml")),
+    ("viscous", include_str!("../../verification/scenes/viscous.toml")),
+    ("layered", include_str!("../../verification/scenes/layered.toml")),
+];
+
+/// Largest scene file that is read, 1 MiB. A scene takes about one KiB; more is a mistaken path.
+pub const SIZE_MAX: u64 = 1 << 20;
+
+/// Longest line that is shown in an error whole, in characters.
+const LINE_WIDTH_MAX: usize = 240;
+
+/// Longest piece of a file that is quoted within a message, in characters.
+const QUOTE_LENGTH_MAX: usize = 60;
+
+/// Where in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Bytes of the offending text, counted behind a byte order mark.
+    pub span: ops::Range<usize>,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+}
+
+/// Why a file is no scene: what is wrong where, what is allowed, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}: {message}", self.location())]
+pub struct SceneError {
+    /// File name as given; `standard input` for `-`.
+    pub file: String,
+    /// Where; `None` if the file could not be read at all.
+    pub place: Option<Place>,
+    /// What is wrong.
+    pub message: String,
+    /// What is allowed.
+    pub allowed: String,
+    /// What to do.
+    pub help: String,
+    /// The text of the file.
+    text: String,
+}
+
+impl SceneError {
+    /// `file:line:column`, or the file alone if it could not be read.
+    pub fn location(&self) -> String {
+        let file = printable(&self.file);
+        match &self.place {
+            Some(place) => format!("{file}:{}:{}", place.line, place.column),
+            None => file,
+        }
+    }
+
+    /// The error for a terminal, the offending text underlined, with colours if `color`.
+    ///
+    /// Control characters of the file are replaced, so that no file steers the terminal that shows it.
+    pub fn render(&self, color: bool) -> String {
+        self.underlined(color).unwrap_or_else(|| {
+            format!(
+                "Error: {}\n  at {}\n  allowed: {}\n  Help: {}\n",
+                self.message,
+                self.location(),
+                self.allowed,
+                self.help
+            )
+        })
+    }
+
+    fn underlined(&self, color: bool) -> Option<String> {
+        let place = self.place.as_ref()?;
+        let text = printable(&self.text);
+        let start = place.span.start.min(text.len());
+        let line_start = text[..start].rfind('\n').map_or(0, |end| end + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |end| start + end);
+        if text[line_start..line_end].chars().count() > LINE_WIDTH_MAX {
+            return None;
+        }
+        let file = printable(&self.file);
+        // A span over several lines (an inline table) is underlined in its first.
+        let span = (file.as_str(), start..place.span.end.clamp(start, line_end));
+        let mut output = Vec::new();
+        Report::build(ReportKind::Error, span.clone())
+            .with_config(Config::default().with_color(color).with_index_type(IndexType::Byte))
+            .with_message(&self.message)
+            .with_label(Label::new(span).with_message(&self.allowed).with_color(ariadne::Color::Red))
+            .with_help(&self.help)
+            .finish()
+            .write((file.as_str(), Source::from(text.as_str())), &mut output)
+            .ok()?;
+        let shown = String::from_utf8(output).ok()?;
+        // Nothing stands behind the last visible character of a line.
+        Some(shown.lines().flat_map(|line| [line.trim_end(), "\n"]).collect())
+    }
+}
+
+/// `text` with every character that steers a terminal or breaks a line replaced by one of the same length in bytes.
+fn printable(text: &str) -> String {
+    let replace = |(index, symbol): (usize, char)| match symbol {
+        '\n' | '\t' => symbol,
+        '\r' if text[index + 1..].starts_with('\n') => symbol,
+        '\u{2028}' | '\u{2029}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {
+            char::REPLACEMENT_CHARACTER
+        }
+        _ if symbol.is_control() => {
+            if symbol.len_utf8() == 1 {
+                '?'
+            } else {
+                '¿'
+            }
+        }
+        _ => symbol,
+    };
+    text.char_indices().map(replace).collect()
+}
+
+/// A piece of the file within a message: one line, bounded, in backticks.
+fn quoted(text: &str) -> String {
+    let mut piece: String = printable(text).replace(['\n', '\r', '\t'], " ").chars().take(QUOTE_LENGTH_MAX).collect();
+    if text.chars().count() > QUOTE_LENGTH_MAX {
+        piece.push('…');
+    }
+    format!("`{piece}`")
+}
+
+/// What is wrong with a text, before it is known which file it is from.
+#[derive(Debug)]
+struct Fault {
+    span: ops::Range<usize>,
+    message: String,
+    allowed: String,
+    help: String,
+}
+
+impl Fault {
+    fn new(
+        span: ops::Range<usize>,
+        message: impl Into<String>,
+        allowed: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
+        Self { span, message: message.into(), allowed: allowed.into(), help: help.into() }
+    }
+
+    fn in_file(self, file: &str, text: &str) -> Box<SceneError> {
+        let mut start = self.span.start.min(text.len());
+        while !text.is_char_boundary(start) {
+            start -= 1;
+        }
+        let line_start = text[..start].rfind('\n').map_or(0, |end| end + 1);
+        Box::new(SceneError {
+            file: file.to_owned(),
+            place: Some(Place {
+                line: 1 + text[..start].matches('\n').count(),
+                column: 1 + text[line_start..start].chars().count(),
+                span: start..self.span.end.clamp(start, text.len()),
+            }),
+            message: self.message,
+            allowed: self.allowed,
+            help: self.help,
+            text: text.to_owned(),
+        })
+    }
+}
+
+impl Scene {
+    /// The scene that the TOML `text` describes; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`SceneError`]: the text is not TOML, or not a scene.
+    ///
+    /// # Example
+    /// ```
+    /// use penetrode::physics::Scene;
+    /// let text = r#"
+    ///     [projectile]
+    ///     mass = "1 kg"
+    ///     [[stage]]
+    ///     static_force = "2 kN"
+    ///     [impact]
+    ///     velocity = 100
+    /// "#;
+    /// let problem = Scene::from_toml(text, "scene.toml")?.problem()?;
+    /// assert_eq!(problem.stages[0].static_force, 2000.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_toml(text: &str, file: &str) -> Result<Self, Box<SceneError>> {
+        scene(text).map_err(|fault| fault.in_file(file, text))
+    }
+
+    /// The scene in the file at `path`; `-` is standard input.
+    ///
+    /// # Errors
+    /// [`SceneError`]: the file cannot be read, is larger than [`SIZE_MAX`] (it is then not read), is not UTF-8, or is
+    /// not a scene.
+    pub fn read(path: &Path) -> Result<Self, Box<SceneError>> {
+        let (file, text) = read_text(path)?;
+        Self::from_toml(&text, &file)
+    }
+}
+
+/// Name and text of the small UTF-8 file at `path`, without its byte order mark; `-` is standard input.
+///
+/// # Errors
+/// [`SceneError`]: the file cannot be read, is larger than [`SIZE_MAX`], or is not UTF-8.
+pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
+    let from_stdin = path.as_os_str() == "-";
+    let file = if from_stdin { "standard input".to_owned() } else { path.display().to_string() };
+    let unread = |message: String, allowed: &str, help: &str| {
+        Box::new(SceneError {
+            file: file.clone(),
+            place: None,
+            message,
+            allowed: allowed.to_owned(),
+            help: help.to_owned(),
+            text: String::new(),
+        })
+    };
+    let unreadable = |error: std::io::Error| {
+        unread(format!("cannot be read: {error}"), "a readable file, or `-` for standard input", "check the path")
+    };
+    let too_large = || {
+        unread(
+            format!("larger than {SIZE_MAX} bytes, and not read"),
+            "a scene file of at most 1 MiB",
+            "check that this is a scene file",
+        )
+    };
+    let mut bytes = Vec::new();
+    if from_stdin {
+        std::io::stdin().lock().take(SIZE_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    } else {
+        let metadata = std::fs::metadata(path).map_err(unreadable)?;
+        if metadata.is_dir() {
+            return Err(unread("is a directory".to_owned(), "a file, or `-` for standard input", "name a file in it"));
+        }
+        if metadata.len() > SIZE_MAX {
+            return Err(too_large());
+        }
+        // A device or a pipe has no length beforehand.
+        File::open(path).map_err(unreadable)?.take(SIZE_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    }
+    if bytes.len() as u64 > SIZE_MAX {
+        return Err(too_large());
+    }
+    text_of(bytes, &file).map(|text| (file, text))
+}
+
+/// `bytes` as UTF-8, without a byte order mark.
+fn text_of(mut bytes: Vec<u8>, file: &str) -> Result<String, Box<SceneError>> {
+    if bytes.starts_with(b"\xef\xbb\xbf") {
+        bytes.drain(..3);
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let start = error.utf8_error().valid_up_to();
+        let byte = error.as_bytes()[start];
+        // The first replacement character stands where the first bad byte was; what is before it has not moved.
+        let text = String::from_utf8_lossy(error.as_bytes());
+        Fault::new(
+            start..start + char::REPLACEMENT_CHARACTER.len_utf8(),
+            format!("the byte 0x{byte:02x} is not UTF-8"),
+            "UTF-8 text",
+            "save the file in UTF-8",
+        )
+        .in_file(file, &text)
+    })
+}
+
+/// Keys of each table.
+const ROOT: &[&str] = &["title", "projectile", "target", "resistance", "impact", "perforation", "stage"];
+const PROJECTILE: &[&str] = &["mass", "diameter", "nose"];
+const NOSE: &[&str] = &["factor", "shape", "caliber_radius_head", "length_ratio", "radius_ratio"];
+const TARGET: &[&str] = &["strength", "density", "thickness", "layer"];
+const LAYER: &[&str] = &["thickness", "strength", "density", "S", "viscosity"];
+const RESISTANCE: &[&str] = &["S", "B", "k", "crater_stiffness"];
+const IMPACT: &[&str] = &["velocity"];
+const PERFORATION: &[&str] = &["criterion"];
+const STAGE: &[&str] = &["static_force", "stiffness", "viscosity", "drag", "end"];
+
+/// Every table by its header, to tell where a misplaced key belongs.
+const TABLES: &[(&str, &[&str])] = &[
+    ("[projectile]", PROJECTILE),
+    ("nose", NOSE),
+    ("[target]", TARGET),
+    ("[[target.layer]]", LAYER),
+    ("[resistance]", RESISTANCE),
+    ("[impact]", IMPACT),
+    ("[perforation]", PERFORATION),
+    ("[[stage]]", STAGE),
+];
+
+type Value<'i> = Spanned<DeValue<'i>>;
+
+/// A table of the file: its keys are known, their values not yet read.
+struct Section<'t, 'i> {
+    /// Header for messages: `[projectile]`.
+    name: &'static str,
+    table: &'t DeTable<'i>,
+    /// The header, or the inline table.
+    span: ops::Range<usize>,
+    /// The file, from which offending text is quoted.
+    text: &'t str,
+}
+
+impl<'t, 'i> Section<'t, 'i> {
+    /// The table, once it has no other than the keys `known`.
+    fn new(
+        name: &'static str,
+        table: &'t DeTable<'i>,
+        span: ops::Range<usize>,
+        text: &'t str,
+        known: &[&'static str],
+    ) -> Result<Self, Fault> {
+        let unknown = table.keys().filter(|key| !known.contains(&key.get_ref().as_ref()));
+        match unknown.min_by_key(|key| key.span().start) {
+            None => Ok(Self { name, table, span, text }),
+            Some(key) => Err(unknown_key(name, key, known)),
+        }
+    }
+
+    fn get(&self, key: &str) -> Option<&'t Value<'i>> {
+        self.table.get(key)
+    }
+
+    /// Span of `key` itself.
+    fn key_span(&self, key: &str) -> ops::Range<usize> {
+        self.table.get_key_value(key).map_or_else(|| self.span.clone(), |(key, _)| key.span())
+    }
+
+    fn missing(&self, key: &str, example: &str) -> Fault {
+        Fault::new(
+            self.span.clone(),
+            format!("{} has no `{key}`", self.name),
+            format!("`{key}` is required here"),
+            format!("add {key} = {example}"),
+        )
+    }
+
+    fn missing_table(&self, header: &str, help: &str) -> Fault {
+        Fault::new(
+            self.span.clone(),
+            format!("{} has no {header}", self.name),
+            format!("{header} is required"),
+            format!("add {help}"),
+        )
+    }
+
+    /// Fault of the value of `key`, which is of the wrong type.
+    fn wrong_type(key: &str, value: &Value<'_>, wanted: &str, help: &str) -> Fault {
+        Fault::new(
+            value.span(),
+            format!("`{key}` is {}", type_name(value.get_ref())),
+            format!("must be {wanted}"),
+            help,
+        )
+    }
+
+    fn table(&self, key: &'static str, name: &'static str, known: &[&'static str]) -> Result<Option<Self>, Fault> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let DeValue::Table(table) = value.get_ref() else {
+            return Err(Self::wrong_type(key, value, "a table", &format!("write it as {name}")));
+        };
+        Section::new(name, table, self.header_span(key, value), self.text, known).map(Some)
+    }
+
+    /// The header or inline table of `key`; the key itself where a table has neither (dotted keys).
+    fn header_span(&self, key: &str, value: &Value<'_>) -> ops::Range<usize> {
+        if value.span().is_empty() { self.key_span(key) } else { value.span() }
+    }
+
+    /// An array of tables, each with keys `known`; `None` when absent, never empty.
+    fn tables(
+        &self,
+        key: &'static str,
+        name: &'static str,
+        known: &[&'static str],
+    ) -> Result<Option<Vec<Self>>, Fault> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let help = format!("write each as {name}");
+        let DeValue::Array(array) = value.get_ref() else {
+            let mut fault = Self::wrong_type(key, value, "an array of tables", &help);
+            fault.span = self.header_span(key, value);
+            return Err(fault);
+        };
+        if array.is_empty() {
+            return Err(Fault::new(value.span(), format!("`{key}` is empty"), "at least one table", help));
+        }
+        let read = |value: &'t Value<'i>| match value.get_ref() {
+            DeValue::Table(table) => Section::new(name, table, value.span(), self.text, known),
+            _ => Err(Self::wrong_type(key, value, "a table", &help)),
+        };
+        array.iter().map(read).collect::<Result<_, _>>().map(Some)
+    }
+
+    fn string(&self, key: &str, help: &str) -> Result<Option<(&'t str, ops::Range<usize>)>, Fault> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        match value.get_ref() {
+            DeValue::String(text) => Ok(Some((text.as_ref(), value.span()))),
+            _ => Err(Self::wrong_type(key, value, "a string", help)),
+        }
+    }
+
+    /// A number without unit.
+    fn number(&self, key: &str, range: Range) -> Result<Option<f64>, Fault> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let Some(number) = plain_number(value.get_ref()) else {
+            let wanted = format!("{}, without unit or quotes", range.description());
+            return Err(Self::wrong_type(key, value, &wanted, &format!("write for instance {key} = 2.0")));
+        };
+        let number = number.map_err(|error| {
+            Fault::new(value.span(), format!("`{key}`: {error}"), range.description(), "correct the number")
+        })?;
+        self.admit(key, value, number, range, &format!("correct `{key}`")).map(Some)
+    }
+
+    /// A quantity, `"number unit"` or a bare number in SI units, in SI units.
+    fn quantity(&self, key: &str, dimension: Dimension, range: Range) -> Result<Option<f64>, Fault> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let si = dimension.units()[0];
+        let example = format!("\"1 {si}\"");
+        let number = match (value.get_ref(), plain_number(value.get_ref())) {
+            (DeValue::String(text), _) => units::quantity(text, dimension)
+                .map_err(|error| self.bad_quantity(key, value, text, dimension, &error))?,
+            (_, Some(number)) => number.map_err(|error| {
+                Fault::new(value.span(), format!("`{key}`: {error}"), range.description(), "correct the number")
+            })?,
+            _ => {
+                let wanted = format!("a {}: \"number unit\", or a bare number in {si}", dimension.noun());
+                return Err(Self::wrong_type(key, value, &wanted, &format!("write for instance {key} = {example}")));
+            }
+        };
+        self.admit(key, value, number, range, &format!("correct `{key}`; it is read in {si} as {number}")).map(Some)
+    }
+
+    fn admit(&self, key: &str, value: &Value<'_>, number: f64, range: Range, help: &str) -> Result<f64, Fault> {
+        if range.contains(number) {
+            return Ok(number);
+        }
+        let raw = quoted(self.text.get(value.span()).unwrap_or_default());
+        Err(Fault::new(value.span(), format!("`{key}` = {raw} is out of range"), range.description(), help))
+    }
+
+    fn bad_quantity(
+        &self,
+        key: &str,
+        value: &Value<'_>,
+        text: &str,
+        dimension: Dimension,
+        error: &QuantityError,
+    ) -> Fault {
+        let known = dimension.units();
+        let mut allowed = format!("a {}, in {} and others", dimension.noun(), known.join(", "));
+        let (span, message, help) = match error {
+            QuantityError::UnknownUnit { unit } => {
+                let help = if unit.starts_with(',') {
+                    "write a decimal point".to_owned()
+                } else {
+                    nearest(unit, known).map_or_else(|| format!("give it in {}", known[0]), did_you_mean)
+                };
+                (self.part(value, text, unit), format!("{} is no unit that is known", quoted(unit)), help)
+            }
+            QuantityError::WrongDimension { unit, has } => (
+                self.part(value, text, unit),
+                format!("`{key}` is a {}, {} is a unit of {}", dimension.noun(), quoted(unit), has.noun()),
+                format!("give it in {}", known[0]),
+            ),
+            QuantityError::NoUnit => (
+                value.span(),
+                format!("`{key}` has no unit"),
+                format!("append one, or leave out the quotes for {}", known[0]),
+            ),
+            QuantityError::NoNumber => (
+                value.span(),
+                format!("`{key}` is no quantity: {error}"),
+                format!("write for instance {key} = \"1 {}\"", known[0]),
+            ),
+            QuantityError::NotFinite | QuantityError::TooSmall => {
+                "a finite number".clone_into(&mut allowed);
+                (value.span(), format!("`{key}`: {error}"), "correct the number".to_owned())
+            }
+        };
+        Fault::new(span, message, allowed, help)
+    }
+
+    /// Span of `part` within the string `value`; of the whole value where escapes moved the text.
+    fn part(&self, value: &Value<'_>, text: &str, part: &str) -> ops::Range<usize> {
+        let whole = value.span();
+        let raw = self.text.get(whole.clone()).unwrap_or_default();
+        match (raw.find(text), text.rfind(part)) {
+            (Some(start), Some(offset)) if !text.is_empty() => {
+                let start = whole.start + start + offset;
+                start..start + part.len()
+            }
+            _ => whole,
+        }
+    }
+
+    fn required(&self, key: &str, dimension: Dimension, range: Range, example: &str) -> Result<f64, Fault> {
+        self.quantity(key, dimension, range)?.ok_or_else(|| self.missing(key, example))
+    }
+
+    /// Refuses the first of `keys` that is given.
+    fn without(&self, keys: &[&str], why: &str) -> Result<(), Fault> {
+        let given = keys.iter().filter(|key| self.get(key).is_some()).map(|key| (self.key_span(key), key));
+        match given.min_by_key(|(span, _)| span.start) {
+            None => Ok(()),
+            Some((span, key)) => Err(Fault::new(
+                span,
+                format!("`{key}` has no place in {} here", self.name),
+                why,
+                format!("remove `{key}`"),
+            )),
+        }
+    }
+}
+
+fn unknown_key(name: &str, key: &Spanned<toml::de::DeString<'_>>, known: &[&'static str]) -> Fault {
+    let text = key.get_ref().as_ref();
+    let help = nearest(text, known).map(did_you_mean).or_else(|| {
+        let home = TABLES.iter().find(|(_, keys)| keys.contains(&text))?;
+        Some(format!("`{text}` belongs to {}", home.0))
+    });
+    Fault::new(
+        key.span(),
+        format!("unknown key {} in {name}", quoted(text)),
+        format!("known keys: {}", known.join(", ")),
+        help.unwrap_or_else(|| "remove it".to_owned()),
+    )
+}
+
+fn did_you_mean(known: &str) -> String {
+    format!("did you mean `{known}`?")
+}
+
+/// The one of `known` that `text` is most likely a misspelling of.
+fn nearest(text: &str, known: &[&'static str]) -> Option<&'static str> {
+    let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
+    // A long text is no misspelling, and comparing it takes its length squared.
+    let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
+    let best = candidates.min_by_key(distance)?;
+    let length = best.chars().count();
+    // One slip in three letters; in two letters one; a unit of one letter has no misspelling.
+    (distance(&best) <= (length / 3).max(1).min(length.saturating_sub(1))).then_some(best)
+}
+
+/// The value of a TOML number; `None` for anything else.
+fn plain_number(value: &DeValue<'_>) -> Option<Result<f64, QuantityError>> {
+    match value {
+        DeValue::Float(float) => Some(units::number(&float.as_str().replace('_', ""))),
+        DeValue::Integer(integer) => {
+            let digits = integer.as_str().replace('_', "");
+            Some(if integer.radix() == 10 {
+                units::number(&digits)
+            } else {
+                u128::from_str_radix(&digits, integer.radix()).map(|n| n as f64).map_err(|_| QuantityError::NotFinite)
+            })
+        }
+        _ => None,
+    }
+}
+
+fn type_name(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "an integer",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "a truth value",
+        DeValue::Datetime(_) => "a date or time",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    }
+}
+
+fn scene(text: &str) -> Result<Scene, Fault> {
+    let document = DeTable::parse(text).map_err(|error| not_toml(text, &error))?;
+    let root = Section::new("the scene", document.get_ref(), 0..0, text, ROOT)?;
+    let title = root.string("title", "put the title in quotes")?.map(|(title, _)| title.to_owned());
+    let velocity = match root.table("impact", "[impact]", IMPACT)? {
+        None => None,
+        Some(impact) => Some(impact.required(
+            "velocity",
+            Dimension::Velocity,
+            Range::NotNegative,
+            "\"300 m/s\", or drop [impact]",
+        )?),
+    };
+    let criterion = root.table("perforation", "[perforation]", PERFORATION)?;
+    let criterion = criterion.map_or(Ok(Criterion::default()), |section| read_criterion(&section, &root))?;
+    let projectile = root
+        .table("projectile", "[projectile]", PROJECTILE)?
+        .ok_or_else(|| root.missing_table("[projectile]", "[projectile] with mass, diameter and nose"))?;
+    let mass = projectile.required("mass", Dimension::Mass, Range::Positive, "\"2 kg\"")?;
+    let target = root.table("target", "[target]", TARGET)?;
+    let (resistance, thickness) = match root.tables("stage", "[[stage]]", STAGE)? {
+        Some(sections) => outright(&root, &projectile, target.as_ref(), &sections)?,
+        None => concrete(&root, &projectile, target.as_ref())?,
+    };
+    Ok(Scene { title, mass, resistance, thickness, criterion, velocity })
+}
+
+fn not_toml(text: &str, error: &toml::de::Error) -> Fault {
+    let span = error.span().unwrap_or(0..0);
+    // At most the rest of the line: some spans reach to the end of the file.
+    let line_end = text.get(span.start..).and_then(|rest| rest.find('\n')).map_or(text.len(), |end| span.start + end);
+    let span = span.start..span.end.clamp(span.start, line_end.max(span.start));
+    let named = text.get(span.clone()).unwrap_or_default();
+    if error.message() == "duplicate key" {
+        let message = format!("{} is given twice", quoted(named));
+        return Fault::new(span, message, "each key and table once", "remove one of the two");
+    }
+    let message = printable(error.message());
+    Fault::new(span, format!("this is not TOML: {message}"), "TOML text", "correct the syntax; strings need quotes")
+}
+
+fn read_criterion(section: &Section<'_, '_>, root: &Section<'_, '_>) -> Result<Criterion, Fault> {
+    const CRITERIA: &[&str] = &["full-depth", "ndrc"];
+    let Some((name, span)) = section.string("criterion", "write criterion = \"full-depth\"")? else {
+        return Ok(Criterion::default());
+    };
+    match name {
+        "full-depth" => Ok(Criterion::FullDepth),
+        "ndrc" if root.get("stage").is_some() => Err(Fault::new(
+            span,
+            "`ndrc` needs a projectile diameter, and a scene of stages has none",
+            "`full-depth` in a scene of stages",
+            "write criterion = \"full-depth\"",
+        )),
+        "ndrc" => Ok(Criterion::Ndrc),
+        _ => Err(Fault::new(
+            span,
+            format!("unknown criterion {}", quoted(name)),
+            "`full-depth` or `ndrc`",
+            nearest(name, CRITERIA).map_or_else(|| "write criterion = \"full-depth\"".to_owned(), did_you_mean),
+        )),
+    }
+}
+
+/// A scene that gives its stages outright.
+fn outright(
+    root: &Section<'_, '_>,
+    projectile: &Section<'_, '_>,
+    target: Option<&Section<'_, '_>>,
+    sections: &[Section<'_, '_>],
+) -> Result<(Resistance, Option<f64>), Fault> {
+    projectile.without(&["diameter", "nose"], "with [[stage]], [projectile] has only `mass`")?;
+    root.without(&["resistance"], "with [[stage]] there is no [resistance]")?;
+    let thickness = match target {
+        None => None,
+        Some(target) => {
+            target.without(&["strength", "density", "layer"], "with [[stage]], [target] has only `thickness`")?;
+            target.quantity("thickness", Dimension::Length, Range::NotNegative)?
+        }
+    };
+    let mut stages: Vec<Stage> = Vec::with_capacity(sections.len());
+    for (index, section) in sections.iter().enumerate() {
+        let read = |key, dimension, range| Ok(section.quantity(key, dimension, range)?.unwrap_or(0.0));
+        let end = section.quantity("end", Dimension::Length, Range::NotNegative)?;
+        let stage = Stage {
+            static_force: read("static_force", Dimension::Force, Range::Finite)?,
+            stiffness: read("stiffness", Dimension::Stiffness, Range::NotNegative)?,
+            viscosity: read("viscosity", Dimension::Viscosity, Range::NotNegative)?,
+            drag: read("drag", Dimension::Drag, Range::NotNegative)?,
+            end: end.unwrap_or(f64::INFINITY),
+        };
+        if end.is_none() && index + 1 < sections.len() {
+            return Err(Fault::new(
+                section.span.clone(),
+                "this stage has no `end`, and another follows",
+                "only the last stage goes without an `end`",
+                "give it an `end`, or remove the stages behind it",
+            ));
+        }
+        let previous = stages.last().map_or(0.0, |previous| previous.end);
+        if stage.end < previous {
+            return Err(Fault::new(
+                section.get("end").map_or(0..0, Spanned::span),
+                format!("this stage ends at {} m, in front of where it begins", stage.end),
+                format!("an end at {previous} m or beyond"),
+                "give the ends in order, each from the impact face",
+            ));
+        }
+        stages.push(stage);
+    }
+    if let Some((section, stage)) = sections.last().zip(stages.last())
+        && stage.end < thickness.unwrap_or(f64::INFINITY)
+    {
+        return Err(Fault::new(
+            section.get("end").map_or(0..0, Spanned::span),
+            "the last stage ends inside the target",
+            "no `end` in the last stage, or one at the target's thickness or beyond",
+            "leave out this `end`, or add the stage that follows",
+        ));
+    }
+    Ok((Resistance::Stages(stages), thickness))
+}
+
+/// A scene of Eq. 4-5.
+fn concrete(
+    root: &Section<'_, '_>,
+    projectile: &Section<'_, '_>,
+    target: Option<&Section<'_, '_>>,
+) -> Result<(Resistance, Option<f64>), Fault> {
+    let diameter = projectile.required("diameter", Dimension::Length, Range::Positive, "\"50 mm\"")?;
+    let nose_factor = projectile
+        .table("nose", "nose = { factor = 0.72 }", NOSE)?
+        .ok_or_else(|| projectile.missing("nose", "{ shape = \"flat\" }"))
+        .and_then(|nose| nose_factor(&nose))?;
+    let resistance = root.table("resistance", "[resistance]", RESISTANCE)?;
+    let number = |key, range| resistance.as_ref().map_or(Ok(None), |section| section.number(key, range));
+    let static_factor = number("S", Range::Positive)?;
+    let inertia_factor = number("B", Range::NotNegative)?.unwrap_or(1.0);
+    let crater_ratio = number("k", Range::NotNegative)?.unwrap_or(2.0);
+    let crater_stiffness =
+        resistance.as_ref().map_or(Ok(CraterStiffness::Continuous), |section| crater_stiffness(section))?;
+    let target =
+        target.ok_or_else(|| root.missing_table("[target]", "[target] with strength and density, or stages"))?;
+    let layers = layers(target, static_factor)?;
+    let thickness = if layers.is_empty() {
+        target.quantity("thickness", Dimension::Length, Range::NotNegative)?
+    } else {
+        total_thickness(target, &layers)?
+    };
+    let medium = match beyond(&layers, crater_ratio * diameter) {
+        Some(layer) => *layer,
+        None => medium(target, static_factor, Range::Positive, f64::INFINITY)?,
+    };
+    let concrete = Concrete {
+        diameter,
+        nose_factor,
+        strength: medium.strength,
+        density: medium.density,
+        static_factor: medium.static_factor,
+        inertia_factor,
+        crater_ratio,
+        crater_stiffness,
+        layers,
+    };
+    Ok((Resistance::Concrete(concrete), thickness))
+}
+
+/// Strength, density and S of a target or a layer.
+fn medium(
+    section: &Section<'_, '_>,
+    static_factor: Option<f64>,
+    strength_range: Range,
+    thickness: f64,
+) -> Result<Layer, Fault> {
+    let strength = section.required("strength", Dimension::Pressure, strength_range, "\"36 MPa\"")?;
+    let density = section.required("density", Dimension::Density, Range::NotNegative, "\"2300 kg/m^3\"")?;
+    // An air gap has no strength for Eq. 14 to go by, and needs none.
+    let eq14 = if strength == 0.0 { 0.0 } else { semi_empirical::static_factor(strength) };
+    Ok(Layer { thickness, strength, density, static_factor: static_factor.unwrap_or(eq14), viscosity: 0.0 })
+}
+
+/// The layers from the impact face on; empty without any.
+fn layers(target: &Section<'_, '_>, static_factor: Option<f64>) -> Result<Vec<Layer>, Fault> {
+    let Some(sections) = target.tables("layer", "[[target.layer]]", LAYER)? else { return Ok(Vec::new()) };
+    target.without(&["strength", "density", "thickness"], "with [[target.layer]], each layer has its own")?;
+    let read = |(index, section): (usize, &Section<'_, '_>)| {
+        let thickness = section.quantity("thickness", Dimension::Length, Range::NotNegative)?;
+        let thickness = match thickness {
+            Some(thickness) => thickness,
+            None if index + 1 == sections.len() => f64::INFINITY,
+            None => return Err(section.missing("thickness", "\"100 mm\": only the last layer goes without")),
+        };
+        let own_factor = section.number("S", Range::Positive)?.or(static_factor);
+        let viscosity = section.quantity("viscosity", Dimension::Viscosity, Range::NotNegative)?.unwrap_or(0.0);
+        Ok(Layer { viscosity, ..medium(section, own_factor, Range::NotNegative, thickness)? })
+    };
+    sections.iter().enumerate().map(read).collect()
+}
+
+/// H of a layered target; `None` when the last layer has no end.
+fn total_thickness(target: &Section<'_, '_>, layers: &[Layer]) -> Result<Option<f64>, Fault> {
+    // Summed from the face on, as the ends of the layers are.
+    let sum = layers.iter().fold(0.0, |sum, layer| sum + layer.thickness);
+    let open = layers.last().is_some_and(|last| last.thickness.is_infinite());
+    match (open, sum.is_finite()) {
+        (true, _) => Ok(None),
+        (false, true) => Ok(Some(sum)),
+        (false, false) => Err(Fault::new(
+            target.key_span("layer"),
+            "the layers sum up to no finite thickness",
+            "a finite sum",
+            "correct the thicknesses",
+        )),
+    }
+}
+
+/// The layer that holds `depth` just beyond it, else the last.
+fn beyond(layers: &[Layer], depth: f64) -> Option<&Layer> {
+    let mut end = 0.0;
+    let holds = |layer: &&Layer| {
+        end += layer.thickness;
+        end > depth
+    };
+    layers.iter().find(holds).or(layers.last())
+}
+
+fn crater_stiffness(section: &Section<'_, '_>) -> Result<CraterStiffness, Fault> {
+    const KEY: &str = "crater_stiffness";
+    if let Some(value) = section.get(KEY)
+        && let DeValue::String(text) = value.get_ref()
+    {
+        if text.trim() == "continuous" {
+            return Ok(CraterStiffness::Continuous);
+        }
+        if units::split(text.trim()).0.is_empty() {
+            return Err(Fault::new(
+                value.span(),
+                format!("unknown crater stiffness {}", quoted(text)),
+                "`continuous`, or a stiffness such as \"8.48e6 N/m\"",
+                nearest(text, &["continuous"]).map_or_else(|| "write \"continuous\"".to_owned(), did_you_mean),
+            ));
+        }
+    }
+    let given = section.quantity(KEY, Dimension::Stiffness, Range::Positive)?;
+    Ok(given.map_or(CraterStiffness::Continuous, CraterStiffness::Given))
+}
+
+/// N* of the nose, given as such or by a shape.
+fn nose_factor(nose: &Section<'_, '_>) -> Result<f64, Fault> {
+    const SHAPES: &[&str] = &["flat", "ogive", "cone", "spherical"];
+    const PARAMETERS: &[&str] = &["caliber_radius_head", "length_ratio", "radius_ratio"];
+    let factor = nose.number("factor", Range::UnitInterval)?;
+    let shape = nose.string("shape", "write shape = \"flat\"")?;
+    let (shape, span) = match (factor, shape) {
+        (Some(_), Some(_)) => {
+            return Err(Fault::new(
+                nose.key_span("shape"),
+                "the nose has both a `factor` and a `shape`",
+                "exactly one of `factor` and `shape`",
+                "remove one of the two",
+            ));
+        }
+        (None, None) => {
+            return Err(Fault::new(
+                nose.span.clone(),
+                "the nose has neither a `factor` nor a `shape`",
+                "exactly one of `factor` and `shape`",
+                "write { factor = 0.72 } or { shape = \"flat\" }",
+            ));
+        }
+        (Some(factor), None) => {
+            nose.without(PARAMETERS, "a `factor` takes no parameter of a shape")?;
+            return Ok(factor);
+        }
+        (None, Some(shape)) => shape,
+    };
+    let (parameter, range, why) = match shape {
+        "flat" => {
+            nose.without(PARAMETERS, "the shape `flat` takes no parameter")?;
+            return Ok(NoseShape::Flat.factor());
+        }
+        "ogive" => (PARAMETERS[0], Range::AtLeastHalf, "the shape `ogive` takes `caliber_radius_head`"),
+        "cone" => (PARAMETERS[1], Range::Positive, "the shape `cone` takes `length_ratio`"),
+        "spherical" => (PARAMETERS[2], Range::AtLeastHalf, "the shape `spherical` takes `radius_ratio`"),
+        _ => {
+            return Err(Fault::new(
+                span,
+                format!("unknown nose shape {}", quoted(shape)),
+                format!("one of {}", SHAPES.join(", ")),
+                nearest(shape, SHAPES)
+                    .map_or_else(|| "give the nose factor: { factor = 0.72 }".to_owned(), did_you_mean),
+            ));
+        }
+    };
+    let others: Vec<_> = PARAMETERS.iter().copied().filter(|other| *other != parameter).collect();
+    nose.without(&others, why)?;
+    let ratio = nose.number(parameter, range)?.ok_or_else(|| nose.missing(parameter, "3.0"))?;
+    Ok(match shape {
+        "ogive" => NoseShape::Ogive { caliber_radius_head: ratio },
+        "cone" => NoseShape::Cone { length_ratio: ratio },
+        _ => NoseShape::Spherical { radius_ratio: ratio },
+    }
+    .factor())
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a missing value is a failed test")]
+mod tests {
+    use approx::assert_relative_eq;
+    use insta::assert_snapshot;
+
+    use super::*;
+    use crate::physics::scene::tests as shot_14;
+    use crate::physics::{Problem, Target};
+
+    /// The contract's example, every table and key in it.
+    const FULL: &str = r#"title = "tunnel stop, blunt nose"
+[projectile]
+mass = "2 kg"
+diameter = "50 mm"
+nose = { factor = 0.72 }
+[target]
+strength = "36 MPa"
+density = "2300 kg/m^3"
+thickness = "180 mm"
+[resistance]
+S = 12.0
+B = 1.0
+k = 2.0
+crater_stiffness = "8.48e6 N/m"
+[impact]
+velocity = "300 m/s"
+[perforation]
+criterion = "ndrc"
+"#;
+
+    /// A scene of two stages.
+    const STAGES: &str = r#"[projectile]
+mass = 2
+[[stage]]
+stiffness = "8 MN/m"
+viscosity = "1e3 kg/s"
+end = "0.1 m"
+[[stage]]
+static_force = "-10 N"
+drag = "3 kg/m"
+[impact]
+velocity = 300
+"#;
+
+    fn read(text: &str) -> Scene {
+        Scene::from_toml(text, "scene.toml").unwrap_or_else(|error| panic!("{}", error.render(false)))
+    }
+
+    fn refuse(text: &str) -> Box<SceneError> {
+        Scene::from_toml(text, "scene.toml").unwrap_err()
+    }
+
+    /// `FULL` with `from` replaced; the test would be void if it were not there.
+    fn with(from: &str, to: &str) -> String {
+        assert!(FULL.contains(from), "{from}");
+        FULL.replace(from, to)
+    }
+
+    fn in_stages(from: &str, to: &str) -> String {
+        assert!(STAGES.contains(from), "{from}");
+        STAGES.replace(from, to)
+    }
+
+    fn shipped(name: &str) -> Problem {
+        let (name, text) = SHIPPED.iter().find(|(shipped, _)| *shipped == name).unwrap();
+        Scene::from_toml(text, name).unwrap().problem().unwrap()
+    }
+
+    #[test]
+    fn every_key_of_the_contract_is_read() {
+        let concrete = Concrete {
+            diameter: 0.05,
+            nose_factor: 0.72,
+            strength: 36e6,
+            density: 2300.0,
+            static_factor: 12.0,
+            inertia_factor: 1.0,
+            crater_ratio: 2.0,
+            crater_stiffness: CraterStiffness::Given(8.48e6),
+            layers: Vec::new(),
+        };
+        let scene = Scene {
+            title: Some("tunnel stop, blunt nose".to_owned()),
+            mass: 2.0,
+            resistance: Resistance::Concrete(concrete),
+            thickness: Some(0.18),
+            criterion: Criterion::Ndrc,
+            velocity: Some(300.0),
+        };
+        assert_eq!(read(FULL), scene);
+    }
+
+    #[test]
+    fn everything_optional_has_the_default_of_the_contract() {
+        let scene = read(
+            r#"
+            [projectile]
+            mass = 2
+            diameter = 0.05
+            nose.shape = "flat"
+            [target]
+            strength = 36e6
+            density = 2_300"#,
+        );
+        let concrete = scene.concrete().unwrap();
+        assert_eq!((concrete.static_factor, concrete.inertia_factor, concrete.crater_ratio), (12.0, 1.0, 2.0));
+        assert_eq!(concrete.crater_stiffness, CraterStiffness::Continuous);
+        assert_eq!((concrete.nose_factor, concrete.density), (1.0, 2300.0));
+        assert_eq!((scene.title, scene.thickness, scene.velocity), (None, None, None));
+        assert_eq!(scene.criterion, Criterion::FullDepth);
+    }
+
+    #[test]
+    fn stages_are_read_as_given_and_a_key_left_out_is_0() {
+        let scene = read(STAGES);
+        let crater = Stage { static_force: 0.0, stiffness: 8e6, viscosity: 1e3, drag: 0.0, end: 0.1 };
+        let tunnel = Stage { static_force: -10.0, stiffness: 0.0, viscosity: 0.0, drag: 3.0, end: f64::INFINITY };
+        assert_eq!(scene.resistance, Resistance::Stages(vec![crater, tunnel]));
+        let closed = in_stages("[impact]", "end = 0.3\n[target]\nthickness = \"30 cm\"\n[impact]");
+        assert_eq!(read(&closed).problem().unwrap().exit_depth, 0.3);
+    }
+
+    #[test]
+    fn noses_are_read_by_shape() {
+        for (nose, factor) in [
+            ("{ shape = \"flat\" }", 1.0),
+            ("{ shape = \"ogive\", caliber_radius_head = 2 }", 0.15625),
+            ("{ shape = \"cone\", length_ratio = 1.0 }", 0.2),
+            ("{ shape = \"spherical\", radius_ratio = 0.5 }", 0.5),
+            ("{ factor = 0 }", 0.0),
+        ] {
+            let scene = read(&with("{ factor = 0.72 }", nose));
+            assert_relative_eq!(scene.concrete().unwrap().nose_factor, factor, max_relative = 1e-15);
+        }
+    }
+
+    #[test]
+    fn layers_sum_up_and_the_one_beyond_the_crater_stands_for_the_target() {
+        let problem = shipped("layered");
+        assert_eq!((problem.target, problem.crater), (Target::Stages, Some(0)));
+        assert_eq!(problem.stages.iter().map(|stage| stage.end).collect::<Vec<_>>(), [0.1, 0.12, 0.2, f64::INFINITY]);
+        assert_relative_eq!(problem.exit_depth, 0.4, max_relative = 1e-15);
+        let (_, text) = SHIPPED.last().unwrap();
+        let gap = text.replace("25 MPa", "0 MPa").replace("thickness = \"200 mm\"\n", "S = 10\nviscosity = 5\n");
+        let scene = read(&gap.replace("velocity = \"250 m/s\"", "velocity = 1"));
+        let concrete = scene.concrete().unwrap();
+        assert_eq!((concrete.strength, scene.thickness), (60e6, None));
+        assert_eq!((concrete.layers[1].static_factor, concrete.layers[2].static_factor), (0.0, 10.0));
+        assert_eq!((concrete.layers[2].viscosity, concrete.layers[2].thickness), (5.0, f64::INFINITY));
+        assert!(scene.problem().is_ok());
+    }
+
+    #[test]
+    fn shipped_scenes_are_the_files_and_each_resolves_with_a_title_and_a_comment() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes");
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), SHIPPED.len());
+        for (name, text) in SHIPPED {
+            let scene = Scene::read(&folder.join(name).with_extension("toml")).unwrap();
+            assert_eq!(scene, Scene::from_toml(text, name).unwrap());
+            assert!(scene.problem().is_ok() && scene.title.is_some() && text.starts_with("# "), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_shipped_shot_is_the_one_of_forrestal() {
+        let scene = Scene { title: None, ..read(SHIPPED[0].1) };
+        assert_eq!(scene, shot_14::scene());
+    }
+
+    #[test]
+    fn paper_slab_and_stage_scenes_are_what_their_comments_say() {
+        let paper = shipped("paper-slab");
+        assert_relative_eq!(paper.mass / (2400.0 * 0.06_f64.powi(3)), 38.58, epsilon = 5e-3);
+        assert_eq!((paper.exit_depth, paper.stages[0].end), (0.3, 0.12));
+        let stiff = shipped("stiff");
+        assert_eq!((stiff.exit_depth, stiff.stages[0].static_force, stiff.stages.len()), (9.0, -1000.0, 1));
+        let viscous = shipped("viscous");
+        assert!(viscous.stages[0].resists() && !viscous.has_exit());
+        assert_eq!(viscous.stages[0].viscosity, stiff.stages[0].viscosity);
+        assert_eq!(shipped("graze").exit_depth, 0.200_771_166_635);
+    }
+
+    #[test]
+    fn a_byte_order_mark_and_windows_line_ends_are_no_fault() {
+        let text = text_of([b"\xef\xbb\xbf", FULL.replace('\n', "\r\n").as_bytes()].concat(), "scene.toml").unwrap();
+        assert_eq!(read(&text), read(FULL));
+        let bad = refuse(&text.replace("36 MPa", "36 m"));
+        assert_eq!(bad.location(), "scene.toml:7:16");
+    }
+}

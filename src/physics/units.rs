@@ -1,0 +1,467 @@
+//! Which SI value a text such as `26.9 mm` stands for.
+//!
+//! Units are those of the `uom` crate, by abbreviation, singular and plural. Two things are added:
+//!
+//! - the product of number and conversion factor is taken of the decimals as written and rounded once, so that
+//!   `26.9 mm` is the f64 nearest 0.0269, which `26.9 · 0.001` need not be;
+//! - pound, ounce, slug, pound-force and what is made of them convert by their exact definitions (1 lb = 0.45359237 kg,
+//!   1 in = 25.4 mm, g = 9.80665 m/s²); `uom` rounds them to seven digits.
+
+use std::str::FromStr;
+
+use thiserror::Error;
+use uom::si::f64 as si;
+
+/// What a quantity of a scene is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Dimension {
+    /// Mass [kg].
+    Mass,
+    /// Length [m].
+    Length,
+    /// Pressure or strength [Pa].
+    Pressure,
+    /// Mass density [kg/m³].
+    Density,
+    /// Velocity [m/s].
+    Velocity,
+    /// Force [N].
+    Force,
+    /// Stiffness, force per length [N/m].
+    Stiffness,
+    /// Viscosity, force per velocity [kg/s].
+    Viscosity,
+    /// Drag, force per velocity squared [kg/m].
+    Drag,
+    /// Time [s].
+    Time,
+    /// Energy [J]; no scene has one, and a unit of it is told apart from an unknown unit.
+    Energy,
+}
+
+/// Units that `uom` rounds or lacks, by exact definition: dimension, spellings, SI value.
+const EXACT: &[(Dimension, &[&str], f64)] = &[
+    (Dimension::Mass, &["lb", "lbs", "lbm", "pound", "pounds"], 0.453_592_37),
+    (Dimension::Mass, &["oz", "ounce", "ounces"], 0.028_349_523_125),
+    (Dimension::Mass, &["slug", "slugs"], 14.593_902_937_206_364),
+    (Dimension::Force, &["lbf", "pound-force", "pounds-force"], 4.448_221_615_260_5),
+    (Dimension::Force, &["kip", "kips"], 4_448.221_615_260_5),
+    (Dimension::Pressure, &["psi", "lbf/in²"], 6_894.757_293_168_361),
+    (Dimension::Pressure, &["ksi", "kip/in²"], 6_894_757.293_168_361),
+    (Dimension::Pressure, &["psf", "lbf/ft²"], 47.880_258_980_335_84),
+    (Dimension::Density, &["lb/ft³", "pcf"], 16.018_463_373_960_14),
+    (Dimension::Density, &["lb/in³"], 27_679.904_710_203_125),
+    (Dimension::Density, &["slug/ft³"], 515.378_818_393_196_2),
+    (Dimension::Density, &["t/m³", "kg/dm³", "kg/L", "kg/l"], 1e3),
+    (Dimension::Stiffness, &["N/mm"], 1e3),
+    (Dimension::Stiffness, &["kN/mm"], 1e6),
+    (Dimension::Stiffness, &["lbf/in"], 175.126_835_246_476_36),
+    (Dimension::Stiffness, &["lbf/ft"], 14.593_902_937_206_364),
+    (Dimension::Viscosity, &["N s/m", "N·s/m", "N*s/m", "Ns/m"], 1.0),
+    (Dimension::Viscosity, &["kN s/m", "kN·s/m", "kN*s/m", "kNs/m"], 1e3),
+    (Dimension::Viscosity, &["lb/s"], 0.453_592_37),
+    (Dimension::Viscosity, &["slug/s", "lbf s/ft", "lbf·s/ft", "lbf*s/ft"], 14.593_902_937_206_364),
+    (Dimension::Drag, &["N s²/m²", "N·s²/m²", "N*s²/m²"], 1.0),
+    (Dimension::Drag, &["g/mm", "t/km"], 1.0),
+    (Dimension::Drag, &["g/m"], 1e-3),
+    (Dimension::Drag, &["t/m"], 1e3),
+    (Dimension::Drag, &["lb/ft"], 1.488_163_943_569_553_7),
+    (Dimension::Drag, &["lb/in"], 17.857_967_322_834_646),
+    (Dimension::Drag, &["slug/ft"], 47.880_258_980_335_84),
+];
+
+impl Dimension {
+    /// Every dimension, those of scenes first.
+    pub const ALL: [Self; 11] = [
+        Self::Mass,
+        Self::Length,
+        Self::Pressure,
+        Self::Density,
+        Self::Velocity,
+        Self::Force,
+        Self::Stiffness,
+        Self::Viscosity,
+        Self::Drag,
+        Self::Time,
+        Self::Energy,
+    ];
+
+    /// Name for messages: `mass`.
+    pub fn noun(self) -> &'static str {
+        match self {
+            Self::Mass => "mass",
+            Self::Length => "length",
+            Self::Pressure => "pressure",
+            Self::Density => "mass density",
+            Self::Velocity => "velocity",
+            Self::Force => "force",
+            Self::Stiffness => "stiffness (force per length)",
+            Self::Viscosity => "viscosity (force per velocity)",
+            Self::Drag => "drag (force per velocity squared)",
+            Self::Time => "time",
+            Self::Energy => "energy",
+        }
+    }
+
+    /// Common units, the SI unit first.
+    pub fn units(self) -> &'static [&'static str] {
+        match self {
+            Self::Mass => &["kg", "g", "t", "mg", "lb", "oz"],
+            Self::Length => &["m", "mm", "cm", "µm", "km", "in", "ft"],
+            Self::Pressure => &["Pa", "kPa", "MPa", "GPa", "bar", "psi", "ksi"],
+            Self::Density => &["kg/m^3", "g/cm^3", "t/m^3", "lb/ft^3", "lb/in^3"],
+            Self::Velocity => &["m/s", "mm/s", "km/s", "km/h", "ft/s"],
+            Self::Force => &["N", "kN", "MN", "lbf", "kgf"],
+            Self::Stiffness => &["N/m", "kN/m", "MN/m", "N/mm", "lbf/in"],
+            Self::Viscosity => &["kg/s", "N s/m", "g/s", "lb/s"],
+            Self::Drag => &["kg/m", "g/cm", "g/m", "lb/ft"],
+            Self::Time => &["s", "ms", "µs", "min"],
+            Self::Energy => &["J", "kJ", "MJ"],
+        }
+    }
+
+    /// SI value of one `unit`; `None` for a unit that is not of this dimension.
+    pub fn coefficient(self, unit: &str) -> Option<f64> {
+        let unit = canonical(unit);
+        let exact = EXACT.iter().find(|(dimension, names, _)| *dimension == self && names.contains(&unit.as_str()));
+        if let Some((_, _, coefficient)) = exact {
+            return Some(*coefficient);
+        }
+        let coefficient = match self {
+            Self::Mass => one::<si::Mass>(&unit).map(|q| q.value),
+            Self::Length => one::<si::Length>(&unit).map(|q| q.value),
+            Self::Pressure => one::<si::Pressure>(&unit).map(|q| q.value),
+            Self::Density => one::<si::MassDensity>(&unit).map(|q| q.value),
+            Self::Velocity => one::<si::Velocity>(&unit).map(|q| q.value),
+            Self::Force => one::<si::Force>(&unit).map(|q| q.value),
+            Self::Stiffness => one::<si::SurfaceTension>(&unit).map(|q| q.value),
+            Self::Viscosity => one::<si::MassRate>(&unit).map(|q| q.value),
+            Self::Drag => one::<si::LinearMassDensity>(&unit).map(|q| q.value),
+            Self::Time => one::<si::Time>(&unit).map(|q| q.value),
+            Self::Energy => one::<si::Energy>(&unit).map(|q| q.value),
+        }?;
+        // Some prefixes are quotients of rounded powers of ten there: 1 µg gives 9.999999999999999e-10 kg.
+        let power = format!("1e{}", coefficient.log10().round()).parse().unwrap_or(coefficient);
+        Some(if (coefficient / power - 1.0).abs() < 1e-15 { power } else { coefficient })
+    }
+
+    /// The dimension that `unit` has, if any.
+    pub fn of(unit: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|dimension| dimension.coefficient(unit).is_some())
+    }
+}
+
+/// One of a unit, read by `uom`.
+fn one<Q: FromStr>(unit: &str) -> Option<Q> {
+    format!("1 {unit}").parse().ok()
+}
+
+/// Spelling that the tables know: single spaces, `²` and `³` for `^2`, `^3` or a digit after a letter, one micro sign.
+fn canonical(unit: &str) -> String {
+    let words = unit.split_whitespace().collect::<Vec<_>>().join(" ").replace(" ^", "^").replace(" / ", "/");
+    let mut text = String::with_capacity(words.len());
+    for symbol in words.replace('^', "").chars() {
+        let after_letter = text.chars().next_back().is_some_and(char::is_alphabetic);
+        text.push(match symbol {
+            '2' if after_letter => '²',
+            '3' if after_letter => '³',
+            // Greek mu, as keyboards give it, for the micro sign.
+            'μ' => 'µ',
+            other => other,
+        });
+    }
+    match text.as_str() {
+        "um" => "µm".to_owned(),
+        "us" => "µs".to_owned(),
+        _ => text,
+    }
+}
+
+/// Why a text is no quantity.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum QuantityError {
+    /// No number in front.
+    #[error("there is no number in front of the unit")]
+    NoNumber,
+    /// NaN, an infinity, or beyond the largest `f64`.
+    #[error("the number is not finite in 64 bits")]
+    NotFinite,
+    /// Not zero as written, zero as an `f64`.
+    #[error("the number is too small for 64 bits: it would be read as 0")]
+    TooSmall,
+    /// A number alone.
+    #[error("there is no unit")]
+    NoUnit,
+    /// A unit of another dimension.
+    #[error("`{unit}` is a unit of {}", .has.noun())]
+    WrongDimension {
+        /// The unit.
+        unit: String,
+        /// What it is a unit of.
+        has: Dimension,
+    },
+    /// No unit that is known.
+    #[error("`{unit}` is no known unit")]
+    UnknownUnit {
+        /// The text in place of a unit.
+        unit: String,
+    },
+}
+
+/// Splits `text` into the number in front and what follows it; the number may be empty.
+pub fn split(text: &str) -> (&str, &str) {
+    let bytes = text.as_bytes();
+    let digits = |from: usize| from + bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
+    let mut end = usize::from(bytes.first().is_some_and(|b| matches!(b, b'+' | b'-')));
+    let start = end;
+    end = digits(end);
+    let mut count = end - start;
+    if bytes.get(end) == Some(&b'.') {
+        let fraction = digits(end + 1);
+        count += fraction - end - 1;
+        end = fraction;
+    }
+    if count == 0 {
+        return ("", text);
+    }
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(bytes.get(end + 1).is_some_and(|b| matches!(b, b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        // `5 eV` has no exponent: a digit has to follow.
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    text.split_at(end)
+}
+
+/// The `f64` nearest the decimal `number`.
+///
+/// # Errors
+/// [`QuantityError::NotFinite`] for NaN, infinities and overflow; [`QuantityError::TooSmall`] for a number that is
+/// not zero and would be read as zero; [`QuantityError::NoNumber`] for anything else that is no number.
+pub fn number(number: &str) -> Result<f64, QuantityError> {
+    let value: f64 = number.parse().map_err(|_| QuantityError::NoNumber)?;
+    let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
+    if !value.is_finite() {
+        Err(QuantityError::NotFinite)
+    } else if value == 0.0 && mantissa.contains(|digit: char| ('1'..='9').contains(&digit)) {
+        Err(QuantityError::TooSmall)
+    } else {
+        // Adding zero turns -0 into 0, which no formula needs to think about then.
+        Ok(value + 0.0)
+    }
+}
+
+/// SI value of a text `number unit`, of `dimension`. White space around and between is free, and may be absent.
+///
+/// # Errors
+/// [`QuantityError`]: what is wrong with the text.
+///
+/// # Accuracy
+/// Correctly rounded where the SI value of the unit is a decimal of at most 17 digits, as it is for metric units;
+/// within 1 ulp else (units such as psi, whose value is itself rounded to `f64`).
+///
+/// # Example
+/// ```
+/// use penetrode::physics::units::{Dimension, quantity};
+/// assert_eq!(quantity("26.9 mm", Dimension::Length), Ok(0.0269));
+/// assert_eq!(quantity("36MPa", Dimension::Pressure), Ok(36e6));
+/// ```
+pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
+    let text = text.trim();
+    let (digits, unit) = split(text);
+    if digits.is_empty() {
+        let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+        let word = word.split_whitespace().next().unwrap_or_default();
+        return Err(match word {
+            "nan" | "inf" | "infinity" => QuantityError::NotFinite,
+            _ => QuantityError::NoNumber,
+        });
+    }
+    number(digits)?;
+    let unit = unit.trim();
+    if unit.is_empty() {
+        return Err(QuantityError::NoUnit);
+    }
+    let coefficient = dimension.coefficient(unit).ok_or_else(|| match Dimension::of(unit) {
+        Some(has) => QuantityError::WrongDimension { unit: unit.to_owned(), has },
+        None => QuantityError::UnknownUnit { unit: unit.to_owned() },
+    })?;
+    number(&product(digits, coefficient))
+}
+
+/// Decimal text of `number · coefficient`, exact where 38 digits hold it.
+fn product(number: &str, coefficient: f64) -> String {
+    let exact = || {
+        let (left, left_exponent) = decimal(number)?;
+        let (right, right_exponent) = decimal(&format!("{coefficient:e}"))?;
+        Some(format!("{}e{}", left.checked_mul(right)?, left_exponent.checked_add(right_exponent)?))
+    };
+    // Beyond 38 digits the last ones do not matter: two roundings more.
+    exact().unwrap_or_else(|| format!("{:e}", number.parse().unwrap_or(f64::NAN) * coefficient))
+}
+
+/// Signed digits and power of ten of a decimal.
+fn decimal(text: &str) -> Option<(i128, i64)> {
+    let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let exponent: i64 = exponent.parse().ok()?;
+    Some((format!("{whole}{fraction}").parse().ok()?, exponent.checked_sub(i64::try_from(fraction.len()).ok()?)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_common_unit_of_every_dimension_is_known_and_of_that_dimension_alone() {
+        for dimension in Dimension::ALL {
+            assert_eq!(dimension.coefficient(dimension.units()[0]), Some(1.0), "{dimension:?}");
+            for unit in dimension.units() {
+                assert!(quantity(&format!("1 {unit}"), dimension).is_ok(), "{unit}");
+                assert_eq!(Dimension::of(unit), Some(dimension), "{unit}");
+            }
+        }
+        for (dimension, names, value) in EXACT {
+            for name in *names {
+                assert_eq!(quantity(&format!("1{name}"), *dimension), Ok(*value), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn conversions_are_the_nearest_f64_of_the_decimal() {
+        for (text, dimension, value) in [
+            ("26.9 mm", Dimension::Length, 0.0269),
+            ("0.0269 m", Dimension::Length, 0.0269),
+            ("2.69cm", Dimension::Length, 0.0269),
+            ("7 µm", Dimension::Length, 7e-6),
+            ("7 um", Dimension::Length, 7e-6),
+            ("7 \u{3bc}m", Dimension::Length, 7e-6),
+            ("1.3 km", Dimension::Length, 1300.0),
+            ("0.1 in", Dimension::Length, 0.00254),
+            ("0.7 ft", Dimension::Length, 0.213_36),
+            ("36 MPa", Dimension::Pressure, 36e6),
+            ("35.2 MPa", Dimension::Pressure, 35.2e6),
+            ("0.0363 GPa", Dimension::Pressure, 36.3e6),
+            ("41.1 kPa", Dimension::Pressure, 41_100.0),
+            ("36.3 N/mm²", Dimension::Pressure, 36.3e6),
+            ("36.3 N/mm^2", Dimension::Pressure, 36.3e6),
+            ("906 g", Dimension::Mass, 0.906),
+            ("64.9 mg", Dimension::Mass, 64.9e-6),
+            ("2.27 t", Dimension::Mass, 2270.0),
+            ("2.37 g/cm3", Dimension::Density, 2370.0),
+            ("2.37 g/cm³", Dimension::Density, 2370.0),
+            ("2300 kg/m^3", Dimension::Density, 2300.0),
+            ("2300 kg/m3", Dimension::Density, 2300.0),
+            ("2300 kg/m³", Dimension::Density, 2300.0),
+            ("2300 kg / m ^3", Dimension::Density, 2300.0),
+            ("0.277 km/s", Dimension::Velocity, 277.0),
+            ("1000.5 ft/s", Dimension::Velocity, 304.9524),
+            ("8.48e3 kN/m", Dimension::Stiffness, 8.48e6),
+            ("-10 N", Dimension::Force, -10.0),
+            ("+0.0103 MN", Dimension::Force, 10_300.0),
+            ("1e3 kg/s", Dimension::Viscosity, 1e3),
+            ("1.1 kN s/m", Dimension::Viscosity, 1.1e3),
+            (".5 kg/m", Dimension::Drag, 0.5),
+            ("5. g/cm", Dimension::Drag, 0.5),
+            ("  3 \u{a0} µs ", Dimension::Time, 3e-6),
+        ] {
+            assert_eq!(quantity(text, dimension), Ok(value), "{text}");
+        }
+    }
+
+    #[test]
+    fn metric_prefixes_of_the_library_are_exact_powers_of_ten() {
+        // Each prefix is a quotient of two f64 powers in the table of the library.
+        for (prefix, power) in [("k", "3"), ("M", "6"), ("G", "9"), ("m", "-3"), ("µ", "-6"), ("n", "-9")] {
+            for (unit, dimension, base) in [
+                ("m", Dimension::Length, 0),
+                ("g", Dimension::Mass, -3),
+                ("Pa", Dimension::Pressure, 0),
+                ("N", Dimension::Force, 0),
+                ("N/m", Dimension::Stiffness, 0),
+                ("m/s", Dimension::Velocity, 0),
+                ("g/s", Dimension::Viscosity, -3),
+                ("g/m³", Dimension::Density, -3),
+                ("s", Dimension::Time, 0),
+            ] {
+                let exponent = power.parse::<i32>().unwrap_or_default() + base;
+                let exact = format!("1e{exponent}").parse().ok();
+                let Some(coefficient) = dimension.coefficient(&format!("{prefix}{unit}")) else { continue };
+                assert_eq!(Some(coefficient), exact, "{prefix}{unit}");
+            }
+        }
+    }
+
+    #[test]
+    fn customary_units_follow_their_exact_definitions() {
+        let (pound, foot, inch, gravity) = (0.453_592_37_f64, 0.3048_f64, 0.0254_f64, 9.806_65_f64);
+        let pound_force = pound * gravity;
+        for (unit, dimension, value) in [
+            ("oz", Dimension::Mass, pound / 16.0),
+            ("slug", Dimension::Mass, pound_force / foot),
+            ("lbf", Dimension::Force, pound_force),
+            ("kip", Dimension::Force, 1e3 * pound_force),
+            ("psi", Dimension::Pressure, pound_force / (inch * inch)),
+            ("ksi", Dimension::Pressure, 1e3 * pound_force / (inch * inch)),
+            ("psf", Dimension::Pressure, pound_force / (foot * foot)),
+            ("lb/ft3", Dimension::Density, pound / foot.powi(3)),
+            ("lb/in3", Dimension::Density, pound / inch.powi(3)),
+            ("slug/ft3", Dimension::Density, pound_force / foot.powi(4)),
+            ("lbf/in", Dimension::Stiffness, pound_force / inch),
+            ("lbf/ft", Dimension::Stiffness, pound_force / foot),
+            ("lb/s", Dimension::Viscosity, pound),
+            ("slug/s", Dimension::Viscosity, pound_force / foot),
+            ("lb/ft", Dimension::Drag, pound / foot),
+            ("lb/in", Dimension::Drag, pound / inch),
+            ("slug/ft", Dimension::Drag, pound_force / (foot * foot)),
+        ] {
+            approx::assert_relative_eq!(dimension.coefficient(unit).unwrap_or(f64::NAN), value, max_relative = 5e-16);
+        }
+    }
+
+    #[test]
+    fn texts_that_are_no_quantity_say_why() {
+        let refused = |text: &str| quantity(text, Dimension::Length).map_err(|error| error.to_string());
+        for (text, message) in [
+            ("", "there is no number in front of the unit"),
+            ("mm", "there is no number in front of the unit"),
+            (". mm", "there is no number in front of the unit"),
+            ("nan mm", "the number is not finite in 64 bits"),
+            ("-inf mm", "the number is not finite in 64 bits"),
+            ("1e400 mm", "the number is not finite in 64 bits"),
+            ("1e308 km", "the number is not finite in 64 bits"),
+            ("1e-400 m", "the number is too small for 64 bits: it would be read as 0"),
+            ("1e-323 mm", "the number is too small for 64 bits: it would be read as 0"),
+            ("5", "there is no unit"),
+            ("5 kg", "`kg` is a unit of mass"),
+            ("5 s", "`s` is a unit of time"),
+            ("5 J", "`J` is a unit of energy"),
+            ("5 furlong", "`furlong` is no known unit"),
+            ("5 eV", "`eV` is a unit of energy"),
+            ("1,5 mm", "`,5 mm` is no known unit"),
+            ("5 mm mm", "`mm mm` is no known unit"),
+        ] {
+            assert_eq!(refused(text), Err(message.to_owned()), "{text}");
+        }
+    }
+
+    #[test]
+    fn zero_and_many_digits_are_read() {
+        assert_eq!(quantity("0.000e-999 m", Dimension::Length), Ok(0.0));
+        assert!(quantity("-0 m", Dimension::Length).is_ok_and(f64::is_sign_positive));
+        let many = format!("0.{}m", "3".repeat(500));
+        assert_eq!(quantity(&many, Dimension::Length), Ok(1.0 / 3.0));
+    }
+
+    #[test]
+    fn a_number_ends_where_no_exponent_follows() {
+        assert_eq!(split("5 eV"), ("5", " eV"));
+        assert_eq!(split("5e"), ("5", "e"));
+        assert_eq!(split("5e-3mm"), ("5e-3", "mm"));
+        assert_eq!(split("-.5e+3"), ("-.5e+3", ""));
+        assert_eq!(split("e5"), ("", "e5"));
+    }
+}
