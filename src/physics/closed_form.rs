@@ -1,0 +1,683 @@
+//! Where, when and how fast, without integrating: the exact solution of a [`Problem`], stage by stage.
+//!
+//! A stage `M dV/dt = -(p + s x + r V + q V²)` is entered at time t0, depth x0, speed V0 and left at its limit
+//! (its end, or the exit depth) or not at all. With `xi = x - x0`, `f = (p + s x)/M` the static deceleration and
+//! `f0 = (p + s x0)/M`, three families have a solution in elementary functions:
+//!
+//! ```text
+//! p, q (r = s = 0)   V² = V0² e^{-y} - (2 p xi/M) E(-y),  y = 2 q xi/M,  E(z) = expm1(z)/z
+//!                    t  = tau T(tau sqrt(p q)/M),  tau = 2 xi E(-y)/(V + V0 e^{-y}),  T(z) = atan(z)/z (atanh for p < 0)
+//!                    rest at xi = (M/(2 q)) log1p(q V0²/p),  tau = M V0/p
+//! p, s (q = r = 0)   V² = V0² - xi (f0 + f),  t = atan2(w (f V0 - f0 V), w² V V0 + f0 f)/w,  w² = s/M
+//!                    rest at xi = V0²/(f0 + hypot(f0, w V0)),  T = atan2(w V0, f0)/w
+//! p, s, r (q = 0)    damped oscillation: xi(t) and V(t), rest at an elementary time; passing a depth is one scalar root
+//! ```
+//!
+//! The form for `tau` is ours: it follows from `V0 - V = (2 xi/M) E(-y) (p + q V0²)/(V0 + V)`, and it needs no
+//! difference of nearly equal speeds, holds for p of either sign and through p = 0, q = 0 and terminal velocity.
+//! The crater (Eq. 4) is `s` alone, the tunnel (Eq. 5) `p, q`. Stages with r and q, or with s and q, have no form
+//! here: of the latter the speed over depth is known ([`squared_speed_at`]), the time is not.
+//!
+//! Accuracy: depth, times and velocities (these relative to V0), critical velocity and energy stay within
+//! 8 ulp x max(1, condition number) of the 50-digit reference ([`super::reference`]).
+//!
+//! Source: Li & Chen (2003) for crater and tunnel; the others from the linear and separable equations above.
+
+use smallvec::SmallVec;
+use thiserror::Error;
+
+use super::event::{Event, EventKind, Outcome, State};
+use super::exit_energy::{carry, exit_margin, expm1_over, second_exponential_integral};
+use super::scene::CraterStiffness;
+use super::stage::{Problem, Stage};
+
+/// The exact course of a flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// How it ended: by energy and depth, never `Undecided` (the bar below is for the caller to judge by).
+    pub outcome: Outcome,
+    /// Index from 0 of the stage in which it ended.
+    pub stage: usize,
+    /// State at the end: at rest `X, T, 0`; perforated: exit depth, time of exit, V_r.
+    pub end: State,
+    /// Events in time order; at one place stage ends, exit, rest.
+    pub events: SmallVec<[Event; 4]>,
+    /// Exit margin `W(exit)/V0²` ([`super::exit_energy`]); `None` without an exit depth or an impact speed.
+    pub exit_margin: Option<f64>,
+    /// Half-width of the round-off bar of the margin.
+    pub exit_margin_error: Option<f64>,
+}
+
+/// Why there is no closed form, or no end of the flight.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ClosedFormError {
+    /// A stage on the way has no solution in elementary functions.
+    #[error("stage {stage} has no closed form: {why}")]
+    NoForm {
+        /// Index of the stage from 0.
+        stage: usize,
+        /// Which combination of coefficients stands in the way.
+        why: &'static str,
+    },
+    /// Nothing stops the projectile and there is no far side, or both are only approached.
+    #[error("the flight never ends: {why}; entered the last stage at {last}")]
+    NeverEnds {
+        /// What keeps it going.
+        why: &'static str,
+        /// State in which the endless stage was entered.
+        last: State,
+    },
+    /// A quantity left the range of 64-bit numbers.
+    #[error("the closed form of stage {stage} leaves the range of 64-bit numbers after {last}")]
+    OutOfRange {
+        /// Index of the stage from 0.
+        stage: usize,
+        /// Last state in range.
+        last: State,
+    },
+}
+
+/// Solves `problem` from impact to rest or exit.
+///
+/// Without an allocation for crater and tunnel. At one place: reaching a depth with no speed left is reaching it, so
+/// `X = exit depth` is a perforation with `V_r = 0` and rest exactly at k d is a stop in the crater.
+///
+/// # Errors
+/// [`ClosedFormError`]: a stage on the way has no closed form, the flight never ends, or a number is out of range.
+///
+/// # Example
+/// ```
+/// use penetrode::physics::{Outcome, Problem, Stage, Target, closed_form};
+/// // 100 N against 1 kg at 10 m/s: V0²/(2 a) = 0.5 m in V0/a = 0.1 s.
+/// let problem = Problem {
+///     mass: 1.0,
+///     impact_speed: 10.0,
+///     exit_depth: f64::INFINITY,
+///     stages: [Stage::tunnel(100.0, 0.0)].into_iter().collect(),
+///     crater: None,
+///     target: Target::CraterAndTunnel,
+/// };
+/// let solution = closed_form::solve(&problem)?;
+/// assert_eq!(solution.outcome, Outcome::StoppedInTunnel);
+/// assert_eq!((solution.end.depth, solution.end.time), (0.5, 0.1));
+/// # Ok::<(), closed_form::ClosedFormError>(())
+/// ```
+pub fn solve(problem: &Problem) -> Result<Solution, ClosedFormError> {
+    let mut events = SmallVec::new();
+    let Arrival { stage, state: end, reached } = follow(problem, problem.exit_depth, Some(&mut events))?;
+    let outcome = if reached { Outcome::Perforated } else { problem.stop_in(stage) };
+    let margin = exit_margin(problem, outcome, stage, end, &events);
+    Ok(Solution {
+        outcome,
+        stage,
+        end,
+        events,
+        exit_margin: margin,
+        exit_margin_error: margin.map(|margin| margin_bar(problem, stage, end.depth, margin)),
+    })
+}
+
+/// The state in which the flight passes `depth` [m], rest there included; `None` where it never gets.
+///
+/// Depths beyond the exit depth are not reached. With [`solve`] this gives the path: V(x) and t(x).
+///
+/// # Errors
+/// As [`solve`], for the stages up to `depth` only.
+pub fn state_at(problem: &Problem, depth: f64) -> Result<Option<State>, ClosedFormError> {
+    // `<=` and not `>`, so that a NaN is not reached either.
+    if !(depth <= problem.exit_depth && depth.is_finite()) || depth < 0.0 {
+        return Ok(None);
+    }
+    let arrival = follow(problem, depth, None)?;
+    Ok((arrival.state.depth == depth).then_some(arrival.state))
+}
+
+/// `W = V²` [m²/s²] at `depth`, continued below zero beyond rest; `None` when a stage before `depth` has r > 0.
+///
+/// Unlike [`state_at`] it covers stages with stiffness and drag together.
+pub fn squared_speed_at(problem: &Problem, depth: f64) -> Option<f64> {
+    let mut w = problem.impact_speed * problem.impact_speed;
+    let mut from = 0.0;
+    for stage in &problem.stages {
+        let to = stage.end.min(depth);
+        if to > from {
+            if stage.viscosity > 0.0 {
+                return None;
+            }
+            w = carry(stage, problem.mass, w, from, to);
+            from = to;
+        }
+        if stage.end >= depth {
+            break;
+        }
+    }
+    Some(w)
+}
+
+/// Where a flight arrived.
+struct Arrival {
+    stage: usize,
+    state: State,
+    /// Whether it got to the depth asked for.
+    reached: bool,
+}
+
+/// Goes through the stages until rest or until depth `until`, and notes the events.
+fn follow(
+    problem: &Problem,
+    until: f64,
+    mut events: Option<&mut SmallVec<[Event; 4]>>,
+) -> Result<Arrival, ClosedFormError> {
+    let mut note = |kind, state| {
+        if let Some(events) = events.as_deref_mut() {
+            events.push(Event { kind, state });
+        }
+    };
+    let mut state = State::at_impact(problem);
+    // The stage flown last, so that rest on a boundary counts to the stage before it; none yet at the face.
+    let mut flown = None;
+    for (index, stage) in problem.stages.iter().enumerate() {
+        let limit = if until < stage.end { until } else { stage.end };
+        if limit > state.depth {
+            if state.velocity <= 0.0 {
+                note(EventKind::Rest, state);
+                return Ok(Arrival { stage: flown.unwrap_or(index), state, reached: false });
+            }
+            flown = Some(index);
+            let entry = state;
+            let leg = leg(stage, problem.mass, entry, limit).map_err(|why| ClosedFormError::NoForm { stage: index, why })?;
+            let (kept_on, next) = match leg {
+                Leg::Passes { time, velocity } => (true, State { time: entry.time + time, depth: limit, velocity }),
+                Leg::Rests { time, way } => {
+                    // The depth of rest and the speed at the limit round apart; the limit was not reached.
+                    let depth = (entry.depth + way).min(limit);
+                    (false, State { time: entry.time + time, depth, velocity: 0.0 })
+                }
+                Leg::Endless(why) => return Err(ClosedFormError::NeverEnds { why, last: entry }),
+            };
+            if !(next.time.is_finite() && next.depth.is_finite() && next.velocity.is_finite()) {
+                return Err(ClosedFormError::OutOfRange { stage: index, last: entry });
+            }
+            state = next;
+            if !kept_on {
+                note(EventKind::Rest, state);
+                return Ok(Arrival { stage: index, state, reached: false });
+            }
+        }
+        if stage.end <= until {
+            note(EventKind::boundary(problem, index), state);
+        }
+        // Stages of no length may end at the exit as well; they are noted before it.
+        let more_here = stage.end <= until && problem.stages.get(index + 1).is_some_and(|next| next.end <= until);
+        if limit == until && !more_here {
+            note(EventKind::Exit, state);
+            if state.velocity <= 0.0 {
+                note(EventKind::Rest, state);
+            }
+            let at_face = if stage.end <= until { (index + 1).min(problem.stages.len() - 1) } else { index };
+            return Ok(Arrival { stage: flown.unwrap_or(at_face), state, reached: true });
+        }
+    }
+    // Only a list whose last stage ends gets here, which the invariants of a problem exclude.
+    Err(ClosedFormError::NeverEnds { why: "the last stage ends and nothing follows", last: state })
+}
+
+/// How a stage is left.
+enum Leg {
+    /// At its limit, after `time` [s], with `velocity` [m/s].
+    Passes { time: f64, velocity: f64 },
+    /// Not at all: rest after `time` [s] and `way` [m].
+    Rests { time: f64, way: f64 },
+    /// Not at all, and without rest.
+    Endless(&'static str),
+}
+
+/// One stage from `entry` (V > 0) to `limit` (beyond it, possibly infinite).
+fn leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Result<Leg, &'static str> {
+    match (stage.stiffness > 0.0, stage.viscosity > 0.0, stage.drag > 0.0) {
+        (false, false, _) => Ok(drag_leg(stage, mass, entry, limit)),
+        (true, false, false) => Ok(spring_leg(stage, mass, entry, limit)),
+        (_, true, false) => Ok(viscous_leg(stage, mass, entry, limit)),
+        (true, false, true) => Err("stiffness and drag together give the speed over depth but no elementary time"),
+        (_, true, true) => Err("viscosity and drag act together"),
+    }
+}
+
+/// `F = p + q V²`, p of any sign, q >= 0: the tunnel, constant force, drag alone, free flight.
+#[inline]
+fn drag_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
+    let (p, q, v0) = (stage.static_force, stage.drag, entry.velocity);
+    let xi = limit - entry.depth;
+    if limit.is_finite() {
+        let y = 2.0 * q * xi / mass;
+        let (decay, mean_decay) = decay_and_mean(y);
+        let w = v0 * v0 * decay - 2.0 * p * xi / mass * mean_decay;
+        if w >= 0.0 {
+            // Without a static force w may underflow where its root does not.
+            let v = if p == 0.0 { v0 * (-0.5 * y).exp() } else { w.sqrt() };
+            return Leg::Passes { time: drag_time(p, q, mass, xi, y, v0, v), velocity: v };
+        }
+    }
+    if p > 0.0 {
+        let u = q * v0 * v0 / p;
+        let tau = mass * v0 / p;
+        // Below 1e-200 the logarithm equals u, and u may have lost its digits.
+        let way = if u > 1e-200 { 0.5 * mass / q * u.ln_1p() } else { 0.5 * tau * v0 };
+        return Leg::Rests { time: tau * atan_over(u.sqrt()), way };
+    }
+    Leg::Endless(match (p < 0.0, q > 0.0) {
+        (true, _) => "the last stage drives the projectile",
+        (false, true) => "drag alone never brings it to rest",
+        (false, false) => "no force acts in the last stage",
+    })
+}
+
+/// Time [s] from speed `v0` to `v` over the way `xi` under `p + q V²`, `y = 2 q xi/M`.
+fn drag_time(p: f64, q: f64, mass: f64, xi: f64, y: f64, v0: f64, v: f64) -> f64 {
+    let (decay, mean_decay) = decay_and_mean(y);
+    if p == 0.0 {
+        // tau with V = V0 e^{-y/2}, freed of the exponentials that underflow: (xi/V0) E(y/2).
+        return xi / v0 * expm1_over(0.5 * y);
+    }
+    let tau = 2.0 * xi * mean_decay / (v + v0 * decay);
+    if p > 0.0 {
+        return tau * atan_over((p * q).sqrt() * tau / mass);
+    }
+    let rate = (-p * q).sqrt() / mass;
+    let z = rate * tau;
+    if z < 0.5 {
+        return tau * atanh_over(z);
+    }
+    // Near terminal velocity z -> 1; (1 + z)/(1 - z) in speeds, with e^y taken out.
+    let terminal = (-p / q).sqrt();
+    let ratio = (v + terminal) / (v0 + terminal) * ((v + terminal + (v0 - terminal) * decay) / (v0 + v));
+    0.5 * (y + ratio.ln()) / rate
+}
+
+/// `F = p + s x`, s > 0: the crater, and a spring that may be pulled first (p + s x < 0).
+#[inline]
+fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
+    let v0 = entry.velocity;
+    let w = (stage.stiffness / mass).sqrt();
+    let f0 = (stage.static_force + stage.stiffness * entry.depth) / mass;
+    let xi = limit - entry.depth;
+    if f0 == 0.0 {
+        // The spring is entered where it is slack: the crater, and the hot path.
+        let (sine, energy) = (w * xi, (v0 - w * xi) * (v0 + w * xi));
+        if energy >= 0.0 {
+            let v = energy.sqrt();
+            return Leg::Passes { time: sine.atan2(v) / w, velocity: v };
+        }
+        return Leg::Rests { time: std::f64::consts::FRAC_PI_2 / w, way: v0 / w };
+    }
+    if limit.is_finite() {
+        let f = (stage.static_force + stage.stiffness * limit) / mass;
+        let energy = v0 * v0 - xi * (f0 + f);
+        if energy >= 0.0 {
+            let v = energy.sqrt();
+            // f V0 - f0 V, where f and f0 have one sign as a sum of terms of one sign.
+            let crossed = if f0 < 0.0 && f > 0.0 {
+                f * v0 - f0 * v
+            } else {
+                xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)))
+            };
+            return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, velocity: v };
+        }
+    }
+    let reach = f0.hypot(w * v0);
+    let way = if f0 > 0.0 { v0 * (v0 / (f0 + reach)) } else { (reach - f0) / (w * w) };
+    Leg::Rests { time: (w * v0).atan2(f0) / w, way }
+}
+
+/// `F = p + s x + r V`, r > 0: a damped oscillator, or drag in proportion to speed when s = 0.
+///
+/// Kept out of line: the hot path has no viscosity.
+#[inline(never)]
+fn viscous_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
+    let motion = Damped::new(stage, mass, entry);
+    let way_to_limit = limit - entry.depth;
+    if stage.static_force == 0.0 && stage.stiffness == 0.0 {
+        // Viscosity alone: the speed falls by r/M for each metre.
+        let lost = motion.fast * way_to_limit / motion.v0;
+        return if lost < 1.0 {
+            Leg::Passes { time: -(-lost).ln_1p() / motion.fast, velocity: motion.v0 * (1.0 - lost) }
+        } else {
+            Leg::Endless("viscosity alone never brings it to rest")
+        };
+    }
+    let rest = motion.rest_time();
+    if let Some(time) = rest {
+        let (way, _) = motion.after(time);
+        if way < way_to_limit {
+            return Leg::Rests { time, way };
+        }
+    }
+    if limit.is_infinite() {
+        return Leg::Endless("its drive and its viscosity balance");
+    }
+    match motion.time_over(way_to_limit, rest) {
+        Some(time) => Leg::Passes { time, velocity: motion.after(time).1.max(0.0) },
+        None => Leg::Endless("it creeps towards a depth that it never reaches"),
+    }
+}
+
+/// The linear motion `u'' + 2 g u' + w² u = 0`, `u = x + p/s`, from `u' = V0` and `w² u = f0`.
+struct Damped {
+    /// Speed at the start [m/s].
+    v0: f64,
+    /// Static deceleration at the start `f0 = (p + s x0)/M` [m/s²].
+    f0: f64,
+    /// `w² = s/M` [1/s²].
+    w2: f64,
+    /// `g = r/(2 M)` [1/s].
+    g: f64,
+    /// `|g² - w²|^(1/2)` [1/s].
+    m: f64,
+    /// Sign of `g² - w²`: overdamped, critical, underdamped.
+    damping: std::cmp::Ordering,
+    /// Overdamped: the fast rate `l1 = g + m` [1/s].
+    fast: f64,
+    /// Overdamped: the slow rate `l2 = w²/l1` [1/s], not from `g - m`, which cancels.
+    slow: f64,
+}
+
+impl Damped {
+    fn new(stage: &Stage, mass: f64, entry: State) -> Self {
+        let w2 = stage.stiffness / mass;
+        let w = w2.sqrt();
+        let g = 0.5 * stage.viscosity / mass;
+        let m = ((g - w).abs() * (g + w)).sqrt();
+        Self {
+            v0: entry.velocity,
+            f0: (stage.static_force + stage.stiffness * entry.depth) / mass,
+            w2,
+            g,
+            m,
+            damping: g.total_cmp(&w),
+            fast: g + m,
+            slow: w2 / (g + m),
+        }
+    }
+
+    /// Way [m] and speed [m/s] after time `t` [s].
+    fn after(&self, t: f64) -> (f64, f64) {
+        let Self { v0, f0, w2, g, m, .. } = *self;
+        if (g + w2.sqrt()) * t < 0.5 {
+            // Taylor series of u: 20 terms leave less than 1e-18 of the sum, and nothing cancels to first order.
+            let (mut u1, mut u2) = (v0 * t, -0.5 * (2.0 * g * v0 + f0) * t * t);
+            let (mut way, mut speed) = (u1 + u2, u1 + 2.0 * u2);
+            for n in 1..20_u32 {
+                let n = f64::from(n);
+                let u3 = -(2.0 * g * t * (n + 1.0) * u2 + w2 * t * t * u1) / ((n + 2.0) * (n + 1.0));
+                way += u3;
+                speed += (n + 2.0) * u3;
+                (u1, u2) = (u2, u3);
+            }
+            return (way, speed / t);
+        }
+        if self.damping.is_gt() && m * t > 1.0 {
+            let (fast, slow) = (self.fast, self.slow);
+            let gap = 2.0 * m;
+            let (fast_decay, slow_decay) = ((-fast * t).exp(), (-slow * t).exp());
+            let impulse = slow_decay * -(-gap * t).exp_m1() / gap;
+            let step = t * (expm1_over(-slow * t) - expm1_over(-fast * t)) / gap;
+            let speed = ((fast * v0 + f0) * fast_decay - (slow * v0 + f0) * slow_decay) / gap;
+            return (v0 * impulse - f0 * step, speed);
+        }
+        let (cosine, sine) = match self.damping {
+            std::cmp::Ordering::Greater => ((m * t).cosh(), (m * t).sinh() / m),
+            std::cmp::Ordering::Equal => (1.0, t),
+            std::cmp::Ordering::Less => ((m * t).cos(), (m * t).sin() / m),
+        };
+        let decay = (-g * t).exp();
+        let impulse = decay * sine;
+        let step = if w2 > 0.0 {
+            (1.0 - decay * (cosine + g * sine)) / w2
+        } else {
+            t * t * second_exponential_integral(self.fast * t)
+        };
+        (v0 * impulse - f0 * step, decay * (v0 * cosine - (g * v0 + f0) * sine))
+    }
+
+    /// Time until rest [s]; `None` when overdamped and driven so that it never rests.
+    fn rest_time(&self) -> Option<f64> {
+        let Self { v0, f0, g, m, .. } = *self;
+        let brake = g * v0 + f0;
+        match self.damping {
+            std::cmp::Ordering::Less => Some((m * v0).atan2(brake) / m),
+            std::cmp::Ordering::Equal => (brake > 0.0).then(|| v0 / brake),
+            std::cmp::Ordering::Greater => {
+                // D - m V0 = f0 + l2 V0, without the cancellation.
+                let slow_brake = f0 + self.slow * v0;
+                (slow_brake > 0.0).then(|| (2.0 * m * v0 / slow_brake).ln_1p() / (2.0 * m))
+            }
+        }
+    }
+
+    /// Time to cover `way` [m], which is reached before `rest` if there is one.
+    ///
+    /// Newton steps inside a bracket that only shrinks, halved where they would leave it. `None` when the way is
+    /// only approached.
+    fn time_over(&self, way: f64, rest: Option<f64>) -> Option<f64> {
+        let mut low = 0.0;
+        let mut high = match rest {
+            Some(rest) => rest,
+            None => {
+                let mut high = way / self.v0;
+                let mut doublings = 0;
+                while self.after(high).0 < way {
+                    high *= 2.0;
+                    doublings += 1;
+                    // 2^200 times the free-flight time: the motion has long settled.
+                    if doublings > 200 {
+                        return None;
+                    }
+                }
+                high
+            }
+        };
+        let mut t = (way / self.v0).min(high);
+        for _ in 0..200 {
+            let (covered, speed) = self.after(t);
+            let excess = covered - way;
+            if excess == 0.0 {
+                return Some(t);
+            }
+            if excess < 0.0 {
+                low = t;
+            } else {
+                high = t;
+            }
+            let newton = t - excess / speed;
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if (next - t).abs() <= f64::EPSILON * t {
+                return Some(next);
+            }
+            t = next;
+        }
+        Some(t)
+    }
+}
+
+/// `e^{-y}` and its mean over [0, y], `-expm1(-y)/y`, for y >= 0 at the price of one exponential.
+#[inline]
+fn decay_and_mean(y: f64) -> (f64, f64) {
+    if y == 0.0 {
+        (1.0, 1.0)
+    } else if y < 0.7 {
+        let lost = -(-y).exp_m1();
+        (1.0 - lost, lost / y)
+    } else {
+        // Below one half the decay is subtracted from 1 without loss.
+        let decay = (-y).exp();
+        (decay, (1.0 - decay) / y)
+    }
+}
+
+/// `atan(z)/z`, 1 at zero.
+#[inline]
+fn atan_over(z: f64) -> f64 {
+    if z == 0.0 { 1.0 } else { z.atan() / z }
+}
+
+/// `atanh(z)/z`, 1 at zero.
+fn atanh_over(z: f64) -> f64 {
+    if z == 0.0 { 1.0 } else { z.atanh() / z }
+}
+
+/// Half-width of the round-off bar of the exit margin.
+///
+/// Every stage forms W from W at its start and the work done in it with at most eight roundings, each of half an
+/// epsilon of the larger of the two: `e^{-y}` counts three of them however large y is, as `y e^{-y} < 1`. A depth of
+/// rest off by two epsilons shifts the margin by that part of `2 |F| X/(M V0²)`. Both are within eight epsilons of
+///
+/// ```text
+/// 1 + |margin| + sum over stages flown of (2/(M V0²)) (|p| b + s b²/2),   b = min(end, depth of the end)
+/// ```
+///
+/// for each stage on the way to the exit.
+fn margin_bar(problem: &Problem, stage: usize, depth: f64, margin: f64) -> f64 {
+    let v0 = problem.impact_speed;
+    let mut size = 1.0 + margin.abs();
+    for law in &problem.stages[..=stage] {
+        let way = if law.end < depth { law.end } else { depth };
+        size += 2.0 * (law.static_force.abs() + 0.5 * law.stiffness * way) * way / problem.mass / v0 / v0;
+    }
+    let on_the_way = problem.stages.iter().take_while(|law| law.end < problem.exit_depth).count() + 1;
+    8.0 * f64::EPSILON * size * on_the_way as f64
+}
+
+/// Crater and tunnel as the model gives them, before an impact speed turns them into stages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CraterAndTunnel {
+    /// Projectile mass M [kg], above zero.
+    pub mass: f64,
+    /// Crater depth k d [m]; zero for none.
+    pub crater_depth: f64,
+    /// Static force of the tunnel P [N].
+    pub static_force: f64,
+    /// Drag of the tunnel Q [kg/m].
+    pub drag: f64,
+    /// How the crater constant c is chosen.
+    pub crater_stiffness: CraterStiffness,
+}
+
+impl CraterAndTunnel {
+    /// Crater constant c [N/m] at impact speed `impact_speed` [m/s]; zero without a crater.
+    pub fn stiffness(&self, impact_speed: f64) -> f64 {
+        let Self { mass, crater_depth: kd, static_force: p, drag: q, crater_stiffness } = *self;
+        match crater_stiffness {
+            CraterStiffness::Given(stiffness) => stiffness,
+            CraterStiffness::Continuous if kd > 0.0 => {
+                (p + q * impact_speed * impact_speed) / kd * (mass / (mass + kd * q))
+            }
+            CraterStiffness::Continuous => 0.0,
+        }
+    }
+}
+
+/// The impact speed that just perforates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Critical {
+    /// Critical velocity V_c [m/s].
+    pub velocity: f64,
+    /// Critical energy E_c = M V_c²/2 [J].
+    pub energy: f64,
+}
+
+impl Critical {
+    fn new(mass: f64, squared_velocity: f64) -> Result<Self, CriticalError> {
+        let critical = Self { velocity: squared_velocity.sqrt(), energy: 0.5 * mass * squared_velocity };
+        if critical.energy.is_finite() && critical.velocity.is_finite() {
+            Ok(critical)
+        } else {
+            Err(CriticalError::OutOfRange)
+        }
+    }
+}
+
+/// Why there is no critical velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum CriticalError {
+    /// A semi-infinite target is never perforated.
+    #[error("the target has no far side")]
+    NoExit,
+    /// The critical energy is not a 64-bit number: the drag multiplies it by e for every M/(2 Q) of depth.
+    #[error("the critical energy leaves the range of 64-bit numbers: the drag over the thickness is too large")]
+    OutOfRange,
+    /// A stage with viscosity loses energy in proportion to the path's speed, so W(exit) is not affine in V0².
+    #[error("stage {stage} is viscous: the critical velocity has no closed form")]
+    Viscous {
+        /// Index of the stage from 0.
+        stage: usize,
+    },
+}
+
+/// Critical velocity of crater and tunnel: the impact speed with `X = exit_depth`.
+///
+/// ```text
+/// continuous c, H <= k d :  V_c² = H² P/(k d M + Q (k d - H)(k d + H))
+/// continuous c, H >  k d :  V_c² = (V1c² (M + k d Q) + k d P)/M,   V1c² = (2 P (H - k d)/M) E(2 Q (H - k d)/M)
+/// c given                :  V_c² = c H²/M                   and    V_c² = V1c² + c (k d)²/M
+/// ```
+///
+/// with `E(z) = expm1(z)/z`. The continuous c depends on the impact speed, which is why this is not the critical
+/// velocity of any one [`Problem`].
+///
+/// # Errors
+/// [`CriticalError::NoExit`] for an infinite `exit_depth` [m], [`CriticalError::OutOfRange`] beyond 1e308 J.
+pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, CriticalError> {
+    let CraterAndTunnel { mass, crater_depth: kd, static_force: p, drag: q, crater_stiffness } = *target;
+    if exit_depth.is_infinite() {
+        return Err(CriticalError::NoExit);
+    }
+    let h = exit_depth;
+    if h <= kd {
+        return match crater_stiffness {
+            // H = k d = 0 is 0/0 in either form: nothing to perforate.
+            _ if h == 0.0 => Critical::new(mass, 0.0),
+            CraterStiffness::Continuous => Critical::new(mass, h * h * p / (kd * mass + q * (kd - h) * (kd + h))),
+            CraterStiffness::Given(c) => Critical::new(mass, c * h * h / mass),
+        };
+    }
+    let beyond = h - kd;
+    let at_crater_end = 2.0 * p * beyond / mass * expm1_over(2.0 * q * beyond / mass);
+    Critical::new(
+        mass,
+        match crater_stiffness {
+            CraterStiffness::Continuous => (at_crater_end * (mass + kd * q) + kd * p) / mass,
+            CraterStiffness::Given(c) => at_crater_end + c * kd * kd / mass,
+        },
+    )
+}
+
+/// Critical velocity of stages with fixed coefficients and no viscosity; the impact speed of `problem` is not used.
+///
+/// Backwards from the exit, where nothing need be left, through each stage by `W(from) = W(to)` carried the other
+/// way. A stage that drives may demand less than nothing at its start; then its start is what must be reached, and
+/// the demand is cut at zero (a barrier before it decides). Zero when every stage drives.
+///
+/// # Errors
+/// [`CriticalError`].
+pub fn critical_of_stages(problem: &Problem) -> Result<Critical, CriticalError> {
+    if !problem.has_exit() {
+        return Err(CriticalError::NoExit);
+    }
+    let mut demand = 0.0_f64;
+    for (index, stage) in problem.stages.iter().enumerate().rev() {
+        let (from, to) = (problem.start_of(index), problem.limit_of(index));
+        if to <= from {
+            continue;
+        }
+        if stage.viscosity > 0.0 {
+            return Err(CriticalError::Viscous { stage: index });
+        }
+        demand = carry(stage, problem.mass, demand, to, from).max(0.0);
+        if !demand.is_finite() {
+            return Err(CriticalError::OutOfRange);
+        }
+    }
+    Critical::new(problem.mass, demand)
+}
