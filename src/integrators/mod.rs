@@ -2,6 +2,8 @@
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 
+pub mod closed_form;
 pub mod outcome;
 
+pub use closed_form::ClosedForm;
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};

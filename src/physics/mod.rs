@@ -1,9 +1,11 @@
 //! The equation of motion, what a scene says about it, and what is known of it exactly.
 
+pub mod closed_form;
 pub mod event;
 pub mod exit_energy;
 pub mod groups;
 pub mod nose;
+pub mod reference;
 pub mod scalar;
 pub mod scene;
 pub mod scene_file;

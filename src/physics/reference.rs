@@ -1,0 +1,1069 @@
+//! What is the answer to 50 digits? The reference that every 64-bit number of the project is measured against.
+//!
+//! The same equation of motion as everywhere, `M dV/dt = -(p + s x + r V + q V²)`, solved with big floats
+//! (`dashu-float`) and **independently of [`super::closed_form`]**: from the plain definitions, which lose digits, and
+//! enough digits to lose. Each answer is computed at two precisions (256 and 384 bits, then half as much again each time)
+//! until they agree to 52 decimal digits; the inputs are the `f64` given, taken as exact.
+//!
+//! ```text
+//! p, q   W = (V0² + p/q) e^{-y} - p/q,  y = 2 q (x - x0)/M        t = (M/sqrt(p q)) [atan(V sqrt(q/p))] from V to V0
+//! p, s   W = V0² - (2 p xi + s (x² - x0²))/M                      t = [atan2(w u, V)]/w,  u = x + p/s,  w² = s/M
+//! p, r   V = (V0 + p/r) e^{-r t/M} - p/r                          x(t) its integral, inverted by root finding
+//! p, s, r  u = A e^{-l1 t} + B e^{-l2 t}, or damped sine           the same
+//! p, s, q  W = W_p(x) + (V0² - W_p(x0)) e^{-y},  W_p = s M/(2 q²) - (p + s x)/q;   t = ∫ dx/V by quadrature
+//! ```
+//!
+//! From a [`Scene`] it starts at the scene's own numbers (mass, diameter, strength ...), so that rounding in resolving
+//! a scene counts as error too; from a [`Problem`] at its coefficients. Critical velocities come from W at the stage
+//! ends being affine in V0², not from the formulas of theory section 2. Condition numbers are difference quotients
+//! with a relative step of 2^-80, a step that only this precision can afford.
+
+use std::cmp::Ordering;
+
+use dashu_float::FBig;
+use dashu_float::round::mode::HalfEven;
+use thiserror::Error;
+
+use super::event::{EventKind, Outcome};
+use super::scene::{CraterStiffness, Criterion, Resistance, Scene};
+use super::stage::{Problem, Target};
+
+/// A binary float of any precision, rounding half to even.
+type Big = FBig<HalfEven, 2>;
+
+/// Bits of the first attempt: 77 decimal digits.
+const FIRST_BITS: usize = 256;
+/// Attempts before an answer is given up; the last has 4374 bits.
+const ATTEMPTS: usize = 8;
+/// Two attempts agree when they differ by less than 2^-AGREEMENT_BITS of the value: 52 digits.
+const AGREEMENT_BITS: isize = 173;
+/// Relative step of the difference quotients is 2^-STEP_BITS: their error is near 2^-80, of no account to a bar.
+const STEP_BITS: isize = 80;
+
+/// A number known to 50 digits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exact(Big);
+
+impl Exact {
+    /// The nearest `f64`.
+    pub fn to_f64(&self) -> f64 {
+        self.0.to_f64().value()
+    }
+
+    /// `|value - exact|/|exact|`, rounded only at the end; infinite when the exact value is zero and `value` is not,
+    /// or when `value` is not finite.
+    pub fn relative_error(&self, value: f64) -> f64 {
+        self.error_over(value, self)
+    }
+
+    /// `|value - exact|/|scale|`, as [`Exact::relative_error`] with a scale of its own: velocities are judged by V0.
+    pub fn error_over(&self, value: f64, scale: &Self) -> f64 {
+        if !value.is_finite() {
+            return f64::INFINITY;
+        }
+        let difference = magnitude(big(value, FIRST_BITS) - &self.0);
+        if is_zero(&difference) {
+            0.0
+        } else if is_zero(&scale.0) {
+            f64::INFINITY
+        } else {
+            (difference / magnitude(scale.0.clone())).to_f64().value()
+        }
+    }
+
+    /// Decimal digits, `digits` significant ones.
+    pub fn to_decimal(&self, digits: usize) -> String {
+        let decimal = self.0.to_decimal().value();
+        decimal.with_precision(digits).value().to_string()
+    }
+}
+
+/// A place and an instant to 50 digits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExactState {
+    /// Time since impact [s].
+    pub time: Exact,
+    /// Depth from the impact face [m].
+    pub depth: Exact,
+    /// Velocity [m/s].
+    pub velocity: Exact,
+}
+
+/// An event and its exact state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExactEvent {
+    /// What happened.
+    pub kind: EventKind,
+    /// When, where and how fast.
+    pub state: ExactState,
+}
+
+/// A flight to 50 digits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExactFlight {
+    /// How it ended; never `Undecided`.
+    pub outcome: Outcome,
+    /// Index from 0 of the stage in which it ended.
+    pub stage: usize,
+    /// State at the end.
+    pub end: ExactState,
+    /// Events in time order.
+    pub events: Vec<ExactEvent>,
+    /// Exit margin `W(exit)/V0²` ([`super::exit_energy`]).
+    pub exit_margin: Option<Exact>,
+    /// Impact speed V0 [m/s], the scale of velocity errors.
+    pub impact_speed: Exact,
+}
+
+impl ExactFlight {
+    /// State at x = k d, if the flight reached it.
+    pub fn crater_end(&self) -> Option<&ExactState> {
+        self.events.iter().find(|e| e.kind == EventKind::CraterEnd).map(|e| &e.state)
+    }
+}
+
+/// Critical velocity and energy to 50 digits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExactCritical {
+    /// Critical velocity V_c [m/s].
+    pub velocity: Exact,
+    /// Critical energy E_c = M V_c²/2 [J].
+    pub energy: Exact,
+}
+
+/// Condition numbers: the sum over all inputs p of `|p df/dp|/|f|`, so that inputs off by one ulp each move f by no
+/// more than so many ulps. Velocities and the margin are taken absolutely (over V0, over 1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// Of the depth at the end.
+    pub depth: f64,
+    /// Of the time of the end.
+    pub time: f64,
+    /// Of the velocity at the end, over V0.
+    pub velocity: f64,
+    /// Of the time at x = k d.
+    pub crater_end_time: Option<f64>,
+    /// Of the velocity at x = k d, over V0.
+    pub crater_end_velocity: Option<f64>,
+    /// Of the exit margin, absolute.
+    pub exit_margin: Option<f64>,
+}
+
+/// Why there is no reference answer.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ReferenceError {
+    /// The reference knows no solution of this stage.
+    #[error("no reference for stage {stage}: {why}")]
+    Unsupported {
+        /// Index of the stage from 0.
+        stage: usize,
+        /// What stands in the way.
+        why: &'static str,
+    },
+    /// Nothing stops the projectile and there is no far side.
+    #[error("the flight never ends")]
+    NeverEnds,
+    /// There is no far side to perforate, or a viscous stage before it.
+    #[error("there is no critical velocity")]
+    NoCritical,
+    /// The scene gives layers, or no impact speed where one is needed.
+    #[error("the reference does not read this scene: {why}")]
+    Scene {
+        /// What it lacks.
+        why: &'static str,
+    },
+    /// Two precisions never agreed: a tie finer than the numbers can tell.
+    #[error("{bits} bits do not settle the answer")]
+    Unsettled {
+        /// Bits of the last attempt.
+        bits: usize,
+    },
+}
+
+/// Where the exact inputs come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// A problem's coefficients.
+    Problem(&'a Problem),
+    /// A scene's numbers, at this impact speed [m/s].
+    Scene(&'a Scene, f64),
+}
+
+/// The flight of `source` to 50 digits.
+///
+/// # Errors
+/// [`ReferenceError`].
+pub fn flight(source: Source<'_>) -> Result<ExactFlight, ReferenceError> {
+    settled(|bits| fly(&source.model(&source.inputs(bits), bits)?), Raw::agrees).map(|(raw, _)| raw.into_exact())
+}
+
+/// The critical velocity of `source` to 50 digits; its impact speed is not used.
+///
+/// # Errors
+/// [`ReferenceError`].
+pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
+    let (critical, _) = settled(
+        |bits| squared_critical(source, &source.inputs(bits), bits).map(|(mass, squared)| [squared.sqrt(), half(mass * squared)]),
+        |a, b| a.iter().zip(b).all(|(a, b)| agree(a, b)),
+    )?;
+    let [velocity, energy] = critical.map(Exact);
+    Ok(ExactCritical { velocity, energy })
+}
+
+/// Condition numbers of the flight of `source` with respect to all its inputs.
+///
+/// Infinite where a step of 2^-80 in an input changes the outcome or the list of events.
+///
+/// # Errors
+/// [`ReferenceError`].
+pub fn conditions(source: Source<'_>) -> Result<Conditions, ReferenceError> {
+    let (base, bits) = settled(|bits| fly(&source.model(&source.inputs(bits), bits)?), Raw::agrees)?;
+    let crater = base.crater_end().is_some();
+    let mut sum = Conditions {
+        depth: 0.0,
+        time: 0.0,
+        velocity: 0.0,
+        crater_end_time: crater.then_some(0.0),
+        crater_end_velocity: crater.then_some(0.0),
+        exit_margin: base.margin.is_some().then_some(0.0),
+    };
+    let add = |to: &mut Option<f64>, term: f64| {
+        if let Some(to) = to {
+            *to += term;
+        }
+    };
+    for stepped in source.stepped_inputs(bits) {
+        let moved = fly(&source.model(&stepped, bits)?)?;
+        if !moved.same_course(&base) {
+            let lost = f64::INFINITY;
+            return Ok(Conditions {
+                depth: lost,
+                time: lost,
+                velocity: lost,
+                crater_end_time: crater.then_some(lost),
+                crater_end_velocity: crater.then_some(lost),
+                exit_margin: sum.exit_margin.map(|_| lost),
+            });
+        }
+        sum.depth += quotient(&moved.end.depth, &base.end.depth, &base.end.depth);
+        sum.time += quotient(&moved.end.time, &base.end.time, &base.end.time);
+        sum.velocity += quotient(&moved.end.velocity, &base.end.velocity, &base.impact_speed);
+        if let (Some(moved), Some(base_end)) = (moved.crater_end(), base.crater_end()) {
+            add(&mut sum.crater_end_time, quotient(&moved.time, &base_end.time, &base_end.time));
+            add(&mut sum.crater_end_velocity, quotient(&moved.velocity, &base_end.velocity, &base.impact_speed));
+        }
+        if let (Some(moved), Some(margin)) = (&moved.margin, &base.margin) {
+            add(&mut sum.exit_margin, quotient(moved, margin, &int(1, bits)));
+        }
+    }
+    Ok(sum)
+}
+
+/// Condition number of the critical velocity of `source` with respect to all its inputs.
+///
+/// # Errors
+/// [`ReferenceError`].
+pub fn critical_condition(source: Source<'_>) -> Result<f64, ReferenceError> {
+    let velocity = |inputs: &[Big], bits| squared_critical(source, inputs, bits).map(|(_, squared)| squared.sqrt());
+    let (base, bits) = settled(|bits| velocity(&source.inputs(bits), bits), agree)?;
+    let mut sum = 0.0;
+    for stepped in source.stepped_inputs(bits) {
+        sum += quotient(&velocity(&stepped, bits)?, &base, &base);
+    }
+    Ok(sum)
+}
+
+/// `|moved - base|/(2^-80 |scale|)`.
+fn quotient(moved: &Big, base: &Big, scale: &Big) -> f64 {
+    let difference = magnitude(moved - base);
+    if is_zero(&difference) {
+        return 0.0;
+    }
+    if is_zero(scale) {
+        return f64::INFINITY;
+    }
+    ((difference / magnitude(scale.clone())) << STEP_BITS).to_f64().value()
+}
+
+/// Raises the precision until two attempts agree; also gives the bits of the one returned.
+fn settled<T>(
+    attempt: impl Fn(usize) -> Result<T, ReferenceError>,
+    agree: impl Fn(&T, &T) -> bool,
+) -> Result<(T, usize), ReferenceError> {
+    let mut bits = FIRST_BITS;
+    let mut last = attempt(bits)?;
+    for _ in 0..ATTEMPTS {
+        bits += bits / 2;
+        let next = attempt(bits)?;
+        if agree(&last, &next) {
+            return Ok((next, bits));
+        }
+        last = next;
+    }
+    Err(ReferenceError::Unsettled { bits })
+}
+
+fn agree(a: &Big, b: &Big) -> bool {
+    let difference = magnitude(a - b);
+    is_zero(&difference) || (difference << AGREEMENT_BITS) < magnitude(b.clone())
+}
+
+// Big floats: the few words that the formulas below are written in.
+
+fn big(value: f64, bits: usize) -> Big {
+    assert!(value.is_finite(), "a reference input is finite: {value}");
+    Big::try_from(value).unwrap_or(Big::ZERO).with_precision(bits).value()
+}
+
+fn int(value: i32, bits: usize) -> Big {
+    big(f64::from(value), bits)
+}
+
+fn is_zero(value: &Big) -> bool {
+    *value == Big::ZERO
+}
+
+fn is_positive(value: &Big) -> bool {
+    *value > Big::ZERO
+}
+
+fn is_negative(value: &Big) -> bool {
+    *value < Big::ZERO
+}
+
+fn magnitude(value: Big) -> Big {
+    if is_negative(&value) { -value } else { value }
+}
+
+fn half(value: Big) -> Big {
+    value >> 1
+}
+
+fn twice(value: Big) -> Big {
+    value << 1
+}
+
+fn square(value: &Big) -> Big {
+    value * value
+}
+
+/// Natural logarithm: sixteen square roots bring the argument near one, where the series is short (35 us become 4).
+fn ln(value: &Big) -> Big {
+    let mut root = value.clone();
+    for _ in 0..16 {
+        root = root.sqrt();
+    }
+    (root - Big::ONE).ln_1p() << 16
+}
+
+/// Arc tangent, by `atan z = 2 atan(z/(1 + sqrt(1 + z²)))` twelve times for a short series.
+fn atan(value: &Big) -> Big {
+    let mut z = value.clone();
+    for _ in 0..12 {
+        let hypotenuse = (Big::ONE + square(&z)).sqrt();
+        z /= Big::ONE + hypotenuse;
+    }
+    z.atan() << 12
+}
+
+/// Angle of the point (`x`, `y`), in -pi to pi.
+fn atan2(y: &Big, x: &Big, bits: usize) -> Big {
+    if is_positive(x) {
+        return atan(&(y / x));
+    }
+    let right = half(Big::pi(bits));
+    let right = if is_negative(y) { -right } else { right };
+    if is_zero(y) { twice(right) } else { right - atan(&(x / y)) }
+}
+
+/// Whether `value`, a difference of terms of magnitude `size`, is zero as far as `bits` can tell: half of them.
+fn vanishes(value: &Big, size: &Big, bits: usize) -> bool {
+    (magnitude(value.clone()) << (bits / 2).cast_signed()) <= *size
+}
+
+/// A stage's coefficients.
+#[derive(Clone, Debug)]
+struct Law {
+    p: Big,
+    s: Big,
+    r: Big,
+    q: Big,
+    end: Option<Big>,
+}
+
+/// A problem in big floats.
+struct Model {
+    bits: usize,
+    mass: Big,
+    impact_speed: Big,
+    exit: Option<Big>,
+    stages: Vec<Law>,
+    crater: Option<usize>,
+    target: Target,
+}
+
+impl Source<'_> {
+    /// Every number that goes in, in the order that [`Source::model`] reads them.
+    fn inputs(&self, bits: usize) -> Vec<Big> {
+        let mut list = Vec::new();
+        match self {
+            Self::Problem(problem) => {
+                list.extend([problem.mass, problem.impact_speed]);
+                list.extend(problem.has_exit().then_some(problem.exit_depth));
+                for stage in &problem.stages {
+                    list.extend([stage.static_force, stage.stiffness, stage.viscosity, stage.drag]);
+                    list.extend(stage.end.is_finite().then_some(stage.end));
+                }
+            }
+            Self::Scene(scene, impact_speed) => {
+                list.extend([scene.mass, *impact_speed]);
+                list.extend(scene.thickness);
+                match &scene.resistance {
+                    Resistance::Concrete(concrete) => {
+                        list.extend([
+                            concrete.diameter,
+                            concrete.nose_factor,
+                            concrete.strength,
+                            concrete.density,
+                            concrete.static_factor,
+                            concrete.inertia_factor,
+                            concrete.crater_ratio,
+                        ]);
+                        if let CraterStiffness::Given(stiffness) = concrete.crater_stiffness {
+                            list.push(stiffness);
+                        }
+                    }
+                    Resistance::Stages(stages) => {
+                        for stage in stages {
+                            list.extend([stage.static_force, stage.stiffness, stage.viscosity, stage.drag]);
+                            list.extend(stage.end.is_finite().then_some(stage.end));
+                        }
+                    }
+                }
+            }
+        }
+        list.into_iter().map(|value| big(value, bits)).collect()
+    }
+
+    /// The inputs with one of them moved by a relative 2^-80, for each that is not zero.
+    fn stepped_inputs(&self, bits: usize) -> impl Iterator<Item = Vec<Big>> {
+        let inputs = self.inputs(bits);
+        (0..inputs.len()).filter(|&i| !is_zero(&inputs[i])).map(move_one(inputs.clone())).collect::<Vec<_>>().into_iter()
+    }
+
+    /// The problem that `inputs` describe.
+    fn model(&self, inputs: &[Big], bits: usize) -> Result<Model, ReferenceError> {
+        let short = ReferenceError::Scene { why: "inputs are missing" };
+        let mut next = {
+            let mut rest = inputs.iter();
+            move || rest.next().cloned().ok_or_else(|| short.clone())
+        };
+        let mass = next()?;
+        let impact_speed = next()?;
+        let mut outright = |stages: &[super::stage::Stage], exit: bool| {
+            let exit = if exit { Some(next()?) } else { None };
+            let mut laws = Vec::with_capacity(stages.len());
+            for stage in stages {
+                let (p, s, r, q) = (next()?, next()?, next()?, next()?);
+                let end = if stage.end.is_finite() { Some(next()?) } else { None };
+                laws.push(Law { p, s, r, q, end });
+            }
+            Ok((exit, laws))
+        };
+        match self {
+            Self::Problem(problem) => {
+                let (exit, stages) = outright(&problem.stages, problem.has_exit())?;
+                Ok(Model { bits, mass, impact_speed, exit, stages, crater: problem.crater, target: problem.target })
+            }
+            Self::Scene(Scene { resistance: Resistance::Stages(stages), thickness, .. }, _) => {
+                let (exit, stages) = outright(stages, thickness.is_some())?;
+                Ok(Model { bits, mass, impact_speed, exit, stages, crater: None, target: Target::Stages })
+            }
+            Self::Scene(Scene { resistance: Resistance::Concrete(concrete), thickness, criterion, .. }, _) => {
+                if !concrete.layers.is_empty() {
+                    return Err(ReferenceError::Scene { why: "it has layers; give the problem it resolves into" });
+                }
+                let thickness = if thickness.is_some() { Some(next()?) } else { None };
+                let (d, nose, strength, density) = (next()?, next()?, next()?, next()?);
+                let (static_factor, inertia_factor, k) = (next()?, next()?, next()?);
+                let area = Big::pi(bits) * square(&d) / int(4, bits);
+                let p = &area * static_factor * strength;
+                let q = area * nose * inertia_factor * density;
+                let kd = k * &d;
+                let exit = match criterion {
+                    Criterion::FullDepth => thickness,
+                    Criterion::Ndrc => thickness.map(|h| ndrc_depth(&h, &d, bits)),
+                };
+                let mut stages = Vec::with_capacity(2);
+                let crater = is_positive(&kd).then_some(0);
+                if crater.is_some() {
+                    let s = match concrete.crater_stiffness {
+                        CraterStiffness::Given(_) => next()?,
+                        // From c k d = P + Q V1² and M V1² = M V0² - c (k d)².
+                        CraterStiffness::Continuous => {
+                            let work = &mass * (&p + &q * square(&impact_speed));
+                            work / (&kd * (&mass + &kd * &q))
+                        }
+                    };
+                    stages.push(Law { p: Big::ZERO, s, r: Big::ZERO, q: Big::ZERO, end: Some(kd) });
+                }
+                stages.push(Law { p, s: Big::ZERO, r: Big::ZERO, q, end: None });
+                Ok(Model { bits, mass, impact_speed, exit, stages, crater, target: Target::CraterAndTunnel })
+            }
+        }
+    }
+}
+
+/// Steps input `i` of a copy of `inputs`.
+fn move_one(inputs: Vec<Big>) -> impl Fn(usize) -> Vec<Big> {
+    move |i| {
+        let mut moved = inputs.clone();
+        moved[i] = &inputs[i] + (inputs[i].clone() >> STEP_BITS);
+        moved
+    }
+}
+
+/// Penetration that perforates thickness `h` by the ACE/NDRC relation (theory section 4): its first branch, the
+/// smaller depth, as far as that goes.
+fn ndrc_depth(h: &Big, d: &Big, bits: usize) -> Big {
+    let ratio = |numerator, denominator| int(numerator, bits) / int(denominator, bits);
+    let e = h / d;
+    // 3.19 y - 0.718 y² at its end y = 1.35.
+    let first_end = ratio(319, 100) * ratio(135, 100) - ratio(718, 1000) * square(&ratio(135, 100));
+    let y = if e <= first_end {
+        let (b, a) = (ratio(319, 100), ratio(718, 1000));
+        (&b - (square(&b) - int(4, bits) * &a * e).sqrt()) / twice(a)
+    } else {
+        (e - ratio(132, 100)) / ratio(124, 100)
+    };
+    y * d
+}
+
+/// Time, depth, velocity.
+#[derive(Clone)]
+struct Point {
+    time: Big,
+    depth: Big,
+    velocity: Big,
+}
+
+/// A flight at one precision.
+struct Raw {
+    outcome: Outcome,
+    stage: usize,
+    end: Point,
+    events: Vec<(EventKind, Point)>,
+    margin: Option<Big>,
+    impact_speed: Big,
+}
+
+impl Raw {
+    fn same_course(&self, other: &Self) -> bool {
+        self.outcome == other.outcome
+            && self.stage == other.stage
+            && self.events.iter().map(|e| e.0).eq(other.events.iter().map(|e| e.0))
+    }
+
+    fn agrees(&self, other: &Self) -> bool {
+        let points = |a: &Point, b: &Point| {
+            agree(&a.time, &b.time) && agree(&a.depth, &b.depth) && agree(&a.velocity, &b.velocity)
+        };
+        self.same_course(other)
+            && points(&self.end, &other.end)
+            && self.events.iter().zip(&other.events).all(|(a, b)| points(&a.1, &b.1))
+            && match (&self.margin, &other.margin) {
+                // A margin that is all cancellation is good to 50 digits of one.
+                (Some(a), Some(b)) => agree(a, b) || (magnitude(a - b) << AGREEMENT_BITS) < Big::ONE,
+                (None, None) => true,
+                _ => false,
+            }
+    }
+
+    fn crater_end(&self) -> Option<&Point> {
+        self.events.iter().find(|e| e.0 == EventKind::CraterEnd).map(|e| &e.1)
+    }
+
+    fn into_exact(self) -> ExactFlight {
+        let state = |p: Point| ExactState { time: Exact(p.time), depth: Exact(p.depth), velocity: Exact(p.velocity) };
+        ExactFlight {
+            outcome: self.outcome,
+            stage: self.stage,
+            end: state(self.end),
+            events: self.events.into_iter().map(|(kind, p)| ExactEvent { kind, state: state(p) }).collect(),
+            exit_margin: self.margin.map(Exact),
+            impact_speed: Exact(self.impact_speed),
+        }
+    }
+}
+
+impl Model {
+    /// Where stage `index` is left: its end or the exit; none when there is neither.
+    fn limit(&self, index: usize) -> Option<&Big> {
+        match (&self.stages[index].end, &self.exit) {
+            (Some(end), Some(exit)) => Some(if exit < end { exit } else { end }),
+            (end, exit) => end.as_ref().or(exit.as_ref()),
+        }
+    }
+
+    fn boundary(&self, index: usize) -> EventKind {
+        if self.crater == Some(index) { EventKind::CraterEnd } else { EventKind::StageEnd(index) }
+    }
+
+    fn stop_in(&self, index: usize) -> Outcome {
+        match (self.target, self.crater) {
+            (Target::Stages, _) => Outcome::Stopped,
+            (Target::CraterAndTunnel, Some(crater)) if index <= crater => Outcome::StoppedInCrater,
+            (Target::CraterAndTunnel, _) => Outcome::StoppedInTunnel,
+        }
+    }
+}
+
+/// Flies the model.
+fn fly(model: &Model) -> Result<Raw, ReferenceError> {
+    let zero = int(0, model.bits);
+    let mut now = Point { time: zero.clone(), depth: zero.clone(), velocity: model.impact_speed.clone() };
+    let mut events: Vec<(EventKind, Point)> = Vec::new();
+    let mut flown = None;
+    let finish = |outcome, stage, end: Point, events: Vec<(EventKind, Point)>| {
+        let margin = margin(model, outcome, stage, &end, &events);
+        Raw { outcome, stage, end, events, margin, impact_speed: model.impact_speed.clone() }
+    };
+    for (index, law) in model.stages.iter().enumerate() {
+        let limit = model.limit(index);
+        if limit.is_none_or(|limit| *limit > now.depth) {
+            let rests = if is_zero(&now.velocity) {
+                true
+            } else {
+                let (next, rests) = through(model, index, law, &now, limit)?;
+                now = next;
+                flown = Some(index);
+                rests
+            };
+            if rests {
+                events.push((EventKind::Rest, now.clone()));
+                let stage = flown.unwrap_or(index);
+                return Ok(finish(model.stop_in(stage), stage, now, events));
+            }
+        }
+        if law.end.is_some() && law.end.as_ref() == limit {
+            events.push((model.boundary(index), now.clone()));
+        }
+        let ends_by_exit = |law: &Law| match (&law.end, &model.exit) {
+            (Some(end), Some(exit)) => end <= exit,
+            _ => false,
+        };
+        let more_here = ends_by_exit(law) && model.stages.get(index + 1).is_some_and(ends_by_exit);
+        if model.exit.is_some() && limit == model.exit.as_ref() && !more_here {
+            let at_face = events.len().min(model.stages.len() - 1);
+            events.push((EventKind::Exit, now.clone()));
+            if is_zero(&now.velocity) {
+                events.push((EventKind::Rest, now.clone()));
+            }
+            return Ok(finish(Outcome::Perforated, flown.unwrap_or(at_face), now, events));
+        }
+    }
+    Err(ReferenceError::NeverEnds)
+}
+
+/// One stage: the point at its limit and `false`, or the point of rest and `true`.
+fn through(
+    model: &Model,
+    index: usize,
+    law: &Law,
+    from: &Point,
+    limit: Option<&Big>,
+) -> Result<(Point, bool), ReferenceError> {
+    if is_positive(&law.r) {
+        if is_positive(&law.q) {
+            return Err(ReferenceError::Unsupported { stage: index, why: "viscosity and drag act together" });
+        }
+        return damped(model, law, from, limit);
+    }
+    // Without viscosity W over x decides. In a resisting or driven stage alike W >= 0 at the limit means W > 0 before.
+    let bits = model.bits;
+    if let Some(limit) = limit {
+        let (gain, loss) = squared_speed_terms(law, &model.mass, &square(&from.velocity), &from.depth, limit, bits);
+        let w = &gain - &loss;
+        let touches = vanishes(&w, &(magnitude(gain) + magnitude(loss)), bits);
+        if touches || is_positive(&w) {
+            let velocity = if touches { int(0, bits) } else { w.sqrt() };
+            let time = &from.time + passage_time(model, law, from, limit, &velocity);
+            return Ok((Point { time, depth: limit.clone(), velocity }, false));
+        }
+    }
+    let depth = rest_depth(model, law, from)?;
+    let velocity = int(0, bits);
+    let time = &from.time + passage_time(model, law, from, &depth, &velocity);
+    Ok((Point { time, depth, velocity }, true))
+}
+
+/// W at `to` as gain minus loss, `w` at `from` carried through a stage without viscosity.
+fn squared_speed_terms(law: &Law, mass: &Big, w: &Big, from: &Big, to: &Big, bits: usize) -> (Big, Big) {
+    let Law { p, s, q, .. } = law;
+    if is_zero(q) {
+        let work = p * (to - from) + half(s * (square(to) - square(from)));
+        return (w.clone(), twice(work) / mass);
+    }
+    // W_p = s M/(2 q²) - (p + s x)/q solves W' = -2 (p + s x + q W)/M.
+    let particular = |x: &Big| half(s * mass) / square(q) - (p + s * x) / q;
+    let decay = (-(twice(q * (to - from)) / mass)).with_precision(bits).value().exp();
+    (w * &decay, particular(from) * decay - particular(to))
+}
+
+/// Depth of rest in a stage without viscosity and without a limit.
+fn rest_depth(model: &Model, law: &Law, from: &Point) -> Result<Big, ReferenceError> {
+    let Law { p, s, q, .. } = law;
+    let (mass, w0, bits) = (&model.mass, square(&from.velocity), model.bits);
+    match (is_positive(s), is_positive(q)) {
+        (false, _) if !is_positive(p) => Err(ReferenceError::NeverEnds),
+        (false, false) => Ok(&from.depth + mass * w0 / twice(p.clone())),
+        (false, true) => Ok(&from.depth + mass / twice(q.clone()) * ln(&(int(1, bits) + q * w0 / p))),
+        (true, false) => {
+            let u0 = &from.depth + p / s;
+            Ok((square(&u0) + w0 * mass / s).sqrt() - p / s)
+        }
+        (true, true) => {
+            let w = |x: &Big| {
+                let (gain, loss) = squared_speed_terms(law, mass, &w0, &from.depth, x, bits);
+                gain - loss
+            };
+            // Without the drag it would get further: the bracket.
+            let u0 = &from.depth + p / s;
+            let far = (square(&u0) + &w0 * mass / s).sqrt() - p / s;
+            let slope = |x: &Big, w: &Big| -(twice(p + s * x + q * w) / mass);
+            Ok(root(&from.depth, &far, bits, |x| {
+                let value = w(x);
+                let slope = slope(x, &value);
+                // Falling through zero: turned over to rise.
+                (-value, -slope)
+            }))
+        }
+    }
+}
+
+/// Time from `from` to depth `to`, where the speed is `velocity`, in a stage without viscosity.
+fn passage_time(model: &Model, law: &Law, from: &Point, to: &Big, velocity: &Big) -> Big {
+    let Law { p, s, q, .. } = law;
+    let (mass, bits, v0) = (&model.mass, model.bits, &from.velocity);
+    let xi = to - &from.depth;
+    if is_zero(&xi) {
+        return int(0, bits);
+    }
+    match (is_positive(s), is_positive(q)) {
+        (true, false) => {
+            let w = (s / mass).sqrt();
+            let phase = |x: &Big, v: &Big| atan2(&(&w * (x + p / s)), v, bits);
+            (phase(to, velocity) - phase(&from.depth, v0)) / w
+        }
+        (true, true) => quadrature(model, law, from, to),
+        (false, false) if is_zero(p) => xi / v0,
+        (false, false) => mass * (v0 - velocity) / p,
+        (false, true) if is_zero(p) => mass / q * (int(1, bits) / velocity - int(1, bits) / v0),
+        (false, true) if is_positive(p) => {
+            let scale = (q / p).sqrt();
+            let angle = |v: &Big| atan(&(v * &scale));
+            mass / (p * q).sqrt() * (angle(v0) - angle(velocity))
+        }
+        (false, true) => {
+            let terminal = (-(p / q)).sqrt();
+            if terminal == *v0 {
+                return xi / v0;
+            }
+            // Partial fractions of dV/(q (Vt² - V²)).
+            let ratio = (v0 - &terminal) * (velocity + &terminal) / ((v0 + &terminal) * (velocity - &terminal));
+            mass / twice(q * terminal) * ln(&ratio)
+        }
+    }
+}
+
+/// `∫ dx/V` by the tanh-sinh rule, whose double exponential swallows the root of W at rest.
+///
+/// With `x = a + (b - a) z`, `z = 1/(1 + e^{-2 sigma})`, `sigma = (pi/2) sinh(h j)`; W near its zero is summed from
+/// there, so that `1 - z` is taken as it is and not as a difference.
+fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
+    let bits = model.bits;
+    let one = int(1, bits);
+    let length = to - &from.depth;
+    let (gain, loss) = squared_speed_terms(law, &model.mass, &square(&from.velocity), &from.depth, to, bits);
+    let w_end = gain - loss;
+    // Both ends are left by half the bits squared: e^{-2 sigma} below 2^-bits there.
+    let half_pi = half(Big::pi(bits));
+    // The error falls as e^{-pi²/(2 h)} or better: h = 1/(bits/4) is far finer than it needs.
+    let steps = i32::try_from(bits / 8).unwrap_or(i32::MAX);
+    let span = 7;
+    let h = int(1, bits) / int(steps, bits) * int(4, bits);
+    let mut sum = int(0, bits);
+    for j in -(steps * span / 4)..=(steps * span / 4) {
+        let at = int(j, bits) * &h;
+        let grow = at.exp();
+        let shrink = &one / &grow;
+        let sigma = &half_pi * half(&grow - &shrink);
+        let far = twice(sigma).exp();
+        let near_end = &one / (&one + &far);
+        let z = &far / (&one + &far);
+        // W from whichever end is nearer.
+        let w = if near_end < z {
+            let x = to - &length * &near_end;
+            let (gain, loss) = squared_speed_terms(law, &model.mass, &w_end, to, &x, bits);
+            gain - loss
+        } else {
+            let x = &from.depth + &length * &z;
+            let (gain, loss) = squared_speed_terms(law, &model.mass, &square(&from.velocity), &from.depth, &x, bits);
+            gain - loss
+        };
+        if !is_positive(&w) {
+            continue;
+        }
+        // dz/dj = z (1 - z) 2 sigma'.
+        let weight = z * near_end * twice(&half_pi * half(grow + shrink)) * &h;
+        sum += weight / w.sqrt();
+    }
+    sum * length
+}
+
+/// A stage `p + s x + r V`: x(t), V(t), rest and the passing of `limit`.
+fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
+    let (bits, mass, v0) = (model.bits, &model.mass, &from.velocity);
+    let Law { p, s, r, .. } = law;
+    let zero = int(0, bits);
+    let after: Box<dyn Fn(&Big) -> (Big, Big)>;
+    let rest: Option<Big>;
+    // Farthest depth, when it is only approached.
+    let mut horizon: Option<Big> = None;
+    if is_zero(s) {
+        let rate = r / mass;
+        let drift = p / r;
+        rest = is_positive(p).then(|| ln(&(int(1, bits) + r * v0 / p)) / &rate);
+        if is_zero(p) {
+            horizon = Some(&from.depth + v0 / &rate);
+        }
+        let (x0, fall) = (from.depth.clone(), v0 + &drift);
+        after = Box::new(move |t| {
+            let decay = (-(&rate * t)).exp();
+            (&x0 - &drift * t + &fall * (int(1, bits) - &decay) / &rate, &fall * decay - &drift)
+        });
+    } else {
+        let centre = p / s;
+        let u0 = &from.depth + &centre;
+        let g = half(r / mass);
+        let w2 = s / mass;
+        // Exact, as products of 64-bit inputs fit: critical damping is seen as such.
+        let discriminant = square(r) - int(4, bits) * s * mass;
+        let m = half(magnitude(discriminant.clone()).sqrt() / mass);
+        let brake = &g * v0 + &w2 * &u0;
+        let (v0, order) = (v0.clone(), discriminant.cmp(&Big::ZERO));
+        rest = match order {
+            Ordering::Less => Some(atan2(&(&m * &v0), &brake, bits) / &m),
+            Ordering::Equal => is_positive(&brake).then(|| &v0 / &brake),
+            Ordering::Greater => {
+                let slow_brake = &brake - &m * &v0;
+                is_positive(&slow_brake).then(|| ln(&((&brake + &m * &v0) / slow_brake)) / twice(m.clone()))
+            }
+        };
+        if rest.is_none() {
+            horizon = Some(-centre.clone());
+        }
+        after = Box::new(move |t| {
+            let decay = (-(&g * t)).exp();
+            let (cosine, sine) = match order {
+                Ordering::Less => {
+                    let (sine, cosine) = (&m * t).sin_cos();
+                    (cosine, sine / &m)
+                }
+                Ordering::Equal => (int(1, bits), t.clone()),
+                Ordering::Greater => {
+                    let grow = (&m * t).exp();
+                    let shrink = int(1, bits) / &grow;
+                    (half(&grow + &shrink), half(grow - shrink) / &m)
+                }
+            };
+            let u = &decay * (&u0 * &cosine + (&v0 + &g * &u0) * &sine);
+            (u - &centre, decay * (&v0 * cosine - &brake * sine))
+        });
+    }
+    if let Some(rest) = &rest {
+        let (depth, _) = after(rest);
+        let touches = limit.is_some_and(|limit| vanishes(&(&depth - limit), limit, bits));
+        let short = limit.is_none_or(|limit| depth < *limit);
+        if touches || short {
+            let depth = if touches { limit.cloned().unwrap_or(depth) } else { depth };
+            return Ok((Point { time: &from.time + rest, depth, velocity: zero }, !touches));
+        }
+    }
+    let Some(limit) = limit else { return Err(ReferenceError::NeverEnds) };
+    if horizon.is_some_and(|horizon| horizon <= *limit) {
+        return Err(ReferenceError::NeverEnds);
+    }
+    let mut high = match rest {
+        Some(rest) => rest,
+        None => (limit - &from.depth) / &from.velocity,
+    };
+    // 2^400 times free flight is beyond any of the rates; the loop ends because the limit lies before the horizon.
+    for _ in 0..400 {
+        if after(&high).0 >= *limit {
+            break;
+        }
+        high = twice(high);
+    }
+    let time = root(&zero, &high, bits, |t| {
+        let (depth, speed) = after(t);
+        (depth - limit, speed)
+    });
+    let velocity = after(&time).1;
+    Ok((Point { time: &from.time + time, depth: limit.clone(), velocity }, false))
+}
+
+/// The root of a rising function between `low` and `high`: Newton steps in a bracket that shrinks, else halving.
+fn root(low: &Big, high: &Big, bits: usize, value_and_slope: impl Fn(&Big) -> (Big, Big)) -> Big {
+    let (mut low, mut high) = (low.clone(), high.clone());
+    let mut at = half(&low + &high);
+    for _ in 0..4 * bits {
+        let (value, slope) = value_and_slope(&at);
+        if is_zero(&value) {
+            return at;
+        }
+        if is_negative(&value) {
+            low = at.clone();
+        } else {
+            high = at.clone();
+        }
+        let newton = if is_zero(&slope) { high.clone() } else { &at - value / slope };
+        let next = if newton > low && newton < high { newton } else { half(&low + &high) };
+        let step = magnitude(&next - &at);
+        at = next;
+        // The last eight bits are the function's own round-off.
+        if is_zero(&step) || (step << (bits - 8).cast_signed()) < magnitude(at.clone()) {
+            return at;
+        }
+    }
+    at
+}
+
+/// The exit margin: least W over the stage ends ahead and the exit, over V0².
+fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[(EventKind, Point)]) -> Option<Big> {
+    let exit = model.exit.as_ref()?;
+    if is_zero(&model.impact_speed) {
+        return None;
+    }
+    let scale = square(&model.impact_speed);
+    let mut least: Option<Big> = None;
+    let mut take = |w: Big| {
+        if least.as_ref().is_none_or(|least| w < *least) {
+            least = Some(w);
+        }
+    };
+    if outcome == Outcome::Perforated {
+        for (kind, point) in events {
+            if *kind != EventKind::Rest {
+                take(square(&point.velocity));
+            }
+        }
+    } else {
+        let (mut w, mut from) = (int(0, model.bits), end.depth.clone());
+        for index in stage..model.stages.len() {
+            let law = &model.stages[index];
+            let to = model.limit(index)?.clone();
+            let to = if to < from { from.clone() } else { to };
+            if is_positive(&law.r) {
+                let work = &law.p * (&to - &from) + half(&law.s * (square(&to) - square(&from)));
+                w -= twice(work) / &model.mass;
+            } else {
+                let (gain, loss) = squared_speed_terms(law, &model.mass, &w, &from, &to, model.bits);
+                w = gain - loss;
+            }
+            take(w.clone());
+            from = to;
+            if law.end.as_ref().is_none_or(|end| end >= exit) {
+                break;
+            }
+        }
+    }
+    least.map(|w| w / scale)
+}
+
+/// Mass and V_c²: W at each stage end up to the exit is affine in V0², and none may be below zero.
+fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(Big, Big), ReferenceError> {
+    // The models at V0² = 0 and 1 (input 1 is the impact speed in either source): only a continuous crater differs.
+    let at = |impact_speed: i32| {
+        let mut inputs = inputs.to_vec();
+        inputs[1] = int(impact_speed, bits);
+        source.model(&inputs, bits)
+    };
+    let (model, moved) = (at(0)?, at(1)?);
+    let exit = model.exit.as_ref().ok_or(ReferenceError::NoCritical)?;
+    // W = w + slope V0² at depth `from`.
+    let (mut w, mut slope, mut from) = (int(0, bits), int(1, bits), int(0, bits));
+    let mut squared = int(0, bits);
+    for (index, (law, moved_law)) in model.stages.iter().zip(&moved.stages).enumerate() {
+        let to = model.limit(index).ok_or(ReferenceError::NoCritical)?;
+        if *to > from {
+            if is_positive(&law.r) {
+                return Err(ReferenceError::NoCritical);
+            }
+            let carried = |law: &Law, w: &Big| {
+                let (gain, loss) = squared_speed_terms(law, &model.mass, w, &from, to, bits);
+                gain - loss
+            };
+            // A drag's slope by itself: as a difference it would drown in the static work once e^{-y} is small.
+            slope = if is_zero(&law.q) {
+                carried(moved_law, &(&w + slope)) - carried(law, &w)
+            } else {
+                slope * (-(twice(&law.q * (to - &from)) / &model.mass)).exp()
+            };
+            w = carried(law, &w);
+            from = to.clone();
+            let demand = -(&w / &slope);
+            if demand > squared {
+                squared = demand;
+            }
+        }
+        if law.end.as_ref().is_none_or(|end| end >= exit) {
+            break;
+        }
+    }
+    Ok((model.mass, squared))
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
+    use super::*;
+    use crate::physics::stage::Stage;
+
+    fn problem(stages: &[Stage], impact_speed: f64, exit_depth: f64) -> Problem {
+        Problem {
+            mass: 2.0,
+            impact_speed,
+            exit_depth,
+            stages: stages.iter().copied().collect(),
+            crater: None,
+            target: Target::Stages,
+        }
+    }
+
+    /// Relative difference of two big floats.
+    fn apart(a: &Big, b: &Big) -> f64 {
+        (magnitude(a - b) / magnitude(b.clone())).to_f64().value()
+    }
+
+    #[test]
+    fn elementary_functions_agree_with_the_library_and_with_identities() {
+        for (numerator, denominator) in [(7, 9), (1, 1_000_003), (123_456, 7), (1, 1)] {
+            let z = int(numerator, 256) / int(denominator, 256);
+            assert!(apart(&atan(&z), &z.atan()) < 1e-70);
+            let y = &z + int(1, 256);
+            // Near one the roots cost sixteen bits and the argument its own twenty.
+            assert!(apart(&ln(&y), &y.ln()) < 1e-64);
+            assert!(apart(&ln(&y).exp(), &y) < 1e-64);
+            for (sy, sx) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
+                let (y, x) = (&z * int(sy, 256), int(sx, 256));
+                assert!(apart(&atan2(&y, &x, 256), &y.atan2(&x)) < 1e-70, "{sy} {sx}");
+            }
+        }
+        // Machin: pi/4 = 4 atan(1/5) - atan(1/239).
+        let fraction = |n| int(1, 256) / int(n, 256);
+        let machin = (atan(&fraction(5)) << 4) - (atan(&fraction(239)) << 2);
+        assert!(apart(&machin, &Big::pi(256)) < 1e-75);
+    }
+}
