@@ -2,6 +2,8 @@
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 
+pub mod central_difference;
 pub mod outcome;
 
+pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};
