@@ -6,4 +6,8 @@ pub mod closed_form;
 pub mod outcome;
 
 pub use closed_form::ClosedForm;
+pub mod central_difference;
+pub mod outcome;
+
+pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};

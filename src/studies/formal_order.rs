@@ -1,0 +1,196 @@
+//! Which order of convergence is to be expected: the table of theory section 5 as a function.
+//!
+//! "The order of the method" has no single value. It belongs to the velocity rule, the boundary rule, the path and the
+//! quantity: the same scheme is of second order in the depth, of first order in the time, and of first order in both
+//! as soon as a lagged drag acts. A measured order is judged against this function, degraded orders included.
+
+use super::quantity::Quantity;
+use crate::integrators::{Boundaries, Flight, VelocityAt};
+use crate::physics::{EventKind, Outcome, Problem};
+
+/// Largest jump of the force at a stage end, relative to the force, that still counts as continuous.
+///
+/// A continuous crater constant closes the gap to a few ulp times the condition of V1²; a real jump of this size
+/// would lower an order only where the error is below a millionth of what the step leaves anyway.
+const CONTINUOUS: f64 = 1e-9;
+
+/// What happens on the way to a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stretch {
+    /// The force of a stage on the way depends on the velocity.
+    pub velocity_dependent: bool,
+    /// The force jumps at a stage end on the way. One that is only reached, at the place itself, is not on the way.
+    pub force_jumps: bool,
+}
+
+/// The facts about a flight that decide the order of a fixed-step scheme.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Path {
+    /// Whether the flight leaves the target.
+    pub perforates: bool,
+    /// The way to x = k d, if the flight comes there.
+    pub to_crater_end: Option<Stretch>,
+    /// The whole way.
+    pub to_end: Stretch,
+}
+
+impl Path {
+    /// The facts about `flight`, an accurate flight (closed form, Taylor) through `problem` with its events.
+    pub fn of(problem: &Problem, flight: &Flight) -> Self {
+        // Stages of no length leave no trace.
+        let flown: Vec<usize> =
+            (0..=flight.stage).filter(|&index| problem.stages[index].end > problem.start_of(index)).collect();
+        let stretch = |last: usize| {
+            let mut stretch = Stretch::default();
+            for (turn, &index) in flown.iter().enumerate().take_while(|(_, index)| **index <= last) {
+                let law = &problem.stages[index];
+                stretch.velocity_dependent |= law.viscosity > 0.0 || law.drag > 0.0;
+                if turn > 0
+                    && let behind = flown[turn - 1]
+                    && let Some(state) = flight.at(EventKind::boundary(problem, behind))
+                {
+                    let left = problem.stages[behind].force(state.depth, state.velocity);
+                    let right = law.force(state.depth, state.velocity);
+                    stretch.force_jumps |= (left - right).abs() > CONTINUOUS * left.abs().max(right.abs());
+                }
+            }
+            stretch
+        };
+        Self {
+            perforates: flight.outcome == Outcome::Perforated,
+            to_crater_end: flight.crater_end().and(problem.crater).map(stretch),
+            to_end: stretch(flight.stage),
+        }
+    }
+}
+
+/// Formal order in dt of `quantity` for central difference; `None` for a quantity that the flight fixes or does not
+/// have (the depth of a perforation, the velocity at rest, the crater's end if it is not reached).
+///
+/// | reason | orders |
+/// |---|---|
+/// | none of the below | 2 |
+/// | `lagged`, force depends on the velocity before the quantity is taken | 1 |
+/// | force jumps on the way and is not landed on | 1 |
+/// | `step-end`: time and velocity are taken up to one step late | 1 |
+/// | `step-end`: the depth at rest, which is flat there | 2 |
+/// | not landed, force jumps at x = k d: the velocity there is interpolated over the jump | 1, its time 2 |
+///
+/// The critical velocity has the order of the depth at rest. `path` is then that of the critical flight, whatever it
+/// says about leaving the target.
+pub fn formal_order(velocity: VelocityAt, boundaries: Boundaries, path: &Path, quantity: Quantity) -> Option<f64> {
+    let stretch = match quantity {
+        Quantity::Depth if path.perforates => None,
+        Quantity::Velocity if !path.perforates => None,
+        Quantity::Depth | Quantity::Time | Quantity::Velocity | Quantity::CriticalVelocity => Some(path.to_end),
+        Quantity::CraterEndTime => path.to_crater_end,
+        // The velocity is interpolated with the force of the far side, if the flight goes there.
+        Quantity::CraterEndVelocity => {
+            path.to_crater_end.map(|way| Stretch { force_jumps: path.to_end.force_jumps, ..way })
+        }
+    }?;
+    let lags = velocity == VelocityAt::LaggedHalfStep && stretch.velocity_dependent;
+    let misses_jump = boundaries != Boundaries::Landed && stretch.force_jumps;
+    let late = boundaries == Boundaries::StepEnd && !matches!(quantity, Quantity::Depth | Quantity::CriticalVelocity);
+    Some(if lags || misses_jump || late { 1.0 } else { 2.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VELOCITIES: [VelocityAt; 3] =
+        [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
+    const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
+
+    /// Depth, time, velocity at the end; time and velocity at k d.
+    type Row = [Option<f64>; 5];
+
+    fn row(velocity: VelocityAt, boundaries: Boundaries, path: Path) -> Row {
+        use Quantity::{CraterEndTime, CraterEndVelocity, Depth, Time, Velocity};
+        [Depth, Time, Velocity, CraterEndTime, CraterEndVelocity].map(|q| formal_order(velocity, boundaries, &path, q))
+    }
+
+    const PLAIN: Stretch = Stretch { velocity_dependent: false, force_jumps: false };
+    const DRAGGED: Stretch = Stretch { velocity_dependent: true, ..PLAIN };
+    const CRATER: Path = Path { perforates: false, to_crater_end: None, to_end: PLAIN };
+    const TUNNEL: Path = Path { to_crater_end: Some(PLAIN), ..CRATER };
+    const DRAG: Path = Path { to_end: DRAGGED, ..TUNNEL };
+
+    fn with_jump(path: Path) -> Path {
+        Path { to_end: Stretch { force_jumps: true, ..path.to_end }, ..path }
+    }
+
+    #[test]
+    fn a_rest_in_the_crater_is_second_order_and_its_step_end_time_first() {
+        for velocity in VELOCITIES {
+            for boundaries in BOUNDARIES {
+                let time = if boundaries == Boundaries::StepEnd { 1.0 } else { 2.0 };
+                assert_eq!(row(velocity, boundaries, CRATER), [Some(2.0), Some(time), None, None, None]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_continuous_tunnel_without_lag_is_second_order_and_first_where_taken_late() {
+        for velocity in VELOCITIES {
+            for path in [TUNNEL, DRAG] {
+                if path.to_end.velocity_dependent && velocity == VelocityAt::LaggedHalfStep {
+                    continue;
+                }
+                for boundaries in BOUNDARIES {
+                    let taken = Some(if boundaries == Boundaries::StepEnd { 1.0 } else { 2.0 });
+                    assert_eq!(row(velocity, boundaries, path), [Some(2.0), taken, None, taken, taken]);
+                    let through = Path { perforates: true, ..path };
+                    assert_eq!(row(velocity, boundaries, through), [None, taken, taken, taken, taken]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lagged_drag_is_first_order_but_not_at_the_end_of_a_crater_without_drag() {
+        for boundaries in BOUNDARIES {
+            let at_crater_end = Some(if boundaries == Boundaries::StepEnd { 1.0 } else { 2.0 });
+            for path in [DRAG, with_jump(DRAG)] {
+                if path == with_jump(DRAG) && boundaries != Boundaries::Landed {
+                    continue;
+                }
+                let expected = [Some(1.0), Some(1.0), None, at_crater_end, at_crater_end];
+                assert_eq!(row(VelocityAt::LaggedHalfStep, boundaries, path), expected);
+            }
+        }
+        let viscous_crater = Path { to_crater_end: Some(DRAGGED), ..DRAG };
+        let order =
+            formal_order(VelocityAt::LaggedHalfStep, Boundaries::Landed, &viscous_crater, Quantity::CraterEndVelocity);
+        assert_eq!(order, Some(1.0));
+    }
+
+    #[test]
+    fn a_force_jump_is_second_order_only_when_landed_and_not_lagged() {
+        let (one, two) = (Some(1.0), Some(2.0));
+        for path in [TUNNEL, DRAG] {
+            let path = with_jump(path);
+            for velocity in VELOCITIES {
+                assert_eq!(row(velocity, Boundaries::StepEnd, path), [one, one, None, one, one]);
+                assert_eq!(row(velocity, Boundaries::Interpolated, path), [one, one, None, two, one]);
+                let lags = velocity == VelocityAt::LaggedHalfStep && path.to_end.velocity_dependent;
+                let end = if lags { one } else { two };
+                assert_eq!(row(velocity, Boundaries::Landed, path), [end, end, None, two, two]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_critical_velocity_has_the_order_of_the_depth_at_rest() {
+        for velocity in VELOCITIES {
+            for boundaries in BOUNDARIES {
+                for path in [DRAG, with_jump(DRAG)] {
+                    let depth = formal_order(velocity, boundaries, &path, Quantity::Depth);
+                    let through = Path { perforates: true, ..path };
+                    assert_eq!(formal_order(velocity, boundaries, &through, Quantity::CriticalVelocity), depth);
+                }
+            }
+        }
+    }
+}
