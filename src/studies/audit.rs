@@ -1,0 +1,1 @@
+//! Judgement of step-size results that another code produced.
