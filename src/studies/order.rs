@@ -43,7 +43,7 @@ pub const CLASS_LEVEL: f64 = 1e-3;
 pub const ORDER_RESOLUTION: f64 = 0.05;
 
 /// Level of the F test for a bend in the line, before one is believed.
-pub const BEND_LEVEL: f64 = 1e-6;
+pub const BEND_LEVEL: f64 = 1e-10;
 
 /// An error that stops falling is a round-off floor up to this many times the round-off of its point.
 pub const ROUND_OFF_ALLOWANCE: f64 = 1e3;
@@ -482,18 +482,26 @@ struct Bend {
 /// Two extra parameters, slope and place, so by the F distribution with 2 and n - 4 degrees of freedom, whose tail has
 /// a closed form: `P(F > f) = (1 + 2 f/(n - 4))^-((n - 4)/2) = (S_bent/S_straight)^((n - 4)/2)`.
 fn bend(x: &[f64], y: &[f64]) -> Option<Bend> {
+    let (tail, bend) = best_bend(x, y)?;
+    let matters = (bend.coarse_slope - bend.fine_slope).abs() > BEND_MIN;
+    (tail < BEND_LEVEL && matters).then_some(bend)
+}
+#[cfg(test)]
+fn bend_tail(x: &[f64], y: &[f64]) -> Option<f64> { best_bend(x,y).map(|b| b.0) }
+fn best_bend(x: &[f64], y: &[f64]) -> Option<(f64, Bend)> {
     let n = x.len();
-    if n < 2 * SIDE_MIN {
+    let side = SIDE_MIN.max(n / 8);
+    if n < 2 * side {
         return None;
     }
     let straight = line(x, y)?;
     let [x_mean, y_mean] = straight.centre;
     let straight_sum = straight.scatter * straight.scatter * straight.dof as f64;
     let mut best: Option<(f64, Bend)> = None;
-    let last = n - 2 * SIDE_MIN;
+    let last = n - 2 * side;
     let stride = last.div_ceil(BEND_CANDIDATES).max(1);
     for skip in (0..=last).step_by(stride) {
-        let left = SIDE_MIN + skip;
+        let left = side + skip;
         let at = 0.5 * (x[left - 1] + x[left]);
         // Three columns of the same size: the normal equations lose no more than a few digits of sixteen.
         let row = |i: usize| Vector3::new(1.0, x[i] - x_mean, (x[i] - at).max(0.0));
@@ -511,8 +519,7 @@ fn bend(x: &[f64], y: &[f64]) -> Option<Bend> {
     }
     let (bent_sum, bend) = best?;
     let tail = (bent_sum / straight_sum).powf(0.5 * (n - 4) as f64);
-    let matters = (bend.coarse_slope - bend.fine_slope).abs() > BEND_MIN;
-    (tail < BEND_LEVEL && matters).then_some(bend)
+    Some((tail, bend))
 }
 
 /// The t that Student's variable with `dof` degrees of freedom exceeds in size with probability `level`.
@@ -551,4 +558,99 @@ fn inside(theta: f64, dof: usize) -> f64 {
         power += 2;
     }
     if odd { FRAC_2_PI * (theta + sin * sum) } else { sin * sum }
+}
+
+#[cfg(test)]
+pub(super) mod noise {
+    //! Reproducible noise of the kinds that steps make.
+
+    /// Splitmix64 (Steele, Lea and Flood 2014): small, and good enough to draw steps with.
+    pub(crate) struct Noise(pub(crate) u64);
+
+    impl Noise {
+        /// Uniform in (0, 1), both ends excluded.
+        pub(crate) fn uniform(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            ((z ^ (z >> 31)) >> 12) as f64 * 2.0_f64.powi(-52) + 2.0_f64.powi(-53)
+        }
+
+        /// Standard normal (Box and Muller).
+        pub(crate) fn normal(&mut self) -> f64 {
+            (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+        }
+
+        /// Steps drawn log-uniformly from `coarsest * [10^-decades, 1]`.
+        pub(crate) fn steps(&mut self, n: usize, coarsest: f64, decades: f64) -> Vec<f64> {
+            (0..n).map(|_| coarsest * 10_f64.powf(-decades * self.uniform())).collect()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tuning {
+    use super::noise::Noise;
+    use super::*;
+    #[test]
+    #[ignore]
+    fn tune() {
+        let kinds: [(&str, fn(&mut Noise) -> f64); 6] = [
+            ("u", |r| r.uniform()),
+            ("u2", |r| r.uniform().powi(2)),
+            ("sin", |r| (std::f64::consts::TAU * r.uniform()).sin().abs()),
+            ("1-4u2", |r| 1.0 - (2.0 * r.uniform() - 1.0).powi(2)),
+            ("u-.3", |r| (r.uniform() - 0.3).abs()),
+            ("ln", |r| r.normal().exp()),
+        ];
+        let fits: usize = std::env::var("FITS").unwrap().parse().unwrap();
+        let raw = std::env::var("RAW").is_ok();
+        for n in [8, 20, 40, 60] {
+            for (name, kind) in kinds {
+                let mut r = Noise(n as u64 * 77);
+                let levels = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+                let mut miss = [0; 5];
+                let (mut half, mut pass, mut fail, mut bent, mut fail_off, mut pass_off) = (0.0, 0, 0, 0, 0, 0);
+                let mut cls = 0;
+                let ts: Vec<f64> = levels.iter().map(|&l| student_t(l, n - 2)).collect();
+                for _ in 0..fits {
+                    let h = r.steps(n, 1e0, 3.0);
+                    if std::env::var("BEND").is_ok() {
+                        let mut h = h; h.sort_by(f64::total_cmp);
+                        let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
+                        let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
+                        if let Some(t) = bend_tail(&x, &y) { for (i, l) in [1e-6, 1e-8, 1e-10, 1e-12, 1e-14].into_iter().enumerate() { if t < l { miss[i] += 1; } } }
+                        continue;
+                    }
+                    if raw {
+                        let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
+                        let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
+                        let (mx, my) = (x.iter().sum::<f64>() / n as f64, y.iter().sum::<f64>() / n as f64);
+                        let sxx: f64 = x.iter().map(|x| (x - mx) * (x - mx)).sum();
+                        let sxy: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
+                        let b = sxy / sxx;
+                        let s: f64 = x.iter().zip(&y).map(|(x, y)| (y - my - b * (x - mx)).powi(2)).sum();
+                        let t = (b - 2.0).abs() / (s / (n - 2) as f64 / sxx).sqrt();
+                        for i in 0..5 { if t > ts[i] { miss[i] += 1; } }
+                        continue;
+                    }
+                    let pts: Vec<_> = h.iter().map(|&h| StepError::new(h, h * h * kind(&mut r))).collect();
+                    let f = fit(&pts).unwrap();
+                    let l = f.line.unwrap();
+                    half += (l.verdict_band[1] - l.verdict_band[0]) / 2.0;
+                    if f.used() < n { bent += 1; }
+                    if f.class != Class::Converging { cls += 1; }
+                    match f.verdict(2.0) { OrderVerdict::Pass => pass += 1, OrderVerdict::Fail => fail += 1, _ => () }
+                    match f.verdict(1.5) { OrderVerdict::Pass => pass_off += 1, OrderVerdict::Fail => fail_off += 1, _ => () }
+                    let nu = f.used() - 2;
+                    let se = l.interval95[1] - l.order;
+                    let t = (l.order - 2.0).abs() / se * student_t(0.05, nu);
+                    for i in 0..5 { if t > student_t(levels[i], nu) { miss[i] += 1; } }
+                }
+                let m: Vec<_> = miss.iter().zip(levels).map(|(&m, l)| format!("{:.2}", m as f64 / fits as f64 / l)).collect();
+                println!("n {n} {name}: miss/level {m:?} half {:.3} pass {pass} fail {fail} bent {bent} noncls {cls} off .5: fail {fail_off} pass {pass_off}", half / fits as f64);
+            }
+        }
+    }
 }
