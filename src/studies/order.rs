@@ -487,7 +487,9 @@ fn bend(x: &[f64], y: &[f64]) -> Option<Bend> {
     (tail < BEND_LEVEL && matters).then_some(bend)
 }
 #[cfg(test)]
-fn bend_tail(x: &[f64], y: &[f64]) -> Option<f64> { best_bend(x,y).map(|b| b.0) }
+fn bend_tail(x: &[f64], y: &[f64]) -> Option<f64> {
+    best_bend(x, y).map(|b| b.0)
+}
 fn best_bend(x: &[f64], y: &[f64]) -> Option<(f64, Bend)> {
     let n = x.len();
     let side = SIDE_MIN.max(n / 8);
@@ -617,10 +619,17 @@ mod tuning {
                 for _ in 0..fits {
                     let h = r.steps(n, 1e0, 3.0);
                     if std::env::var("BEND").is_ok() {
-                        let mut h = h; h.sort_by(f64::total_cmp);
+                        let mut h = h;
+                        h.sort_by(f64::total_cmp);
                         let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
                         let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
-                        if let Some(t) = bend_tail(&x, &y) { for (i, l) in [1e-6, 1e-8, 1e-10, 1e-12, 1e-14].into_iter().enumerate() { if t < l { miss[i] += 1; } } }
+                        if let Some(t) = bend_tail(&x, &y) {
+                            for (i, l) in [1e-6, 1e-8, 1e-10, 1e-12, 1e-14].into_iter().enumerate() {
+                                if t < l {
+                                    miss[i] += 1;
+                                }
+                            }
+                        }
                         continue;
                     }
                     if raw {
@@ -632,24 +641,48 @@ mod tuning {
                         let b = sxy / sxx;
                         let s: f64 = x.iter().zip(&y).map(|(x, y)| (y - my - b * (x - mx)).powi(2)).sum();
                         let t = (b - 2.0).abs() / (s / (n - 2) as f64 / sxx).sqrt();
-                        for i in 0..5 { if t > ts[i] { miss[i] += 1; } }
+                        for i in 0..5 {
+                            if t > ts[i] {
+                                miss[i] += 1;
+                            }
+                        }
                         continue;
                     }
                     let pts: Vec<_> = h.iter().map(|&h| StepError::new(h, h * h * kind(&mut r))).collect();
                     let f = fit(&pts).unwrap();
                     let l = f.line.unwrap();
                     half += (l.verdict_band[1] - l.verdict_band[0]) / 2.0;
-                    if f.used() < n { bent += 1; }
-                    if f.class != Class::Converging { cls += 1; }
-                    match f.verdict(2.0) { OrderVerdict::Pass => pass += 1, OrderVerdict::Fail => fail += 1, _ => () }
-                    match f.verdict(1.5) { OrderVerdict::Pass => pass_off += 1, OrderVerdict::Fail => fail_off += 1, _ => () }
+                    if f.used() < n {
+                        bent += 1;
+                    }
+                    if f.class != Class::Converging {
+                        cls += 1;
+                    }
+                    match f.verdict(2.0) {
+                        OrderVerdict::Pass => pass += 1,
+                        OrderVerdict::Fail => fail += 1,
+                        _ => (),
+                    }
+                    match f.verdict(1.5) {
+                        OrderVerdict::Pass => pass_off += 1,
+                        OrderVerdict::Fail => fail_off += 1,
+                        _ => (),
+                    }
                     let nu = f.used() - 2;
                     let se = l.interval95[1] - l.order;
                     let t = (l.order - 2.0).abs() / se * student_t(0.05, nu);
-                    for i in 0..5 { if t > student_t(levels[i], nu) { miss[i] += 1; } }
+                    for i in 0..5 {
+                        if t > student_t(levels[i], nu) {
+                            miss[i] += 1;
+                        }
+                    }
                 }
-                let m: Vec<_> = miss.iter().zip(levels).map(|(&m, l)| format!("{:.2}", m as f64 / fits as f64 / l)).collect();
-                println!("n {n} {name}: miss/level {m:?} half {:.3} pass {pass} fail {fail} bent {bent} noncls {cls} off .5: fail {fail_off} pass {pass_off}", half / fits as f64);
+                let m: Vec<_> =
+                    miss.iter().zip(levels).map(|(&m, l)| format!("{:.2}", m as f64 / fits as f64 / l)).collect();
+                println!(
+                    "n {n} {name}: miss/level {m:?} half {:.3} pass {pass} fail {fail} bent {bent} noncls {cls} off .5: fail {fail_off} pass {pass_off}",
+                    half / fits as f64
+                );
             }
         }
     }
