@@ -5,3 +5,9 @@ pub mod quantity;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;
+//! Studies over many flights: order of convergence, grid convergence, and the judgement of other codes' results.
+
+pub mod audit;
+pub mod grid_convergence;
+pub mod order;
+pub mod quantity;

@@ -1,7 +1,10 @@
 //! The quantities whose error is studied, under their names in the contract.
 
 /// A number that a flight, or a search over flights, gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// Depth at the end of the flight [m].
     Depth,

@@ -1,0 +1,689 @@
+//! At which power of the step does an error vanish, and how sure is that?
+//!
+//! ```text
+//! |e(h)| = C h^p U,   ln|e| = ln C + p ln h + ln U
+//! ```
+//!
+//! The order p and the constant C come from least squares over many step sizes with random ratios. Pairwise orders
+//! are noise here: x = k d, x = H and rest fall at a random place in the step, so U is random, and often close to
+//! zero. Hence the interval beside every order, and a verdict that rests on a wider band ([`FALSE_ALARM_LEVEL`]).
+//!
+//! Before the fit, and each with its reason kept at the point ([`Exclusion`]):
+//! - errors that are zero are left out, for they have no logarithm;
+//! - the finest steps are left out when the error stops falling there **and** lies within [`ROUND_OFF_ALLOWANCE`]
+//!   times the round-off. An error that levels off anywhere above is no floor: the method converges to something else;
+//! - the coarsest steps are left out when the finer ones follow another power, by the test of [`BEND_LEVEL`]. The order
+//!   is a limit for h -> 0, so the fine end decides, also when it is the worse one.
+//!
+//! The same fit serves error against tolerance (slope 1: proportional) and error against 1/evaluations (slope: order).
+//!
+//! Source of the statistics: Draper and Smith, Applied Regression Analysis, ch. 1; Student t by Abramowitz and Stegun
+//! 26.7.3 and 26.7.4.
+
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use serde::Serialize;
+use thiserror::Error;
+
+/// Two-sided level of the band behind a verdict: the chance that a right order falls outside.
+///
+/// A suite of 100 fits then raises a false alarm once in 10⁴ seeds. It holds for the noise that steps make and not
+/// only for a normal one: over 10⁷ fits with `U` uniform, the bands of 10⁻³ to 10⁻⁵ are missed no more often than
+/// they say (`bands_keep_their_level_for_the_noise_of_steps` repeats a part of it).
+pub const FALSE_ALARM_LEVEL: f64 = 1e-6;
+
+/// Two-sided level at which a slope counts as different from zero, for the class.
+pub const CLASS_LEVEL: f64 = 1e-3;
+
+/// Half-width that no band goes below.
+///
+/// Without noise the residuals are the next term of the error, which is no random number: an interval made of them
+/// does not cover the truth. Orders closer than this are not told apart.
+pub const ORDER_RESOLUTION: f64 = 0.05;
+
+/// Level of the F test for a bend in the line, before one is believed.
+pub const BEND_LEVEL: f64 = 1e-10;
+
+/// An error that stops falling is a round-off floor up to this many times the round-off of its point.
+pub const ROUND_OFF_ALLOWANCE: f64 = 1e3;
+
+/// Fewest different steps from which an order is fitted.
+pub const STEPS_MIN: usize = 4;
+
+/// Slopes closer than this are one line, however significant their difference.
+const BEND_MIN: f64 = 0.1;
+/// Fewest points on either side of a bend.
+const SIDE_MIN: usize = 5;
+/// Places at which a bend is looked for.
+const BEND_CANDIDATES: usize = 24;
+/// Bends removed at most: a floor, and two of the coarse end.
+const BENDS_MAX: usize = 3;
+/// Share of the trend that the floor may still be at the finest step used.
+const FLOOR_SHARE: f64 = 0.25;
+
+/// The error at one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepError {
+    /// Step h, positive: a time [s], a tolerance, or 1/evaluations.
+    pub step: f64,
+    /// Error of either sign; the sign shows oscillation.
+    pub error: f64,
+    /// Size of the round-off in `error`, in its unit.
+    ///
+    /// `None` takes `f64::EPSILON` times the number of steps relative to the coarsest one: right for errors
+    /// relative to a value of order one.
+    pub round_off: Option<f64>,
+}
+
+impl StepError {
+    /// Error `error` at step `step`, round-off not known.
+    pub fn new(step: f64, error: f64) -> Self {
+        Self { step, error, round_off: None }
+    }
+}
+
+/// What the errors do as the step shrinks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// They vanish.
+    Converging,
+    /// They grow.
+    Diverging,
+    /// Their sign changes from step to step.
+    Oscillating,
+    /// They are round-off.
+    AtFloor,
+    /// Nothing of this can be told.
+    Undecided,
+}
+
+impl Class {
+    /// Name in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converging => "converging",
+            Self::Diverging => "diverging",
+            Self::Oscillating => "oscillating",
+            Self::AtFloor => "at-floor",
+            Self::Undecided => "undecided",
+        }
+    }
+}
+
+/// Why a point is not in the fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Exclusion {
+    /// The error is zero.
+    ZeroError,
+    /// Fine end: the error is round-off.
+    RoundOffFloor,
+    /// Coarse end: outside the asymptotic range.
+    PreAsymptotic,
+}
+
+/// One point and what became of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FittedPoint {
+    /// Step h.
+    pub step: f64,
+    /// Error as given.
+    pub error: f64,
+    /// Whether the fit rests on it.
+    pub used: bool,
+    /// Why not.
+    pub excluded: Option<Exclusion>,
+}
+
+/// A fitted `|e| = C h^p`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PowerLaw {
+    /// Order p.
+    pub order: f64,
+    /// 95 % interval of the order (Student t).
+    pub interval95: [f64; 2],
+    /// Wider interval on which verdicts rest.
+    pub verdict_band: [f64; 2],
+    /// Constant C: geometric mean of `|e| h^-p` with the fitted p, in the error's unit per `step^p`.
+    pub error_constant: f64,
+    /// 95 % interval of the constant.
+    pub constant_interval: [f64; 2],
+    /// Standard deviation of `ln|e|` about the line.
+    pub residual_scatter: f64,
+}
+
+/// The constant for an order that is known.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorConstant {
+    /// Geometric mean of `|e| h^-p`; with the sign of the errors if they share one.
+    pub value: f64,
+    /// 95 % interval.
+    pub interval95: [f64; 2],
+}
+
+/// Whether a fit bears out an order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderVerdict {
+    /// Converging, the order is in the band, and its integer neighbours are not.
+    Pass,
+    /// The order is outside the band, or the errors grow.
+    Fail,
+    /// Neither can be said.
+    Undecided,
+}
+
+/// The result of [`fit`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OrderFit {
+    /// The fitted line; `None` when fewer than [`STEPS_MIN`] points are left.
+    pub line: Option<PowerLaw>,
+    /// What the errors do.
+    pub class: Class,
+    /// Why this class: one clause with its numbers.
+    pub reason: String,
+    /// Every point, ascending in step.
+    pub points: Vec<FittedPoint>,
+}
+
+/// Why there is no fit. None of these is ever a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum FitError {
+    /// NaN or infinity.
+    #[error("error {error} at step {step} is not finite (point {index})")]
+    NotFinite {
+        /// Index from 0 in the points given.
+        index: usize,
+        /// Step.
+        step: f64,
+        /// Error.
+        error: f64,
+    },
+    /// A step, or a round-off estimate, that is none.
+    #[error("step {step} is not a positive number (point {index})")]
+    BadStep {
+        /// Index from 0 in the points given.
+        index: usize,
+        /// Step.
+        step: f64,
+    },
+    /// Too little to fit.
+    #[error("{found} different steps, and an order needs {STEPS_MIN}")]
+    TooFewSteps {
+        /// Different steps found.
+        found: usize,
+    },
+}
+
+impl OrderFit {
+    /// Points in the fit.
+    pub fn used(&self) -> usize {
+        self.points.iter().filter(|point| point.used).count()
+    }
+
+    /// Whether the fit bears out the order `formal`.
+    pub fn verdict(&self, formal: f64) -> OrderVerdict {
+        let Some(line) = self.line else { return OrderVerdict::Undecided };
+        let [low, high] = line.verdict_band;
+        let holds = |order: f64| low <= order && order <= high;
+        match self.class {
+            Class::Diverging => OrderVerdict::Fail,
+            Class::AtFloor | Class::Oscillating => OrderVerdict::Undecided,
+            Class::Converging | Class::Undecided if !holds(formal) => OrderVerdict::Fail,
+            Class::Converging if !holds(formal - 1.0) && !holds(formal + 1.0) => OrderVerdict::Pass,
+            Class::Converging | Class::Undecided => OrderVerdict::Undecided,
+        }
+    }
+
+    /// The constant C of `e = C h^order` for a known order; `None` with fewer than two points in the fit.
+    pub fn constant_at(&self, order: f64) -> Option<ErrorConstant> {
+        let used: Vec<_> = self.points.iter().filter(|point| point.used).collect();
+        if used.len() < 2 {
+            return None;
+        }
+        let n = used.len() as f64;
+        let logs: Vec<f64> = used.iter().map(|point| point.error.abs().ln() - order * point.step.ln()).collect();
+        let mean = logs.iter().sum::<f64>() / n;
+        let variance = logs.iter().map(|log| (log - mean) * (log - mean)).sum::<f64>() / (n - 1.0);
+        let half = student_t(0.05, used.len() - 1) * (variance / n).sqrt();
+        let negative = used.iter().all(|point| point.error < 0.0);
+        let (low, value, high) = ((mean - half).exp(), mean.exp(), (mean + half).exp());
+        Some(if negative {
+            ErrorConstant { value: -value, interval95: [-high, -low] }
+        } else {
+            ErrorConstant { value, interval95: [low, high] }
+        })
+    }
+
+    /// Share of neighbouring used points whose error falls with the step, 0 to 1; `None` with fewer than two.
+    ///
+    /// One for an error that is monotone in the step or in the tolerance.
+    pub fn falling_share(&self) -> Option<f64> {
+        let errors: Vec<f64> = self.points.iter().filter(|point| point.used).map(|point| point.error.abs()).collect();
+        let pairs = errors.len().checked_sub(1).filter(|&pairs| pairs > 0)?;
+        let falling = errors.windows(2).filter(|pair| pair[0] < pair[1]).count();
+        Some(falling as f64 / pairs as f64)
+    }
+}
+
+/// Fits the order over `points`, in any sequence, with the band of [`FALSE_ALARM_LEVEL`].
+///
+/// # Errors
+/// [`FitError`]: NaN or infinity, a step that is not positive, fewer than [`STEPS_MIN`] different steps.
+pub fn fit(points: &[StepError]) -> Result<OrderFit, FitError> {
+    fit_at_level(points, FALSE_ALARM_LEVEL)
+}
+
+/// As [`fit`], with the verdict band of the two-sided level `level`, 1e-9 to 1.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_at_level(points: &[StepError], level: f64) -> Result<OrderFit, FitError> {
+    let mut sorted = admissible(points)?;
+    sorted.sort_by(|a, b| a.step.total_cmp(&b.step));
+    let distinct = 1 + sorted.windows(2).filter(|pair| pair[0].step < pair[1].step).count();
+    if distinct < STEPS_MIN {
+        return Err(FitError::TooFewSteps { found: distinct.min(points.len()) });
+    }
+    let round_off = round_off(&sorted);
+    let excluded = exclusions(&sorted, &round_off);
+    let used: Vec<usize> = (0..sorted.len()).filter(|&i| excluded[i].is_none()).collect();
+    let x: Vec<f64> = used.iter().map(|&i| sorted[i].step.ln()).collect();
+    let y: Vec<f64> = used.iter().map(|&i| sorted[i].error.abs().ln()).collect();
+    let line = line(&x, &y).map(|raw| raw.power_law(level));
+    let signs: Vec<bool> = used.iter().map(|&i| sorted[i].error < 0.0).collect();
+    // How far above round-off the bulk of all points lies: the median, so that single zeros and outliers do not decide.
+    let mut heights: Vec<f64> = (0..sorted.len()).map(|i| sorted[i].error.abs() / round_off[i]).collect();
+    heights.sort_by(f64::total_cmp);
+    let height = heights[heights.len() / 2];
+    let (class, reason) = classify(&x, &y, &signs, height, &excluded);
+    let points = (0..sorted.len())
+        .map(|i| FittedPoint {
+            step: sorted[i].step,
+            error: sorted[i].error,
+            used: excluded[i].is_none() && line.is_some(),
+            excluded: excluded[i],
+        })
+        .collect();
+    Ok(OrderFit { line, class, reason, points })
+}
+
+/// The points, every number checked.
+fn admissible(points: &[StepError]) -> Result<Vec<StepError>, FitError> {
+    for (index, &StepError { step, error, round_off }) in points.iter().enumerate() {
+        if !error.is_finite() || round_off.is_some_and(|size| !size.is_finite() || size < 0.0) {
+            return Err(FitError::NotFinite { index, step, error });
+        }
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(FitError::BadStep { index, step });
+        }
+    }
+    Ok(points.to_vec())
+}
+
+/// Round-off of each point, never zero so that ratios exist.
+fn round_off(sorted: &[StepError]) -> Vec<f64> {
+    let coarsest = sorted.last().map_or(1.0, |point| point.step);
+    sorted
+        .iter()
+        .map(|point| point.round_off.unwrap_or(f64::EPSILON * coarsest / point.step).max(f64::MIN_POSITIVE))
+        .collect()
+}
+
+/// Which of the points, ascending in step, stay out of the fit.
+fn exclusions(sorted: &[StepError], round_off: &[f64]) -> Vec<Option<Exclusion>> {
+    let mut excluded: Vec<Option<Exclusion>> =
+        sorted.iter().map(|point| (point.error == 0.0).then_some(Exclusion::ZeroError)).collect();
+    // The unbroken run at the fine end that does not rise above its round-off. A single small error further up is
+    // only an error near its change of sign, and leaving that out would tilt the line.
+    for i in 0..sorted.len() {
+        if sorted[i].error.abs() > 3.0 * round_off[i] {
+            break;
+        }
+        excluded[i].get_or_insert(Exclusion::RoundOffFloor);
+    }
+    for _ in 0..BENDS_MAX {
+        let used: Vec<usize> = (0..sorted.len()).filter(|&i| excluded[i].is_none()).collect();
+        let x: Vec<f64> = used.iter().map(|&i| sorted[i].step.ln()).collect();
+        let y: Vec<f64> = used.iter().map(|&i| sorted[i].error.abs().ln()).collect();
+        let Some(bend) = bend(&x, &y) else { break };
+        let mut heights: Vec<f64> = used
+            .iter()
+            .filter(|&&i| sorted[i].step.ln() <= bend.at)
+            .map(|&i| sorted[i].error.abs() / round_off[i])
+            .collect();
+        heights.sort_by(f64::total_cmp);
+        let round_off_made = heights[heights.len() / 2] <= ROUND_OFF_ALLOWANCE;
+        if bend.fine_slope < 0.5 * bend.coarse_slope && bend.coarse_slope > 0.0 && round_off_made {
+            // Trend and floor are equal at the bend; above it the floor's share falls with the difference in slope.
+            let clear = bend.at - FLOOR_SHARE.ln() / (bend.coarse_slope - bend.fine_slope);
+            for &i in used.iter().filter(|&&i| sorted[i].step.ln() <= clear) {
+                excluded[i] = Some(Exclusion::RoundOffFloor);
+            }
+        } else {
+            for &i in used.iter().filter(|&&i| sorted[i].step.ln() > bend.at) {
+                excluded[i] = Some(Exclusion::PreAsymptotic);
+            }
+        }
+    }
+    excluded
+}
+
+/// The class of the used points `x, y`, their signs, and the height above round-off of all.
+fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Option<Exclusion>]) -> (Class, String) {
+    let count = |reason| excluded.iter().filter(|&&e| e == Some(reason)).count();
+    let at_floor = count(Exclusion::ZeroError) + count(Exclusion::RoundOffFloor);
+    let Some(line) = line(x, y) else {
+        return if at_floor > 0 {
+            (Class::AtFloor, format!("{at_floor} of {} errors are zero or round-off", excluded.len()))
+        } else {
+            (Class::Undecided, format!("{} points are too few", x.len()))
+        };
+    };
+    let [low, high] = line.slope_band(CLASS_LEVEL);
+    let slope = line.slope;
+    if low <= 0.0 && height <= ROUND_OFF_ALLOWANCE {
+        return (
+            Class::AtFloor,
+            format!("the errors do not fall with the step and are {height:.1} times the round-off"),
+        );
+    }
+    if negative.len() >= STEPS_MIN && alternates(negative) {
+        let n = negative.len();
+        return (Class::Oscillating, format!("the error changes sign from step to step, {n} points"));
+    }
+    if low > 0.0 {
+        (Class::Converging, format!("the error falls as h^{slope:.2}"))
+    } else if high < 0.0 {
+        (Class::Diverging, format!("the error grows as h^{slope:.2} while the step shrinks"))
+    } else {
+        (Class::Undecided, format!("slope {slope:.2} is not told from zero, [{low:.2}, {high:.2}]"))
+    }
+}
+
+/// Whether at least nine in ten neighbours differ in sign, at least three signs given.
+///
+/// Random signs do so in 1 of 8 tables of four points, and in 1 of 10¹⁰ of sixty.
+pub(super) fn alternates(negative: &[bool]) -> bool {
+    let pairs = negative.len().saturating_sub(1);
+    let changes = negative.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    pairs >= 2 && 10 * changes >= 9 * pairs
+}
+
+/// A straight line through `(x, y)` by least squares.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    slope: f64,
+    /// Mean of x and of y: the line passes through it, and the two coefficients there are uncorrelated.
+    centre: [f64; 2],
+    /// Sum of squared distances of x from its mean.
+    spread: f64,
+    /// Standard deviation of the residuals.
+    scatter: f64,
+    dof: usize,
+}
+
+impl Line {
+    fn slope_band(&self, level: f64) -> [f64; 2] {
+        let half = (student_t(level, self.dof) * self.scatter / self.spread.sqrt()).max(ORDER_RESOLUTION);
+        [self.slope - half, self.slope + half]
+    }
+
+    fn power_law(&self, level: f64) -> PowerLaw {
+        let t = student_t(0.05, self.dof);
+        let half = t * self.scatter / self.spread.sqrt();
+        let [x, y] = self.centre;
+        let log_constant = y - self.slope * x;
+        let n = (self.dof + 2) as f64;
+        let log_half = t * self.scatter * (1.0 / n + x * x / self.spread).sqrt();
+        PowerLaw {
+            order: self.slope,
+            interval95: [self.slope - half, self.slope + half],
+            verdict_band: self.slope_band(level),
+            error_constant: log_constant.exp(),
+            constant_interval: [(log_constant - log_half).exp(), (log_constant + log_half).exp()],
+            residual_scatter: self.scatter,
+        }
+    }
+}
+
+/// `None` for fewer than [`STEPS_MIN`] points or fewer than two different x.
+fn line(x: &[f64], y: &[f64]) -> Option<Line> {
+    let n = x.len();
+    if n < STEPS_MIN {
+        return None;
+    }
+    let centre = [x.iter().sum::<f64>() / n as f64, y.iter().sum::<f64>() / n as f64];
+    let design = DMatrix::from_fn(n, 2, |i, j| if j == 0 { 1.0 } else { x[i] - centre[0] });
+    let values = DVector::from_fn(n, |i, _| y[i] - centre[1]);
+    let solution = design.clone().svd(true, true).solve(&values, f64::EPSILON).ok()?;
+    let residuals = values - &design * &solution;
+    let spread = design.column(1).norm_squared();
+    // Steps that differ only in their last digits carry no slope.
+    if spread <= 1e-20 * n as f64 {
+        return None;
+    }
+    let dof = n - 2;
+    Some(Line { slope: solution[1], centre, spread, scatter: (residuals.norm_squared() / dof as f64).sqrt(), dof })
+}
+
+/// A place where the line changes its slope.
+#[derive(Clone, Copy, Debug)]
+struct Bend {
+    at: f64,
+    fine_slope: f64,
+    coarse_slope: f64,
+}
+
+/// The best bend of the points, x ascending, if there is one beyond doubt and of a size that matters.
+///
+/// Two extra parameters, slope and place, so by the F distribution with 2 and n - 4 degrees of freedom, whose tail has
+/// a closed form: `P(F > f) = (1 + 2 f/(n - 4))^-((n - 4)/2) = (S_bent/S_straight)^((n - 4)/2)`.
+fn bend(x: &[f64], y: &[f64]) -> Option<Bend> {
+    let (tail, bend) = best_bend(x, y)?;
+    let matters = (bend.coarse_slope - bend.fine_slope).abs() > BEND_MIN;
+    (tail < BEND_LEVEL && matters).then_some(bend)
+}
+#[cfg(test)]
+fn bend_tail(x: &[f64], y: &[f64]) -> Option<f64> {
+    best_bend(x, y).map(|b| b.0)
+}
+fn best_bend(x: &[f64], y: &[f64]) -> Option<(f64, Bend)> {
+    let n = x.len();
+    let side = SIDE_MIN.max(n / 8);
+    if n < 2 * side {
+        return None;
+    }
+    let straight = line(x, y)?;
+    let [x_mean, y_mean] = straight.centre;
+    let straight_sum = straight.scatter * straight.scatter * straight.dof as f64;
+    let mut best: Option<(f64, Bend)> = None;
+    let last = n - 2 * side;
+    let stride = last.div_ceil(BEND_CANDIDATES).max(1);
+    for skip in (0..=last).step_by(stride) {
+        let left = side + skip;
+        let at = 0.5 * (x[left - 1] + x[left]);
+        // Three columns of the same size: the normal equations lose no more than a few digits of sixteen.
+        let row = |i: usize| Vector3::new(1.0, x[i] - x_mean, (x[i] - at).max(0.0));
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (i, &value) in y.iter().enumerate() {
+            normal += row(i) * row(i).transpose();
+            right += row(i) * (value - y_mean);
+        }
+        let Some(factor) = normal.cholesky() else { continue };
+        let fitted = factor.solve(&right);
+        let sum: f64 = (0..n).map(|i| (y[i] - y_mean - row(i).dot(&fitted)).powi(2)).sum();
+        if best.is_none_or(|(least, _)| sum < least) {
+            best = Some((sum, Bend { at, fine_slope: fitted[1], coarse_slope: fitted[1] + fitted[2] }));
+        }
+    }
+    let (bent_sum, bend) = best?;
+    let tail = (bent_sum / straight_sum).powf(0.5 * (n - 4) as f64);
+    Some((tail, bend))
+}
+
+/// The t that Student's variable with `dof` degrees of freedom exceeds in size with probability `level`.
+///
+/// `level` 1e-9 to 1 and `dof` at least 1. The distribution is a finite sum in `theta = atan(t/sqrt(dof))` (Abramowitz
+/// and Stegun 26.7.3, 26.7.4), so nothing is approximated; inverted by bisection. Relative accuracy 1e-16/level.
+///
+/// # Panics
+/// If `level` or `dof` is outside its range: a mistake of the caller.
+pub fn student_t(level: f64, dof: usize) -> f64 {
+    assert!((1e-9..=1.0).contains(&level), "level {level} is outside 1e-9..1");
+    assert!(dof >= 1, "no degree of freedom");
+    let (mut low, mut high) = (0.0, FRAC_PI_2);
+    for _ in 0..64 {
+        let theta = 0.5 * (low + high);
+        if 1.0 - inside(theta, dof) > level {
+            low = theta;
+        } else {
+            high = theta;
+        }
+    }
+    (dof as f64).sqrt() * (0.5 * (low + high)).tan()
+}
+
+/// Probability that |T| < sqrt(dof) tan(theta).
+fn inside(theta: f64, dof: usize) -> f64 {
+    let (sin, cos) = theta.sin_cos();
+    let odd = dof % 2 == 1;
+    let (mut term, mut sum) = if odd { (cos, if dof > 1 { cos } else { 0.0 }) } else { (1.0, 1.0) };
+    // Terms run in steps of cos² up to the power dof - 2.
+    let mut power = if odd { 3 } else { 2 };
+    while power + 2 <= dof {
+        let k = power as f64;
+        term *= cos * cos * (k - 1.0) / k;
+        sum += term;
+        power += 2;
+    }
+    if odd { FRAC_2_PI * (theta + sin * sum) } else { sin * sum }
+}
+
+#[cfg(test)]
+pub(super) mod noise {
+    //! Reproducible noise of the kinds that steps make.
+
+    /// Splitmix64 (Steele, Lea and Flood 2014): small, and good enough to draw steps with.
+    pub(crate) struct Noise(pub(crate) u64);
+
+    impl Noise {
+        /// Uniform in (0, 1), both ends excluded.
+        pub(crate) fn uniform(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            ((z ^ (z >> 31)) >> 12) as f64 * 2.0_f64.powi(-52) + 2.0_f64.powi(-53)
+        }
+
+        /// Standard normal (Box and Muller).
+        pub(crate) fn normal(&mut self) -> f64 {
+            (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+        }
+
+        /// Steps drawn log-uniformly from `coarsest * [10^-decades, 1]`.
+        pub(crate) fn steps(&mut self, n: usize, coarsest: f64, decades: f64) -> Vec<f64> {
+            (0..n).map(|_| coarsest * 10_f64.powf(-decades * self.uniform())).collect()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tuning {
+    use super::noise::Noise;
+    use super::*;
+    #[test]
+    #[ignore]
+    fn tune() {
+        let kinds: [(&str, fn(&mut Noise) -> f64); 6] = [
+            ("u", |r| r.uniform()),
+            ("u2", |r| r.uniform().powi(2)),
+            ("sin", |r| (std::f64::consts::TAU * r.uniform()).sin().abs()),
+            ("1-4u2", |r| 1.0 - (2.0 * r.uniform() - 1.0).powi(2)),
+            ("u-.3", |r| (r.uniform() - 0.3).abs()),
+            ("ln", |r| r.normal().exp()),
+        ];
+        let fits: usize = std::env::var("FITS").unwrap().parse().unwrap();
+        let raw = std::env::var("RAW").is_ok();
+        for n in [8, 20, 40, 60] {
+            for (name, kind) in kinds {
+                let mut r = Noise(n as u64 * 77);
+                let levels = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+                let mut miss = [0; 5];
+                let (mut half, mut pass, mut fail, mut bent, mut fail_off, mut pass_off) = (0.0, 0, 0, 0, 0, 0);
+                let mut cls = 0;
+                let ts: Vec<f64> = levels.iter().map(|&l| student_t(l, n - 2)).collect();
+                for _ in 0..fits {
+                    let h = r.steps(n, 1e0, 3.0);
+                    if std::env::var("BEND").is_ok() {
+                        let mut h = h;
+                        h.sort_by(f64::total_cmp);
+                        let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
+                        let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
+                        if let Some(t) = bend_tail(&x, &y) {
+                            for (i, l) in [1e-6, 1e-8, 1e-10, 1e-12, 1e-14].into_iter().enumerate() {
+                                if t < l {
+                                    miss[i] += 1;
+                                }
+                            }
+                        }
+                        continue;
+                    }
+                    if raw {
+                        let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
+                        let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
+                        let (mx, my) = (x.iter().sum::<f64>() / n as f64, y.iter().sum::<f64>() / n as f64);
+                        let sxx: f64 = x.iter().map(|x| (x - mx) * (x - mx)).sum();
+                        let sxy: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
+                        let b = sxy / sxx;
+                        let s: f64 = x.iter().zip(&y).map(|(x, y)| (y - my - b * (x - mx)).powi(2)).sum();
+                        let t = (b - 2.0).abs() / (s / (n - 2) as f64 / sxx).sqrt();
+                        for i in 0..5 {
+                            if t > ts[i] {
+                                miss[i] += 1;
+                            }
+                        }
+                        continue;
+                    }
+                    let pts: Vec<_> = h.iter().map(|&h| StepError::new(h, h * h * kind(&mut r))).collect();
+                    let f = fit(&pts).unwrap();
+                    let l = f.line.unwrap();
+                    half += (l.verdict_band[1] - l.verdict_band[0]) / 2.0;
+                    if f.used() < n {
+                        bent += 1;
+                    }
+                    if f.class != Class::Converging {
+                        cls += 1;
+                    }
+                    match f.verdict(2.0) {
+                        OrderVerdict::Pass => pass += 1,
+                        OrderVerdict::Fail => fail += 1,
+                        _ => (),
+                    }
+                    match f.verdict(1.5) {
+                        OrderVerdict::Pass => pass_off += 1,
+                        OrderVerdict::Fail => fail_off += 1,
+                        _ => (),
+                    }
+                    let nu = f.used() - 2;
+                    let se = l.interval95[1] - l.order;
+                    let t = (l.order - 2.0).abs() / se * student_t(0.05, nu);
+                    for i in 0..5 {
+                        if t > student_t(levels[i], nu) {
+                            miss[i] += 1;
+                        }
+                    }
+                }
+                let m: Vec<_> =
+                    miss.iter().zip(levels).map(|(&m, l)| format!("{:.2}", m as f64 / fits as f64 / l)).collect();
+                println!(
+                    "n {n} {name}: miss/level {m:?} half {:.3} pass {pass} fail {fail} bent {bent} noncls {cls} off .5: fail {fail_off} pass {pass_off}",
+                    half / fits as f64
+                );
+            }
+        }
+    }
+}
