@@ -2,6 +2,8 @@
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 
+pub mod energy;
 pub mod outcome;
 
-pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};
+pub use energy::Energy;
+pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};

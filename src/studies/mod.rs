@@ -1,0 +1,3 @@
+//! Questions asked of many flights: what an integrator's answers say together.
+
+pub mod critical_velocity;
