@@ -50,7 +50,9 @@ const ROUNDINGS_PER_STEP: f64 = 4.0;
 /// To be preferred where the outcome or the critical velocity matters: neither has a grazing case here. It is
 /// independent of the time-domain methods, which makes it their cross-check.
 ///
-/// Measured over 2,000 varied scenes against the closed form: see the tests of this file, which hold the limits.
+/// Measured over 2,000 varied scenes against the closed form: depth 7e-16, V² 5e-16 of V0², times 3e-14 of their
+/// condition number (1e-14 against the same code in double-double, the rest is the closed form's); the error of the
+/// margin is at most 0.27 of its stated bar.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Relative tolerance of a step; zero stands for the round-off of the number type.
@@ -166,10 +168,7 @@ impl Energy {
     ///
     /// # Errors
     /// As [`Energy::fly_in`], save that a flight with an exit always ends here.
-    pub fn exit_margin_in<S: Scalar>(
-        &self,
-        problem: &Problem<S>,
-    ) -> Result<Option<(S, f64, Cost)>, IntegrationError> {
+    pub fn exit_margin_in<S: Scalar>(&self, problem: &Problem<S>) -> Result<Option<(S, f64, Cost)>, IntegrationError> {
         refuse_viscosity(problem)?;
         if !problem.has_exit() || problem.impact_speed.value() <= 0.0 {
             return Ok(None);
@@ -297,15 +296,15 @@ impl<S: Scalar> Loss<S> {
         let per_mass = S::from_f64(2.0).over(problem.mass);
         // Divided twice: the square of a speed may leave the range of the number type where the quotient does not.
         let relative = |force: S| (per_mass * force).over(problem.impact_speed).over(problem.impact_speed);
-        let loss =
-            Self { steady: relative(stage.static_force), growing: relative(stage.stiffness), drag: per_mass * stage.drag };
+        let loss = Self {
+            steady: relative(stage.static_force),
+            growing: relative(stage.stiffness),
+            drag: per_mass * stage.drag,
+        };
         if [loss.steady, loss.growing, loss.drag].iter().all(|c| c.value().is_finite()) {
             Ok(loss)
         } else {
-            Err(IntegrationError::NotFinite {
-                what: "force over M V0²",
-                last: State::at_impact(problem).values(),
-            })
+            Err(IntegrationError::NotFinite { what: "force over M V0²", last: State::at_impact(problem).values() })
         }
     }
 
@@ -378,7 +377,6 @@ impl<S: Scalar> Walk<S> {
     /// With a finite limit w is carried on to it through rest, else the walk ends at rest. A w of exactly zero at the
     /// limit is an arrival, not a rest before it.
     fn cross(&mut self, loss: &Loss<S>, limit: S, tolerance: f64, seek_rest: bool) -> Result<Option<S>, Fault> {
-        let start = self.depth;
         let longest = DRAG_LENGTHS_MAX / loss.drag.value();
         let mut rest = None;
         while self.depth.value() < limit.value() {
@@ -393,23 +391,21 @@ impl<S: Scalar> Walk<S> {
                 length = length.min(1.5 * loss.static_reach(x.value(), w.value()));
             }
             let last = length >= left.value();
-            let h = if last { left } else { S::from_f64(length) };
-            let to = if last { limit } else { x + h };
+            // The step is the difference of two depths as they are stored: their rounding does not add up on the way.
+            let to = if last { limit } else { x + S::from_f64(length) };
+            let h = to - x;
 
-            // Every term is at most of this size. The way since the start of the stage stands for h, since the
-            // roundings of all steps so far are in it.
-            let way = to.value() - start.value();
-            let size = w.value().abs()
-                + way
-                    * (loss.steady.value().abs() + loss.growing.value() * to.value() + loss.drag.value() * w.value().abs());
+            // Every term of the sum, and every part of the rate, is at most of this size.
+            let (a, b, drag) = (loss.steady.value().abs(), loss.growing.value(), loss.drag.value());
+            let size = w.value().abs() + h.value() * (a + b * to.value() + drag * w.value().abs());
             let negligible = 0.5 * tolerance * size;
             let (change, terms) = loss.change(x, w, h, negligible);
             self.w = w + change;
             self.depth = to;
             self.cost.steps += 1;
             self.cost.force_evaluations += u64::from(terms);
-            // An error in w fades like exp(-κ h), which is below 1/(1 + κ h).
-            self.error = self.error / (1.0 + loss.drag.value() * h.value())
+            // An error in w fades as w itself would without a static force.
+            self.error = self.error * (-drag * h.value()).exp()
                 + (tolerance.max(S::EPSILON) + ROUNDINGS_PER_STEP * S::EPSILON) * size;
             if !self.w.value().is_finite() || !self.error.is_finite() {
                 return Err(Fault::NotFinite("V²"));
@@ -492,8 +488,7 @@ impl<S: Scalar> Leg<S> {
             let v = now.velocity.value();
             let rate_slope = 2.0 * v * (self.loss.drag.value() - self.loss.growing.value() / rate);
             let speed_radius = (rate / rate_slope).abs();
-            // Negated, so that a radius of 0/0 leaves depth as the variable.
-            let by_speed = monotone && (way <= 0.0 || !(speed_radius / fall.abs() <= depth_radius / way));
+            let by_speed = monotone && (way <= 0.0 || speed_radius / fall.abs() > depth_radius / way);
             let done = if by_speed {
                 self.step_in_speed(&mut now, velocity, speed_radius)
             } else if way > 0.0 {
@@ -568,14 +563,14 @@ impl<S: Scalar> Leg<S> {
             if n > 0 {
                 f[n] = self.loss.growing * gain[n];
                 if n == 1 {
-                    f[1] = f[1] - two * self.loss.drag * v * unit;
+                    f[1] -= two * self.loss.drag * v * unit;
                 } else if n == 2 {
                     f[2] += self.loss.drag * unit * unit;
                 }
             }
             let mut sum = if n == 0 { two } else { S::zero() };
             for k in 1..=n {
-                sum = sum - f[k] * inverse[n - k];
+                sum -= f[k] * inverse[n - k];
             }
             inverse[n] = sum.over(f[0]);
             let before = if n == 0 { S::zero() } else { unit * inverse[n - 1] };
@@ -689,7 +684,7 @@ impl<'a, S: Scalar> Log<'a, S> {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a failed unwrap is a failed test")]
 mod tests {
     use std::f64::consts::PI;
 
@@ -743,7 +738,7 @@ mod tests {
             low * (high / low).powf(self.unit())
         }
 
-        /// Concrete of 15 to 135 MPa, 1 to 10 cm, 30 to 1500 m/s; a quarter each without drag and with a given c.
+        /// Concrete of 15 to 135 megapascals, 1 to 10 cm, 30 to 1500 m/s; a quarter each without drag and with a given c.
         fn scene(&mut self, with_exit: bool) -> Problem {
             let d = self.between(0.01, 0.1);
             let mass = self.between(200.0, 1e5) * d * d * d;
@@ -805,7 +800,7 @@ mod tests {
         assert!((flight.end.depth / 0.144_826_200_112_217_07 - 1.0).abs() < 1e-15, "{:e}", flight.end.depth);
         assert!((flight.end.time / 8.291_966_948_249_334e-4 - 1.0).abs() < 1e-14, "{:e}", flight.end.time);
         let kd = flight.crater_end().unwrap();
-        assert!((kd.time / 3.749_918_414_549_262_4e-4 - 1.0).abs() < 1e-14, "{:e}", kd.time);
+        assert!((kd.time / 3.749_918_414_549_262e-4 - 1.0).abs() < 1e-14, "{:e}", kd.time);
         assert!((kd.velocity / 202.320_580_497_900_37 - 1.0).abs() < 1e-15, "{:e}", kd.velocity);
         assert_eq!(flight.events.len(), 2);
         assert_eq!(flight.exit_margin, None);
@@ -900,12 +895,13 @@ mod tests {
     fn margin_is_affine_in_the_square_of_the_impact_speed() {
         let w = |v0: f64| exit_energy_of(&concrete(2.0, v0, 0.4, 0.1, 848_230.0, 3.25, None)).unwrap().unwrap();
         let (low, middle, high) = (w(100.0), w(500.0), w(900.0));
-        let line = low + (high - low) * (500.0_f64.powi(2) - 100.0_f64.powi(2)) / (900.0_f64.powi(2) - 100.0_f64.powi(2));
+        let line =
+            low + (high - low) * (500.0_f64.powi(2) - 100.0_f64.powi(2)) / (900.0_f64.powi(2) - 100.0_f64.powi(2));
         assert!(low < 0.0 && high > 0.0);
         assert!((line - middle).abs() < 1e-14 * high.abs().max(low.abs()), "{line:e} {middle:e}");
     }
 
-    /// At V0 = V_c (1 ± 10^-j) the sign is right, or the outcome undecided: never silently wrong.
+    /// At V0 = `V_c` (1 ± 10^-j) the sign is right, or the outcome undecided: never silently wrong.
     #[test]
     fn outcome_near_the_critical_velocity_is_right_or_undecided() {
         let (mass, p, q, kd, h) = (2.0, 848_230.0_f64, 3.25_f64, 0.1, 0.4_f64);
@@ -939,8 +935,11 @@ mod tests {
 
     #[test]
     fn flights_without_an_end_are_errors() {
-        for last in [stage(0.0, 0.0, 0.0, f64::INFINITY), stage(0.0, 0.0, 1.0, f64::INFINITY), stage(-5.0, 0.0, 1.0, f64::INFINITY)]
-        {
+        for last in [
+            stage(0.0, 0.0, 0.0, f64::INFINITY),
+            stage(0.0, 0.0, 1.0, f64::INFINITY),
+            stage(-5.0, 0.0, 1.0, f64::INFINITY),
+        ] {
             let problem = staged(1.0, 10.0, f64::INFINITY, &[stage(1.0, 0.0, 0.0, 0.1), last]);
             let error = Energy::new().fly(&problem, Detail::Events).unwrap_err();
             assert!(matches!(error, IntegrationError::NeverEnds { last, .. } if last.depth == 0.1), "{error}");
@@ -1003,8 +1002,7 @@ mod tests {
     fn driven_flight_through_its_fastest_point_agrees_with_the_closed_form() {
         let mut random = Random(4);
         for _ in 0..300 {
-            let (m, s, p, v0) =
-                (1.0, random.between(1.0, 1e4), -random.between(0.1, 1e4), random.between(1e-3, 1e3));
+            let (m, s, p, v0) = (1.0, random.between(1.0, 1e4), -random.between(0.1, 1e4), random.between(1e-3, 1e3));
             let (w, u0) = ((s / m).sqrt(), p / s);
             // Below zero u0 the closed form of the depth cancels; this is the same root, added.
             let depth = (v0 / w).hypot(u0) - u0;
@@ -1092,7 +1090,8 @@ mod tests {
         // Twenty digits, 0.14482620011221707453 m and 8.2919669482493341157e-4 s, in two exact pieces each.
         let digits = |head: f64, tail: f64, scale: f64| (TwoFloat::new_mul(head, 1e6) + of(tail)).over(of(scale));
         let depth = (end.depth.over(digits(14_482_620_011_221.0, 707_453.0, 1e20)) - of(1.0)).value().abs();
-        let time = (end.time.over(digits(82_919_669_482_493.0, 341_157.0, 1e22).over(of(10.0))) - of(1.0)).value().abs();
+        let time =
+            (end.time.over(digits(82_919_669_482_493.0, 341_157.0, 1e22).over(of(10.0))) - of(1.0)).value().abs();
         assert!(depth < 5e-20 && time < 5e-20, "depth {depth:e}, time {time:e}");
     }
 
@@ -1116,8 +1115,8 @@ mod tests {
         assert_eq!(rows[0].state, State::at_impact(&problem));
         assert_eq!(rows[rows.len() - 1].state, flight.end);
         for pair in rows.windows(2) {
-            assert!(pair[1].state.time > pair[0].state.time, "{:?}", pair);
-            assert!(pair[1].state.depth > pair[0].state.depth, "{:?}", pair);
+            assert!(pair[1].state.time > pair[0].state.time, "{pair:?}");
+            assert!(pair[1].state.depth > pair[0].state.depth, "{pair:?}");
             let (before, after) = (pair[0].state, pair[1].state);
             let law = &problem.stages[pair[1].stage];
             let w = exit_energy::carry(law, problem.mass, before.velocity.powi(2), before.depth, after.depth);
@@ -1134,6 +1133,14 @@ mod tests {
     }
 
     #[test]
+    fn flight_with_its_events_holds_no_heap_memory() {
+        let problem = concrete(2.0, 900.0, 0.3, 0.1, 848_230.0, 3.25, None);
+        let flight = Energy::new().fly(&problem, Detail::Events).unwrap();
+        assert!(flight.events.len() == 2 && !flight.events.spilled());
+        assert_eq!((flight.trajectory.capacity(), flight.notes.capacity()), (0, 0));
+    }
+
+    #[test]
     fn impact_speed_zero_and_exit_at_the_face_end_at_once() {
         let mut problem = concrete(2.0, 0.0, 0.3, 0.1, 8e5, 3.0, Some(8e6));
         assert_eq!(Energy::new().fly(&problem, Detail::Events).unwrap().outcome, Outcome::StoppedInCrater);
@@ -1142,5 +1149,51 @@ mod tests {
         problem.exit_depth = 0.0;
         assert_eq!(Energy::new().fly(&problem, Detail::Events).unwrap().outcome, Outcome::Perforated);
         assert_eq!(exit_energy_of(&problem).unwrap(), Some(100.0));
+    }
+
+    /// Stages of either sign in any order over twelve decades of scale. Double-double takes other steps, and other
+    /// variables in them, so it tells whether the times depend on the way they were computed.
+    #[test]
+    fn any_stages_at_any_scale_give_ascending_events_and_the_times_of_double_double() {
+        let mut random = Random(6);
+        let (mut flights, mut worst) = (0, 0.0_f64);
+        for case in 0..3000 {
+            let (m, v0, unit) = (random.between(1e-6, 1e6), random.between(1e-6, 1e6), random.between(1e-6, 1e6));
+            let energy = m * v0 * v0;
+            let mut stages = Vec::new();
+            let mut end = 0.0;
+            for _ in 0..4 {
+                let mut pick = |share: f64, size: f64| if random.unit() < share { random.unit() * size } else { 0.0 };
+                let (static_force, drive, s, q) = (pick(0.6, 2.0), pick(0.3, 2.0), pick(0.4, 2.0), pick(0.5, 4.0));
+                end += unit * pick(0.9, 1.0);
+                stages.push(stage((static_force - drive) * energy / unit, s * energy / unit / unit, q * m / unit, end));
+            }
+            let last = stages.len() - 1;
+            stages[last].end = f64::INFINITY;
+            let problem = staged(m, v0, if case % 2 == 0 { f64::INFINITY } else { end }, &stages);
+            let flight = match Energy::new().fly(&problem, Detail::Trajectory) {
+                Ok(flight) => flight,
+                Err(IntegrationError::NeverEnds { .. }) => continue,
+                Err(other) => panic!("case {case}: {other}"),
+            };
+            if flight.end.time == 0.0 {
+                continue;
+            }
+            flights += 1;
+            for pair in flight.trajectory.windows(2) {
+                assert!(pair[1].state.time >= pair[0].state.time, "case {case}: {pair:?}");
+                assert!(pair[1].state.depth >= pair[0].state.depth, "case {case}: {pair:?}");
+            }
+            assert!(flight.cost.steps < 400, "case {case}: {:?}", flight.cost);
+            let fine = Energy::new().fly_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap().values();
+            let slowest = flight.events.iter().map(|e| e.state.velocity / v0).filter(|v| *v > 0.0).fold(1.0, f64::min);
+            assert_eq!(flight.events.len(), fine.events.len(), "case {case}");
+            // A time is conditioned like 1/v at a boundary, and once more where that speed is left uphill.
+            let error = (flight.end.time / fine.end.time - 1.0).abs() * slowest * slowest;
+            worst = worst.max(error);
+            assert!(error < 1e-13, "case {case}: {error:e} {flight:?}");
+        }
+        println!("{flights} flights, worst time error {worst:e}");
+        assert!(flights > 2000);
     }
 }

@@ -36,7 +36,7 @@ pub trait Scalar:
     /// To be used for `/` wherever the low part matters: the operator of `twofloat` 0.8.4 takes the residual
     /// `1 - b (1/b)` in plain `f64` and is good to 2e-16 only.
     #[must_use]
-    #[inline(always)]
+    #[inline]
     fn over(self, divisor: Self) -> Self {
         self / divisor
     }
