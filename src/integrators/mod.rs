@@ -11,3 +11,8 @@ pub mod outcome;
 
 pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};
+pub mod energy;
+pub mod outcome;
+
+pub use energy::Energy;
+pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};

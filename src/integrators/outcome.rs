@@ -243,6 +243,17 @@ impl IntegrationError {
     }
 }
 
+/// The exit margin alone, without the flight around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margin {
+    /// Exit margin W(exit)/V0², as [`Flight::exit_margin`].
+    pub value: f64,
+    /// Half-width of its error bar, as [`Flight::exit_margin_error`].
+    pub error: Option<f64>,
+    /// Work done.
+    pub cost: Cost,
+}
+
 /// A way to fly a problem.
 pub trait Integrator {
     /// Name of the method in the contract.
@@ -258,4 +269,15 @@ pub trait Integrator {
     /// # Errors
     /// [`IntegrationError`]: the method refuses the problem, or no end can be computed.
     fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError>;
+
+    /// The exit margin of `problem`; `None` without an exit depth, or at no impact speed.
+    ///
+    /// The whole flight unless a method knows a shorter way: the search for the critical velocity asks for nothing else.
+    ///
+    /// # Errors
+    /// As [`Integrator::fly`].
+    fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
+        let flight = self.fly(problem, Detail::End)?;
+        Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }))
+    }
 }

@@ -11,3 +11,6 @@ pub mod audit;
 pub mod grid_convergence;
 pub mod order;
 pub mod quantity;
+//! Questions asked of many flights: what an integrator's answers say together.
+
+pub mod critical_velocity;
