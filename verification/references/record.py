@@ -32,7 +32,7 @@ def stage(p=0.0, s=0.0, r=0.0, q=0.0, end=None):
     return {"static_force_n": p, "stiffness_n_m": s, "viscosity_kg_s": r, "drag_kg_m": q, "end_m": end}
 
 
-def concrete(mass, diameter, nose_factor, strength, density, static_factor, velocity, ratio=2.0, inertia=1.0, c=None):
+def concrete(mass, diameter, nose_factor, strength, density, static_factor, velocity, inertia=1.0, c=None, ratio=2.0):
     """Crater and tunnel of Eq. 4-5; the crater constant c continuous unless given."""
     area = 0.25 * math.pi * diameter**2
     force, drag = area * static_factor * strength, area * nose_factor * inertia * density
@@ -56,6 +56,15 @@ SCENES = [
     ("tunnel", "rest in the tunnel", 0, 2.0, 300.0, None, blunt(300.0)),
     ("perforate", "exit at 135 m/s", 0, 2.0, 400.0, 0.18, blunt(400.0)),
     ("graze", "exit a millionth of the depth before rest", 0, 2.0, 400.0, 0.200771166635, blunt(400.0)),
+    (
+        "constant",
+        "constant force in the tunnel, exit halfway to rest: error estimates vanish and steps jump over the end",
+        0,
+        2.0,
+        300.0,
+        0.128,
+        blunt(300.0, inertia=0.0),
+    ),
     ("jump", "the crater constant is given, the force jumps at k d", 0, 2.0, 300.0, None, blunt(300.0, c=5e6)),
     ("forrestal", "Forrestal 1994 shot 14, ogive", 0, 0.906, 277.0, None, concrete(**SHOT_14, velocity=277.0)),
     ("viscous", "p + s x + r V, underdamped, one stage", None, 2.0, 60.0, None, [stage(p=5e4, s=1e6, r=500.0)]),
