@@ -14,3 +14,6 @@ pub mod quantity;
 //! Questions asked of many flights: what an integrator's answers say together.
 
 pub mod critical_velocity;
+//! Questions that take more than one flight: orders, critical velocities, other people's programs.
+
+pub mod peers;

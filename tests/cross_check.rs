@@ -1,0 +1,157 @@
+//! The live cross-check: the programs themselves are asked, and must still say what was recorded.
+//!
+//! Where Python 3 or the network for its packages is missing, the tests say so in one line and count as ignored; with
+//! `CI=true` they fail, so that a build server cannot quietly check nothing.
+
+use std::env;
+use std::error::Error;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use penetrode::physics::Outcome;
+use penetrode::studies::peers::{
+    BundledPeer, Environment, Peer, PeerSetupError, RecordedFlight, Recording, recordings,
+};
+
+/// What makes a test fail; every error of ours chains into it.
+type Check = Result<(), Box<dyn Error>>;
+
+const CHECKS: [(&str, BundledPeer, fn(BundledPeer, &Environment) -> Check); 6] = [
+    ("cvode_adams_still_says_what_was_recorded", BundledPeer::SundaeAdams, says_what_was_recorded),
+    ("cvode_bdf_still_says_what_was_recorded", BundledPeer::SundaeBdf, says_what_was_recorded),
+    ("ida_still_says_what_was_recorded", BundledPeer::SundaeIda, says_what_was_recorded),
+    ("heyoka_still_says_what_was_recorded", BundledPeer::Heyoka, says_what_was_recorded),
+    ("cvode_with_coincident_events_answers_or_reports_and_lives", BundledPeer::SundaeAdams, survives_coincidence),
+    ("scipy_with_the_natural_events_misses_a_perforation", BundledPeer::Scipy, misses_a_perforation),
+];
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let wanted = |name: &str| {
+        let hit = |pattern: &String| if arguments.exact { name == pattern } else { name.contains(pattern.as_str()) };
+        arguments.filter.as_ref().is_none_or(hit) && !arguments.skip.iter().any(hit)
+    };
+    let required = env::var("CI").is_ok_and(|value| value == "true");
+    let mut said = Vec::new();
+    let mut trials = Vec::new();
+    for (name, peer, check) in CHECKS {
+        // Neither a list nor tests that were not asked for are worth a download.
+        if arguments.list || !wanted(name) {
+            trials.push(Trial::test(name, || Ok(())));
+            continue;
+        }
+        let trial = match Environment::ensure(peer, &mut |line| eprintln!("{line}")) {
+            Ok(environment) => {
+                Trial::test(name, move || check(peer, &environment).map_err(|error| Failed::from(error.to_string())))
+            }
+            Err(error) => {
+                let reason = error.to_string();
+                if !required && !said.contains(&reason) {
+                    eprintln!("cross-check ignored: {reason}");
+                    said.push(reason.clone());
+                }
+                // Asked for all the same (`--ignored`), it fails: it cannot pass without having checked.
+                Trial::test(name, move || Err(Failed::from(reason))).with_ignored_flag(!required)
+            }
+        };
+        trials.push(trial);
+    }
+    trials.push(Trial::test("without_a_network_the_set_up_says_so_in_one_line_and_leaves_nothing", || {
+        says_that_the_network_is_missing().map_err(|error| Failed::from(error.to_string()))
+    }));
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// The same program at the same tolerance: on another machine only its rounding may differ.
+fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check {
+    let recording = recording_of(peer)?;
+    let mut live = Peer::start(&environment.command(peer))?;
+    let identity = live.identity();
+    if (&identity.name, &identity.version) != (&recording.program, &recording.version) {
+        return Err(format!("{identity} is not the program of the recording, {}", recording.version).into());
+    }
+    for flight in &recording.flights {
+        let answer = live.ask(&flight.request)?;
+        let differences = answer
+            .differences_from(&flight.answer, &flight.problem())
+            .ok_or_else(|| format!("{}: {} was {}", flight.scene, answer.outcome, flight.answer.outcome))?;
+        if answer.events.len() != flight.answer.events.len() {
+            return Err(format!("{}: {:?} were {:?}", flight.scene, answer.events, flight.answer.events).into());
+        }
+        for difference in differences {
+            if difference.relative > 1e-10 * difference.conditioning {
+                return Err(format!("{}: {difference:?}", flight.scene).into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// H = k d and rest there, within 1e-12 and 1e-6: SUNDIALS may refuse ("root found at and very near"), and must then
+/// be heard saying so, and answer the next question.
+fn survives_coincidence(peer: BundledPeer, environment: &Environment) -> Check {
+    let tunnel = flight("tunnel")?;
+    let mut request = tunnel.request;
+    let (crater_end, stiffness) = (0.1, 1e7);
+    request.stages[0].stiffness_n_m = stiffness;
+    request.exit_depth_m = Some(crater_end);
+    let critical = crater_end * f64::sqrt(stiffness / request.mass_kg);
+    let mut live = Peer::start(&environment.command(peer))?;
+    for offset in [0.0, 1e-12, -1e-12, 1e-6, -1e-6] {
+        request.velocity_m_s = critical * (1.0 + offset);
+        match live.ask(&request) {
+            Ok(answer) if offset.abs() < 1e-9 || (answer.outcome == Outcome::Perforated) == (offset > 0.0) => {}
+            Ok(answer) => return Err(format!("offset {offset}: {answer:?}").into()),
+            Err(failure) if failure.is_reported() => {}
+            Err(failure) => return Err(failure.into()),
+        }
+    }
+    Ok(())
+}
+
+/// The fault that this peer is kept for: with the natural events {x = H, V = 0} a step jumps over the turning point,
+/// sees x < H at both ends, and calls a perforation with half of the way to rest still before it a stop.
+fn misses_a_perforation(peer: BundledPeer, environment: &Environment) -> Check {
+    let constant = flight("constant")?;
+    let mut live = Peer::start(&environment.command(peer))?;
+    let missed = live.ask(&constant.request)?;
+    let found = constant.answer;
+    if missed.outcome.is_stop() && missed.depth_m > 1.1 * found.depth_m && found.outcome == Outcome::Perforated {
+        return Ok(());
+    }
+    Err(format!("it is expected to call a stop beyond the exit depth, and answers {missed:?}").into())
+}
+
+fn says_that_the_network_is_missing() -> Check {
+    let cache = tempfile::tempdir()?;
+    // Port 9 of this machine answers nobody.
+    let unreachable = "--index-url http://127.0.0.1:9/simple\nno-such-package==1.0\n";
+    match Environment::ensure_in(cache.path(), "python3", unreachable, &mut |_| ()) {
+        Err(error @ PeerSetupError::NoPackages { .. }) => {
+            let left: Vec<_> = std::fs::read_dir(cache.path())?.filter_map(Result::ok).map(|e| e.file_name()).collect();
+            let message = error.to_string();
+            if message.contains('\n') || left.iter().any(|name| !name.to_string_lossy().starts_with("scripts-")) {
+                return Err(format!("{message:?} and {left:?}").into());
+            }
+            Ok(())
+        }
+        // Without Python there is nothing to install from; the other tests say so.
+        Err(
+            PeerSetupError::NoPython { .. }
+            | PeerSetupError::PythonTooOld { .. }
+            | PeerSetupError::NoVirtualEnvironment { .. },
+        ) => Ok(()),
+        other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn recording_of(peer: BundledPeer) -> Result<Recording, Box<dyn Error>> {
+    let command = format!("python3 verification/peers/{}", peer.arguments().join(" "));
+    let found = recordings()?.into_iter().find(|recording| recording.command == command);
+    found.ok_or_else(|| format!("no recording of `{command}`").into())
+}
+
+fn flight(scene: &str) -> Result<RecordedFlight, Box<dyn Error>> {
+    let recording = recording_of(BundledPeer::SundaeAdams)?;
+    let found = recording.flights.into_iter().find(|flight| flight.scene == scene);
+    found.ok_or_else(|| format!("no scene `{scene}`").into())
+}
