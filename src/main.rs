@@ -1,2 +1,9 @@
-//! The program.
-fn main() {}
+//! The program: parse, run, exit code.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    penetrode::cli::Cli::parse().run().into()
+}

@@ -1,13 +1,15 @@
 //! The command line: one file per subcommand, exit codes in one place.
 
-pub mod batch;
+pub mod audit;
 pub mod completions;
+pub mod converge;
 pub mod critical;
 pub mod method_args;
 pub mod output;
 pub mod scene_json;
 pub mod schema;
 pub mod solve;
+pub mod verify;
 
 use std::io;
 use std::process::ExitCode;
@@ -17,7 +19,9 @@ use serde::Serialize;
 
 use crate::integrators::IntegrationError;
 use crate::physics::State;
-use crate::physics::scene_file::SceneError;
+use crate::physics::{ResolveError, Scene, SceneError};
+use crate::studies::convergence::ConvergenceError;
+use crate::studies::critical_velocity::CriticalError;
 
 /// How the program ended (contract, "Exit codes").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +51,7 @@ impl From<Exit> for ExitCode {
 pub enum CliError {
     /// A scene that cannot be used: exit 2.
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(#[from] Box<SceneError>),
     /// A request that cannot be served: exit 2.
     #[error("{message}")]
     Usage {
@@ -86,6 +90,34 @@ impl From<IntegrationError> for CliError {
             Self::Usage { message, help }
         } else {
             Self::Run { message, help, last: error.last() }
+        }
+    }
+}
+
+impl From<ResolveError> for CliError {
+    fn from(error: ResolveError) -> Self {
+        let (message, help) = (error.to_string(), error.help().to_owned());
+        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last: None } }
+    }
+}
+
+impl<E: std::fmt::Display> From<CriticalError<E>> for CliError {
+    fn from(error: CriticalError<E>) -> Self {
+        let message = error.to_string();
+        let (help, last) = match &error {
+            CriticalError::Flight { cause, .. } => (cause.help().to_owned(), cause.last()),
+            _ => (String::new(), None),
+        };
+        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last } }
+    }
+}
+
+impl From<ConvergenceError> for CliError {
+    fn from(error: ConvergenceError) -> Self {
+        match error {
+            ConvergenceError::Resolve(error) => error.into(),
+            ConvergenceError::Integration(error) => error.into(),
+            ConvergenceError::Critical(error) => error.into(),
         }
     }
 }
@@ -163,8 +195,12 @@ pub enum Command {
     Solve(solve::SolveArgs),
     /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
     Critical(critical::CriticalArgs),
-    /// Many scenes from a table, one line of results each.
-    Batch(batch::BatchArgs),
+    /// Order of convergence of every quantity, fitted and classified.
+    Converge(converge::ConvergeArgs),
+    /// Order, error band and verdict for step-size results of another code.
+    Audit(audit::AuditArgs),
+    /// The verification suite and its report.
+    Verify(verify::VerifyArgs),
     /// JSON schema of what a command prints.
     Schema(schema::SchemaArgs),
     /// Shell completion.
@@ -176,7 +212,9 @@ impl Command {
         match self {
             Self::Solve(_) => "solve",
             Self::Critical(_) => "critical",
-            Self::Batch(_) => "batch",
+            Self::Converge(_) => "converge",
+            Self::Audit(_) => "audit",
+            Self::Verify(_) => "verify",
             Self::Schema(_) => "schema",
             Self::Completions(_) => "completions",
         }
@@ -186,6 +224,9 @@ impl Command {
         match self {
             Self::Solve(args) => args.json,
             Self::Critical(args) => args.json,
+            Self::Converge(args) => args.json,
+            Self::Audit(args) => args.json,
+            Self::Verify(args) => args.json,
             _ => false,
         }
     }
@@ -194,7 +235,9 @@ impl Command {
         match self {
             Self::Solve(args) => args.run(),
             Self::Critical(args) => args.run(),
-            Self::Batch(args) => args.run(),
+            Self::Converge(args) => args.run(),
+            Self::Audit(args) => args.run(),
+            Self::Verify(args) => args.run(),
             Self::Schema(args) => args.run(),
             Self::Completions(args) => args.run(),
         }
@@ -229,6 +272,11 @@ impl Cli {
             }
         }
     }
+}
+
+/// The scene in the file at `path`; `-` is standard input.
+fn read_scene(path: &str) -> Result<Scene, Box<SceneError>> {
+    Scene::read(std::path::Path::new(path))
 }
 
 /// Whether standard error is a terminal that wants colour.

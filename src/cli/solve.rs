@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{engineering, error_text, print_json, print_text, significant, table, write_whole};
 use super::scene_json::SceneJson;
-use super::{CliError, Exit};
+use super::{CliError, Exit, read_scene};
 use crate::integrators::closed_form::ClosedForm;
 use crate::integrators::{Detail, Flight, Integrator};
 use crate::physics::groups::Groups;
@@ -151,7 +151,7 @@ impl SolveArgs {
     /// # Errors
     /// A scene or options that cannot be used (exit 2), a flight without an answer (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
-        let scene = Scene::read(&self.scene)?;
+        let scene = read_scene(&self.scene)?;
         let problem = scene.problem()?;
         let method = self.method.build()?;
         let detail = if self.trajectory.is_some() { Detail::Trajectory } else { Detail::Events };

@@ -2,17 +2,12 @@
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 
-pub mod closed_form;
-pub mod outcome;
-
-pub use closed_form::ClosedForm;
 pub mod central_difference;
-pub mod outcome;
-
-pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
-pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};
+pub mod closed_form;
 pub mod energy;
 pub mod outcome;
 
+pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
+pub use closed_form::ClosedForm;
 pub use energy::Energy;
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};

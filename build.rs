@@ -1,0 +1,27 @@
+//! Records what a report must name: compiler, commit and whether the tree was clean.
+
+use std::process::Command;
+
+fn main() {
+    let run = |program: &str, arguments: &[&str]| {
+        Command::new(program)
+            .args(arguments)
+            .output()
+            .ok()
+            .filter(|output| output.status.success())
+            .and_then(|output| String::from_utf8(output.stdout).ok())
+            .map(|text| text.trim().to_owned())
+    };
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
+    let set = |name: &str, value: Option<String>| {
+        println!("cargo:rustc-env={name}={}", value.unwrap_or_else(|| "unknown".to_owned()));
+    };
+    set("PENETRODE_RUSTC", run(&rustc, &["--version"]));
+    set("PENETRODE_TARGET", std::env::var("TARGET").ok());
+    set("PENETRODE_PROFILE", std::env::var("PROFILE").ok());
+    // A source package has no repository: the version then has to do.
+    set("PENETRODE_COMMIT", run("git", &["rev-parse", "--short=12", "HEAD"]));
+    println!("cargo:rerun-if-changed=.git/HEAD");
+    println!("cargo:rerun-if-changed=.git/refs/heads");
+    println!("cargo:rerun-if-changed=build.rs");
+}

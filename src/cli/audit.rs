@@ -1,0 +1,129 @@
+//! `penetrode audit`: order, error band and verdict for step-size results that another code produced.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::output::{print_json, print_text, significant, table};
+use super::{CliError, Exit, read_scene};
+use crate::physics::Problem;
+use crate::studies::audit::{Audit, AuditError, ExactValues, Expectation, Table, Verdict, audit};
+use crate::studies::convergence::Yardstick;
+use crate::studies::critical_velocity;
+use crate::studies::error::{is_fixed, value_of};
+use crate::studies::quantity::Quantity;
+
+/// Largest table that is read [bytes]: a study of step sizes is some kilobytes.
+const SIZE_MAX: u64 = 64 << 20;
+
+/// Arguments of `audit`.
+#[derive(Args, Debug)]
+pub struct AuditArgs {
+    /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
+    /// critical_velocity_m_s.
+    pub results: PathBuf,
+    /// Scene whose exact answer the results must approach.
+    #[arg(long)]
+    pub scene: Option<String>,
+    /// Formal order of the code; without it any order above zero converges.
+    #[arg(long, value_name = "P")]
+    pub order: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl AuditArgs {
+    /// Judges the table and prints the judgement.
+    ///
+    /// # Errors
+    /// A table or a scene that cannot be used (exit 2).
+    pub fn run(&self) -> Result<Exit, CliError> {
+        let file = self.results.display().to_string();
+        let bytes = self.read(&file)?;
+        let refuse = |error: AuditError| CliError::usage(error.to_string(), error.help());
+        let results = Table::read(&file, &bytes).map_err(refuse)?;
+        let exact = self.scene.as_deref().map(exact_values).transpose()?;
+        let judged = audit(&results, &Expectation { order: self.order, exact }).map_err(refuse)?;
+        if self.json { print_json(&judged) } else { print_text(&text(&file, &judged)) }.map_err(CliError::stdout)?;
+        Ok(match judged.verdict {
+            Verdict::Passed => Exit::Success,
+            Verdict::Failed => Exit::Criterion,
+            Verdict::Undecided => Exit::Undecided,
+        })
+    }
+
+    fn read(&self, file: &str) -> Result<Vec<u8>, CliError> {
+        let refuse = |cause: String| CliError::usage(format!("{file}: {cause}"), "name a CSV file with a column dt_s");
+        if self.results.is_dir() {
+            return Err(refuse("is a folder".to_owned()));
+        }
+        let mut bytes = Vec::new();
+        File::open(&self.results)
+            .and_then(|f| f.take(SIZE_MAX + 1).read_to_end(&mut bytes))
+            .map_err(|error| refuse(format!("cannot be read: {error}")))?;
+        if bytes.len() as u64 > SIZE_MAX {
+            return Err(refuse("is larger than 64 MiB, which no study of step sizes is".to_owned()));
+        }
+        Ok(bytes)
+    }
+}
+
+/// What the scene at `path` gives exactly.
+fn exact_values(path: &str) -> Result<ExactValues, CliError> {
+    let scene = read_scene(path)?;
+    let problem: Problem = scene.problem()?;
+    let exact = Yardstick::of(&problem)?.flight;
+    let value = |quantity| if is_fixed(quantity, &exact) { None } else { value_of(quantity, &exact) };
+    Ok(ExactValues {
+        impact_velocity: problem.impact_speed,
+        depth: value(Quantity::Depth),
+        time: value(Quantity::Time),
+        velocity: value(Quantity::Velocity),
+        crater_end_time: value(Quantity::CraterEndTime),
+        crater_end_velocity: value(Quantity::CraterEndVelocity),
+        critical_velocity: critical_velocity::exact_or_refined(&scene).ok(),
+    })
+}
+
+fn text(file: &str, judged: &Audit) -> String {
+    let mut lines = vec![file.to_owned(), String::new()];
+    let mut rows = table(&["  quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"]);
+    let verdict = |verdict: Verdict| match verdict {
+        Verdict::Passed => "passed",
+        Verdict::Undecided => "undecided",
+        Verdict::Failed => "failed",
+    };
+    for q in &judged.quantities {
+        let band = q.error_bands.first();
+        rows.add_row([
+            format!("  {}", q.quantity.name()),
+            q.observed_order.map_or("-".to_owned(), |p| format!("{p:.2}")),
+            q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}")),
+            q.limit.map_or("-".to_owned(), significant),
+            band.map_or("-".to_owned(), |b| format!("{:.1e}", b.half_width)),
+            q.class.name().to_owned(),
+            verdict(q.verdict).to_owned(),
+        ]);
+    }
+    lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+    lines.push(String::new());
+    for q in &judged.quantities {
+        lines.push(format!("  {}: {}", q.quantity.name(), q.reason));
+        for band in &q.error_bands {
+            lines.push(format!("    +- {:.2e} by {}", band.half_width, band.rule));
+        }
+        if let (Some(exact), Some(agrees)) = (q.exact, q.agrees_with_exact) {
+            let word = if agrees { "agrees with" } else { "misses" };
+            lines.push(format!("    the limit {word} the exact {}", significant(exact)));
+        }
+    }
+    for finding in &judged.findings {
+        lines.push(format!("  note: {}", finding.message));
+    }
+    lines.push(format!("  verdict    {}", verdict(judged.verdict)));
+    lines.push(String::new());
+    lines.join("\n")
+}

@@ -1,0 +1,180 @@
+//! `penetrode critical`: V_c and E_c by argmin, closed form and Eq. 15 beside them.
+
+use clap::Args;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::method_args::{MethodArgs, MethodJson};
+use super::output::{engineering, error_text, print_json, print_text, significant, table};
+use super::scene_json::SceneJson;
+use super::solve::escape_terminal;
+use super::{CliError, Exit, read_scene};
+use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
+use crate::physics::{Criterion, Problem, Scene, groups};
+use crate::studies::critical_velocity::{self, CriticalVelocity};
+
+/// Arguments of `critical`.
+#[derive(Args, Debug)]
+pub struct CriticalArgs {
+    /// Scene file (TOML), or - for standard input.
+    pub scene: String,
+    /// Method and its options.
+    #[command(flatten)]
+    pub method: MethodArgs,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `critical --json` prints.
+#[derive(Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "the contract names every field with its unit")]
+pub struct CriticalJson {
+    pub schema: &'static str,
+    pub scene: SceneJson,
+    pub method: MethodJson,
+    pub critical_velocity_m_s: f64,
+    pub error_bar_m_s: Option<f64>,
+    pub critical_energy_j: f64,
+    pub dimensionless_energy: Option<f64>,
+    pub evaluations: u32,
+    pub note: &'static str,
+    pub closed_form: Option<ClosedCriticalJson>,
+    pub relative_error: Option<f64>,
+    pub eq15: Option<Eq15Json>,
+}
+
+/// The exact critical velocity.
+#[derive(Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "the contract names every field with its unit")]
+pub struct ClosedCriticalJson {
+    pub critical_velocity_m_s: f64,
+    pub critical_energy_j: f64,
+    pub dimensionless_energy: Option<f64>,
+}
+
+/// Eq. 15 as E_c/(d³ fc), beside the simulation.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Eq15Json {
+    /// With the printed coefficients.
+    pub printed: f64,
+    /// With unrounded coefficients.
+    pub unrounded: f64,
+    /// Whether H/d lies in the range of the formula.
+    pub valid: bool,
+    /// What is to be known of that range.
+    pub note: String,
+}
+
+impl Eq15Json {
+    /// Eq. 15 for `scene`; `None` for stages, layers and semi-infinite targets.
+    pub fn new(scene: &Scene) -> Option<Self> {
+        let concrete = scene.concrete().filter(|c| c.layers.is_empty())?;
+        let ratio = scene.thickness? / concrete.diameter;
+        let (printed, unrounded) = (eq15_printed(ratio), eq15_unrounded(ratio));
+        let range = eq15_printed_validity(ratio);
+        let relation = perforation_validity(ratio);
+        Some(Self {
+            printed: concrete.static_factor * printed,
+            unrounded: concrete.static_factor * unrounded,
+            valid: range.valid && relation.valid,
+            note: if range.valid { relation.note } else { range.note },
+        })
+    }
+}
+
+impl CriticalArgs {
+    /// Finds the critical velocity and prints it.
+    ///
+    /// # Errors
+    /// A scene without a thickness or options that cannot be used (exit 2), no finite V_c (exit 1).
+    pub fn run(&self) -> Result<Exit, CliError> {
+        let scene = read_scene(&self.scene)?;
+        if scene.thickness.is_none() {
+            return Err(CliError::usage(
+                "a semi-infinite target has no critical velocity",
+                "give the target a thickness: [target] thickness = \"180 mm\"",
+            ));
+        }
+        let method = self.method.build()?;
+        let found = critical_velocity::of_scene(&scene, method.integrator())?;
+        let exact = critical_velocity::exact(&scene).ok();
+        if let Some(warning) = scene.exit_depth_warning() {
+            eprintln!("warning: {warning}");
+        }
+        let problem = scene.resolve(found.velocity)?;
+        let report = self.report(&scene, &problem, &found, exact)?;
+        if self.json { print_json(&report) } else { print_text(&text(&scene, &report)) }.map_err(CliError::stdout)?;
+        Ok(Exit::Success)
+    }
+
+    fn report(
+        &self,
+        scene: &Scene,
+        problem: &Problem,
+        found: &CriticalVelocity,
+        exact: Option<f64>,
+    ) -> Result<CriticalJson, CliError> {
+        let dimensionless = |energy: f64| {
+            scene.concrete().filter(|c| c.layers.is_empty()).map(|c| groups::dimensionless_energy(energy, c))
+        };
+        let energy = |velocity: f64| 0.5 * scene.mass * velocity * velocity;
+        Ok(CriticalJson {
+            schema: "penetrode/critical/1",
+            scene: SceneJson::new(scene, problem),
+            method: MethodJson::new(self.method.method, &self.method.options()?, Some(problem), None),
+            critical_velocity_m_s: found.velocity,
+            error_bar_m_s: found.error_bar,
+            critical_energy_j: found.energy,
+            dimensionless_energy: dimensionless(found.energy),
+            evaluations: found.evaluations,
+            note: found.note,
+            closed_form: exact.map(|velocity| ClosedCriticalJson {
+                critical_velocity_m_s: velocity,
+                critical_energy_j: energy(velocity),
+                dimensionless_energy: dimensionless(energy(velocity)),
+            }),
+            relative_error: exact
+                .map(|exact| if found.velocity == exact { 0.0 } else { ((found.velocity - exact) / exact).abs() }),
+            eq15: Eq15Json::new(scene),
+        })
+    }
+}
+
+fn text(scene: &Scene, report: &CriticalJson) -> String {
+    let mut lines = Vec::new();
+    if let Some(title) = &scene.title {
+        lines.push(escape_terminal(title));
+    }
+    let criterion = match scene.criterion {
+        Criterion::FullDepth => "x = H",
+        Criterion::Ndrc => "x = x_p(H), the NDRC relation",
+    };
+    lines.push(format!("  method     {}, perforation at {criterion}", report.method.name));
+    let bar = report.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {bar:.1e}"));
+    lines.push(format!("  V_c        {}{bar} m/s, {} flights", report.critical_velocity_m_s, report.evaluations));
+    lines.push(format!("  E_c        {}", engineering(report.critical_energy_j, "J")));
+    if !report.note.is_empty() {
+        lines.push(format!("  note       {}", report.note));
+    }
+    if let Some(exact) = &report.closed_form {
+        let error = error_text(report.relative_error);
+        lines.push(format!("  exact      {} m/s, relative error {error}", exact.critical_velocity_m_s));
+    }
+    if let (Some(ours), Some(eq15)) = (report.dimensionless_energy, &report.eq15) {
+        let mut rows = table(&["  E_c/(d³ fc)", "value", "simulation over it"]);
+        rows.add_row(["  simulation".to_owned(), significant(ours), String::new()]);
+        let mut row = |name: &str, value: f64| {
+            rows.add_row([name.to_owned(), significant(value), format!("{:+.1} %", 100.0 * (ours / value - 1.0))]);
+        };
+        row("  Eq. 15, printed", eq15.printed);
+        row("  Eq. 15, unrounded", eq15.unrounded);
+        lines.push(String::new());
+        lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+        if !eq15.valid {
+            lines.push(format!("  Eq. 15 does not apply: {}", eq15.note));
+        }
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}

@@ -1,0 +1,198 @@
+//! `penetrode verify`: the verification suite and its report.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::output::{print_json, print_text};
+use super::{CliError, Exit};
+use crate::report::{Environment, Run, VerifyJson, folder};
+use crate::studies::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
+use crate::suite::checks::PeerAnswers;
+use crate::suite::{Counts, Judged, Suite, Verdict, summary};
+
+/// Arguments of `verify`.
+#[derive(Args, Debug)]
+pub struct VerifyArgs {
+    /// Suite file (TOML) [default: the suite that ships].
+    pub suite: Option<String>,
+    /// Folder of the report.
+    #[arg(long, value_name = "DIR", default_value = folder::DEFAULT)]
+    pub out: PathBuf,
+    /// Only claims whose id contains this.
+    #[arg(long, value_name = "PATTERN")]
+    pub only: Option<String>,
+    /// Seed of every random number.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Ask scikit-sundae and heyoka now instead of comparing with recorded answers (needs Python 3.11).
+    #[arg(long)]
+    pub live_peers: bool,
+    /// Put another solver through the suite: a program that speaks the peer protocol.
+    #[arg(long, value_name = "CMD")]
+    pub peer: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Name of a user's peer in the suite.
+const USER_PEER: &str = "user";
+
+impl VerifyArgs {
+    /// Runs the suite, writes the report and prints the summary.
+    ///
+    /// # Errors
+    /// A suite, a scene or a folder that cannot be used (exit 2); a report that cannot be written (exit 1); a peer
+    /// that cannot be started (exit 5).
+    pub fn run(&self) -> Result<Exit, CliError> {
+        folder::check(&self.out).map_err(folder_error)?;
+        let mut suite = match &self.suite {
+            Some(path) => Suite::read(path)?,
+            None => Suite::embedded()?,
+        };
+        if let Some(pattern) = &self.only {
+            suite.only(pattern);
+            if suite.claims.is_empty() {
+                return Err(CliError::usage(
+                    format!("no claim has `{pattern}` in its id"),
+                    "see the ids in `report.json`, or leave out --only",
+                ));
+            }
+        }
+        let peers = self.peers()?;
+        let progress = progress_bar(suite.claims.len() as u64);
+        let running = Mutex::new(Counts::default());
+        let judged = suite.run(self.seed, &peers, &|judged| tell(&progress, &running, judged));
+        progress.finish_and_clear();
+        let run = Run {
+            suite: &suite,
+            judged: &judged,
+            environment: Environment::here(self.seed, self.command(), &suite, peers.describe()),
+        };
+        folder::write(&run, &self.out).map_err(folder_error)?;
+        let report = VerifyJson::new(&run);
+        for claim in judged.iter().filter(|j| !suite.is_embedded && j.looseness().is_some_and(|l| l > 100.0)) {
+            eprintln!(
+                "warning: the limit {} of {} is {:.0} times what is measured: it guards nothing",
+                claim.claim.limit,
+                claim.claim.id,
+                claim.looseness().unwrap_or(f64::NAN)
+            );
+        }
+        if self.json { print_json(&report) } else { print_text(&self.text(&judged)) }.map_err(CliError::stdout)?;
+        Ok(match report.verdict {
+            Verdict::Passed | Verdict::Skipped => Exit::Success,
+            Verdict::Failed => Exit::Criterion,
+            Verdict::Undecided => Exit::Undecided,
+        })
+    }
+
+    fn peers(&self) -> Result<PeerAnswers, CliError> {
+        let mut peers = PeerAnswers::recorded().map_err(|error| CliError::Run {
+            message: format!("a recorded answer cannot be read: {error}"),
+            help: "remake it with `python3 verification/references/record.py`".to_owned(),
+            last: None,
+        })?;
+        let start = |peers: &mut PeerAnswers, name: &str, command: &str| match peers.start(name, command) {
+            Err(error) if error.is_usage() => {
+                Err(CliError::usage(error.to_string(), "give a program and its arguments, quoted as for a shell"))
+            }
+            Err(error) if error.is_missing() => Err(CliError::PeerMissing(error.to_string())),
+            // It started and then failed: its claims fail, and the others go on.
+            Err(PeerStartError::Greeting(failure)) => {
+                peers.fail(name, failure.to_string());
+                Ok(())
+            }
+            Err(error) => Err(CliError::PeerMissing(error.to_string())),
+            Ok(()) => Ok(()),
+        };
+        if self.live_peers {
+            for (name, peer) in [
+                ("sundae-adams", BundledPeer::SundaeAdams),
+                ("sundae-bdf", BundledPeer::SundaeBdf),
+                ("sundae-ida", BundledPeer::SundaeIda),
+                ("heyoka-taylor", BundledPeer::Heyoka),
+            ] {
+                let environment = PeerEnvironment::ensure(peer, &mut |line| eprintln!("{line}"))
+                    .map_err(|error| CliError::PeerMissing(error.to_string()))?;
+                start(&mut peers, name, &environment.command(peer))?;
+            }
+        }
+        if let Some(command) = &self.peer {
+            start(&mut peers, USER_PEER, command)?;
+        }
+        Ok(peers)
+    }
+
+    /// The command that remakes this run.
+    fn command(&self) -> String {
+        let quote = |text: &str| shlex::try_quote(text).map_or_else(|_| text.to_owned(), |q| q.into_owned());
+        let mut words = vec!["penetrode verify".to_owned()];
+        words.extend(self.suite.as_deref().map(quote));
+        words.extend(self.only.as_deref().map(|pattern| format!("--only {}", quote(pattern))));
+        words.push(format!("--seed {}", self.seed));
+        if self.live_peers {
+            words.push("--live-peers".to_owned());
+        }
+        words.extend(self.peer.as_deref().map(|command| format!("--peer {}", quote(command))));
+        words.join(" ")
+    }
+
+    fn text(&self, judged: &[Judged]) -> String {
+        let (verdict, counts) = summary(judged);
+        let mut text = String::new();
+        for judged in judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)) {
+            let measured = judged.measured.map_or("nothing measured".to_owned(), |m| {
+                format!("{m:.3e}, limit {:.1e} {}", judged.claim.limit, judged.claim.check.unit())
+            });
+            text.push_str(&format!(
+                "{:<9} {}\n          {}\n          {measured}; {}\n",
+                judged.verdict.name(),
+                judged.claim.id,
+                judged.claim.statement,
+                super::solve::escape_terminal(&judged.remark)
+            ));
+        }
+        text.push_str(&format!(
+            "{}: {} passed, {} failed, {} undecided, {} skipped\nreport: {}\n",
+            verdict.name(),
+            counts.passed,
+            counts.failed,
+            counts.undecided,
+            counts.skipped,
+            self.out.join("report.html").display()
+        ));
+        text
+    }
+}
+
+fn folder_error(error: folder::FolderError) -> CliError {
+    match error {
+        folder::FolderError::NotOurs { .. } => {
+            CliError::usage(error.to_string(), "choose another folder with --out, or remove it yourself")
+        }
+        folder::FolderError::Write { path, cause } => CliError::Write { path, cause },
+    }
+}
+
+/// A bar with time left, on a terminal only.
+fn progress_bar(length: u64) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} claims, {eta} left {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn tell(progress: &ProgressBar, running: &Mutex<Counts>, judged: &Judged) {
+    progress.inc(1);
+    if judged.verdict == Verdict::Failed
+        && let Ok(mut counts) = running.lock()
+    {
+        counts.failed += 1;
+        progress.set_message(format!("({} failed)", counts.failed));
+    }
+}

@@ -1,0 +1,21 @@
+//! How a run of the suite is shown: JSON, and a folder with a page, figures, tables and JUnit.
+
+pub mod environment;
+pub mod folder;
+pub mod json;
+
+pub use environment::Environment;
+pub use json::VerifyJson;
+
+use crate::suite::{Judged, Suite};
+
+/// A finished run of a suite: everything that a report shows.
+#[derive(Debug)]
+pub struct Run<'a> {
+    /// The suite.
+    pub suite: &'a Suite,
+    /// Its claims, judged, in the suite's order.
+    pub judged: &'a [Judged],
+    /// Where it ran and what remakes it.
+    pub environment: Environment,
+}

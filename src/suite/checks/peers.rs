@@ -1,0 +1,165 @@
+//! Other programs beside ours: recorded answers, or programs that run.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use super::super::claim::{Measurement, NotMeasured};
+use super::Subject;
+use crate::integrators::Detail;
+use crate::physics::Problem;
+use crate::studies::peers::{Peer, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
+
+/// Names by which claims ask for the recorded programs, in the order of [`recordings`].
+pub const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
+
+/// Name by which claims ask for the program given on the command line.
+pub const USER: &str = "user";
+
+/// Relative tolerance that a running peer is asked for: tight enough to judge it, loose enough for any solver.
+const RTOL_USER: f64 = 1e-9;
+
+/// Where the answers of other programs come from, by the name that claims use.
+#[derive(Debug, Default)]
+pub struct PeerAnswers {
+    sources: BTreeMap<String, Source>,
+}
+
+#[derive(Debug)]
+enum Source {
+    /// Answers recorded earlier.
+    Recorded(Box<Recording>),
+    /// A program that is asked now.
+    Running { peer: Box<Mutex<Asked>>, rtol: f64 },
+}
+
+/// A running peer and, once it has failed, why it is not asked again.
+#[derive(Debug)]
+struct Asked {
+    peer: Peer,
+    given_up: Option<String>,
+}
+
+impl PeerAnswers {
+    /// The recorded answers.
+    ///
+    /// # Errors
+    /// Only if a shipped recording is broken, which a test excludes.
+    pub fn recorded() -> Result<Self, serde_json::Error> {
+        let sources = RECORDED
+            .iter()
+            .zip(recordings()?)
+            .map(|(name, recording)| ((*name).to_owned(), Source::Recorded(Box::new(recording))))
+            .collect();
+        Ok(Self { sources })
+    }
+
+    /// Starts `command` and asks it in place of what was recorded under `name`.
+    ///
+    /// # Errors
+    /// [`PeerStartError`]: it cannot be started, or does not greet.
+    pub fn start(&mut self, name: &str, command: &str) -> Result<(), PeerStartError> {
+        let peer = Peer::start(command)?;
+        let rtol = match self.sources.get(name) {
+            Some(Source::Recorded(recording)) => recording.rtol,
+            _ => RTOL_USER,
+        };
+        let asked = Mutex::new(Asked { peer, given_up: None });
+        self.sources.insert(name.to_owned(), Source::Running { peer: Box::new(asked), rtol });
+        Ok(())
+    }
+
+    /// Names and versions of the programs, for the report.
+    pub fn describe(&self) -> Vec<(String, String)> {
+        self.sources
+            .iter()
+            .map(|(name, source)| {
+                let text = match source {
+                    Source::Recorded(r) => {
+                        format!("{} {} ({}), rtol {:e}, recorded {}", r.program, r.version, r.method, r.rtol, r.recorded)
+                    }
+                    Source::Running { peer, rtol } => {
+                        let asked = peer.lock().unwrap_or_else(PoisonError::into_inner);
+                        let identity = asked.peer.identity();
+                        format!("{identity}, rtol {rtol:e}, asked by `{}`", asked.peer.command())
+                    }
+                };
+                (name.clone(), text)
+            })
+            .collect()
+    }
+
+    /// What the program `name` says of `problem`, which is the scene called `scene`.
+    fn answer(&self, name: &str, scene: &str, problem: &Problem) -> Result<PeerAnswer, NotMeasured> {
+        let Some(source) = self.sources.get(name) else {
+            return Err(NotMeasured::skip(if name == USER {
+                "no program was given with --peer".to_owned()
+            } else {
+                format!("no answers of {name}")
+            }));
+        };
+        match source {
+            Source::Recorded(recording) => {
+                let flight = recording
+                    .flights
+                    .iter()
+                    .find(|flight| flight.scene == scene)
+                    .ok_or_else(|| NotMeasured::skip(format!("{name} was not asked for {scene}")))?;
+                if !is_same(&flight.problem(), problem) {
+                    let remake = &recording.recipe;
+                    return Err(NotMeasured::broken(format!("{scene} was recorded with other numbers: remake with `{remake}`")));
+                }
+                Ok(flight.answer.clone())
+            }
+            Source::Running { peer, rtol } => {
+                let mut asked = peer.lock().unwrap_or_else(PoisonError::into_inner);
+                if let Some(why) = &asked.given_up {
+                    return Err(NotMeasured::broken(format!("not asked again: {why}")));
+                }
+                asked.peer.ask(&PeerRequest::from_problem(problem, *rtol)).map_err(|failure| {
+                    if !failure.is_reported() {
+                        asked.given_up = Some(failure.to_string());
+                    }
+                    NotMeasured::broken(failure)
+                })
+            }
+        }
+    }
+}
+
+/// Whether two problems are the same but for the last digits of their coefficients.
+fn is_same(a: &Problem, b: &Problem) -> bool {
+    let close = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-14 * a.abs().max(b.abs());
+    a.stages.len() == b.stages.len()
+        && close(a.mass, b.mass)
+        && close(a.impact_speed, b.impact_speed)
+        && close(a.exit_depth, b.exit_depth)
+        && a.stages.iter().zip(&b.stages).all(|(a, b)| {
+            close(a.static_force, b.static_force)
+                && close(a.stiffness, b.stiffness)
+                && close(a.viscosity, b.viscosity)
+                && close(a.drag, b.drag)
+                && close(a.end, b.end)
+        })
+}
+
+/// Largest difference of the program's answer from the claim's method, over its conditioning and `tolerance`.
+pub(super) fn agreement(subject: &Subject<'_>, name: &str, tolerance: f64) -> Result<Measurement, NotMeasured> {
+    let scene = subject.claim.scene.as_deref().unwrap_or_default();
+    let theirs = subject.context.peers.answer(name, scene, &subject.problem)?;
+    let ours = subject.fly(&subject.method(None)?, Detail::Events)?;
+    let reference = PeerAnswer::from_flight(&ours);
+    let differences = theirs.differences_from(&reference, &subject.problem).ok_or_else(|| {
+        NotMeasured::broken(format!(
+            "{name} says {} at x = {} m where {} is right (x = {} m)",
+            theirs.outcome, theirs.depth_m, ours.outcome, ours.end.depth
+        ))
+    })?;
+    let mut worst = (0.0_f64, "nothing");
+    for difference in &differences {
+        let value = difference.relative / difference.conditioning;
+        if value.is_nan() || value > worst.0 {
+            worst = (value, &difference.quantity);
+        }
+    }
+    Ok(Measurement::new(worst.0 / tolerance).remark(format!("largest in {}: {:.1e}", worst.1, worst.0)))
+}
