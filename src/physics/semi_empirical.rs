@@ -53,7 +53,7 @@ const THIRD_BRANCH: f64 = 3.8;
 
 /// Static strength over compressive strength S of a concrete of strength fc [Pa] (Eq. 14).
 ///
-/// `S = 72 (fc/MPa)^(-1/2)`, evaluated as `72 / sqrt(fc · 1e-6)`. Not finite for fc = 0.
+/// `S = 72 (fc/MPa)^(-1/2)`, Not finite for fc = 0.
 pub fn static_factor(strength: f64) -> f64 {
     72.0 / (strength / 1e6).sqrt()
 }
