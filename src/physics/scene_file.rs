@@ -1099,6 +1099,7 @@ velocity = 300
 
     /// Each refusal as a person sees it.
     #[test]
+    #[expect(clippy::too_many_lines, reason = "the lines are what a person sees")]
     fn refusals_underline_the_fault_and_say_what_to_do() {
         let rendered = |text: String| refuse(&text).render(false);
         assert_snapshot!(rendered(with("\"2 kg\"", "\"2 m\"")), @r#"
