@@ -14,7 +14,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::nose::NoseShape;
-use super::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene};
+use super::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene, layer_beyond};
 use super::semi_empirical;
 use super::stage::Stage;
 use super::units::{self, Dimension, QuantityError};
@@ -565,7 +565,7 @@ fn did_you_mean(known: &str) -> String {
 /// The one of `known` that `text` is most likely a misspelling of.
 fn nearest(text: &str, known: &[&'static str]) -> Option<&'static str> {
     let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
-    // A long text is no misspelling, and comparing it takes its length squared.
+    // A long text is no misspelling, and not worth the comparison.
     let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
     let best = candidates.min_by_key(distance)?;
     let length = best.chars().count();
@@ -750,8 +750,8 @@ fn concrete(
     } else {
         total_thickness(target, &layers)?
     };
-    let medium = match beyond(&layers, crater_ratio * diameter) {
-        Some(layer) => *layer,
+    let medium = match layer_beyond(&layers, crater_ratio * diameter) {
+        Some(index) => layers[index],
         None => medium(target, static_factor, Range::Positive, f64::INFINITY)?,
     };
     let concrete = Concrete {
@@ -815,16 +815,6 @@ fn total_thickness(target: &Section<'_, '_>, layers: &[Layer]) -> Result<Option<
             "correct the thicknesses",
         )),
     }
-}
-
-/// The layer that holds `depth` just beyond it, else the last.
-fn beyond(layers: &[Layer], depth: f64) -> Option<&Layer> {
-    let mut end = 0.0;
-    let holds = |layer: &&Layer| {
-        end += layer.thickness;
-        end > depth
-    };
-    layers.iter().find(holds).or(layers.last())
 }
 
 fn crater_stiffness(section: &Section<'_, '_>) -> Result<CraterStiffness, Fault> {
@@ -1095,6 +1085,9 @@ velocity = 300
         assert_eq!(read(&text), read(FULL));
         let bad = refuse(&text.replace("36 MPa", "36 m"));
         assert_eq!(bad.location(), "scene.toml:7:16");
+        assert!(!bad.render(false).contains('?'), "{}", bad.render(false));
+        let first_line = text_of(b"\xef\xbb\xbfx = 1".to_vec(), "scene.toml").unwrap();
+        assert_eq!(refuse(&first_line).place.unwrap().span, 0..1);
     }
 
     /// Each refusal as a person sees it.
@@ -1305,6 +1298,7 @@ velocity = 300
             (with("\"2 kg\"", "1979-05-27"), "3:8", "`mass` is a date or time"),
             (with("50 mm", "1,5 mm"), "4:14", "`,5 mm` is no unit that is known"),
             (with("title = \"tunnel stop, blunt nose\"", "title = 3"), "1:9", "`title` is an integer"),
+            (with("mass", "zz = 1\naa = 2\nmass"), "3:1", "unknown key `zz` in [projectile]"),
             (with("[target]", "[taget]"), "6:2", "unknown key `taget` in the scene"),
             (with("[target]\n", "[target]\nk = 2\n"), "7:1", "unknown key `k` in [target]"),
             (with("[resistance]", "[target]"), "10:2", "`target` is given twice"),
@@ -1456,7 +1450,11 @@ velocity = 300
         std::fs::write(at("limit.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len())].concat()).unwrap();
         assert!(Scene::read(&at("limit.toml")).is_ok());
         std::fs::write(at("large.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len() + 1)].concat()).unwrap();
-        assert_eq!(refused(&at("large.toml")), (None, "larger than 1048576 bytes, and not read".to_owned()));
+        let too_large = (None, "larger than 1048576 bytes, and not read".to_owned());
+        assert_eq!(refused(&at("large.toml")), too_large);
+        // A file whose length is known only by reading it.
+        #[cfg(target_os = "linux")]
+        assert_eq!(refused(Path::new("/dev/zero")), too_large);
     }
 
     #[test]
