@@ -69,6 +69,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
+    use crate::physics::Layer;
     use crate::physics::scene::tests::{concrete, scene};
 
     #[test]
@@ -100,6 +101,15 @@ mod tests {
         let groups = Groups::of(&wanted, speed).unwrap();
         assert_relative_eq!(groups.impact, 3.5, max_relative = 1e-15);
         assert_relative_eq!(groups.geometry.unwrap(), 17.0, max_relative = 1e-15);
+    }
+
+    #[test]
+    fn stages_and_layers_have_no_groups() {
+        let stages = Scene { resistance: Resistance::Stages(Vec::new()), ..scene() };
+        assert_eq!(Groups::of(&stages, 1.0), None);
+        let layer = Layer { thickness: 1.0, strength: 30e6, density: 2300.0, static_factor: 12.0, viscosity: 0.0 };
+        let layered = Resistance::Concrete(Concrete { layers: vec![layer], ..concrete() });
+        assert_eq!(Groups::of(&Scene { resistance: layered, ..scene() }, 1.0), None);
     }
 
     #[test]

@@ -224,6 +224,16 @@ fn representable(quantity: &'static str, value: f64, zero: bool) -> Result<f64, 
     }
 }
 
+/// Index of the layer that holds `depth` [m] just beyond it, of the last where all end before; `None` without layers.
+pub(super) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
+    let mut end = 0.0;
+    let holds = |layer: &Layer| {
+        end += layer.thickness;
+        end > depth
+    };
+    layers.iter().position(holds).or(layers.len().checked_sub(1))
+}
+
 impl Concrete {
     /// Crater depth k d [m].
     pub fn crater_depth(&self) -> f64 {
@@ -260,7 +270,7 @@ impl Concrete {
     /// layer, as a homogeneous one is by itself.
     fn beyond_crater(&self) -> Result<Stages, ResolveError> {
         let mut stages = Stages::new();
-        let Some((last, inner)) = self.layers.split_last() else {
+        let Some(first) = layer_beyond(&self.layers, self.crater_depth()) else {
             let medium = Layer {
                 thickness: f64::INFINITY,
                 strength: self.strength,
@@ -271,15 +281,14 @@ impl Concrete {
             stages.push(self.tunnel(&medium, f64::INFINITY)?);
             return Ok(stages);
         };
-        let crater_depth = self.crater_depth();
+        let last = self.layers.len() - 1;
         let mut end = 0.0;
-        for layer in inner {
+        for (index, layer) in self.layers.iter().enumerate() {
             end += layer.thickness;
-            if end > crater_depth {
-                stages.push(self.tunnel(layer, end)?);
+            if index >= first {
+                stages.push(self.tunnel(layer, if index == last { f64::INFINITY } else { end })?);
             }
         }
-        stages.push(self.tunnel(last, f64::INFINITY)?);
         Ok(stages)
     }
 
@@ -625,6 +634,37 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn inadmissible_layers_are_refused() {
+        let faults: [fn(&mut Layer); 5] = [
+            |layer| layer.thickness = -0.1,
+            |layer| layer.strength = -1.0,
+            |layer| layer.density = f64::NAN,
+            |layer| layer.static_factor = -1.0,
+            |layer| layer.viscosity = f64::INFINITY,
+        ];
+        for fault in faults {
+            for index in 0..2 {
+                let mut scene = layered(&[0.2, 0.1]);
+                let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+                fault(&mut concrete.layers[index]);
+                let refused = scene.problem();
+                assert!(matches!(refused, Err(ResolveError::Inadmissible { .. })), "{refused:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_nose_factor_inertia_factor_or_density_of_0_gives_no_drag() {
+        for frictionless in [
+            Concrete { nose_factor: 0.0, ..concrete() },
+            Concrete { inertia_factor: 0.0, ..concrete() },
+            Concrete { density: 0.0, ..concrete() },
+        ] {
+            assert_eq!(scene_of(frictionless).drag(), Some(0.0));
+        }
+    }
+
+    #[test]
     fn layers_that_do_not_sum_up_are_refused() {
         let scene = Scene { thickness: Some(1.0), ..layered(&[0.1, 0.2]) };
         assert!(matches!(scene.problem(), Err(ResolveError::LayersDoNotSumUp { thickness: 1.0, .. })));
@@ -670,6 +710,12 @@ pub(crate) mod tests {
         assert!(thick.exit_depth_warning().unwrap().contains("18.06"));
         let open = Scene { thickness: None, ..slab.clone() };
         assert_eq!(open.exit_depth(), Ok(f64::INFINITY));
+        let of_no_size = Scene {
+            thickness: slab.thickness,
+            criterion: slab.criterion,
+            ..scene_of(Concrete { diameter: 0.0, ..concrete() })
+        };
+        assert!(matches!(of_no_size.exit_depth(), Err(ResolveError::Inadmissible { .. })));
         let stages = Scene { resistance: Resistance::Stages(vec![Stage::tunnel(1.0, 0.0)]), ..slab };
         assert_eq!(stages.exit_depth(), Err(ResolveError::NoDiameter));
     }

@@ -14,7 +14,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::nose::NoseShape;
-use super::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene};
+use super::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene, layer_beyond};
 use super::semi_empirical;
 use super::stage::Stage;
 use super::units::{self, Dimension, QuantityError};
@@ -308,7 +308,7 @@ const STAGE: &[&str] = &["static_force", "stiffness", "viscosity", "drag", "end"
 /// Every table by its header, to tell where a misplaced key belongs.
 const TABLES: &[(&str, &[&str])] = &[
     ("[projectile]", PROJECTILE),
-    ("nose", NOSE),
+    ("the nose", NOSE),
     ("[target]", TARGET),
     ("[[target.layer]]", LAYER),
     ("[resistance]", RESISTANCE),
@@ -386,7 +386,9 @@ impl<'t, 'i> Section<'t, 'i> {
     fn table(&self, key: &'static str, name: &'static str, known: &[&'static str]) -> Result<Option<Self>, Fault> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let DeValue::Table(table) = value.get_ref() else {
-            return Err(Self::wrong_type(key, value, "a table", &format!("write it as {name}")));
+            let help =
+                if key == "nose" { "write nose = { factor = 0.72 }".to_owned() } else { format!("write {name}") };
+            return Err(Self::wrong_type(key, value, "a table", &help));
         };
         Section::new(name, table, self.header_span(key, value), self.text, known).map(Some)
     }
@@ -464,8 +466,8 @@ impl<'t, 'i> Section<'t, 'i> {
         if range.contains(number) {
             return Ok(number);
         }
-        let raw = quoted(self.text.get(value.span()).unwrap_or_default());
-        Err(Fault::new(value.span(), format!("`{key}` = {raw} is out of range"), range.description(), help))
+        let raw = quoted(&format!("{key} = {}", self.text.get(value.span()).unwrap_or_default()));
+        Err(Fault::new(value.span(), format!("{raw} is out of range"), range.description(), help))
     }
 
     fn bad_quantity(
@@ -489,7 +491,7 @@ impl<'t, 'i> Section<'t, 'i> {
             }
             QuantityError::WrongDimension { unit, has } => (
                 self.part(value, text, unit),
-                format!("`{key}` is a {}, {} is a unit of {}", dimension.noun(), quoted(unit), has.noun()),
+                format!("`{key}` takes a {}; {} is a unit of {}", dimension.noun(), quoted(unit), has.noun()),
                 format!("give it in {}", known[0]),
             ),
             QuantityError::NoUnit => (
@@ -563,7 +565,7 @@ fn did_you_mean(known: &str) -> String {
 /// The one of `known` that `text` is most likely a misspelling of.
 fn nearest(text: &str, known: &[&'static str]) -> Option<&'static str> {
     let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
-    // A long text is no misspelling, and comparing it takes its length squared.
+    // A long text is no misspelling, and not worth the comparison.
     let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
     let best = candidates.min_by_key(distance)?;
     let length = best.chars().count();
@@ -730,7 +732,7 @@ fn concrete(
 ) -> Result<(Resistance, Option<f64>), Fault> {
     let diameter = projectile.required("diameter", Dimension::Length, Range::Positive, "\"50 mm\"")?;
     let nose_factor = projectile
-        .table("nose", "nose = { factor = 0.72 }", NOSE)?
+        .table("nose", "the nose", NOSE)?
         .ok_or_else(|| projectile.missing("nose", "{ shape = \"flat\" }"))
         .and_then(|nose| nose_factor(&nose))?;
     let resistance = root.table("resistance", "[resistance]", RESISTANCE)?;
@@ -748,8 +750,8 @@ fn concrete(
     } else {
         total_thickness(target, &layers)?
     };
-    let medium = match beyond(&layers, crater_ratio * diameter) {
-        Some(layer) => *layer,
+    let medium = match layer_beyond(&layers, crater_ratio * diameter) {
+        Some(index) => layers[index],
         None => medium(target, static_factor, Range::Positive, f64::INFINITY)?,
     };
     let concrete = Concrete {
@@ -813,16 +815,6 @@ fn total_thickness(target: &Section<'_, '_>, layers: &[Layer]) -> Result<Option<
             "correct the thicknesses",
         )),
     }
-}
-
-/// The layer that holds `depth` just beyond it, else the last.
-fn beyond(layers: &[Layer], depth: f64) -> Option<&Layer> {
-    let mut end = 0.0;
-    let holds = |layer: &&Layer| {
-        end += layer.thickness;
-        end > depth
-    };
-    layers.iter().find(holds).or(layers.last())
 }
 
 fn crater_stiffness(section: &Section<'_, '_>) -> Result<CraterStiffness, Fault> {
@@ -1093,5 +1085,461 @@ velocity = 300
         assert_eq!(read(&text), read(FULL));
         let bad = refuse(&text.replace("36 MPa", "36 m"));
         assert_eq!(bad.location(), "scene.toml:7:16");
+        assert!(!bad.render(false).contains('?'), "{}", bad.render(false));
+        let first_line = text_of(b"\xef\xbb\xbfx = 1".to_vec(), "scene.toml").unwrap();
+        assert_eq!(refuse(&first_line).place.unwrap().span, 0..1);
+    }
+
+    /// Each refusal as a person sees it.
+    #[test]
+    #[expect(clippy::too_many_lines, reason = "the lines are what a person sees")]
+    fn refusals_underline_the_fault_and_say_what_to_do() {
+        let rendered = |text: String| refuse(&text).render(false);
+        assert_snapshot!(rendered(with("\"2 kg\"", "\"2 m\"")), @r#"
+        Error: `mass` takes a mass; `m` is a unit of length
+           ╭─[ scene.toml:3:11 ]
+           │
+         3 │ mass = "2 m"
+           │           ┬
+           │           ╰── a mass, in kg, g, t, mg, lb, oz and others
+           │
+           │ Help: give it in kg
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("50 mm", "50 furlong")), @r#"
+        Error: `furlong` is no unit that is known
+           ╭─[ scene.toml:4:16 ]
+           │
+         4 │ diameter = "50 furlong"
+           │                ───┬───
+           │                   ╰───── a length, in m, mm, cm, µm, km, in, ft and others
+           │
+           │ Help: give it in m
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("36 MPa", "36 MPA")), @r#"
+        Error: `MPA` is no unit that is known
+           ╭─[ scene.toml:7:16 ]
+           │
+         7 │ strength = "36 MPA"
+           │                ─┬─
+           │                 ╰─── a pressure, in Pa, kPa, MPa, GPa, bar, psi, ksi and others
+           │
+           │ Help: did you mean `MPa`?
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("diameter", "diametr")), @r#"
+        Error: unknown key `diametr` in [projectile]
+           ╭─[ scene.toml:4:1 ]
+           │
+         4 │ diametr = "50 mm"
+           │ ───┬───
+           │    ╰───── known keys: mass, diameter, nose
+           │
+           │ Help: did you mean `diameter`?
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("mass = \"2 kg\"\n", "")), @r#"
+        Error: [projectile] has no `mass`
+           ╭─[ scene.toml:2:1 ]
+           │
+         2 │ [projectile]
+           │ ──────┬─────
+           │       ╰─────── `mass` is required here
+           │
+           │ Help: add mass = "2 kg"
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("B = 1.0", "S = 1.0")), @r#"
+        Error: `S` is given twice
+            ╭─[ scene.toml:12:1 ]
+            │
+         12 │ S = 1.0
+            │ ┬
+            │ ╰── each key and table once
+            │
+            │ Help: remove one of the two
+        ────╯
+        "#);
+        assert_snapshot!(rendered(with("k = 2.0", "k = \"2.0\"")), @r#"
+        Error: `k` is a string
+            ╭─[ scene.toml:13:5 ]
+            │
+         13 │ k = "2.0"
+            │     ──┬──
+            │       ╰──── must be a number >= 0, without unit or quotes
+            │
+            │ Help: write for instance k = 2.0
+        ────╯
+        "#);
+        assert_snapshot!(rendered(with("\"300 m/s\"", "inf")), @r#"
+        Error: `velocity`: the number is not finite in 64 bits
+            ╭─[ scene.toml:16:12 ]
+            │
+         16 │ velocity = inf
+            │            ─┬─
+            │             ╰─── a number >= 0
+            │
+            │ Help: correct the number
+        ────╯
+        "#);
+        assert_snapshot!(rendered(with("180 mm", "-180 mm")), @r#"
+        Error: `thickness = "-180 mm"` is out of range
+           ╭─[ scene.toml:9:13 ]
+           │
+         9 │ thickness = "-180 mm"
+           │             ────┬────
+           │                 ╰────── a number >= 0
+           │
+           │ Help: correct `thickness`; it is read in m as -0.18
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("{ factor = 0.72 }", "{ factor = 0.72, shape = \"flat\" }")), @r#"
+        Error: the nose has both a `factor` and a `shape`
+           ╭─[ scene.toml:5:25 ]
+           │
+         5 │ nose = { factor = 0.72, shape = "flat" }
+           │                         ──┬──
+           │                           ╰──── exactly one of `factor` and `shape`
+           │
+           │ Help: remove one of the two
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("{ factor = 0.72 }", "{ shape = \"ogive\", length_ratio = 3.0 }")), @r#"
+        Error: `length_ratio` has no place in the nose here
+           ╭─[ scene.toml:5:27 ]
+           │
+         5 │ nose = { shape = "ogive", length_ratio = 3.0 }
+           │                           ──────┬─────
+           │                                 ╰─────── the shape `ogive` takes `caliber_radius_head`
+           │
+           │ Help: remove `length_ratio`
+        ───╯
+        "#);
+        assert_snapshot!(rendered(with("\"ndrc\"", "\"ndcr\"")), @r#"
+        Error: unknown criterion `ndcr`
+            ╭─[ scene.toml:18:13 ]
+            │
+         18 │ criterion = "ndcr"
+            │             ───┬──
+            │                ╰──── `full-depth` or `ndrc`
+            │
+            │ Help: did you mean `ndrc`?
+        ────╯
+        "#);
+        assert_snapshot!(rendered(in_stages("mass = 2", "mass = 2\ndiameter = \"50 mm\"")), @r#"
+        Error: `diameter` has no place in [projectile] here
+           ╭─[ scene.toml:3:1 ]
+           │
+         3 │ diameter = "50 mm"
+           │ ────┬───
+           │     ╰───── with [[stage]], [projectile] has only `mass`
+           │
+           │ Help: remove `diameter`
+        ───╯
+        "#);
+        assert_snapshot!(rendered(in_stages("drag", "end = \"9 cm\"\ndrag")), @r#"
+        Error: this stage ends at 0.09 m, in front of where it begins
+           ╭─[ scene.toml:9:7 ]
+           │
+         9 │ end = "9 cm"
+           │       ───┬──
+           │          ╰──── an end at 0.1 m or beyond
+           │
+           │ Help: give the ends in order, each from the impact face
+        ───╯
+        "#);
+        assert_snapshot!(rendered(in_stages("end = \"0.1 m\"\n", "")), @r#"
+        Error: this stage has no `end`, and another follows
+           ╭─[ scene.toml:3:1 ]
+           │
+         3 │ [[stage]]
+           │ ────┬────
+           │     ╰────── only the last stage goes without an `end`
+           │
+           │ Help: give it an `end`, or remove the stages behind it
+        ───╯
+        "#);
+        assert_snapshot!(rendered(FULL.replace("]\nvelocity", "\nvelocity")), @r#"
+        Error: this is not TOML: unclosed table, expected `]`
+            ╭─[ scene.toml:15:8 ]
+            │
+         15 │ [impact
+            │        │
+            │        ╰─ TOML text
+            │
+            │ Help: correct the syntax; strings need quotes
+        ────╯
+        "#);
+        assert_snapshot!(rendered(String::new()), @r#"
+        Error: the scene has no [projectile]
+           ╭─[ scene.toml:1:1 ]
+           │
+         1 │
+           │ │
+           │ ╰─ [projectile] is required
+           │
+           │ Help: add [projectile] with mass, diameter and nose
+        ───╯
+        "#);
+    }
+
+    /// Edits of `FULL` or `STAGES`, each with the place and the message of its refusal.
+    #[test]
+    fn every_other_refusal_of_the_contract_names_its_place_and_cause() {
+        let nose = "{ factor = 0.72 }";
+        for (text, place, message) in [
+            (with("\"2 kg\"", "\"2\""), "3:8", "`mass` has no unit"),
+            (with("\"2 kg\"", "\"kg\""), "3:8", "`mass` is no quantity: there is no number in front of the unit"),
+            (with("\"2 kg\"", "true"), "3:8", "`mass` is a truth value"),
+            (with("\"2 kg\"", "\"nan kg\""), "3:8", "`mass`: the number is not finite in 64 bits"),
+            (with("\"2 kg\"", "1e400"), "3:8", "`mass`: the number is not finite in 64 bits"),
+            (with("\"2 kg\"", "1e-400"), "3:8", "`mass`: the number is too small for 64 bits: it would be read as 0"),
+            (with("\"2 kg\"", "1979-05-27"), "3:8", "`mass` is a date or time"),
+            (with("50 mm", "1,5 mm"), "4:14", "`,5 mm` is no unit that is known"),
+            (with("title = \"tunnel stop, blunt nose\"", "title = 3"), "1:9", "`title` is an integer"),
+            (with("mass", "zz = 1\naa = 2\nmass"), "3:1", "unknown key `zz` in [projectile]"),
+            (with("[target]", "[taget]"), "6:2", "unknown key `taget` in the scene"),
+            (with("[target]\n", "[target]\nk = 2\n"), "7:1", "unknown key `k` in [target]"),
+            (with("[resistance]", "[target]"), "10:2", "`target` is given twice"),
+            (with("strength = \"36 MPa\"\n", ""), "6:1", "[target] has no `strength`"),
+            (with("density = \"2300 kg/m^3\"\n", ""), "6:1", "[target] has no `density`"),
+            (with("diameter = \"50 mm\"\n", ""), "2:1", "[projectile] has no `diameter`"),
+            (with("nose = { factor = 0.72 }\n", ""), "2:1", "[projectile] has no `nose`"),
+            (with("velocity = \"300 m/s\"\n", ""), "15:1", "[impact] has no `velocity`"),
+            (with(nose, "0.72"), "5:8", "`nose` is a number"),
+            (with(nose, "{}"), "5:8", "the nose has neither a `factor` nor a `shape`"),
+            (with(nose, "{ factor = 1.01 }"), "5:19", "`factor = 1.01` is out of range"),
+            (with(nose, "{ factor = \"0.7\" }"), "5:19", "`factor` is a string"),
+            (
+                with(nose, "{ factor = 0.7, length_ratio = 1.0 }"),
+                "5:24",
+                "`length_ratio` has no place in the nose here",
+            ),
+            (
+                with(nose, "{ shape = \"flat\", radius_ratio = 1.0 }"),
+                "5:26",
+                "`radius_ratio` has no place in the nose here",
+            ),
+            (with(nose, "{ shape = \"ogiv\" }"), "5:18", "unknown nose shape `ogiv`"),
+            (with(nose, "{ shape = 3 }"), "5:18", "`shape` is an integer"),
+            (with(nose, "{ shape = \"cone\" }"), "5:8", "the nose has no `length_ratio`"),
+            (with("8.48e6 N/m", "continous"), "14:20", "unknown crater stiffness `continous`"),
+            (
+                with("8.48e6 N/m", "8.48e6 N"),
+                "14:28",
+                "`crater_stiffness` takes a stiffness (force per length); `N` is a unit of force",
+            ),
+            (with("[target]\n", "[target]\nlayer = []\n"), "7:9", "`layer` is empty"),
+            (with("[target]\n", "[target]\nlayer = 3\n"), "7:9", "`layer` is an integer"),
+            (with("[resistance]", "[[target.layer]]\n[resistance]"), "7:1", "`strength` has no place in [target] here"),
+            (
+                in_stages("[impact]", "[resistance]\nk = 2\n[impact]"),
+                "10:2",
+                "`resistance` has no place in the scene here",
+            ),
+            (
+                in_stages("[impact]", "[target]\ndensity = 1\n[impact]"),
+                "11:1",
+                "`density` has no place in [target] here",
+            ),
+            (
+                in_stages("[impact]", "[perforation]\ncriterion = \"ndrc\"\n[impact]"),
+                "11:13",
+                "`ndrc` needs a projectile diameter, and a scene of stages has none",
+            ),
+            (
+                in_stages("[impact]", "end = 1\n[target]\nthickness = 2\n[impact]"),
+                "10:7",
+                "the last stage ends inside the target",
+            ),
+            (in_stages("[impact]", "end = 1\n[impact]"), "10:7", "the last stage ends inside the target"),
+            (STAGES.replace("[[stage]]", "[stage]"), "7:2", "`stage` is given twice"),
+            ("stage = []\nprojectile.mass = 1".to_owned(), "1:9", "`stage` is empty"),
+            ("[stage]\n[projectile]\nmass = 1".to_owned(), "1:1", "`stage` is a table"),
+            ("stage = [3]\nprojectile.mass = 1".to_owned(), "1:10", "`stage` is an integer"),
+            ("projectile = 3".to_owned(), "1:14", "`projectile` is an integer"),
+            ("projectile.mss = 3".to_owned(), "1:12", "unknown key `mss` in [projectile]"),
+        ] {
+            let error = refuse(&text);
+            assert_eq!((error.location(), error.message.as_str()), (format!("scene.toml:{place}"), message), "{text}");
+            assert!(!error.allowed.is_empty() && !error.help.is_empty(), "{message}");
+        }
+    }
+
+    #[test]
+    fn admissible_ranges_are_those_of_the_contract() {
+        let (nan, inf) = ("nan", "inf");
+        let ogive = "{ shape = \"ogive\", caliber_radius_head = VALUE }";
+        let cone = "{ shape = \"cone\", length_ratio = VALUE }";
+        let cap = "{ shape = \"spherical\", radius_ratio = VALUE }";
+        let layer = "layer = [{ thickness = 1, strength = 0, density = VALUE, viscosity = 1 }]\n";
+        let nose = "{ factor = 0.72 }";
+        for (from, to, inside, outside) in [
+            ("\"2 kg\"", "VALUE", ["5e-324", "1e300"], ["0", "-1"]),
+            ("\"50 mm\"", "VALUE", ["1e-6", "1e3"], ["0.0", "-1"]),
+            ("\"36 MPa\"", "VALUE", ["1", "1e9"], ["-0.0", "-1"]),
+            ("12.0", "VALUE", ["1e-3", "1e3"], ["0", "-12.0"]),
+            ("\"8.48e6 N/m\"", "VALUE", ["1", "1e12"], ["0", "-1"]),
+            ("0.72", "VALUE", ["0", "1"], ["-0.1", "1.1"]),
+            (nose, ogive, ["0.5", "1e9"], ["0.4999", "-1"]),
+            (nose, cap, ["0.5", "1e9"], ["0.4999", "0"]),
+            (nose, cone, ["1e-9", "1e9"], ["0", "-1"]),
+            ("\"2300 kg/m^3\"", "VALUE", ["0", "-0.0"], ["-1", "-1e-300"]),
+            ("B = 1.0", "B = VALUE", ["0", "1.1"], ["-1", "-0.1"]),
+            ("k = 2.0", "k = VALUE", ["0", "1e-8"], ["-1", "-0.1"]),
+            ("\"180 mm\"", "VALUE", ["0", "1e3"], ["-1", "-0.1"]),
+            ("\"300 m/s\"", "VALUE", ["0", "1e4"], ["-1", "-0.1"]),
+        ] {
+            let text = |value: &str| with(from, &to.replace("VALUE", value));
+            for value in inside {
+                read(&text(value));
+            }
+            for value in outside.into_iter().chain([nan, inf, "-inf", "\"\"", "[]"]) {
+                let error = refuse(&text(value));
+                assert!(!error.message.is_empty() && error.place.is_some(), "{from} = {value}: {error}");
+            }
+        }
+        for key in ["static_force", "stiffness", "viscosity", "drag", "end"] {
+            let text =
+                |value: &str| format!("projectile.mass = 1\n[[stage]]\n{key} = {value}\n[target]\nthickness = 0");
+            read(&text("0"));
+            read(&text("1e300"));
+            assert_eq!(Scene::from_toml(&text("-1"), "").is_ok(), key == "static_force", "{key}");
+            for value in [nan, inf, "-inf"] {
+                refuse(&text(value));
+            }
+        }
+        let target = "strength = \"36 MPa\"\ndensity = \"2300 kg/m^3\"\nthickness = \"180 mm\"\n";
+        read(&with(target, &layer.replace("VALUE", "0")));
+        refuse(&with(target, &layer.replace("VALUE", "-1")));
+        refuse(&with(target, &layer.replace("VALUE", "1").replace("strength = 0", "strength = -1")));
+        refuse(&with(target, &layer.replace("VALUE", "1").replace("viscosity = 1", "viscosity = -1")));
+    }
+
+    #[test]
+    fn only_the_last_layer_goes_without_a_thickness_and_the_sum_is_finite() {
+        let (_, text) = SHIPPED.last().unwrap();
+        let error = refuse(&text.replace("thickness = \"80 mm\"\n", ""));
+        assert_eq!(error.message, "[[target.layer]] has no `thickness`");
+        assert_eq!(error.place.unwrap().line, 16);
+        let huge = text.replace("80 mm", "1.7e308 m").replace("200 mm", "1.7e308 m");
+        assert_eq!(refuse(&huge).message, "the layers sum up to no finite thickness");
+    }
+
+    #[test]
+    fn a_static_factor_of_the_scene_holds_for_layers_without_their_own() {
+        let (_, text) = SHIPPED.last().unwrap();
+        let scene = read(&text.replace("k = 2.0", "k = 2.0\nS = 9.0").replacen("density", "S = 7.0\ndensity", 1));
+        let factors: Vec<_> = scene.concrete().unwrap().layers.iter().map(|layer| layer.static_factor).collect();
+        assert_eq!(factors, [7.0, 9.0, 9.0]);
+    }
+
+    #[test]
+    fn unreadable_files_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let refused = |path: &Path| {
+            let error = Scene::read(path).unwrap_err();
+            assert!(error.render(false).contains(&error.location()), "{error}");
+            (error.place.clone(), error.message)
+        };
+        assert_eq!(refused(folder.path()), (None, "is a directory".to_owned()));
+        let (place, message) = refused(&at("absent.toml"));
+        assert!(place.is_none() && message.starts_with("cannot be read: "), "{message}");
+        std::fs::write(at("limit.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len())].concat()).unwrap();
+        assert!(Scene::read(&at("limit.toml")).is_ok());
+        std::fs::write(at("large.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len() + 1)].concat()).unwrap();
+        let too_large = (None, "larger than 1048576 bytes, and not read".to_owned());
+        assert_eq!(refused(&at("large.toml")), too_large);
+        // A file whose length is known only by reading it.
+        #[cfg(target_os = "linux")]
+        assert_eq!(refused(Path::new("/dev/zero")), too_large);
+    }
+
+    #[test]
+    fn bytes_that_are_not_utf_8_are_refused_at_their_place() {
+        let error = text_of(b"title = \"\xc3\xa4\"\nx = \"\xff\xfe\"".to_vec(), "scene.toml").unwrap_err();
+        assert_eq!(error.location(), "scene.toml:2:6");
+        assert_eq!(error.message, "the byte 0xff is not UTF-8");
+        assert_snapshot!(error.render(false), @r#"
+        Error: the byte 0xff is not UTF-8
+           ╭─[ scene.toml:2:6 ]
+           │
+         2 │ x = "��"
+           │      ┬
+           │      ╰── UTF-8 text
+           │
+           │ Help: save the file in UTF-8
+        ───╯
+        "#);
+    }
+
+    #[test]
+    fn no_file_steers_the_terminal_that_shows_it() {
+        let hostile = "[projectile]\n\"ma\\u001b[31mss\\u202e\" = 1 # \u{1b}]0;owned\u{7}\u{9b}\u{202e}";
+        let hostiles = [hostile.to_owned(), hostile.replace('#', "\n#"), format!("x = {hostile}"), "a\rb".to_owned()];
+        for text in hostiles {
+            let error = Scene::from_toml(&text, "evil\u{1b}[2J.toml").unwrap_err();
+            for shown in [error.render(false), error.to_string()] {
+                let steers = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+                assert!(!shown.chars().any(steers), "{shown:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn colours_appear_only_when_asked_for() {
+        let error = refuse("");
+        assert!(error.render(true).contains('\u{1b}') && !error.render(false).contains('\u{1b}'));
+    }
+
+    #[test]
+    fn a_line_of_any_length_gives_a_short_message() {
+        let long = format!("{} = 1", "x".repeat(100_000));
+        let error = refuse(&long);
+        assert!(error.render(false).len() < 1000, "{}", error.render(false));
+        assert_eq!(error.location(), "scene.toml:1:1");
+        let unit = with("50 mm", &format!("50 {}", "y".repeat(100_000)));
+        assert!(refuse(&unit).render(false).len() < 1000);
+    }
+
+    proptest::proptest! {
+        /// Any text gives a scene or an error that can be shown, never a panic.
+        #[test]
+        fn arbitrary_text_is_read_or_refused(text in ".{0,80}") {
+            if let Err(error) = Scene::from_toml(&text, &text) {
+                proptest::prop_assert!(!error.render(true).is_empty());
+            }
+        }
+
+        /// So does a scene with any one piece replaced by any other text, and what is read resolves to finite numbers.
+        #[test]
+        fn a_mutilated_scene_is_read_or_refused(
+            stages in proptest::bool::ANY,
+            start in 0_usize..400,
+            length in 0_usize..12,
+            insert in "[-0-9a-z\\[\\]{}=\"'.,# \n\u{e4}\u{1b}]{0,6}",
+        ) {
+            let source = if stages { STAGES } else { FULL };
+            let start = start.min(source.len());
+            let end = (start + length).min(source.len());
+            let text = [&source[..start], &insert, &source[end..]].concat();
+            match Scene::from_toml(&text, "scene.toml") {
+                Err(error) => {
+                    let place = error.place.clone().unwrap();
+                    proptest::prop_assert!(text.get(place.span).is_some());
+                    proptest::prop_assert!(error.render(false).contains(&error.message));
+                }
+                Ok(scene) => {
+                    if let Ok(problem) = scene.problem() {
+                        for stage in &problem.stages {
+                            let force = [stage.static_force, stage.stiffness, stage.viscosity, stage.drag];
+                            proptest::prop_assert!(force.iter().all(|number| number.is_finite()));
+                        }
+                    }
+                }
+            }
+        }
     }
 }

@@ -53,12 +53,12 @@ const THIRD_BRANCH: f64 = 3.8;
 
 /// Static strength over compressive strength S of a concrete of strength fc [Pa] (Eq. 14).
 ///
-/// `S = 72 (fc/MPa)^(-1/2)`, evaluated as `72 / sqrt(fc · 1e-6)`. Not finite for fc = 0.
+/// `S = 72 (fc/MPa)^(-1/2)`, Not finite for fc = 0.
 pub fn static_factor(strength: f64) -> f64 {
     72.0 / (strength / 1e6).sqrt()
 }
 
-/// Range of the shots to which Eq. 14 was fitted: fc from 13.5 to 96.7 MPa.
+/// Range of the shots to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
 pub fn static_factor_validity(strength: f64) -> Validity {
     Validity::new(
         (13.5e6..=96.7e6).contains(&strength),

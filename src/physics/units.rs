@@ -454,6 +454,10 @@ mod tests {
         assert!(quantity("-0 m", Dimension::Length).is_ok_and(f64::is_sign_positive));
         let many = format!("0.{}m", "3".repeat(500));
         assert_eq!(quantity(&many, Dimension::Length), Ok(1.0 / 3.0));
+        assert!(number("-0.0").is_ok_and(f64::is_sign_positive));
+        // 30 digits by 16 of the factor do not fit 38.
+        let wide = quantity("0.123456789012345678901234567890 psi", Dimension::Pressure);
+        approx::assert_relative_eq!(wide.unwrap_or(f64::NAN), 0.123_456_789_012_345_68 * 6_894.757_293_168_361);
     }
 
     #[test]
