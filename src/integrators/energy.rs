@@ -858,6 +858,23 @@ mod tests {
         }
     }
 
+    /// A barrier that cancels six digits of w, then drag alone, over which the error left by the barrier fades with w.
+    #[test]
+    fn bar_of_the_margin_fades_with_drag_as_the_error_does() {
+        let mut random = Random(7);
+        for case in 0..500 {
+            let length = random.between(0.9, 1.0);
+            let left = 1e-6 * (1.0 + random.unit());
+            let barrier = stage(0.5 * (1.0 - left) / length, 0.0, 0.0, length);
+            let problem = staged(1.0, 1.0, 6.0, &[barrier, stage(0.0, 0.0, 0.5, f64::INFINITY)]);
+            let (value, error, _) = Energy::new().exit_margin_in(&problem).unwrap().unwrap();
+            let (exact, ..) = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>()).unwrap().unwrap();
+            let true_error = (exact - TwoFloat::from(value)).value().abs();
+            assert!(true_error <= error, "case {case}: error {true_error:e}, bar {error:e}");
+            assert!(error < 1e-15 * (-5.0_f64).exp() * 3.0, "case {case}: bar {error:e}");
+        }
+    }
+
     #[test]
     fn tolerance_is_obeyed_and_saves_work() {
         let problem = concrete(2.0, 900.0, 0.4, 0.1, 848_230.0, 3.25, None);

@@ -764,6 +764,32 @@ mod tests {
         }
     }
 
+    /// The residual energy that is zero for every stop: the mirror image of the capped depth.
+    #[test]
+    fn residual_energy_without_a_sign_as_objective_is_refused() {
+        for bar in [None, Some(1e-15)] {
+            let residual = Oracle(|problem: &Problem| (true_margin(problem).max(0.0), bar));
+            let refusal = search(SLAB, &residual).unwrap_err();
+            let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
+            assert!(low.exit_energy == 0.0 && high.exit_energy > 0.0);
+        }
+    }
+
+    /// Noise within the bar, different at every speed, as adaptive steps make it.
+    #[test]
+    fn noise_within_the_bar_costs_neither_flights_nor_truth() {
+        for noise in [1e-12, 1e-9, 1e-6, 1e-3] {
+            let noisy = Oracle(|problem: &Problem| {
+                let wave = (problem.impact_speed * 1e9).sin();
+                (true_margin(problem) + noise * wave, Some(noise))
+            });
+            let found = search(SLAB, &noisy).unwrap();
+            let (error, bar) = ((found.velocity - SLAB.critical()).abs(), found.error_bar.unwrap());
+            assert!(error <= bar, "{noise:e}: {error:e} over {bar:e}");
+            assert!(bar < 10.0 * noise * found.velocity && found.evaluations <= 12, "{noise:e}: {found:?}");
+        }
+    }
+
     /// The residual velocity with its sign has an infinite slope at `V_c`. Its zero is right, and so accepted.
     #[test]
     fn root_of_a_margin_with_an_infinite_slope_is_found() {
