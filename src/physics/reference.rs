@@ -45,6 +45,11 @@ const STEP_BITS: isize = 80;
 pub struct Exact(Big);
 
 impl Exact {
+    /// One, the scale of errors of dimensionless numbers.
+    pub fn one() -> Self {
+        Self(int(1, FIRST_BITS))
+    }
+
     /// The nearest `f64`.
     pub fn to_f64(&self) -> f64 {
         self.0.to_f64().value()
@@ -766,13 +771,10 @@ fn passage_time(model: &Model, law: &Law, from: &Point, to: &Big, velocity: &Big
             mass / (p * q).sqrt() * (angle(v0) - angle(velocity))
         }
         (false, true) => {
+            // Partial fractions of dV/(Vt² - V²), with V² - Vt² = (V0² - Vt²) e^{-y} put in: it drowns in Vt² otherwise.
             let terminal = (-(p / q)).sqrt();
-            if terminal == *v0 {
-                return xi / v0;
-            }
-            // Partial fractions of dV/(q (Vt² - V²)).
-            let ratio = (v0 - &terminal) * (velocity + &terminal) / ((v0 + &terminal) * (velocity - &terminal));
-            mass / twice(q * terminal) * ln(&ratio)
+            let faster = (velocity + &terminal) / (v0 + &terminal);
+            xi / &terminal + mass / (q * terminal) * ln(&faster)
         }
     }
 }
@@ -865,21 +867,24 @@ fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result
             horizon = Some(-centre.clone());
         }
         after = Box::new(move |t| {
-            let decay = (-(&g * t)).exp();
+            // e^{-g t} times cos m t and sin(m t)/m, or their hyperbolic or critical counterparts.
             let (cosine, sine) = match order {
                 Ordering::Less => {
+                    let decay = (-(&g * t)).exp();
                     let (sine, cosine) = (&m * t).sin_cos();
-                    (cosine, sine / &m)
+                    (&decay * cosine, decay * sine / &m)
                 }
-                Ordering::Equal => (int(1, bits), t.clone()),
+                Ordering::Equal => {
+                    let decay = (-(&g * t)).exp();
+                    (decay.clone(), decay * t)
+                }
                 Ordering::Greater => {
-                    let grow = (&m * t).exp();
-                    let shrink = int(1, bits) / &grow;
-                    (half(&grow + &shrink), half(grow - shrink) / &m)
+                    let (slow, fast) = ((-((&g - &m) * t)).exp(), (-((&g + &m) * t)).exp());
+                    (half(&slow + &fast), half(slow - fast) / &m)
                 }
             };
-            let u = &decay * (&u0 * &cosine + (&v0 + &g * &u0) * &sine);
-            (u - &centre, decay * (&v0 * cosine - &brake * sine))
+            let u = &u0 * &cosine + (&v0 + &g * &u0) * &sine;
+            (u - &centre, &v0 * cosine - &brake * sine)
         });
     }
     if let Some(rest) = &rest {
@@ -899,8 +904,8 @@ fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result
         Some(rest) => rest,
         None => (limit - &from.depth) / &from.velocity,
     };
-    // 2^400 times free flight is beyond any of the rates; the loop ends because the limit lies before the horizon.
-    for _ in 0..400 {
+    // 2^100 times free flight is beyond any of the rates; the loop ends because the limit lies before the horizon.
+    for _ in 0..100 {
         if after(&high).0 >= *limit {
             break;
         }
