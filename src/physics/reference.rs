@@ -209,7 +209,10 @@ pub fn flight(source: Source<'_>) -> Result<ExactFlight, ReferenceError> {
 /// [`ReferenceError`].
 pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
     let (critical, _) = settled(
-        |bits| squared_critical(source, &source.inputs(bits), bits).map(|(mass, squared)| [squared.sqrt(), half(mass * squared)]),
+        |bits| {
+            squared_critical(source, &source.inputs(bits), bits)
+                .map(|(mass, squared)| [squared.sqrt(), half(mass * squared)])
+        },
         |a, b| a.iter().zip(b).all(|(a, b)| agree(a, b)),
     )?;
     let [velocity, energy] = critical.map(Exact);
@@ -454,7 +457,11 @@ impl Source<'_> {
     /// The inputs with one of them moved by a relative 2^-80, for each that is not zero.
     fn stepped_inputs(&self, bits: usize) -> impl Iterator<Item = Vec<Big>> {
         let inputs = self.inputs(bits);
-        (0..inputs.len()).filter(|&i| !is_zero(&inputs[i])).map(move_one(inputs.clone())).collect::<Vec<_>>().into_iter()
+        (0..inputs.len())
+            .filter(|&i| !is_zero(&inputs[i]))
+            .map(move_one(inputs.clone()))
+            .collect::<Vec<_>>()
+            .into_iter()
     }
 
     /// The problem that `inputs` describe.
@@ -1009,11 +1016,11 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
                 let (gain, loss) = squared_speed_terms(law, &model.mass, w, &from, to, bits);
                 gain - loss
             };
-            // A drag's slope by itself: as a difference it would drown in the static work once e^{-y} is small.
-            slope = if is_zero(&law.q) {
-                carried(moved_law, &(&w + slope)) - carried(law, &w)
-            } else {
+            // Only the continuous crater needs the difference, in which a slope of e^{-y} would drown.
+            slope = if law.s == moved_law.s {
                 slope * (-(twice(&law.q * (to - &from)) / &model.mass)).exp()
+            } else {
+                carried(moved_law, &(&w + slope)) - carried(law, &w)
             };
             w = carried(law, &w);
             from = to.clone();
@@ -1099,8 +1106,14 @@ mod tests {
             (
                 [100.0, 50.0, 40.0, 0.0],
                 10.0,
-                Some(["0.07603459963009463475310942548804058242016277309471764", "0.2902956610774561305897428290522743332925740961351568"]),
-                ["0.04264223885741157320422351534768555790848867931006064", "2.707299651822331005253424106540591501813351410542086"],
+                Some([
+                    "0.07603459963009463475310942548804058242016277309471764",
+                    "0.2902956610774561305897428290522743332925740961351568",
+                ]),
+                [
+                    "0.04264223885741157320422351534768555790848867931006064",
+                    "2.707299651822331005253424106540591501813351410542086",
+                ],
             ),
             (
                 [100.0, 0.0, 3.0, 0.0],
@@ -1159,8 +1172,7 @@ mod tests {
             let source = Problem { exit_depth, ..source.clone() };
             let exact = flight(Source::Problem(&source)).unwrap();
             let model = Source::Problem(&source).model(&Source::Problem(&source).inputs(384), 384).unwrap();
-            let start =
-                Point { time: int(0, 384), depth: int(0, 384), velocity: model.impact_speed.clone() };
+            let start = Point { time: int(0, 384), depth: int(0, 384), velocity: model.impact_speed.clone() };
             let summed = quadrature(&model, &model.stages[0], &start, &exact.end.depth.0);
             assert!(apart(&summed, &exact.end.time.0) < 1e-55, "{:e}", apart(&summed, &exact.end.time.0));
         }
