@@ -26,8 +26,7 @@ impl Integrator for ClosedForm {
         }
         let Solution { outcome, stage, end, events, exit_margin, exit_margin_error } =
             closed_form::solve(problem).map_err(IntegrationError::from)?;
-        let trajectory =
-            if detail == Detail::Trajectory { trajectory(problem, &events, end)? } else { Vec::new() };
+        let trajectory = if detail == Detail::Trajectory { trajectory(problem, &events, end)? } else { Vec::new() };
         let inside_bar = match (exit_margin, exit_margin_error) {
             (Some(margin), Some(bar)) => margin.abs() <= bar,
             _ => false,

@@ -27,7 +27,7 @@ use smallvec::SmallVec;
 use thiserror::Error;
 
 use super::event::{Event, EventKind, Outcome, State};
-use super::exit_energy::{carry, exit_margin, expm1_over, second_exponential_integral};
+use super::exit_energy::{carry, exit_margin, expm1_over};
 use super::scene::CraterStiffness;
 use super::stage::{Problem, Stage, Stages, Target};
 
@@ -221,7 +221,7 @@ fn follow(
                 Leg::Passes { time, velocity } => (true, State { time: entry.time + time, depth: limit, velocity }),
                 Leg::Rests { time, way } => {
                     // The depth of rest and the speed at the limit round apart; the limit was not reached.
-                    let depth = (entry.depth + way).min(limit);
+                    let depth = if entry.depth + way > limit { limit } else { entry.depth + way };
                     (false, State { time: entry.time + time, depth, velocity: 0.0 })
                 }
                 Leg::Endless(why) => return Err(ClosedFormError::NeverEnds { why, last: entry }),
@@ -319,10 +319,9 @@ fn drag_time(p: f64, q: f64, mass: f64, xi: f64, y: f64, v0: f64, v: f64) -> f64
     if z < 0.5 {
         return tau * atanh_over(z);
     }
-    // Near terminal velocity z -> 1; (1 + z)/(1 - z) in speeds, with e^y taken out.
+    // Near terminal velocity Vt the argument goes to one: atanh in logarithms, with V² - Vt² = (V0² - Vt²) e^{-y}.
     let terminal = (-p / q).sqrt();
-    let ratio = (v + terminal) / (v0 + terminal) * ((v + terminal + (v0 - terminal) * decay) / (v0 + v));
-    0.5 * (y + ratio.ln()) / rate
+    (0.5 * y + ((v + terminal) / (v0 + terminal)).ln()) / rate
 }
 
 /// `F = p + s x`, s > 0: the crater, and a spring that may be pulled first (p + s x < 0).
@@ -342,11 +341,8 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
         if energy >= 0.0 {
             let v = energy.sqrt();
             // f V0 - f0 V, where f and f0 have one sign as a sum of terms of one sign.
-            let crossed = if f0 < 0.0 && f > 0.0 {
-                f * v0 - f0 * v
-            } else {
-                xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)))
-            };
+            let crossed =
+                if f0 < 0.0 && f > 0.0 { f * v0 - f0 * v } else { xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v))) };
             return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, velocity: v };
         }
     }
@@ -452,7 +448,8 @@ impl Damped {
             }
             return (way, speed / t);
         }
-        if self.damping.is_gt() && m * t > 1.0 {
+        // Sums of two decays; nearer to critical damping their difference would cancel.
+        if self.damping.is_gt() && m * t > 0.1 {
             let (fast, slow) = (self.fast, self.slow);
             let gap = 2.0 * m;
             let (fast_decay, slow_decay) = ((-fast * t).exp(), (-slow * t).exp());
@@ -468,11 +465,8 @@ impl Damped {
         };
         let decay = (-g * t).exp();
         let impulse = decay * sine;
-        let step = if w2 > 0.0 {
-            (1.0 - decay * (cosine + g * sine)) / w2
-        } else {
-            t * t * second_exponential_integral(self.fast * t)
-        };
+        // Here g is near w or below it, so that w² t² is no less than 1/16.
+        let step = (1.0 - decay * (cosine + g * sine)) / w2;
         (v0 * impulse - f0 * step, decay * (v0 * cosine - (g * v0 + f0) * sine))
     }
 
@@ -719,9 +713,9 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
 
 /// Critical velocity of stages with fixed coefficients and no viscosity; the impact speed of `problem` is not used.
 ///
-/// Backwards from the exit, where nothing need be left, through each stage by `W(from) = W(to)` carried the other
-/// way. A stage that drives may demand less than nothing at its start; then its start is what must be reached, and
-/// the demand is cut at zero (a barrier before it decides). Zero when every stage drives.
+/// Backwards from the exit, where nothing need be left, by `W(from) = e^y (W(to) + loss)` through each stage. A stage
+/// that drives may demand less than nothing at its start; then its start is what must be reached, and the demand is
+/// cut at zero (a barrier before it decides). Zero when every stage drives.
 ///
 /// # Errors
 /// [`CriticalError`].
@@ -738,8 +732,11 @@ pub fn critical_of_stages(problem: &Problem) -> Result<Critical, CriticalError> 
         if stage.viscosity > 0.0 {
             return Err(CriticalError::Viscous { stage: index });
         }
-        demand = carry(stage, problem.mass, demand, to, from).max(0.0);
-        if !demand.is_finite() {
+        // W(to) = W(from) e^{-y} - loss, solved for W(from); cut before the exponential, which may be infinite.
+        let loss = -carry(stage, problem.mass, 0.0, from, to);
+        let needed = demand + loss;
+        demand = if needed > 0.0 { needed * (2.0 * stage.drag * (to - from) / problem.mass).exp() } else { 0.0 };
+        if !(needed.is_finite() && demand.is_finite()) {
             return Err(CriticalError::OutOfRange);
         }
     }
@@ -753,6 +750,12 @@ mod tests {
     use crate::physics::reference::{self, Conditions, Exact, ExactFlight, Source};
     use crate::physics::scene::{Concrete, Criterion, Resistance, Scene};
     use std::f64::consts::PI;
+
+    /// Allowed error in ulps over max(1, condition): measured 2.6 when every error is divided so, 20,000 scenes.
+    const LIMIT: f64 = 8.0;
+
+    /// Random cases of a test: all of them where the big floats are compiled with optimization.
+    const CASES: u32 = if cfg!(debug_assertions) { 1_000 } else { 20_000 };
 
     /// A generator of our own for the scenes: SplitMix64 (Steele, Lea, Flood 2014), the same on every machine.
     struct Dice(u64);
@@ -793,7 +796,8 @@ mod tests {
     fn roll(dice: &mut Dice) -> (Scene, f64) {
         let d = dice.log(1e-6, 1e2);
         let (strength, static_factor, density) = (dice.log(1e5, 1e9), dice.log(1.0, 30.0), dice.log(1e2, 1e4));
-        let (nose_factor, inertia_factor) = (if dice.one_in(10) { 0.0 } else { dice.log(0.01, 1.0) }, dice.log(0.5, 1.5));
+        let (nose_factor, inertia_factor) =
+            (if dice.one_in(10) { 0.0 } else { dice.log(0.01, 1.0) }, dice.log(0.5, 1.5));
         let n = dice.log(1e-3, 1e12);
         let mass = n * density * d * d * d * if nose_factor > 0.0 { nose_factor * inertia_factor } else { 1.0 };
         let k = if dice.one_in(12) { 0.0 } else { dice.log(0.1, 5.0) };
@@ -854,7 +858,11 @@ mod tests {
 
     fn ulps(exact: &Exact, value: f64) -> f64 {
         let near = exact.to_f64();
-        if near == 0.0 { if value == 0.0 { 0.0 } else { f64::INFINITY } } else { exact.relative_error(value) * near / ulp(near) }
+        if near == 0.0 {
+            if value == 0.0 { 0.0 } else { f64::INFINITY }
+        } else {
+            exact.relative_error(value) * near / ulp(near)
+        }
     }
 
     fn ulps_of(exact: &Exact, value: f64, scale: &Exact) -> f64 {
@@ -904,13 +912,14 @@ mod tests {
         }
 
         fn worst(&self) -> f64 {
-            [self.depth, self.time, self.velocity, self.crater_end_time, self.crater_end_velocity].into_iter().fold(0.0, f64::max)
+            [self.depth, self.time, self.velocity, self.crater_end_time, self.crater_end_velocity]
+                .into_iter()
+                .fold(0.0, f64::max)
         }
     }
 
     /// Compares `count` random scenes and gives the worst errors, flight and critical velocity.
     fn compare(seed: u64, count: u32) -> (Errors, f64) {
-        const LIMIT: f64 = 8.0;
         let mut dice = Dice(seed);
         let (mut worst, mut worst_critical) = (Errors::default(), 0.0_f64);
         let mut undecidable = 0;
@@ -934,7 +943,7 @@ mod tests {
             assert!(solution.outcome.agrees_with(exact.outcome), "case {case}: {solution:?}\n{exact:?}\n{scene:?}");
             // Rest within round-off of k d may name its stage either way.
             if solution.outcome == exact.outcome {
-                let errors = conditioned(errors(&solution, &exact), 2.0, || reference::conditions(source).unwrap());
+                let errors = conditioned(errors(&solution, &exact), LIMIT, || reference::conditions(source).unwrap());
                 assert!(errors.worst() <= LIMIT, "case {case}: {errors:?}\n{solution:?}\n{scene:?} V0 = {speed:e}");
                 worst.worsen(&errors);
             }
@@ -943,7 +952,7 @@ mod tests {
             match critical(&model_of(&scene), thickness) {
                 Ok(critical) => {
                     let mut error = ulps(&exact.velocity, critical.velocity).max(ulps(&exact.energy, critical.energy));
-                    if error > 2.0 {
+                    if error > LIMIT {
                         // That of the energy is larger: twice it, and one for the mass.
                         error /= reference::critical_condition(source).unwrap().max(1.0);
                     }
@@ -962,9 +971,311 @@ mod tests {
 
     #[test]
     fn flights_of_random_scenes_are_within_8_ulp_times_condition_of_50_digits() {
-        let count = std::env::var("COUNT").map_or(500, |c| c.parse().unwrap());
-        let start = std::time::Instant::now();
-        let (worst, worst_critical) = compare(std::env::var("SEED").map_or(1, |c| c.parse().unwrap()), count);
-        eprintln!("{worst:?} {worst_critical} {:?}", start.elapsed());
+        let (worst, worst_critical) = compare(1, CASES);
+        println!("worst, in ulps over max(1, condition): {worst:?}, V_c and E_c {worst_critical}");
+    }
+
+    /// A random list of one to four stages of every family that has a form, resisting and driving, with and without
+    /// a far side; forces up to a thousand times what stops the projectile within its stage, and down to nothing.
+    fn roll_stages(dice: &mut Dice) -> Problem {
+        let (mass, length, speed) = (dice.log(1e-3, 1e3), dice.log(1e-3, 1e1), dice.log(1e-1, 1e3));
+        let energy = mass * speed * speed;
+        let count = 1 + (dice.unit() * 4.0) as usize;
+        let mut stages = Stages::new();
+        let mut end = 0.0;
+        for index in 0..count {
+            let family = (dice.unit() * 8.0) as u32;
+            let sign = if dice.one_in(3) { -1.0 } else { 1.0 };
+            let p = sign * energy / length * dice.log(1e-4, 1e2);
+            let s = energy / length / length * dice.log(1e-4, 1e3);
+            let r = mass * speed / length * dice.log(1e-4, 1e3);
+            let q = mass / length * dice.log(1e-4, 1e2);
+            let (p, s, r, q) = match family {
+                0 => (p, 0.0, 0.0, 0.0),
+                1 => (p, s, 0.0, 0.0),
+                2 => (p, 0.0, 0.0, q),
+                3 => (p, 0.0, r, 0.0),
+                4 => (p, s, r, 0.0),
+                5 => (0.0, 0.0, r, 0.0),
+                6 => (0.0, 0.0, 0.0, q),
+                _ => (0.0, 0.0, 0.0, 0.0),
+            };
+            end += length * dice.log(1e-3, 3.0);
+            let end = if index + 1 == count { f64::INFINITY } else { end };
+            stages.push(Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end });
+        }
+        let exit_depth = if dice.one_in(4) { f64::INFINITY } else { length * dice.log(0.01, 10.0) };
+        Problem { mass, impact_speed: speed, exit_depth, stages, crater: None, target: Target::Stages }
+    }
+
+    #[test]
+    fn flights_through_stages_of_every_family_are_within_8_ulp_times_condition_of_50_digits() {
+        let mut dice = Dice(2);
+        let (mut worst, mut ended, mut endless) = (Errors::default(), [0; 2], 0);
+        for case in 0..CASES {
+            let problem = roll_stages(&mut dice);
+            let source = Source::Problem(&problem);
+            let (solution, exact) = match (solve(&problem), reference::flight(source)) {
+                (Ok(solution), Ok(exact)) => (solution, exact),
+                (Err(ClosedFormError::NeverEnds { .. }), Err(reference::ReferenceError::NeverEnds)) => {
+                    endless += 1;
+                    continue;
+                }
+                (solution, exact) => panic!("case {case}: {solution:?}\n{exact:?}\n{problem:?}"),
+            };
+            assert_eq!(solution.outcome, exact.outcome, "case {case}: {solution:?}\n{exact:?}\n{problem:?}");
+            assert_eq!(solution.stage, exact.stage);
+            ended[usize::from(solution.outcome == Outcome::Perforated)] += 1;
+            let kinds = solution.events.iter().map(|e| e.kind);
+            assert!(kinds.eq(exact.events.iter().map(|e| e.kind)), "case {case}");
+            let errors = conditioned(errors(&solution, &exact), LIMIT, || reference::conditions(source).unwrap());
+            assert!(errors.worst() <= LIMIT, "case {case}: {errors:?}\n{solution:?}\n{problem:?}");
+            worst.worsen(&errors);
+            if let (Some(margin), Some(bar), Some(exact)) =
+                (solution.exit_margin, solution.exit_margin_error, &exact.exit_margin)
+            {
+                let off = exact.error_over(margin, &reference::Exact::one());
+                assert!(
+                    off <= bar,
+                    "case {case}: margin {margin:e} is off by {off:e}, bar {bar:e}\n{solution:?}\n{problem:?}"
+                );
+            }
+        }
+        println!("worst, in ulps over max(1, condition): {worst:?}");
+        let shares = [ended[0], ended[1], endless].map(|n| f64::from(n) / f64::from(CASES));
+        assert!(shares.iter().all(|share| *share > 0.1), "stopped, perforated, endless: {shares:?}");
+    }
+
+    #[test]
+    fn critical_velocity_of_stages_is_within_8_ulp_times_condition_of_50_digits() {
+        let mut dice = Dice(3);
+        let (mut worst, mut zero, mut done) = (0.0_f64, 0, 0);
+        while done < CASES {
+            let mut problem = roll_stages(&mut dice);
+            for stage in &mut problem.stages {
+                // Stiffness with drag among them, which has V(x) and therefore a critical velocity.
+                stage.drag += stage.viscosity * problem.impact_speed.recip();
+                stage.viscosity = 0.0;
+            }
+            let source = Source::Problem(&problem);
+            if !problem.has_exit() {
+                assert_eq!(critical_of_stages(&problem), Err(CriticalError::NoExit));
+                continue;
+            }
+            done += 1;
+            let exact = reference::critical(source).unwrap();
+            let Ok(critical) = critical_of_stages(&problem) else {
+                assert!(exact.energy.to_f64() > 1e290, "{exact:?}");
+                continue;
+            };
+            if critical.velocity == 0.0 {
+                zero += 1;
+            }
+            let mut error = ulps(&exact.velocity, critical.velocity);
+            if error > LIMIT {
+                error /= reference::critical_condition(source).unwrap().max(1.0);
+            }
+            assert!(error <= LIMIT, "{error} ulp\n{problem:?}\n{critical:?} {}", exact.velocity.to_decimal(20));
+            worst = worst.max(error);
+        }
+        println!("worst, in ulps over max(1, condition): {worst}; driven throughout: {zero}");
+        assert!(zero > 0);
+    }
+
+    /// Li & Chen's dimensionless depth, from I, N and k: unit diameter, density and strength.
+    fn dimensionless_depth(i: f64, n: f64, k: f64) -> f64 {
+        let target = CraterAndTunnel {
+            mass: n,
+            crater_depth: k,
+            static_force: 0.25 * PI,
+            drag: 0.25 * PI,
+            crater_stiffness: CraterStiffness::Continuous,
+        };
+        solve_crater_and_tunnel(&target, (i / n).sqrt(), f64::INFINITY).unwrap().end.depth
+    }
+
+    #[test]
+    fn dimensionless_depths_are_the_published_ones() {
+        for (i, n, k, depth) in [
+            (0.5, 10.0, 2.0, 1.184_519_008_163_294_5),
+            (2.0, 10.0, 2.0, 2.231_871_462_056_812_7),
+            (100.0, 10.0, 2.0, 16.336_651_809_520_088),
+            (0.2, 20.0, 0.707, 0.428_021_653_964_986_66),
+            (50.0, 234.3, 2.365, 30.038_836_818_523_704),
+            // Forrestal 1994 shot 14 with the published groups: 6.21.
+            (8.455, 125.9, 2.0, 6.215_773_173_665_595),
+        ] {
+            let computed = dimensionless_depth(i, n, k);
+            assert!((computed / depth - 1.0).abs() < 8.0 * f64::EPSILON, "{computed} for {depth}");
+        }
+    }
+
+    #[test]
+    fn dimensionless_critical_energies_are_those_of_the_table() {
+        // E_c/(d³ fc S) at k = 2, from notes on Li & Chen: H/d, N, value.
+        for (thickness, n, energy) in [
+            (1.0, 5.0, 0.158_907_777_799_397_2),
+            (2.0, 20.0, 0.785_398_163_397_448_3),
+            (10.0, 100.0, 7.585_602_604_876_231),
+            (18.0, 5.0, 498.214_509_251_034_6),
+        ] {
+            let target = CraterAndTunnel {
+                mass: n,
+                crater_depth: 2.0,
+                static_force: 0.25 * PI,
+                drag: 0.25 * PI,
+                crater_stiffness: CraterStiffness::Continuous,
+            };
+            let computed = critical(&target, thickness).unwrap().energy;
+            assert!((computed / energy - 1.0).abs() < 2e-15, "{computed} for {energy}");
+        }
+    }
+
+    fn problem(stages: &[Stage], mass: f64, impact_speed: f64, exit_depth: f64) -> Problem {
+        Problem {
+            mass,
+            impact_speed,
+            exit_depth,
+            stages: stages.iter().copied().collect(),
+            crater: Some(0),
+            target: Target::CraterAndTunnel,
+        }
+    }
+
+    fn kinds(solution: &Solution) -> Vec<EventKind> {
+        solution.events.iter().map(|e| e.kind).collect()
+    }
+
+    #[test]
+    fn rest_at_the_crater_end_is_a_stop_in_the_crater_and_rest_at_the_exit_a_perforation() {
+        // w = V0 = 10: the spring is stopped at x = 1 to the last bit.
+        let stages = [Stage::crater(100.0, 1.0), Stage::tunnel(100.0, 1.0)];
+        let stopped = solve(&problem(&stages, 1.0, 10.0, 2.0)).unwrap();
+        assert_eq!((stopped.outcome, stopped.stage), (Outcome::StoppedInCrater, 0));
+        assert_eq!(kinds(&stopped), [EventKind::CraterEnd, EventKind::Rest]);
+        let through = solve(&problem(&stages, 1.0, 10.0, 1.0)).unwrap();
+        assert_eq!((through.outcome, through.stage, through.end.velocity), (Outcome::Perforated, 0, 0.0));
+        assert_eq!(kinds(&through), [EventKind::CraterEnd, EventKind::Exit, EventKind::Rest]);
+        assert_eq!(through.exit_margin, Some(0.0));
+        // Nor does a drive behind the boundary start what has come to rest.
+        let driven = [Stage::crater(100.0, 1.0), Stage::tunnel(-100.0, 0.0)];
+        assert_eq!(solve(&problem(&driven, 1.0, 10.0, 2.0)).unwrap().outcome, Outcome::StoppedInCrater);
+    }
+
+    #[test]
+    fn every_stage_end_at_one_place_is_an_event_once_and_before_the_exit() {
+        let end = |end| Stage { end, ..Stage::tunnel(1.0, 0.0) };
+        let stages = [end(0.0), end(1.0), end(1.0), end(2.0), end(2.0), Stage::tunnel(1.0, 0.0)];
+        let mut several = problem(&stages, 1.0, 10.0, 2.0);
+        several.crater = Some(1);
+        let solution = solve(&several).unwrap();
+        assert_eq!(
+            kinds(&solution),
+            [
+                EventKind::StageEnd(0),
+                EventKind::CraterEnd,
+                EventKind::StageEnd(2),
+                EventKind::StageEnd(3),
+                EventKind::StageEnd(4),
+                EventKind::Exit
+            ]
+        );
+        assert_eq!(solution.stage, 3);
+    }
+
+    #[test]
+    fn at_rest_or_without_a_target_the_flight_is_over_at_impact() {
+        let stages = [Stage::crater(100.0, 1.0), Stage::tunnel(-100.0, 1.0)];
+        let still = solve(&problem(&stages, 1.0, 0.0, 2.0)).unwrap();
+        assert_eq!(
+            (still.outcome, kinds(&still), still.exit_margin),
+            (Outcome::StoppedInCrater, vec![EventKind::Rest], None)
+        );
+        let bare = solve(&problem(&stages, 1.0, 3.0, 0.0)).unwrap();
+        assert_eq!((bare.outcome, bare.end.velocity, kinds(&bare)), (Outcome::Perforated, 3.0, vec![EventKind::Exit]));
+    }
+
+    #[test]
+    fn the_path_keeps_the_energy_and_ends_where_the_flight_ends() {
+        let stages = [
+            Stage { end: 0.1, ..Stage::crater(8e6, 0.1) },
+            Stage { end: 0.2, ..Stage::tunnel(-3e5, 2.0) },
+            Stage { stiffness: 1e5, end: 0.3, ..Stage::tunnel(1e5, 0.0) },
+            Stage::tunnel(2e5, 3.0),
+        ];
+        let scene = problem(&stages, 2.0, 300.0, f64::INFINITY);
+        let solution = solve(&scene).unwrap();
+        let mut before = State::at_impact(&scene);
+        for step in 1..=1000 {
+            let depth = solution.end.depth * f64::from(step) / 1000.0;
+            let state = state_at(&scene, depth).unwrap().unwrap();
+            let w = squared_speed_at(&scene, depth).unwrap();
+            assert!((state.velocity * state.velocity - w).abs() < 1e-15 * 9e4 * 20.0, "{state} against {w}");
+            // The mean speed of a short step lies between the speeds at its ends, but for rounding.
+            let mean = (state.depth - before.depth) / (state.time - before.time);
+            let (slow, fast) = (before.velocity.min(state.velocity), before.velocity.max(state.velocity));
+            // A driven stage that begins inside the step may raise the speed between.
+            assert!(mean > slow * 0.98 && mean < fast * 1.02, "{before} to {state}");
+            before = state;
+        }
+        assert_eq!(state_at(&scene, solution.end.depth).unwrap(), Some(solution.end));
+        assert_eq!(state_at(&scene, solution.end.depth.next_up()).unwrap(), None);
+        assert_eq!(state_at(&scene, f64::NAN).unwrap(), None);
+    }
+
+    #[test]
+    fn an_endless_flight_and_a_stage_without_a_form_are_named() {
+        for (stage, why) in [
+            (Stage::tunnel(0.0, 0.0), "no force acts in the last stage"),
+            (Stage::tunnel(0.0, 1.0), "drag alone never brings it to rest"),
+            (Stage::tunnel(-1.0, 1.0), "the last stage drives the projectile"),
+            (Stage { viscosity: 1.0, ..Stage::tunnel(0.0, 0.0) }, "viscosity alone never brings it to rest"),
+            (Stage { viscosity: 1.0, ..Stage::tunnel(-1.0, 0.0) }, "its drive and its viscosity balance"),
+        ] {
+            let error = solve(&problem(&[stage], 1.0, 10.0, f64::INFINITY)).unwrap_err();
+            assert_eq!(
+                error,
+                ClosedFormError::NeverEnds { why, last: State { time: 0.0, depth: 0.0, velocity: 10.0 } }
+            );
+        }
+        // The stiff scene creeps towards |p|/s = 10: it leaves at 9 and would never reach 10.
+        let stiff = Stage { static_force: -1000.0, stiffness: 100.0, viscosity: 1000.0, drag: 0.0, end: f64::INFINITY };
+        assert_eq!(solve(&problem(&[stiff], 1.0, 1.0, 9.0)).unwrap().outcome, Outcome::Perforated);
+        assert!(matches!(solve(&problem(&[stiff], 1.0, 1.0, 10.0)), Err(ClosedFormError::NeverEnds { .. })));
+        let both = Stage { viscosity: 1.0, ..Stage::tunnel(1.0, 1.0) };
+        let error = solve(&problem(&[Stage::crater(1.0, 1.0), both], 1.0, 10.0, 3.0)).unwrap_err();
+        assert_eq!(error.to_string(), "stage 1 has no closed form: viscosity and drag act together");
+        // It stands in the way only of a flight that gets there.
+        assert!(solve(&problem(&[Stage::crater(1e3, 1.0), both], 1.0, 10.0, 3.0)).is_ok());
+    }
+
+    #[test]
+    fn a_number_out_of_range_is_an_error_and_not_an_infinity() {
+        let heavy = solve(&problem(&[Stage::tunnel(1e-300, 0.0)], 1e300, 1e100, f64::INFINITY));
+        assert!(matches!(heavy, Err(ClosedFormError::OutOfRange { stage: 0, .. })), "{heavy:?}");
+        let target = CraterAndTunnel {
+            mass: 1.0,
+            crater_depth: 0.0,
+            static_force: 1.0,
+            drag: 1.0,
+            crater_stiffness: CraterStiffness::Continuous,
+        };
+        assert_eq!(critical(&target, 400.0), Err(CriticalError::OutOfRange));
+        assert_eq!(critical(&target, f64::INFINITY), Err(CriticalError::NoExit));
+        assert!(critical(&target, 340.0).is_ok());
+    }
+
+    #[test]
+    fn a_barrier_before_a_drive_decides_the_critical_velocity() {
+        // 2 kg: 0.1 m of 1 MN cost 1e5 J; the drive behind gives more than the last metre takes.
+        let stages = [
+            Stage { end: 0.1, ..Stage::tunnel(1e6, 0.0) },
+            Stage { end: 0.5, ..Stage::tunnel(-1e6, 0.0) },
+            Stage::tunnel(1e5, 0.0),
+        ];
+        let critical = critical_of_stages(&problem(&stages, 2.0, 1.0, 1.5)).unwrap();
+        assert!((critical.energy / 1e5 - 1.0).abs() < 4.0 * f64::EPSILON);
+        let viscous = [Stage { viscosity: 1.0, ..stages[2] }];
+        assert_eq!(critical_of_stages(&problem(&viscous, 2.0, 1.0, 1.5)), Err(CriticalError::Viscous { stage: 0 }));
     }
 }
