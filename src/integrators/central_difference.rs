@@ -1130,6 +1130,8 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 mod tests {
+    use std::fmt::Write as _;
+
     use smallvec::smallvec;
 
     use super::*;
@@ -1140,8 +1142,8 @@ mod tests {
         [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
     const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
 
-    /// Mass [kg], static strength P [N], drag Q [kg/m] and crater depth k d [m] of a 50 mm projectile in 36 MPa
-    /// concrete, at V0 [m/s].
+    /// Mass [kg], static strength P [N], drag Q [kg/m] and crater depth k d [m] of a 50 mm projectile in concrete
+    /// of 36 N/mm², at V0 [m/s].
     const MASS: f64 = 2.0;
     const STRENGTH: f64 = 848_230.0;
     const DRAG: f64 = 3.2515;
@@ -1284,7 +1286,7 @@ mod tests {
                             continue;
                         }
                         let (order, half_width) = slope(&points);
-                        row += &format!("  {quantity} {order:.2}+-{half_width:.2}");
+                        write!(row, "  {quantity} {order:.2}+-{half_width:.2}").unwrap();
                         let band = if boundaries == Boundaries::Landed { 0.05 } else { 0.4 };
                         assert!(
                             (order - formal).abs() < band,
@@ -1489,15 +1491,13 @@ mod tests {
     fn unequal_steps_keep_the_order() {
         let problem = concrete(DRAG, 0.6, SPEED, f64::INFINITY);
         let exact = Exact::of(&problem);
-        // Parts of the step size along the flight, `scale` being about the inverse of the number of steps.
-        let alternating = |_: f64| vec![1.0, 0.35];
-        let smooth = |scale: f64| {
-            (0..).map(|i| f64::from(i) * scale).take_while(|s| *s < 1.0).map(|s| 1.0 + 0.6 * (9.0 * s).sin()).collect()
-        };
-        let random = |_: f64| spread(1000).map(|u| 0.3 + u).collect();
-        let patterns: [(&str, &dyn Fn(f64) -> Vec<f64>); 3] =
-            [("alternating", &alternating), ("smooth", &smooth), ("random", &random)];
-        for (name, pattern) in patterns {
+        // Sizes relative to the mean along the flight, `scale` being about the inverse of the number of steps.
+        type Pattern = fn(f64) -> Vec<f64>;
+        let alternating: Pattern = |_| vec![1.0, 0.35];
+        let smooth: Pattern =
+            |scale| (0..(1.0 / scale) as u32).map(|i| 1.0 + 0.6 * (9.0 * scale * f64::from(i)).sin()).collect();
+        let random: Pattern = |_| spread(1000).map(|u| 0.3 + u).collect();
+        for (name, pattern) in [("alternating", alternating), ("smooth", smooth), ("random", random)] {
             for (velocity, formal) in VELOCITIES.into_iter().zip([1.0, 2.0, 2.0]) {
                 let points: Vec<(f64, f64)> = spread(40)
                     .map(|u| {
@@ -1807,6 +1807,13 @@ mod tests {
             f64::INFINITY,
         );
         assert_eq!(CentralDifference::default().fly(&barrier, Detail::End).unwrap().outcome, Outcome::Stopped);
+        // A driven, overdamped projectile creeps to x = 10, where no force is left.
+        let creep = stages(smallvec![stage(-1000.0, 100.0, 1000.0, 0.0, f64::INFINITY)], 1.0, f64::INFINITY);
+        for velocity in VELOCITIES {
+            let error = scheme(1e-3, velocity, Boundaries::Interpolated).fly(&creep, Detail::End).unwrap_err();
+            let IntegrationError::NeverEnds { last, .. } = error else { unreachable!("{error}") };
+            approx::assert_relative_eq!(last.depth, 10.0, max_relative = 1e-9);
+        }
         // A dashpot alone stops the projectile nowhere: V underflows to zero on the way, which is not rest.
         let dashpot = stages(smallvec![stage(0.0, 0.0, 200.0, 0.0, f64::INFINITY)], SPEED, 10.0);
         for velocity in VELOCITIES {

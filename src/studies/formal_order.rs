@@ -97,7 +97,11 @@ pub fn formal_order(velocity: VelocityAt, boundaries: Boundaries, path: &Path, q
 
 #[cfg(test)]
 mod tests {
+    use smallvec::smallvec;
+
     use super::*;
+    use crate::integrators::Cost;
+    use crate::physics::{Event, Stage, State, Target};
 
     const VELOCITIES: [VelocityAt; 3] =
         [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
@@ -192,5 +196,65 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A flight that ended in stage `stage`, with `events` at these depths and velocities.
+    fn flight(outcome: Outcome, stage: usize, events: &[(EventKind, f64, f64)]) -> Flight {
+        let state = |depth, velocity| State { time: 0.0, depth, velocity };
+        Flight {
+            outcome,
+            stage,
+            end: state(0.0, 0.0),
+            events: events.iter().map(|&(kind, x, v)| Event { kind, state: state(x, v) }).collect(),
+            exit_margin: None,
+            exit_margin_error: None,
+            cost: Cost::default(),
+            trajectory: Vec::new(),
+            step_limit: None,
+            notes: Vec::new(),
+        }
+    }
+
+    fn concrete(stiffness: f64, drag: f64) -> Problem {
+        Problem {
+            mass: 1.0,
+            impact_speed: 4.0,
+            exit_depth: f64::INFINITY,
+            stages: smallvec![Stage::crater(stiffness, 0.5), Stage::tunnel(2.0, drag)],
+            crater: Some(0),
+            target: Target::CraterAndTunnel,
+        }
+    }
+
+    #[test]
+    fn the_facts_of_a_path_are_read_from_the_stages_it_crosses() {
+        use EventKind::{CraterEnd, Exit, Rest};
+        // c k d = 6 = P + Q V1² with Q = 1, V1 = 2: continuous.
+        let stop = flight(Outcome::StoppedInTunnel, 1, &[(CraterEnd, 0.5, 2.0), (Rest, 1.0, 0.0)]);
+        assert_eq!(Path::of(&concrete(12.0, 1.0), &stop), DRAG);
+        assert_eq!(Path::of(&concrete(12.1, 1.0), &stop), with_jump(DRAG));
+        assert_eq!(Path::of(&concrete(4.0, 0.0), &stop), TUNNEL);
+        let through = flight(Outcome::Perforated, 1, &[(CraterEnd, 0.5, 2.0), (Exit, 0.6, 1.0)]);
+        assert_eq!(Path::of(&concrete(12.0, 1.0), &through), Path { perforates: true, ..DRAG });
+        // A stop in the crater knows nothing of the tunnel, nor does one that just touches its end.
+        let short = flight(Outcome::StoppedInCrater, 0, &[(Rest, 0.4, 0.0)]);
+        assert_eq!(Path::of(&concrete(12.1, 1.0), &short), CRATER);
+        let touch = flight(Outcome::StoppedInCrater, 0, &[(CraterEnd, 0.5, 0.0), (Rest, 0.5, 0.0)]);
+        assert_eq!(Path::of(&concrete(12.1, 1.0), &touch), Path { to_crater_end: Some(PLAIN), ..CRATER });
+    }
+
+    #[test]
+    fn a_stage_of_no_length_leaves_no_trace() {
+        use EventKind::{Rest, StageEnd};
+        let wall = Stage { static_force: 1e9, viscosity: 1.0, ..Stage::crater(0.0, 0.5) };
+        let soft = Stage { static_force: 2.0, ..Stage::crater(0.0, 0.5) };
+        let problem = Problem {
+            stages: smallvec![soft, wall, Stage::tunnel(2.0, 0.0)],
+            crater: None,
+            target: Target::Stages,
+            ..concrete(0.0, 0.0)
+        };
+        let events = [(StageEnd(0), 0.5, 2.0), (StageEnd(1), 0.5, 2.0), (Rest, 1.0, 0.0)];
+        assert_eq!(Path::of(&problem, &flight(Outcome::Stopped, 2, &events)), CRATER);
     }
 }
