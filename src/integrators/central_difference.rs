@@ -1129,37 +1129,34 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
 
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-mod tests {
-    use std::fmt::Write as _;
-
+pub(crate) mod tests {
     use smallvec::smallvec;
 
     use super::*;
     use crate::physics::{Stages, Target};
-    use crate::studies::{Path, Quantity, formal_order};
 
-    const VELOCITIES: [VelocityAt; 3] =
+    pub(crate) const VELOCITIES: [VelocityAt; 3] =
         [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
-    const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
+    pub(crate) const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
 
     /// Mass [kg], static strength P [N], drag Q [kg/m] and crater depth k d [m] of a 50 mm projectile in concrete
     /// of 36 N/mm², at V0 [m/s].
-    const MASS: f64 = 2.0;
-    const STRENGTH: f64 = 848_230.0;
-    const DRAG: f64 = 3.2515;
-    const CRATER_DEPTH: f64 = 0.1;
-    const SPEED: f64 = 300.0;
+    pub(crate) const MASS: f64 = 2.0;
+    pub(crate) const STRENGTH: f64 = 848_230.0;
+    pub(crate) const DRAG: f64 = 3.2515;
+    pub(crate) const CRATER_DEPTH: f64 = 0.1;
+    pub(crate) const SPEED: f64 = 300.0;
 
     fn stage(p: f64, s: f64, r: f64, q: f64, end: f64) -> Stage {
         Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end }
     }
 
-    fn stages(list: Stages, speed: f64, exit_depth: f64) -> Problem {
+    pub(crate) fn stages(list: Stages, speed: f64, exit_depth: f64) -> Problem {
         Problem { mass: MASS, impact_speed: speed, exit_depth, stages: list, crater: None, target: Target::Stages }
     }
 
     /// Crater and tunnel with drag `q`; the crater constant times `jump` of the continuous one.
-    fn concrete(q: f64, jump: f64, speed: f64, exit_depth: f64) -> Problem {
+    pub(crate) fn concrete(q: f64, jump: f64, speed: f64, exit_depth: f64) -> Problem {
         let stiffness = jump * MASS * (STRENGTH + q * speed * speed) / (CRATER_DEPTH * (MASS + CRATER_DEPTH * q));
         Problem {
             crater: Some(0),
@@ -1168,21 +1165,21 @@ mod tests {
         }
     }
 
-    fn scheme(step: f64, velocity: VelocityAt, boundaries: Boundaries) -> CentralDifference {
+    pub(crate) fn scheme(step: f64, velocity: VelocityAt, boundaries: Boundaries) -> CentralDifference {
         CentralDifference::uniform(step, velocity, boundaries)
     }
 
     /// Exact depth, time and velocity at the end, time and velocity at k d (theory section 2); `concrete` scenes only.
-    struct Exact {
-        depth: f64,
-        time: f64,
-        velocity: f64,
-        crater_end_time: f64,
-        crater_end_velocity: f64,
+    pub(crate) struct Exact {
+        pub(crate) depth: f64,
+        pub(crate) time: f64,
+        pub(crate) velocity: f64,
+        pub(crate) crater_end_time: f64,
+        pub(crate) crater_end_velocity: f64,
     }
 
     impl Exact {
-        fn of(problem: &Problem) -> Self {
+        pub(crate) fn of(problem: &Problem) -> Self {
             let (v0, kd) = (problem.impact_speed, problem.stages[0].end);
             let w = (problem.stages[0].stiffness / MASS).sqrt();
             let nan = f64::NAN;
@@ -1206,37 +1203,15 @@ mod tests {
             let time = t1 + MASS / p * (v1 - velocity) / (1.0 + a * b) * if z == 0.0 { 1.0 } else { z.atan() / z };
             Self { depth, time, velocity, crater_end_time: t1, crater_end_velocity: v1 }
         }
-
-        fn error(&self, flight: &Flight, speed: f64, quantity: Quantity) -> Option<f64> {
-            let crater_end = flight.crater_end();
-            Some(match quantity {
-                Quantity::Depth => flight.end.depth / self.depth - 1.0,
-                Quantity::Time => flight.end.time / self.time - 1.0,
-                Quantity::Velocity => (flight.end.velocity - self.velocity) / speed,
-                Quantity::CraterEndTime => crater_end?.time / self.crater_end_time - 1.0,
-                Quantity::CraterEndVelocity => (crater_end?.velocity - self.crater_end_velocity) / speed,
-                Quantity::CriticalVelocity => return None,
-            })
-        }
-
-        /// The facts about the flight: the events of a fine one, with the exact velocity at k d.
-        fn path(&self, problem: &Problem) -> Path {
-            let fine = scheme(self.time / 1e3, VelocityAt::Centred, Boundaries::Landed);
-            let mut flight = fine.fly(problem, Detail::Events).unwrap();
-            for event in flight.events.iter_mut().filter(|event| event.kind == EventKind::CraterEnd) {
-                event.state.velocity = self.crater_end_velocity;
-            }
-            Path::of(problem, &flight)
-        }
     }
 
     /// `count` fractions spread evenly and without a common ratio: multiples of the golden section, modulo 1.
-    fn spread(count: u32) -> impl Iterator<Item = f64> {
+    pub(crate) fn spread(count: u32) -> impl Iterator<Item = f64> {
         (1..=count).map(|i| (f64::from(i) * 0.618_033_988_749_894_8).fract())
     }
 
     /// Slope of the points by least squares, and half of its 95 % interval.
-    fn slope(points: &[(f64, f64)]) -> (f64, f64) {
+    pub(crate) fn slope(points: &[(f64, f64)]) -> (f64, f64) {
         let n = points.len() as f64;
         let (mx, my) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
         let xx: f64 = points.iter().map(|(x, _)| (x - mx).powi(2)).sum();
@@ -1246,61 +1221,8 @@ mod tests {
         (slope, 2.0 * (rest / (n - 2.0) / xx).sqrt())
     }
 
-    #[test]
-    fn orders_are_the_formal_ones_for_every_scheme_scene_and_quantity() {
-        // Least squares over 60 steps without a common ratio, T [1e-5, 1e-2]: no pair of steps shares its place in a
-        // step, so that the noise of unlanded places averages out. Landed, nothing is left to chance.
-        let scenes = [
-            ("rest in the crater", concrete(0.0, 1.0, 100.0, f64::INFINITY)),
-            ("tunnel, Q = 0", concrete(0.0, 1.0, SPEED, f64::INFINITY)),
-            ("tunnel, Q > 0", concrete(DRAG, 1.0, SPEED, f64::INFINITY)),
-            ("exit, Q = 0", concrete(0.0, 1.0, SPEED, 0.13)),
-            ("exit, Q > 0", concrete(DRAG, 1.0, SPEED, 0.13)),
-            ("jump, rest, Q = 0", concrete(0.0, 0.6, SPEED, f64::INFINITY)),
-            ("jump, rest, Q > 0", concrete(DRAG, 0.6, SPEED, f64::INFINITY)),
-            ("jump, exit, Q > 0", concrete(DRAG, 0.6, SPEED, 0.13)),
-            ("exit in the crater", concrete(DRAG, 1.0, SPEED, 0.06)),
-        ];
-        for (name, problem) in scenes {
-            let exact = if problem.exit_depth < CRATER_DEPTH { exit_in_crater(&problem) } else { Exact::of(&problem) };
-            let path = exact.path(&problem);
-            for velocity in VELOCITIES {
-                for boundaries in BOUNDARIES {
-                    let flights: Vec<(f64, Flight)> = spread(60)
-                        .map(|u| {
-                            let step = exact.time * 10.0_f64.powf(-5.0 + 3.0 * u);
-                            (step, scheme(step, velocity, boundaries).fly(&problem, Detail::Events).unwrap())
-                        })
-                        .collect();
-                    let mut row = String::new();
-                    for quantity in Quantity::ALL {
-                        let points: Vec<(f64, f64)> = flights
-                            .iter()
-                            .filter_map(|(step, flight)| {
-                                let error = exact.error(flight, problem.impact_speed, quantity)?.abs();
-                                (error > 0.0).then(|| (step.ln(), error.ln()))
-                            })
-                            .collect();
-                        let Some(formal) = formal_order(velocity, boundaries, &path, quantity) else { continue };
-                        if quantity == Quantity::CriticalVelocity {
-                            continue;
-                        }
-                        let (order, half_width) = slope(&points);
-                        write!(row, "  {quantity} {order:.2}+-{half_width:.2}").unwrap();
-                        let band = if boundaries == Boundaries::Landed { 0.05 } else { 0.4 };
-                        assert!(
-                            (order - formal).abs() < band,
-                            "{name}, {velocity}, {boundaries}: {quantity} of order {order:.3} +- {half_width:.3}, not {formal}"
-                        );
-                    }
-                    println!("{name:20} {velocity:9} {boundaries:12}{row}");
-                }
-            }
-        }
-    }
-
     /// `V_r² = (V0 - w H)(V0 + w H)`, `t = atan2(w H, V_r)/w`.
-    fn exit_in_crater(problem: &Problem) -> Exact {
+    pub(crate) fn exit_in_crater(problem: &Problem) -> Exact {
         let w = (problem.stages[0].stiffness / MASS).sqrt();
         let (v0, h) = (problem.impact_speed, problem.exit_depth);
         let velocity = ((v0 - w * h) * (v0 + w * h)).sqrt();
@@ -1487,12 +1409,13 @@ mod tests {
         }
     }
 
+    /// Sizes of the steps along a flight relative to their mean, given about the inverse of their number.
+    type Pattern = fn(f64) -> Vec<f64>;
+
     #[test]
     fn unequal_steps_keep_the_order() {
         let problem = concrete(DRAG, 0.6, SPEED, f64::INFINITY);
         let exact = Exact::of(&problem);
-        // Sizes relative to the mean along the flight, `scale` being about the inverse of the number of steps.
-        type Pattern = fn(f64) -> Vec<f64>;
         let alternating: Pattern = |_| vec![1.0, 0.35];
         let smooth: Pattern =
             |scale| (0..(1.0 / scale) as u32).map(|i| 1.0 + 0.6 * (9.0 * scale * f64::from(i)).sin()).collect();
