@@ -6,6 +6,9 @@
 //! tunnel  k d <= x     :  F = P + Q V²            (Eq. 5)
 //! ```
 
+pub mod cli;
 pub mod integrators;
 pub mod physics;
+pub mod report;
 pub mod studies;
+pub mod suite;

@@ -4,13 +4,12 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::method_args::{MethodArgs, MethodJson};
+use super::method_args::{MethodArgs, MethodJson, parse_time};
 use super::output::{print_json, print_text, table};
 use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Steps;
 use crate::integrators::method::MethodName;
-use crate::physics::scene_file::parse_time;
 use crate::physics::{Problem, Scene};
 use crate::studies::convergence::{
     Ladder, POINTS_DEFAULT, QuantityStudy, STEPS_OVER_TIME, TOLERANCES, Yardstick, of_fixed_steps, of_tolerances,
@@ -35,8 +34,8 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "A:B")]
     pub dt: Option<String>,
     /// How many step sizes or tolerances.
-    #[arg(long, default_value_t = POINTS_DEFAULT, value_parser = clap::value_parser!(u32).range(4..=10_000).map(|n| n as usize))]
-    pub points: usize,
+    #[arg(long, default_value_t = POINTS_DEFAULT, value_parser = clap::value_parser!(u16).range(4..=10_000))]
+    pub points: u16,
     /// Seed of the random sizes.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -126,13 +125,13 @@ impl ConvergeArgs {
                 &scene,
                 &problem,
                 (self.velocity.unwrap_or_default(), self.events.unwrap_or_default()),
-                Ladder { from, to, points: self.points, seed: self.seed },
+                Ladder { from, to, points: usize::from(self.points), seed: self.seed },
                 true,
                 &Steps::Uniform,
             )?
         } else {
             let [from, to] = TOLERANCES;
-            of_tolerances(&problem, self.method, Ladder { from, to, points: self.points, seed: self.seed })?
+            of_tolerances(&problem, self.method, Ladder { from, to, points: usize::from(self.points), seed: self.seed })?
         };
         let quantities: Vec<_> = studies.iter().map(|study| quantity_json(study, fixed)).collect();
         let exit = exit_of(&quantities);

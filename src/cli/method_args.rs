@@ -9,7 +9,7 @@ use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT};
 use crate::integrators::{Flight, StepLimit};
 use crate::physics::Problem;
-use crate::physics::scene_file::parse_time;
+use crate::physics::units::{Dimension, QuantityError, quantity};
 
 /// Method and options.
 #[derive(Args, Clone, Debug, Default)]
@@ -104,8 +104,7 @@ impl MethodJson {
             MethodName::CentralDifference => {
                 let velocity = options.velocity.unwrap_or_default();
                 let events = options.events.unwrap_or_default();
-                let scheme = crate::integrators::CentralDifference::new(options.dt, velocity, events);
-                json.dt_s = problem.map(|p| scheme.time_step(p)).or(options.dt);
+                json.dt_s = problem.map(|p| options.central_difference().time_step(p)).or(options.dt);
                 json.velocity = Some(velocity.to_string());
                 json.events = Some(events.to_string());
                 json.stability = flight.and_then(|f| f.step_limit).map(StabilityJson::from);
@@ -115,5 +114,16 @@ impl MethodJson {
             _ => json.rtol = Some(Some(options.rtol.unwrap_or(RTOL_DEFAULT))),
         }
         json
+    }
+}
+
+/// A time [s] from "1 us" or a bare number of seconds.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn parse_time(text: &str) -> Result<f64, QuantityError> {
+    match text.trim().parse() {
+        Ok(seconds) => Ok(seconds),
+        Err(_) => quantity(text, Dimension::Time),
     }
 }

@@ -121,7 +121,7 @@ pub fn error_text(value: Option<f64>) -> String {
 /// An empty table in the house style: no frame, so that it copies well.
 pub fn table(header: &[&str]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
-    table.load_preset(comfy_table::presets::NOTHING);
+    table.load_style(comfy_table::presets::NOTHING);
     table.set_header(header.iter().copied());
     table
 }

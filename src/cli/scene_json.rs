@@ -3,34 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::physics::{Concrete, CraterStiffness, Problem, Resistance, Scene, Stage};
-
-/// A stage as in the peer protocol.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct StageJson {
-    /// Static force p [N].
-    pub static_force_n: f64,
-    /// Stiffness s [N/m].
-    pub stiffness_n_m: f64,
-    /// Viscosity r [kg/s].
-    pub viscosity_kg_s: f64,
-    /// Drag q [kg/m].
-    pub drag_kg_m: f64,
-    /// End in x [m], from the impact face; `null` in the last stage.
-    pub end_m: Option<f64>,
-}
-
-impl From<&Stage> for StageJson {
-    fn from(stage: &Stage) -> Self {
-        Self {
-            static_force_n: stage.static_force,
-            stiffness_n_m: stage.stiffness,
-            viscosity_kg_s: stage.viscosity,
-            drag_kg_m: stage.drag,
-            end_m: stage.end.is_finite().then_some(stage.end),
-        }
-    }
-}
+use crate::physics::{Concrete, CraterStiffness, Problem, Resistance, Scene};
+use crate::studies::peers::StageJson;
 
 /// The scene in SI units; what a scene of stages does not have is `null`.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -86,8 +60,8 @@ impl SceneJson {
             crater_ratio: of(|c| c.crater_ratio),
             velocity_m_s: problem.impact_speed,
             crater_stiffness_n_m,
-            static_force_n: homogeneous.map(Concrete::static_force),
-            drag_kg_m: homogeneous.map(Concrete::drag),
+            static_force_n: homogeneous.and(scene.static_force()),
+            drag_kg_m: homogeneous.and(scene.drag()),
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
             stages: problem.stages.iter().map(StageJson::from).collect(),
         }

@@ -3,7 +3,8 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, critical, output, solve};
+use super::{CliError, Exit, converge, critical, output, solve};
+use crate::report::VerifyJson;
 
 /// Arguments of `schema`.
 #[derive(Args, Debug)]
@@ -20,6 +21,10 @@ pub enum Documented {
     Solve,
     /// `critical --json`.
     Critical,
+    /// `converge --json`.
+    Converge,
+    /// `verify --json`, which is `report.json`.
+    Verify,
 }
 
 impl SchemaArgs {
@@ -31,6 +36,8 @@ impl SchemaArgs {
         let schema = match self.command {
             Documented::Solve => schema_for!(solve::SolveJson),
             Documented::Critical => schema_for!(critical::CriticalJson),
+            Documented::Converge => schema_for!(converge::ConvergeJson),
+            Documented::Verify => schema_for!(VerifyJson),
         };
         output::print_json(&schema).map_err(CliError::stdout)?;
         Ok(Exit::Success)

@@ -193,7 +193,7 @@ impl SolveArgs {
             groups: GroupsJson {
                 I: groups.map(|g| g.impact),
                 N: groups.and_then(|g| g.geometry),
-                H_over_d: groups.and_then(|g| g.thickness),
+                H_over_d: groups.and_then(|g| g.thickness_ratio),
                 X_over_d: scene.diameter().map(|d| flight.end.depth / d),
             },
             method: MethodJson::new(self.method.method, &self.method.options()?, Some(problem), Some(flight)),
@@ -269,7 +269,7 @@ impl SolveArgs {
             if let Some(n) = g.geometry {
                 row.push_str(&format!("   N {}", significant(n)));
             }
-            if let Some(h) = g.thickness {
+            if let Some(h) = g.thickness_ratio {
                 row.push_str(&format!("   H/d {}", significant(h)));
             }
             if let Some(d) = scene.diameter() {

@@ -22,6 +22,7 @@
 //! Central difference operator of the paper, Eq. 6-8; orders, error constants and limits: theory section 5.
 
 use clap::ValueEnum;
+use serde::Deserialize;
 
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};
 use crate::physics::exit_energy::exit_margin;
@@ -63,38 +64,44 @@ pub enum Steps {
 ///
 /// Where no force on the path depends on the velocity (the crater, a tunnel with Q = 0) all three are the same scheme.
 /// At impact, and where [`Boundaries::Landed`] restarts at a stage end, V(i) itself is known and every rule uses it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, ValueEnum, Deserialize)]
 pub enum VelocityAt {
     /// `V* = V(i-1/2)`, which an explicit finite-element code hands to a user's subroutine: the paper's choice.
     /// First order as soon as the force depends on the velocity.
     #[default]
     #[value(name = "lagged")]
+    #[serde(rename = "lagged")]
     LaggedHalfStep,
     /// `V* = V(i)`: the quadratic `V = V(i-1/2) - dt(i)/2 F(x(i), V)/M` solved for V. Second order; unconditionally
     /// stable as far as the drag goes. One evaluation, one square root and one division a step.
     #[value(name = "centred")]
+    #[serde(rename = "centred")]
     Centred,
     /// `V* = V(i-1/2) - dt(i)/2 F(x(i), V(i-1/2))/M`: half a step ahead with the lagged force. Second order; two
     /// evaluations a step, and no equation to solve.
     #[value(name = "predicted")]
+    #[serde(rename = "predicted")]
     PredictedHalfStep,
 }
 
 /// What is done about stage ends, exit depth and rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, ValueEnum, Deserialize)]
 pub enum Boundaries {
     /// Seen at the first whole step past them, the state not moved back: the paper's choice. Rest at the first
     /// V(i) <= 0, its depth the larger of the last two x.
     #[default]
     #[value(name = "step-end")]
+    #[serde(rename = "step-end")]
     StepEnd,
     /// Located inside the step afterwards; the steps themselves are those of [`Boundaries::StepEnd`].
     #[value(name = "interpolated")]
+    #[serde(rename = "interpolated")]
     Interpolated,
     /// Stage ends are landed on: the step is shortened to `x(i) + V(i) dt + a(i) dt²/2 = end`, and the scheme starts
     /// afresh there, each half step with the force of its own side; the next step has its regular size again. Exit
     /// and rest are located inside the step. The only rule that keeps second order at a jump of the force.
     #[value(name = "landed")]
+    #[serde(rename = "landed")]
     Landed,
 }
 

@@ -3,14 +3,16 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::central_difference::{Boundaries, CentralDifference, VelocityAt};
+use super::central_difference::{Boundaries, CentralDifference, Steps, VelocityAt};
 use super::closed_form::ClosedForm;
 use super::energy::Energy;
-use super::outcome::{IntegrationError, Integrator};
+use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
+use crate::physics::Problem;
 
 /// Names of the methods in the contract.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum MethodName {
     /// Adaptive high-order Taylor series, events by root isolation: the default.
     #[default]
@@ -103,6 +105,18 @@ pub struct MethodOptions {
     pub events: Option<Boundaries>,
 }
 
+impl MethodOptions {
+    /// The central difference with these options.
+    pub fn central_difference(&self) -> CentralDifference {
+        CentralDifference {
+            steps: self.dt.map_or(Steps::Default, Steps::Uniform),
+            velocity: self.velocity.unwrap_or_default(),
+            boundaries: self.events.unwrap_or_default(),
+            ..CentralDifference::default()
+        }
+    }
+}
+
 /// Default relative tolerance of the diffsol methods and of `adaptive`.
 pub const RTOL_DEFAULT: f64 = 1e-10;
 
@@ -160,14 +174,10 @@ impl Method {
             });
         }
         Ok(match name {
-            MethodName::Taylor => Self::Taylor(options.rtol.map_or_else(Taylor::default, Taylor::with_rtol)),
-            MethodName::Energy => Self::Energy(options.rtol.map_or_else(Energy::default, Energy::with_rtol)),
+            MethodName::Taylor => Self::Taylor(options.rtol.map_or_else(|| Ok(Taylor::default()), Taylor::with_rtol)?),
+            MethodName::Energy => Self::Energy(options.rtol.map_or_else(|| Ok(Energy::default()), Energy::with_rtol)?),
             MethodName::ClosedForm => Self::ClosedForm(ClosedForm),
-            MethodName::CentralDifference => Self::CentralDifference(CentralDifference::new(
-                options.dt,
-                options.velocity.unwrap_or_default(),
-                options.events.unwrap_or_default(),
-            )),
+            MethodName::CentralDifference => Self::CentralDifference(options.central_difference()),
             #[cfg(feature = "diffsol")]
             MethodName::Adaptive => {
                 Self::Adaptive(super::adaptive::Adaptive::new(options.rtol.unwrap_or(RTOL_DEFAULT)))
@@ -191,6 +201,42 @@ impl Method {
                 });
             }
         })
+    }
+
+    /// What `problem` let this method skip on `flight`, and why.
+    pub fn explain(&self, problem: &Problem, flight: &Flight, detail: Detail) -> Vec<String> {
+        let mut notes = flight.notes.clone();
+        for index in flight.stage + 1..problem.stages.len() {
+            notes.push(format!(
+                "stage {index} was not built: the flight ended in stage {} at x = {} m, before {} m",
+                flight.stage,
+                flight.end.depth,
+                problem.start_of(index)
+            ));
+        }
+        if !problem.has_exit() {
+            notes.push("exit event not sought: the target has no far side".to_owned());
+        } else if flight.outcome.is_stop() && flight.end.depth < problem.limit_of(flight.stage) {
+            notes.push("exit not located: rest comes first".to_owned());
+        }
+        if detail < Detail::Trajectory {
+            notes.push("trajectory not kept: not asked for".to_owned());
+        }
+        let jacobian = match self {
+            #[cfg(feature = "diffsol")]
+            Self::Diffsol(m) => !m.scheme.is_implicit(),
+            #[cfg(feature = "diffsol")]
+            Self::Adaptive(_) => false,
+            _ => true,
+        };
+        if jacobian {
+            notes.push("Jacobian not built: the method is explicit or needs none".to_owned());
+        }
+        notes.push("sensitivities not computed: not asked for".to_owned());
+        if matches!(self, Self::ClosedForm(_)) {
+            notes.push("nothing integrated: every stage on the way has a closed form".to_owned());
+        }
+        notes
     }
 
     /// The integrator inside.

@@ -5,9 +5,14 @@
 pub mod central_difference;
 pub mod closed_form;
 pub mod energy;
+pub mod locate;
+pub mod method;
 pub mod outcome;
+pub mod taylor;
 
 pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use closed_form::ClosedForm;
 pub use energy::Energy;
+pub use method::{Method, MethodName, MethodOptions};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};
+pub use taylor::Taylor;

@@ -30,6 +30,11 @@ pub const SHIPPED: &[(&str, &str)] = &[
     ("stiff", include_str!("../../verification/scenes/stiff.toml")),
     ("viscous", include_str!("../../verification/scenes/viscous.toml")),
     ("layered", include_str!("../../verification/scenes/layered.toml")),
+    ("tunnel-no-drag", include_str!("../../verification/scenes/tunnel-no-drag.toml")),
+    ("perforate-no-drag", include_str!("../../verification/scenes/perforate-no-drag.toml")),
+    ("jump", include_str!("../../verification/scenes/jump.toml")),
+    ("jump-perforate", include_str!("../../verification/scenes/jump-perforate.toml")),
+    ("constant-force", include_str!("../../verification/scenes/constant-force.toml")),
 ];
 
 /// Largest scene file that is read, 1 MiB. A scene takes about one KiB; more is a mistaken path.
@@ -71,6 +76,18 @@ pub struct SceneError {
 }
 
 impl SceneError {
+    /// Refuses the bytes `span` of `text`, the content of `file`: what is wrong, what is allowed, what to do.
+    pub fn at(
+        file: &str,
+        text: &str,
+        span: ops::Range<usize>,
+        message: impl Into<String>,
+        allowed: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Box<Self> {
+        Fault::new(span, message, allowed, help).in_file(file, text)
+    }
+
     /// `file:line:column`, or the file alone if it could not be read.
     pub fn location(&self) -> String {
         let file = printable(&self.file);

@@ -5,6 +5,8 @@ use std::fs;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::suite::Suite;
+
 /// The lock file that the program was built with.
 const LOCK_FILE: &str = include_str!("../../Cargo.lock");
 
@@ -27,8 +29,6 @@ pub struct Environment {
     pub lock_file_hash: String,
     /// BLAKE3 of the suite.
     pub suite_hash: String,
-    /// BLAKE3 of each scene of the suite, by name.
-    pub scene_hashes: Vec<(String, String)>,
     /// Processor.
     pub cpu: String,
     /// Threads used.
@@ -47,7 +47,7 @@ pub struct Environment {
 
 impl Environment {
     /// This program, on this machine, now.
-    pub fn here(seed: u64, command: String, suite: &str, peers: Vec<(String, String)>) -> Self {
+    pub fn here(seed: u64, command: String, suite: &Suite, peers: Vec<(String, String)>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             commit: env!("PENETRODE_COMMIT"),
@@ -59,8 +59,7 @@ impl Environment {
                 .filter_map(|(name, on)| on.then_some(name))
                 .collect(),
             lock_file_hash: hash(LOCK_FILE),
-            suite_hash: hash(suite),
-            scene_hashes: Vec::new(),
+            suite_hash: hash(&suite.text),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             floating_point: floating_point(),

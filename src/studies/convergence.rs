@@ -17,7 +17,7 @@ use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrat
 use crate::physics::{Problem, ResolveError, Scene};
 
 /// Fewest sizes of a study, so that single unlucky ones do not decide.
-pub const POINTS_DEFAULT: usize = 60;
+pub const POINTS_DEFAULT: u16 = 60;
 
 /// Smallest and largest step of a study over the time of the flight.
 pub const STEPS_OVER_TIME: [f64; 2] = [1e-5, 1e-2];
@@ -78,7 +78,7 @@ pub enum ConvergenceError {
     Integration(#[from] IntegrationError),
     /// A critical velocity has no answer.
     #[error(transparent)]
-    Critical(#[from] CriticalError),
+    Critical(#[from] CriticalError<ResolveError>),
 }
 
 /// The exact flight of a problem, or a refined one where no closed form exists.
@@ -151,13 +151,12 @@ pub fn of_fixed_steps(
         });
     }
     if with_critical && problem.has_exit() {
-        let resolve = |speed: f64| scene.resolve(speed);
         let exact_critical = critical_velocity::exact_or_refined(scene)?;
         let critical_flight = Yardstick::of(&scene.resolve(exact_critical)?)?.flight;
         let path = Path::of(&scene.resolve(exact_critical)?, &critical_flight);
         let mut points = Vec::new();
         for &size in &sizes {
-            let found = critical_velocity::critical_velocity(&resolve, &scheme(size))?;
+            let found = critical_velocity::of_scene(scene, &scheme(size))?;
             let error = signed_error(Quantity::CriticalVelocity, found.velocity, exact_critical, 1.0);
             points.push(StepError::new(size, error));
         }

@@ -17,8 +17,8 @@ use argmin::core::{CostFunction, Executor, IterState, State as _, TerminationRea
 use argmin::solver::brent::BrentRoot;
 use thiserror::Error;
 
-use crate::integrators::{Cost, IntegrationError, Integrator};
-use crate::physics::Problem;
+use crate::integrators::{Cost, IntegrationError, Integrator, Taylor};
+use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, closed_form};
 
 /// Speed [m/s] at which the target is first asked for, to learn its exit depth and static work.
 const PROBE_SPEED: f64 = 1.0;
@@ -255,6 +255,70 @@ fn at_any_speed(velocity: f64, error_bar: Option<f64>, tally: Tally, note: &'sta
         bracket: (0.0, tally.last.velocity()),
         note,
     }
+}
+
+/// Critical velocity of `scene` through `integrator`, to round-off or the integrator's error bar.
+///
+/// # Errors
+/// [`CriticalError`].
+pub fn of_scene(
+    scene: &Scene,
+    integrator: &dyn Integrator,
+) -> Result<CriticalVelocity, CriticalError<ResolveError>> {
+    critical_velocity(|speed| scene.resolve(speed), integrator, Options::default())
+}
+
+/// Exact critical velocity of `scene` [m/s], where it has a closed form.
+///
+/// # Errors
+/// [`closed_form::CriticalError`]: no far side, a viscous stage, or out of range.
+pub fn exact(scene: &Scene) -> Result<f64, ExactError> {
+    let exit_depth = scene.exit_depth()?;
+    let plain = scene.concrete().filter(|c| c.layers.is_empty());
+    let critical = match (plain, scene.static_force(), scene.drag()) {
+        (Some(concrete), Some(static_force), Some(drag)) => closed_form::critical(
+            &closed_form::CraterAndTunnel {
+                mass: scene.mass,
+                crater_depth: concrete.crater_depth(),
+                static_force,
+                drag,
+                crater_stiffness: concrete.crater_stiffness,
+            },
+            exit_depth,
+        )?,
+        // Layers with a continuous crater constant depend on V0 through it.
+        _ if scene.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous) => {
+            return Err(ExactError::Depends);
+        }
+        _ => closed_form::critical_of_stages(&scene.resolve(PROBE_SPEED)?)?,
+    };
+    Ok(critical.velocity)
+}
+
+/// Exact critical velocity of `scene` [m/s], or the one found through the Taylor series to round-off.
+///
+/// # Errors
+/// [`CriticalError`].
+pub fn exact_or_refined(scene: &Scene) -> Result<f64, CriticalError<ResolveError>> {
+    match exact(scene) {
+        Ok(velocity) => Ok(velocity),
+        Err(_) => of_scene(scene, &Taylor::default()).map(|found| found.velocity),
+    }
+}
+
+/// Why a scene has no exact critical velocity.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExactError {
+    /// The scene does not resolve.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+    /// The stages have none.
+    #[error(transparent)]
+    Closed(#[from] closed_form::CriticalError),
+    /// The stages depend on the impact speed in a way without a closed form.
+    #[error("the layers' stages depend on the impact velocity")]
+    Depends,
 }
 
 /// One flight: `u = V0²`, `W(exit)`, and the bar of W [m²/s²].

@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::quantity::Quantity;
 use super::random::Random;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
-use crate::physics::reference::{self, ReferenceError, Source};
+use crate::physics::reference::{self, Conditions, ReferenceError, Source};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, ResolveError, Scene, groups};
 
 /// Draws scenes that cover the groups log-uniformly.
@@ -73,6 +73,18 @@ impl UlpErrors {
             (false, true) => std::cmp::Ordering::Less,
             _ => a.0.total_cmp(&b.0),
         })
+    }
+}
+
+/// Condition number of `quantity`; `None` where the flight does not have it.
+pub fn condition_of(conditions: &Conditions, quantity: Quantity) -> Option<f64> {
+    match quantity {
+        Quantity::Depth => Some(conditions.depth),
+        Quantity::Time => Some(conditions.time),
+        Quantity::Velocity => Some(conditions.velocity),
+        Quantity::CraterEndTime => conditions.crater_end_time,
+        Quantity::CraterEndVelocity => conditions.crater_end_velocity,
+        Quantity::CriticalVelocity => None,
     }
 }
 

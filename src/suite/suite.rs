@@ -1,7 +1,8 @@
 //! A suite: claims and scenes read from a file or shipped with the program, and the run that judges them.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::Path;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -11,23 +12,11 @@ use super::checks::{self, Context, PeerAnswers};
 use super::claim::{Check, Claim, ClaimSpec, Judged, NotMeasured};
 use super::verdict::{Counts, Verdict};
 use crate::physics::Scene;
-use crate::physics::scene_file::{SceneError, SourceText};
+use crate::physics::SceneError;
+use crate::physics::scene_file::{SHIPPED, read_text};
 
 /// The suite that ships.
 pub const EMBEDDED: &str = include_str!("../../verification/suite.toml");
-
-/// The scenes that ship, by name.
-pub const SCENES: [(&str, &str); 9] = [
-    ("crater", include_str!("../../verification/scenes/crater.toml")),
-    ("tunnel", include_str!("../../verification/scenes/tunnel.toml")),
-    ("perforate", include_str!("../../verification/scenes/perforate.toml")),
-    ("graze", include_str!("../../verification/scenes/graze.toml")),
-    ("forrestal-1994-shot-14", include_str!("../../verification/scenes/forrestal-1994-shot-14.toml")),
-    ("paper-slab", include_str!("../../verification/scenes/paper-slab.toml")),
-    ("stiff", include_str!("../../verification/scenes/stiff.toml")),
-    ("viscous", include_str!("../../verification/scenes/viscous.toml")),
-    ("layered", include_str!("../../verification/scenes/layered.toml")),
-];
 
 /// Scenes by the name that claims use.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +61,7 @@ impl Suite {
     ///
     /// # Errors
     /// Only if the shipped files are broken, which a test excludes.
-    pub fn embedded() -> Result<Self, SceneError> {
+    pub fn embedded() -> Result<Self, Box<SceneError>> {
         Self::from_toml(EMBEDDED, "verification/suite.toml", None).map(|suite| Self { is_embedded: true, ..suite })
     }
 
@@ -80,52 +69,70 @@ impl Suite {
     ///
     /// # Errors
     /// [`SceneError`] with file, line, column and remedy.
-    pub fn read(path: &str) -> Result<Self, SceneError> {
-        let text = SourceText::read(path)?;
-        let folder = Path::new(path).parent().map(Path::to_path_buf);
-        Self::from_toml(&text, path, folder)
+    pub fn read(path: &str) -> Result<Self, Box<SceneError>> {
+        let (file, text) = read_text(Path::new(path))?;
+        let folder = Path::new(path).parent().map(Path::to_path_buf).unwrap_or_default();
+        Self::from_toml(&text, &file, Some(&folder))
     }
 
-    fn from_toml(text: &str, name: &str, folder: Option<PathBuf>) -> Result<Self, SceneError> {
-        let refuse = |span: std::ops::Range<usize>, message: String, help: &str| {
-            SceneError::at(name, text, span, message, help)
+    fn from_toml(text: &str, file: &str, folder: Option<&Path>) -> Result<Self, Box<SceneError>> {
+        let refuse = |span: Range<usize>, message: String, allowed: &str, help: &str| {
+            SceneError::at(file, text, span, message, allowed, help)
         };
-        let file: SuiteFile = toml::from_str(text).map_err(|error| {
-            let span = error.span().unwrap_or(0..0);
-            refuse(span, error.message().to_owned(), "see `verification/suite.toml` of the project for every kind of claim")
+        let read: SuiteFile = toml::from_str(text).map_err(|error| {
+            refuse(
+                error.span().unwrap_or(0..0),
+                error.message().to_owned(),
+                "claims as in the suite that ships",
+                "compare with `verification/suite.toml` of the project, which uses every kind of claim",
+            )
         })?;
         let mut scenes = Scenes::default();
         let mut claims: Vec<Claim> = Vec::new();
-        let mut ids = BTreeMap::new();
-        for spec in &file.claim {
-            if let Some(_first) = ids.insert(spec.id.get_ref().clone(), spec.id.span()) {
-                return Err(refuse(spec.id.span(), format!("the id `{}` is taken", spec.id.get_ref()), "give each claim an id of its own"));
+        let mut ids = BTreeSet::new();
+        for spec in &read.claim {
+            let id = spec.id.get_ref();
+            if !ids.insert(id.clone()) {
+                return Err(refuse(
+                    spec.id.span(),
+                    format!("the id `{id}` is taken"),
+                    "an id of its own",
+                    "rename one of the two claims",
+                ));
             }
             let limit = *spec.limit.get_ref();
             if !(limit.is_finite() && limit >= 0.0) {
-                return Err(refuse(spec.limit.span(), format!("a limit of {limit} decides nothing"), "write a finite number, zero or above"));
+                return Err(refuse(
+                    spec.limit.span(),
+                    format!("a limit of {limit} decides nothing"),
+                    "a finite number, zero or above",
+                    "write the largest value that you would accept",
+                ));
             }
             for scene in &spec.scenes {
-                let key = scene.get_ref();
-                if scenes.0.contains_key(key) {
+                let name = scene.get_ref();
+                if scenes.0.contains_key(name) {
                     continue;
                 }
-                let read = match SCENES.iter().find(|(name, _)| name == key) {
-                    Some((name, text)) => Scene::from_toml(text, &format!("verification/scenes/{name}.toml"))?,
-                    None if folder.is_some() || key.ends_with(".toml") => {
-                        let path = folder.clone().unwrap_or_default().join(key);
-                        Scene::read(&path.to_string_lossy())?
-                    }
-                    None => {
-                        let names: Vec<_> = SCENES.iter().map(|(name, _)| *name).collect();
-                        return Err(refuse(scene.span(), format!("no scene `{key}` ships"), &format!("name a file beside the suite, or one of {}", names.join(", "))));
+                let shipped = SHIPPED.iter().find(|(shipped, _)| shipped == name);
+                let found = match (shipped, folder) {
+                    (Some((name, text)), _) => Scene::from_toml(text, &format!("verification/scenes/{name}.toml"))?,
+                    (None, Some(folder)) if name.ends_with(".toml") => Scene::read(&folder.join(name))?,
+                    _ => {
+                        let names: Vec<_> = SHIPPED.iter().map(|(name, _)| *name).collect();
+                        return Err(refuse(
+                            scene.span(),
+                            format!("no scene `{name}` ships"),
+                            &format!("a file that ends in .toml, or one of {}", names.join(", ")),
+                            "check the spelling",
+                        ));
                     }
                 };
-                scenes.0.insert(key.clone(), read);
+                scenes.0.insert(name.clone(), found);
             }
             claims.extend(spec.expand());
         }
-        Ok(Self { title: file.title, is_embedded: false, text: text.to_owned(), scenes, claims })
+        Ok(Self { title: read.title, is_embedded: false, text: text.to_owned(), scenes, claims })
     }
 
     /// Keeps the claims whose id contains `pattern`.

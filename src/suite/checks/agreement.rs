@@ -62,7 +62,7 @@ pub(super) fn with_exact(subject: &Subject<'_>, rtol: Option<f64>) -> Result<Mea
         .ok_or_else(|| NotMeasured::broken(format!("{} where {} is right", flight.outcome, exact.outcome)))?;
     let condition = reference::conditions(Source::Problem(&subject.problem))
         .ok()
-        .and_then(|c| c.of(quantity.name()))
+        .and_then(|c| random_scenes::condition_of(&c, quantity))
         .map_or(1.0, |c| c.max(1.0));
     let value = value_of(quantity, &flight).unwrap_or(f64::NAN);
     let mut remark = format!("{value} with {} evaluations, error {:.1e}", flight.cost.force_evaluations, error.abs());

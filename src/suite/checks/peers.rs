@@ -28,6 +28,8 @@ pub struct PeerAnswers {
 enum Source {
     /// Answers recorded earlier.
     Recorded(Box<Recording>),
+    /// A program that greeted no one: why.
+    Failed(String),
     /// A program that is asked now.
     Running { peer: Box<Mutex<Asked>>, rtol: f64 },
 }
@@ -68,6 +70,11 @@ impl PeerAnswers {
         Ok(())
     }
 
+    /// Notes that the program `name` failed before it could be asked: its claims fail.
+    pub fn fail(&mut self, name: &str, why: String) {
+        self.sources.insert(name.to_owned(), Source::Failed(why));
+    }
+
     /// Names and versions of the programs, for the report.
     pub fn describe(&self) -> Vec<(String, String)> {
         self.sources
@@ -77,6 +84,7 @@ impl PeerAnswers {
                     Source::Recorded(r) => {
                         format!("{} {} ({}), rtol {:e}, recorded {}", r.program, r.version, r.method, r.rtol, r.recorded)
                     }
+                    Source::Failed(why) => why.clone(),
                     Source::Running { peer, rtol } => {
                         let asked = peer.lock().unwrap_or_else(PoisonError::into_inner);
                         let identity = asked.peer.identity();
@@ -110,6 +118,7 @@ impl PeerAnswers {
                 }
                 Ok(flight.answer.clone())
             }
+            Source::Failed(why) => Err(NotMeasured::broken(why)),
             Source::Running { peer, rtol } => {
                 let mut asked = peer.lock().unwrap_or_else(PoisonError::into_inner);
                 if let Some(why) = &asked.given_up {
