@@ -5,23 +5,32 @@
 
 use std::env;
 use std::error::Error;
+use std::io::Write;
+use std::process::{Command, Stdio};
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use penetrode::physics::Outcome;
 use penetrode::studies::peers::{
     BundledPeer, Environment, Peer, PeerSetupError, RecordedFlight, Recording, recordings,
 };
+use serde_json::{Value, json};
 
 /// What makes a test fail; every error of ours chains into it.
 type Check = Result<(), Box<dyn Error>>;
 
-const CHECKS: [(&str, BundledPeer, fn(BundledPeer, &Environment) -> Check); 6] = [
+/// A claim, the program that it needs, and how it is checked.
+type Claim = (&'static str, BundledPeer, fn(BundledPeer, &Environment) -> Check);
+
+const CLAIMS: [Claim; 9] = [
     ("cvode_adams_still_says_what_was_recorded", BundledPeer::SundaeAdams, says_what_was_recorded),
     ("cvode_bdf_still_says_what_was_recorded", BundledPeer::SundaeBdf, says_what_was_recorded),
     ("ida_still_says_what_was_recorded", BundledPeer::SundaeIda, says_what_was_recorded),
     ("heyoka_still_says_what_was_recorded", BundledPeer::Heyoka, says_what_was_recorded),
     ("cvode_with_coincident_events_answers_or_reports_and_lives", BundledPeer::SundaeAdams, survives_coincidence),
     ("scipy_with_the_natural_events_misses_a_perforation", BundledPeer::Scipy, misses_a_perforation),
+    ("scikit_sundae_answers_hostile_lines_with_an_error_and_lives", BundledPeer::SundaeAdams, survives_hostile_lines),
+    ("scipy_answers_hostile_lines_with_an_error_and_lives", BundledPeer::Scipy, survives_hostile_lines),
+    ("heyoka_answers_hostile_lines_with_an_error_and_lives", BundledPeer::Heyoka, survives_hostile_lines),
 ];
 
 fn main() {
@@ -33,7 +42,7 @@ fn main() {
     let required = env::var("CI").is_ok_and(|value| value == "true");
     let mut said = Vec::new();
     let mut trials = Vec::new();
-    for (name, peer, check) in CHECKS {
+    for (name, peer, check) in CLAIMS {
         // Neither a list nor tests that were not asked for are worth a download.
         if arguments.list || !wanted(name) {
             trials.push(Trial::test(name, || Ok(())));
@@ -119,6 +128,58 @@ fn misses_a_perforation(peer: BundledPeer, environment: &Environment) -> Check {
         return Ok(());
     }
     Err(format!("it is expected to call a stop beyond the exit depth, and answers {missed:?}").into())
+}
+
+/// The peers are asked over the same protocol by other people's tools, which make mistakes.
+fn survives_hostile_lines(peer: BundledPeer, environment: &Environment) -> Check {
+    let good = serde_json::to_value(flight("tunnel")?.request)?;
+    let with = |key: &str, value: Value| {
+        let mut request = good.clone();
+        request["id"] = json!(7);
+        request[key] = value;
+        request.to_string()
+    };
+    let nan = with("mass_kg", json!("nan")).replace("\"nan\"", "NaN");
+    let rising = json!([{"static_force_n": 1, "stiffness_n_m": 0, "viscosity_kg_s": 0, "drag_kg_m": 0, "end_m": 1}]);
+    let free = json!([{"static_force_n": 0, "stiffness_n_m": 0, "viscosity_kg_s": 0, "drag_kg_m": 0, "end_m": null}]);
+    let hostile = [
+        "garbage".to_owned(),
+        "[]".to_owned(),
+        "{}".to_owned(),
+        "[".repeat(30_000),
+        nan,
+        with("mass_kg", json!(-1)),
+        with("mass_kg", json!("2 kg")),
+        with("velocity_m_s", json!(true)),
+        with("rtol", json!(0)),
+        with("atol", json!([1e-9])),
+        with("repeats", json!(0)),
+        with("stages", json!([])),
+        with("stages", json!([1])),
+        with("stages", rising),
+        with("stages", free),
+    ];
+    let asked: Vec<_> = hostile.iter().cloned().chain([with("repeats", json!(2))]).collect();
+    let words = shlex::split(&environment.command(peer)).ok_or("the command cannot be split")?;
+    let mut child = Command::new(&words[0]).args(&words[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+    // All of this fits into the pipes, so nobody waits for the other; the end of its input ends the peer.
+    child.stdin.take().ok_or("no pipe")?.write_all((asked.join("\n") + "\n").as_bytes())?;
+    let output = child.wait_with_output()?;
+    let answers = output.stdout.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
+    let answers = answers.map(serde_json::from_slice).collect::<Result<Vec<Value>, _>>()?;
+    if answers.len() != asked.len() || !output.status.success() {
+        return Err(format!("{} answers to {} lines, {}", answers.len(), asked.len(), output.status).into());
+    }
+    for (line, answer) in hostile.iter().zip(&answers) {
+        if answer["error"].as_str().is_none_or(str::is_empty) {
+            return Err(format!("{line:.200} is answered with {answer}").into());
+        }
+    }
+    let last = &answers[hostile.len()];
+    if last["id"] != json!(7) || !last["depth_m"].is_f64() || !last["wall_ns"].is_number() {
+        return Err(format!("the request after them is answered with {last}").into());
+    }
+    Ok(())
 }
 
 fn says_that_the_network_is_missing() -> Check {

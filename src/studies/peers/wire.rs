@@ -367,6 +367,24 @@ mod tests {
     }
 
     #[test]
+    fn conditioning_is_never_below_one_where_a_drive_speeds_the_projectile_up() {
+        let driven = answer(Outcome::Perforated, 900.0, vec![]);
+        let differences = driven.differences_from(&driven, &problem()).unwrap();
+        assert!(differences.iter().all(|d| d.conditioning == 1.0), "{differences:?}");
+    }
+
+    #[test]
+    fn equal_zeros_differ_by_nothing_and_a_value_beside_an_exact_zero_by_everything() {
+        let at_impact = PeerAnswer { depth_m: 0.0, time_s: 0.0, ..answer(Outcome::Perforated, 300.0, vec![]) };
+        let beside = PeerAnswer { time_s: 1e-9, ..at_impact.clone() };
+        let relative = |ours: &PeerAnswer| -> Vec<f64> {
+            ours.differences_from(&at_impact, &problem()).unwrap().iter().map(|d| d.relative).collect()
+        };
+        assert_eq!(relative(&at_impact), [0.0, 0.0, 0.0]);
+        assert_eq!(relative(&beside), [0.0, f64::INFINITY, 0.0]);
+    }
+
+    #[test]
     fn outcomes_are_written_by_the_names_of_the_contract() {
         let text = serde_json::to_string(&answer(Outcome::StoppedInCrater, 0.0, vec![])).unwrap();
         assert!(text.contains(r#""outcome":"stopped-in-crater""#), "{text}");
