@@ -11,7 +11,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use thiserror::Error;
 
-use super::text::{number, power_of_ten};
+use super::text::{number, one_line, power_of_ten};
 
 /// Units of the drawing per unit shown.
 const FINE: i32 = 4;
@@ -486,7 +486,7 @@ fn write_text(
     let style = TextStyle::from(FontDesc::new(FontFamily::SansSerif, size, weight))
         .color(&colour)
         .pos(Pos::new(horizontal, vertical));
-    root.draw(&Text::new(text.to_owned(), at, style))
+    root.draw(&Text::new(one_line(text), at, style))
 }
 
 /// The elements inside plotters' `svg`, colours named by class as well, without what says nothing.

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::chart::{DrawError, Ink, Panel, WIDTH};
 use super::table::Table;
+use super::text::one_line;
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
@@ -115,7 +116,8 @@ impl Drawn {
                 escape(text)
             );
         }
-        let descriptions: Vec<_> = self.figure.panels.iter().map(|p| format!("{}: {}", p.title, p.description)).collect();
+        let descriptions: Vec<_> =
+            self.figure.panels.iter().map(|p| format!("{}: {}", p.title, p.description)).collect();
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y}\" viewBox=\"0 0 {width} {y}\" \
@@ -132,10 +134,10 @@ impl Drawn {
     }
 }
 
-/// `text` for XML and HTML, in elements and attributes.
-pub fn escape(text: &str) -> String {
+/// `text` on one line for XML and HTML, in elements and attributes.
+fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in one_line(text).chars() {
         match c {
             '&' => escaped.push_str("&amp;"),
             '<' => escaped.push_str("&lt;"),

@@ -62,7 +62,11 @@ fn ink_of(verdict: Verdict) -> Ink {
 fn message<'a>(judged: impl IntoIterator<Item = &'a Judged>, subject: &str, good: &str, bad: &str) -> String {
     let judged: Vec<_> = judged.into_iter().collect();
     let not = judged.iter().filter(|j| j.verdict != Verdict::Passed).count();
-    if not == 0 { format!("{subject} {good}") } else { format!("{subject} {bad} ({not} of {})", count(judged.len(), "claim")) }
+    if not == 0 {
+        format!("{subject} {good}")
+    } else {
+        format!("{subject} {bad} ({not} of {})", count(judged.len(), "claim"))
+    }
 }
 
 fn reason_of(excluded: Option<Exclusion>) -> &'static str {
@@ -130,14 +134,21 @@ fn references(lines: &[Reference], points: &[(f64, f64)], x: &Axis, y: &Axis) ->
     let mut marks = Vec::new();
     for (index, line) in lines.iter().enumerate() {
         let [low, high] = line.ends(x, y);
-        marks.push(Mark::Line { points: vec![(low, line.at(low)), (high, line.at(high))], ink: Ink::Muted, dashed: true });
+        marks.push(Mark::Line {
+            points: vec![(low, line.at(low)), (high, line.at(high))],
+            ink: Ink::Muted,
+            dashed: true,
+        });
         let width = WIDTH * line.name.chars().count() as f64 / 7.0;
         let along = |share: f64| low * (high / low).powf(share);
         let others = lines.iter().enumerate().filter(|(other, _)| *other != index);
         let obstacles: Vec<(f64, f64)> = points
             .iter()
             .copied()
-            .chain(others.flat_map(|(_, other)| (0..100).map(move |i| along(f64::from(i) / 99.0)).map(|x| (x, other.at(x)))))
+            .chain(
+                others
+                    .flat_map(|(_, other)| (0..100).map(move |i| along(f64::from(i) / 99.0)).map(|x| (x, other.at(x)))),
+            )
             .map(|(px, py)| (x.share(px), y.share(py)))
             .collect();
         // Above the line to the left of the place, or below it to the right: the line rises.
@@ -148,7 +159,9 @@ fn references(lines: &[Reference], points: &[(f64, f64)], x: &Axis, y: &Axis) ->
             let inside = left >= 0.0 && left + width <= 1.0 && bottom >= 0.0 && bottom + HEIGHT <= 1.0;
             let hits = obstacles
                 .iter()
-                .filter(|(ou, ov)| left - 0.02 < *ou && *ou < left + width + 0.02 && bottom - 0.02 < *ov && *ov < bottom + HEIGHT)
+                .filter(|(ou, ov)| {
+                    left - 0.02 < *ou && *ou < left + width + 0.02 && bottom - 0.02 < *ov && *ov < bottom + HEIGHT
+                })
                 .count();
             if inside { hits } else { usize::MAX }
         };
@@ -315,9 +328,10 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
             "falls with the formal order of each variant",
             "is not shown to fall with the formal order of every variant",
         ),
-        reading: "Each point is one flight; step sizes have random ratios. Numbers beside the names are observed orders. \
+        reading:
+            "Each point is one flight; step sizes have random ratios. Numbers beside the names are observed orders. \
                   Hollow points are outside the fit; the shaded corner is the round-off of the number of steps taken."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, judged),
         panels,
         table,
@@ -342,7 +356,15 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
         matches!(j.claim.check, Check::Order { .. } | Check::Manufactured { .. } | Check::ApproachOrder { .. })
     };
     let mut table = Table::new([
-        "claim", "formal_order", "observed_order", "low95", "high95", "limit", "points_used", "points", "verdict",
+        "claim",
+        "formal_order",
+        "observed_order",
+        "low95",
+        "high95",
+        "limit",
+        "points_used",
+        "points",
+        "verdict",
     ]);
     let mut panels = Vec::new();
     let mut all = Vec::new();
@@ -365,7 +387,12 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             let limit = family.first().claim.limit.min(1.0);
             let (low, high) = (formal - limit, formal + limit);
             let text = format!("{} ({})", family.id, members.len());
-            top.push(Mark::Text { at: (f64::NEG_INFINITY, y - 0.5 * LABEL), text, ink: Ink::Text, anchor: Anchor::Start });
+            top.push(Mark::Text {
+                at: (f64::NEG_INFINITY, y - 0.5 * LABEL),
+                text,
+                ink: Ink::Text,
+                anchor: Anchor::Start,
+            });
             y -= LABEL;
             let points = vec![(low, y - height), (low, y), (high, y), (high, y - height)];
             marks.push(Mark::Area { points, ink: Ink::Shade });
@@ -431,10 +458,11 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             "are the formal ones, degraded orders included",
             "are not all shown to be the formal ones",
         ),
-        reading: "Each dot is one claim: the order of a least-squares fit, with its 95 % interval. The dashed line is the \
+        reading:
+            "Each dot is one claim: the order of a least-squares fit, with its 95 % interval. The dashed line is the \
                   formal order, the shaded band the limit of the claim. Blue passed, orange is undecided, red failed; \
                   what lies beyond the panel is drawn at its edge."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, all),
         panels,
         table,
@@ -508,9 +536,10 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
             "fall in proportion to the tolerance",
             "are not all shown to fall in proportion to the tolerance",
         ),
-        reading: "Each point is one flight. A method that keeps what is asked of it stays near the dashed line; a slope \
+        reading:
+            "Each point is one flight. A method that keeps what is asked of it stays near the dashed line; a slope \
                   of 1 is proportional."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, judged),
         panels,
         table,
@@ -538,14 +567,7 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
         marks.extend(points_of(fit, Ink::Blue, Shape::Circle, RADIUS));
         let order = fit.line.map(|line| line.order);
         for point in &fit.points {
-            table.push([
-                &judged.claim.id,
-                impact,
-                &point.step,
-                &point.error,
-                &(constant * point.step),
-                &point.used,
-            ]);
+            table.push([&judged.claim.id, impact, &point.step, &point.error, &(constant * point.step), &point.used]);
         }
         let order = order.map_or_else(|| "—".to_owned(), |order| format!("{order:.4}"));
         panels.push(Panel {
@@ -558,8 +580,18 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
             y,
             marks,
             keys: vec![
-                Key { text: format!("flown: order {order}"), ink: Ink::Blue, shape: Some(Shape::Circle), hollow: false },
-                Key { text: format!("predicted: {} / N", number(constant, 4)), ink: Ink::Orange, shape: None, hollow: false },
+                Key {
+                    text: format!("flown: order {order}"),
+                    ink: Ink::Blue,
+                    shape: Some(Shape::Circle),
+                    hollow: false,
+                },
+                Key {
+                    text: format!("predicted: {} / N", number(constant, 4)),
+                    ink: Ink::Orange,
+                    shape: None,
+                    hollow: false,
+                },
             ],
             key_place: KeyPlace::Corner,
             height: HEIGHT,
@@ -580,8 +612,9 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
             "is a limit, approached with order 1 in 1/N and with the predicted constant",
             "is not shown to be a limit with the predicted order and constant",
         ),
-        reading: "Points: depth flown at finite N less Eq. 11-12. Line: the first term of the expansion in 1/N, not fitted."
-            .to_owned(),
+        reading:
+            "Points: depth flown at finite N less Eq. 11-12. Line: the first term of the expansion in 1/N, not fitted."
+                .to_owned(),
         claims: ids(run, behind),
         panels,
         table,
@@ -641,7 +674,10 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
         let worst = all.iter().map(|p| p.1).fold(0.0, f64::max);
         panels.push(Panel {
             title: format!("scene {scene}"),
-            description: format!("Energy residual over depth; the largest is {} of the initial energy.", number(worst, 2)),
+            description: format!(
+                "Energy residual over depth; the largest is {} of the initial energy.",
+                number(worst, 2)
+            ),
             x,
             y,
             marks,
@@ -673,7 +709,8 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
 
 /// Differences from other programs in units of the tolerance.
 fn peers(run: &Run<'_>) -> Option<Figure> {
-    let mut table = Table::new(["claim", "peer", "scene", "tolerance", "difference_over_tolerance", "limit", "verdict"]);
+    let mut table =
+        Table::new(["claim", "peer", "scene", "tolerance", "difference_over_tolerance", "limit", "verdict"]);
     let mut rows: Vec<(String, Vec<&Judged>)> = Vec::new();
     for judged in run.judged {
         let Check::Peer { name, tolerance } = &judged.claim.check else { continue };
@@ -698,10 +735,21 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
         let limit = members[0].claim.limit;
         let points = vec![(x.range[0], y - 0.42), (x.range[0], y - 0.02), (limit, y - 0.02), (limit, y - 0.42)];
         marks.push(Mark::Area { points, ink: Ink::Shade });
-        marks.push(Mark::Text { at: (x.range[0], y + 0.24), text: label_of_peer(name, members), ink: Ink::Text, anchor: Anchor::Start });
+        marks.push(Mark::Text {
+            at: (x.range[0], y + 0.24),
+            text: label_of_peer(name, members),
+            ink: Ink::Text,
+            anchor: Anchor::Start,
+        });
         for judged in members {
             let points = vec![(shown(judged), y - 0.22)];
-            marks.push(Mark::Points { points, ink: ink_of(judged.verdict), shape: Shape::Circle, hollow: false, radius: RADIUS });
+            marks.push(Mark::Points {
+                points,
+                ink: ink_of(judged.verdict),
+                shape: Shape::Circle,
+                hollow: false,
+                radius: RADIUS,
+            });
         }
     }
     let bottom = -(rows.len() as f64) + 0.45;
@@ -716,7 +764,7 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
         y: Axis { label: String::new(), scale: Scale::Linear, range: [bottom, 0.55], numbered: false },
         marks,
         keys: Vec::new(),
-            key_place: KeyPlace::Corner,
+        key_place: KeyPlace::Corner,
         height: rows.len() as u32 * 40 + 90,
     };
     Some(Figure {
@@ -728,9 +776,10 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
             "agree within their tolerance on every scene asked",
             "do not agree within their tolerance on every scene asked",
         ),
-        reading: "Each dot is one scene: the largest difference of any quantity, divided by its conditioning and by the \
+        reading:
+            "Each dot is one scene: the largest difference of any quantity, divided by its conditioning and by the \
                   tolerance that is claimed. Shaded: within the limit. Differences below 10⁻⁴ are drawn there."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, behind),
         panels: vec![panel],
         table,
@@ -802,11 +851,11 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
                 y,
                 marks,
                 keys: Vec::new(),
-            key_place: KeyPlace::Corner,
+                key_place: KeyPlace::Corner,
                 height: 230,
             });
         }
-        told.push(format!("{name} {}", words_for_outcome(flight.outcome)));
+        told.push(format!("scene {name} {}", words_for_outcome(flight.outcome)));
     }
     if panels.is_empty() {
         return None;
@@ -814,7 +863,7 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
     Some(Figure {
         name: "flights".into(),
         part: Part::Model,
-        message: format!("The force changes its law at x = k d: {}", told.join(", ")),
+        message: format!("The force acts in stages: {}", told.join(", ")),
         reading: "Closed form, or the Taylor series where there is none. Dashed lines are events.".to_owned(),
         claims: Vec::new(),
         panels,
