@@ -16,18 +16,18 @@ use super::text::{number, one_line, power_of_ten};
 /// Units of the drawing per unit shown.
 const FINE: i32 = 4;
 /// Width of a panel [px at full size]; it fits a phone of 375 px.
-pub const WIDTH: u32 = 344;
+pub const WIDTH: i32 = 344;
 /// Radius of a point, unless it says otherwise [px].
 pub const RADIUS: f64 = 2.75;
 /// Height of a panel, unless it says otherwise [px].
-pub const HEIGHT: u32 = 270;
+pub const HEIGHT: i32 = 270;
 
 const LEFT: i32 = 44;
 const RIGHT: i32 = 10;
 const TOP: i32 = 44;
 const BOTTOM: i32 = 38;
 /// What a panel is higher than its diagram [px].
-pub const MARGINS: u32 = (TOP + BOTTOM) as u32;
+pub const MARGINS: i32 = TOP + BOTTOM;
 /// Widths of lines [units of the drawing]. They tell dashed lines from the others, which plotters' drawing does not.
 const SOLID: u32 = 7;
 const DASHED: u32 = 5;
@@ -305,7 +305,7 @@ pub struct Panel {
     /// Where the legend stands.
     pub key_place: KeyPlace,
     /// Height [px at full size].
-    pub height: u32,
+    pub height: i32,
 }
 
 /// plotters could not draw.
@@ -336,11 +336,11 @@ impl Panel {
 
     /// View box of the drawing.
     pub fn view_box(&self) -> String {
-        format!("0 0 {} {}", WIDTH * FINE as u32, self.height * FINE as u32)
+        format!("0 0 {} {}", WIDTH * FINE, self.height * FINE)
     }
 
     fn draw_on(&self, drawing: &mut String) -> Drawn {
-        let size = (WIDTH * FINE as u32, self.height * FINE as u32);
+        let size = ((WIDTH * FINE).unsigned_abs(), (self.height * FINE).unsigned_abs());
         let root = SVGBackend::with_string(drawing, size).into_drawing_area();
         let [x0, x1] = self.x.places();
         let [y0, y1] = self.y.places();
@@ -359,7 +359,7 @@ impl Panel {
                 chart.draw_series([Polygon::new(corners, ink.rgb())])?;
             }
         }
-        let grid = Ink::Grid.rgb().stroke_width(FINE as u32);
+        let grid = Ink::Grid.rgb().stroke_width(FINE.unsigned_abs());
         let lines = |at: &[f64], upright: bool| -> Vec<_> {
             at.iter()
                 .map(|&t| PathElement::new(if upright { [(t, y0), (t, y1)] } else { [(x0, t), (x1, t)] }, grid))
@@ -367,7 +367,7 @@ impl Panel {
         };
         chart.draw_series(lines(&x_ticks, true))?;
         chart.draw_series(lines(&y_ticks, false))?;
-        let height = self.height as i32;
+        let height = self.height;
         let pixel = |chart: &Chart<'_, '_>, at: (f64, f64)| chart.backend_coord(&at);
         for &tick in &x_ticks {
             let (x, _) = pixel(&chart, (tick, y0));
@@ -379,7 +379,7 @@ impl Panel {
             let at = ((LEFT - 6) * FINE, y);
             write_text(&root, at, &self.y.tick_label(tick), TEXT, Ink::Muted, (HPos::Right, VPos::Center))?;
         }
-        let axis = Ink::Muted.rgb().stroke_width(FINE as u32);
+        let axis = Ink::Muted.rgb().stroke_width(FINE.unsigned_abs());
         chart.draw_series([PathElement::new(vec![(x0, y0), (x1, y0)], axis)])?;
         // Texts last: nothing is drawn over them.
         let (texts, others): (Vec<_>, Vec<_>) = self.marks.iter().partition(|mark| matches!(mark, Mark::Text { .. }));
@@ -390,7 +390,7 @@ impl Panel {
         let start = (HPos::Left, VPos::Top);
         write_text(&root, (2 * FINE, 2 * FINE), &self.title, TITLE, Ink::Text, start)?;
         write_text(&root, (2 * FINE, 22 * FINE), &self.y.label, TEXT, Ink::Muted, start)?;
-        let end = ((WIDTH as i32 - RIGHT) * FINE, (height - 15) * FINE);
+        let end = ((WIDTH - RIGHT) * FINE, (height - 15) * FINE);
         write_text(&root, end, &self.x.label, TEXT, Ink::Muted, (HPos::Right, VPos::Top))?;
         root.present()
     }
@@ -430,10 +430,10 @@ impl Panel {
 
     fn draw_keys(&self, root: &Area<'_>) -> Drawn {
         const LINE: i32 = 16;
-        let mut right = WIDTH as i32 - RIGHT - if self.key_place == KeyPlace::Corner { 8 } else { 4 };
+        let mut right = WIDTH - RIGHT - if self.key_place == KeyPlace::Corner { 8 } else { 4 };
         for (index, key) in self.keys.iter().rev().enumerate() {
             let y = match self.key_place {
-                KeyPlace::Corner => self.height as i32 - BOTTOM - 12 - LINE * index as i32,
+                KeyPlace::Corner => self.height - BOTTOM - 12 - LINE * whole(index),
                 KeyPlace::Head => 28,
             } * FINE;
             let middle = (HPos::Right, VPos::Center);
@@ -447,11 +447,16 @@ impl Panel {
             }
             if self.key_place == KeyPlace::Head {
                 // Letters of this size are six units wide on average.
-                right -= 30 + 6 * key.text.chars().count() as i32;
+                right -= 30 + 6 * whole(key.text.chars().count());
             }
         }
         Ok(())
     }
+}
+
+/// A count as a number of pixels.
+fn whole(count: usize) -> i32 {
+    i32::try_from(count).unwrap_or(i32::MAX)
 }
 
 fn draw_point(root: &Area<'_>, (x, y): (i32, i32), ink: Ink, shape: Shape, hollow: bool, radius: f64) -> Drawn {

@@ -12,7 +12,7 @@ use super::figure::{Figure, Part};
 use super::figure_data::path_of;
 use super::table::{Table, or_empty};
 use super::text::{count, number};
-use crate::integrators::{Boundaries, VelocityAt};
+use crate::integrators::{Boundaries, Sample, VelocityAt};
 use crate::physics::semi_empirical::{depth_ratio, model_difference};
 use crate::physics::{EventKind, Outcome, Problem};
 use crate::studies::Quantity;
@@ -346,10 +346,6 @@ fn slug(name: &str) -> String {
 
 /// Observed order with its interval beside the formal order, one row a family of claims.
 fn observed_orders(run: &Run<'_>) -> Option<Figure> {
-    // Heights [px]: of a label, of a claim, between families.
-    const LABEL: f64 = 16.0;
-    const LINE: f64 = 4.0;
-    const GAP: f64 = 6.0;
     let families = Family::all(run.judged);
     let order_of = |j: &Judged| fit_of(j).filter(|(_, _, fit)| fit.line.is_some()).map(|(_, formal, _)| formal);
     let is_order = |j: &Judged| {
@@ -377,74 +373,22 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             .map(|f| (f, f.members.iter().filter(|j| is_order(j) && order_of(j) == Some(formal)).collect::<Vec<_>>()))
             .filter(|(_, members)| !members.is_empty())
             .collect();
-        let mut reach = 0.3_f64;
-        let mut marks = Vec::new();
-        let mut top = Vec::new();
-        // From the top edge downwards, one unit a pixel.
-        let mut y = 0.0;
-        for (family, members) in &rows {
-            let height = LINE * members.len().max(2) as f64;
-            let limit = family.first().claim.limit.min(1.0);
-            let (low, high) = (formal - limit, formal + limit);
-            let text = format!("{} ({})", family.id, members.len());
-            top.push(Mark::Text {
-                at: (f64::NEG_INFINITY, y - 0.5 * LABEL),
-                text,
-                ink: Ink::Text,
-                anchor: Anchor::Start,
-            });
-            y -= LABEL;
-            let points = vec![(low, y - height), (low, y), (high, y), (high, y - height)];
-            marks.push(Mark::Area { points, ink: Ink::Shade });
-            top.push(Mark::Line { points: vec![(formal, y - height), (formal, y)], ink: Ink::Muted, dashed: true });
-            reach = reach.max(limit);
-            for (index, judged) in members.iter().enumerate() {
-                let Some((_, _, fit)) = fit_of(judged) else { continue };
-                let Some(line) = fit.line else { continue };
-                let y = y - height * (index as f64 + 0.5) / members.len() as f64;
-                let [low, high] = line.interval95;
-                let ink = ink_of(judged.verdict);
-                top.push(Mark::Line { points: vec![(low, y), (high, y)], ink, dashed: false });
-                let points = vec![(line.order, y)];
-                top.push(Mark::Points { points, ink, shape: Shape::Circle, hollow: false, radius: 2.0 });
-                reach = reach.max((line.order - formal).abs().min(1.0));
-                all.push(*judged);
-                table.push([
-                    &judged.claim.id,
-                    &formal,
-                    &line.order,
-                    &low,
-                    &high,
-                    &judged.claim.limit,
-                    &fit.used(),
-                    &fit.points.len(),
-                    &judged.verdict.name(),
-                ]);
-            }
-            y -= height + GAP;
+        for judged in rows.iter().flat_map(|(_, members)| members) {
+            let Some((line, fit)) = fit_of(judged).and_then(|(_, _, fit)| Some((fit.line?, fit))) else { continue };
+            all.push(*judged);
+            table.push([
+                &judged.claim.id,
+                &formal,
+                &line.order,
+                &line.interval95[0],
+                &line.interval95[1],
+                &judged.claim.limit,
+                &fit.used(),
+                &fit.points.len(),
+                &judged.verdict.name(),
+            ]);
         }
-        // What leaves the panel ends at its edge; labels begin there.
-        let (left, right) = (formal - reach * 1.05, formal + reach * 1.05);
-        for mark in &mut top {
-            match mark {
-                Mark::Line { points, .. } | Mark::Points { points, .. } => {
-                    points.iter_mut().for_each(|point| point.0 = point.0.clamp(left, right));
-                }
-                Mark::Text { at, .. } => at.0 = left,
-                Mark::Area { .. } => {}
-            }
-        }
-        marks.extend(top);
-        panels.push(Panel {
-            title: format!("formal order {formal}"),
-            description: format!("{}, each with its observed order and 95 % interval.", count(rows.len(), "row")),
-            x: Axis { label: "observed order".into(), scale: Scale::Linear, range: [left, right], numbered: true },
-            y: Axis { label: String::new(), scale: Scale::Linear, range: [y, 0.0], numbered: false },
-            marks,
-            keys: Vec::new(),
-            key_place: KeyPlace::Corner,
-            height: (-y) as u32 + MARGINS,
-        });
+        panels.push(order_panel(formal, &rows));
     }
     if panels.is_empty() {
         return None;
@@ -467,6 +411,67 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
         panels,
         table,
     })
+}
+
+/// Families of claims of one formal order, one below the other, each member on a line of its own.
+fn order_panel(formal: f64, rows: &[(&Family<'_>, Vec<&Judged>)]) -> Panel {
+    // Heights [px]: of a label, of a claim, between families.
+    const LABEL: f64 = 16.0;
+    const LINE: f64 = 4.0;
+    const GAP: f64 = 6.0;
+    let mut reach = 0.3_f64;
+    let mut marks = Vec::new();
+    let mut top = Vec::new();
+    // From the top edge downwards, one unit a pixel.
+    let mut y = 0.0;
+    for (family, members) in rows {
+        let height = LINE * members.len().max(2) as f64;
+        let limit = family.first().claim.limit.min(1.0);
+        let (low, high) = (formal - limit, formal + limit);
+        let text = format!("{} ({})", family.id, members.len());
+        top.push(Mark::Text { at: (f64::NEG_INFINITY, y - 0.5 * LABEL), text, ink: Ink::Text, anchor: Anchor::Start });
+        y -= LABEL;
+        let points = vec![(low, y - height), (low, y), (high, y), (high, y - height)];
+        marks.push(Mark::Area { points, ink: Ink::Shade });
+        top.push(Mark::Line { points: vec![(formal, y - height), (formal, y)], ink: Ink::Muted, dashed: true });
+        reach = reach.max(limit);
+        for (index, judged) in members.iter().enumerate() {
+            let Some((_, _, fit)) = fit_of(judged) else { continue };
+            let Some(line) = fit.line else { continue };
+            let y = y - height * (index as f64 + 0.5) / members.len() as f64;
+            let [low, high] = line.interval95;
+            let ink = ink_of(judged.verdict);
+            top.push(Mark::Line { points: vec![(low, y), (high, y)], ink, dashed: false });
+            let points = vec![(line.order, y)];
+            top.push(Mark::Points { points, ink, shape: Shape::Circle, hollow: false, radius: 2.0 });
+            reach = reach.max((line.order - formal).abs().min(1.0));
+        }
+        y -= height + GAP;
+    }
+    // What leaves the panel ends at its edge; labels begin there.
+    let (left, right) = (formal - reach * 1.05, formal + reach * 1.05);
+    for mark in &mut top {
+        match mark {
+            Mark::Line { points, .. } | Mark::Points { points, .. } => {
+                for point in points {
+                    point.0 = point.0.clamp(left, right);
+                }
+            }
+            Mark::Text { at, .. } => at.0 = left,
+            Mark::Area { .. } => {}
+        }
+    }
+    marks.extend(top);
+    Panel {
+        title: format!("formal order {formal}"),
+        description: format!("{}, each with its observed order and 95 % interval.", count(rows.len(), "row")),
+        x: Axis { label: "observed order".into(), scale: Scale::Linear, range: [left, right], numbered: true },
+        y: Axis { label: String::new(), scale: Scale::Linear, range: [y, 0.0], numbered: false },
+        marks,
+        keys: Vec::new(),
+        key_place: KeyPlace::Corner,
+        height: (-y) as i32 + MARGINS,
+    }
 }
 
 /// Error against tolerance, one panel a method.
@@ -765,7 +770,7 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
         marks,
         keys: Vec::new(),
         key_place: KeyPlace::Corner,
-        height: rows.len() as u32 * 40 + 90,
+        height: (-40.0 * bottom) as i32 + 90,
     };
     Some(Figure {
         name: "peer-differences".into(),
@@ -793,6 +798,9 @@ fn label_of_peer(name: &str, members: &[&Judged]) -> String {
     }
 }
 
+/// What is drawn over time: its name with its unit, the units in one of SI, and the number.
+type Curve = (&'static str, f64, fn(&Sample) -> f64);
+
 /// Depth, velocity and force over time, events marked: one scene that stops in the tunnel and one that perforates.
 fn paths(run: &Run<'_>) -> Option<Figure> {
     let mut table = Table::new(["scene", "time_s", "depth_m", "velocity_m_s", "force_n", "stage"]);
@@ -816,8 +824,7 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
             let s = sample.state;
             table.push([&name, &s.time, &s.depth, &s.velocity, &sample.force, &sample.stage]);
         }
-        type Shown = (&'static str, f64, fn(&crate::integrators::Sample) -> f64);
-        let curves: [Shown; 3] = [
+        let curves: [Curve; 3] = [
             ("depth [mm]", 1e3, |s| s.state.depth),
             ("velocity [m/s]", 1.0, |s| s.state.velocity),
             ("force [kN]", 1e-3, |s| s.force),

@@ -99,6 +99,7 @@ fn contents() -> Markup {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
 fn section(id: &str, body: Markup) -> Markup {
     let title = SECTIONS.iter().find(|(known, _)| *known == id).map_or(id, |(_, title)| title);
     html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (body) } }
@@ -699,10 +700,11 @@ fn every_claim(run: &Run<'_>) -> Markup {
     section(
         "claims",
         html! {
+            p.onpaper { "On paper only the counts; the claims one by one are in report.html and report.json." }
             @for group in run.judged.chunk_by(|a, b| group_of(&a.claim.id) == group_of(&b.claim.id)) {
                 @let counts = Counts::of(group.iter().map(|j| j.verdict));
                 @let name = one_line(group_of(&group[0].claim.id));
-                details {
+                details.long {
                     summary { (name) ": " (tally(counts)) }
                     (claims_table(&format!("Claims of {name}"), &group.iter().collect::<Vec<_>>()))
                 }
