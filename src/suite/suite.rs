@@ -8,7 +8,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::checks::{self, Context, PeerAnswers};
+use super::checks::{self, Context, Memo, PeerAnswers};
 use super::claim::{Check, Claim, ClaimSpec, Judged, NotMeasured};
 use super::verdict::{Counts, Verdict};
 use crate::physics::Scene;
@@ -142,7 +142,8 @@ impl Suite {
 
     /// Judges every claim, in parallel, in the suite's order; `done` is told of each as it is judged.
     pub fn run(&self, seed: u64, peers: &PeerAnswers, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
-        let context = Context { scenes: &self.scenes, peers, seed };
+        let memo = Memo::default();
+        let context = Context { scenes: &self.scenes, peers, memo: &memo, seed };
         self.claims
             .par_iter()
             .map(|claim| {

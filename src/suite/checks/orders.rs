@@ -23,18 +23,27 @@ pub(super) fn fixed_step(
     let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.flight.end.time);
     let seed = subject.context.seed;
     let ladder = Ladder { from, to, points, seed };
-    let study = convergence::of_fixed_steps(
-        subject.scene,
-        &subject.problem,
-        (subject.claim.velocity, subject.claim.boundaries),
-        ladder,
-        quantity == Quantity::CriticalVelocity,
-        &|size| steps(pattern, size, seed),
-    )
-    .map_err(NotMeasured::broken)?
-    .into_iter()
-    .find(|study| study.quantity == quantity)
-    .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))?;
+    let claim = subject.claim;
+    let critical = quantity == Quantity::CriticalVelocity;
+    let key = format!("{:?} {} {} {pattern:?} {points} {critical}", claim.scene, claim.velocity, claim.boundaries);
+    let study = subject
+        .context
+        .memo
+        .get(key, || {
+            convergence::of_fixed_steps(
+                subject.scene,
+                &subject.problem,
+                (claim.velocity, claim.boundaries),
+                ladder,
+                critical,
+                &|size| steps(pattern, size, seed),
+            )
+            .map_err(NotMeasured::broken)
+        })?
+        .iter()
+        .find(|study| study.quantity == quantity)
+        .cloned()
+        .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))?;
     if study.formal != Some(expected) {
         return Err(NotMeasured::broken(format!(
             "the claim expects order {expected}, the formal order is {:?}: one of them is wrong",
@@ -92,10 +101,16 @@ fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<Quantity
         return Err(NotMeasured::skip(format!("this build leaves out {}", subject.method_name())));
     }
     let ladder = Ladder { from: to.min(from), to: to.max(from), points: 40, seed: subject.context.seed };
-    convergence::of_tolerances(&subject.problem, subject.method_name(), ladder)
-        .map_err(NotMeasured::broken)?
-        .into_iter()
+    let key = format!("{:?} {} {from} {to}", subject.claim.scene, subject.method_name());
+    subject
+        .context
+        .memo
+        .get(key, || {
+            convergence::of_tolerances(&subject.problem, subject.method_name(), ladder).map_err(NotMeasured::broken)
+        })?
+        .iter()
         .find(|study| study.quantity == quantity)
+        .cloned()
         .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))
 }
 
