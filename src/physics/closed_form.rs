@@ -38,7 +38,7 @@ pub struct Solution {
     pub outcome: Outcome,
     /// Index from 0 of the stage in which it ended.
     pub stage: usize,
-    /// State at the end: at rest `X, T, 0`; perforated: exit depth, time of exit, V_r.
+    /// State at the end: at rest `X, T, 0`; perforated: exit depth, time of exit, `V_r`.
     pub end: State,
     /// Events in time order; at one place stage ends, exit, rest.
     pub events: SmallVec<[Event; 4]>,
@@ -491,22 +491,16 @@ impl Damped {
     /// only approached.
     fn time_over(&self, way: f64, rest: Option<f64>) -> Option<f64> {
         let mut low = 0.0;
-        let mut high = match rest {
-            Some(rest) => rest,
-            None => {
-                let mut high = way / self.v0;
-                let mut doublings = 0;
-                while self.after(high).0 < way {
-                    high *= 2.0;
-                    doublings += 1;
-                    // 2^200 times the free-flight time: the motion has long settled.
-                    if doublings > 200 {
-                        return None;
-                    }
-                }
-                high
+        let mut high = rest.unwrap_or(way / self.v0);
+        let mut doublings = 0;
+        while rest.is_none() && self.after(high).0 < way {
+            high *= 2.0;
+            doublings += 1;
+            // 2^200 times the free-flight time: the motion has long settled.
+            if doublings > 200 {
+                return None;
             }
-        };
+        }
         let mut t = (way / self.v0).min(high);
         for _ in 0..200 {
             let (covered, speed) = self.after(t);
@@ -634,9 +628,9 @@ impl CraterAndTunnel {
 /// The impact speed that just perforates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
-    /// Critical velocity V_c [m/s].
+    /// Critical velocity `V_c` [m/s].
     pub velocity: f64,
-    /// Critical energy E_c = M V_c²/2 [J].
+    /// Critical energy `E_c = M V_c²/2` [J].
     pub energy: f64,
 }
 
@@ -745,7 +739,7 @@ pub fn critical_of_stages(problem: &Problem) -> Result<Critical, CriticalError> 
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
+    #![expect(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
     use super::*;
     use crate::physics::reference::{self, Conditions, Exact, ExactFlight, Source};
     use crate::physics::scene::{Concrete, Criterion, Resistance, Scene};
@@ -757,7 +751,7 @@ mod tests {
     /// Random cases of a test: all of them where the big floats are compiled with optimization.
     const CASES: u32 = if cfg!(debug_assertions) { 1_000 } else { 20_000 };
 
-    /// A generator of our own for the scenes: SplitMix64 (Steele, Lea, Flood 2014), the same on every machine.
+    /// A generator of our own for the scenes, `SplitMix64` (Steele, Lea, Flood 2014), the same on every machine.
     struct Dice(u64);
 
     impl Dice {
@@ -1115,7 +1109,7 @@ mod tests {
         // E_c/(d³ fc S) at k = 2, from notes on Li & Chen: H/d, N, value.
         for (thickness, n, energy) in [
             (1.0, 5.0, 0.158_907_777_799_397_2),
-            (2.0, 20.0, 0.785_398_163_397_448_3),
+            (2.0, 20.0, 0.25 * PI),
             (10.0, 100.0, 7.585_602_604_876_231),
             (18.0, 5.0, 498.214_509_251_034_6),
         ] {

@@ -130,9 +130,9 @@ impl ExactFlight {
 /// Critical velocity and energy to 50 digits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactCritical {
-    /// Critical velocity V_c [m/s].
+    /// Critical velocity `V_c` [m/s].
     pub velocity: Exact,
-    /// Critical energy E_c = M V_c²/2 [J].
+    /// Critical energy `E_c = M V_c²/2` [J].
     pub energy: Exact,
 }
 
@@ -830,98 +830,119 @@ fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
     sum * length
 }
 
-/// A stage `p + s x + r V`: x(t), V(t), rest and the passing of `limit`.
-fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
-    let (bits, mass, v0) = (model.bits, &model.mass, &from.velocity);
-    let Law { p, s, r, .. } = law;
-    let zero = int(0, bits);
-    let after: Box<dyn Fn(&Big) -> (Big, Big)>;
-    let rest: Option<Big>;
-    // Farthest depth, when it is only approached.
-    let mut horizon: Option<Big> = None;
-    if is_zero(s) {
-        let rate = r / mass;
-        let drift = p / r;
-        rest = is_positive(p).then(|| ln(&(int(1, bits) + r * v0 / p)) / &rate);
-        if is_zero(p) {
-            horizon = Some(&from.depth + v0 / &rate);
+/// The linear motion under `p + s x + r V`, counted from the entry of the stage.
+enum Linear {
+    /// s = 0: the speed decays at `rate = r/M` towards `-drift`, `drift = p/r`.
+    Drift { start: Big, speed: Big, rate: Big, drift: Big },
+    /// s > 0: a damped oscillator about `-p/s`, as `u = x + p/s` from `u0` and V0.
+    Oscillator { centre: Big, u0: Big, v0: Big, g: Big, m: Big, brake: Big, damping: Ordering },
+}
+
+impl Linear {
+    fn new(law: &Law, mass: &Big, from: &Point, bits: usize) -> Self {
+        let Law { p, s, r, .. } = law;
+        if is_zero(s) {
+            let (start, speed) = (from.depth.clone(), from.velocity.clone());
+            return Self::Drift { start, speed, rate: r / mass, drift: p / r };
         }
-        let (x0, fall) = (from.depth.clone(), v0 + &drift);
-        after = Box::new(move |t| {
-            let decay = (-(&rate * t)).exp();
-            (&x0 - &drift * t + &fall * (int(1, bits) - &decay) / &rate, &fall * decay - &drift)
-        });
-    } else {
         let centre = p / s;
         let u0 = &from.depth + &centre;
         let g = half(r / mass);
-        let w2 = s / mass;
         // Exact, as products of 64-bit inputs fit: critical damping is seen as such.
         let discriminant = square(r) - int(4, bits) * s * mass;
-        let m = half(magnitude(discriminant.clone()).sqrt() / mass);
-        let brake = &g * v0 + &w2 * &u0;
-        let (v0, order) = (v0.clone(), discriminant.cmp(&Big::ZERO));
-        rest = match order {
-            Ordering::Less => Some(atan2(&(&m * &v0), &brake, bits) / &m),
-            Ordering::Equal => is_positive(&brake).then(|| &v0 / &brake),
-            Ordering::Greater => {
-                let slow_brake = &brake - &m * &v0;
-                is_positive(&slow_brake).then(|| ln(&((&brake + &m * &v0) / slow_brake)) / twice(m.clone()))
+        let damping = discriminant.cmp(&Big::ZERO);
+        let m = half(magnitude(discriminant).sqrt() / mass);
+        let brake = &g * &from.velocity + s / mass * &u0;
+        Self::Oscillator { centre, u0, v0: from.velocity.clone(), g, m, brake, damping }
+    }
+
+    /// Depth and speed after time `t`.
+    fn after(&self, t: &Big) -> (Big, Big) {
+        match self {
+            Self::Drift { start, speed, rate, drift } => {
+                let decay = (-(rate * t)).exp();
+                let fall = speed + drift;
+                (start - drift * t + &fall * (Big::ONE - &decay) / rate, fall * decay - drift)
             }
-        };
-        if rest.is_none() {
-            horizon = Some(-centre.clone());
+            Self::Oscillator { centre, u0, v0, g, m, brake, damping } => {
+                // e^{-g t} times cos m t and sin(m t)/m, or their critical or hyperbolic counterparts.
+                let (cosine, sine) = match damping {
+                    Ordering::Less => {
+                        let decay = (-(g * t)).exp();
+                        let (sine, cosine) = (m * t).sin_cos();
+                        (&decay * cosine, decay * sine / m)
+                    }
+                    Ordering::Equal => {
+                        let decay = (-(g * t)).exp();
+                        (decay.clone(), decay * t)
+                    }
+                    Ordering::Greater => {
+                        let (slow, fast) = ((-((g - m) * t)).exp(), (-((g + m) * t)).exp());
+                        (half(&slow + &fast), half(slow - fast) / m)
+                    }
+                };
+                (u0 * &cosine + (v0 + g * u0) * &sine - centre, v0 * cosine - brake * sine)
+            }
         }
-        after = Box::new(move |t| {
-            // e^{-g t} times cos m t and sin(m t)/m, or their hyperbolic or critical counterparts.
-            let (cosine, sine) = match order {
-                Ordering::Less => {
-                    let decay = (-(&g * t)).exp();
-                    let (sine, cosine) = (&m * t).sin_cos();
-                    (&decay * cosine, decay * sine / &m)
-                }
-                Ordering::Equal => {
-                    let decay = (-(&g * t)).exp();
-                    (decay.clone(), decay * t)
-                }
+    }
+
+    /// When it rests, if ever.
+    fn rest_time(&self, bits: usize) -> Option<Big> {
+        match self {
+            Self::Drift { speed, rate, drift, .. } => {
+                is_positive(drift).then(|| ln(&(int(1, bits) + speed / drift)) / rate)
+            }
+            Self::Oscillator { v0, m, brake, damping, .. } => match damping {
+                Ordering::Less => Some(atan2(&(m * v0), brake, bits) / m),
+                Ordering::Equal => is_positive(brake).then(|| v0 / brake),
                 Ordering::Greater => {
-                    let (slow, fast) = ((-((&g - &m) * t)).exp(), (-((&g + &m) * t)).exp());
-                    (half(&slow + &fast), half(slow - fast) / &m)
+                    let slow_brake = brake - m * v0;
+                    is_positive(&slow_brake).then(|| ln(&((brake + m * v0) / slow_brake)) / twice(m.clone()))
                 }
-            };
-            let u = &u0 * &cosine + (&v0 + &g * &u0) * &sine;
-            (u - &centre, &v0 * cosine - &brake * sine)
-        });
-    }
-    if let Some(rest) = &rest {
-        let (depth, _) = after(rest);
-        let touches = limit.is_some_and(|limit| vanishes(&(&depth - limit), limit, bits));
-        let short = limit.is_none_or(|limit| depth < *limit);
-        if touches || short {
-            let depth = if touches { limit.cloned().unwrap_or(depth) } else { depth };
-            return Ok((Point { time: &from.time + rest, depth, velocity: zero }, !touches));
+            },
         }
     }
-    let Some(limit) = limit else { return Err(ReferenceError::NeverEnds) };
-    if horizon.is_some_and(|horizon| horizon <= *limit) {
+
+    /// The depth that a motion without rest only approaches; none when it goes on for ever.
+    fn horizon(&self) -> Option<Big> {
+        match self {
+            Self::Drift { start, speed, rate, drift } => is_zero(drift).then(|| start + speed / rate),
+            Self::Oscillator { centre, .. } => Some(-centre.clone()),
+        }
+    }
+}
+
+/// A stage `p + s x + r V`: the point at `limit` and `false`, or the point of rest and `true`.
+fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
+    let bits = model.bits;
+    let motion = Linear::new(law, &model.mass, from, bits);
+    let rest = motion.rest_time(bits);
+    if let Some(rest) = &rest {
+        let (depth, _) = motion.after(rest);
+        let touched = limit.filter(|limit| vanishes(&(&depth - *limit), limit, bits));
+        if touched.is_some() || limit.is_none_or(|limit| depth < *limit) {
+            let rests_inside = touched.is_none();
+            let depth = touched.cloned().unwrap_or(depth);
+            return Ok((Point { time: &from.time + rest, depth, velocity: int(0, bits) }, rests_inside));
+        }
+    }
+    let limit = limit.ok_or(ReferenceError::NeverEnds)?;
+    if rest.is_none() && motion.horizon().is_some_and(|horizon| horizon <= *limit) {
         return Err(ReferenceError::NeverEnds);
     }
-    let mut high = match rest {
-        Some(rest) => rest,
-        None => (limit - &from.depth) / &from.velocity,
-    };
+    let mut high = rest.unwrap_or_else(|| (limit - &from.depth) / &from.velocity);
     // 2^100 times free flight is beyond any of the rates; the loop ends because the limit lies before the horizon.
     for _ in 0..100 {
-        if after(&high).0 >= *limit {
+        if motion.after(&high).0 >= *limit {
             break;
         }
         high = twice(high);
     }
-    let time = root(&zero, &high, bits, |t| {
-        let (depth, speed) = after(t);
+    let time = root(&int(0, bits), &high, bits, |t| {
+        let (depth, speed) = motion.after(t);
         (depth - limit, speed)
     });
-    let velocity = after(&time).1;
+    let velocity = motion.after(&time).1;
     Ok((Point { time: &from.time + time, depth: limit.clone(), velocity }, false))
 }
 
@@ -935,9 +956,9 @@ fn root(low: &Big, high: &Big, bits: usize, value_and_slope: impl Fn(&Big) -> (B
             return at;
         }
         if is_negative(&value) {
-            low = at.clone();
+            low.clone_from(&at);
         } else {
-            high = at.clone();
+            high.clone_from(&at);
         }
         let newton = if is_zero(&slope) { high.clone() } else { &at - value / slope };
         let next = if newton > low && newton < high { newton } else { half(&low + &high) };
@@ -993,7 +1014,7 @@ fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[
     least.map(|w| w / scale)
 }
 
-/// Mass and V_c²: W at each stage end up to the exit is affine in V0², and none may be below zero.
+/// Mass and `V_c²`: W at each stage end up to the exit is affine in V0², and none may be below zero.
 fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(Big, Big), ReferenceError> {
     // The models at V0² = 0 and 1 (input 1 is the impact speed in either source): only a continuous crater differs.
     let at = |impact_speed: i32| {
@@ -1023,7 +1044,7 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
                 carried(moved_law, &(&w + slope)) - carried(law, &w)
             };
             w = carried(law, &w);
-            from = to.clone();
+            from.clone_from(to);
             let demand = -(&w / &slope);
             if demand > squared {
                 squared = demand;
