@@ -280,13 +280,12 @@ fn drag_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
     let (p, q, v0) = (stage.static_force, stage.drag, entry.velocity);
     let xi = limit - entry.depth;
     if limit.is_finite() {
-        let y = 2.0 * q * xi / mass;
-        let (decay, mean_decay) = decay_and_mean(y);
-        let w = v0 * v0 * decay - 2.0 * p * xi / mass * mean_decay;
+        let decay = Decay::over(2.0 * q * xi / mass);
+        let w = v0 * v0 * decay.end - 2.0 * p * xi / mass * decay.mean;
         if w >= 0.0 {
             // Without a static force w may underflow where its root does not.
-            let v = if p == 0.0 { v0 * (-0.5 * y).exp() } else { w.sqrt() };
-            return Leg::Passes { time: drag_time(p, q, mass, xi, y, v0, v), velocity: v };
+            let v = if p == 0.0 { v0 * (-0.5 * decay.y).exp() } else { w.sqrt() };
+            return Leg::Passes { time: drag_time(stage, mass, xi, &decay, v0, v), velocity: v };
         }
     }
     if p > 0.0 {
@@ -303,14 +302,14 @@ fn drag_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
     })
 }
 
-/// Time [s] from speed `v0` to `v` over the way `xi` under `p + q V²`, `y = 2 q xi/M`.
-fn drag_time(p: f64, q: f64, mass: f64, xi: f64, y: f64, v0: f64, v: f64) -> f64 {
-    let (decay, mean_decay) = decay_and_mean(y);
+/// Time [s] from speed `v0` to `v` over the way `xi` under `p + q V²`.
+fn drag_time(stage: &Stage, mass: f64, xi: f64, decay: &Decay, v0: f64, v: f64) -> f64 {
+    let (p, q) = (stage.static_force, stage.drag);
     if p == 0.0 {
         // tau with V = V0 e^{-y/2}, freed of the exponentials that underflow: (xi/V0) E(y/2).
-        return xi / v0 * expm1_over(0.5 * y);
+        return xi / v0 * expm1_over(0.5 * decay.y);
     }
-    let tau = 2.0 * xi * mean_decay / (v + v0 * decay);
+    let tau = 2.0 * xi * decay.mean / (v + v0 * decay.end);
     if p > 0.0 {
         return tau * atan_over((p * q).sqrt() * tau / mass);
     }
@@ -321,7 +320,34 @@ fn drag_time(p: f64, q: f64, mass: f64, xi: f64, y: f64, v0: f64, v: f64) -> f64
     }
     // Near terminal velocity Vt the argument goes to one: atanh in logarithms, with V² - Vt² = (V0² - Vt²) e^{-y}.
     let terminal = (-p / q).sqrt();
-    (0.5 * y + ((v + terminal) / (v0 + terminal)).ln()) / rate
+    (0.5 * decay.y + ((v + terminal) / (v0 + terminal)).ln()) / rate
+}
+
+/// What is left of W after a way with `y = 2 q xi/M`, and on average over it.
+struct Decay {
+    /// y, not negative.
+    y: f64,
+    /// `e^{-y}`.
+    end: f64,
+    /// `E(-y) = (1 - e^{-y})/y`.
+    mean: f64,
+}
+
+impl Decay {
+    /// Both at the price of one exponential.
+    #[inline]
+    fn over(y: f64) -> Self {
+        if y == 0.0 {
+            Self { y, end: 1.0, mean: 1.0 }
+        } else if y < 0.7 {
+            let lost = -(-y).exp_m1();
+            Self { y, end: 1.0 - lost, mean: lost / y }
+        } else {
+            // Below one half the exponential is subtracted from 1 without loss.
+            let end = (-y).exp();
+            Self { y, end, mean: (1.0 - end) / y }
+        }
+    }
 }
 
 /// `F = p + s x`, s > 0: the crater, and a spring that may be pulled first (p + s x < 0).
@@ -521,21 +547,6 @@ impl Damped {
             t = next;
         }
         Some(t)
-    }
-}
-
-/// `e^{-y}` and its mean over [0, y], `-expm1(-y)/y`, for y >= 0 at the price of one exponential.
-#[inline]
-fn decay_and_mean(y: f64) -> (f64, f64) {
-    if y == 0.0 {
-        (1.0, 1.0)
-    } else if y < 0.7 {
-        let lost = -(-y).exp_m1();
-        (1.0 - lost, lost / y)
-    } else {
-        // Below one half the decay is subtracted from 1 without loss.
-        let decay = (-y).exp();
-        (decay, (1.0 - decay) / y)
     }
 }
 

@@ -1061,6 +1061,7 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
     use super::*;
+    use crate::physics::scene::Concrete;
     use crate::physics::stage::Stage;
 
     fn problem(stages: &[Stage], impact_speed: f64, exit_depth: f64) -> Problem {
@@ -1250,5 +1251,66 @@ mod tests {
         let both = Stage { viscosity: 1.0, ..Stage::tunnel(1.0, 1.0) };
         let error = flight(Source::Problem(&problem(&[both], 10.0, 1.0))).unwrap_err();
         assert_eq!(error.to_string(), "no reference for stage 0: viscosity and drag act together");
+    }
+
+    /// Forrestal 1994 shot 14, as published: S = 12, k = 2.
+    fn shot_14(thickness: Option<f64>, criterion: Criterion) -> Scene {
+        Scene {
+            title: None,
+            mass: 0.906,
+            resistance: Resistance::Concrete(Concrete {
+                diameter: 0.0269,
+                nose_factor: 0.15625,
+                strength: 35.2e6,
+                density: 2370.0,
+                static_factor: 12.0,
+                inertia_factor: 1.0,
+                crater_ratio: 2.0,
+                crater_stiffness: CraterStiffness::Continuous,
+                layers: Vec::new(),
+            }),
+            thickness,
+            criterion,
+            velocity: None,
+        }
+    }
+
+    #[test]
+    fn a_scene_has_the_50_digits_of_the_formulas_in_another_program() {
+        // mpmath 1.3.0 at 70 digits, theory section 2 in its plain forms.
+        let scene = shot_14(None, Criterion::FullDepth);
+        let exact = flight(Source::Scene(&scene, 277.0)).unwrap();
+        assert_digits(&exact.end.depth, "0.1671950802699606820281951756134182369920137166438979");
+        assert_digits(&exact.end.time, "0.001122301305544897903917260544220359543407377520436004");
+        assert_digits(&exact.crater_end().unwrap().velocity, "248.4003030578009719391434245885765193341631673876338");
+        let scene = shot_14(Some(0.1), Criterion::FullDepth);
+        let exact = critical(Source::Scene(&scene, 0.0)).unwrap();
+        assert_digits(&exact.velocity, "198.2723996547944194740407906105459115520752497552203");
+    }
+
+    #[test]
+    fn at_the_critical_velocity_the_margin_is_zero_to_its_rounding_and_just_beyond_the_outcome_changes() {
+        let scene = shot_14(Some(0.1), Criterion::FullDepth);
+        let critical = critical(Source::Scene(&scene, 0.0)).unwrap().velocity.to_f64();
+        let at = |speed| flight(Source::Scene(&scene, speed)).unwrap();
+        let margin = at(critical).exit_margin.unwrap();
+        assert!(margin.error_over(0.0, &Exact::one()) < 2.0 * f64::EPSILON);
+        assert_eq!(at(critical.next_up()).outcome, Outcome::Perforated);
+        assert_eq!(at(critical.next_down()).outcome, Outcome::StoppedInTunnel);
+    }
+
+    #[test]
+    fn the_ndrc_exit_depth_inverts_the_relation_on_both_branches() {
+        let d = int(1, 256);
+        // y = 2 gives e = 1.32 + 2.48 = 3.80; y = 1 gives e = 3.19 - 0.718 = 2.472.
+        let ratio = |numerator, denominator| int(numerator, 256) / int(denominator, 256);
+        assert!(apart(&ndrc_depth(&ratio(380, 100), &d, 256), &int(2, 256)) < 1e-75);
+        assert!(apart(&ndrc_depth(&ratio(2472, 1000), &d, 256), &int(1, 256)) < 1e-75);
+        // Of two depths for e = 2.996 the smaller: 1.3498, not 1.3516.
+        let shallow = ndrc_depth(&ratio(2996, 1000), &d, 256).to_f64().value();
+        assert!(shallow > 1.348 && shallow < 1.35, "{shallow}");
+        let scene = shot_14(Some(3.8 * 0.0269), Criterion::Ndrc);
+        let exact = flight(Source::Scene(&scene, 500.0)).unwrap();
+        assert!((exact.end.depth.to_f64() / 0.0538 - 1.0).abs() < 4.0 * f64::EPSILON);
     }
 }
