@@ -366,9 +366,8 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
         let energy = v0 * v0 - xi * (f0 + f);
         if energy >= 0.0 {
             let v = energy.sqrt();
-            // f V0 - f0 V, where f and f0 have one sign as a sum of terms of one sign.
-            let crossed =
-                if f0 < 0.0 && f > 0.0 { f * v0 - f0 * v } else { xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v))) };
+            // f V0 - f0 V; of the two terms the second is at worst minus half of the first.
+            let crossed = xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)));
             return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, velocity: v };
         }
     }
@@ -740,10 +739,8 @@ pub fn critical_of_stages(problem: &Problem) -> Result<Critical, CriticalError> 
         // W(to) = W(from) e^{-y} - loss, solved for W(from); cut before the exponential, which may be infinite.
         let loss = -carry(stage, problem.mass, 0.0, from, to);
         let needed = demand + loss;
-        demand = if needed > 0.0 { needed * (2.0 * stage.drag * (to - from) / problem.mass).exp() } else { 0.0 };
-        if !(needed.is_finite() && demand.is_finite()) {
-            return Err(CriticalError::OutOfRange);
-        }
+        // Not `needed > 0.0`, so that a NaN is not taken for no demand but refused below.
+        demand = if needed <= 0.0 { 0.0 } else { needed * (2.0 * stage.drag * (to - from) / problem.mass).exp() };
     }
     Critical::new(problem.mass, 0.5 * problem.mass * demand)
 }
@@ -1268,6 +1265,9 @@ mod tests {
         assert_eq!(critical(&target, 400.0), Err(CriticalError::OutOfRange));
         assert_eq!(critical(&target, f64::INFINITY), Err(CriticalError::NoExit));
         assert!(critical(&target, 340.0).is_ok());
+        // 1e-8 kg and 1e302 J: V_c² = 2e310 is out of range, V_c is not.
+        let light = CraterAndTunnel { mass: 1e-8, static_force: 1e302, drag: 0.0, ..target };
+        assert!((critical(&light, 1.0).unwrap().velocity / (2.0_f64.sqrt() * 1e155) - 1.0).abs() < 1e-15);
     }
 
     #[test]
@@ -1282,5 +1282,19 @@ mod tests {
         assert!((critical.energy / 1e5 - 1.0).abs() < 4.0 * f64::EPSILON);
         let viscous = [Stage { viscosity: 1.0, ..stages[2] }];
         assert_eq!(critical_of_stages(&problem(&viscous, 2.0, 1.0, 1.5)), Err(CriticalError::Viscous { stage: 0 }));
+    }
+
+    #[test]
+    fn within_round_off_of_the_exit_a_stop_is_not_deeper_than_the_exit() {
+        let stages = [Stage::crater(8e6, 0.1), Stage::tunnel(1e5, 3.0)];
+        let mut speed = critical_of_stages(&problem(&stages, 2.0, 1.0, 0.3)).unwrap().velocity + 1e-11;
+        let mut stops = 0;
+        for _ in 0..1000 {
+            let solution = solve(&problem(&stages, 2.0, speed, 0.3)).unwrap();
+            assert!(solution.end.depth <= 0.3, "{solution:?}");
+            stops += u32::from(solution.outcome.is_stop());
+            speed = speed.next_down();
+        }
+        assert!(stops > 100 && stops < 900, "{stops} stops around the critical velocity");
     }
 }
