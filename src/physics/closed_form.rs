@@ -1117,7 +1117,7 @@ mod tests {
 
     #[test]
     fn dimensionless_critical_energies_are_those_of_the_table() {
-        // E_c/(d³ fc S) at k = 2, from notes on Li & Chen: H/d, N, value.
+        // E_c/(d³ fc S) at k = 2 by Li & Chen (2003): H/d, N, value.
         for (thickness, n, energy) in [
             (1.0, 5.0, 0.158_907_777_799_397_2),
             (2.0, 20.0, 0.25 * PI),

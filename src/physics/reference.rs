@@ -33,7 +33,7 @@ type Big = FBig<HalfEven, 2>;
 
 /// Bits of the first attempt: 77 decimal digits.
 const FIRST_BITS: usize = 256;
-/// Attempts before an answer is given up; the last has 4374 bits.
+/// Attempts before an answer is given up; the last has 6561 bits.
 const ATTEMPTS: usize = 8;
 /// Two attempts agree when they differ by less than 2^-AGREEMENT_BITS of the value: 52 digits.
 const AGREEMENT_BITS: isize = 173;
