@@ -10,6 +10,7 @@
 //! therefore the least W over the stage ends ahead and the exit; for a target that only resists that is W(exit).
 
 use super::event::{Event, EventKind, Outcome, State};
+use super::scalar::Scalar;
 use super::stage::{Problem, Stage};
 
 /// `expm1(z)/z`, 1 at zero.
@@ -73,21 +74,22 @@ pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State
 }
 
 /// Least W [m²/s²] over the stage ends ahead and the exit, carried on from rest at `depth` in stage `stage`.
-pub fn energy_beyond_stop(problem: &Problem, stage: usize, depth: f64) -> f64 {
+pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64) -> f64 {
     let mut w = 0.0;
     let mut from = depth;
     let mut least = f64::INFINITY;
     for index in stage..problem.stages.len() {
-        let law = &problem.stages[index];
-        let to = problem.limit_of(index).max(from);
+        let law = &problem.stages[index].values();
+        let mass = problem.mass.value();
+        let to = problem.limit_of(index).value().max(from);
         w = if law.viscosity > 0.0 {
-            w - 2.0 * law.static_work(from, to) / problem.mass
+            w - 2.0 * law.static_work(from, to) / mass
         } else {
-            carry(law, problem.mass, w, from, to)
+            carry(law, mass, w, from, to)
         };
         least = least.min(w);
         from = to;
-        if law.end >= problem.exit_depth {
+        if law.end >= problem.exit_depth.value() {
             break;
         }
     }

@@ -58,6 +58,17 @@ impl<S: Scalar> Stage<S> {
         (to - from) * (self.static_force + half * self.stiffness * (to + from))
     }
 
+    /// Values as `f64`.
+    pub fn values(&self) -> Stage {
+        Stage {
+            static_force: self.static_force.value(),
+            stiffness: self.stiffness.value(),
+            viscosity: self.viscosity.value(),
+            drag: self.drag.value(),
+            end: self.end.value(),
+        }
+    }
+
     /// Whether the stage can only slow the projectile (`p >= 0`); such a stage is never stiff.
     pub fn resists(&self) -> bool {
         self.static_force.value() >= 0.0

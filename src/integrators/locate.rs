@@ -1,0 +1,374 @@
+//! Where on one step does the projectile come to rest, and where does it pass the next boundary?
+//!
+//! What an event is belongs to [`crate::physics::event`]; here it is found on the polynomials of a step. No answer
+//! rests on signs at the ends of a step alone, unless a proof says that they suffice. The proofs, for a step inside
+//! one stage `M V' = -(p + s x + r V + q V²)` with `s, r, q >= 0`, starting at `V > 0`:
+//!
+//! 1. `x` grows strictly while `V > 0`. So the first root of `V` decides: a boundary is reached on the flight exactly
+//!    when it lies at or before the depth of rest, and then once.
+//! 2. `s = 0`: the equation of V is autonomous, so V is strictly monotone or constant. It has at most one root, and
+//!    `V(h) > 0` proves `V > 0` on the whole of `[0, h]`.
+//! 3. `q = 0`: the equation is linear. Roots of V are at least `pi/w` apart, `w² = s/M` (damping moves them further
+//!    apart; the overdamped V has one root at most). On a step with `w h < pi` the sign of `V(h)` therefore decides
+//!    as in 2. The step rule keeps `w h <= 1.8`.
+//! 4. Otherwise (`s > 0` and `q > 0`) nothing is assumed: [`first_root`] isolates the earliest root of V on the whole
+//!    step by Bernstein coefficients, roots of even multiplicity included.
+//!
+//! Inside a stage V has no minimum above zero: where `V' = 0`, `M V'' = -s V <= 0`.
+//!
+//! [`rest`] and [`passage`] then solve for the place. At a trial time the polynomial gives `x` and `V`, and the law
+//! itself gives `V'`, `V''`, `V'''` at no further cost, so one trial is corrected to fourth order. Both corrections
+//! are quadratic equations solved in the form that does not lose digits, `2 D/(v + sqrt(v² - 2 a D))`: they are exact
+//! for a constant force, and near a double root (the boundary is just touched) they converge as fast as elsewhere.
+
+use crate::physics::{Scalar, Stage, State};
+
+/// Trials allowed for one event. Four are usual; sixty halvings of a bracket exhaust a 53-bit number.
+const TRIALS_MAX: usize = 80;
+
+/// What a search on one step found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Found<S> {
+    /// The event, inside the step.
+    Inside(State<S>),
+    /// No event on the step; the state at its end.
+    Beyond(State<S>),
+    /// V vanishes on the step, and whether the boundary comes first must be asked from the place of rest.
+    RestFirst,
+}
+
+/// First three derivatives of V at a point, by the law of the stage (mass one).
+struct Jet<S> {
+    first: S,
+    second: S,
+    third: S,
+}
+
+impl<S: Scalar> Jet<S> {
+    /// ```text
+    /// V' = -(p + s x + r V + q V²),  V'' = -(s V + g V'),  V''' = -(s V' + g V'' + 2 q V'²),  g = r + 2 q V
+    /// ```
+    #[inline(always)]
+    fn at(law: &Stage<S>, point: &State<S>) -> Self {
+        let v = point.velocity;
+        let qv = law.drag * v;
+        let gradient = law.viscosity + qv + qv;
+        let first = -(law.static_force + law.stiffness * point.depth + (law.viscosity + qv) * v);
+        let second = -(law.stiffness * v + gradient * first);
+        let third = -(law.stiffness * first + gradient * second + (law.drag + law.drag) * first * first);
+        Self { first, second, third }
+    }
+}
+
+/// Time from `point` to rest, to fourth order: the quadratic `V + V' t + V'' t²/2 = 0`, then its cubic term.
+///
+/// Where the quadratic has no root, Newton's step if V falls, else infinite.
+#[inline(always)]
+fn time_to_rest<S: Scalar>(jet: &Jet<S>, velocity: S) -> S {
+    let deceleration = -jet.first;
+    let product = jet.second * velocity;
+    let discriminant = deceleration * deceleration - (product + product);
+    let positive = deceleration.value() > 0.0;
+    // Half of the discriminant gone means that the parabola bends away long before it reaches zero.
+    if discriminant.value() <= 0.0 || !(positive || discriminant.value() > 0.0) {
+        return if positive { velocity / deceleration } else { S::from_f64(f64::INFINITY) };
+    }
+    let slope = discriminant.sqrt();
+    let denominator = deceleration + slope;
+    if denominator.value() <= 0.0 {
+        return S::from_f64(f64::INFINITY);
+    }
+    let time = (velocity + velocity) / denominator;
+    let correction = jet.third * time * time * time * S::from_f64(1.0 / 6.0) / slope;
+    // Far away the cubic term says nothing; it may not move the trial by more than a quarter.
+    if correction.value().abs() > 0.25 * time.value().abs() { time } else { time + correction }
+}
+
+/// `1/6` to the precision of the number.
+#[inline(always)]
+fn sixth<S: Scalar>() -> S {
+    S::one() / S::from_f64(6.0)
+}
+
+/// Place of rest on `(0, span]`, searched from `start`; V is known to have at most one root there.
+///
+/// `at` evaluates the step's polynomials. A correction of at most `closing` is the last: its neglected terms are
+/// below `closing⁴`, and at rest `x` is stationary, so the depth needs no further evaluation.
+#[inline(always)]
+pub(crate) fn rest<S: Scalar>(
+    law: &Stage<S>,
+    at: impl Fn(f64) -> State<S>,
+    start: State<S>,
+    span: f64,
+    closing: f64,
+) -> Found<S> {
+    let mut point = start;
+    let (mut low, mut high, mut high_known) = (0.0, span, false);
+    for _ in 0..TRIALS_MAX {
+        let jet = Jet::at(law, &point);
+        let step = time_to_rest(&jet, point.velocity);
+        let here = point.time.value();
+        if step.value().abs() <= closing && here + step.value() <= span {
+            return Found::Inside(at_rest(&point, &jet, step));
+        }
+        let mut next = here + step.value();
+        if !(next > low && next < high) {
+            next = if high_known { 0.5 * (low + high) } else { span };
+        }
+        if next == here {
+            return Found::Inside(at_rest(&point, &jet, step));
+        }
+        point = at(next);
+        if point.velocity.value() > 0.0 {
+            if next >= span {
+                return Found::Beyond(point);
+            }
+            low = next;
+        } else {
+            high = next;
+            high_known = true;
+        }
+    }
+    // The bracket is one spacing wide by now: its newest end is the root.
+    Found::Inside(State { velocity: S::zero(), ..point })
+}
+
+/// The state of rest, `step` after `point`.
+#[inline(always)]
+fn at_rest<S: Scalar>(point: &State<S>, jet: &Jet<S>, step: S) -> State<S> {
+    let half = S::from_f64(0.5);
+    let mean = point.velocity + step * (jet.first * half + step * jet.second * sixth());
+    State { time: point.time + step, depth: point.depth + step * mean, velocity: S::zero() }
+}
+
+/// Time from `point` to the depth `law.end`, to fourth order, and whether the quadratic reaches it at all.
+///
+/// From `D = V t + V' t²/2`, root with `V >= 0`: `t = 2 D/(V + sqrt(V² + 2 V' D))`; then the cubic and quartic terms.
+#[inline(always)]
+fn time_to_depth<S: Scalar>(law: &Stage<S>, jet: &Jet<S>, point: &State<S>) -> (S, bool) {
+    let way = law.end - point.depth;
+    let v = point.velocity;
+    let product = jet.first * way;
+    let energy = v * v + (product + product);
+    if energy.value() < 0.0 {
+        // Out of reach for this parabola: its vertex comes nearest. (V' < 0 here, as D > 0; V' > 0 if D < 0.)
+        return (-v / jet.first, false);
+    }
+    let arrival = energy.sqrt();
+    let denominator = v + arrival;
+    if denominator.value() <= 0.0 {
+        return (S::zero(), way.value() == 0.0);
+    }
+    let time = (way + way) / denominator;
+    let beyond = time * time * time * sixth() * (jet.second + S::from_f64(0.25) * time * jet.third);
+    let slope = arrival + S::from_f64(0.5) * jet.second * time * time;
+    // Far away the higher terms say nothing; they may not move the trial by more than a quarter.
+    if beyond.value().abs() <= 0.25 * time.value().abs() * slope.value() {
+        (time - beyond / slope, true)
+    } else {
+        (time, true)
+    }
+}
+
+/// Where the depth `law.end` is passed on `(0, span]`, searched from `start` with V > 0 up to there.
+///
+/// `reached` says that the boundary lies at or before `span`, which then is the place of rest or a place beyond the
+/// boundary; the search then always ends `Inside`. Else it gives up with `RestFirst` at the first sign of a rest.
+#[inline(always)]
+pub(crate) fn passage<S: Scalar>(
+    law: &Stage<S>,
+    at: impl Fn(f64) -> State<S>,
+    start: State<S>,
+    span: f64,
+    reached: bool,
+    closing: f64,
+) -> Found<S> {
+    let mut point = start;
+    let (mut low, mut high, mut high_known) = (0.0, span, reached);
+    for _ in 0..TRIALS_MAX {
+        let jet = Jet::at(law, &point);
+        let (step, reaches) = time_to_depth(law, &jet, &point);
+        if !reaches && !reached {
+            return Found::RestFirst;
+        }
+        let here = point.time.value();
+        if reaches && step.value().abs() <= closing && here + step.value() <= span {
+            return Found::Inside(at_depth(law, &point, &jet, step));
+        }
+        let mut next = here + step.value();
+        if !(next > low && next < high) {
+            next = if high_known { 0.5 * (low + high) } else { span };
+        }
+        if next == here {
+            return Found::Inside(at_depth(law, &point, &jet, S::zero()));
+        }
+        point = at(next);
+        if point.velocity.value() > 0.0 && point.depth.value() < law.end.value() {
+            if next >= span {
+                return Found::Beyond(point);
+            }
+            low = next;
+        } else if point.velocity.value() > 0.0 || reached {
+            high = next;
+            high_known = true;
+        } else {
+            return Found::RestFirst;
+        }
+    }
+    let jet = Jet::at(law, &point);
+    Found::Inside(at_depth(law, &point, &jet, S::zero()))
+}
+
+/// The state at the boundary, `step` after `point`: its depth is the boundary's own, its velocity not negative.
+#[inline(always)]
+fn at_depth<S: Scalar>(law: &Stage<S>, point: &State<S>, jet: &Jet<S>, step: S) -> State<S> {
+    let half = S::from_f64(0.5);
+    let velocity = point.velocity + step * (jet.first + step * (jet.second * half + step * jet.third * sixth()));
+    let velocity = if velocity.value() > 0.0 { velocity } else { S::zero() };
+    State { time: point.time + step, depth: law.end, velocity }
+}
+
+/// Highest number of coefficients that [`first_root`] takes.
+pub const COEFFICIENTS_MAX: usize = 64;
+
+/// Earliest root of the polynomial `c[0] + c[1] t + ...` in `(0, span]`, roots of even multiplicity included.
+///
+/// On `[a, b]` the polynomial lies in the convex hull of its Bernstein coefficients, and has at most as many roots as
+/// they have changes of sign, of the same parity (Descartes). The step is walked from the left in boxes that are
+/// halved until the coefficients have one sign (no root) or one change of it (exactly one root, then bisected). A box
+/// whose values cannot be told from zero by their rounding error holds a root, too: that is how a touching root is
+/// found, and how a pair closer than rounding can separate counts as one. A root at `t = 0` itself is not reported:
+/// leading coefficients that are exactly zero are divided out first.
+///
+/// A simple root comes with a relative error of a few rounding units of the larger terms; a double root with the
+/// square root of that.
+///
+/// # Panics
+/// If there are more than [`COEFFICIENTS_MAX`] coefficients, or `span` is not positive and finite.
+pub fn first_root(coefficients: &[f64], span: f64) -> Option<f64> {
+    assert!(span > 0.0 && span.is_finite(), "span {span} is not positive and finite");
+    let count = coefficients.len();
+    assert!(count <= COEFFICIENTS_MAX, "{count} coefficients, at most {COEFFICIENTS_MAX} fit");
+    let skipped = coefficients.iter().take_while(|c| **c == 0.0).count();
+    let coefficients = &coefficients[skipped..];
+    let n = coefficients.len().checked_sub(1)?;
+
+    let mut whole = [0.0; COEFFICIENTS_MAX];
+    let whole = &mut whole[..=n];
+    let size = to_bernstein(coefficients, span, whole);
+    // De Casteljau and the conversion each take n additions of numbers not above `size`.
+    let noise = 4.0 * (n as f64 + 1.0) * f64::EPSILON * size;
+
+    let mut room = [0.0; COEFFICIENTS_MAX];
+    let (mut left, mut width) = (0.0, 1.0);
+    // Each box is halved at most WIDTH_BITS times, and at most n boxes of one width hold a change of sign.
+    for _ in 0..COEFFICIENTS_MAX * WIDTH_BITS {
+        let part = &mut room[..=n];
+        restrict(whole, left, left + width, part);
+        if part.iter().all(|b| *b > noise) || part.iter().all(|b| *b < -noise) {
+            left += width;
+            if left >= 1.0 {
+                return None;
+            }
+            // Boxes stay aligned to their width, so the next may be as wide as its place allows.
+            while width < 0.5 && (left / (2.0 * width)).fract() == 0.0 {
+                width *= 2.0;
+            }
+            continue;
+        }
+        let one_root = part[0].abs() > noise && part[n].abs() > noise && part[0] * part[n] < 0.0 && changes(part) == 1;
+        if one_root {
+            return Some(span * bisect(whole, left, left + width));
+        }
+        if width <= TOUCH_WIDTH || part.iter().all(|b| b.abs() <= noise) {
+            return Some(span * (left + 0.5 * width));
+        }
+        width *= 0.5;
+    }
+    None
+}
+
+/// Halvings before a box that still has no verdict counts as a touching root.
+const WIDTH_BITS: usize = 40;
+/// `2^-40`, far below the width `sqrt(noise)` in which a double root cannot be told from its neighbourhood.
+const TOUCH_WIDTH: f64 = 1.0 / (1_u64 << WIDTH_BITS) as f64;
+
+/// Bernstein coefficients on `[0, span]`, `b_i = sum over k <= i of C(i,k)/C(n,k) c_k span^k`; returns the sum of
+/// `|c_k| span^k`, which bounds them.
+fn to_bernstein(coefficients: &[f64], span: f64, bernstein: &mut [f64]) -> f64 {
+    let n = coefficients.len() - 1;
+    let mut power = 1.0;
+    let mut size = 0.0;
+    for (k, c) in coefficients.iter().enumerate() {
+        bernstein[k] = c * power;
+        size += bernstein[k].abs();
+        power *= span;
+    }
+    // Dividing by C(n,k) first, the rest is the binomial sum, which n rounds of additions perform.
+    let mut binomial = 1.0;
+    for (k, b) in bernstein.iter_mut().enumerate() {
+        *b /= binomial;
+        binomial *= (n - k) as f64 / (k as f64 + 1.0);
+    }
+    for round in 1..=n {
+        for i in (round..=n).rev() {
+            bernstein[i] += bernstein[i - 1];
+        }
+    }
+    size
+}
+
+/// Bernstein coefficients on `[from, to]` of the polynomial whose coefficients on `[0, 1]` are `whole`.
+fn restrict(whole: &[f64], from: f64, to: f64, part: &mut [f64]) {
+    part.copy_from_slice(whole);
+    let n = whole.len() - 1;
+    // Left part [0, to]: de Casteljau from the back keeps b_0 of every round.
+    if to < 1.0 {
+        for round in 1..=n {
+            for i in (round..=n).rev() {
+                part[i] = (1.0 - to) * part[i - 1] + to * part[i];
+            }
+        }
+    }
+    // Right part [from/to, 1] of that.
+    if from > 0.0 {
+        let ratio = from / to;
+        for round in 1..=n {
+            for i in 0..=n - round {
+                part[i] = (1.0 - ratio) * part[i] + ratio * part[i + 1];
+            }
+        }
+    }
+}
+
+/// Changes of sign in a sequence, zeros left out.
+fn changes(sequence: &[f64]) -> usize {
+    let mut count = 0;
+    let mut last = 0.0;
+    for value in sequence.iter().copied().filter(|v| *v != 0.0) {
+        if last * value < 0.0 {
+            count += 1;
+        }
+        last = value;
+    }
+    count
+}
+
+/// The one change of sign in `[from, to]`, by halving down to neighbouring numbers.
+fn bisect(whole: &[f64], mut from: f64, mut to: f64) -> f64 {
+    let value = |t: f64| {
+        let mut room = [0.0; COEFFICIENTS_MAX];
+        let part = &mut room[..whole.len()];
+        restrict(whole, 0.0, t, part);
+        part[whole.len() - 1]
+    };
+    let rising = value(to) > 0.0;
+    for _ in 0..64 {
+        let middle = 0.5 * (from + to);
+        if middle <= from || middle >= to {
+            break;
+        }
+        if (value(middle) > 0.0) == rising { to = middle } else { from = middle }
+    }
+    to
+}
