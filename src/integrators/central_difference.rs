@@ -1625,6 +1625,18 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn rest_is_never_told_above_a_place_already_reached() {
+        // A coarse step through a viscous stage: the parabola has its vertex at x = 0.11, V on the chord falls to zero
+        // later, where the parabola is back at 0.06.
+        let viscous = |end| stage(64.0, 0.0, 64.0, 0.0, end);
+        let problem = stages(smallvec![viscous(0.1), viscous(f64::INFINITY)], 8.0, f64::INFINITY);
+        let flight = scheme(0.05, VelocityAt::LaggedHalfStep, Boundaries::Interpolated).fly(&problem, Detail::Events);
+        let flight = flight.unwrap();
+        assert_eq!(kinds(&flight), [EventKind::StageEnd(0), EventKind::Rest]);
+        assert_eq!(flight.end.depth, 0.1);
+    }
+
+    #[test]
     fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
         for tunnel in [1.0, 64.0, 1e6] {
             let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], f64::INFINITY);
@@ -1764,6 +1776,11 @@ pub(crate) mod tests {
                 approx::assert_relative_eq!(flight.end.time, flight.cost.steps as f64 * step, max_relative = 1e-15);
             }
         }
+        // Thinner still, the stability limit wins over the number of steps.
+        let thinnest = thin(1e-14);
+        let step = CentralDifference::default().time_step(&thinnest);
+        let limit = stability_limit(&thinnest.stages[0], MASS, SPEED, VelocityAt::LaggedHalfStep);
+        assert_eq!(step, PART_OF_LIMIT * limit);
         let nothing = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 0.0, 0.0);
         assert_eq!(CentralDifference::default().fly(&nothing, Detail::End).unwrap().outcome, Outcome::Perforated);
     }
