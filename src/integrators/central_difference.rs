@@ -1595,6 +1595,55 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_place_or_rest_exactly_at_a_node_belongs_to_that_step() {
+        let step = 1.0 / 64.0;
+        for (velocity, boundaries) in combinations() {
+            let scheme = scheme(step, velocity, boundaries);
+            let alone = binary(smallvec![Stage::tunnel(64.0, 0.0)], f64::INFINITY);
+            let rest = scheme.fly(&Problem { crater: None, ..alone.clone() }, Detail::Events).unwrap();
+            assert_eq!((rest.end, rest.cost.steps), (State { time: 0.25, depth: 1.0, velocity: 0.0 }, 16));
+            let exit = scheme.fly(&Problem { crater: None, exit_depth: 0.75, ..alone }, Detail::Events).unwrap();
+            assert_eq!((exit.end, exit.cost.steps), (State { time: 0.125, depth: 0.75, velocity: 4.0 }, 8));
+            assert_eq!(kinds(&exit), [EventKind::Exit]);
+            // The force of the far side holds from the node that stands on the end.
+            let jump = smallvec![stage(64.0, 0.0, 0.0, 0.0, 0.75), Stage::tunnel(128.0, 0.0)];
+            let flight = scheme.fly(&binary(jump, f64::INFINITY), Detail::Trajectory).unwrap();
+            let node = flight.trajectory.iter().rfind(|row| row.state.depth == 0.75).unwrap();
+            assert_eq!((node.state.time, node.stage, node.force), (0.125, 1, 128.0));
+        }
+    }
+
+    #[test]
+    fn a_stage_end_touched_on_the_way_back_to_rest_is_reached() {
+        // Whole steps see x(6) = 0.984 and V < 0; the vertex in between stands at 1.
+        let list: Stages = smallvec![stage(64.0, 0.0, 0.0, 0.0, 0.999), Stage::tunnel(64.0, 0.0)];
+        for velocity in VELOCITIES {
+            for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
+                let scheme = scheme(3.0 / 64.0, velocity, boundaries);
+                let flight = scheme.fly(&binary(list.clone(), f64::INFINITY), Detail::Events).unwrap();
+                assert_eq!(kinds(&flight), [EventKind::CraterEnd, EventKind::Rest]);
+                assert_eq!(flight.outcome, Outcome::StoppedInTunnel);
+                approx::assert_relative_eq!(flight.end.depth, 1.0, max_relative = 1e-15);
+                assert_eq!(flight.cost.rejected_steps, u64::from(boundaries == Boundaries::Landed));
+                let flight = scheme.fly(&binary(list.clone(), 0.999), Detail::Events).unwrap();
+                assert_eq!(flight.outcome, Outcome::Perforated);
+            }
+        }
+    }
+
+    #[test]
+    fn rest_is_never_told_above_a_place_already_reached() {
+        // A coarse step through a viscous stage: the parabola has its vertex at x = 0.11, V on the chord falls to zero
+        // later, where the parabola is back at 0.06.
+        let viscous = |end| stage(64.0, 0.0, 64.0, 0.0, end);
+        let problem = stages(smallvec![viscous(0.1), viscous(f64::INFINITY)], 8.0, f64::INFINITY);
+        let flight = scheme(0.05, VelocityAt::LaggedHalfStep, Boundaries::Interpolated).fly(&problem, Detail::Events);
+        let flight = flight.unwrap();
+        assert_eq!(kinds(&flight), [EventKind::StageEnd(0), EventKind::Rest]);
+        assert_eq!(flight.end.depth, 0.1);
+    }
+
+    #[test]
     fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
         for tunnel in [1.0, 64.0, 1e6] {
             let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], f64::INFINITY);
@@ -1685,6 +1734,24 @@ pub(crate) mod tests {
         );
         assert!(lagged(1.3e-5).step_limit.unwrap().stable);
         assert!(!lagged(1.4e-5).step_limit.unwrap().stable);
+        // Each stage is judged by its own speeds and steps.
+        let drag = 100.0;
+        let slowed = stages(
+            smallvec![stage(4e5, 0.0, 0.0, 0.0, 0.2), stage(4e5, 1e9, 0.0, drag, f64::INFINITY)],
+            SPEED,
+            f64::INFINITY,
+        );
+        let scheme = CentralDifference {
+            steps: Steps::Given([vec![5e-4], vec![2e-6; 10_000]].concat()),
+            ..scheme(1.0, VelocityAt::LaggedHalfStep, Boundaries::Landed)
+        };
+        let flight = scheme.fly(&slowed, Detail::Events).unwrap();
+        let behind = flight.events[0].state.velocity;
+        assert!(flight.events[0].state.time > 5e-4 && behind < 0.7 * SPEED);
+        let expected = stability_limit(&slowed.stages[1], MASS, behind, VelocityAt::LaggedHalfStep);
+        let told = flight.step_limit.unwrap();
+        approx::assert_relative_eq!(told.limit, expected, max_relative = 1e-14);
+        assert!(told.stable);
         // A crater that a landed step crosses at once is flown with that short step.
         assert!(flown(1.0, VelocityAt::Centred, 300.0 * SPEED).stable);
     }
@@ -1716,6 +1783,11 @@ pub(crate) mod tests {
                 approx::assert_relative_eq!(flight.end.time, flight.cost.steps as f64 * step, max_relative = 1e-15);
             }
         }
+        // Thinner still, the stability limit wins over the number of steps.
+        let thinnest = thin(1e-14);
+        let step = CentralDifference::default().time_step(&thinnest);
+        let limit = stability_limit(&thinnest.stages[0], MASS, SPEED, VelocityAt::LaggedHalfStep);
+        assert_eq!(step, PART_OF_LIMIT * limit);
         let nothing = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 0.0, 0.0);
         assert_eq!(CentralDifference::default().fly(&nothing, Detail::End).unwrap().outcome, Outcome::Perforated);
     }
@@ -1744,6 +1816,10 @@ pub(crate) mod tests {
             let IntegrationError::NeverEnds { last, .. } = error else { unreachable!("{error}") };
             approx::assert_relative_eq!(last.depth, 10.0, max_relative = 1e-9);
         }
+        // Overdamped by the step, V falls to zero exactly, where no force would hold it.
+        let dashpot = stages(smallvec![stage(0.0, 0.0, 256.0, 0.0, f64::INFINITY)], 8.0, 10.0);
+        let error = scheme(1.0 / 64.0, VelocityAt::LaggedHalfStep, Boundaries::StepEnd).fly(&dashpot, Detail::End);
+        assert!(matches!(error, Err(IntegrationError::NeverEnds { .. })), "{error:?}");
         // A dashpot alone stops the projectile nowhere: V underflows to zero on the way, which is not rest.
         let dashpot = stages(smallvec![stage(0.0, 0.0, 200.0, 0.0, f64::INFINITY)], SPEED, 10.0);
         for velocity in VELOCITIES {
@@ -1770,7 +1846,7 @@ pub(crate) mod tests {
         }
         let driven = stages(smallvec![stage(-1e300, 1e-300, 0.0, 0.0, f64::INFINITY)], SPEED, f64::INFINITY);
         let error = scheme(1e6, VelocityAt::Centred, Boundaries::Landed).fly(&driven, Detail::End).unwrap_err();
-        assert!(matches!(error, IntegrationError::NotFinite { .. }), "{error}");
+        assert!(matches!(error, IntegrationError::NotFinite { what: "depth", .. }), "{error}");
         let rough = stages(smallvec![Stage::tunnel(STRENGTH, 1e300)], 1e10, 1.0);
         for velocity in VELOCITIES {
             match scheme(1e-15, velocity, Boundaries::StepEnd).fly(&rough, Detail::End) {
