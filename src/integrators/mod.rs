@@ -2,6 +2,10 @@
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 
+#[cfg(feature = "diffsol")]
+pub mod diffsol;
 pub mod outcome;
 
+#[cfg(feature = "diffsol")]
+pub use diffsol::{Diffsol, Scheme};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample, StepLimit};
