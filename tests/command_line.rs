@@ -117,7 +117,7 @@ fn bad_input_is_refused_with_exit_2_an_underline_and_nothing_on_standard_output(
     assert_eq!(code(&output), 2);
     assert!(output.stdout.is_empty());
     let message = String::from_utf8(output.stderr).unwrap();
-    assert!(message.contains("bad.toml:6:8"), "{message}");
+    assert!(message.contains("bad.toml:6:11"), "{message}");
     assert!(message.contains("mass"), "{message}");
     assert!(!trajectory.exists());
 }

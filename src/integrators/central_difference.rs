@@ -1102,7 +1102,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         if self.detail == Detail::End {
             self.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest));
         } else {
-            notes.extend(self.notes(stage));
+            notes.push("error bar of the exit margin not given: a fixed step has no error estimate".to_owned());
         }
         Flight {
             outcome,
@@ -1116,21 +1116,6 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             step_limit: Some(self.scheme.step_limit),
             notes,
         }
-    }
-
-    fn notes(&self, stage: usize) -> Vec<String> {
-        let unreached = self.scheme.problem.stages.len() - 1 - stage;
-        let mut notes = vec!["error bar of the exit margin: a fixed step has no error estimate".to_owned()];
-        if unreached > 0 {
-            notes.push(format!("the last {unreached} stage(s): not reached, their force was never evaluated"));
-        }
-        if !self.scheme.problem.has_exit() {
-            notes.push("exit: the target has no far side".to_owned());
-        }
-        if self.detail != Detail::Trajectory {
-            notes.push("trajectory: not asked for".to_owned());
-        }
-        notes
     }
 }
 

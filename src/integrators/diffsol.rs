@@ -172,11 +172,7 @@ impl Integrator for Diffsol {
     }
 
     fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
-        let mut flight = self.study(|fly_one| fly_one(problem, detail))??;
-        if detail >= Detail::Events && !self.scheme.is_implicit() {
-            flight.notes.push("Jacobian: an explicit method needs none".to_owned());
-        }
-        Ok(flight)
+        self.study(|fly_one| fly_one(problem, detail))?
     }
 }
 
@@ -846,8 +842,6 @@ impl<'p> Course<'p> {
         let undecided = exit_margin.is_some_and(|margin| margin.abs() <= self.margin_error);
         if self.detail == Detail::End {
             self.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest));
-        } else if stage + 1 < self.problem.stages.len() {
-            self.notes.push(format!("stages from {} on: the flight ended in stage {stage}", stage + 1));
         }
         Flight {
             outcome: if undecided { Outcome::Undecided } else { outcome },
@@ -1296,7 +1290,6 @@ mod tests {
         problem.stages[1].static_force = f64::NAN;
         let flight = Diffsol::new(Scheme::Tsit45, 1e-10).fly(&problem, Detail::Events).unwrap();
         assert_eq!(flight.outcome, Outcome::StoppedInCrater);
-        assert!(flight.notes.iter().any(|note| note.contains("stages from 1 on")), "{:?}", flight.notes);
     }
 
     #[test]
