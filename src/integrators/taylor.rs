@@ -39,6 +39,9 @@ const PHASE_MAX: f64 = 1.8;
 /// Longest step in its own unit of time. No flight needs more, and beyond it coefficients that underflow would count.
 const SPAN_MAX: f64 = 64.0;
 
+/// Most coefficients that are computed without a loop.
+const UNROLLED_MAX: usize = 24;
+
 /// The Taylor integrator.
 ///
 /// The default works to the round-off of the number type. A looser tolerance takes a lower order, for
@@ -88,8 +91,9 @@ impl Taylor {
 
     /// Truncation error of one step relative to the velocity, in the number type `S`.
     pub fn tolerance_in<S: Scalar>(&self) -> f64 {
-        // A flight takes a few steps and adds up their errors; half a rounding unit each stays below the rounding.
-        self.tolerance.map_or(0.0, |rtol| 0.25 * rtol).max(0.5 * S::EPSILON)
+        // What is neglected is smaller than the last term kept, which is made equal to this: by a factor of six at the
+        // usual ratio of step and radius. Measured over random scenes, the errors then stay below `rtol`.
+        self.tolerance.map_or(0.0, |rtol| 2.0 * rtol).max(S::EPSILON)
     }
 
     /// Flies `problem` in the number type `S`. See [`Integrator::fly`].
@@ -117,7 +121,7 @@ impl Taylor {
         } else if tolerance > 1e-13 {
             Course::<S, 16, 18>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-17 {
-            Course::<S, 20, 24>::new(problem, tolerance, detail).fly()
+            Course::<S, 22, 24>::new(problem, tolerance, detail).fly()
         } else {
             Course::<S, 40, 48>::new(problem, tolerance, detail).fly()
         }
@@ -129,6 +133,7 @@ impl Taylor {
         for (index, law) in problem.stages.iter().enumerate() {
             let shape = match Shape::of(law) {
                 Shape::Constant => "constant force: the series ends, one step serves",
+                Shape::Spring => "a spring alone: recurrence of one term, no convolution",
                 Shape::Linear => "no drag: recurrence of two terms, no convolution",
                 Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
                 Shape::General => "stiffness and drag: earliest root isolated on every step",
@@ -168,6 +173,8 @@ impl Integrator for Taylor {
 enum Shape {
     /// p alone: V is linear in t.
     Constant,
+    /// p, s: linear, and every second coefficient follows from the one before it alone.
+    Spring,
     /// p, s, r: linear.
     Linear,
     /// p, r, q: autonomous in V, a Riccati equation.
@@ -181,6 +188,7 @@ impl Shape {
     fn of<S: Scalar>(law: &Stage<S>) -> Self {
         match (law.stiffness.value() == 0.0, law.drag.value() == 0.0) {
             (true, true) if law.viscosity.value() == 0.0 => Self::Constant,
+            (false, true) if law.viscosity.value() == 0.0 => Self::Spring,
             (_, true) => Self::Linear,
             (true, false) => Self::Drag,
             (false, false) => Self::General,
@@ -217,40 +225,61 @@ pub(crate) struct Series<S, const K: usize> {
 impl<S: Scalar, const K: usize> Series<S, K> {
     /// The first K coefficients of V and of x for unit mass, from `x = 0` and V = `velocity`.
     ///
-    /// `SPRING` and `DRAG` say whether `s` and `q` may differ from zero. With `g = r + 2 q v[0]`,
+    /// `SPRING`, `DRAG` and `DAMPED` say whether `s`, `q` and `r` may differ from zero (with drag, r always may).
+    /// With `g = r + 2 q v[0]`,
     ///
     /// ```text
-    /// v[k+1] = -(g v[k] + s v[k-1]/k + q (2 sum over 0 < i < k/2 of v[i] v[k-i] + [k even] v[k/2]²)) / (k+1)
+    /// v[k+1] = -(g v[k] + s v[k-1]/k + 2 q (sum over 0 < i < k/2 of v[i] v[k-i] + [k even] v[k/2]²/2)) / (k+1)
     /// ```
     ///
-    /// so the longest chain of dependent operations is one product and one sum a coefficient.
+    /// arranged so that the longest chain of dependent operations is one product and one sum a coefficient.
     #[inline(always)]
-    pub(crate) fn new<const SPRING: bool, const DRAG: bool>(law: &Stage<S>, velocity: S) -> Self {
+    pub(crate) fn new<const SPRING: bool, const DRAG: bool, const DAMPED: bool>(law: &Stage<S>, velocity: S) -> Self {
         let mut v = [S::zero(); K];
         let mut advance = [S::zero(); K];
+        // 2 q v[i], so that a sum of products needs no factor afterwards.
+        let mut pull = [S::zero(); K];
         let qv = law.drag * velocity;
-        let gradient = law.viscosity + qv + qv;
         let twice_drag = law.drag + law.drag;
+        let gradient = law.viscosity + qv + qv;
         v[0] = velocity;
         advance[0] = velocity;
         v[1] = -(law.static_force + (law.viscosity + qv) * velocity);
-        for k in 1..K - 1 {
-            advance[k] = v[k] * reciprocal(k + 1);
-            let mut rest = S::zero();
-            if SPRING {
-                rest = law.stiffness * advance[k - 1];
-            }
-            if DRAG {
-                let mut sum = S::zero();
-                for i in 1..k.div_ceil(2) {
-                    sum += v[i] * v[k - i];
+        // One coefficient. A macro, for with a literal k the sum below has a fixed length and needs no loop.
+        macro_rules! coefficient {
+            ($k:expr) => {{
+                let k: usize = $k;
+                let minus = -reciprocal::<S>(k + 1);
+                advance[k] = v[k] * reciprocal(k + 1);
+                let mut rest = S::zero();
+                if DRAG {
+                    pull[k] = twice_drag * v[k];
+                    if k % 2 == 0 {
+                        rest = S::from_f64(0.5) * (pull[k / 2] * v[k / 2]);
+                    }
+                    // The newest coefficient comes last: the rest of the sum is ready before it is.
+                    for i in (1..k.div_ceil(2)).rev() {
+                        rest += pull[i] * v[k - i];
+                    }
+                    rest = rest * minus;
                 }
-                rest += twice_drag * sum;
-                if k % 2 == 0 {
-                    rest += law.drag * (v[k / 2] * v[k / 2]);
+                if SPRING {
+                    let spring = (law.stiffness * (minus * reciprocal(k))) * v[k - 1];
+                    rest = if DRAG { rest + spring } else { spring };
                 }
+                v[k + 1] = if DRAG || DAMPED { rest + (gradient * minus) * v[k] } else { rest };
+            }};
+        }
+        macro_rules! coefficients {
+            ($($k:literal)*) => { $( if $k + 1 < K { coefficient!($k); } )* };
+        }
+        if K > UNROLLED_MAX || S::EPSILON < f64::EPSILON {
+            for k in 1..K - 1 {
+                coefficient!(k);
             }
-            v[k + 1] = -((gradient * v[k] + rest) * reciprocal(k + 1));
+        } else {
+            // A loop over k would spend more on its bounds than on the sums.
+            coefficients!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22);
         }
         advance[K - 1] = v[K - 1] * reciprocal(K);
         Self { velocity: v, advance }
@@ -436,14 +465,17 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             self.refuse_endless(law)?;
         }
         match Shape::of(law) {
-            Shape::Constant => self.step_through::<4, false, false>(),
-            Shape::Linear => self.step_through::<L, true, false>(),
-            Shape::Drag => self.step_through::<K, false, true>(),
-            Shape::General => self.step_through::<K, true, true>(),
+            Shape::Constant => self.step_through::<4, false, false, false>(),
+            Shape::Spring => self.step_through::<L, true, false, false>(),
+            Shape::Linear => self.step_through::<L, true, false, true>(),
+            Shape::Drag => self.step_through::<K, false, true, true>(),
+            Shape::General => self.step_through::<K, true, true, true>(),
         }
     }
 
-    fn step_through<const N: usize, const SPRING: bool, const DRAG: bool>(&mut self) -> Result<bool, IntegrationError> {
+    fn step_through<const N: usize, const SPRING: bool, const DRAG: bool, const DAMPED: bool>(
+        &mut self,
+    ) -> Result<bool, IntegrationError> {
         let problem = self.problem;
         let stage = &problem.stages[self.stage];
         let limit = problem.limit_of(self.stage);
@@ -481,7 +513,7 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             let start =
                 State { time: S::zero(), depth: S::zero(), velocity: velocity * S::from_f64(1.0 / unit_velocity) };
 
-            let series = Series::<S, N>::new::<SPRING, DRAG>(&law, start.velocity);
+            let series = Series::<S, N>::new::<SPRING, DRAG, DAMPED>(&law, start.velocity);
             self.cost.steps += 1;
             self.cost.force_evaluations += if SPRING || DRAG { N as u64 - 1 } else { 1 };
             let span = if SPRING || DRAG { series.span(self.tolerance) } else { f64::INFINITY };
