@@ -647,7 +647,8 @@ impl<'a> Separable<'a> {
         let h: Vec<f64> = self.logs.iter().map(|log| log.exp()).collect();
         let design = nalgebra::DMatrix::from_fn(n, 3, |i, j| w[i].sqrt() * h[i].powi(j as i32));
         let values = nalgebra::DVector::from_fn(n, |i, _| w[i].sqrt() * self.table[i].value);
-        let solution = design.clone().svd(true, true).solve(&values, 1e-12).ok()?;
+        let factors = design.clone().qr();
+        let solution = factors.r().solve_upper_triangular(&(factors.q().transpose() * &values))?;
         let sum = (&design * &solution - values).norm_squared() * n as f64 / total;
         let at_finest = solution[0] + h[0] * (solution[1] + h[0] * solution[2]);
         Some(Fit { order: 1.0, limit: solution[0], constant: solution[1], at_finest, sum, likelihood: 0.0, weights })
