@@ -988,6 +988,15 @@ mod tests {
     }
 
     #[test]
+    fn rows_that_differ_from_the_exact_value_by_their_printed_digits_only_are_left_out() {
+        let text = table(9, |h, _| ((0.173_214_1 + 0.02 * h * h) * 1e6).round() / 1e6);
+        let audit = judge_text(&text, Some(2.0), Some(0.173_214_1));
+        assert_eq!(audit.exit_code(), 0, "{:?}", audit.findings);
+        let finest = audit.quantities[0].points[0];
+        assert_eq!((finest.used, finest.excluded), (false, Some(Exclusion::RoundOffFloor)));
+    }
+
+    #[test]
     fn not_finite_values_fail_in_every_spelling() {
         for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
             let audit = judge_text(&format!("dt_s,depth_m\n{BASE}16e-6,{cell}\n"), Some(2.0), Some(1.0));

@@ -234,10 +234,10 @@ impl OrderFit {
         let holds = |order: f64| low <= order && order <= high;
         match self.class {
             Class::Diverging => OrderVerdict::Fail,
-            Class::AtFloor | Class::Oscillating => OrderVerdict::Undecided,
+            // An error that does not fall misses every order that its band excludes, whatever else it does.
             Class::Converging | Class::Undecided if !holds(formal) => OrderVerdict::Fail,
             Class::Converging if !holds(formal - 1.0) && !holds(formal + 1.0) => OrderVerdict::Pass,
-            Class::Converging | Class::Undecided => OrderVerdict::Undecided,
+            _ => OrderVerdict::Undecided,
         }
     }
 

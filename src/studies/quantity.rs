@@ -14,7 +14,7 @@ pub enum Quantity {
     CraterEndTime,
     /// Velocity at x = k d [m/s].
     CraterEndVelocity,
-    /// Critical velocity V_c [m/s].
+    /// Critical velocity `V_c` [m/s].
     CriticalVelocity,
 }
 
