@@ -232,6 +232,27 @@ impl CentralDifference {
         self.dispatch(problem, Free { count })
     }
 
+    /// The states of the scheme under an outer force `source(j, t)` [N] that drives, the stages parted by time:
+    /// `M x'' = -F_j(x, x') + source(j, t)` until `ends[j]` [s], ascending, which is landed on as
+    /// [`Boundaries::Landed`] lands on a stage end. All other events are off. For manufactured solutions.
+    ///
+    /// # Errors
+    /// `BadOption` as in [`Self::fly_in`], or `ends` without a stage each; `StepBudgetSpent` before the last end. As
+    /// with [`Self::free_states`] overflow is no error.
+    pub fn forced_states<S: Scalar>(
+        &self,
+        problem: &Problem<S>,
+        source: impl Fn(usize, S) -> S,
+        ends: &[f64],
+    ) -> Result<Vec<State<S>>, IntegrationError> {
+        self.check::<S>()?;
+        if ends.is_empty() || ends.len() > problem.stages.len() {
+            let (option, value, allowed) = ("ends", format!("{} times", ends.len()), "one for each stage flown");
+            return Err(IntegrationError::BadOption { option, value, allowed });
+        }
+        self.dispatch(problem, Forced { source, ends })
+    }
+
     /// Refuses options outside their domain, as numbers of type `S`.
     fn check<S: Scalar>(&self) -> Result<(), IntegrationError> {
         let bad = |option, value: String, allowed| Err(IntegrationError::BadOption { option, value, allowed });
@@ -809,6 +830,13 @@ impl<'a, S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Scheme<'a, S, A, C, R> {
         Node { x, u, v: u.value() - half * d, d, h }
     }
 
+    /// A step of size `h` by Eq. 6-7, whatever lies in its way; the clock is not told.
+    fn advance(&mut self, h: S) {
+        let u = self.node.u.plus(-(S::from_f64(0.5) * (self.node.h + h) * self.node.d));
+        let x = self.node.x.plus(h * u.value());
+        self.node = self.arrive(x, u, h);
+    }
+
     /// The step from the present node to `next`.
     fn step_to(&self, next: &Node<S, A>, time: S) -> Step<S> {
         let to = State { time, depth: next.x.value(), velocity: next.v };
@@ -839,11 +867,54 @@ impl<S: Scalar> Job<S> for Free {
         for _ in 0..self.count {
             states.push(scheme.state());
             let h = scheme.clock.step();
-            let kick = S::from_f64(0.5) * (scheme.node.h + h) * scheme.node.d;
-            let u = scheme.node.u.plus(-kick);
-            let x = scheme.node.x.plus(h * u.value());
-            scheme.node = scheme.arrive(x, u, h);
+            scheme.advance(h);
             scheme.clock.tick();
+        }
+        Ok(states)
+    }
+}
+
+/// [`CentralDifference::forced_states`].
+struct Forced<'a, F> {
+    source: F,
+    ends: &'a [f64],
+}
+
+impl<S: Scalar, F: Fn(usize, S) -> S> Job<S> for Forced<'_, F> {
+    type Answer = Vec<State<S>>;
+
+    fn run<A: Sum<S>, C: Clock<S>, R: Rule>(
+        self,
+        mut scheme: Scheme<'_, S, A, C, R>,
+    ) -> Result<Self::Answer, IntegrationError> {
+        let mass = scheme.problem.mass;
+        let mut states = vec![scheme.state()];
+        for (stage, &end) in self.ends.iter().enumerate() {
+            let law = per_mass(&scheme.problem.stages[stage], mass);
+            // At a given time the outer force is one more static force, whatever the velocity rule makes of the rest.
+            let law_at = |time| Stage { static_force: law.static_force - (self.source)(stage, time) / mass, ..law };
+            let start = scheme.state();
+            scheme.law = law_at(start.time);
+            scheme.start(start);
+            let mut landed = false;
+            while !landed {
+                if states.len() as u64 > scheme.options.max_steps {
+                    let (max_steps, last) = (scheme.options.max_steps, scheme.state().values());
+                    return Err(IntegrationError::StepBudgetSpent { max_steps, last });
+                }
+                let (now, h) = (scheme.clock.now(), scheme.clock.step());
+                let left = S::from_f64(end) - now;
+                landed = left.value() <= h.value();
+                let h = if landed { left } else { h };
+                scheme.law = law_at(now + h);
+                scheme.advance(h);
+                if landed {
+                    scheme.clock.tick_part(h);
+                } else {
+                    scheme.clock.tick();
+                }
+                states.push(scheme.state());
+            }
         }
         Ok(states)
     }
@@ -1900,6 +1971,36 @@ pub(crate) mod tests {
             }
             close(dual.values(), 1e-15);
         }
+    }
+
+    #[test]
+    fn a_constant_source_is_a_smaller_static_force_and_an_end_in_time_changes_the_law() {
+        let law = stage(STRENGTH, 2e5, 30.0, DRAG, f64::INFINITY);
+        let driven = Stage { static_force: STRENGTH - 4e5, ..law };
+        for velocity in VELOCITIES {
+            let scheme = scheme(1e-6, velocity, Boundaries::Landed);
+            let plain = scheme.free_states(&stages(smallvec![driven], SPEED, f64::INFINITY), 101).unwrap();
+            let forced = stages(smallvec![law, law], SPEED, f64::INFINITY);
+            let pushed = scheme.forced_states(&forced, |_, _| 4e5, &[100.5e-6]).unwrap();
+            assert_eq!(pushed.len(), 102);
+            for (a, b) in plain.iter().zip(&pushed) {
+                assert!((a.depth - b.depth).abs() <= 1e-15, "{a} {b}");
+            }
+            // 2e5 N for 50.5 µs, then none: the difference of the momenta is the impulse, whatever the steps.
+            let [first, second] = [[2e5, 0.0], [0.0, 0.0]].map(|push| {
+                let weightless = Stage { drag: 0.0, viscosity: 0.0, stiffness: 0.0, ..law };
+                let forced = stages(smallvec![weightless, weightless], SPEED, f64::INFINITY);
+                scheme.forced_states(&forced, |j, _| push[j], &[50.5e-6, 90e-6]).unwrap().pop().unwrap()
+            });
+            assert!((first.time - 90e-6).abs() < 1e-18);
+            assert!((MASS * (first.velocity - second.velocity) / (2e5 * 50.5e-6) - 1.0).abs() < 1e-12);
+        }
+        let short = CentralDifference { max_steps: 10, ..scheme(1e-6, VelocityAt::Centred, Boundaries::Landed) };
+        let problem = stages(smallvec![law], SPEED, f64::INFINITY);
+        let spent = short.forced_states(&problem, |_, _| 0.0, &[1e-4]).unwrap_err();
+        assert!(matches!(spent, IntegrationError::StepBudgetSpent { max_steps: 10, .. }), "{spent}");
+        assert!(short.forced_states(&problem, |_, _| 0.0, &[1e-4, 2e-4]).unwrap_err().is_usage());
+        assert!(short.forced_states(&problem, |_, _| 0.0, &[]).unwrap_err().is_usage());
     }
 
     #[test]

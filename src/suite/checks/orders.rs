@@ -50,12 +50,13 @@ pub(super) fn fixed_step(
             study.formal
         )));
     }
-    judge(study, expected, "dt_s")
+    judge(study.fit, study.lost, expected, "dt_s")
 }
 
 /// Distance of the slope of error against tolerance from 1.
 pub(super) fn proportionality(subject: &Subject<'_>, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
-    judge(tolerance_study(subject, from, to)?, 1.0, "rtol")
+    let study = tolerance_study(subject, from, to)?;
+    judge(study.fit, study.lost, 1.0, "rtol")
 }
 
 /// Distance of the slope of error against 1/evaluations from the order of the method.
@@ -65,9 +66,9 @@ pub(super) fn work_order(subject: &Subject<'_>, from: f64, to: f64) -> Result<Me
         .integrator()
         .order()
         .ok_or_else(|| NotMeasured::skip("a method of variable order has no order against work"))?;
-    let mut study = tolerance_study(subject, from, to)?;
-    study.fit = study.work.take().ok_or_else(|| NotMeasured::broken("no work was counted"))?;
-    judge(study, f64::from(order), "1/evaluations")
+    let study = tolerance_study(subject, from, to)?;
+    let work = study.work.ok_or_else(|| NotMeasured::broken("no work was counted"))?;
+    judge(work, study.lost, f64::from(order), "1/evaluations")
 }
 
 /// Self-convergence from the values alone: distance of the extrapolated value from the exact one, over the
@@ -148,9 +149,15 @@ fn steps(pattern: StepPattern, size: f64, seed: u64) -> Steps {
 /// Largest share of runs whose outcome may differ from the exact one before nothing is claimed.
 const LOST_SHARE_MAX: f64 = 0.2;
 
-fn judge(study: QuantityStudy, expected: f64, abscissa: &'static str) -> Result<Measurement, NotMeasured> {
-    let total = study.lost + study.fit.as_ref().map_or(0, |fit| fit.points.len());
-    let fit: OrderFit = match study.fit {
+/// Distance of a fitted order from the one expected; `lost` runs gave no error to fit.
+pub(super) fn judge(
+    fit: Result<OrderFit, FitError>,
+    lost: usize,
+    expected: f64,
+    abscissa: &'static str,
+) -> Result<Measurement, NotMeasured> {
+    let total = lost + fit.as_ref().map_or(0, |fit| fit.points.len());
+    let fit: OrderFit = match fit {
         Ok(fit) => fit,
         Err(error @ FitError::TooFewSteps { .. }) => {
             return Ok(Measurement::new(f64::NAN).verdict(Verdict::Undecided).remark(error.to_string()));
@@ -176,8 +183,8 @@ fn judge(study: QuantityStudy, expected: f64, abscissa: &'static str) -> Result<
         remark = format!("{}: {}; {remark}", fit.class.name(), fit.reason);
         let verdict = if fit.class == Class::Diverging { Verdict::Failed } else { Verdict::Undecided };
         measurement = measurement.verdict(verdict);
-    } else if study.lost as f64 > LOST_SHARE_MAX * total as f64 {
-        remark = format!("{} of {total} runs have another outcome; {remark}", study.lost);
+    } else if lost as f64 > LOST_SHARE_MAX * total as f64 {
+        remark = format!("{lost} of {total} runs have another outcome; {remark}");
         measurement = measurement.verdict(Verdict::Undecided);
     }
     Ok(measurement.remark(remark).evidence(Evidence::Fit { abscissa, formal: expected, fit: Box::new(fit) }))
