@@ -3,6 +3,7 @@
 pub mod environment;
 pub mod folder;
 pub mod json;
+pub mod plots_sweep;
 
 pub use environment::Environment;
 pub use json::VerifyJson;
