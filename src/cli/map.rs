@@ -13,10 +13,12 @@ use crate::studies::applicability::{self, LEVELS};
 
 /// Arguments of `map`.
 #[derive(Args, Debug)]
-#[command(after_help = "The error is that of the depth of Eq. 11-12 against the equation of motion with finite N, exact \
+#[command(
+    after_help = "The error is that of the depth of Eq. 11-12 against the equation of motion with finite N, exact \
     and not to first order. Above the N of a line the error is smaller. It vanishes at I = k pi/4 for every N.\n\n\
     Files: --out F.csv writes the lines as level,I,N and, beside it, the contour figure F.svg with the scenes of the \
-    measured data marked.")]
+    measured data marked."
+)]
 pub struct MapArgs {
     /// Crater depth in diameters.
     #[arg(long, default_value_t = 2.0)]
@@ -80,8 +82,8 @@ impl MapArgs {
         if let Some(path) = &self.out {
             let failed = |cause| CliError::Write { path: path.display().to_string(), cause };
             let sets = Vec::new();
-            let figure = plots_sweep::applicability_map(self.k, &sets)
-                .map_err(|error| failed(std::io::Error::other(error)))?;
+            let figure =
+                plots_sweep::applicability_map(self.k, &sets).map_err(|error| failed(std::io::Error::other(error)))?;
             let mut csv = String::from("level,I,N\n");
             for line in &report.lines {
                 for (impact, geometry) in &line.points {
@@ -116,9 +118,11 @@ impl MapArgs {
         let mut rows = table(&["  I", "1 %", "5 %", "20 %"]);
         for impact in [0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0] {
             let mut cells = vec![format!("  {}", significant(impact))];
-            cells.extend(LEVELS.map(|level| {
-                applicability::geometry_at(level, impact, self.k).map_or("any".to_owned(), significant)
-            }));
+            cells.extend(
+                LEVELS.map(|level| {
+                    applicability::geometry_at(level, impact, self.k).map_or("any".to_owned(), significant)
+                }),
+            );
             rows.add_row(cells);
         }
         lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));

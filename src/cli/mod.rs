@@ -88,11 +88,7 @@ pub enum CliError {
 impl From<IntegrationError> for CliError {
     fn from(error: IntegrationError) -> Self {
         let (message, help) = (error.to_string(), error.help().to_owned());
-        if error.is_usage() {
-            Self::Usage { message, help }
-        } else {
-            Self::Run { message, help, last: error.last() }
-        }
+        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last: error.last() } }
     }
 }
 

@@ -244,7 +244,9 @@ impl SweepArgs {
         }
         lines.push(String::new());
         let mut header: Vec<String> = paths.iter().map(|path| format!("  {path}")).collect();
-        header.extend(["V_c [m/s]", "E_c/(d³ fc)", "Eq. 15", "over it", "outcome", "depth [m]", "V [m/s]"].map(str::to_owned));
+        header.extend(
+            ["V_c [m/s]", "E_c/(d³ fc)", "Eq. 15", "over it", "outcome", "depth [m]", "V [m/s]"].map(str::to_owned),
+        );
         let mut shown = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
         let dash = |value: Option<f64>| value.map_or("-".to_owned(), significant);
         // Evenly, first and last among them.

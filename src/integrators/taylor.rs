@@ -478,7 +478,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             if may_creep {
                 self.refuse_creep(stage, limit.value())?;
             }
-            let start = State { time: S::zero(), depth: S::zero(), velocity: velocity * S::from_f64(1.0 / unit_velocity) };
+            let start =
+                State { time: S::zero(), depth: S::zero(), velocity: velocity * S::from_f64(1.0 / unit_velocity) };
 
             let series = Series::<S, N>::new::<SPRING, DRAG>(&law, start.velocity);
             self.cost.steps += 1;
@@ -492,11 +493,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             };
 
             let (Step::Whole(local) | Step::Limit(local) | Step::Rest(local)) = step;
-            let new_depth = if matches!(step, Step::Limit(_)) {
-                limit
-            } else {
-                depth + local.depth * S::from_f64(unit_depth)
-            };
+            let new_depth =
+                if matches!(step, Step::Limit(_)) { limit } else { depth + local.depth * S::from_f64(unit_depth) };
             let next = State {
                 time: time + local.time * S::from_f64(unit_time),
                 depth: new_depth,

@@ -64,8 +64,8 @@ pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
         .prefix(".penetrode-report-")
         .tempdir_in(&parent)
         .map_err(|cause| failed(&parent, cause))?;
-    let mut json = serde_json::to_vec_pretty(&VerifyJson::new(run))
-        .map_err(|cause| failed(folder, io::Error::other(cause)))?;
+    let mut json =
+        serde_json::to_vec_pretty(&VerifyJson::new(run)).map_err(|cause| failed(folder, io::Error::other(cause)))?;
     json.push(b'\n');
     let put = |name: &str, bytes: &[u8]| {
         let path = stage.path().join(name);

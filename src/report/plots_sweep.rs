@@ -97,7 +97,9 @@ fn all_points<'a>(lines: &'a [Line], marks: &'a [Marks]) -> impl Iterator<Item =
 }
 
 /// Runs `draw` on an empty white SVG.
-fn svg(draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), FigureError>) -> Result<String, FigureError> {
+fn svg(
+    draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), FigureError>,
+) -> Result<String, FigureError> {
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -118,7 +120,9 @@ macro_rules! draw_series {
             // A path as such: the series of lines is a feature of the library that nothing else needs.
             let path = line.points.clone();
             let series = if dashed {
-                $chart.draw_series([plotters::element::DashedPathElement::new(path.into_iter(), 7, 5, style)]).map_err(drawing)?
+                $chart
+                    .draw_series([plotters::element::DashedPathElement::new(path.into_iter(), 7, 5, style)])
+                    .map_err(drawing)?
             } else {
                 $chart.draw_series([PathElement::new(path, style)]).map_err(drawing)?
             };
@@ -233,8 +237,8 @@ pub fn critical_energy(rows: &[Row], points: &[Point]) -> Result<String, FigureE
         Line::new("simulation, ndrc x = x_p(H)", GREEN, along(|row| row.energy_ndrc)),
         Line::new("Eq. 15, printed", RED, along(|row| row.eq15_printed)).dashed(),
     ];
-    let marks = (!points.is_empty())
-        .then(|| Marks { name: "measured".to_owned(), color: GREY, points: points.to_vec() });
+    let marks =
+        (!points.is_empty()).then(|| Marks { name: "measured".to_owned(), color: GREY, points: points.to_vec() });
     let frame = Frame { title: "Critical impact energy over target thickness", x: "H/d", y: "E_c/(d³ f_c)" };
     linear(&frame, &lines, marks.as_slice())
 }
@@ -263,8 +267,7 @@ pub fn critical_energy_difference(rows: &[Row]) -> Result<String, FigureError> {
         Line::new("ndrc over Eq. 15, unrounded", GREEN, over(|row| row.energy_ndrc, |row| row.eq15_unrounded)).dashed(),
         Line::new("limit of full depth for H/d and N infinite", GREY, vec![(first, 24.0), (last, 24.0)]).dashed(),
     ];
-    let frame =
-        Frame { title: "Simulation less Eq. 15, relative to Eq. 15", x: "H/d", y: "difference [%]" };
+    let frame = Frame { title: "Simulation less Eq. 15, relative to Eq. 15", x: "H/d", y: "difference [%]" };
     linear(&frame, &lines, &[])
 }
 
@@ -286,9 +289,9 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Result<String, FigureErro
                     Some((row.values[0], row.critical_velocity?))
                 })
                 .collect();
-            let name = rest.first().map_or("V_c".to_owned(), |axis| {
-                format!("{} = {}", axis.parameter, number(axis.value(column)))
-            });
+            let name = rest
+                .first()
+                .map_or("V_c".to_owned(), |axis| format!("{} = {}", axis.parameter, number(axis.value(column))));
             Line::new(name, FAMILY[line], points)
         })
         .collect();
@@ -348,8 +351,7 @@ pub fn measured_depths(sets: &[MarkedSet<'_>]) -> Result<String, FigureError> {
     let line = |name: &str, factor: f64, color| {
         Line::new(name, color, vec![(range.0, factor * range.0), (range.1, factor * range.1)])
     };
-    let lines =
-        [line("equal", 1.0, GREY), line("+20 %", 1.2, GREY).dashed(), line("-20 %", 0.8, GREY).dashed()];
+    let lines = [line("equal", 1.0, GREY), line("+20 %", 1.2, GREY).dashed(), line("-20 %", 0.8, GREY).dashed()];
     let frame = Frame {
         title: "Predicted and measured depth, S of Eq. 14, k = 0.707 + h/d",
         x: "measured depth [m]",

@@ -166,7 +166,7 @@ mod tests {
                 assert!(error < previous * (1.0 + 1e-12) + 1e-14, "I {impact} N {n}: {error} after {previous}");
                 previous = error;
             }
-            let n = 1e7 * impact;
+            let n = 1e7 * (1.0 + impact);
             let ratio = -model_error(impact, Some(n), 2.0) / semi_empirical::model_difference(impact, n, 2.0);
             assert!((ratio - 1.0).abs() < 1e-5, "{impact}: {ratio}");
         }

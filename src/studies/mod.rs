@@ -5,6 +5,7 @@ pub mod audit;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
+pub mod experiments;
 pub mod formal_order;
 pub mod grid_convergence;
 pub mod order;
@@ -13,6 +14,7 @@ pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
+pub mod sensitivity;
 pub mod sweep;
 
 pub use formal_order::{Path, Stretch, formal_order};

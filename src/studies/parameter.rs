@@ -145,7 +145,10 @@ impl ParameterError {
         match self {
             Self::Unknown { .. } => {
                 let names: Vec<_> = NAMES.iter().map(|(_, name)| *name).collect();
-                format!("choose from {}, target.layer.0.strength and its like, stage.0.drag and its like", names.join(", "))
+                format!(
+                    "choose from {}, target.layer.0.strength and its like, stage.0.drag and its like",
+                    names.join(", ")
+                )
             }
             Self::Absent { .. } => "vary a number that the scene file gives".to_owned(),
             Self::Value { parameter, .. } => match parameter.dimension() {
@@ -467,7 +470,9 @@ mod tests {
     #[test]
     fn groups_move_the_one_number_that_they_say() {
         let mut scene = shipped("paper-slab");
-        for (parameter, value) in [(Parameter::ThicknessRatio, 7.0), (Parameter::Geometry, 12.5), (Parameter::Impact, 3.0)] {
+        for (parameter, value) in
+            [(Parameter::ThicknessRatio, 7.0), (Parameter::Geometry, 12.5), (Parameter::Impact, 3.0)]
+        {
             parameter.set(&mut scene, value).unwrap();
             assert!((parameter.get(&scene).unwrap() / value - 1.0).abs() < 1e-15, "{parameter}");
         }
@@ -503,9 +508,12 @@ mod tests {
         assert_eq!(Parameter::Strength.parse_value("20MPa"), Ok(20e6));
         assert_eq!(Parameter::Strength.parse_value("2e7"), Ok(2e7));
         assert_eq!(Parameter::ThicknessRatio.parse_value("0.5"), Ok(0.5));
-        for (parameter, text) in
-            [(Parameter::Strength, "20 mm"), (Parameter::ThicknessRatio, "5 m"), (Parameter::Mass, "nan"), (Parameter::Mass, "")]
-        {
+        for (parameter, text) in [
+            (Parameter::Strength, "20 mm"),
+            (Parameter::ThicknessRatio, "5 m"),
+            (Parameter::Mass, "nan"),
+            (Parameter::Mass, ""),
+        ] {
             assert!(matches!(parameter.parse_value(text), Err(ParameterError::Value { .. })), "{text}");
         }
     }

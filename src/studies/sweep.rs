@@ -331,8 +331,7 @@ fn fly(scene: &Scene, integrator: &dyn Integrator, row: &mut Row) -> Result<(), 
     let Some(speed) = scene.velocity else { return Ok(()) };
     let problem = scene.resolve(speed).map_err(|error| error.to_string())?;
     let flight = integrator.fly(&problem, Detail::End).map_err(|error| error.to_string())?;
-    row.flight =
-        Some(Flown { outcome: flight.outcome, depth: flight.end.depth, velocity: flight.end.velocity });
+    row.flight = Some(Flown { outcome: flight.outcome, depth: flight.end.depth, velocity: flight.end.velocity });
     Ok(())
 }
 
@@ -554,7 +553,10 @@ mod tests {
         let mut scene = slab();
         Parameter::Strength.set(&mut scene, 40e6).unwrap();
         scene.thickness = Some(4.0 * 0.06);
-        assert_eq!(rows[3].critical_velocity.unwrap(), critical_velocity::of_scene(&scene, &Taylor::default()).unwrap().velocity);
+        assert_eq!(
+            rows[3].critical_velocity.unwrap(),
+            critical_velocity::of_scene(&scene, &Taylor::default()).unwrap().velocity
+        );
         let exact = critical_velocity::exact(&scene).unwrap();
         assert!((rows[3].critical_velocity.unwrap() / exact - 1.0).abs() < 1e-13);
     }
@@ -592,7 +594,7 @@ mod tests {
         assert!(refused("H/d,H/d,E_c/(d3 fc)\n1,2,3\n").contains("2 times"));
         assert!(refused("H/d,E_c/(d3 fc)\n1,2\n3,\n").contains("line 3, column `E_c/(d3 fc)`"));
         assert!(refused("H/d,E_c/(d3 fc)\n1,nan\n").contains("`nan`"));
-        assert!(refused("H/d,E_c/(d3 fc)\n1,2,3\n").contains("line: 2") );
+        assert!(refused("H/d,E_c/(d3 fc)\n1,2,3\n").contains("line: 2"));
         assert_eq!(read_points("H/d,E_c/(d3 fc)\n"), Err(PointsError::Empty));
     }
 
