@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, converge, critical, output, solve};
+use super::{CliError, Exit, converge, critical, map, output, solve, sweep};
 use crate::report::VerifyJson;
 
 /// Arguments of `schema`.
@@ -23,6 +23,10 @@ pub enum Documented {
     Critical,
     /// `converge --json`.
     Converge,
+    /// `sweep --json`.
+    Sweep,
+    /// `map --json`.
+    Map,
     /// `verify --json`, which is `report.json`.
     Verify,
 }
@@ -37,6 +41,8 @@ impl SchemaArgs {
             Documented::Solve => schema_for!(solve::SolveJson),
             Documented::Critical => schema_for!(critical::CriticalJson),
             Documented::Converge => schema_for!(converge::ConvergeJson),
+            Documented::Sweep => schema_for!(sweep::SweepJson),
+            Documented::Map => schema_for!(map::MapJson),
             Documented::Verify => schema_for!(VerifyJson),
         };
         output::print_json(&schema).map_err(CliError::stdout)?;

@@ -356,4 +356,3 @@ fn trajectory_csv(flight: &Flight) -> String {
     }
     csv
 }
-

@@ -109,9 +109,8 @@ fn floating_point() -> String {
 
 /// Date and time of day in UTC, `YYYY-MM-DDThh:mm:ssZ`.
 fn utc_now() -> String {
-    let seconds = std::time::SystemTime::now()
-        .duration_since(std::time::UNIX_EPOCH)
-        .map_or(0, |elapsed| elapsed.as_secs());
+    let seconds =
+        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
     utc(seconds)
 }
 

@@ -13,6 +13,7 @@ pub mod page;
 pub mod summary;
 pub mod table;
 pub mod text;
+pub mod plots_sweep;
 
 pub use environment::Environment;
 pub use json::VerifyJson;

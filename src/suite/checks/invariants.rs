@@ -29,7 +29,8 @@ pub(super) fn energy_balance(subject: &Subject<'_>) -> Result<Measurement, NotMe
         }
         let law = &problem.stages[stage_at(problem, a.state.depth + 0.5 * way)];
         spent += work(law, problem.mass, a.state.depth, way, a.state.velocity);
-        let kinetic = 0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
+        let kinetic =
+            0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
         residual = worse(residual, (kinetic - spent).abs() / scale);
         points.push((b.state.depth, (kinetic - spent) / scale));
     }
@@ -112,7 +113,8 @@ pub(super) fn time_reversal(subject: &Subject<'_>) -> Result<Measurement, NotMea
     let again = fly(&method, &back, Detail::End)?;
     let speed = (again.end.velocity / problem.impact_speed - 1.0).abs();
     let time = (again.end.time / there.end.time - 1.0).abs();
-    Ok(Measurement::new(worse(speed, time)).remark(format!("back at the face with V0 (1 {:+.1e})", again.end.velocity / problem.impact_speed - 1.0)))
+    Ok(Measurement::new(worse(speed, time))
+        .remark(format!("back at the face with V0 (1 {:+.1e})", again.end.velocity / problem.impact_speed - 1.0)))
 }
 
 /// Factors of length, mass and time.

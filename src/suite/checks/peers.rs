@@ -82,7 +82,10 @@ impl PeerAnswers {
             .map(|(name, source)| {
                 let text = match source {
                     Source::Recorded(r) => {
-                        format!("{} {} ({}), rtol {:e}, recorded {}", r.program, r.version, r.method, r.rtol, r.recorded)
+                        format!(
+                            "{} {} ({}), rtol {:e}, recorded {}",
+                            r.program, r.version, r.method, r.rtol, r.recorded
+                        )
                     }
                     Source::Failed(why) => why.clone(),
                     Source::Running { peer, rtol } => {
@@ -114,7 +117,9 @@ impl PeerAnswers {
                     .ok_or_else(|| NotMeasured::skip(format!("{name} was not asked for {scene}")))?;
                 if !is_same(&flight.problem(), problem) {
                     let remake = &recording.recipe;
-                    return Err(NotMeasured::broken(format!("{scene} was recorded with other numbers: remake with `{remake}`")));
+                    return Err(NotMeasured::broken(format!(
+                        "{scene} was recorded with other numbers: remake with `{remake}`"
+                    )));
                 }
                 Ok(flight.answer.clone())
             }
