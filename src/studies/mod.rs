@@ -4,6 +4,7 @@ pub mod audit;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
+pub mod extreme_scenes;
 pub mod formal_order;
 pub mod grid_convergence;
 pub mod order;
