@@ -2,6 +2,7 @@
 
 pub mod applicability;
 pub mod audit;
+pub mod batch;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
