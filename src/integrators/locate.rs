@@ -21,6 +21,8 @@
 //! are quadratic equations solved in the form that does not lose digits, `2 D/(v + sqrt(v² - 2 a D))`: they are exact
 //! for a constant force, and near a double root (the boundary is just touched) they converge as fast as elsewhere.
 
+#![expect(clippy::inline_always, reason = "measured: one flight is one function, 1.3 times faster than with calls")]
+
 use crate::physics::{Scalar, Stage, State};
 
 /// Trials allowed for one event. Four are usual; sixty halvings of a bracket exhaust a 53-bit number.
@@ -468,7 +470,7 @@ fn bisect(whole: &[f64], mut from: f64, mut to: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -510,10 +512,10 @@ mod tests {
             // An end of the span between two eighths: a root on the very end is a test of its own.
             let span = f64::from(span) / 8.0 + 1.0 / 16.0;
             let least = roots.iter().copied().filter(|r| *r > 0.0 && *r < span).fold(f64::INFINITY, f64::min);
-            let multiplicity = roots.iter().filter(|r| **r == least).count() as i32;
+            let multiplicity = roots.iter().filter(|r| **r == least).count() as f64;
             let found = first_root(&product(&roots, &pairs), span);
             if least.is_finite() {
-                let accuracy = 1e-9_f64.powf(1.0 / f64::from(multiplicity)).max(1e-9);
+                let accuracy = 1e-9_f64.powf(1.0 / multiplicity).max(1e-9);
                 prop_assert!((found.unwrap() - least).abs() <= accuracy, "{found:?} for {least}");
             } else {
                 prop_assert_eq!(found, None);

@@ -24,6 +24,10 @@
 //! Source of the step rule: Jorba, Zou (2005), A software package for the numerical integration of ODEs by means of
 //! high-order Taylor methods, Experimental Mathematics 14, section 3.
 
+#![expect(clippy::inline_always, reason = "measured: one flight is one function, 1.3 times faster than with calls")]
+
+use std::cmp::Ordering;
+
 use super::locate::{self, Closing, Found};
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample};
 use crate::physics::exit_energy;
@@ -117,9 +121,9 @@ impl Taylor {
         if tolerance > 1e-5 {
             Course::<S, 8, 10>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-9 {
-            Course::<S, 12, 14>::new(problem, tolerance, detail).fly()
+            Course::<S, 12, 18>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-13 {
-            Course::<S, 16, 18>::new(problem, tolerance, detail).fly()
+            Course::<S, 16, 20>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-17 {
             Course::<S, 22, 24>::new(problem, tolerance, detail).fly()
         } else {
@@ -328,20 +332,20 @@ impl<S: Scalar, const K: usize> Series<S, K> {
 /// `log2 |x|` plus the exponent bias, 0 to 0.087 too small: exponent and significand read as one number.
 #[inline(always)]
 fn rough_log2(x: f64) -> f64 {
-    x.abs().to_bits() as i64 as f64 * (1.0 / (1_u64 << 52) as f64)
+    x.abs().to_bits().cast_signed() as f64 * (1.0 / (1_u64 << 52) as f64)
 }
 
 /// `2^y` times a factor from 0.94 to 1, for -1000 < y; at most `2^1000`.
 #[inline(always)]
 fn rough_exp2(y: f64) -> f64 {
     let bits = (y.clamp(-1000.0, 1000.0) + 1023.0) * (1_u64 << 52) as f64;
-    0.94 * f64::from_bits(bits as i64 as u64)
+    0.94 * f64::from_bits((bits as i64).cast_unsigned())
 }
 
 /// The power of two at or below a positive number (the least normal number for what is smaller).
 #[inline(always)]
 fn power_of_two_below(x: f64) -> f64 {
-    f64::from_bits(x.max(f64::MIN_POSITIVE).min(0.5 * f64::MAX).to_bits() & (0x7ff << 52))
+    f64::from_bits(x.clamp(f64::MIN_POSITIVE, 0.5 * f64::MAX).to_bits() & (0x7ff << 52))
 }
 
 /// What ended a step.
@@ -577,7 +581,9 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             let beyond = exit_energy::energy_beyond_stop(problem, self.stage, self.state.depth.value());
             (Some(beyond / scale / scale), Some(self.bar))
         };
-        let undecided = matches!((margin, bar), (Some(m), Some(b)) if !(m.abs() > b));
+        // A margin that is no number decides nothing.
+        let undecided =
+            matches!((margin, bar), (Some(m), Some(b)) if m.abs().partial_cmp(&b) != Some(Ordering::Greater));
         let outcome = if undecided {
             Outcome::Undecided
         } else if through {
@@ -693,26 +699,22 @@ fn search_certified<S: Scalar, const N: usize>(
 ) -> Step<S> {
     let at = |time| series.at(time);
     let way = law.end.value();
-    match locate::first_root(&series.velocity_values(), span) {
-        Some(root) => {
-            // The root is isolated; correct it in the number type, from the nearest trial.
-            let rest = match locate::rest(law, at, at(root), span, closing) {
-                Found::Inside(rest) => rest,
-                _ => State { velocity: S::zero(), ..at(root) },
-            };
-            if rest.depth.value() >= way {
-                return through(locate::passage(law, at, rest, rest.time.value(), true, closing));
-            }
-            Step::Rest(rest)
+    if let Some(root) = locate::first_root(&series.velocity_values(), span) {
+        // The root is isolated; correct it in the number type, from the nearest trial.
+        let rest = match locate::rest(law, at, at(root), span, closing) {
+            Found::Inside(rest) => rest,
+            _ => State { velocity: S::zero(), ..at(root) },
+        };
+        if rest.depth.value() >= way {
+            return through(locate::passage(law, at, rest, rest.time.value(), true, closing));
         }
-        None => {
-            let end = at(span);
-            if end.depth.value() >= way {
-                return through(locate::passage(law, at, end, span, true, closing));
-            }
-            Step::Whole(end)
-        }
+        return Step::Rest(rest);
     }
+    let end = at(span);
+    if end.depth.value() >= way {
+        return through(locate::passage(law, at, end, span, true, closing));
+    }
+    Step::Whole(end)
 }
 
 /// A passage that is known to lie inside the step.
@@ -726,7 +728,7 @@ fn through<S: Scalar>(found: Found<S>) -> Step<S> {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]
 mod tests {
     use num_dual::Dual64;
     use proptest::prelude::Rng;
@@ -773,7 +775,7 @@ mod tests {
             ((v1_squared * (mass + crater_depth * drag) + crater_depth * static_force) / mass).sqrt()
         }
 
-        /// `d margin / d ln V0` at V_c: the margin is affine in V0², `M/(M + k d Q) e^(-y) (1 - V_c²/V0²)`.
+        /// `d margin / d ln V0` at the critical velocity `V_c`; `margin = M/(M + k d Q) e^(-y) (1 - V_c²/V0²)`.
         fn margin_slope(self) -> f64 {
             let y = 2.0 * self.drag * (self.exit_depth - self.crater_depth) / self.mass;
             2.0 * (-y).exp() * self.mass / (self.mass + self.crater_depth * self.drag)
@@ -856,7 +858,7 @@ mod tests {
         }
     }
 
-    /// The scenes of the peer benchmark: fc 36 MPa, S 12, k 2, rho 2300, N* 0.72, d 50 mm, M 2 kg.
+    /// The scenes of the peer benchmark: strength 36e6 Pa, S 12, k 2, density 2300, nose factor 0.72, d 50 mm, M 2 kg.
     fn peer_scene(impact_speed: f64, exit_depth: f64) -> Concrete {
         let d: f64 = 0.05;
         let area = std::f64::consts::FRAC_PI_4 * d * d;
@@ -899,9 +901,9 @@ mod tests {
         let flight = fly(&peer_scene(300.0, f64::INFINITY).problem());
         assert_eq!(flight.outcome, Outcome::StoppedInTunnel);
         let crater_end = flight.crater_end().unwrap();
-        assert!(relative(flight.end.depth, 0.144_826_200_112_217_07) < 1e-15);
+        assert!(relative(flight.end.depth, 0.144_826_200_112_217_08) < 1e-15);
         assert!(relative(flight.end.time, 8.291_966_948_249_334e-4) < 1e-15);
-        assert!(relative(crater_end.time, 3.749_918_414_549_262_4e-4) < 1e-15);
+        assert!(relative(crater_end.time, 3.749_918_414_549_262e-4) < 1e-15);
         assert!(relative(crater_end.velocity, 202.320_580_497_900_37) < 1e-15);
         assert_eq!(kinds(&flight), [EventKind::CraterEnd, EventKind::Rest]);
     }
@@ -1278,7 +1280,7 @@ mod tests {
     fn the_same_code_runs_in_single_precision_and_in_dual_numbers() {
         let scene = peer_scene(300.0, f64::INFINITY);
         let single = Taylor::default().fly_in::<f32>(&scene.problem().cast(), Detail::Events).unwrap();
-        assert!(relative(single.end.depth.value(), 0.144_826_200_112_217_07) < 5e-7);
+        assert!(relative(single.end.depth.value(), 0.144_826_200_112_217_08) < 5e-7);
         assert_eq!(single.outcome, Outcome::StoppedInTunnel);
 
         // d/dV0 of the tunnel alone: X = (M/2Q) ln(1 + Q V0²/P), dX/dV0 = M V0/(P + Q V0²), dT/dV0 = M/(P + Q V0²).
