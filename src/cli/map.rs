@@ -8,8 +8,10 @@ use serde::Serialize;
 
 use super::output::{print_json, print_text, significant, table, write_whole};
 use super::{CliError, Exit};
+use crate::physics::groups::Groups;
 use crate::report::plots_sweep;
 use crate::studies::applicability::{self, LEVELS};
+use crate::studies::experiments::{self, ExperimentError};
 
 /// Arguments of `map`.
 #[derive(Args, Debug)]
@@ -78,10 +80,16 @@ impl MapArgs {
         if !(self.k.is_finite() && self.k > 0.0) {
             return Err(CliError::usage(format!("--k {} is not allowed", self.k), "give a number above zero"));
         }
-        let report = self.report();
+        let report = self.report().map_err(|error| CliError::usage(error.to_string(), ""))?;
         if let Some(path) = &self.out {
             let failed = |cause| CliError::Write { path: path.display().to_string(), cause };
-            let sets = Vec::new();
+            let mut sets: Vec<plots_sweep::MarkedSet<'_>> = Vec::new();
+            for scene in &report.scenes {
+                match sets.iter_mut().find(|(set, _)| *set == scene.set) {
+                    Some((_, points)) => points.push((scene.I, scene.N)),
+                    None => sets.push((&scene.set, vec![(scene.I, scene.N)])),
+                }
+            }
             let figure =
                 plots_sweep::applicability_map(self.k, &sets).map_err(|error| failed(std::io::Error::other(error)))?;
             let mut csv = String::from("level,I,N\n");
@@ -97,7 +105,7 @@ impl MapArgs {
         Ok(Exit::Success)
     }
 
-    fn report(&self) -> MapJson {
+    fn report(&self) -> Result<MapJson, ExperimentError> {
         let impacts: Vec<f64> = (0..=600).map(|i| 10f64.powf(-2.0 + f64::from(i) / 120.0)).collect();
         let lines = LEVELS
             .iter()
@@ -107,7 +115,15 @@ impl MapArgs {
                     .map(move |points| LineJson { level, points })
             })
             .collect();
-        MapJson { schema: "penetrode/map/1", k: self.k, lines, scenes: Vec::new() }
+        let marked = |shot: &experiments::Shot| {
+            let scene = shot.scene(None);
+            let groups = Groups::of(&scene, shot.velocity)?;
+            let k = shot.nose.crater_ratio();
+            let error = applicability::model_error(groups.impact, groups.geometry, k);
+            Some(MarkedSceneJson { set: shot.set.clone(), I: groups.impact, N: groups.geometry?, k, error })
+        };
+        let scenes = experiments::shipped()?.iter().filter_map(marked).collect();
+        Ok(MapJson { schema: "penetrode/map/1", k: self.k, lines, scenes })
     }
 
     fn text(&self, report: &MapJson) -> String {
@@ -126,7 +142,27 @@ impl MapArgs {
             rows.add_row(cells);
         }
         lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
-        let _ = report;
+        lines.push(String::new());
+        let mut sets = table(&["  measured set", "shots", "I", "N", "error of Eq. 11-12", "within 5 %"]);
+        let mut names: Vec<&str> = report.scenes.iter().map(|scene| scene.set.as_str()).collect();
+        names.dedup();
+        for name in names {
+            let of_set: Vec<_> = report.scenes.iter().filter(|scene| scene.set == name).collect();
+            let range = |get: fn(&MarkedSceneJson) -> f64| {
+                of_set.iter().map(|s| get(s)).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+            };
+            let (impact, geometry, error) = (range(|s| s.I), range(|s| s.N), range(|s| s.error));
+            let within = of_set.iter().filter(|s| s.error.abs() <= applicability::ERROR_ALLOWED).count();
+            sets.add_row([
+                format!("  {name}"),
+                of_set.len().to_string(),
+                format!("{:.2} to {:.1}", impact.0, impact.1),
+                format!("{:.1} to {:.1}", geometry.0, geometry.1),
+                format!("{:+.1} to {:+.1} %", 100.0 * error.0, 100.0 * error.1),
+                within.to_string(),
+            ]);
+        }
+        lines.extend(sets.to_string().lines().map(|line| line.trim_end().to_owned()));
         lines.push(String::new());
         lines.join("\n")
     }

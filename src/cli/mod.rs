@@ -5,11 +5,13 @@ pub mod batch;
 pub mod completions;
 pub mod converge;
 pub mod critical;
+pub mod experiments;
 pub mod map;
 pub mod method_args;
 pub mod output;
 pub mod scene_json;
 pub mod schema;
+pub mod sensitivities;
 pub mod solve;
 pub mod sweep;
 pub mod verify;
@@ -202,6 +204,8 @@ pub enum Command {
     Sweep(sweep::SweepArgs),
     /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
     Map(map::MapArgs),
+    /// Measured penetration depths beside predicted ones: shipped data or your own.
+    Experiments(experiments::ExperimentsArgs),
     /// Order, error band and verdict for step-size results of another code.
     Audit(audit::AuditArgs),
     /// The verification suite and its report.
@@ -221,6 +225,7 @@ impl Command {
             Self::Converge(_) => "converge",
             Self::Sweep(_) => "sweep",
             Self::Map(_) => "map",
+            Self::Experiments(_) => "experiments",
             Self::Audit(_) => "audit",
             Self::Verify(_) => "verify",
             Self::Schema(_) => "schema",
@@ -235,6 +240,7 @@ impl Command {
             Self::Converge(args) => args.json,
             Self::Sweep(args) => args.json,
             Self::Map(args) => args.json,
+            Self::Experiments(args) => args.json,
             Self::Audit(args) => args.json,
             Self::Verify(args) => args.json,
             _ => false,
@@ -249,6 +255,7 @@ impl Command {
             Self::Converge(args) => args.run(),
             Self::Sweep(args) => args.run(),
             Self::Map(args) => args.run(),
+            Self::Experiments(args) => args.run(),
             Self::Audit(args) => args.run(),
             Self::Verify(args) => args.run(),
             Self::Schema(args) => args.run(),

@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, converge, critical, map, output, solve, sweep};
+use super::{CliError, Exit, converge, critical, experiments, map, output, solve, sweep};
 use crate::report::VerifyJson;
 
 /// Arguments of `schema`.
@@ -27,6 +27,8 @@ pub enum Documented {
     Sweep,
     /// `map --json`.
     Map,
+    /// `experiments --json`.
+    Experiments,
     /// `verify --json`, which is `report.json`.
     Verify,
 }
@@ -42,6 +44,7 @@ impl SchemaArgs {
             Documented::Critical => schema_for!(critical::CriticalJson),
             Documented::Converge => schema_for!(converge::ConvergeJson),
             Documented::Sweep => schema_for!(sweep::SweepJson),
+            Documented::Experiments => schema_for!(experiments::ExperimentsJson),
             Documented::Map => schema_for!(map::MapJson),
             Documented::Verify => schema_for!(VerifyJson),
         };

@@ -77,6 +77,7 @@ struct Frame<'a> {
     title: &'a str,
     x: &'a str,
     y: &'a str,
+    legend: SeriesLabelPosition,
 }
 
 /// Least and greatest of `values`, widened where they are one.
@@ -168,7 +169,7 @@ fn linear(frame: &Frame<'_>, lines: &[Line], marks: &[Marks]) -> Result<String, 
         draw_series!(chart, lines, marks);
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
+            .position(frame.legend.clone())
             .background_style(WHITE.mix(0.85))
             .border_style(GREY)
             .label_font(("sans-serif", 13))
@@ -207,7 +208,7 @@ fn logarithmic(
         draw_series!(chart, lines, marks);
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
+            .position(frame.legend.clone())
             .background_style(WHITE.mix(0.85))
             .border_style(GREY)
             .label_font(("sans-serif", 13))
@@ -239,7 +240,12 @@ pub fn critical_energy(rows: &[Row], points: &[Point]) -> Result<String, FigureE
     ];
     let marks =
         (!points.is_empty()).then(|| Marks { name: "measured".to_owned(), color: GREY, points: points.to_vec() });
-    let frame = Frame { title: "Critical impact energy over target thickness", x: "H/d", y: "E_c/(d³ f_c)" };
+    let frame = Frame {
+        title: "Critical impact energy over target thickness",
+        x: "H/d",
+        y: "E_c/(d³ f_c)",
+        legend: SeriesLabelPosition::UpperLeft,
+    };
     linear(&frame, &lines, marks.as_slice())
 }
 
@@ -267,7 +273,12 @@ pub fn critical_energy_difference(rows: &[Row]) -> Result<String, FigureError> {
         Line::new("ndrc over Eq. 15, unrounded", GREEN, over(|row| row.energy_ndrc, |row| row.eq15_unrounded)).dashed(),
         Line::new("limit of full depth for H/d and N infinite", GREY, vec![(first, 24.0), (last, 24.0)]).dashed(),
     ];
-    let frame = Frame { title: "Simulation less Eq. 15, relative to Eq. 15", x: "H/d", y: "difference [%]" };
+    let frame = Frame {
+        title: "Simulation less Eq. 15, relative to Eq. 15",
+        x: "H/d",
+        y: "difference [%]",
+        legend: SeriesLabelPosition::UpperRight,
+    };
     linear(&frame, &lines, &[])
 }
 
@@ -299,7 +310,8 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Result<String, FigureErro
         Some(dimension) => format!("{} [{}]", first.parameter, dimension.units()[0]),
         None => first.parameter.to_string(),
     };
-    linear(&Frame { title: "Critical velocity", x: &x, y: "V_c [m/s]" }, &lines, &[])
+    let frame = Frame { title: "Critical velocity", x: &x, y: "V_c [m/s]", legend: SeriesLabelPosition::LowerRight };
+    linear(&frame, &lines, &[])
 }
 
 /// Scenes marked on the map: name of the set and its (I, N).
@@ -328,7 +340,8 @@ pub fn applicability_map(crater_ratio: f64, sets: &[MarkedSet<'_>]) -> Result<St
         .map(|((name, points), color)| Marks { name: (*name).to_owned(), color: *color, points: points.clone() })
         .collect();
     let title = format!("Error of Eq. 11-12 against the equation of motion, k = {}", number(crater_ratio));
-    logarithmic(&Frame { title: &title, x: "I", y: "N" }, x, y, &lines, &marks)
+    let frame = Frame { title: &title, x: "I", y: "N", legend: SeriesLabelPosition::UpperLeft };
+    logarithmic(&frame, x, y, &lines, &marks)
 }
 
 /// Predicted over measured depth [m] with the band of ±20 %; one kind of mark for each set.
@@ -356,6 +369,7 @@ pub fn measured_depths(sets: &[MarkedSet<'_>]) -> Result<String, FigureError> {
         title: "Predicted and measured depth, S of Eq. 14, k = 0.707 + h/d",
         x: "measured depth [m]",
         y: "predicted depth [m]",
+        legend: SeriesLabelPosition::UpperLeft,
     };
     logarithmic(&frame, range, (0.8 * range.0, 1.2 * range.1), &lines, &marks)
 }

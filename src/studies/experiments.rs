@@ -370,7 +370,7 @@ pub struct SetSummary {
     pub shots: usize,
     /// Median of predicted over measured.
     pub median: f64,
-    /// Standard deviation of predicted over measured; zero for one shot.
+    /// Standard deviation of predicted over measured, about the mean of the set itself.
     pub spread: f64,
     /// Least and greatest of predicted over measured.
     pub extremes: (f64, f64),
@@ -416,7 +416,7 @@ fn summary(group: String, of_group: &[&Comparison]) -> SetSummary {
         group,
         shots,
         median: 0.5 * (ratios[(shots - 1) / 2] + ratios[shots / 2]),
-        spread: if shots > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 },
+        spread: (squares / count).sqrt(),
         extremes: (ratios[0], ratios[shots - 1]),
         within_band: ratios.iter().filter(|ratio| (*ratio - 1.0).abs() <= BAND).count(),
         in_range_of_fit: of_group.iter().filter(|c| c.shot.is_in_range_of_fit()).count(),
