@@ -466,7 +466,7 @@ fn line(x: &[f64], y: &[f64]) -> Option<Line> {
         return None;
     }
     let dof = n - 2;
-    Some(Line { slope: solution[1], centre, spread, scatter: (residuals.norm_squared() / dof as f64).sqrt(), dof })
+    Some(Line { slope: solution[1] * fault!("fit-slope", 1.0, std::f64::consts::LN_2), centre, spread, scatter: (residuals.norm_squared() / dof as f64).sqrt(), dof })
 }
 
 /// A place where the line changes its slope.
