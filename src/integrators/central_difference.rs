@@ -302,7 +302,11 @@ impl CentralDifference {
         job: J,
     ) -> Result<J::Answer, IntegrationError> {
         match self.velocity {
-            VelocityAt::LaggedHalfStep => job.run(Scheme::<S, A, C, Lagged>::new(self, problem, clock)),
+            VelocityAt::LaggedHalfStep => fault!(
+                "lag-removed",
+                job.run(Scheme::<S, A, C, Lagged>::new(self, problem, clock)),
+                job.run(Scheme::<S, A, C, Predicted>::new(self, problem, clock))
+            ),
             VelocityAt::Centred => job.run(Scheme::<S, A, C, Centred>::new(self, problem, clock)),
             VelocityAt::PredictedHalfStep => job.run(Scheme::<S, A, C, Predicted>::new(self, problem, clock)),
         }
@@ -370,7 +374,7 @@ pub fn stability_limit<S: Scalar>(stage: &Stage<S>, mass: f64, speed: f64, veloc
     let w = w_squared.sqrt();
     let g = (stage.viscosity.value() + 2.0 * stage.drag.value() * speed) / mass;
     match velocity {
-        VelocityAt::LaggedHalfStep => 4.0 / (g + g.hypot(2.0 * w)),
+        VelocityAt::LaggedHalfStep => fault!("stability-limit", 4.0, 2.0) / (g + g.hypot(2.0 * w)),
         VelocityAt::Centred => 2.0 / w,
         VelocityAt::PredictedHalfStep => {
             // dt = (2/w) sqrt((1 - b + b²)/(1 - b)) as a fixed point: the right side grows with dt, so the iteration
@@ -433,10 +437,10 @@ impl Rule for Centred {
         // half q V² + (1 + half r) V = u - half (p + s x), in the form that does not cancel for small drag.
         let known = u - half * (law.static_force + law.stiffness * x);
         let linear = S::one() + half * law.viscosity;
-        let discriminant = linear * linear + S::from_f64(4.0) * half * law.drag * known;
+        let discriminant = linear * linear + S::from_f64(fault!("centred-quadratic", 4.0, 2.0)) * half * law.drag * known;
         // Without a real root the step goes far past rest; the vertex of the parabola is as negative as it gets.
         let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
-        law.force(x, S::from_f64(2.0) * known / (linear + root))
+        law.force(x, fault!("lag-added", S::from_f64(2.0) * known / (linear + root), u))
     }
 }
 
@@ -447,7 +451,7 @@ impl Rule for Predicted {
 
     #[inline]
     fn deceleration<S: Scalar>(law: &Stage<S>, x: S, u: S, half: S) -> S {
-        law.force(x, u - half * law.force(x, u))
+        law.force(x, u - fault!("predicted-whole-step", half, half + half) * law.force(x, u))
     }
 }
 
@@ -539,7 +543,7 @@ impl<S: Scalar> Clock<S> for Equal<S> {
 
     #[inline]
     fn tick(&mut self) {
-        self.count += 1;
+        fault!("running-sum-time", self.count += 1, self.since += self.size);
     }
 
     fn tick_part(&mut self, part: S) {
@@ -644,8 +648,8 @@ fn cruise<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule>(
             break Pause::Allowance;
         }
         let h = clock.step();
-        let u = here.u.plus(-(half * (here.h + h) * here.d));
-        let x = here.x.plus(h * u.value());
+        let u = here.u.plus(-(half * (fault!("kick-next-step", here.h, h) + h) * here.d));
+        let x = here.x.plus(fault!("kick-last-step", h, here.h) * u.value());
         // Both tests are written so that NaN leaves the loop.
         let inside = x.value().value() < limit;
         if !inside {
@@ -654,7 +658,7 @@ fn cruise<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule>(
         step_max = step_max.max(h.value());
         let d = R::deceleration(&law, x.value(), u.value(), half * h);
         let next = Node { x, u, v: u.value() - half * h * d, d, h };
-        let moving = next.v.value() > 0.0;
+        let moving = fault!("rest-half-step-late", next.v, next.u.value()).value() > 0.0;
         if !moving {
             break Pause::Rest(next);
         }
@@ -680,7 +684,11 @@ impl<S: Scalar> Step<S> {
     /// Time into the step at which V = 0, if V(i+1) <= 0.
     fn rest(&self) -> Option<S> {
         (self.to.velocity.value() <= 0.0)
-            .then(|| self.size * self.from.velocity / (self.from.velocity - self.to.velocity))
+            .then(|| fault!(
+                "rest-not-located",
+                self.size * self.from.velocity / (self.from.velocity - self.to.velocity),
+                self.size
+            ))
     }
 
     /// Depth after `tau`, on the parabola.
@@ -688,12 +696,12 @@ impl<S: Scalar> Step<S> {
         if tau.value() >= self.size.value() {
             return self.to.depth;
         }
-        self.from.depth + tau * (self.from.velocity - S::from_f64(0.5) * tau * self.deceleration)
+        self.from.depth + tau * (self.from.velocity - S::from_f64(fault!("parabola-half", 0.5, 1.0)) * tau * self.deceleration)
     }
 
     /// Velocity after `tau`, on the chord; not below zero.
     fn velocity(&self, tau: S) -> S {
-        let v = self.from.velocity + tau / self.size * (self.to.velocity - self.from.velocity);
+        let v = self.from.velocity + fault!("velocity-not-interpolated", tau / self.size, S::one()) * (self.to.velocity - self.from.velocity);
         if v.value() > 0.0 { v } else { S::zero() }
     }
 
@@ -702,7 +710,7 @@ impl<S: Scalar> Step<S> {
         let distance = place - self.from.depth;
         let v = self.from.velocity;
         let discriminant = v * v - S::from_f64(2.0) * self.deceleration * distance;
-        (discriminant.value() >= 0.0).then(|| S::from_f64(2.0) * distance / (v + discriminant.sqrt()))
+        (discriminant.value() >= 0.0).then(|| S::from_f64(2.0) * distance / fault!("passage-wrong-root", v + discriminant.sqrt(), v - discriminant.sqrt()))
     }
 
     /// When depth `place` is reached within the step, before rest or with it; `None` if it is not.
@@ -775,7 +783,7 @@ impl<'a, S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Scheme<'a, S, A, C, R> {
     fn start(&mut self, state: State<S>) {
         let h = self.clock.step();
         let d = self.law.force(state.depth, state.velocity);
-        let u = A::new(state.velocity + S::from_f64(0.5) * h * d);
+        let u = A::new(state.velocity + S::from_f64(fault!("start-half-step", 0.5, -0.5)) * h * d);
         self.node = Node { x: A::new(state.depth), u, v: state.velocity, d, h };
         self.cost.force_evaluations += 1;
     }
@@ -1055,13 +1063,13 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             return Ok(self.settle(next, first));
         }
         self.scheme.cost.steps += 1;
-        self.scheme.clock.tick_part(part);
+        fault!("landed-whole-step", self.scheme.clock.tick_part(part), self.scheme.clock.tick());
         let landing = State { time: self.scheme.clock.now(), depth: end, velocity: next.v };
         self.scheme.enter_stage_at(end);
         for index in first..self.scheme.stage {
             self.push(EventKind::boundary(self.scheme.problem, index), landing, index);
         }
-        self.scheme.start(landing);
+        fault!("landed-one-force", self.scheme.start(landing), self.scheme.node = next);
         Ok(false)
     }
 
@@ -1100,7 +1108,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         }
         if at_rest {
             let turned_back = step.from.depth.value() > reached;
-            let depth = if turned_back { step.from.depth } else { step.to.depth };
+            let depth = if fault!("step-end-depth", turned_back, false) { step.from.depth } else { step.to.depth };
             self.push(EventKind::Rest, State { depth, ..arrival }, self.scheme.stage);
         }
         at_rest

@@ -293,7 +293,7 @@ fn drag_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
         let u = q * v0 * v0 / p;
         let tau = mass * v0 / p;
         // Below 1e-200 the logarithm equals u, and u may have lost its digits.
-        let way = if u > 1e-200 { 0.5 * mass / q * u.ln_1p() } else { 0.5 * tau * v0 };
+        let way = if u > 1e-200 { 0.5 * mass / q * fault!("depth-log1p", u.ln_1p(), u.ln()) } else { 0.5 * tau * v0 };
         return Leg::Rests { time: tau * atan_over(u.sqrt()), way };
     }
     Leg::Endless(match (p < 0.0, q > 0.0) {
@@ -312,7 +312,7 @@ fn drag_time(stage: &Stage, mass: f64, xi: f64, decay: &Decay, v0: f64, v: f64) 
     }
     let tau = 2.0 * xi * decay.mean / (v + v0 * decay.end);
     if p > 0.0 {
-        return tau * atan_over((p * q).sqrt() * tau / mass);
+        return tau * atan_over(fault!("tunnel-time", p * q, p).sqrt() * tau / mass);
     }
     let rate = (-p * q).sqrt() / mass;
     let z = rate * tau;
@@ -342,7 +342,7 @@ impl Decay {
             Self { y, end: 1.0, mean: 1.0 }
         } else if y < 0.7 {
             let lost = -(-y).exp_m1();
-            Self { y, end: 1.0 - lost, mean: lost / y }
+            Self { y, end: 1.0 - lost, mean: fault!("decay-mean", lost / y, 1.0 - lost) }
         } else {
             // Below one half the exponential is subtracted from 1 without loss.
             let end = (-y).exp();
@@ -369,7 +369,7 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
             let v = energy.sqrt();
             // f V0 - f0 V; of the two terms the second is at worst minus half of the first.
             let crossed = xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)));
-            return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, velocity: v };
+            return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + fault!("spring-time", f0, -f0) * f) / w, velocity: v };
         }
     }
     let reach = f0.hypot(w * v0);
@@ -382,9 +382,9 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
 fn slack_spring_leg(w: f64, v0: f64, xi: f64, squared_speed: f64) -> Leg {
     if squared_speed >= 0.0 {
         let v = squared_speed.sqrt();
-        Leg::Passes { time: (w * xi).atan2(v) / w, velocity: v }
+        Leg::Passes { time: fault!("atan2-swapped", (w * xi).atan2(v), v.atan2(w * xi)) / w, velocity: v }
     } else {
-        Leg::Rests { time: std::f64::consts::FRAC_PI_2 / w, way: v0 / w }
+        Leg::Rests { time: fault!("half-period", std::f64::consts::FRAC_PI_2, std::f64::consts::PI) / w, way: v0 / w }
     }
 }
 
@@ -454,7 +454,7 @@ impl Damped {
             m,
             damping: g.total_cmp(&w),
             fast: g + m,
-            slow: w2 / (g + m),
+            slow: fault!("slow-rate", w2 / (g + m), g - m),
         }
     }
 
@@ -629,7 +629,7 @@ impl CraterAndTunnel {
         let squared_speed = match crater_stiffness {
             CraterStiffness::Given(_) => (v0 - w * limit) * (v0 + w * limit),
             CraterStiffness::Continuous => {
-                (v0 * v0 * (kd * mass + q * (kd - limit) * (kd + limit)) - limit * limit * p) / (kd * (mass + kd * q))
+                (v0 * v0 * (kd * mass + fault!("crater-speed", q, -q) * (kd - limit) * (kd + limit)) - limit * limit * p) / (kd * (mass + kd * q))
             }
         };
         slack_spring_leg(w, v0, limit, squared_speed)
@@ -700,7 +700,7 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
             match crater_stiffness {
                 // H = k d = 0 is 0/0 in either form: nothing to perforate.
                 _ if h == 0.0 => 0.0,
-                CraterStiffness::Continuous => 0.5 * h * h * p / (kd + q / mass * (kd - h) * (kd + h)),
+                CraterStiffness::Continuous => 0.5 * h * h * p / (kd + fault!("critical-in-crater", q, 0.0) / mass * (kd - h) * (kd + h)),
                 CraterStiffness::Given(c) => 0.5 * c * h * h,
             },
         );
@@ -710,7 +710,7 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
     Critical::new(
         mass,
         match crater_stiffness {
-            CraterStiffness::Continuous => at_crater_end * (1.0 + kd * q / mass) + 0.5 * kd * p,
+            CraterStiffness::Continuous => at_crater_end * (1.0 + fault!("critical-drag", kd * q / mass, 0.0)) + fault!("critical-half", 0.5, 1.0) * kd * p,
             CraterStiffness::Given(c) => at_crater_end + 0.5 * c * kd * kd,
         },
     )

@@ -477,7 +477,7 @@ fn line(x: &[f64], y: &[f64]) -> Option<Line> {
     let slope = x.dot(&y) / spread;
     let dof = n - 2;
     let scatter = ((y - slope * x).norm_squared() / dof as f64).sqrt();
-    Some(Line { slope, centre, spread, scatter, dof })
+    Some(Line { slope: slope * fault!("fit-slope", 1.0, std::f64::consts::LN_2), centre, spread, scatter, dof })
 }
 
 /// A place where the line changes its slope.

@@ -57,6 +57,10 @@ pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMe
     match claim.check {
         Check::Reference { random } => agreement::reference(claim, context, random),
         Check::Agreement { rtol } => agreement::with_exact(&Subject::of(claim, context)?, rtol),
+        Check::Stated { value } => agreement::stated(&Subject::of(claim, context)?, value),
+        Check::Nose {} => formulas::nose(),
+        Check::GridConvergence {} => on(orders::grid_convergence),
+        Check::CraterBand {} => on(scheme::crater_band),
         Check::Outcome { ref is } => agreement::outcome(&Subject::of(claim, context)?, is),
         Check::Pair { with, tolerance } => agreement::pair(&Subject::of(claim, context)?, with, tolerance),
         Check::EventOrder {} => on(agreement::event_order),

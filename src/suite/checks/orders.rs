@@ -3,10 +3,13 @@
 use super::super::claim::{Evidence, Measurement, NotMeasured, StepPattern};
 use super::super::verdict::Verdict;
 use super::Subject;
-use crate::integrators::{CentralDifference, Detail, Integrator, Steps};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Steps};
 use crate::studies::convergence::{self, Ladder, QuantityStudy, STEPS_OVER_TIME};
 use crate::studies::error::{is_fixed, value_of};
-use crate::studies::grid_convergence::{GridValue, self_convergence as fit_values};
+use crate::studies::formal_order::{Path, formal_order};
+use crate::studies::grid_convergence::{
+    GridValue, richardson, roache, self_convergence as fit_values, three_grids,
+};
 use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
@@ -94,6 +97,41 @@ pub(super) fn self_convergence(subject: &Subject<'_>) -> Result<Measurement, Not
         measurement.verdict(Verdict::Undecided)
     };
     Ok(measurement.remark(format!("limit {} in [{low}, {high}]; {}; {}", found.limit, found.reason, found.rule)))
+}
+
+/// What the rules for few grids say of three runs, beside the true error: in the asymptotic range Roache's index is 1.25
+/// times it, Richardson's extrapolation leaves a small part of it, and the observed order is the formal one.
+///
+/// Steps and landing make the error smooth only for [`Boundaries::Landed`]; with any other rule a triple shows noise.
+pub(super) fn grid_convergence(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+    let quantity = free_quantity(subject)?;
+    let claim = subject.claim;
+    if claim.boundaries != Boundaries::Landed {
+        return Err(NotMeasured::skip("three runs show an order only where the steps land on k d"));
+    }
+    let exact = subject.yardstick()?.flight;
+    let formal = formal_order(claim.velocity, claim.boundaries, &Path::of(&subject.problem, &exact), quantity)
+        .ok_or_else(|| NotMeasured::skip("no formal order"))?;
+    let truth = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one flight"))?;
+    let mut grids = Vec::new();
+    for share in [1.0 / 20_011.3, 1.0 / 12_007.7, 1.0 / 7_001.9] {
+        let size = share * exact.end.time;
+        let scheme = CentralDifference::uniform(size, claim.velocity, claim.boundaries);
+        let flight = scheme.fly(&subject.problem, Detail::Events).map_err(NotMeasured::broken)?;
+        grids.extend(value_of(quantity, &flight).map(|value| GridValue::new(size, value)));
+    }
+    let [fine, middle, coarse] = grids[..] else { return Err(NotMeasured::broken("a run without the quantity")) };
+    let error = (fine.value - truth).abs();
+    let order = three_grids([fine, middle, coarse])
+        .map_err(NotMeasured::broken)?
+        .order
+        .ok_or_else(|| NotMeasured::broken("two of three runs agree to the last digit"))?;
+    let index = roache(fine, middle, Some(order), Some(formal)).ok_or_else(|| NotMeasured::broken("no index"))?;
+    let (index, extrapolated) = (index.half_width / error, richardson(fine, middle, formal));
+    let off = [(index / 1.25 - 1.0).abs(), (extrapolated - truth).abs() / error, (order / formal - 1.0).abs()];
+    let worst = off.into_iter().fold(0.0, |a: f64, b| if b <= a { a } else { b });
+    Ok(Measurement::new(worst)
+        .remark(format!("order {order:.4}, GCI {index:.4} times the error, extrapolated {:.1e} of it left", off[1])))
 }
 
 fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<QuantityStudy, NotMeasured> {
