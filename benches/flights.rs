@@ -3,6 +3,12 @@
 //! `cargo bench` runs them; ids are `method/scene`. Besides the shipped scenes, 1,000 varied scenes from a seed: one
 //! scene repeated flatters small solvers, whose branches the processor then knows.
 
+#![expect(
+    clippy::panic,
+    missing_docs,
+    reason = "a bench that cannot be set up stops; criterion's macro writes its functions"
+)]
+
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -69,9 +75,7 @@ fn varied(criterion: &mut Criterion) {
     assert_eq!(problems.len(), 1000);
     for (name, method) in [("taylor", &Taylor::default() as &dyn Integrator), ("closed-form", &ClosedForm)] {
         criterion.bench_function(&format!("{name}/varied-1000"), |bencher| {
-            bencher.iter(|| {
-                problems.iter().filter(|p| black_box(method.fly(p, Detail::Events)).is_ok()).count()
-            });
+            bencher.iter(|| problems.iter().filter(|p| black_box(method.fly(p, Detail::Events)).is_ok()).count());
         });
     }
 }

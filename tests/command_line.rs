@@ -1,6 +1,6 @@
 //! The commands as a person or a script meets them: exit codes, JSON, refusals, files.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -112,8 +112,7 @@ fn bad_input_is_refused_with_exit_2_an_underline_and_nothing_on_standard_output(
     let text = fs::read_to_string(scene("tunnel")).unwrap().replace("\"2 kg\"", "\"2 m\"");
     fs::write(&bad, text).unwrap();
     let trajectory = folder.path().join("path.csv");
-    let output =
-        run(&["solve", bad.to_str().unwrap(), "--json", "--trajectory", trajectory.to_str().unwrap()]);
+    let output = run(&["solve", bad.to_str().unwrap(), "--json", "--trajectory", trajectory.to_str().unwrap()]);
     assert_eq!(code(&output), 2);
     assert!(output.stdout.is_empty());
     let message = String::from_utf8(output.stderr).unwrap();
@@ -169,7 +168,8 @@ fn a_step_beyond_the_stability_limit_exits_3_and_still_shows_the_flight() {
 #[test]
 fn a_flight_without_an_end_exits_1_with_the_state_reached_in_json() {
     let text = "[projectile]\nmass = 1\n[[stage]]\ndrag = 1\n[impact]\nvelocity = 10\n";
-    let output = Command::cargo_bin("penetrode").unwrap().args(["solve", "-", "--json"]).write_stdin(text).output().unwrap();
+    let output =
+        Command::cargo_bin("penetrode").unwrap().args(["solve", "-", "--json"]).write_stdin(text).output().unwrap();
     assert_eq!(code(&output), 1);
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(answer["schema"], "penetrode/solve/1");
@@ -184,8 +184,7 @@ fn a_trajectory_has_a_row_for_each_step_and_event() {
     let text = fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("time_s,depth_m,velocity_m_s,force_n,stage"));
-    let rows: Vec<Vec<f64>> =
-        lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
     assert!(rows.windows(2).all(|pair| pair[0][0] <= pair[1][0]), "times do not fall");
     let last = rows.last().unwrap();
     assert_eq!(last[1], answer["depth_m"].as_f64().unwrap());
@@ -279,7 +278,9 @@ fn bad_convergence_data_never_passes() {
     let folder = tempfile::tempdir().unwrap();
     let table = |rows: &[(f64, f64)]| {
         let mut text = String::from("dt_s,depth_m\n");
-        rows.iter().for_each(|(dt, x)| text.push_str(&format!("{dt},{x}\n")));
+        for (dt, x) in rows {
+            text.push_str(&format!("{dt},{x}\n"));
+        }
         let path = folder.path().join("table.csv");
         fs::write(&path, text).unwrap();
         path.display().to_string()

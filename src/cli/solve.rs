@@ -314,7 +314,9 @@ impl SolveArgs {
                 engineering(e.state.velocity, "m/s"),
             ]);
         }
-        table_lines(&events).iter().for_each(|l| line(l));
+        for row in table_lines(&events) {
+            line(&row);
+        }
         line("");
         match exact {
             Some(exact) => {
@@ -327,7 +329,9 @@ impl SolveArgs {
                 row("depth", flight.end.depth, exact.end.depth, "m", error(|e| e.depth));
                 row("time", flight.end.time, exact.end.time, "s", error(|e| e.time));
                 row("velocity", flight.end.velocity, exact.end.velocity, "m/s", error(|e| e.velocity));
-                table_lines(&rows).iter().for_each(|l| line(l));
+                for row in table_lines(&rows) {
+                    line(&row);
+                }
                 if errors.is_none() {
                     line(&format!("  the closed form says {}", exact.outcome.name()));
                 }

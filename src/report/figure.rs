@@ -115,7 +115,8 @@ impl Drawn {
                 escape(text)
             );
         }
-        let descriptions: Vec<_> = self.figure.panels.iter().map(|p| format!("{}: {}", p.title, p.description)).collect();
+        let descriptions: Vec<_> =
+            self.figure.panels.iter().map(|p| format!("{}: {}", p.title, p.description)).collect();
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y}\" viewBox=\"0 0 {width} {y}\" \

@@ -264,9 +264,10 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
             "falls with the formal order of each variant",
             "variants miss their formal order",
         ),
-        reading: "Each point is one flight; step sizes have random ratios. Numbers beside the names are observed orders. \
+        reading:
+            "Each point is one flight; step sizes have random ratios. Numbers beside the names are observed orders. \
                   Hollow points are outside the fit; the shaded corner is the round-off of the number of steps taken."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, judged),
         panels,
         table,
@@ -289,7 +290,15 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
         matches!(j.claim.check, Check::Order { .. } | Check::Manufactured { .. } | Check::ApproachOrder { .. })
     };
     let mut table = Table::new([
-        "claim", "formal_order", "observed_order", "low95", "high95", "limit", "points_used", "points", "verdict",
+        "claim",
+        "formal_order",
+        "observed_order",
+        "low95",
+        "high95",
+        "limit",
+        "points_used",
+        "points",
+        "verdict",
     ]);
     let mut panels = Vec::new();
     let mut all = Vec::new();
@@ -380,10 +389,11 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             "are the formal ones, degraded orders included",
             "are not shown to be the formal ones",
         ),
-        reading: "Each dot is one claim: the order of a least-squares fit, with its 95 % interval. The dashed line is the \
+        reading:
+            "Each dot is one claim: the order of a least-squares fit, with its 95 % interval. The dashed line is the \
                   formal order, the shaded band the limit of the claim. Blue passed, orange is undecided, red failed; \
                   what lies beyond the panel is drawn at its edge."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, all),
         panels,
         table,
@@ -454,9 +464,10 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
             "fall in proportion to the tolerance",
             "do not fall in proportion to the tolerance",
         ),
-        reading: "Each point is one flight. A method that keeps what is asked of it stays near the dashed line; a slope \
+        reading:
+            "Each point is one flight. A method that keeps what is asked of it stays near the dashed line; a slope \
                   of 1 is proportional."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, judged),
         panels,
         table,
@@ -484,14 +495,7 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
         marks.extend(points_of(fit, Ink::Blue, Shape::Circle));
         let order = fit.line.map(|line| line.order);
         for point in &fit.points {
-            table.push([
-                &judged.claim.id,
-                impact,
-                &point.step,
-                &point.error,
-                &(constant * point.step),
-                &point.used,
-            ]);
+            table.push([&judged.claim.id, impact, &point.step, &point.error, &(constant * point.step), &point.used]);
         }
         let order = order.map_or_else(|| "—".to_owned(), |order| format!("{order:.4}"));
         panels.push(Panel {
@@ -504,8 +508,18 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
             y,
             marks,
             keys: vec![
-                Key { text: format!("flown: order {order}"), ink: Ink::Blue, shape: Some(Shape::Circle), hollow: false },
-                Key { text: format!("predicted: {} / N", number(constant, 4)), ink: Ink::Orange, shape: None, hollow: false },
+                Key {
+                    text: format!("flown: order {order}"),
+                    ink: Ink::Blue,
+                    shape: Some(Shape::Circle),
+                    hollow: false,
+                },
+                Key {
+                    text: format!("predicted: {} / N", number(constant, 4)),
+                    ink: Ink::Orange,
+                    shape: None,
+                    hollow: false,
+                },
             ],
             height: HEIGHT,
         });
@@ -525,8 +539,9 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
             "is a limit, approached with order 1 in 1/N and with the predicted constant",
             "claims on the approach to the limit do not hold",
         ),
-        reading: "Points: depth flown at finite N less Eq. 11-12. Line: the first term of the expansion in 1/N, not fitted."
-            .to_owned(),
+        reading:
+            "Points: depth flown at finite N less Eq. 11-12. Line: the first term of the expansion in 1/N, not fitted."
+                .to_owned(),
         claims: ids(run, behind),
         panels,
         table,
@@ -586,7 +601,10 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
         let worst = all.iter().map(|p| p.1).fold(0.0, f64::max);
         panels.push(Panel {
             title: format!("scene {scene}"),
-            description: format!("Energy residual over depth; the largest is {} of the initial energy.", number(worst, 2)),
+            description: format!(
+                "Energy residual over depth; the largest is {} of the initial energy.",
+                number(worst, 2)
+            ),
             x,
             y,
             marks,
@@ -617,7 +635,8 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
 
 /// Differences from other programs in units of the tolerance.
 fn peers(run: &Run<'_>) -> Option<Figure> {
-    let mut table = Table::new(["claim", "peer", "scene", "tolerance", "difference_over_tolerance", "limit", "verdict"]);
+    let mut table =
+        Table::new(["claim", "peer", "scene", "tolerance", "difference_over_tolerance", "limit", "verdict"]);
     let mut rows: Vec<(String, Vec<&Judged>)> = Vec::new();
     for judged in run.judged {
         let Check::Peer { name, tolerance } = &judged.claim.check else { continue };
@@ -642,7 +661,12 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
         let limit = members[0].claim.limit;
         let points = vec![(x.range[0], y - 0.42), (x.range[0], y - 0.02), (limit, y - 0.02), (limit, y - 0.42)];
         marks.push(Mark::Area { points, ink: Ink::Shade });
-        marks.push(Mark::Text { at: (x.range[0], y + 0.24), text: label_of_peer(name, members), ink: Ink::Text, anchor: Anchor::Start });
+        marks.push(Mark::Text {
+            at: (x.range[0], y + 0.24),
+            text: label_of_peer(name, members),
+            ink: Ink::Text,
+            anchor: Anchor::Start,
+        });
         for judged in members {
             let points = vec![(shown(judged), y - 0.22)];
             marks.push(Mark::Points { points, ink: ink_of(judged.verdict), shape: Shape::Circle, hollow: false });
@@ -671,9 +695,10 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
             "agree within their tolerance on every scene asked",
             "flights differ by more than the limit",
         ),
-        reading: "Each dot is one scene: the largest difference of any quantity, divided by its conditioning and by the \
+        reading:
+            "Each dot is one scene: the largest difference of any quantity, divided by its conditioning and by the \
                   tolerance that is claimed. Shaded: within the limit. Differences below 10⁻⁴ are drawn there."
-            .to_owned(),
+                .to_owned(),
         claims: ids(run, behind),
         panels: vec![panel],
         table,

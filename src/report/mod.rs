@@ -10,10 +10,10 @@ pub mod folder;
 pub mod json;
 pub mod junit;
 pub mod page;
+pub mod plots_sweep;
 pub mod summary;
 pub mod table;
 pub mod text;
-pub mod plots_sweep;
 
 pub use environment::Environment;
 pub use json::VerifyJson;

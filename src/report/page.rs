@@ -468,8 +468,14 @@ fn of_kind<'f, 'a>(families: &'f [Family<'a>], kind: fn(&Check) -> bool) -> Vec<
 fn is_exact(check: &Check) -> bool {
     matches!(
         check,
-        Check::Reference { .. } | Check::Agreement { .. } | Check::SmallImpact { .. } | Check::ApproachOrder { .. }
-            | Check::ApproachConstant { .. } | Check::Eq15 { .. } | Check::Eq15Jump { .. } | Check::NdrcCriterion { .. }
+        Check::Reference { .. }
+            | Check::Agreement { .. }
+            | Check::SmallImpact { .. }
+            | Check::ApproachOrder { .. }
+            | Check::ApproachConstant { .. }
+            | Check::Eq15 { .. }
+            | Check::Eq15Jump { .. }
+            | Check::NdrcCriterion { .. }
     )
 }
 
@@ -497,10 +503,7 @@ fn is_event(check: &Check) -> bool {
 }
 
 fn is_invariant(check: &Check) -> bool {
-    matches!(
-        check,
-        Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. }
-    )
+    matches!(check, Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. })
 }
 
 fn is_stability(check: &Check) -> bool {

@@ -13,7 +13,8 @@ const TOLD_MAX: usize = 30;
 /// The run in Markdown: verdict, what failed or is undecided, one line a family of claims, and the command.
 pub fn to_markdown(run: &Run<'_>) -> String {
     let (verdict, counts) = summary(run.judged);
-    let mut text = format!("## {} {}: {}\n\n{}\n\n", mark(verdict), escape(&run.suite.title), verdict.name(), told(counts));
+    let mut text =
+        format!("## {} {}: {}\n\n{}\n\n", mark(verdict), escape(&run.suite.title), verdict.name(), told(counts));
     let told: Vec<_> =
         run.judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)).collect();
     if !told.is_empty() {

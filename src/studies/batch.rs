@@ -242,7 +242,8 @@ mod tests {
             assert_eq!(message, expected);
             assert_eq!(result_line(3, &Err(message)), format!("3,,,,,,,,,\"{expected}\""));
         }
-        let negative = layout().scene(&ByteRecord::from(vec!["300", "-2", "0.05", "0.72", "36e6", "2300", ""])).unwrap();
+        let negative =
+            layout().scene(&ByteRecord::from(vec!["300", "-2", "0.05", "0.72", "36e6", "2300", ""])).unwrap();
         assert!(answer(&negative, &Taylor::default(), false).unwrap_err().contains("mass"));
     }
 

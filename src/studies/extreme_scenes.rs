@@ -24,9 +24,7 @@ use super::quantity::Quantity;
 use super::random::Random;
 use crate::integrators::{ClosedForm, Detail, Energy, Flight, IntegrationError, Integrator, MethodName, Taylor};
 use crate::physics::reference::{self, Source};
-use crate::physics::{
-    Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scalar, Scene, groups,
-};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scalar, Scene, groups};
 
 /// Largest error in units of round-off times max(1, condition number).
 ///
@@ -632,14 +630,7 @@ pub fn scene_text(scene: &Scene, title: &str) -> Option<String> {
         "title = \"{title}\"\n\n[projectile]\nmass = {:e}\ndiameter = {:e}\nnose = {{ factor = {:e} }}\n\n[target]\n\
          strength = {:e}\ndensity = {:e}\n{thickness}\n[resistance]\nS = {:e}\nB = {:e}\nk = {:e}\n\
          crater_stiffness = {stiffness}\n{velocity}",
-        scene.mass,
-        c.diameter,
-        c.nose_factor,
-        c.strength,
-        c.density,
-        c.static_factor,
-        c.inertia_factor,
-        c.crater_ratio,
+        scene.mass, c.diameter, c.nose_factor, c.strength, c.density, c.static_factor, c.inertia_factor, c.crater_ratio,
     ))
 }
 

@@ -256,7 +256,8 @@ pub fn three_grids(grids: [GridValue; 3]) -> Result<ThreeGrids, GridError> {
 /// # Panics
 /// If the two steps are not positive and different, or the order is not positive: a mistake of the caller.
 pub fn richardson(fine: GridValue, coarse: GridValue, order: f64) -> f64 {
-    fine.value - fault!("richardson-sign", coarse.value - fine.value, fine.value - coarse.value) / growth(fine, coarse, order)
+    fine.value
+        - fault!("richardson-sign", coarse.value - fine.value, fine.value - coarse.value) / growth(fine, coarse, order)
 }
 
 /// r^p - 1 between two grids.
@@ -282,9 +283,11 @@ pub fn roache(fine: GridValue, coarse: GridValue, observed: Option<f64>, formal:
         return None;
     }
     let (safety_factor, order, rule) = match (observed, formal) {
-        (Some(p), Some(formal)) if (p - formal).abs() <= 0.1 * formal => {
-            (fault!("gci-safety-factor", 1.25, 1.0), formal, "Roache GCI, Fs 1.25, observed order within 10 % of the formal one")
-        }
+        (Some(p), Some(formal)) if (p - formal).abs() <= 0.1 * formal => (
+            fault!("gci-safety-factor", 1.25, 1.0),
+            formal,
+            "Roache GCI, Fs 1.25, observed order within 10 % of the formal one",
+        ),
         (Some(p), Some(formal)) => {
             (3.0, p.min(formal).max(0.5_f64.min(formal)), "Roache GCI, Fs 3, order clamped (Oberkampf and Roy)")
         }

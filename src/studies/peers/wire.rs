@@ -263,7 +263,8 @@ fn compare(prefix: &str, ours: State, theirs: State, problem: &Problem) -> Vec<D
     let impact_speed = problem.impact_speed;
     // W = V² carries the error of the energy: dV = dW/2V, and the time at a place follows dx/V.
     let passing = if theirs.velocity > 0.0 { (impact_speed / theirs.velocity).max(1.0) } else { 1.0 };
-    let timing = if theirs.velocity > 0.0 { passing } else { (impact_speed / change_to_rest(theirs, problem)).max(1.0) };
+    let timing =
+        if theirs.velocity > 0.0 { passing } else { (impact_speed / change_to_rest(theirs, problem)).max(1.0) };
     [
         ("depth", relative(ours.depth, theirs.depth, theirs.depth), 1.0),
         ("time", relative(ours.time, theirs.time, theirs.time), timing),

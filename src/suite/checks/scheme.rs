@@ -50,9 +50,10 @@ pub(super) fn discrete_solution(subject: &Subject<'_>, step: f64, steps: usize) 
     // The parabola turns back; its amplitude is the way flown so far where that is larger.
     let scale = states.iter().map(|s| s.depth.abs()).fold(amplitude.abs(), f64::max);
     // Times are i dt to the last bit, never a sum of steps.
-    let worst = worst_of(states.iter().enumerate().flat_map(|(i, s)| {
-        [(s.depth - exact(i)).abs() / scale, (s.time - i as f64 * dt).abs() / (steps as f64 * dt)]
-    }));
+    let worst =
+        worst_of(states.iter().enumerate().flat_map(|(i, s)| {
+            [(s.depth - exact(i)).abs() / scale, (s.time - i as f64 * dt).abs() / (steps as f64 * dt)]
+        }));
     Ok(Measurement::new(worst).remark(format!("{} steps of {dt:.3e} s", states.len())))
 }
 
