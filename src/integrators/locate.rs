@@ -16,7 +16,7 @@
 //!
 //! Inside a stage V has no minimum above zero: where `V' = 0`, `M V'' = -s V <= 0`.
 //!
-//! [`rest`] and [`passage`] then solve for the place. At a trial time the polynomial gives `x` and `V`, and the law
+//! `rest` and `passage` then solve for the place. At a trial time the polynomial gives `x` and `V`, and the law
 //! itself gives `V'`, `V''`, `V'''` at no further cost, so one trial is corrected to fourth order. Both corrections
 //! are quadratic equations solved in the form that does not lose digits, `2 D/(v + sqrt(v² - 2 a D))`: they are exact
 //! for a constant force, and near a double root (the boundary is just touched) they converge as fast as elsewhere.
