@@ -519,7 +519,7 @@ mod tests {
                 let multiplicity = roots.iter().filter(|r| **r == least).count() as f64;
                 let others: f64 = roots.iter().filter(|r| **r != least).map(|r| (least - r).abs()).product();
                 let slope = others * pairs.iter().map(|(a, b)| (least - a).powi(2) + b * b).product::<f64>();
-                let size: f64 = polynomial.iter().enumerate().map(|(k, c)| c.abs() * span.powi(k as i32)).sum();
+                let size = polynomial.iter().rev().fold(0.0, |sum, c| sum * span + c.abs());
                 let noise = 8.0 * polynomial.len() as f64 * f64::EPSILON * size;
                 let accuracy = 2.0 * (noise / slope).powf(1.0 / multiplicity);
                 prop_assert!((found.unwrap() - least).abs() <= accuracy, "{found:?} for {least} within {accuracy:e}");
