@@ -397,7 +397,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
 
     fn fly(mut self) -> Result<Flight<S>, IntegrationError> {
         self.record();
-        loop {
+        // Every round leaves a stage behind, or ends the flight.
+        for _ in 0..=self.problem.stages.len() {
             // Stages without length are passed where they stand. The last stage has no end.
             self.pass_ends();
             let entered = self.stage;
@@ -416,7 +417,9 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
                 self.stage = entered;
                 return Ok(self.finish(exit));
             }
+            assert!(self.stage > entered, "stage {entered} was crossed and not left, at {}", self.state.values());
         }
+        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: self.state.values() })
     }
 
     /// Lists the stage ends at the present depth and enters the stage beyond them.
@@ -1225,6 +1228,20 @@ mod tests {
         let time = amplitude.ln() / slow;
         assert!(relative(flight.end.time, time) < 1e-12, "{} {time}", flight.end.time);
         assert!((1000..20_000).contains(&flight.cost.steps), "{:?}", flight.cost);
+    }
+
+    #[test]
+    fn no_step_spans_more_than_the_phase_in_which_the_sign_of_v_is_decisive() {
+        // Driven from far below its balance, a spring takes nearly half a period to rest; the loosest tolerance takes
+        // the longest steps.
+        let law = Stage { static_force: -100.0, stiffness: 1.0, viscosity: 0.0, drag: 0.0, end: f64::INFINITY };
+        for rtol in [0.1, 1e-3, 0.0] {
+            let taylor = Taylor::with_rtol(rtol).unwrap();
+            let flight = taylor.fly(&one_stage(law, 0.1, f64::INFINITY), Detail::Trajectory).unwrap();
+            let longest = flight.trajectory.windows(2).map(|s| s[1].state.time - s[0].state.time).fold(0.0, f64::max);
+            assert!(longest <= PHASE_MAX && flight.cost.steps >= 2, "{longest} at rtol {rtol}");
+            assert!(relative(flight.end.time, 0.1_f64.atan2(-100.0)) < rtol.max(1e-14), "{:?}", flight.end);
+        }
     }
 
     #[test]
