@@ -409,6 +409,11 @@ impl Parameter {
         Ok(())
     }
 
+    /// Whether it is the viscosity of a layer or a stage.
+    pub fn is_viscosity(self) -> bool {
+        matches!(self, Self::Layer(_, LayerNumber::Viscosity) | Self::Stage(_, StageNumber::Viscosity))
+    }
+
     /// Whether setting it in `scene` moves an S that follows Eq. 14.
     pub fn moves_static_factor(self, scene: &Scene) -> bool {
         let Some(concrete) = scene.concrete() else { return false };
