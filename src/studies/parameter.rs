@@ -229,6 +229,7 @@ impl Parameter {
     }
 
     /// The number whose value this one sets: a group and what it moves are the same.
+    #[must_use]
     pub fn moves(self) -> Self {
         match self {
             Self::ThicknessRatio => Self::Thickness,

@@ -549,7 +549,9 @@ pub fn uncertainty(
     }
     let variance: f64 = shares.iter().sum();
     if variance > 0.0 {
-        shares.iter_mut().for_each(|share| *share /= variance);
+        for share in &mut shares {
+            *share /= variance;
+        }
     }
 
     let chunks = samples.div_ceil(CHUNK);
