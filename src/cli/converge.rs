@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, parse_time};
-use super::output::{print_json, print_text, table};
+use super::output::{print_json, print_text, table, table_lines};
 use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Steps;
@@ -250,13 +250,13 @@ fn text(scene: &Scene, problem: &Problem, report: &ConvergeJson) -> String {
     lines.push(format!("  method     {}{rules}", report.method.name));
     lines.push(format!("  reference  {}, V0 = {} m/s", report.reference, problem.impact_speed));
     lines.push(String::new());
-    let mut rows = table(&["  quantity", "formal", "observed", "95 % interval", "constant", "used", "class"]);
+    let mut rows = table(&["quantity", "formal", "observed", "95 % interval", "constant", "used", "class"]);
     for q in &report.quantities {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
         let interval = q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}"));
         let used = q.points.iter().filter(|p| p.used).count();
         rows.add_row([
-            format!("  {}", q.quantity),
+            q.quantity.to_owned(),
             number(q.formal_order),
             number(q.observed_order),
             interval,
@@ -265,7 +265,7 @@ fn text(scene: &Scene, problem: &Problem, report: &ConvergeJson) -> String {
             q.class.to_owned(),
         ]);
     }
-    lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+    lines.extend(table_lines(&rows));
     for q in report.quantities.iter().filter(|q| q.verdict != "passed") {
         lines.push(format!("  {}: {} ({})", q.quantity, q.verdict, q.reason));
     }

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{engineering, error_text, print_json, print_text, significant, table};
+use super::output::{engineering, error_text, print_json, print_text, significant, table, table_lines};
 use super::scene_json::SceneJson;
 use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
@@ -265,15 +265,15 @@ fn text(scene: &Scene, report: &CriticalJson) -> String {
         lines.push(format!("             {} random scenes, seed {}{left_out}", u.samples, u.seed));
     }
     if let (Some(ours), Some(eq15)) = (report.dimensionless_energy, &report.eq15) {
-        let mut rows = table(&["  E_c/(d³ fc)", "value", "simulation over it"]);
-        rows.add_row(["  simulation".to_owned(), significant(ours), String::new()]);
+        let mut rows = table(&["E_c/(d³ fc)", "value", "simulation over it"]);
+        rows.add_row(["simulation".to_owned(), significant(ours), String::new()]);
         let mut row = |name: &str, value: f64| {
             rows.add_row([name.to_owned(), significant(value), format!("{:+.1} %", 100.0 * (ours / value - 1.0))]);
         };
-        row("  Eq. 15, printed", eq15.printed);
-        row("  Eq. 15, unrounded", eq15.unrounded);
+        row("Eq. 15, printed", eq15.printed);
+        row("Eq. 15, unrounded", eq15.unrounded);
         lines.push(String::new());
-        lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.extend(table_lines(&rows));
         if !eq15.valid {
             lines.push(format!("  Eq. 15 does not apply: {}", eq15.note));
         }

@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand, exit codes in one place.
 
 pub mod audit;
+pub mod batch;
 pub mod completions;
 pub mod converge;
 pub mod critical;
@@ -195,6 +196,8 @@ pub enum Command {
     Solve(solve::SolveArgs),
     /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
     Critical(critical::CriticalArgs),
+    /// Many scenes from a table, one line of results each.
+    Batch(batch::BatchArgs),
     /// Order of convergence of every quantity, fitted and classified.
     Converge(converge::ConvergeArgs),
     /// V_c, E_c/(d³ fc), depth and Eq. 15 along one number of a scene, or over two.
@@ -218,6 +221,7 @@ impl Command {
         match self {
             Self::Solve(_) => "solve",
             Self::Critical(_) => "critical",
+            Self::Batch(_) => "batch",
             Self::Converge(_) => "converge",
             Self::Sweep(_) => "sweep",
             Self::Map(_) => "map",
@@ -247,6 +251,7 @@ impl Command {
         match self {
             Self::Solve(args) => args.run(),
             Self::Critical(args) => args.run(),
+            Self::Batch(args) => args.run(),
             Self::Converge(args) => args.run(),
             Self::Sweep(args) => args.run(),
             Self::Map(args) => args.run(),

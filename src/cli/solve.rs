@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{engineering, error_text, print_json, print_text, significant, table, write_whole};
+use super::output::{engineering, error_text, print_json, print_text, significant, table, table_lines, write_whole};
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
 use super::{CliError, Exit, read_scene};
@@ -301,11 +301,11 @@ impl SolveArgs {
             line(&row);
         }
         line("");
-        let mut events = table(&["  event", "time", "depth", "velocity"]);
+        let mut events = table(&["event", "time", "depth", "velocity"]);
         for e in &flight.events {
             let name = match e.kind {
-                EventKind::StageEnd(index) => format!("  stage-end {index}"),
-                kind => format!("  {}", kind.name()),
+                EventKind::StageEnd(index) => format!("stage-end {index}"),
+                kind => kind.name().to_owned(),
             };
             events.add_row([
                 name,
@@ -314,20 +314,24 @@ impl SolveArgs {
                 engineering(e.state.velocity, "m/s"),
             ]);
         }
-        line(&events.to_string());
+        for row in table_lines(&events) {
+            line(&row);
+        }
         line("");
         match exact {
             Some(exact) => {
                 let errors = RelativeErrorJson::new(flight, exact, problem.impact_speed);
-                let mut rows = table(&["  at the end", json.name, "closed form", "error"]);
+                let mut rows = table(&["at the end", json.name, "closed form", "error"]);
                 let error = |get: fn(&RelativeErrorJson) -> Option<f64>| error_text(errors.as_ref().and_then(get));
                 let mut row = |name: &str, ours: f64, theirs: f64, unit: &str, error: String| {
-                    rows.add_row([format!("  {name}"), engineering(ours, unit), engineering(theirs, unit), error]);
+                    rows.add_row([name.to_owned(), engineering(ours, unit), engineering(theirs, unit), error]);
                 };
                 row("depth", flight.end.depth, exact.end.depth, "m", error(|e| e.depth));
                 row("time", flight.end.time, exact.end.time, "s", error(|e| e.time));
                 row("velocity", flight.end.velocity, exact.end.velocity, "m/s", error(|e| e.velocity));
-                line(&rows.to_string());
+                for row in table_lines(&rows) {
+                    line(&row);
+                }
                 if errors.is_none() {
                     line(&format!("  the closed form says {}", exact.outcome.name()));
                 }

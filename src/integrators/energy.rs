@@ -293,13 +293,13 @@ struct Loss<S> {
 impl<S: Scalar> Loss<S> {
     /// The loss of `stage` in `problem`, whose impact speed is the unit of speed.
     fn of(stage: &Stage<S>, problem: &Problem<S>) -> Result<Self, IntegrationError> {
-        let per_mass = S::from_f64(2.0).over(problem.mass);
+        let per_mass = S::from_f64(fault!("energy-factor", 2.0, 1.0)).over(problem.mass);
         // Divided twice: the square of a speed may leave the range of the number type where the quotient does not.
         let relative = |force: S| (per_mass * force).over(problem.impact_speed).over(problem.impact_speed);
         let loss = Self {
             steady: relative(stage.static_force),
             growing: relative(stage.stiffness),
-            drag: per_mass * stage.drag,
+            drag: fault!("energy-drag", per_mass, S::one().over(problem.mass)) * stage.drag,
         };
         if [loss.steady, loss.growing, loss.drag].iter().all(|c| c.value().is_finite()) {
             Ok(loss)
@@ -536,7 +536,8 @@ impl<S: Scalar> Leg<S> {
         for n in 1..TIME_ORDER {
             let mut sum = S::zero();
             for k in 1..=n {
-                sum += S::from_f64(n as f64 - 0.5 * k as f64) * w[k] * slowness[n - k];
+                sum +=
+                    S::from_f64(n as f64 - fault!("energy-time-power", 0.5, 1.0) * k as f64) * w[k] * slowness[n - k];
             }
             slowness[n] = -sum.over(S::from_f64(n as f64) * w0);
         }

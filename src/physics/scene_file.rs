@@ -34,6 +34,10 @@ pub const SHIPPED: &[(&str, &str)] = &[
     ("perforate-no-drag", include_str!("../../verification/scenes/perforate-no-drag.toml")),
     ("jump", include_str!("../../verification/scenes/jump.toml")),
     ("jump-perforate", include_str!("../../verification/scenes/jump-perforate.toml")),
+    ("thin-slab", include_str!("../../verification/scenes/thin-slab.toml")),
+    ("layer-at-crater-end", include_str!("../../verification/scenes/layer-at-crater-end.toml")),
+    ("loaded-spring", include_str!("../../verification/scenes/loaded-spring.toml")),
+    ("spring-and-drag", include_str!("../../verification/scenes/spring-and-drag.toml")),
     ("constant-force", include_str!("../../verification/scenes/constant-force.toml")),
 ];
 
@@ -756,7 +760,7 @@ fn concrete(
     let number = |key, range| resistance.as_ref().map_or(Ok(None), |section| section.number(key, range));
     let static_factor = number("S", Range::Positive)?;
     let inertia_factor = number("B", Range::NotNegative)?.unwrap_or(1.0);
-    let crater_ratio = number("k", Range::NotNegative)?.unwrap_or(2.0);
+    let crater_ratio = number("k", Range::NotNegative)?.unwrap_or(fault!("default-k", 2.0, 1.0));
     let crater_stiffness =
         resistance.as_ref().map_or(Ok(CraterStiffness::Continuous), |section| crater_stiffness(section))?;
     let target =

@@ -236,7 +236,7 @@ pub fn critical_velocity<E: Display>(
             // dV = du / 2V.
             ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity)
         }),
-        energy: 0.5 * probe.mass * root.u,
+        energy: fault!("critical-energy", 0.5, 1.0) * probe.mass * root.u,
         evaluations: tally.flights,
         cost: tally.cost,
         bracket: (bracket.low.velocity(), bracket.high.velocity()),

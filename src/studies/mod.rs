@@ -2,10 +2,12 @@
 
 pub mod applicability;
 pub mod audit;
+pub mod batch;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
 pub mod experiments;
+pub mod extreme_scenes;
 pub mod formal_order;
 pub mod grid_convergence;
 pub mod order;

@@ -1,6 +1,6 @@
 //! What no formula is needed for: energy, reversal, similarity, composition.
 
-use super::super::claim::{Measurement, NotMeasured};
+use super::super::claim::{Evidence, Measurement, NotMeasured};
 use super::{Subject, fly};
 use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Stage, Stages, Target};
@@ -20,6 +20,7 @@ pub(super) fn energy_balance(subject: &Subject<'_>) -> Result<Measurement, NotMe
     let scale = 0.5 * problem.mass * problem.impact_speed * problem.impact_speed;
     let mut residual = 0.0_f64;
     let mut spent = 0.0;
+    let mut points = Vec::with_capacity(flight.trajectory.len());
     for rows in flight.trajectory.windows(2) {
         let (a, b) = (rows[0], rows[1]);
         let way = b.state.depth - a.state.depth;
@@ -31,11 +32,13 @@ pub(super) fn energy_balance(subject: &Subject<'_>) -> Result<Measurement, NotMe
         let kinetic =
             0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
         residual = worse(residual, (kinetic - spent).abs() / scale);
+        points.push((b.state.depth, (kinetic - spent) / scale));
     }
     if flight.trajectory.len() < 2 {
         return Err(NotMeasured::skip("the flight has no path"));
     }
-    Ok(Measurement::new(residual).remark(format!("{} rows of the path", flight.trajectory.len())))
+    let evidence = Evidence::Series { abscissa: "depth_m", ordinate: "residual_over_initial_energy", points };
+    Ok(Measurement::new(residual).remark(format!("{} rows of the path", flight.trajectory.len())).evidence(evidence))
 }
 
 /// The larger; NaN if either is.

@@ -10,10 +10,10 @@ use crate::physics::Problem;
 use crate::studies::peers::{Peer, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
-pub const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
+pub(super) const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
 
 /// Name by which claims ask for the program given on the command line.
-pub const USER: &str = "user";
+pub(super) const USER: &str = "user";
 
 /// Relative tolerance that a running peer is asked for: tight enough to judge it, loose enough for any solver.
 const RTOL_USER: f64 = 1e-9;
