@@ -433,7 +433,7 @@ fn csv_of(plan: &Plan, rows: &[Row]) -> std::io::Result<Vec<u8>> {
         ]);
         writer.write_record(&cells)?;
     }
-    writer.into_inner().map_err(|error| error.into_error())
+    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
 /// What a reader of standard error should know: bad and undecided rows, and H/d beyond the relation.

@@ -322,7 +322,8 @@ pub type MarkedSet<'a> = (&'a str, Vec<Point>);
 /// # Errors
 /// [`FigureError`].
 pub fn applicability_map(crater_ratio: f64, sets: &[MarkedSet<'_>]) -> Result<String, FigureError> {
-    let (x, y) = ((0.01, 1000.0), (0.1, 10_000.0));
+    // Room above for the names: the lines meet the upper edge at the right only.
+    let (x, y) = ((0.01, 1000.0), (0.1, 100_000.0));
     let impacts: Vec<f64> = (0..=600).map(|i| 10f64.powf(-2.0 + f64::from(i) / 120.0)).collect();
     let colors = [GREEN, BLUE, RED];
     let mut lines = Vec::new();
@@ -339,7 +340,10 @@ pub fn applicability_map(crater_ratio: f64, sets: &[MarkedSet<'_>]) -> Result<St
         .zip(FAMILY.iter().cycle())
         .map(|((name, points), color)| Marks { name: (*name).to_owned(), color: *color, points: points.clone() })
         .collect();
-    let title = format!("Error of Eq. 11-12 against the equation of motion, k = {}", number(crater_ratio));
+    let title = format!(
+        "Error of Eq. 11-12 against the equation of motion: lines for k = {}, shots by their own k",
+        number(crater_ratio)
+    );
     let frame = Frame { title: &title, x: "I", y: "N", legend: SeriesLabelPosition::UpperLeft };
     logarithmic(&frame, x, y, &lines, &marks)
 }

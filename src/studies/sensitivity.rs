@@ -327,6 +327,11 @@ pub fn by_closed_form(scene: &Scene) -> Result<Sensitivities, SensitivityError> 
     let mut entries = Vec::new();
     for parameter in Parameter::all_of(scene) {
         let mut entry = blank(scene, parameter)?;
+        // The formula knows no viscosity: at r = 0 it has a value, and no derivative in that direction.
+        if parameter.is_viscosity() {
+            entries.push(entry);
+            continue;
+        }
         if let (Some(speed), true) = (scene.velocity, quantities.depth.or(quantities.velocity).is_some()) {
             let problem = dual_problem(scene, speed, parameter)?;
             if let Some(depth) = quantities.depth
@@ -409,8 +414,11 @@ impl Sensitivities {
         let impact_speed = self.entries.iter().find(|e| e.parameter == Parameter::Velocity).map(|e| e.value);
         for (ours, theirs) in self.entries.iter().zip(&other.entries) {
             let of = |get: fn(&Sensitivity) -> Option<f64>, quantity: Option<f64>| {
-                let a = elasticity(get(ours), quantity, ours.value)?;
-                let b = elasticity(get(theirs), quantity, theirs.value)?;
+                // Where the number is zero all elasticities are; then the derivatives themselves are compared.
+                let scale =
+                    if ours.value == 0.0 { get(ours).filter(|d| *d != 0.0)?.recip() * quantity? } else { ours.value };
+                let a = elasticity(get(ours), quantity, scale)?;
+                let b = elasticity(get(theirs), quantity, scale)?;
                 Some((a - b).abs() / a.abs().max(1.0))
             };
             let q = &self.quantities;
@@ -541,7 +549,9 @@ pub fn uncertainty(
     }
     let variance: f64 = shares.iter().sum();
     if variance > 0.0 {
-        shares.iter_mut().for_each(|share| *share /= variance);
+        for share in &mut shares {
+            *share /= variance;
+        }
     }
 
     let chunks = samples.div_ceil(CHUNK);
