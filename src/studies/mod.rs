@@ -12,6 +12,8 @@ pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
+pub mod rounding;
+pub mod stability;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;
