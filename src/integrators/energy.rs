@@ -36,6 +36,10 @@ const DRAG_LENGTHS_MAX: f64 = 1.0;
 /// Bound on the terms of w in a step. At one drag length the term 40 is below 1e-47, under any tolerance we have.
 const TERMS_MAX: u32 = 40;
 
+/// Least change of speed, over the speed, for which speed serves as the variable of time: two bits of the difference are
+/// lost there, and depth, with the singularity at least twice as far as the end, is no worse.
+const LEAST_FALL: f64 = 0.25;
+
 /// Coefficients of the series for time. A step then takes about a fifth of the radius of convergence at round-off.
 const TIME_ORDER: usize = 24;
 
@@ -394,6 +398,11 @@ impl<S: Scalar> Walk<S> {
             // The step is the difference of two depths as they are stored: their rounding does not add up on the way.
             let to = if last { limit } else { x + S::from_f64(length) };
             let h = to - x;
+            if h.value() <= 0.0 && !limit.value().is_finite() {
+                // Rest is nearer than depths can tell apart; the quotient carries its derivatives.
+                rest = Some(x + w.over(loss.rate(x, w)));
+                break;
+            }
 
             // Every term of the sum, and every part of the rate, is at most of this size.
             let (a, b, drag) = (loss.steady.value().abs(), loss.growing.value(), loss.drag.value());
@@ -426,8 +435,12 @@ impl<S: Scalar> Walk<S> {
     /// There is just one: once w falls it goes on falling. Newton's method, whose derivative is the equation itself,
     /// kept inside a bracket; its last step is taken in `S` and so carries derivatives and low parts along.
     fn root(&mut self, loss: &Loss<S>, x: S, w: S, h: S, negligible: f64) -> S {
-        let (mut low, mut high) = (S::zero(), h);
-        let mut at = h * w.over(w - self.w);
+        // Half as far again as rest can be: a step may be longer than that by any power of ten, more than 80 halvings
+        // mend. Without drag the first guess is the root.
+        let reach = loss.static_reach(x.value(), w.value());
+        let nearer = |bound: f64| if bound < h.value() { S::from_f64(bound) } else { h };
+        let (mut low, mut high) = (S::zero(), nearer(1.5 * reach));
+        let mut at = nearer(reach);
         for _ in 0..80 {
             let (change, terms) = loss.change(x, w, at, negligible);
             self.cost.force_evaluations += u64::from(terms);
@@ -488,7 +501,9 @@ impl<S: Scalar> Leg<S> {
             let v = now.velocity.value();
             let rate_slope = 2.0 * v * (self.loss.drag.value() - self.loss.growing.value() / rate);
             let speed_radius = (rate / rate_slope).abs();
-            let by_speed = monotone && (way <= 0.0 || speed_radius / fall.abs() > depth_radius / way);
+            // Nor where it hardly changes: the fall is a difference, and its lost digits would be those of the time.
+            let falls_much = fall.abs() > LEAST_FALL * v;
+            let by_speed = monotone && (way <= 0.0 || (falls_much && speed_radius / fall.abs() > depth_radius / way));
             let done = if by_speed {
                 self.step_in_speed(&mut now, velocity, speed_radius)
             } else if way > 0.0 {

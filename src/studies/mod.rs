@@ -18,6 +18,8 @@ pub mod random;
 pub mod random_scenes;
 pub mod sensitivity;
 pub mod sweep;
+pub mod rounding;
+pub mod stability;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;
