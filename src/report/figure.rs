@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::chart::{DrawError, Ink, Panel, WIDTH};
 use super::table::Table;
+use super::text::one_line;
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
@@ -122,7 +123,9 @@ impl Drawn {
              <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y}\" viewBox=\"0 0 {width} {y}\" \
              role=\"img\" aria-labelledby=\"t d\" font-family=\"system-ui, 'Segoe UI', Roboto, sans-serif\">\n\
              <title id=\"t\">{}</title>\n<desc id=\"d\">{}</desc>\n\
-             <style>{}.paper{{fill:#fff}}@media screen and (prefers-color-scheme:dark){{.paper{{fill:#161a20}}}}</style>\n\
+             <style>{}:root{{--paper:#fff}}.paper{{fill:var(--paper)}}\
+             svg svg text{{paint-order:stroke;stroke:var(--paper);stroke-width:12px;stroke-linejoin:round}}\
+             @media screen and (prefers-color-scheme:dark){{:root{{--paper:#161a20}}}}</style>\n\
              <rect width=\"{width}\" height=\"{y}\" fill=\"#fff\" class=\"paper\"/>\n{title}{body}</svg>\n",
             escape(&self.figure.message),
             escape(&descriptions.join(" ")),
@@ -131,10 +134,10 @@ impl Drawn {
     }
 }
 
-/// `text` for XML and HTML, in elements and attributes.
-pub fn escape(text: &str) -> String {
+/// `text` on one line for XML and HTML, in elements and attributes.
+fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in one_line(text).chars() {
         match c {
             '&' => escaped.push_str("&amp;"),
             '<' => escaped.push_str("&lt;"),
