@@ -92,6 +92,16 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
                 return Err(format!("{}: {difference:?}", flight.scene).into());
             }
         }
+        // And ours: two unlike methods agree within what the program is trusted to.
+        let ours = PeerAnswer::from_flight(&Taylor::default().fly(&flight.problem(), Detail::Events)?);
+        let differences = answer
+            .differences_from(&ours, &flight.problem())
+            .ok_or_else(|| format!("{}: {} is {} by the Taylor series", flight.scene, answer.outcome, ours.outcome))?;
+        for difference in differences {
+            if difference.relative > recording.trusted_to() * difference.conditioning {
+                return Err(format!("{} against the Taylor series: {difference:?}", flight.scene).into());
+            }
+        }
     }
     Ok(())
 }

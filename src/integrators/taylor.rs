@@ -131,34 +131,16 @@ impl Taylor {
         }
     }
 
-    /// What the scene let this flight skip, and how each stage was treated: one sentence each, for people.
-    pub fn explain(&self, problem: &Problem, flight: &Flight) -> Vec<String> {
-        let mut lines = Vec::new();
-        for (index, law) in problem.stages.iter().enumerate() {
-            let shape = match Shape::of(law) {
-                Shape::Constant => "constant force: the series ends, one step serves",
-                Shape::Spring => "a spring alone: recurrence of one term, no convolution",
-                Shape::Linear => "no drag: recurrence of two terms, no convolution",
-                Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
-                Shape::General => "stiffness and drag: earliest root isolated on every step",
-            };
-            lines.push(if index <= flight.stage {
-                format!("stage {index}: {shape}")
-            } else {
-                format!("stage {index}: never entered, no force evaluated")
-            });
-        }
-        if !problem.has_exit() {
-            lines.push("exit: none in a semi-infinite target, no passage sought".to_owned());
-        } else if flight.outcome.is_stop() && problem.stages[flight.stage].end < problem.exit_depth {
-            lines.push("exit: in a stage never entered, no passage sought".to_owned());
-        }
-        if flight.trajectory.is_empty() {
-            lines.push("trajectory: not asked for, not stored".to_owned());
-        }
-        lines.push("Jacobian: an explicit method needs none".to_owned());
-        lines.push("sensitivities: not asked for, no derivatives carried".to_owned());
-        lines
+    /// How each stage of `flight` was treated: one sentence each, for people.
+    pub fn explain(problem: &Problem, flight: &Flight) -> Vec<String> {
+        let treatment = |law: &Stage| match Shape::of(law) {
+            Shape::Constant => "constant force: the series ends, one step serves",
+            Shape::Linear => "no drag: recurrence of two terms, no convolution",
+            Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
+            Shape::General => "stiffness and drag: earliest root isolated on every step",
+        };
+        let flown = problem.stages.iter().take(flight.stage + 1);
+        flown.enumerate().map(|(index, law)| format!("stage {index}: {}", treatment(law))).collect()
     }
 }
 

@@ -16,10 +16,10 @@ pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
-pub mod sensitivity;
-pub mod sweep;
 pub mod rounding;
+pub mod sensitivity;
 pub mod stability;
+pub mod sweep;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;

@@ -13,8 +13,8 @@
 //! The formulas are derived here from Eq. 6-8 alone, apart from
 //! [`crate::integrators::central_difference::stability_limit`], which states the limit in closed form.
 
-use crate::integrators::central_difference::{Boundaries, CentralDifference, VelocityAt};
 use crate::integrators::IntegrationError;
+use crate::integrators::central_difference::{Boundaries, CentralDifference, VelocityAt};
 use crate::physics::{Problem, Stage, Stages, State, Target};
 
 /// Steps of a run that decides whether amplitudes grow. At 1e-3 beyond the limit they grow by e in about 30 steps.
@@ -105,7 +105,9 @@ pub fn map(count: usize) -> Result<Vec<BoundaryPoint>, IntegrationError> {
 fn grows(velocity: VelocityAt, w_dt: f64, drag_dt: f64) -> Result<bool, IntegrationError> {
     let states = states(velocity, w_dt, drag_dt, STEPS)?;
     let (early, late) = states.split_at(STEPS / 2);
-    let reach = |part: &[State]| part.iter().map(|s| s.depth.abs()).fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
+    let reach = |part: &[State]| {
+        part.iter().map(|s| s.depth.abs()).fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) })
+    };
     Ok(!(reach(late) <= 1.5 * reach(early)))
 }
 

@@ -119,7 +119,9 @@ fn no_root(_: Subject) -> Result<Measurement, NotMeasured> {
     // A kilometre of concrete against 0.9 kg: the drag multiplies E_c by e for every 3 m or so, some 1e128 times.
     let deep = search(&Scene { thickness: Some(1000.0), ..slab(true) });
     let said = deep.as_ref().err().map(ToString::to_string).unwrap_or_default();
-    seen.expect(matches!(deep, Err(CriticalError::NoBracket { .. } | CriticalError::Flight { .. })), || format!("{deep:?}"));
+    seen.expect(matches!(deep, Err(CriticalError::NoBracket { .. } | CriticalError::Flight { .. })), || {
+        format!("{deep:?}")
+    });
     seen.expect(said.matches("m/s").count() >= 1, || said.clone());
     seen.notes.push(said);
     let none = search(&Scene { thickness: Some(0.0), ..slab(true) });

@@ -407,13 +407,7 @@ fn scaled_forces(subject: Subject) -> Result<Measurement, NotMeasured> {
         for power in [-1060, -560, -100, 100, 980] {
             // In two factors: 2^-1060 is subnormal, and powi goes through its inverse.
             let scale = |x: f64| x * 2f64.powi(power / 2) * 2f64.powi(power - power / 2);
-            let problem = concrete(
-                scale(1.0),
-                2.0,
-                exit,
-                (scale(8.0), 0.5),
-                (scale(4.0), scale(0.25)),
-            );
+            let problem = concrete(scale(1.0), 2.0, exit, (scale(8.0), 0.5), (scale(4.0), scale(0.25)));
             let flight = subject.fly(&problem)?;
             if !flight.outcome.agrees_with(base.outcome) || kinds(&flight) != kinds(&base) {
                 return Err(NotMeasured::broken(format!("{} became {} at 2^{power}", base.outcome, flight.outcome)));
@@ -494,12 +488,8 @@ fn small_times_and_far_starts(subject: Subject) -> Result<Measurement, NotMeasur
             .collect(),
         ..base
     };
-    let far = staged(
-        1.0,
-        300.0,
-        1e6 + 0.25,
-        &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)],
-    );
+    let far =
+        staged(1.0, 300.0, 1e6 + 0.25, &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)]);
     for problem in [tiny, far] {
         let flight = subject.fly(&problem)?;
         let exact = exact(&problem)?.values();

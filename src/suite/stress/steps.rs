@@ -205,7 +205,9 @@ fn limits_are_told(_: Subject) -> Result<Measurement, NotMeasured> {
     for part in [0.5, 0.99, 1.01, 2.0] {
         for velocity in RULES {
             let told = fly(&crater, part, velocity)?.step_limit;
-            seen.expect(told.is_some_and(|t| t.stable == (part < 1.0)), || format!("crater, {velocity}, {part}: {told:?}"));
+            seen.expect(told.is_some_and(|t| t.stable == (part < 1.0)), || {
+                format!("crater, {velocity}, {part}: {told:?}")
+            });
         }
         let told: Option<StepLimit> = fly(&tunnel, part, VelocityAt::LaggedHalfStep)?.step_limit;
         seen.expect(told.is_some_and(|t| t.stable == (part < 1.0)), || format!("lagged drag at {part}: {told:?}"));
@@ -218,7 +220,9 @@ fn limits_are_told(_: Subject) -> Result<Measurement, NotMeasured> {
                 .fly(&problem, Detail::Events)
                 .map_err(NotMeasured::broken)?;
             let found = flight.outcome == Outcome::Stopped && flight.end.velocity <= 0.0 && flight.cost.steps <= 2;
-            seen.expect(found, || format!("{velocity}, {boundaries}: {} after {} steps", flight.end, flight.cost.steps));
+            seen.expect(found, || {
+                format!("{velocity}, {boundaries}: {} after {} steps", flight.end, flight.cost.steps)
+            });
             let reach = problem.impact_speed * 0.2;
             seen.expect((0.0..=reach).contains(&flight.end.depth), || format!("rest at {} m", flight.end.depth));
         }
@@ -231,7 +235,8 @@ fn closed_form_everywhere(subject: Subject) -> Result<Measurement, NotMeasured> 
     let mut at = String::new();
     for index in 0..150 {
         let scene = extreme_scenes::scene(subject.seed, 2 * index);
-        let errors = closed_form_errors(&scene).map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
+        let errors =
+            closed_form_errors(&scene).map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
         if let Some((error, quantity)) = errors.worst() {
             if !(error <= worst) {
                 at = format!("{quantity} of scene {}", 2 * index);
@@ -309,7 +314,14 @@ fn fitted(
 }
 
 /// `count` random steps over `from` to `to` of the flight time of `problem`.
-fn random_steps(seed: u64, part: &str, problem: &Problem, from: f64, to: f64, count: usize) -> Result<Vec<f64>, NotMeasured> {
+fn random_steps(
+    seed: u64,
+    part: &str,
+    problem: &Problem,
+    from: f64,
+    to: f64,
+    count: usize,
+) -> Result<Vec<f64>, NotMeasured> {
     let time = exact(problem)?.end.time.hi();
     let mut random = Random::for_part(seed, part);
     Ok((0..count).map(|_| time * random.log_uniform(from, to)).collect())
@@ -418,7 +430,8 @@ fn viscous_resisting(subject: Subject) -> Result<Measurement, NotMeasured> {
         let law = Stage { static_force: 10.0, stiffness: 100.0, viscosity: rate, drag: 0.0, end: f64::INFINITY };
         let problem = staged(1.0, 10.0, f64::INFINITY, &[law]);
         let (flight, exact) = (subject.fly(&problem)?, exact(&problem)?.values());
-        let off = worse((flight.end.depth / exact.end.depth - 1.0).abs(), (flight.end.time / exact.end.time - 1.0).abs());
+        let off =
+            worse((flight.end.depth / exact.end.depth - 1.0).abs(), (flight.end.time / exact.end.time - 1.0).abs());
         // Not `off > ...`, so that a NaN is refused.
         if !(off <= 1e3 * subject.promise()) {
             return Err(NotMeasured::broken(format!("off by {off:e} at r/M = {rate:e}")));
@@ -426,7 +439,11 @@ fn viscous_resisting(subject: Subject) -> Result<Measurement, NotMeasured> {
         worst = worse(worst, flight.cost.force_evaluations as f64);
         points.push((rate, flight.cost.force_evaluations as f64));
     }
-    Ok(Measurement::new(worst).evidence(Evidence::Series { abscissa: "r/M, 1/s", ordinate: "force evaluations", points }))
+    Ok(Measurement::new(worst).evidence(Evidence::Series {
+        abscissa: "r/M, 1/s",
+        ordinate: "force evaluations",
+        points,
+    }))
 }
 
 /// The driven scene of theory section 1 with its drive in proportion to r, so that the slow motion stays the same.
@@ -436,13 +453,7 @@ fn viscous_driven(subject: Subject) -> Result<Measurement, NotMeasured> {
     let rates: &[f64] = if explicit { &[1e2, 1e3, 1e4] } else { &[1e2, 1e3, 1e4, 1e5, 1e6] };
     let mut points = Vec::new();
     for &rate in rates {
-        let law = Stage {
-            static_force: -rate,
-            stiffness: 0.1 * rate,
-            viscosity: rate,
-            drag: 0.0,
-            end: f64::INFINITY,
-        };
+        let law = Stage { static_force: -rate, stiffness: 0.1 * rate, viscosity: rate, drag: 0.0, end: f64::INFINITY };
         let problem = staged(1.0, 1.0, 9.0, &[law]);
         let flight = subject.fly(&problem)?;
         // x = 10 (1 - e^(-0.1 t)) but for the transient, of the order of M/r: t = 10 ln 10 s.
