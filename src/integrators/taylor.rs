@@ -135,6 +135,7 @@ impl Taylor {
     pub fn explain(problem: &Problem, flight: &Flight) -> Vec<String> {
         let treatment = |law: &Stage| match Shape::of(law) {
             Shape::Constant => "constant force: the series ends, one step serves",
+            Shape::Spring => "a spring alone: recurrence of one term, no convolution",
             Shape::Linear => "no drag: recurrence of two terms, no convolution",
             Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
             Shape::General => "stiffness and drag: earliest root isolated on every step",
@@ -1244,8 +1245,8 @@ mod tests {
         assert_eq!(flight.outcome, Outcome::StoppedInCrater);
         assert_eq!(flight.cost, Cost { steps: 1, rejected_steps: 0, force_evaluations: 23 });
         assert!(flight.trajectory.is_empty() && flight.notes.is_empty());
-        let lines = Taylor::default().explain(&peer_scene(60.0, f64::INFINITY).problem(), &flight);
-        assert!(lines.iter().any(|l| l == "stage 1: never entered, no force evaluated"), "{lines:?}");
+        let lines = Taylor::explain(&peer_scene(60.0, f64::INFINITY).problem(), &flight);
+        assert_eq!(lines, ["stage 0: a spring alone: recurrence of one term, no convolution"]);
         // The end alone is the same end.
         let end = Taylor::default().fly(&peer_scene(60.0, 1.0).problem(), Detail::End).unwrap();
         assert!(end.events.is_empty());
