@@ -9,6 +9,7 @@ pub mod output;
 pub mod scene_json;
 pub mod schema;
 pub mod solve;
+pub mod stress;
 pub mod verify;
 
 use std::io;
@@ -201,6 +202,8 @@ pub enum Command {
     Audit(audit::AuditArgs),
     /// The verification suite and its report.
     Verify(verify::VerifyArgs),
+    /// Numerical stability and event stress cases, and random scenes by the million.
+    Stress(stress::StressArgs),
     /// JSON schema of what a command prints.
     Schema(schema::SchemaArgs),
     /// Shell completion.
@@ -215,6 +218,7 @@ impl Command {
             Self::Converge(_) => "converge",
             Self::Audit(_) => "audit",
             Self::Verify(_) => "verify",
+            Self::Stress(_) => "stress",
             Self::Schema(_) => "schema",
             Self::Completions(_) => "completions",
         }
@@ -227,6 +231,7 @@ impl Command {
             Self::Converge(args) => args.json,
             Self::Audit(args) => args.json,
             Self::Verify(args) => args.json,
+            Self::Stress(args) => args.json,
             _ => false,
         }
     }
@@ -238,6 +243,7 @@ impl Command {
             Self::Converge(args) => args.run(),
             Self::Audit(args) => args.run(),
             Self::Verify(args) => args.run(),
+            Self::Stress(args) => args.run(),
             Self::Schema(args) => args.run(),
             Self::Completions(args) => args.run(),
         }

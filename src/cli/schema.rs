@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, converge, critical, output, solve};
+use super::{CliError, Exit, converge, critical, output, solve, stress};
 use crate::report::VerifyJson;
 
 /// Arguments of `schema`.
@@ -25,6 +25,8 @@ pub enum Documented {
     Converge,
     /// `verify --json`, which is `report.json`.
     Verify,
+    /// `stress --json`.
+    Stress,
 }
 
 impl SchemaArgs {
@@ -38,6 +40,7 @@ impl SchemaArgs {
             Documented::Critical => schema_for!(critical::CriticalJson),
             Documented::Converge => schema_for!(converge::ConvergeJson),
             Documented::Verify => schema_for!(VerifyJson),
+            Documented::Stress => schema_for!(stress::StressJson),
         };
         output::print_json(&schema).map_err(CliError::stdout)?;
         Ok(Exit::Success)
