@@ -297,13 +297,15 @@ struct Loss<S> {
 impl<S: Scalar> Loss<S> {
     /// The loss of `stage` in `problem`, whose impact speed is the unit of speed.
     fn of(stage: &Stage<S>, problem: &Problem<S>) -> Result<Self, IntegrationError> {
-        let per_mass = S::from_f64(fault!("energy-factor", 2.0, 1.0)).over(problem.mass);
-        // Divided twice: the square of a speed may leave the range of the number type where the quotient does not.
-        let relative = |force: S| (per_mass * force).over(problem.impact_speed).over(problem.impact_speed);
+        // Quotients throughout: neither 1/M nor the square of a speed may leave the range of the number type where the
+        // result does not.
+        let two = S::from_f64(fault!("energy-factor", 2.0, 1.0));
+        let per_mass = |coefficient: S| two * coefficient.over(problem.mass);
+        let relative = |force: S| per_mass(force).over(problem.impact_speed).over(problem.impact_speed);
         let loss = Self {
             steady: relative(stage.static_force),
             growing: relative(stage.stiffness),
-            drag: fault!("energy-drag", per_mass, S::one().over(problem.mass)) * stage.drag,
+            drag: fault!("energy-drag", per_mass(stage.drag), stage.drag.over(problem.mass)),
         };
         if [loss.steady, loss.growing, loss.drag].iter().all(|c| c.value().is_finite()) {
             Ok(loss)
@@ -315,6 +317,16 @@ impl<S: Scalar> Loss<S> {
     /// `-dw/dx` at depth `x`; proportional to the force, with the same sign.
     fn rate(&self, x: S, w: S) -> S {
         self.steady + self.growing * x + self.drag * w
+    }
+
+    /// Whether w has come to its limit -a/κ, so that no way however long changes it: behind a stop a target may be
+    /// millions of drag lengths thick, and before one a driven projectile reaches its terminal velocity.
+    fn is_settled(&self, x: S, w: S) -> bool {
+        let drag = self.drag.value().abs();
+        drag > 0.0
+            && self.growing.value() == 0.0
+            // The limit itself is met to the rounding of w, of κ w and of the sum.
+            && self.rate(x, w).value().abs() <= 4.0 * S::EPSILON * drag * w.value().abs()
     }
 
     /// `w(x + h) - w(x)` by the Taylor series at `x`, and the number of its terms.
@@ -381,13 +393,17 @@ impl<S: Scalar> Walk<S> {
     /// With a finite limit w is carried on to it through rest, else the walk ends at rest. A w of exactly zero at the
     /// limit is an arrival, not a rest before it.
     fn cross(&mut self, loss: &Loss<S>, limit: S, tolerance: f64, seek_rest: bool) -> Result<Option<S>, Fault> {
-        let longest = DRAG_LENGTHS_MAX / loss.drag.value();
+        let longest = DRAG_LENGTHS_MAX / loss.drag.value().abs();
         let mut rest = None;
         while self.depth.value() < limit.value() {
             if self.cost.steps >= STEPS_MAX {
                 return Err(Fault::Budget);
             }
             let (x, w) = (self.depth, self.w);
+            if limit.value().is_finite() && loss.is_settled(x, w) {
+                self.depth = limit;
+                break;
+            }
             let left = limit - x;
             let mut length = longest;
             if !limit.value().is_finite() {

@@ -85,7 +85,7 @@ pub struct Floor {
     pub steps: f64,
     /// Time step [s].
     pub dt: f64,
-    /// Truncation error of the time or depth, in double-double: what the floor rises against.
+    /// Truncation error of the depth, in double-double: what the floor rises against.
     pub truncation: f64,
     /// Rounding error of the depth with plain sums.
     pub plain: f64,
@@ -93,7 +93,7 @@ pub struct Floor {
     pub compensated: f64,
 }
 
-/// Error of the depth of `problem` against the number of steps, from 2^`from` to 2^`to`, centred and located: truncation
+/// Error of the depth of `problem` against the number of steps, from 2^`from` to 2^`to`, centred and landed: truncation
 /// (double-double against the exact depth) falls, rounding (f64 against double-double) rises.
 ///
 /// # Errors
@@ -102,7 +102,7 @@ pub fn floor(problem: &Problem, from: u32, to: u32) -> Result<Vec<Floor>, Integr
     let exact = Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end;
     let scheme = |dt: f64, summation| CentralDifference {
         summation,
-        ..CentralDifference::uniform(dt, VelocityAt::Centred, Boundaries::Interpolated)
+        ..CentralDifference::uniform(dt, VelocityAt::Centred, Boundaries::Landed)
     };
     (from..=to)
         .map(|power| {

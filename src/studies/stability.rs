@@ -105,10 +105,10 @@ pub fn map(count: usize) -> Result<Vec<BoundaryPoint>, IntegrationError> {
 fn grows(velocity: VelocityAt, w_dt: f64, drag_dt: f64) -> Result<bool, IntegrationError> {
     let states = states(velocity, w_dt, drag_dt, STEPS)?;
     let (early, late) = states.split_at(STEPS / 2);
-    let reach = |part: &[State]| {
-        part.iter().map(|s| s.depth.abs()).fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) })
-    };
-    Ok(!(reach(late) <= 1.5 * reach(early)))
+    let reach = |part: &[State]| part.iter().map(|s| s.depth.abs()).fold(0.0, f64::max);
+    // Beyond the range of the numbers there is no ratio: max passes over a NaN, and the last state tells it.
+    let overflows = late.last().is_none_or(|s| !s.depth.is_finite());
+    Ok(overflows || reach(late) > 1.5 * reach(early))
 }
 
 /// Where `grows` turns true between w dt = 0.01 and 20, by bisection.
