@@ -6,9 +6,16 @@
 //! tunnel  k d <= x     :  F = P + Q V²            (Eq. 5)
 //! ```
 
+#[macro_use]
+mod fault;
+
 pub mod cli;
 pub mod integrators;
 pub mod physics;
 pub mod report;
 pub mod studies;
 pub mod suite;
+
+#[cfg(feature = "faults")]
+#[doc(hidden)]
+pub use fault::{FAULTS, Fault, Seeded};

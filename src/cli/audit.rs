@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::output::{print_json, print_text, significant, table};
+use super::output::{print_json, print_text, significant, table, table_lines};
 use super::{CliError, Exit, read_scene};
 use crate::physics::Problem;
 use crate::studies::audit::{Audit, AuditError, ExactValues, Expectation, Table, Verdict, audit};
@@ -90,7 +90,7 @@ fn exact_values(path: &str) -> Result<ExactValues, CliError> {
 
 fn text(file: &str, judged: &Audit) -> String {
     let mut lines = vec![file.to_owned(), String::new()];
-    let mut rows = table(&["  quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"]);
+    let mut rows = table(&["quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"]);
     let verdict = |verdict: Verdict| match verdict {
         Verdict::Passed => "passed",
         Verdict::Undecided => "undecided",
@@ -99,7 +99,7 @@ fn text(file: &str, judged: &Audit) -> String {
     for q in &judged.quantities {
         let band = q.error_bands.first();
         rows.add_row([
-            format!("  {}", q.quantity.name()),
+            q.quantity.name().to_owned(),
             q.observed_order.map_or("-".to_owned(), |p| format!("{p:.2}")),
             q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}")),
             q.limit.map_or("-".to_owned(), significant),
@@ -108,7 +108,7 @@ fn text(file: &str, judged: &Audit) -> String {
             verdict(q.verdict).to_owned(),
         ]);
     }
-    lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+    lines.extend(table_lines(&rows));
     lines.push(String::new());
     for q in &judged.quantities {
         lines.push(format!("  {}: {}", q.quantity.name(), q.reason));

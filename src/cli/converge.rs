@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, parse_time};
-use super::output::{print_json, print_text, table};
+use super::output::{print_json, print_text, table, table_lines};
 use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Steps;
@@ -102,13 +102,8 @@ impl ConvergeArgs {
     pub fn run(&self) -> Result<Exit, CliError> {
         let scene = read_scene(&self.scene)?;
         let problem = scene.problem()?;
-        let method = MethodArgs {
-            method: self.method,
-            rtol: None,
-            dt: None,
-            velocity: self.velocity,
-            events: self.events,
-        };
+        let method =
+            MethodArgs { method: self.method, rtol: None, dt: None, velocity: self.velocity, events: self.events };
         if self.method == MethodName::ClosedForm {
             return Err(CliError::usage("the closed form has no order of convergence", "choose an integrator"));
         }
@@ -131,7 +126,11 @@ impl ConvergeArgs {
             )?
         } else {
             let [from, to] = TOLERANCES;
-            of_tolerances(&problem, self.method, Ladder { from, to, points: usize::from(self.points), seed: self.seed })?
+            of_tolerances(
+                &problem,
+                self.method,
+                Ladder { from, to, points: usize::from(self.points), seed: self.seed },
+            )?
         };
         let quantities: Vec<_> = studies.iter().map(|study| quantity_json(study, fixed)).collect();
         let exit = exit_of(&quantities);
@@ -161,9 +160,8 @@ impl ConvergeArgs {
         let help = "write the smallest and the largest step, such as 10ns:10us";
         let (a, b) =
             text.split_once(':').ok_or_else(|| CliError::usage(format!("--dt {text} is not a range"), help))?;
-        let time = |text: &str| {
-            parse_time(text).map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help))
-        };
+        let time =
+            |text: &str| parse_time(text).map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help));
         let (a, b) = (time(a)?, time(b)?);
         if a > 0.0 && a < b && b.is_finite() {
             Ok([a, b])
@@ -174,9 +172,8 @@ impl ConvergeArgs {
 }
 
 fn quantity_json(study: &QuantityStudy, fixed: bool) -> QuantityJson {
-    let work_order = (!fixed).then(|| {
-        study.work.as_ref().and_then(|fit| fit.as_ref().ok()).and_then(|fit| fit.line).map(|line| line.order)
-    });
+    let work_order = (!fixed)
+        .then(|| study.work.as_ref().and_then(|fit| fit.as_ref().ok()).and_then(|fit| fit.line).map(|line| line.order));
     match &study.fit {
         Ok(fit) => QuantityJson {
             quantity: study.quantity.name(),
@@ -253,13 +250,13 @@ fn text(scene: &Scene, problem: &Problem, report: &ConvergeJson) -> String {
     lines.push(format!("  method     {}{rules}", report.method.name));
     lines.push(format!("  reference  {}, V0 = {} m/s", report.reference, problem.impact_speed));
     lines.push(String::new());
-    let mut rows = table(&["  quantity", "formal", "observed", "95 % interval", "constant", "used", "class"]);
+    let mut rows = table(&["quantity", "formal", "observed", "95 % interval", "constant", "used", "class"]);
     for q in &report.quantities {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
         let interval = q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}"));
         let used = q.points.iter().filter(|p| p.used).count();
         rows.add_row([
-            format!("  {}", q.quantity),
+            q.quantity.to_owned(),
             number(q.formal_order),
             number(q.observed_order),
             interval,
@@ -268,7 +265,7 @@ fn text(scene: &Scene, problem: &Problem, report: &ConvergeJson) -> String {
             q.class.to_owned(),
         ]);
     }
-    lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+    lines.extend(table_lines(&rows));
     for q in report.quantities.iter().filter(|q| q.verdict != "passed") {
         lines.push(format!("  {}: {} ({})", q.quantity, q.verdict, q.reason));
     }

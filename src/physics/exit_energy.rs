@@ -27,7 +27,7 @@ pub(crate) fn second_exponential_integral(y: f64) -> f64 {
         // sum over n >= 0 of (-y)^n / (n + 2)!
         let mut sum = 0.0;
         for n in (0..14_u32).rev() {
-            sum = (1.0 - y * sum) / f64::from(n + 2);
+            sum = (1.0 - y * sum) / f64::from(fault!("exit-energy-series", n + 2, n + 3));
         }
         // The loop nests 1/(2)(1 - y/3 (1 - y/4 (...))).
         sum
@@ -47,8 +47,9 @@ pub fn carry(stage: &Stage, mass: f64, w: f64, from: f64, to: f64) -> f64 {
     let xi = to - from;
     let y = 2.0 * stage.drag * xi / mass;
     let static_at_start = stage.static_force + stage.stiffness * from;
-    w * (-y).exp()
-        - 2.0 * xi / mass * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
+    w * fault!("exit-energy-sign", -y, y).exp()
+        - fault!("exit-energy-factor", 2.0, 1.0) * xi / mass
+            * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
 }
 
 /// The margin `min W / V0²` over the stage ends ahead and the exit; `None` without an exit or an impact speed.
@@ -68,7 +69,7 @@ pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State
                 least = least.min(event.state.velocity / scale);
             }
         }
-        return Some(least * least);
+        return Some(fault!("exit-margin-speed", least * least, least));
     }
     Some(relative(energy_beyond_stop(problem, stage, end.depth)))
 }

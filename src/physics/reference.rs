@@ -33,7 +33,7 @@ type Big = FBig<HalfEven, 2>;
 
 /// Bits of the first attempt: 77 decimal digits.
 const FIRST_BITS: usize = 256;
-/// Attempts before an answer is given up; the last has 4374 bits.
+/// Attempts before an answer is given up; the last has 6561 bits.
 const ATTEMPTS: usize = 8;
 /// Two attempts agree when they differ by less than 2^-AGREEMENT_BITS of the value: 52 digits.
 const AGREEMENT_BITS: isize = 173;
@@ -130,9 +130,9 @@ impl ExactFlight {
 /// Critical velocity and energy to 50 digits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactCritical {
-    /// Critical velocity V_c [m/s].
+    /// Critical velocity `V_c` [m/s].
     pub velocity: Exact,
-    /// Critical energy E_c = M V_c²/2 [J].
+    /// Critical energy `E_c = M V_c²/2` [J].
     pub energy: Exact,
 }
 
@@ -830,98 +830,119 @@ fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
     sum * length
 }
 
-/// A stage `p + s x + r V`: x(t), V(t), rest and the passing of `limit`.
-fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
-    let (bits, mass, v0) = (model.bits, &model.mass, &from.velocity);
-    let Law { p, s, r, .. } = law;
-    let zero = int(0, bits);
-    let after: Box<dyn Fn(&Big) -> (Big, Big)>;
-    let rest: Option<Big>;
-    // Farthest depth, when it is only approached.
-    let mut horizon: Option<Big> = None;
-    if is_zero(s) {
-        let rate = r / mass;
-        let drift = p / r;
-        rest = is_positive(p).then(|| ln(&(int(1, bits) + r * v0 / p)) / &rate);
-        if is_zero(p) {
-            horizon = Some(&from.depth + v0 / &rate);
+/// The linear motion under `p + s x + r V`, counted from the entry of the stage.
+enum Linear {
+    /// s = 0: the speed decays at `rate = r/M` towards `-drift`, `drift = p/r`.
+    Drift { start: Big, speed: Big, rate: Big, drift: Big },
+    /// s > 0: a damped oscillator about `-p/s`, as `u = x + p/s` from `u0` and V0.
+    Oscillator { centre: Big, u0: Big, v0: Big, g: Big, m: Big, brake: Big, damping: Ordering },
+}
+
+impl Linear {
+    fn new(law: &Law, mass: &Big, from: &Point, bits: usize) -> Self {
+        let Law { p, s, r, .. } = law;
+        if is_zero(s) {
+            let (start, speed) = (from.depth.clone(), from.velocity.clone());
+            return Self::Drift { start, speed, rate: r / mass, drift: p / r };
         }
-        let (x0, fall) = (from.depth.clone(), v0 + &drift);
-        after = Box::new(move |t| {
-            let decay = (-(&rate * t)).exp();
-            (&x0 - &drift * t + &fall * (int(1, bits) - &decay) / &rate, &fall * decay - &drift)
-        });
-    } else {
         let centre = p / s;
         let u0 = &from.depth + &centre;
         let g = half(r / mass);
-        let w2 = s / mass;
         // Exact, as products of 64-bit inputs fit: critical damping is seen as such.
         let discriminant = square(r) - int(4, bits) * s * mass;
-        let m = half(magnitude(discriminant.clone()).sqrt() / mass);
-        let brake = &g * v0 + &w2 * &u0;
-        let (v0, order) = (v0.clone(), discriminant.cmp(&Big::ZERO));
-        rest = match order {
-            Ordering::Less => Some(atan2(&(&m * &v0), &brake, bits) / &m),
-            Ordering::Equal => is_positive(&brake).then(|| &v0 / &brake),
-            Ordering::Greater => {
-                let slow_brake = &brake - &m * &v0;
-                is_positive(&slow_brake).then(|| ln(&((&brake + &m * &v0) / slow_brake)) / twice(m.clone()))
+        let damping = discriminant.cmp(&Big::ZERO);
+        let m = half(magnitude(discriminant).sqrt() / mass);
+        let brake = &g * &from.velocity + s / mass * &u0;
+        Self::Oscillator { centre, u0, v0: from.velocity.clone(), g, m, brake, damping }
+    }
+
+    /// Depth and speed after time `t`.
+    fn after(&self, t: &Big) -> (Big, Big) {
+        match self {
+            Self::Drift { start, speed, rate, drift } => {
+                let decay = (-(rate * t)).exp();
+                let fall = speed + drift;
+                (start - drift * t + &fall * (Big::ONE - &decay) / rate, fall * decay - drift)
             }
-        };
-        if rest.is_none() {
-            horizon = Some(-centre.clone());
+            Self::Oscillator { centre, u0, v0, g, m, brake, damping } => {
+                // e^{-g t} times cos m t and sin(m t)/m, or their critical or hyperbolic counterparts.
+                let (cosine, sine) = match damping {
+                    Ordering::Less => {
+                        let decay = (-(g * t)).exp();
+                        let (sine, cosine) = (m * t).sin_cos();
+                        (&decay * cosine, decay * sine / m)
+                    }
+                    Ordering::Equal => {
+                        let decay = (-(g * t)).exp();
+                        (decay.clone(), decay * t)
+                    }
+                    Ordering::Greater => {
+                        let (slow, fast) = ((-((g - m) * t)).exp(), (-((g + m) * t)).exp());
+                        (half(&slow + &fast), half(slow - fast) / m)
+                    }
+                };
+                (u0 * &cosine + (v0 + g * u0) * &sine - centre, v0 * cosine - brake * sine)
+            }
         }
-        after = Box::new(move |t| {
-            // e^{-g t} times cos m t and sin(m t)/m, or their hyperbolic or critical counterparts.
-            let (cosine, sine) = match order {
-                Ordering::Less => {
-                    let decay = (-(&g * t)).exp();
-                    let (sine, cosine) = (&m * t).sin_cos();
-                    (&decay * cosine, decay * sine / &m)
-                }
-                Ordering::Equal => {
-                    let decay = (-(&g * t)).exp();
-                    (decay.clone(), decay * t)
-                }
+    }
+
+    /// When it rests, if ever.
+    fn rest_time(&self, bits: usize) -> Option<Big> {
+        match self {
+            Self::Drift { speed, rate, drift, .. } => {
+                is_positive(drift).then(|| ln(&(int(1, bits) + speed / drift)) / rate)
+            }
+            Self::Oscillator { v0, m, brake, damping, .. } => match damping {
+                Ordering::Less => Some(atan2(&(m * v0), brake, bits) / m),
+                Ordering::Equal => is_positive(brake).then(|| v0 / brake),
                 Ordering::Greater => {
-                    let (slow, fast) = ((-((&g - &m) * t)).exp(), (-((&g + &m) * t)).exp());
-                    (half(&slow + &fast), half(slow - fast) / &m)
+                    let slow_brake = brake - m * v0;
+                    is_positive(&slow_brake).then(|| ln(&((brake + m * v0) / slow_brake)) / twice(m.clone()))
                 }
-            };
-            let u = &u0 * &cosine + (&v0 + &g * &u0) * &sine;
-            (u - &centre, &v0 * cosine - &brake * sine)
-        });
-    }
-    if let Some(rest) = &rest {
-        let (depth, _) = after(rest);
-        let touches = limit.is_some_and(|limit| vanishes(&(&depth - limit), limit, bits));
-        let short = limit.is_none_or(|limit| depth < *limit);
-        if touches || short {
-            let depth = if touches { limit.cloned().unwrap_or(depth) } else { depth };
-            return Ok((Point { time: &from.time + rest, depth, velocity: zero }, !touches));
+            },
         }
     }
-    let Some(limit) = limit else { return Err(ReferenceError::NeverEnds) };
-    if horizon.is_some_and(|horizon| horizon <= *limit) {
+
+    /// The depth that a motion without rest only approaches; none when it goes on for ever.
+    fn horizon(&self) -> Option<Big> {
+        match self {
+            Self::Drift { start, speed, rate, drift } => is_zero(drift).then(|| start + speed / rate),
+            Self::Oscillator { centre, .. } => Some(-centre.clone()),
+        }
+    }
+}
+
+/// A stage `p + s x + r V`: the point at `limit` and `false`, or the point of rest and `true`.
+fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
+    let bits = model.bits;
+    let motion = Linear::new(law, &model.mass, from, bits);
+    let rest = motion.rest_time(bits);
+    if let Some(rest) = &rest {
+        let (depth, _) = motion.after(rest);
+        let touched = limit.filter(|limit| vanishes(&(&depth - *limit), limit, bits));
+        if touched.is_some() || limit.is_none_or(|limit| depth < *limit) {
+            let rests_inside = touched.is_none();
+            let depth = touched.cloned().unwrap_or(depth);
+            return Ok((Point { time: &from.time + rest, depth, velocity: int(0, bits) }, rests_inside));
+        }
+    }
+    let limit = limit.ok_or(ReferenceError::NeverEnds)?;
+    if rest.is_none() && motion.horizon().is_some_and(|horizon| horizon <= *limit) {
         return Err(ReferenceError::NeverEnds);
     }
-    let mut high = match rest {
-        Some(rest) => rest,
-        None => (limit - &from.depth) / &from.velocity,
-    };
+    let mut high = rest.unwrap_or_else(|| (limit - &from.depth) / &from.velocity);
     // 2^100 times free flight is beyond any of the rates; the loop ends because the limit lies before the horizon.
     for _ in 0..100 {
-        if after(&high).0 >= *limit {
+        if motion.after(&high).0 >= *limit {
             break;
         }
         high = twice(high);
     }
-    let time = root(&zero, &high, bits, |t| {
-        let (depth, speed) = after(t);
+    let time = root(&int(0, bits), &high, bits, |t| {
+        let (depth, speed) = motion.after(t);
         (depth - limit, speed)
     });
-    let velocity = after(&time).1;
+    let velocity = motion.after(&time).1;
     Ok((Point { time: &from.time + time, depth: limit.clone(), velocity }, false))
 }
 
@@ -935,9 +956,9 @@ fn root(low: &Big, high: &Big, bits: usize, value_and_slope: impl Fn(&Big) -> (B
             return at;
         }
         if is_negative(&value) {
-            low = at.clone();
+            low.clone_from(&at);
         } else {
-            high = at.clone();
+            high.clone_from(&at);
         }
         let newton = if is_zero(&slope) { high.clone() } else { &at - value / slope };
         let next = if newton > low && newton < high { newton } else { half(&low + &high) };
@@ -993,7 +1014,7 @@ fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[
     least.map(|w| w / scale)
 }
 
-/// Mass and V_c²: W at each stage end up to the exit is affine in V0², and none may be below zero.
+/// Mass and `V_c²`: W at each stage end up to the exit is affine in V0², and none may be below zero.
 fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(Big, Big), ReferenceError> {
     // The models at V0² = 0 and 1 (input 1 is the impact speed in either source): only a continuous crater differs.
     let at = |impact_speed: i32| {
@@ -1023,7 +1044,7 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
                 carried(moved_law, &(&w + slope)) - carried(law, &w)
             };
             w = carried(law, &w);
-            from = to.clone();
+            from.clone_from(to);
             let demand = -(&w / &slope);
             if demand > squared {
                 squared = demand;
@@ -1040,6 +1061,7 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
     use super::*;
+    use crate::physics::scene::Concrete;
     use crate::physics::stage::Stage;
 
     fn problem(stages: &[Stage], impact_speed: f64, exit_depth: f64) -> Problem {
@@ -1229,5 +1251,66 @@ mod tests {
         let both = Stage { viscosity: 1.0, ..Stage::tunnel(1.0, 1.0) };
         let error = flight(Source::Problem(&problem(&[both], 10.0, 1.0))).unwrap_err();
         assert_eq!(error.to_string(), "no reference for stage 0: viscosity and drag act together");
+    }
+
+    /// Forrestal 1994 shot 14, as published: S = 12, k = 2.
+    fn shot_14(thickness: Option<f64>, criterion: Criterion) -> Scene {
+        Scene {
+            title: None,
+            mass: 0.906,
+            resistance: Resistance::Concrete(Concrete {
+                diameter: 0.0269,
+                nose_factor: 0.15625,
+                strength: 35.2e6,
+                density: 2370.0,
+                static_factor: 12.0,
+                inertia_factor: 1.0,
+                crater_ratio: 2.0,
+                crater_stiffness: CraterStiffness::Continuous,
+                layers: Vec::new(),
+            }),
+            thickness,
+            criterion,
+            velocity: None,
+        }
+    }
+
+    #[test]
+    fn a_scene_has_the_50_digits_of_the_formulas_in_another_program() {
+        // mpmath 1.3.0 at 70 digits, theory section 2 in its plain forms.
+        let scene = shot_14(None, Criterion::FullDepth);
+        let exact = flight(Source::Scene(&scene, 277.0)).unwrap();
+        assert_digits(&exact.end.depth, "0.1671950802699606820281951756134182369920137166438979");
+        assert_digits(&exact.end.time, "0.001122301305544897903917260544220359543407377520436004");
+        assert_digits(&exact.crater_end().unwrap().velocity, "248.4003030578009719391434245885765193341631673876338");
+        let scene = shot_14(Some(0.1), Criterion::FullDepth);
+        let exact = critical(Source::Scene(&scene, 0.0)).unwrap();
+        assert_digits(&exact.velocity, "198.2723996547944194740407906105459115520752497552203");
+    }
+
+    #[test]
+    fn at_the_critical_velocity_the_margin_is_zero_to_its_rounding_and_just_beyond_the_outcome_changes() {
+        let scene = shot_14(Some(0.1), Criterion::FullDepth);
+        let critical = critical(Source::Scene(&scene, 0.0)).unwrap().velocity.to_f64();
+        let at = |speed| flight(Source::Scene(&scene, speed)).unwrap();
+        let margin = at(critical).exit_margin.unwrap();
+        assert!(margin.error_over(0.0, &Exact::one()) < 2.0 * f64::EPSILON);
+        assert_eq!(at(critical.next_up()).outcome, Outcome::Perforated);
+        assert_eq!(at(critical.next_down()).outcome, Outcome::StoppedInTunnel);
+    }
+
+    #[test]
+    fn the_ndrc_exit_depth_inverts_the_relation_on_both_branches() {
+        let d = int(1, 256);
+        // y = 2 gives e = 1.32 + 2.48 = 3.80; y = 1 gives e = 3.19 - 0.718 = 2.472.
+        let ratio = |numerator, denominator| int(numerator, 256) / int(denominator, 256);
+        assert!(apart(&ndrc_depth(&ratio(380, 100), &d, 256), &int(2, 256)) < 1e-75);
+        assert!(apart(&ndrc_depth(&ratio(2472, 1000), &d, 256), &int(1, 256)) < 1e-75);
+        // Of two depths for e = 2.996 the smaller: 1.3498, not 1.3516.
+        let shallow = ndrc_depth(&ratio(2996, 1000), &d, 256).to_f64().value();
+        assert!(shallow > 1.348 && shallow < 1.35, "{shallow}");
+        let scene = shot_14(Some(3.8 * 0.0269), Criterion::Ndrc);
+        let exact = flight(Source::Scene(&scene, 500.0)).unwrap();
+        assert!((exact.end.depth.to_f64() / 0.0538 - 1.0).abs() < 4.0 * f64::EPSILON);
     }
 }

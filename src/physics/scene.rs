@@ -229,7 +229,7 @@ pub(super) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
     let mut end = 0.0;
     let holds = |layer: &Layer| {
         end += layer.thickness;
-        end > depth
+        fault!("layer-at-crater-end", end > depth, end >= depth)
     };
     layers.iter().position(holds).or(layers.len().checked_sub(1))
 }
@@ -237,7 +237,7 @@ pub(super) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
 impl Concrete {
     /// Crater depth k d [m].
     pub fn crater_depth(&self) -> f64 {
-        self.crater_ratio * self.diameter
+        self.crater_ratio * fault!("crater-radii", self.diameter, 0.5 * self.diameter)
     }
 
     /// Whether S is the one of Eq. 14, so that it ought to follow when the strength is varied.
@@ -250,9 +250,10 @@ impl Concrete {
     /// The factors are paired so that no product overflows before the result does.
     fn tunnel(&self, medium: &Layer, end: f64) -> Result<Stage, ResolveError> {
         let d = self.diameter;
-        let static_force = FRAC_PI_4 * (medium.static_factor * d) * (medium.strength * d);
+        let static_force =
+            fault!("area", FRAC_PI_4, 2.0 * FRAC_PI_4) * (medium.static_factor * d) * (medium.strength * d);
         let no_force = medium.static_factor == 0.0 || medium.strength == 0.0;
-        let nose = self.nose_factor * self.inertia_factor;
+        let nose = fault!("nose-left-out", self.nose_factor, 1.0) * self.inertia_factor;
         let drag = FRAC_PI_4 * (nose * d) * (medium.density * d);
         let no_drag = self.nose_factor == 0.0 || self.inertia_factor == 0.0 || medium.density == 0.0;
         Ok(Stage {
@@ -304,8 +305,9 @@ impl Concrete {
             CraterStiffness::Continuous => {
                 let beyond = &stages[0];
                 // c = M (P + Q V0²)/(k d (M + k d Q)), divided through by M.
-                let force = beyond.static_force + beyond.drag * impact_speed * impact_speed;
-                let stiffness = force / (1.0 + depth * (beyond.drag / mass)) / depth;
+                let force =
+                    beyond.static_force + fault!("c-not-continuous", beyond.drag, 0.0) * impact_speed * impact_speed;
+                let stiffness = force / (1.0 + fault!("c-at-impact", depth * (beyond.drag / mass), 0.0)) / depth;
                 // No force at k d (an air gap there) leaves no force in the crater.
                 representable("the crater stiffness c [N/m]", stiffness, force == 0.0)?
             }
@@ -360,6 +362,15 @@ fn outright(stages: &[Stage], exit_depth: f64) -> Result<Stages, ResolveError> {
         admit("a stage's stiffness s [N/m]", stage.stiffness, Range::NotNegative)?;
         admit("a stage's viscosity r [kg/s]", stage.viscosity, Range::NotNegative)?;
         admit("a stage's drag q [kg/m]", stage.drag, Range::NotNegative)?;
+        // A subnormal number has lost digits already, and any product with it loses more.
+        for (quantity, value) in [
+            ("a stage's static force p [N]", stage.static_force),
+            ("a stage's stiffness s [N/m]", stage.stiffness),
+            ("a stage's viscosity r [kg/s]", stage.viscosity),
+            ("a stage's drag q [kg/m]", stage.drag),
+        ] {
+            representable(quantity, value, true)?;
+        }
         // Written so that a NaN is caught, and so is any stage behind one without an end.
         if !(stage.end >= previous && previous.is_finite()) {
             return Err(ResolveError::StageEndsFall { stage: index, end: stage.end, previous });
@@ -394,6 +405,7 @@ impl Scene {
     pub fn resolve(&self, impact_speed: f64) -> Result<Problem, ResolveError> {
         admit("the impact speed V0 [m/s]", impact_speed, Range::NotNegative)?;
         admit("the mass M [kg]", self.mass, Range::Positive)?;
+        representable("the mass M [kg]", self.mass, false)?;
         let exit_depth = self.exit_depth()?;
         let (stages, crater, target) = match &self.resistance {
             Resistance::Stages(stages) => (outright(stages, exit_depth)?, None, Target::Stages),
@@ -460,7 +472,8 @@ impl Scene {
         admit("the target's thickness H [m]", thickness, Range::NotNegative)?;
         let Some(diameter) = diameter else { return Ok(thickness) };
         admit("the diameter d [m]", diameter, Range::Positive)?;
-        let depth = diameter * semi_empirical::perforating_depth_ratio(thickness / diameter);
+        let depth =
+            fault!("ndrc-ignored", diameter * semi_empirical::perforating_depth_ratio(thickness / diameter), thickness);
         representable("the exit depth x_p [m]", depth, thickness == 0.0)
     }
 

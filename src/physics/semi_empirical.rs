@@ -55,7 +55,7 @@ const THIRD_BRANCH: f64 = 3.8;
 ///
 /// `S = 72 (fc/MPa)^(-1/2)`, Not finite for fc = 0.
 pub fn static_factor(strength: f64) -> f64 {
-    72.0 / (strength / 1e6).sqrt()
+    fault!("eq14-72", 72.0, 82.6) / (strength / 1e6).sqrt()
 }
 
 /// Range of the shots to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
@@ -69,13 +69,17 @@ pub fn static_factor_validity(strength: f64) -> Validity {
 /// Depth X/d of Eq. 11-12 at impact function `impact`, for crater depth `crater_ratio` = k > 0.
 pub fn depth_ratio(impact: f64, crater_ratio: f64) -> f64 {
     let k = crater_ratio;
-    if impact <= k * FRAC_PI_4 { (k * impact / FRAC_PI_4).sqrt() } else { 0.5 * k + impact / FRAC_PI_2 }
+    if impact <= k * FRAC_PI_4 {
+        fault!("eq11-as-printed", (k * impact / FRAC_PI_4).sqrt(), (k / FRAC_PI_4).sqrt() * impact)
+    } else {
+        fault!("eq12-offset", 0.5, 1.0) * k + impact / FRAC_PI_2
+    }
 }
 
 /// Impact function I that reaches the depth X/d = `depth_ratio` by Eq. 11-12: the inverse of [`depth_ratio`].
 pub fn impact_function(depth_ratio: f64, crater_ratio: f64) -> f64 {
     let (y, k) = (depth_ratio, crater_ratio);
-    if y <= k { FRAC_PI_4 * y * (y / k) } else { FRAC_PI_2 * (y - 0.5 * k) }
+    if y <= k { FRAC_PI_4 * y * (y / k) } else { FRAC_PI_2 * (y - fault!("eq12-inverse", 0.5, 1.0) * k) }
 }
 
 /// How far Eq. 11-12 is from the equation of motion at finite N, by the first term in 1/N, relative to X/d.
@@ -88,9 +92,11 @@ pub fn impact_function(depth_ratio: f64, crater_ratio: f64) -> f64 {
 pub fn model_difference(impact: f64, geometry: f64, crater_ratio: f64) -> f64 {
     let at_crater_end = crater_ratio * FRAC_PI_4;
     if impact <= at_crater_end {
-        0.5 * (at_crater_end - impact) / geometry
+        fault!("approach-half", 0.5, 1.0) * (at_crater_end - impact) / geometry
     } else {
-        (at_crater_end - impact) * (at_crater_end + impact) / (PI * geometry) / depth_ratio(impact, crater_ratio)
+        (at_crater_end - impact) * (at_crater_end + impact)
+            / (fault!("approach-pi", PI, 1.0) * geometry)
+            / depth_ratio(impact, crater_ratio)
     }
 }
 
@@ -133,11 +139,11 @@ pub fn perforated_thickness_ratio(depth_ratio: f64) -> f64 {
 pub fn perforating_depth_ratio(thickness_ratio: f64) -> f64 {
     let h = thickness_ratio;
     if h <= NDRC_FIRST_BRANCH_END {
-        let a = 3.19 / (2.0 * 0.718);
-        let scaled = h / 0.718;
-        scaled / (a + (a * a - scaled).sqrt())
+        let a = fault!("ndrc-3.19", 3.19, 3.91) / (2.0 * 0.718);
+        let scaled = h / fault!("ndrc-0.718", 0.718, 0.781);
+        scaled / fault!("ndrc-wrong-root", a + (a * a - scaled).sqrt(), a - (a * a - scaled).sqrt())
     } else {
-        (h - 1.32) / 1.24
+        (h - fault!("ndrc-1.32", 1.32, 1.23)) / fault!("ndrc-1.24", 1.24, 1.42)
     }
 }
 
@@ -172,16 +178,16 @@ fn range_validity(thickness_ratio: f64, below_end: bool, end: &str) -> Validity 
 /// 5.2e-8 in place of 0, since its difference cancels: that is what is printed. Beyond 18 the last branch continues.
 pub fn eq15_printed(thickness_ratio: f64) -> f64 {
     let h = thickness_ratio;
-    if h <= 3.0 { printed_first(h) } else { printed_beyond_first(h) }
+    if h <= fault!("eq15-joint", 3.0, 3.2) { printed_first(h) } else { printed_beyond_first(h) }
 }
 
 fn printed_first(h: f64) -> f64 {
-    let root = 2.222 - (4.935 - 1.393 * h).sqrt();
+    let root = fault!("eq15-2.222", 2.222, 2.221) - (4.935 - 1.393 * h).sqrt();
     0.196 * root * root
 }
 
 fn printed_beyond_first(h: f64) -> f64 {
-    if h <= THIRD_BRANCH { 0.128 * (h - 1.320) * (h - 1.320) } else { 0.633 * (h - 2.560) }
+    if h <= THIRD_BRANCH { fault!("eq15-0.128", 0.128, 0.182) * (h - 1.320) * (h - 1.320) } else { 0.633 * (h - 2.560) }
 }
 
 /// Critical energy `E_c/(S d³ fc)` of Eq. 15 with unrounded coefficients: Eq. 11-12 at k = 2 with the ACE/NDRC

@@ -10,6 +10,7 @@ pub mod folder;
 pub mod json;
 pub mod junit;
 pub mod page;
+pub mod plots_sweep;
 pub mod summary;
 pub mod table;
 pub mod text;

@@ -25,7 +25,7 @@ pub fn signed_error(quantity: Quantity, value: f64, exact: f64, impact_speed: f6
         Quantity::Velocity | Quantity::CraterEndVelocity => impact_speed,
         Quantity::Depth | Quantity::Time | Quantity::CraterEndTime | Quantity::CriticalVelocity => exact,
     };
-    if value == exact { 0.0 } else { (value - exact) / scale }
+    if value == exact { 0.0 } else { (value - exact) / fault!("error-not-relative", scale, 1.0) }
 }
 
 /// Error with its sign of `quantity` of `flight` against `exact`; `None` where the outcomes differ, where either

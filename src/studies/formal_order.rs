@@ -90,7 +90,7 @@ pub fn formal_order(velocity: VelocityAt, boundaries: Boundaries, path: &Path, q
         }
     }?;
     let lags = velocity == VelocityAt::LaggedHalfStep && stretch.velocity_dependent;
-    let misses_jump = boundaries != Boundaries::Landed && stretch.force_jumps;
+    let misses_jump = boundaries != Boundaries::Landed && fault!("formal-order", stretch.force_jumps, false);
     let late = boundaries == Boundaries::StepEnd && !matches!(quantity, Quantity::Depth | Quantity::CriticalVelocity);
     Some(if lags || misses_jump || late { 1.0 } else { 2.0 })
 }

@@ -46,8 +46,7 @@ impl Generator {
         let thickness = (!random.chance(0.3)).then(|| concrete.diameter * random.log_uniform(0.1, 30.0));
         if random.chance(0.3) {
             let area = std::f64::consts::FRAC_PI_4 * concrete.diameter * concrete.diameter;
-            let about = area * concrete.static_factor * concrete.strength
-                / (concrete.crater_ratio * concrete.diameter);
+            let about = area * concrete.static_factor * concrete.strength / (concrete.crater_ratio * concrete.diameter);
             concrete.crater_stiffness = CraterStiffness::Given(about * random.log_uniform(0.25, 4.0));
         }
         Scene {
@@ -138,7 +137,7 @@ pub fn errors_of(scene: &Scene, impact_speed: f64, flight: &Flight) -> Result<Ul
     let conditions = reference::conditions(source)?;
     let mut errors = Vec::new();
     let mut add = |error: f64, condition: f64, quantity| {
-        errors.push((error.abs() / f64::EPSILON / condition.max(1.0), quantity));
+        errors.push((error.abs() / f64::EPSILON / fault!("condition-left-out", condition.max(1.0), 1.0), quantity));
     };
     add(exact.end.depth.relative_error(flight.end.depth), conditions.depth, Quantity::Depth);
     add(exact.end.time.relative_error(flight.end.time), conditions.time, Quantity::Time);
@@ -147,7 +146,10 @@ pub fn errors_of(scene: &Scene, impact_speed: f64, flight: &Flight) -> Result<Ul
         conditions.velocity,
         Quantity::Velocity,
     );
-    if let (Some(found), Some(end)) = (flight.crater_end(), exact.crater_end()) {
+    if flight.crater_end().is_some() != exact.crater_end().is_some() {
+        // One lacks an event that the other has: no number of ulps.
+        errors.push((f64::NAN, Quantity::CraterEndTime));
+    } else if let (Some(found), Some(end)) = (flight.crater_end(), exact.crater_end()) {
         let (time, velocity) =
             (conditions.crater_end_time.unwrap_or(1.0), conditions.crater_end_velocity.unwrap_or(1.0));
         add(end.time.relative_error(found.time), time, Quantity::CraterEndTime);

@@ -61,6 +61,22 @@ pub enum Check {
         /// Relative tolerance of the method.
         rtol: Option<f64>,
     },
+    /// The claim's quantity of its scene against a number stated in the suite: published, measured, or computed
+    /// elsewhere; relative difference.
+    Stated {
+        /// The number, in SI units.
+        value: f64,
+    },
+    /// N* and height of every nose shape against the integral and the circle that they stand for; worst relative
+    /// difference.
+    Nose {},
+    /// Roache's GCI and Richardson's extrapolation on three runs of the central difference against the true error:
+    /// worst of |GCI/(1.25 |error|) - 1|, |extrapolated error/error|, and the distance of Celik's order from the formal
+    /// one over it.
+    GridConvergence {},
+    /// Central difference at rest in the crater, step ends: how far (X(dt)/X - 1)/(w dt)² leaves 0 to 1/8, over many
+    /// steps, and how far its extremes stay inside; relative to 1/8.
+    CraterBand {},
     /// Outcome of the method; 0 when right or undecided, 1 when wrong.
     Outcome {
         /// Name of the outcome in the contract.
@@ -254,8 +270,7 @@ impl Check {
     /// One ulp in the unit of the check: no measurement is believed to be finer.
     pub fn resolution(&self) -> f64 {
         match self {
-            Self::Reference { .. } => 1.0,
-            Self::Outcome { .. } | Self::EventOrder {} => 1.0,
+            Self::Reference { .. } | Self::Outcome { .. } | Self::EventOrder {} => 1.0,
             Self::Pair { tolerance, .. } | Self::Peer { tolerance, .. } => f64::EPSILON / tolerance,
             _ => f64::EPSILON,
         }

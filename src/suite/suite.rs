@@ -8,7 +8,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::checks::{self, Context, PeerAnswers};
+use super::checks::{self, Context, Memo, PeerAnswers};
 use super::claim::{Check, Claim, ClaimSpec, Judged, NotMeasured};
 use super::verdict::{Counts, Verdict};
 use crate::physics::Scene;
@@ -117,7 +117,9 @@ impl Suite {
                 let shipped = SHIPPED.iter().find(|(shipped, _)| shipped == name);
                 let found = match (shipped, folder) {
                     (Some((name, text)), _) => Scene::from_toml(text, &format!("verification/scenes/{name}.toml"))?,
-                    (None, Some(folder)) if name.ends_with(".toml") => Scene::read(&folder.join(name))?,
+                    (None, Some(folder)) if Path::new(name).extension().is_some_and(|e| e == "toml") => {
+                        Scene::read(&folder.join(name))?
+                    }
                     _ => {
                         let names: Vec<_> = SHIPPED.iter().map(|(name, _)| *name).collect();
                         return Err(refuse(
@@ -142,7 +144,8 @@ impl Suite {
 
     /// Judges every claim, in parallel, in the suite's order; `done` is told of each as it is judged.
     pub fn run(&self, seed: u64, peers: &PeerAnswers, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
-        let context = Context { scenes: &self.scenes, peers, seed };
+        let memo = Memo::default();
+        let context = Context { scenes: &self.scenes, peers, memo: &memo, seed };
         self.claims
             .par_iter()
             .map(|claim| {

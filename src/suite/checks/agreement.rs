@@ -85,6 +85,19 @@ fn critical(subject: &Subject<'_>, method: &Method) -> Result<Measurement, NotMe
     Ok(Measurement::new(error.abs()).remark(format!("{} m/s after {} flights", found.velocity, found.evaluations)))
 }
 
+/// Relative difference of the claim's quantity from the number that the claim states.
+pub(super) fn stated(subject: &Subject<'_>, stated: f64) -> Result<Measurement, NotMeasured> {
+    let quantity = subject.quantity()?;
+    let method = subject.method(None)?;
+    let value = if quantity == Quantity::CriticalVelocity {
+        critical_velocity::of_scene(subject.scene, method.integrator()).map_err(NotMeasured::broken)?.velocity
+    } else {
+        let flight = subject.fly(&method, Detail::Events)?;
+        value_of(quantity, &flight).ok_or_else(|| NotMeasured::broken(format!("{} has none", flight.outcome)))?
+    };
+    Ok(Measurement::new((value / stated - 1.0).abs()).remark(format!("{value}, stated {stated}")))
+}
+
 /// 0 when the outcome is `is` or undecided, 1 when it is wrong.
 pub(super) fn outcome(subject: &Subject<'_>, is: &str) -> Result<Measurement, NotMeasured> {
     let flight = subject.fly(&subject.method(None)?, Detail::End)?;

@@ -1,13 +1,139 @@
-//! Manufactured solutions.
+//! Manufactured solutions: a path is chosen, the force that makes it a solution is added, and the scheme must find it.
+//!
+//! ```text
+//! M x'' = -F(x, x') + S(t),   S(t) = M x_m'' + F(x_m, x_m')
+//! ```
+//!
+//! No event is in play and no closed form is needed, so the order belongs to the steps alone. The path's derivatives
+//! come from second-order dual numbers: a chosen formula is the only thing that can be wrong here.
+//!
+//! # Source
+//! Theory section 7; P. J. Roache, J. Fluids Eng. 124 (2002) 4-10.
+
+use num_dual::{Dual2_64, DualNum, second_derivative};
+use rayon::prelude::*;
 
 use super::super::claim::{Claim, ManufacturedPath, Measurement, NotMeasured};
-use super::Context;
+use super::{Context, orders};
+use crate::integrators::CentralDifference;
+use crate::physics::{Problem, Stage, State, Target};
+use crate::studies::convergence::{Ladder, STEPS_OVER_TIME};
+use crate::studies::order::{StepError, fit};
 
+/// How many step sizes.
+const POINTS: usize = 40;
+
+/// When the path ends [s].
+const END: f64 = 1.0;
+
+/// When stage, force and acceleration change on the path with a kink [s]: at no simple share of the end.
+const KINK: f64 = 0.437;
+
+/// Mass [kg]. Every term of the force is of the size of the inertia, so that none can go wrong unseen.
+const MASS: f64 = 2.0;
+
+const FIRST: Stage = Stage { static_force: 1.5, stiffness: 4.0, viscosity: 0.7, drag: 1.1, end: f64::INFINITY };
+
+/// Behind the kink: another value of every coefficient.
+const SECOND: Stage = Stage { static_force: 3.5, stiffness: 1.0, viscosity: 0.2, drag: 2.3, end: f64::INFINITY };
+
+impl ManufacturedPath {
+    /// Times at which the stages end [s].
+    fn ends(self) -> &'static [f64] {
+        match self {
+            Self::Smooth => &[END],
+            Self::Kink => &[KINK, END],
+        }
+    }
+
+    /// x_m(t) [m] in stage `stage`: always forward, at a speed that swings between 0.4 and 1.6 m/s.
+    ///
+    /// Behind the kink a term in (t - t_k)² joins it: x_m' has a kink there and x_m'' a jump, so that a step around it
+    /// with the acceleration of one side alone shows.
+    fn depth(self, stage: usize, t: Dual2_64) -> Dual2_64 {
+        let path = t + (t * 3.0).sin() * 0.2;
+        if stage == 0 { path } else { path + (t - KINK).powi(2) * 0.8 }
+    }
+
+    /// The path's depth, velocity and acceleration at `t`.
+    fn at(self, stage: usize, t: f64) -> (f64, f64, f64) {
+        second_derivative(|t| self.depth(stage, t), t)
+    }
+
+    /// S(t) [N] in stage `stage`.
+    fn source(self, problem: &Problem, stage: usize, t: f64) -> f64 {
+        let (x, v, a) = self.at(stage, t);
+        problem.mass * a + problem.stages[stage].force(x, v)
+    }
+}
+
+/// Largest distance of the scheme from the path at its nodes, over the depth reached, fitted over the step size:
+/// distance of the order from `expected`.
 pub(super) fn order(
-    _claim: &Claim,
-    _context: Context<'_>,
-    _path: ManufacturedPath,
-    _order: f64,
+    claim: &Claim,
+    context: Context<'_>,
+    path: ManufacturedPath,
+    expected: f64,
 ) -> Result<Measurement, NotMeasured> {
-    Err(NotMeasured::broken("not yet"))
+    let (_, impact_speed, _) = path.at(0, 0.0);
+    let problem = Problem {
+        mass: MASS,
+        impact_speed,
+        exit_depth: f64::INFINITY,
+        stages: [FIRST, SECOND].into_iter().collect(),
+        crater: None,
+        target: Target::Stages,
+    };
+    let ends = path.ends();
+    let (amplitude, ..) = path.at(ends.len() - 1, END);
+    let error = |size: f64| -> Result<StepError, NotMeasured> {
+        let states = CentralDifference::uniform(size, claim.velocity, claim.boundaries)
+            .forced_states(&problem, |stage, t| path.source(&problem, stage, t), ends)
+            .map_err(NotMeasured::broken)?;
+        let off = |state: &State| {
+            let stage = ends.iter().take_while(|&&end| end < state.time).count().min(ends.len() - 1);
+            state.depth - path.at(stage, state.time).0
+        };
+        // `f64::max` would drop a NaN.
+        let worst = states.iter().map(off).fold(0.0, |a: f64, b| if b.abs() <= a.abs() { a } else { b });
+        Ok(StepError::new(size, worst / amplitude))
+    };
+    let [from, to] = STEPS_OVER_TIME.map(|share| share * END);
+    let sizes = Ladder { from, to, points: POINTS, seed: context.seed }.sizes();
+    let errors: Vec<StepError> = sizes.into_par_iter().map(error).collect::<Result<_, _>>()?;
+    orders::judge(fit(&errors), 0, expected, "dt_s")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_source_is_the_one_derived_by_hand() {
+        let problem = Problem {
+            mass: MASS,
+            impact_speed: 1.6,
+            exit_depth: f64::INFINITY,
+            stages: [FIRST, SECOND].into_iter().collect(),
+            crater: None,
+            target: Target::Stages,
+        };
+        for (stage, t) in [(0, 0.0), (0, 0.3), (1, 0.9)] {
+            let bend = if stage == 0 { 0.0 } else { 0.8 };
+            let x = t + 0.2 * (3.0 * t).sin() + bend * (t - KINK) * (t - KINK);
+            let v = 1.0 + 0.6 * (3.0 * t).cos() + 2.0 * bend * (t - KINK);
+            let a = -1.8 * (3.0 * t).sin() + 2.0 * bend;
+            let by_hand = MASS * a + problem.stages[stage].force(x, v);
+            let error = ManufacturedPath::Kink.source(&problem, stage, t) - by_hand;
+            assert!(error.abs() < 1e-14 * by_hand.abs().max(1.0), "stage {stage}, t = {t}: {error:e}");
+        }
+    }
+
+    #[test]
+    fn depth_and_velocity_are_continuous_through_the_kink_and_acceleration_and_source_jump() {
+        let path = ManufacturedPath::Kink;
+        let (before, after) = (path.at(0, KINK), path.at(1, KINK));
+        assert_eq!((before.0, before.1), (after.0, after.1));
+        assert!((after.2 - before.2 - 1.6).abs() < 1e-14);
+    }
 }

@@ -8,15 +8,32 @@ mod orders;
 mod peers;
 mod scheme;
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
 use super::claim::{Check, Claim, Measurement, NotMeasured};
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Resistance, Scene};
-use crate::studies::convergence::Yardstick;
+use crate::studies::convergence::{QuantityStudy, Yardstick};
 use crate::studies::quantity::Quantity;
 
 pub use peers::PeerAnswers;
+
+/// Studies that several claims share, computed once: one run of a scheme gives every quantity.
+#[derive(Debug, Default)]
+pub struct Memo(Mutex<HashMap<String, Arc<OnceLock<Studied>>>>);
+
+type Studied = Result<Arc<Vec<QuantityStudy>>, NotMeasured>;
+
+impl Memo {
+    /// The studies under `key`, by `compute` if nobody has asked for them yet; whoever asks meanwhile waits.
+    fn get(&self, key: String, compute: impl FnOnce() -> Result<Vec<QuantityStudy>, NotMeasured>) -> Studied {
+        let cell = self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(key).or_default().clone();
+        cell.get_or_init(|| compute().map(Arc::new)).clone()
+    }
+}
 
 /// What every check may use.
 #[derive(Clone, Copy)]
@@ -25,6 +42,8 @@ pub struct Context<'a> {
     pub scenes: &'a Scenes,
     /// Answers of other programs.
     pub peers: &'a PeerAnswers,
+    /// Studies that claims share.
+    pub memo: &'a Memo,
     /// Seed of every random number.
     pub seed: u64,
 }
@@ -38,6 +57,10 @@ pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMe
     match claim.check {
         Check::Reference { random } => agreement::reference(claim, context, random),
         Check::Agreement { rtol } => agreement::with_exact(&Subject::of(claim, context)?, rtol),
+        Check::Stated { value } => agreement::stated(&Subject::of(claim, context)?, value),
+        Check::Nose {} => formulas::nose(),
+        Check::GridConvergence {} => on(orders::grid_convergence),
+        Check::CraterBand {} => on(scheme::crater_band),
         Check::Outcome { ref is } => agreement::outcome(&Subject::of(claim, context)?, is),
         Check::Pair { with, tolerance } => agreement::pair(&Subject::of(claim, context)?, with, tolerance),
         Check::EventOrder {} => on(agreement::event_order),
