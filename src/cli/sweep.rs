@@ -320,8 +320,8 @@ pub(super) fn wrapped(text: &str, width: usize) -> String {
 fn refuse_parquet(path: &Path) -> Result<(), CliError> {
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
         return Err(CliError::usage(
-            "sweep writes its table as CSV",
-            "name a .csv file; `penetrode batch` converts to .parquet in a build with `--features parquet`",
+            format!("{}: this build writes CSV only", path.display()),
+            "name a .csv file",
         ));
     }
     Ok(())

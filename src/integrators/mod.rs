@@ -8,6 +8,8 @@ pub mod central_difference;
 pub mod closed_form;
 #[cfg(feature = "diffsol")]
 pub mod diffsol;
+#[cfg(feature = "diffsol")]
+pub mod diffsol_sensitivity;
 pub mod energy;
 pub mod locate;
 pub mod method;
