@@ -3,6 +3,7 @@
 //! Claims are data. A suite file holds an array of `[[claim]]` tables; one table with several scenes, methods or
 //! quantities stands for one claim each (their product), so that a table of orders is a few lines.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Deserialize;
@@ -66,6 +67,17 @@ pub enum Check {
     Stated {
         /// The number, in SI units.
         value: f64,
+    },
+    /// Exit margin and outcome against 50 digits at `points` impact speeds from a fifth of the critical velocity to
+    /// five times it: worst error of the margin over its error bar. A wrong outcome that is not `undecided` breaks it.
+    Margin {
+        /// How many, log-uniform from the seed.
+        points: usize,
+    },
+    /// Central difference: worst relative distance of the time of step i from i dt, over `steps` steps.
+    Clock {
+        /// How many steps.
+        steps: usize,
     },
     /// N* and height of every nose shape against the integral and the circle that they stand for; worst relative
     /// difference.
@@ -263,6 +275,7 @@ impl Check {
             Self::Eq15Jump { .. } => "S",
             Self::Pair { .. } | Self::Peer { .. } => "tolerance",
             Self::SelfConvergence {} => "uncertainty",
+            Self::Margin { .. } => "error bars",
             _ => "relative",
         }
     }
@@ -283,6 +296,8 @@ impl Check {
 pub struct Claim {
     /// Name, unique.
     pub id: String,
+    /// Name of its table, which it shares with the claims that differ in scene, method, quantity or rule alone.
+    pub table: String,
     /// What is claimed.
     pub statement: String,
     /// How it is checked.
@@ -340,6 +355,7 @@ impl ClaimSpec {
                             }
                             claims.push(Claim {
                                 id,
+                                table: self.id.get_ref().clone(),
                                 statement: self.statement.clone(),
                                 check: self.check.get_ref().clone(),
                                 scene: scene.as_ref().map(|s| s.get_ref().clone()),
@@ -472,15 +488,26 @@ pub struct Judged {
     pub wall_ms: f64,
 }
 
-impl Judged {
-    /// How many times looser the limit is than what was measured, taken as at least one ulp.
-    ///
-    /// `None` where nothing was measured, and for counts and limits of zero.
-    pub fn looseness(&self) -> Option<f64> {
-        if self.claim.limit == 0.0 || matches!(self.claim.check, Check::Outcome { .. } | Check::EventOrder {}) {
-            return None;
+/// Largest looseness of a limit that still guards something.
+pub const LOOSENESS_MAX: f64 = 100.0;
+
+/// How many times looser the limit of each table is than the worst that was measured for it, taken as at least one ulp
+/// and as at least what the measurement resolves.
+///
+/// A table has one limit for all of its claims, so the worst of them decides. Tables are left out in which nothing was
+/// measured, and those of counts and limits of zero.
+pub fn looseness(judged: &[Judged]) -> BTreeMap<&str, f64> {
+    let mut worst: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for judged in judged {
+        let Claim { ref table, ref check, limit, .. } = judged.claim;
+        if limit == 0.0 || matches!(check, Check::Outcome { .. } | Check::EventOrder {}) {
+            continue;
         }
-        let floor = self.resolution.max(self.claim.check.resolution());
-        self.measured.map(|m| self.claim.limit / m.max(floor))
+        if let Some(measured) = judged.measured {
+            let seen = measured.max(judged.resolution).max(check.resolution());
+            let entry = worst.entry(table).or_insert((limit, 0.0));
+            entry.1 = entry.1.max(seen);
+        }
     }
+    worst.into_iter().map(|(table, (limit, seen))| (table, limit / seen)).collect()
 }
