@@ -120,7 +120,7 @@ fn survives_coincidence(peer: BundledPeer, environment: &Environment) -> Check {
 /// The fault that this peer is kept for: with the natural events {x = H, V = 0} a step jumps over the turning point,
 /// sees x < H at both ends, and calls a perforation with half of the way to rest still before it a stop.
 fn misses_a_perforation(peer: BundledPeer, environment: &Environment) -> Check {
-    let constant = flight("constant")?;
+    let constant = flight("perforate-no-drag")?;
     let mut live = Peer::start(&environment.command(peer))?;
     let missed = live.ask(&constant.request)?;
     let found = constant.answer;

@@ -78,7 +78,8 @@ mod faults {
         let _seeded = Seeded::activate(fault);
         for patterns in [fault.claims, ""] {
             if let Some(judged) = failures(patterns).into_iter().find(|judged| !healthy.contains(&judged.claim.id)) {
-                let seen = judged.measured.map_or(judged.remark.clone(), |m| format!("{m:.2e} > {:.0e}", judged.claim.limit));
+                let seen =
+                    judged.measured.map_or(judged.remark.clone(), |m| format!("{m:.2e} > {:.0e}", judged.claim.limit));
                 let mut caught = CAUGHT.lock().unwrap_or_else(PoisonError::into_inner);
                 caught.push((fault, judged.claim.id, seen));
                 return Ok(());

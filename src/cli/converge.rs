@@ -102,13 +102,8 @@ impl ConvergeArgs {
     pub fn run(&self) -> Result<Exit, CliError> {
         let scene = read_scene(&self.scene)?;
         let problem = scene.problem()?;
-        let method = MethodArgs {
-            method: self.method,
-            rtol: None,
-            dt: None,
-            velocity: self.velocity,
-            events: self.events,
-        };
+        let method =
+            MethodArgs { method: self.method, rtol: None, dt: None, velocity: self.velocity, events: self.events };
         if self.method == MethodName::ClosedForm {
             return Err(CliError::usage("the closed form has no order of convergence", "choose an integrator"));
         }
@@ -131,7 +126,11 @@ impl ConvergeArgs {
             )?
         } else {
             let [from, to] = TOLERANCES;
-            of_tolerances(&problem, self.method, Ladder { from, to, points: usize::from(self.points), seed: self.seed })?
+            of_tolerances(
+                &problem,
+                self.method,
+                Ladder { from, to, points: usize::from(self.points), seed: self.seed },
+            )?
         };
         let quantities: Vec<_> = studies.iter().map(|study| quantity_json(study, fixed)).collect();
         let exit = exit_of(&quantities);
@@ -161,9 +160,8 @@ impl ConvergeArgs {
         let help = "write the smallest and the largest step, such as 10ns:10us";
         let (a, b) =
             text.split_once(':').ok_or_else(|| CliError::usage(format!("--dt {text} is not a range"), help))?;
-        let time = |text: &str| {
-            parse_time(text).map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help))
-        };
+        let time =
+            |text: &str| parse_time(text).map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help));
         let (a, b) = (time(a)?, time(b)?);
         if a > 0.0 && a < b && b.is_finite() {
             Ok([a, b])
@@ -174,9 +172,8 @@ impl ConvergeArgs {
 }
 
 fn quantity_json(study: &QuantityStudy, fixed: bool) -> QuantityJson {
-    let work_order = (!fixed).then(|| {
-        study.work.as_ref().and_then(|fit| fit.as_ref().ok()).and_then(|fit| fit.line).map(|line| line.order)
-    });
+    let work_order = (!fixed)
+        .then(|| study.work.as_ref().and_then(|fit| fit.as_ref().ok()).and_then(|fit| fit.line).map(|line| line.order));
     match &study.fit {
         Ok(fit) => QuantityJson {
             quantity: study.quantity.name(),

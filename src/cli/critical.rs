@@ -12,6 +12,8 @@ use super::{CliError, Exit, read_scene};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
 use crate::physics::{Criterion, Problem, Scene, groups};
 use crate::studies::critical_velocity::{self, CriticalVelocity};
+use crate::studies::sensitivity::{self, SensitivityError, Spread};
+use crate::studies::{applicability, parameter::ParameterError};
 
 /// Arguments of `critical`.
 #[derive(Args, Debug)]
@@ -21,6 +23,15 @@ pub struct CriticalArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
+    /// Relative standard deviation of an input, such as target.strength=5%; repeatable, for the uncertainty of V_c.
+    #[arg(long, value_name = "PATH=REL")]
+    pub spread: Vec<String>,
+    /// Random scenes behind that uncertainty.
+    #[arg(long, default_value_t = 100_000, requires = "spread", value_parser = clap::value_parser!(u32).range(2..=100_000_000))]
+    pub samples: u32,
+    /// Seed of the random scenes.
+    #[arg(long, default_value_t = 1, requires = "spread")]
+    pub seed: u64,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
@@ -42,6 +53,36 @@ pub struct CriticalJson {
     pub closed_form: Option<ClosedCriticalJson>,
     pub relative_error: Option<f64>,
     pub eq15: Option<Eq15Json>,
+    /// Uncertainty of V_c from the spreads asked for; `null` without any.
+    pub uncertainty: Option<UncertaintyJson>,
+}
+
+/// Uncertainty of V_c from stated input spreads.
+#[derive(Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "named as in the text, with its unit")]
+pub struct UncertaintyJson {
+    pub spreads: Vec<SpreadJson>,
+    /// To first order, by the derivatives of V_c.
+    pub first_order_m_s: f64,
+    pub samples: usize,
+    /// Random scenes that were not admissible, left out.
+    pub inadmissible: usize,
+    pub seed: u64,
+    pub mean_m_s: f64,
+    pub deviation_m_s: f64,
+    /// Quantiles 2.5, 50 and 97.5 %.
+    pub quantiles_m_s: [f64; 3],
+}
+
+/// One input's part in it.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SpreadJson {
+    /// Path of the number.
+    pub path: String,
+    /// Its relative standard deviation.
+    pub relative: f64,
+    /// Its share in the variance of V_c, to first order.
+    pub share: f64,
 }
 
 /// The exact critical velocity.
@@ -83,6 +124,25 @@ impl Eq15Json {
     }
 }
 
+impl From<ParameterError> for CliError {
+    fn from(error: ParameterError) -> Self {
+        Self::Usage { message: error.to_string(), help: error.help() }
+    }
+}
+
+impl From<SensitivityError> for CliError {
+    fn from(error: SensitivityError) -> Self {
+        match error {
+            SensitivityError::Resolve(error) => error.into(),
+            SensitivityError::Flight(error) => error.into(),
+            SensitivityError::Parameter(error) => error.into(),
+            SensitivityError::NoCritical(_) => {
+                Self::Run { message: error.to_string(), help: String::new(), last: None }
+            }
+        }
+    }
+}
+
 impl CriticalArgs {
     /// Finds the critical velocity and prints it.
     ///
@@ -97,13 +157,20 @@ impl CriticalArgs {
             ));
         }
         let method = self.method.build()?;
+        let spreads: Vec<Spread> = self.spread.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let exact = critical_velocity::exact(&scene).ok();
         if let Some(warning) = scene.exit_depth_warning() {
             eprintln!("warning: {warning}");
         }
         let problem = scene.resolve(found.velocity)?;
-        let report = self.report(&scene, &problem, &found, exact)?;
+        for warning in applicability::warnings(&scene, found.velocity) {
+            eprintln!("warning: {warning}");
+        }
+        let mut report = self.report(&scene, &problem, &found, exact)?;
+        if !spreads.is_empty() {
+            report.uncertainty = Some(self.uncertainty(&scene, &spreads)?);
+        }
         if self.json { print_json(&report) } else { print_text(&text(&scene, &report)) }.map_err(CliError::stdout)?;
         Ok(Exit::Success)
     }
@@ -137,6 +204,29 @@ impl CriticalArgs {
             relative_error: exact
                 .map(|exact| if found.velocity == exact { 0.0 } else { ((found.velocity - exact) / exact).abs() }),
             eq15: Eq15Json::new(scene),
+            uncertainty: None,
+        })
+    }
+
+    fn uncertainty(&self, scene: &Scene, spreads: &[Spread]) -> Result<UncertaintyJson, CliError> {
+        let found = sensitivity::uncertainty(scene, spreads, self.samples as usize, self.seed)?;
+        Ok(UncertaintyJson {
+            spreads: spreads
+                .iter()
+                .zip(&found.shares)
+                .map(|(spread, &share)| SpreadJson {
+                    path: spread.parameter.to_string(),
+                    relative: spread.relative,
+                    share,
+                })
+                .collect(),
+            first_order_m_s: found.first_order,
+            samples: found.samples,
+            inadmissible: found.inadmissible,
+            seed: self.seed,
+            mean_m_s: found.mean,
+            deviation_m_s: found.deviation,
+            quantiles_m_s: found.quantiles,
         })
     }
 }
@@ -160,6 +250,19 @@ fn text(scene: &Scene, report: &CriticalJson) -> String {
     if let Some(exact) = &report.closed_form {
         let error = error_text(report.relative_error);
         lines.push(format!("  exact      {} m/s, relative error {error}", exact.critical_velocity_m_s));
+    }
+    if let Some(u) = &report.uncertainty {
+        lines.push(format!("  spread     +- {:.4} m/s to first order", u.first_order_m_s));
+        for part in &u.spreads {
+            let (path, share) = (&part.path, 100.0 * part.share);
+            lines.push(format!("             {path} {} %: {share:.1} % of the variance", 100.0 * part.relative));
+        }
+        let [low, median, high] = u.quantiles_m_s;
+        lines.push(format!("  sampled    mean {:.4}, deviation {:.4} m/s", u.mean_m_s, u.deviation_m_s));
+        lines.push(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
+        let left_out =
+            if u.inadmissible > 0 { format!(", {} inadmissible left out", u.inadmissible) } else { String::new() };
+        lines.push(format!("             {} random scenes, seed {}{left_out}", u.samples, u.seed));
     }
     if let (Some(ours), Some(eq15)) = (report.dimensionless_energy, &report.eq15) {
         let mut rows = table(&["E_c/(d³ fc)", "value", "simulation over it"]);

@@ -1,14 +1,19 @@
 //! The command line: one file per subcommand, exit codes in one place.
 
 pub mod audit;
+pub mod batch;
 pub mod completions;
 pub mod converge;
 pub mod critical;
+pub mod experiments;
+pub mod map;
 pub mod method_args;
 pub mod output;
 pub mod scene_json;
 pub mod schema;
+pub mod sensitivities;
 pub mod solve;
+pub mod sweep;
 pub mod verify;
 
 use std::io;
@@ -86,11 +91,7 @@ pub enum CliError {
 impl From<IntegrationError> for CliError {
     fn from(error: IntegrationError) -> Self {
         let (message, help) = (error.to_string(), error.help().to_owned());
-        if error.is_usage() {
-            Self::Usage { message, help }
-        } else {
-            Self::Run { message, help, last: error.last() }
-        }
+        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last: error.last() } }
     }
 }
 
@@ -195,8 +196,16 @@ pub enum Command {
     Solve(solve::SolveArgs),
     /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
     Critical(critical::CriticalArgs),
+    /// Many scenes from a table, one line of results each.
+    Batch(batch::BatchArgs),
     /// Order of convergence of every quantity, fitted and classified.
     Converge(converge::ConvergeArgs),
+    /// V_c, E_c/(d³ fc), depth and Eq. 15 along one number of a scene, or over two.
+    Sweep(sweep::SweepArgs),
+    /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
+    Map(map::MapArgs),
+    /// Measured penetration depths beside predicted ones: shipped data or your own.
+    Experiments(experiments::ExperimentsArgs),
     /// Order, error band and verdict for step-size results of another code.
     Audit(audit::AuditArgs),
     /// The verification suite and its report.
@@ -212,7 +221,11 @@ impl Command {
         match self {
             Self::Solve(_) => "solve",
             Self::Critical(_) => "critical",
+            Self::Batch(_) => "batch",
             Self::Converge(_) => "converge",
+            Self::Sweep(_) => "sweep",
+            Self::Map(_) => "map",
+            Self::Experiments(_) => "experiments",
             Self::Audit(_) => "audit",
             Self::Verify(_) => "verify",
             Self::Schema(_) => "schema",
@@ -225,6 +238,9 @@ impl Command {
             Self::Solve(args) => args.json,
             Self::Critical(args) => args.json,
             Self::Converge(args) => args.json,
+            Self::Sweep(args) => args.json,
+            Self::Map(args) => args.json,
+            Self::Experiments(args) => args.json,
             Self::Audit(args) => args.json,
             Self::Verify(args) => args.json,
             _ => false,
@@ -235,7 +251,11 @@ impl Command {
         match self {
             Self::Solve(args) => args.run(),
             Self::Critical(args) => args.run(),
+            Self::Batch(args) => args.run(),
             Self::Converge(args) => args.run(),
+            Self::Sweep(args) => args.run(),
+            Self::Map(args) => args.run(),
+            Self::Experiments(args) => args.run(),
             Self::Audit(args) => args.run(),
             Self::Verify(args) => args.run(),
             Self::Schema(args) => args.run(),

@@ -10,11 +10,13 @@ use serde::Serialize;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{engineering, error_text, print_json, print_text, significant, table, table_lines, write_whole};
 use super::scene_json::SceneJson;
+use super::sensitivities::SensitivitiesJson;
 use super::{CliError, Exit, read_scene};
 use crate::integrators::closed_form::ClosedForm;
 use crate::integrators::{Detail, Flight, Integrator};
 use crate::physics::groups::Groups;
 use crate::physics::{EventKind, Outcome, Problem, Scene};
+use crate::studies::applicability;
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
 
@@ -32,6 +34,9 @@ pub struct SolveArgs {
     /// Say what the scene let the method skip, and why.
     #[arg(long)]
     pub explain: bool,
+    /// Derivatives of depth, residual and critical velocity with respect to every number of the scene.
+    #[arg(long)]
+    pub sensitivities: bool,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
@@ -57,6 +62,8 @@ pub struct SolveJson {
     pub closed_form: Option<ClosedFormJson>,
     pub relative_error: Option<RelativeErrorJson>,
     pub skipped: Vec<String>,
+    /// Asked for with `--sensitivities`; `null` otherwise.
+    pub sensitivities: Option<SensitivitiesJson>,
 }
 
 /// The groups of Eq. 13; `null` where the scene has none.
@@ -167,11 +174,26 @@ impl SolveArgs {
             write_whole(path, csv.as_bytes())
                 .map_err(|cause| CliError::Write { path: path.display().to_string(), cause })?;
         }
-        let skipped = method.explain(&problem, &flight, detail);
-        if self.json {
-            print_json(&self.json(&scene, &problem, &flight, exact.as_ref(), skipped, wall_ns)?)
+        for warning in applicability::warnings(&scene, problem.impact_speed) {
+            eprintln!("warning: {warning}");
+        }
+        let mut skipped = method.explain(&problem, &flight, detail);
+        let sensitivities = if self.sensitivities {
+            skipped.retain(|note| !note.starts_with("sensitivities"));
+            Some(SensitivitiesJson::new(&scene)?)
         } else {
-            print_text(&self.text(&scene, &problem, &flight, exact.as_ref(), &skipped)?)
+            None
+        };
+        if self.json {
+            let mut json = self.json(&scene, &problem, &flight, exact.as_ref(), skipped, wall_ns)?;
+            json.sensitivities = sensitivities;
+            print_json(&json)
+        } else {
+            let mut text = self.text(&scene, &problem, &flight, exact.as_ref(), &skipped)?;
+            if let Some(sensitivities) = &sensitivities {
+                text.push_str(&sensitivities.text());
+            }
+            print_text(&text)
         }
         .map_err(CliError::stdout)?;
         Ok(exit_of(&flight))
@@ -227,6 +249,7 @@ impl SolveArgs {
             closed_form: exact.map(ClosedFormJson::from),
             relative_error: exact.and_then(|e| RelativeErrorJson::new(flight, e, problem.impact_speed)),
             skipped,
+            sensitivities: None,
         })
     }
 
@@ -291,7 +314,9 @@ impl SolveArgs {
                 engineering(e.state.velocity, "m/s"),
             ]);
         }
-        table_lines(&events).iter().for_each(|l| line(l));
+        for row in table_lines(&events) {
+            line(&row);
+        }
         line("");
         match exact {
             Some(exact) => {
@@ -304,7 +329,9 @@ impl SolveArgs {
                 row("depth", flight.end.depth, exact.end.depth, "m", error(|e| e.depth));
                 row("time", flight.end.time, exact.end.time, "s", error(|e| e.time));
                 row("velocity", flight.end.velocity, exact.end.velocity, "m/s", error(|e| e.velocity));
-                table_lines(&rows).iter().for_each(|l| line(l));
+                for row in table_lines(&rows) {
+                    line(&row);
+                }
                 if errors.is_none() {
                     line(&format!("  the closed form says {}", exact.outcome.name()));
                 }
@@ -356,4 +383,3 @@ fn trajectory_csv(flight: &Flight) -> String {
     }
     csv
 }
-

@@ -126,7 +126,7 @@ impl VerifyArgs {
 
     /// The command that remakes this run.
     fn command(&self) -> String {
-        let quote = |text: &str| shlex::try_quote(text).map_or_else(|_| text.to_owned(), |q| q.into_owned());
+        let quote = |text: &str| shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned);
         let mut words = vec!["penetrode verify".to_owned()];
         words.extend(self.suite.as_deref().map(quote));
         words.extend(self.only.as_deref().map(|pattern| format!("--only {}", quote(pattern))));

@@ -36,7 +36,7 @@ const IMPLICIT: Scheme = Scheme::Bdf;
 /// Chooses between `tsit45` and `bdf` in every stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
-    /// Relative tolerance of each step, as for [`super::Diffsol`].
+    /// Relative tolerance of each step, 1e-14 to 0.1, with absolute ones as for [`super::Diffsol`].
     pub rtol: f64,
     /// Largest number of steps of one flight.
     pub max_steps: u64,
@@ -107,7 +107,7 @@ impl Adaptive {
     /// # Errors
     /// As there.
     pub fn study<R>(&self, work: impl FnOnce(&mut FlyOne<'_>) -> R) -> Result<R, IntegrationError> {
-        check_rtol(self.rtol)?;
+        check_rtol(IMPLICIT, self.rtol)?;
         with_legs(EXPLICIT, self.rtol, |explicit| {
             with_legs(IMPLICIT, self.rtol, |implicit| {
                 work(&mut |problem, detail| {

@@ -437,7 +437,8 @@ impl Rule for Centred {
         // half q V² + (1 + half r) V = u - half (p + s x), in the form that does not cancel for small drag.
         let known = u - half * (law.static_force + law.stiffness * x);
         let linear = S::one() + half * law.viscosity;
-        let discriminant = linear * linear + S::from_f64(fault!("centred-quadratic", 4.0, 2.0)) * half * law.drag * known;
+        let discriminant =
+            linear * linear + S::from_f64(fault!("centred-quadratic", 4.0, 2.0)) * half * law.drag * known;
         // Without a real root the step goes far past rest; the vertex of the parabola is as negative as it gets.
         let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
         law.force(x, fault!("lag-added", S::from_f64(2.0) * known / (linear + root), u))
@@ -683,12 +684,13 @@ struct Step<S> {
 impl<S: Scalar> Step<S> {
     /// Time into the step at which V = 0, if V(i+1) <= 0.
     fn rest(&self) -> Option<S> {
-        (self.to.velocity.value() <= 0.0)
-            .then(|| fault!(
+        (self.to.velocity.value() <= 0.0).then(|| {
+            fault!(
                 "rest-not-located",
                 self.size * self.from.velocity / (self.from.velocity - self.to.velocity),
                 self.size
-            ))
+            )
+        })
     }
 
     /// Depth after `tau`, on the parabola.
@@ -696,12 +698,14 @@ impl<S: Scalar> Step<S> {
         if tau.value() >= self.size.value() {
             return self.to.depth;
         }
-        self.from.depth + tau * (self.from.velocity - S::from_f64(fault!("parabola-half", 0.5, 1.0)) * tau * self.deceleration)
+        self.from.depth
+            + tau * (self.from.velocity - S::from_f64(fault!("parabola-half", 0.5, 1.0)) * tau * self.deceleration)
     }
 
     /// Velocity after `tau`, on the chord; not below zero.
     fn velocity(&self, tau: S) -> S {
-        let v = self.from.velocity + fault!("velocity-not-interpolated", tau / self.size, S::one()) * (self.to.velocity - self.from.velocity);
+        let v = self.from.velocity
+            + fault!("velocity-not-interpolated", tau / self.size, S::one()) * (self.to.velocity - self.from.velocity);
         if v.value() > 0.0 { v } else { S::zero() }
     }
 
@@ -710,7 +714,9 @@ impl<S: Scalar> Step<S> {
         let distance = place - self.from.depth;
         let v = self.from.velocity;
         let discriminant = v * v - S::from_f64(2.0) * self.deceleration * distance;
-        (discriminant.value() >= 0.0).then(|| S::from_f64(2.0) * distance / fault!("passage-wrong-root", v + discriminant.sqrt(), v - discriminant.sqrt()))
+        (discriminant.value() >= 0.0).then(|| {
+            S::from_f64(2.0) * distance / fault!("passage-wrong-root", v + discriminant.sqrt(), v - discriminant.sqrt())
+        })
     }
 
     /// When depth `place` is reached within the step, before rest or with it; `None` if it is not.
@@ -1181,7 +1187,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         if self.detail == Detail::End {
             self.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest));
         } else {
-            notes.extend(self.notes(stage));
+            notes.push("error bar of the exit margin not given: a fixed step has no error estimate".to_owned());
         }
         Flight {
             outcome,
@@ -1195,21 +1201,6 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             step_limit: Some(self.scheme.step_limit),
             notes,
         }
-    }
-
-    fn notes(&self, stage: usize) -> Vec<String> {
-        let unreached = self.scheme.problem.stages.len() - 1 - stage;
-        let mut notes = vec!["error bar of the exit margin: a fixed step has no error estimate".to_owned()];
-        if unreached > 0 {
-            notes.push(format!("the last {unreached} stage(s): not reached, their force was never evaluated"));
-        }
-        if !self.scheme.problem.has_exit() {
-            notes.push("exit: the target has no far side".to_owned());
-        }
-        if self.detail != Detail::Trajectory {
-            notes.push("trajectory: not asked for".to_owned());
-        }
-        notes
     }
 }
 

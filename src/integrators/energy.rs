@@ -536,7 +536,8 @@ impl<S: Scalar> Leg<S> {
         for n in 1..TIME_ORDER {
             let mut sum = S::zero();
             for k in 1..=n {
-                sum += S::from_f64(n as f64 - fault!("energy-time-power", 0.5, 1.0) * k as f64) * w[k] * slowness[n - k];
+                sum +=
+                    S::from_f64(n as f64 - fault!("energy-time-power", 0.5, 1.0) * k as f64) * w[k] * slowness[n - k];
             }
             slowness[n] = -sum.over(S::from_f64(n as f64) * w0);
         }

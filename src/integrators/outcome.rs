@@ -82,7 +82,8 @@ pub struct Flight<S = f64> {
     pub trajectory: Vec<Sample>,
     /// Step limit, for schemes that have one.
     pub step_limit: Option<StepLimit>,
-    /// What was not computed and why, one sentence each; filled when [`Detail::Events`] or more is asked for.
+    /// What the method has to say of this flight: choices it made, with their reasons. What a scene lets every method
+    /// skip is told by [`super::Method::explain`].
     pub notes: Vec<String>,
 }
 

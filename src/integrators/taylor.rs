@@ -24,7 +24,11 @@
 //! Source of the step rule: Jorba, Zou (2005), A software package for the numerical integration of ODEs by means of
 //! high-order Taylor methods, Experimental Mathematics 14, section 3.
 
-use super::locate::{self, Found};
+#![expect(clippy::inline_always, reason = "measured: one flight is one function, 1.3 times faster than with calls")]
+
+use std::cmp::Ordering;
+
+use super::locate::{self, Closing, Found};
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample};
 use crate::physics::exit_energy;
 use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State};
@@ -38,6 +42,9 @@ const PHASE_MAX: f64 = 1.8;
 
 /// Longest step in its own unit of time. No flight needs more, and beyond it coefficients that underflow would count.
 const SPAN_MAX: f64 = 64.0;
+
+/// Most coefficients that are computed without a loop.
+const UNROLLED_MAX: usize = 24;
 
 /// The Taylor integrator.
 ///
@@ -88,8 +95,9 @@ impl Taylor {
 
     /// Truncation error of one step relative to the velocity, in the number type `S`.
     pub fn tolerance_in<S: Scalar>(&self) -> f64 {
-        // A flight takes a few steps and adds up their errors; half a rounding unit each stays below the rounding.
-        self.tolerance.map_or(0.0, |rtol| 0.25 * rtol).max(0.5 * S::EPSILON)
+        // What is neglected is smaller than the last term kept, which is made equal to this: by a factor of six at the
+        // usual ratio of step and radius. Measured over random scenes, the errors then stay below `rtol`.
+        self.tolerance.map_or(0.0, |rtol| 2.0 * rtol).max(S::EPSILON)
     }
 
     /// Flies `problem` in the number type `S`. See [`Integrator::fly`].
@@ -113,11 +121,11 @@ impl Taylor {
         if tolerance > 1e-5 {
             Course::<S, 8, 10>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-9 {
-            Course::<S, 12, 14>::new(problem, tolerance, detail).fly()
+            Course::<S, 12, 18>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-13 {
-            Course::<S, 16, 18>::new(problem, tolerance, detail).fly()
+            Course::<S, 16, 20>::new(problem, tolerance, detail).fly()
         } else if tolerance > 1e-17 {
-            Course::<S, 20, 24>::new(problem, tolerance, detail).fly()
+            Course::<S, 22, 24>::new(problem, tolerance, detail).fly()
         } else {
             Course::<S, 40, 48>::new(problem, tolerance, detail).fly()
         }
@@ -129,6 +137,7 @@ impl Taylor {
         for (index, law) in problem.stages.iter().enumerate() {
             let shape = match Shape::of(law) {
                 Shape::Constant => "constant force: the series ends, one step serves",
+                Shape::Spring => "a spring alone: recurrence of one term, no convolution",
                 Shape::Linear => "no drag: recurrence of two terms, no convolution",
                 Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
                 Shape::General => "stiffness and drag: earliest root isolated on every step",
@@ -168,6 +177,8 @@ impl Integrator for Taylor {
 enum Shape {
     /// p alone: V is linear in t.
     Constant,
+    /// p, s: linear, and every second coefficient follows from the one before it alone.
+    Spring,
     /// p, s, r: linear.
     Linear,
     /// p, r, q: autonomous in V, a Riccati equation.
@@ -181,6 +192,7 @@ impl Shape {
     fn of<S: Scalar>(law: &Stage<S>) -> Self {
         match (law.stiffness.value() == 0.0, law.drag.value() == 0.0) {
             (true, true) if law.viscosity.value() == 0.0 => Self::Constant,
+            (false, true) if law.viscosity.value() == 0.0 => Self::Spring,
             (_, true) => Self::Linear,
             (true, false) => Self::Drag,
             (false, false) => Self::General,
@@ -217,40 +229,61 @@ pub(crate) struct Series<S, const K: usize> {
 impl<S: Scalar, const K: usize> Series<S, K> {
     /// The first K coefficients of V and of x for unit mass, from `x = 0` and V = `velocity`.
     ///
-    /// `SPRING` and `DRAG` say whether `s` and `q` may differ from zero. With `g = r + 2 q v[0]`,
+    /// `SPRING`, `DRAG` and `DAMPED` say whether `s`, `q` and `r` may differ from zero (with drag, r always may).
+    /// With `g = r + 2 q v[0]`,
     ///
     /// ```text
-    /// v[k+1] = -(g v[k] + s v[k-1]/k + q (2 sum over 0 < i < k/2 of v[i] v[k-i] + [k even] v[k/2]²)) / (k+1)
+    /// v[k+1] = -(g v[k] + s v[k-1]/k + 2 q (sum over 0 < i < k/2 of v[i] v[k-i] + [k even] v[k/2]²/2)) / (k+1)
     /// ```
     ///
-    /// so the longest chain of dependent operations is one product and one sum a coefficient.
+    /// arranged so that the longest chain of dependent operations is one product and one sum a coefficient.
     #[inline(always)]
-    pub(crate) fn new<const SPRING: bool, const DRAG: bool>(law: &Stage<S>, velocity: S) -> Self {
+    pub(crate) fn new<const SPRING: bool, const DRAG: bool, const DAMPED: bool>(law: &Stage<S>, velocity: S) -> Self {
         let mut v = [S::zero(); K];
         let mut advance = [S::zero(); K];
+        // 2 q v[i], so that a sum of products needs no factor afterwards.
+        let mut pull = [S::zero(); K];
         let qv = law.drag * velocity;
-        let gradient = law.viscosity + qv + qv;
         let twice_drag = law.drag + law.drag;
+        let gradient = law.viscosity + qv + qv;
         v[0] = velocity;
         advance[0] = velocity;
         v[1] = -(law.static_force + (law.viscosity + qv) * velocity);
-        for k in 1..K - 1 {
-            advance[k] = v[k] * reciprocal(k + 1);
-            let mut rest = S::zero();
-            if SPRING {
-                rest = law.stiffness * advance[k - 1];
-            }
-            if DRAG {
-                let mut sum = S::zero();
-                for i in 1..k.div_ceil(2) {
-                    sum += v[i] * v[k - i];
+        // One coefficient. A macro, for with a literal k the sum below has a fixed length and needs no loop.
+        macro_rules! coefficient {
+            ($k:expr) => {{
+                let k: usize = $k;
+                let minus = -reciprocal::<S>(k + 1);
+                advance[k] = v[k] * reciprocal(k + 1);
+                let mut rest = S::zero();
+                if DRAG {
+                    pull[k] = twice_drag * v[k];
+                    if k % 2 == 0 {
+                        rest = S::from_f64(0.5) * (pull[k / 2] * v[k / 2]);
+                    }
+                    // The newest coefficient comes last: the rest of the sum is ready before it is.
+                    for i in (1..k.div_ceil(2)).rev() {
+                        rest += pull[i] * v[k - i];
+                    }
+                    rest = rest * minus;
                 }
-                rest += twice_drag * sum;
-                if k % 2 == 0 {
-                    rest += law.drag * (v[k / 2] * v[k / 2]);
+                if SPRING {
+                    let spring = (law.stiffness * (minus * reciprocal(k))) * v[k - 1];
+                    rest = if DRAG { rest + spring } else { spring };
                 }
+                v[k + 1] = if DRAG || DAMPED { rest + (gradient * minus) * v[k] } else { rest };
+            }};
+        }
+        macro_rules! coefficients {
+            ($($k:literal)*) => { $( if $k + 1 < K { coefficient!($k); } )* };
+        }
+        if K > UNROLLED_MAX || S::EPSILON < f64::EPSILON {
+            for k in 1..K - 1 {
+                coefficient!(k);
             }
-            v[k + 1] = -((gradient * v[k] + rest) * reciprocal(k + 1));
+        } else {
+            // A loop over k would spend more on its bounds than on the sums.
+            coefficients!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22);
         }
         advance[K - 1] = v[K - 1] * reciprocal(K);
         Self { velocity: v, advance }
@@ -299,20 +332,20 @@ impl<S: Scalar, const K: usize> Series<S, K> {
 /// `log2 |x|` plus the exponent bias, 0 to 0.087 too small: exponent and significand read as one number.
 #[inline(always)]
 fn rough_log2(x: f64) -> f64 {
-    x.abs().to_bits() as i64 as f64 * (1.0 / (1_u64 << 52) as f64)
+    x.abs().to_bits().cast_signed() as f64 * (1.0 / (1_u64 << 52) as f64)
 }
 
 /// `2^y` times a factor from 0.94 to 1, for -1000 < y; at most `2^1000`.
 #[inline(always)]
 fn rough_exp2(y: f64) -> f64 {
     let bits = (y.clamp(-1000.0, 1000.0) + 1023.0) * (1_u64 << 52) as f64;
-    0.94 * f64::from_bits(bits as i64 as u64)
+    0.94 * f64::from_bits((bits as i64).cast_unsigned())
 }
 
 /// The power of two at or below a positive number (the least normal number for what is smaller).
 #[inline(always)]
 fn power_of_two_below(x: f64) -> f64 {
-    f64::from_bits(x.max(f64::MIN_POSITIVE).min(0.5 * f64::MAX).to_bits() & (0x7ff << 52))
+    f64::from_bits(x.clamp(f64::MIN_POSITIVE, 0.5 * f64::MAX).to_bits() & (0x7ff << 52))
 }
 
 /// What ended a step.
@@ -330,8 +363,8 @@ struct Course<'a, S, const K: usize, const L: usize> {
     problem: &'a Problem<S>,
     detail: Detail,
     tolerance: f64,
-    /// Longest last correction of an event in units of the step: its neglected terms are of fourth order.
-    closing: f64,
+    /// When a trial for an event is the last.
+    closing: Closing,
     state: State<S>,
     stage: usize,
     events: Events<S>,
@@ -350,7 +383,7 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             problem,
             detail,
             tolerance,
-            closing: tolerance.sqrt().sqrt(),
+            closing: Closing::new(tolerance),
             state: State::at_impact(problem),
             stage: 0,
             events: Events::new(),
@@ -367,26 +400,21 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         loop {
             // Stages without length are passed where they stand. The last stage has no end.
             self.pass_ends();
-            let at_rest = self.cross_stage()?;
-            if !at_rest {
-                // At the limit of the stage. It may be the exit, the end of the stage, or both.
-                let entered = self.stage;
-                self.pass_ends();
-                let exit = self.state.depth.value() >= self.problem.exit_depth.value();
-                let stopped = self.state.velocity.value() <= 0.0;
-                if exit {
-                    self.push(EventKind::Exit);
-                }
-                if stopped {
-                    self.push(EventKind::Rest);
-                }
-                if exit || stopped {
-                    self.stage = entered;
-                    return Ok(self.finish(exit));
-                }
-            } else {
+            let entered = self.stage;
+            self.cross_stage()?;
+            // At rest, or at the limit of the stage: its end, the exit, or both; touched or passed.
+            self.pass_ends();
+            let exit = self.state.depth.value() >= self.problem.exit_depth.value();
+            let stopped = self.state.velocity.value() <= 0.0;
+            if exit {
+                self.push(EventKind::Exit);
+            }
+            if stopped {
                 self.push(EventKind::Rest);
-                return Ok(self.finish(false));
+            }
+            if exit || stopped {
+                self.stage = entered;
+                return Ok(self.finish(exit));
             }
         }
     }
@@ -428,22 +456,25 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         });
     }
 
-    /// Steps through the present stage to its limit (false) or to rest (true).
+    /// Steps through the present stage to its limit or to rest.
     #[inline(always)]
-    fn cross_stage(&mut self) -> Result<bool, IntegrationError> {
+    fn cross_stage(&mut self) -> Result<(), IntegrationError> {
         let law = &self.problem.stages[self.stage];
         if law.static_force.value() <= 0.0 {
             self.refuse_endless(law)?;
         }
         match Shape::of(law) {
-            Shape::Constant => self.step_through::<4, false, false>(),
-            Shape::Linear => self.step_through::<L, true, false>(),
-            Shape::Drag => self.step_through::<K, false, true>(),
-            Shape::General => self.step_through::<K, true, true>(),
+            Shape::Constant => self.step_through::<4, false, false, false>(),
+            Shape::Spring => self.step_through::<L, true, false, false>(),
+            Shape::Linear => self.step_through::<L, true, false, true>(),
+            Shape::Drag => self.step_through::<K, false, true, true>(),
+            Shape::General => self.step_through::<K, true, true, true>(),
         }
     }
 
-    fn step_through<const N: usize, const SPRING: bool, const DRAG: bool>(&mut self) -> Result<bool, IntegrationError> {
+    fn step_through<const N: usize, const SPRING: bool, const DRAG: bool, const DAMPED: bool>(
+        &mut self,
+    ) -> Result<(), IntegrationError> {
         let problem = self.problem;
         let stage = &problem.stages[self.stage];
         let limit = problem.limit_of(self.stage);
@@ -455,7 +486,6 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         let frequency = if SPRING { stiffness.value().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
-        let steps_before = self.cost.steps;
 
         while self.cost.steps < STEPS_MAX {
             // Units: velocity and time, powers of two. The time is the shortest of V/|a|, M/r, M/(q V), 1/w, or,
@@ -481,23 +511,24 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             let start =
                 State { time: S::zero(), depth: S::zero(), velocity: velocity * S::from_f64(1.0 / unit_velocity) };
 
-            let series = Series::<S, N>::new::<SPRING, DRAG>(&law, start.velocity);
+            let series = Series::<S, N>::new::<SPRING, DRAG, DAMPED>(&law, start.velocity);
             self.cost.steps += 1;
             self.cost.force_evaluations += if SPRING || DRAG { N as u64 - 1 } else { 1 };
             let span = if SPRING || DRAG { series.span(self.tolerance) } else { f64::INFINITY };
             let span = if SPRING { span.min(PHASE_MAX / (frequency * unit_time)) } else { span };
             let step = if SPRING && DRAG {
-                search_certified(&law, &series, start, span, self.closing)
+                search_certified(&law, &series, span, &self.closing)
             } else {
-                search(&law, &series, start, span, self.closing)
+                search(&law, &series, start, span, &self.closing)
             };
 
             let (Step::Whole(local) | Step::Limit(local) | Step::Rest(local)) = step;
-            let new_depth =
-                if matches!(step, Step::Limit(_)) { limit } else { depth + local.depth * S::from_f64(unit_depth) };
+            let reached = depth + local.depth * S::from_f64(unit_depth);
+            // The boundary's own depth, also where a rest just short of it rounds onto it.
+            let at_limit = matches!(step, Step::Limit(_)) || reached.value() > limit.value();
             let next = State {
                 time: time + local.time * S::from_f64(unit_time),
-                depth: new_depth,
+                depth: if at_limit { limit } else { reached },
                 velocity: local.velocity * S::from_f64(unit_velocity),
             };
             if !(next.time.value().is_finite() && next.depth.value().is_finite() && next.velocity.value().is_finite()) {
@@ -507,11 +538,9 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             self.state = next;
             match step {
                 Step::Whole(_) => self.record(),
-                Step::Limit(_) => return Ok(false),
-                Step::Rest(_) => return Ok(true),
+                Step::Limit(_) | Step::Rest(_) => return Ok(()),
             }
         }
-        debug_assert!(self.cost.steps >= steps_before);
         Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: self.state.values() })
     }
 
@@ -521,8 +550,11 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
     /// d(dW)/dx = -(r/V + 2 q) dW/M,  so  dW -> dW/(1 + r t/M + 2 q x/M) at most over the step
     /// ```
     ///
-    /// A step adds `2 V dV` for the rounding (and truncation) of V, and `2 F dx/M` for that of x, which is rounded
-    /// relative to the whole depth, and for that of the force, which acts over the way of the step.
+    /// A step adds `2 V dV` for V: three roundings of the greatest (the sum of the series cannot exceed a few times V,
+    /// the time of the step is short of its radius) and one tolerance of truncation; and `2 F dx/M`, `F` the sum of the
+    /// magnitudes of its terms, for the depth, which is rounded relative to its whole, and for the force, which is off
+    /// by roundings of its terms over the way of the step. A force jump needs nothing more: both sides are integrated
+    /// up to the exact boundary. Measured over random scenes, the error is at most half of the bar.
     #[inline(always)]
     fn widen_bar(&mut self, law: &Stage<S>, start: &State<S>, end: &State<S>, unit_velocity: f64, depth: f64) {
         let (v0, v1) = (start.velocity.value(), end.velocity.value());
@@ -531,8 +563,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         let (r, q) = (law.viscosity.value(), law.drag.value());
         let force = law.static_force.value().abs() + law.stiffness.value() * way + (r + q * fastest) * fastest;
         let relative = unit_velocity / self.problem.impact_speed.value();
-        let unit = S::EPSILON.max(f64::EPSILON) + 2.0 * self.tolerance;
-        let added = unit * (4.0 * fastest * fastest + 2.0 * force * (depth + 2.0 * way));
+        let rounding = 6.0 * fastest * fastest + 3.0 * force * (depth + 2.0 * way);
+        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * fastest * fastest;
         self.bar = self.bar / (1.0 + r * end.time.value() + 2.0 * q * way) + relative * relative * added;
     }
 
@@ -549,7 +581,9 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             let beyond = exit_energy::energy_beyond_stop(problem, self.stage, self.state.depth.value());
             (Some(beyond / scale / scale), Some(self.bar))
         };
-        let undecided = matches!((margin, bar), (Some(m), Some(b)) if !(m.abs() > b));
+        // A margin that is no number decides nothing.
+        let undecided =
+            matches!((margin, bar), (Some(m), Some(b)) if m.abs().partial_cmp(&b) != Some(Ordering::Greater));
         let outcome = if undecided {
             Outcome::Undecided
         } else if through {
@@ -629,7 +663,7 @@ fn search<S: Scalar, const N: usize>(
     series: &Series<S, N>,
     start: State<S>,
     span: f64,
-    closing: f64,
+    closing: &Closing,
 ) -> Step<S> {
     let at = |time| series.at(time);
     // r, q >= 0 only take energy, so W at the limit is at most v² - (2 p + s D) D. One hundredth is left for rounding.
@@ -660,41 +694,639 @@ fn search<S: Scalar, const N: usize>(
 fn search_certified<S: Scalar, const N: usize>(
     law: &Stage<S>,
     series: &Series<S, N>,
-    start: State<S>,
     span: f64,
-    closing: f64,
+    closing: &Closing,
 ) -> Step<S> {
     let at = |time| series.at(time);
     let way = law.end.value();
-    match locate::first_root(&series.velocity_values(), span) {
-        Some(root) => {
-            // The root is isolated; correct it in the number type, from the nearest trial.
-            let rest = match locate::rest(law, at, at(root), span, closing) {
-                Found::Inside(rest) => rest,
-                _ => State { velocity: S::zero(), ..at(root) },
-            };
-            if rest.depth.value() >= way {
-                return through(locate::passage(law, at, rest, rest.time.value(), true, closing));
-            }
-            Step::Rest(rest)
+    if let Some(root) = locate::first_root(&series.velocity_values(), span) {
+        // The root is isolated; correct it in the number type, from the nearest trial.
+        let rest = match locate::rest(law, at, at(root), span, closing) {
+            Found::Inside(rest) => rest,
+            _ => State { velocity: S::zero(), ..at(root) },
+        };
+        if rest.depth.value() >= way {
+            return through(locate::passage(law, at, rest, rest.time.value(), true, closing));
         }
-        None => {
-            let end = at(span);
-            if end.depth.value() >= way {
-                return through(locate::passage(law, at, end, span, true, closing));
-            }
-            Step::Whole(end)
-        }
+        return Step::Rest(rest);
     }
+    let end = at(span);
+    if end.depth.value() >= way {
+        return through(locate::passage(law, at, end, span, true, closing));
+    }
+    Step::Whole(end)
 }
 
 /// A passage that is known to lie inside the step.
 #[inline(always)]
 fn through<S: Scalar>(found: Found<S>) -> Step<S> {
     match found {
-        Found::Inside(state) => Step::Limit(state),
-        Found::Beyond(state) => Step::Whole(state),
-        // `passage` gives up only when it does not know that the boundary is reached.
-        Found::RestFirst => unreachable!("a boundary known to be reached was given up"),
+        Found::Inside(state) | Found::Beyond(state) => Step::Limit(state),
+        // `passage` gives up only where it does not know that the boundary is reached.
+        Found::RestFirst => Step::Limit(State { time: S::zero(), depth: S::zero(), velocity: S::zero() }),
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]
+mod tests {
+    use num_dual::Dual64;
+    use proptest::prelude::Rng;
+    use proptest::test_runner::{RngAlgorithm, TestRng};
+    use twofloat::TwoFloat;
+
+    use super::*;
+    use crate::physics::{Stages, Target};
+
+    /// Crater and tunnel with the continuous crater constant (theory section 1), and its closed form (section 2).
+    #[derive(Clone, Copy, Debug)]
+    struct Concrete {
+        mass: f64,
+        static_force: f64,
+        drag: f64,
+        crater_depth: f64,
+        impact_speed: f64,
+        exit_depth: f64,
+    }
+
+    impl Concrete {
+        fn problem(self) -> Problem {
+            let Self { mass, static_force, drag, crater_depth, impact_speed, exit_depth } = self;
+            let stiffness = mass * (static_force + drag * impact_speed * impact_speed)
+                / (crater_depth * (mass + crater_depth * drag));
+            Problem {
+                mass,
+                impact_speed,
+                exit_depth,
+                stages: [Stage::crater(stiffness, crater_depth), Stage::tunnel(static_force, drag)]
+                    .into_iter()
+                    .collect(),
+                crater: Some(0),
+                target: Target::CraterAndTunnel,
+            }
+        }
+
+        /// Velocity V with X(V) = exit depth, for an exit beyond the crater.
+        fn critical_velocity(self) -> f64 {
+            let Self { mass, static_force, drag, crater_depth, exit_depth, .. } = self;
+            let way = exit_depth - crater_depth;
+            let z = 2.0 * drag * way / mass;
+            let v1_squared = 2.0 * static_force * way / mass * if z == 0.0 { 1.0 } else { z.exp_m1() / z };
+            ((v1_squared * (mass + crater_depth * drag) + crater_depth * static_force) / mass).sqrt()
+        }
+
+        /// `d margin / d ln V0` at the critical velocity `V_c`; `margin = M/(M + k d Q) e^(-y) (1 - V_c²/V0²)`.
+        fn margin_slope(self) -> f64 {
+            let y = 2.0 * self.drag * (self.exit_depth - self.crater_depth) / self.mass;
+            2.0 * (-y).exp() * self.mass / (self.mass + self.crater_depth * self.drag)
+        }
+
+        /// Depth and time of rest in a semi-infinite target.
+        fn rest(self) -> (f64, f64) {
+            let Self { mass: m, static_force: p, drag: q, crater_depth: kd, impact_speed: v0, .. } = self;
+            let w = ((p + q * v0 * v0) / (kd * (m + kd * q))).sqrt();
+            let v1_squared = (m * v0 * v0 - kd * p) / (m + kd * q);
+            if v1_squared <= 0.0 {
+                return (v0 / w, std::f64::consts::FRAC_PI_2 / w);
+            }
+            let v1 = v1_squared.sqrt();
+            let u = q * v1_squared / p;
+            let log_over = if u == 0.0 { 1.0 } else { u.ln_1p() / u };
+            let a = v1 * (q / p).sqrt();
+            let atan_over = if a == 0.0 { 1.0 } else { a.atan() / a };
+            (kd + m * v1_squared / (2.0 * p) * log_over, (w * kd).atan2(v1) / w + m / p * v1 * atan_over)
+        }
+    }
+
+    /// Uniform and log-uniform numbers from a fixed seed.
+    struct Draw(TestRng);
+
+    impl Draw {
+        fn new(seed: u8) -> Self {
+            Self(TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]))
+        }
+        fn between(&mut self, low: f64, high: f64) -> f64 {
+            low + (high - low) * ((self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64)
+        }
+        fn log_between(&mut self, low: f64, high: f64) -> f64 {
+            self.between(low.ln(), high.ln()).exp()
+        }
+        fn chance(&mut self, probability: f64) -> bool {
+            self.between(0.0, 1.0) < probability
+        }
+
+        /// Groups over the whole admitted range: I 1e-9..1e6, N 1e-3..1e12 or no drag, H/d 1e-3..1e3.
+        fn concrete(&mut self) -> Concrete {
+            let (i, n, h) = (self.log_between(1e-9, 1e6), self.log_between(1e-3, 1e12), self.log_between(1e-3, 1e3));
+            let (d, mass, strength) =
+                (self.log_between(1e-3, 1.0), self.log_between(1e-3, 1e3), self.log_between(1e6, 1e9));
+            let area = std::f64::consts::FRAC_PI_4 * d * d;
+            Concrete {
+                mass,
+                static_force: area * strength,
+                drag: if self.chance(0.1) { 0.0 } else { mass / (n * d * d * d) * area },
+                crater_depth: d * self.between(0.3, 3.0),
+                impact_speed: (i * strength * d * d * d / mass).sqrt(),
+                exit_depth: h * d,
+            }
+        }
+
+        /// One to four stages with any of the four terms, driven ones among them.
+        fn stages(&mut self) -> Problem {
+            let count = 1 + (self.0.next_u64() % 4) as usize;
+            let mut stages = Stages::new();
+            let mut end = 0.0;
+            for index in 0..count {
+                end += if self.chance(0.1) { 0.0 } else { self.between(0.01, 0.5) };
+                let driven = self.chance(0.2);
+                stages.push(Stage {
+                    static_force: self.log_between(1.0, 1e3) * if driven { -1.0 } else { 1.0 },
+                    stiffness: if self.chance(0.5) { self.log_between(1.0, 1e4) } else { 0.0 },
+                    viscosity: if self.chance(0.5) { self.log_between(0.1, 300.0) } else { 0.0 },
+                    drag: if self.chance(0.5) { self.log_between(0.01, 30.0) } else { 0.0 },
+                    end: if index + 1 == count { f64::INFINITY } else { end },
+                });
+            }
+            Problem {
+                mass: 1.0,
+                impact_speed: self.log_between(0.1, 100.0),
+                exit_depth: if self.chance(0.5) { f64::INFINITY } else { self.between(0.02, 2.5) },
+                stages,
+                crater: None,
+                target: Target::Stages,
+            }
+        }
+    }
+
+    /// The scenes of the peer benchmark: strength 36e6 Pa, S 12, k 2, density 2300, nose factor 0.72, d 50 mm, M 2 kg.
+    fn peer_scene(impact_speed: f64, exit_depth: f64) -> Concrete {
+        let d: f64 = 0.05;
+        let area = std::f64::consts::FRAC_PI_4 * d * d;
+        Concrete {
+            mass: 2.0,
+            static_force: area * 36.0e6 * 12.0,
+            drag: area * 0.72 * 2300.0,
+            crater_depth: 0.1,
+            impact_speed,
+            exit_depth,
+        }
+    }
+
+    fn fly(problem: &Problem) -> Flight {
+        Taylor::default().fly(problem, Detail::Events).unwrap()
+    }
+
+    fn relative(value: f64, exact: f64) -> f64 {
+        if value == exact { 0.0 } else { ((value - exact) / exact).abs() }
+    }
+
+    fn kinds(flight: &Flight) -> Vec<EventKind> {
+        flight.events.iter().map(|e| e.kind).collect()
+    }
+
+    fn one_stage(stage: Stage, impact_speed: f64, exit_depth: f64) -> Problem {
+        Problem {
+            mass: 1.0,
+            impact_speed,
+            exit_depth,
+            stages: [stage].into_iter().collect(),
+            crater: None,
+            target: Target::Stages,
+        }
+    }
+
+    #[test]
+    fn tunnel_scene_agrees_with_fifty_digits() {
+        // References: closed form at 50 digits from these f64 inputs.
+        let flight = fly(&peer_scene(300.0, f64::INFINITY).problem());
+        assert_eq!(flight.outcome, Outcome::StoppedInTunnel);
+        let crater_end = flight.crater_end().unwrap();
+        assert!(relative(flight.end.depth, 0.144_826_200_112_217_08) < 1e-15);
+        assert!(relative(flight.end.time, 8.291_966_948_249_334e-4) < 1e-15);
+        assert!(relative(crater_end.time, 3.749_918_414_549_262e-4) < 1e-15);
+        assert!(relative(crater_end.velocity, 202.320_580_497_900_37) < 1e-15);
+        assert_eq!(kinds(&flight), [EventKind::CraterEnd, EventKind::Rest]);
+    }
+
+    #[test]
+    fn rest_agrees_with_the_closed_form_over_the_whole_range_of_groups() {
+        let mut draw = Draw::new(1);
+        for _ in 0..3000 {
+            let scene = Concrete { exit_depth: f64::INFINITY, ..draw.concrete() };
+            let flight = fly(&scene.problem());
+            let (depth, time) = scene.rest();
+            // The closed form itself is good to a few units in the last place.
+            assert!(relative(flight.end.depth, depth) < 5e-15, "{scene:?} {flight:?}");
+            assert!(relative(flight.end.time, time) < 1e-13, "{scene:?} {flight:?}");
+            assert!(flight.cost.steps <= 120, "{scene:?} {:?}", flight.cost);
+        }
+    }
+
+    #[test]
+    fn f64_agrees_with_double_double_on_random_stages_of_every_kind() {
+        let mut draw = Draw::new(2);
+        let mut finished = 0;
+        for _ in 0..400 {
+            let problem = draw.stages();
+            let flight = Taylor::default().fly(&problem, Detail::Events);
+            let reference = Taylor::default().fly_in::<TwoFloat>(&problem.cast(), Detail::Events);
+            let (flight, reference) = match (flight, reference) {
+                (Ok(flight), Ok(reference)) => (flight, reference.values()),
+                (Err(a), Err(b)) => {
+                    assert_eq!(std::mem::discriminant(&a), std::mem::discriminant(&b), "{problem:?}");
+                    continue;
+                }
+                (a, b) => panic!("{problem:?}\n{a:?}\n{b:?}"),
+            };
+            finished += 1;
+            assert_eq!(flight.outcome, reference.outcome, "{problem:?}");
+            assert_eq!(kinds(&flight), kinds(&reference), "{problem:?}");
+            let fastest = reference.events.iter().map(|e| e.state.velocity).fold(problem.impact_speed, f64::max);
+            for (event, exact) in flight.events.iter().zip(&reference.events) {
+                // Inherent: a boundary passed slowly, before or here, scatters the time after it.
+                let condition = reference
+                    .events
+                    .iter()
+                    .filter(|e| e.kind != EventKind::Rest)
+                    .map(|e| fastest / e.state.velocity)
+                    .fold(1.0, f64::max);
+                assert!(relative(event.state.depth, exact.state.depth) < 5e-15 * condition, "{event:?} {problem:?}");
+                assert!(relative(event.state.time, exact.state.time) < 2e-14 * condition, "{event:?} {problem:?}");
+                let off = (event.state.velocity - exact.state.velocity).abs() / fastest;
+                assert!(off < 2e-14 * condition, "{event:?} {exact:?} {problem:?}");
+            }
+        }
+        assert!(finished > 250, "only {finished} flights ended");
+    }
+
+    #[test]
+    fn general_stages_agree_with_their_closed_forms() {
+        let drive = |p, s, r, q| Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end: f64::INFINITY };
+        // p, r: T = (M/r) log1p(z), X = (M V0²/p)(z - log1p(z))/z², z = r V0/p.
+        let (p, r, v) = (7.0, 3.0, 5.0);
+        let z: f64 = r * v / p;
+        let flight = fly(&one_stage(drive(p, 0.0, r, 0.0), v, f64::INFINITY));
+        assert!(relative(flight.end.time, z.ln_1p() / r) < 1e-15);
+        assert!(relative(flight.end.depth, v * v / p * (z - z.ln_1p()) / (z * z)) < 2e-15);
+        // p, s: X = (V0/w)²/(u0 + hypot(u0, V0/w)), T = atan2(V0, w u0)/w; driven and resisting.
+        for p in [7.0, -7.0_f64] {
+            let s: f64 = 11.0;
+            let (w, u) = (s.sqrt(), p / s);
+            let flight = fly(&one_stage(drive(p, s, 0.0, 0.0), v, f64::INFINITY));
+            assert!(relative(flight.end.depth, (v / w) * (v / w) / (u + u.hypot(v / w))) < 1e-15);
+            assert!(relative(flight.end.time, v.atan2(w * u) / w) < 1e-15);
+        }
+        // r alone with an exit: V = V0 - r H/M.
+        let flight = fly(&one_stage(drive(0.0, 0.0, 2.0, 0.0), 10.0, 4.0));
+        assert_eq!(flight.outcome, Outcome::Perforated);
+        assert!(relative(flight.end.velocity, 2.0) < 1e-14 && relative(flight.end.time, 5.0_f64.ln() / 2.0) < 1e-14);
+        // q alone with an exit: V = V0 exp(-q H/M).
+        let flight = fly(&one_stage(drive(0.0, 0.0, 0.0, 2.0), 10.0, 4.0));
+        assert!(relative(flight.end.velocity, 10.0 * (-8.0_f64).exp()) < 1e-14);
+        assert!(relative(flight.end.time, 8.0_f64.exp_m1() / 20.0) < 1e-14);
+        // No force at all: V0 t = H.
+        let flight = fly(&one_stage(drive(0.0, 0.0, 0.0, 0.0), 10.0, 4.0));
+        assert_eq!((flight.end.velocity, flight.end.time), (10.0, 0.4));
+    }
+
+    #[test]
+    fn graze_ladder_is_right_outside_the_bar_and_undecided_only_inside() {
+        let mut draw = Draw::new(3);
+        let (mut undecided, mut flights) = (0, 0);
+        for _ in 0..300 {
+            let mut scene = draw.concrete();
+            scene.exit_depth = scene.crater_depth + scene.exit_depth.min(1e2 * scene.crater_depth);
+            let critical = scene.critical_velocity();
+            let slope = scene.margin_slope();
+            if slope < 1e-10 || !critical.is_finite() {
+                continue;
+            }
+            for j in 1..=15 {
+                for sign in [1.0, -1.0] {
+                    scene.impact_speed = critical * (1.0 + sign * 10.0_f64.powi(-j));
+                    let off = scene.impact_speed / critical - 1.0;
+                    let flight = fly(&scene.problem());
+                    let bar = flight.exit_margin_error.unwrap();
+                    let margin = flight.exit_margin.unwrap();
+                    flights += 1;
+                    assert!(bar < 3e-14, "bar {bar:e} of {scene:?}");
+                    let exact = 0.5 * slope * off * (2.0 + off) / ((1.0 + off) * (1.0 + off));
+                    // 4e-15: the closed form of V_c, and the crater constant, rounded.
+                    let error = (margin - exact).abs();
+                    assert!(error <= bar + 4e-15 * slope, "{margin:e} {exact:e} {bar:e} {slope} {scene:?}");
+                    match flight.outcome {
+                        Outcome::Perforated => assert!(margin > bar && off > -2e-15, "{off:e} {scene:?}"),
+                        Outcome::Undecided => {
+                            undecided += 1;
+                            assert!((slope * off).abs() < 2.0 * bar + 4e-15, "{off:e} {bar:e} {scene:?}");
+                        }
+                        _ => assert!(margin < -bar && off < 2e-15, "{off:e} {scene:?}"),
+                    }
+                }
+            }
+        }
+        assert!(undecided > 0 && undecided < flights / 5, "{undecided} of {flights} undecided");
+    }
+
+    #[test]
+    fn a_scan_of_a_thousand_speeds_around_the_critical_flips_once() {
+        for width in [1e-1, 1e-6, 1e-11, 1e-13] {
+            let mut scene = peer_scene(0.0, 0.18);
+            let critical = scene.critical_velocity();
+            let mut last = -1;
+            for i in 0..1000 {
+                scene.impact_speed = critical * (1.0 + width * (f64::from(i) / 500.0 - 1.0));
+                let now = match fly(&scene.problem()).outcome {
+                    Outcome::Perforated => 1,
+                    Outcome::Undecided => 0,
+                    _ => -1,
+                };
+                assert!(now >= last, "outcome fell from {last} to {now} at {}", scene.impact_speed);
+                last = now;
+            }
+            assert_eq!(last, if width > 1e-12 { 1 } else { last });
+        }
+    }
+
+    #[test]
+    fn margin_bar_covers_the_error_of_perforations() {
+        let mut draw = Draw::new(4);
+        let mut worst: f64 = 0.0;
+        for _ in 0..600 {
+            let problem = draw.concrete().problem();
+            let flight = fly(&problem);
+            let reference = Taylor::default().fly_in::<TwoFloat>(&problem.cast(), Detail::End).unwrap();
+            if flight.outcome != Outcome::Perforated {
+                continue;
+            }
+            let relative = reference.end.velocity / TwoFloat::from(problem.impact_speed);
+            let exact = (relative * relative).hi();
+            worst = worst.max((flight.exit_margin.unwrap() - exact).abs() / flight.exit_margin_error.unwrap());
+        }
+        assert!(worst > 0.02 && worst < 0.6, "worst error is {worst} of its bar");
+    }
+
+    #[test]
+    fn simultaneous_crater_end_exit_and_rest_give_one_verdict_and_ordered_events() {
+        // Q = 0 and V0 = sqrt(k d P/M): rest at x = k d = H. Powers of two, so nothing is rounded but the series.
+        for off in [0.0, 1e-12, -1e-12, 1e-6, -1e-6] {
+            let scene = Concrete {
+                mass: 2.0,
+                static_force: 1024.0,
+                drag: 0.0,
+                crater_depth: 0.125,
+                impact_speed: 8.0 * (1.0 + off),
+                exit_depth: 0.125,
+            };
+            let flight = fly(&scene.problem());
+            assert!(relative(flight.end.depth, 0.125_f64.min(0.125 * (1.0 + off))) < 5e-15, "{flight:?}");
+            match flight.outcome {
+                Outcome::Undecided => assert!(off == 0.0),
+                Outcome::Perforated => {
+                    assert!(off > 0.0);
+                    assert_eq!(kinds(&flight), [EventKind::CraterEnd, EventKind::Exit]);
+                }
+                _ => {
+                    assert!(off < 0.0);
+                    assert_eq!(kinds(&flight), [EventKind::Rest]);
+                }
+            }
+            assert!(flight.cost.steps <= 2);
+        }
+        // Constant force touches the boundary without rounding: V0 = 4, F/M = 8, X = 1.
+        let mut problem = one_stage(Stage::tunnel(8.0, 0.0), 4.0, 1.0);
+        problem.stages.insert(0, Stage { end: 1.0, ..Stage::tunnel(8.0, 0.0) });
+        let flight = fly(&problem);
+        assert_eq!(kinds(&flight), [EventKind::StageEnd(0), EventKind::Exit, EventKind::Rest]);
+        assert_eq!((flight.outcome, flight.stage, flight.exit_margin), (Outcome::Undecided, 0, Some(0.0)));
+        assert_eq!(flight.end, State { time: 0.5, depth: 1.0, velocity: 0.0 });
+    }
+
+    #[test]
+    fn a_target_thinner_than_the_crater_has_no_crater_end() {
+        let ulp = f64::EPSILON * 0.1;
+        for (exit, crater_end) in [(0.05, false), (0.1 - ulp, false), (0.1, true), (0.1 + ulp, true), (1e-9, false)] {
+            let flight = fly(&peer_scene(300.0, exit).problem());
+            assert_eq!(flight.outcome, Outcome::Perforated, "H = {exit}");
+            assert_eq!(flight.crater_end().is_some(), crater_end, "H = {exit}");
+            assert_eq!(flight.end.depth, exit);
+        }
+        let flight = fly(&peer_scene(300.0, 0.0).problem());
+        assert_eq!((flight.outcome, flight.end.velocity), (Outcome::Perforated, 300.0));
+    }
+
+    #[test]
+    fn many_ends_inside_one_step_are_all_passed_in_order_and_change_nothing() {
+        let whole = peer_scene(300.0, 0.14).problem();
+        let mut split = whole.clone();
+        split.target = Target::Stages;
+        split.crater = None;
+        split.stages.clear();
+        // Ten ends in the crater, three of them equal and two one spacing apart, and more in the tunnel.
+        let (crater, tunnel) = (whole.stages[0], whole.stages[1]);
+        for end in [0.01, 0.02, 0.02, 0.02, 0.03, 0.03_f64.next_up(), 0.05, 0.07, 0.0999, 0.1] {
+            split.stages.push(Stage { end, ..crater });
+        }
+        for end in [0.1, 0.1_f64.next_up(), 0.12, 0.14, 0.15] {
+            split.stages.push(Stage { end, ..tunnel });
+        }
+        split.stages.push(tunnel);
+        let (whole, flight) = (fly(&whole), fly(&split));
+        let mut expected: Vec<EventKind> = (0..14).map(EventKind::StageEnd).collect();
+        expected.push(EventKind::Exit);
+        assert_eq!(kinds(&flight), expected);
+        assert!(flight.events.windows(2).all(|e| e[0].state.time <= e[1].state.time));
+        assert!(relative(flight.end.time, whole.end.time) < 2e-15);
+        assert!(relative(flight.end.velocity, whole.end.velocity) < 2e-14);
+        assert_eq!(flight.stage, 13);
+    }
+
+    #[test]
+    fn a_boundary_on_the_end_of_a_step_is_passed_once() {
+        let scene = peer_scene(900.0, f64::INFINITY);
+        let flight = Taylor::default().fly(&scene.problem(), Detail::Trajectory).unwrap();
+        // Samples: impact, crater end, steps of the tunnel, rest.
+        let inside = flight.trajectory.len() - 2;
+        assert!(inside > 3, "{:?}", flight.trajectory);
+        let depth = flight.trajectory[inside].state.depth;
+        for end in [depth.next_down(), depth, depth.next_up()] {
+            let mut problem = scene.problem();
+            problem.stages.insert(1, Stage { end, ..problem.stages[1] });
+            let again = Taylor::default().fly(&problem, Detail::Trajectory).unwrap();
+            assert_eq!(kinds(&again), [EventKind::CraterEnd, EventKind::StageEnd(1), EventKind::Rest]);
+            assert!(relative(again.end.depth, flight.end.depth) < 2e-15);
+            assert!(again.trajectory.windows(2).all(|s| s[0].state.time <= s[1].state.time));
+        }
+    }
+
+    #[test]
+    fn rest_near_the_crater_end_is_continuous_and_cheap() {
+        // V1² = 0 at V0 = sqrt(k d P/M), approached from both sides down to one spacing.
+        let mut scene = peer_scene(0.0, f64::INFINITY);
+        let touching = (scene.crater_depth * scene.static_force / scene.mass).sqrt();
+        for j in 1..=17 {
+            for sign in [1.0, -1.0] {
+                scene.impact_speed = touching * (1.0 + sign * 10.0_f64.powi(-j));
+                let flight = fly(&scene.problem());
+                let (depth, time) = scene.rest();
+                assert!(relative(flight.end.depth, depth) < 5e-15, "1e-{j}: {flight:?}");
+                assert!(
+                    relative(flight.end.time, time) < 1e-14,
+                    "1e-{j}: {} {time} {:e}",
+                    flight.end.time,
+                    relative(flight.end.time, time)
+                );
+                assert!(flight.cost.steps <= 4, "{:?}", flight.cost);
+                if j < 14 {
+                    assert_eq!(flight.outcome == Outcome::StoppedInTunnel, sign > 0.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_flight_without_an_end_says_so() {
+        let law = |p, s, r, q| Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end: f64::INFINITY };
+        let endless = [
+            (law(0.0, 0.0, 0.0, 0.0), f64::INFINITY),
+            (law(0.0, 0.0, 2.0, 0.0), f64::INFINITY),
+            (law(0.0, 0.0, 0.0, 2.0), f64::INFINITY),
+            (law(-1.0, 0.0, 3.0, 1.0), f64::INFINITY),
+            // r alone covers M V0/r = 5 m and no more; with drag ln(1 + q V0/r)/q.
+            (law(0.0, 0.0, 2.0, 0.0), 5.0),
+            (law(0.0, 0.0, 2.0, 1.0), 6.0_f64.ln()),
+            // Overdamped towards x = 10.
+            (law(-1000.0, 100.0, 1000.0, 0.0), f64::INFINITY),
+            (law(-1000.0, 100.0, 1000.0, 5.0), 10.0),
+        ];
+        for (stage, exit) in endless {
+            let error = Taylor::default().fly(&one_stage(stage, 10.0, exit), Detail::Events).unwrap_err();
+            assert!(matches!(error, IntegrationError::NeverEnds { .. }), "{stage:?}: {error}");
+            assert!(error.last().is_some());
+        }
+        // Just this side of each limit the flight ends.
+        for (stage, exit) in
+            [(law(0.0, 0.0, 2.0, 0.0), 4.999), (law(0.0, 0.0, 2.0, 1.0), 1.79), (law(-1.0, 0.0, 3.0, 1.0), 50.0)]
+        {
+            assert_eq!(fly(&one_stage(stage, 10.0, exit)).outcome, Outcome::Perforated, "{stage:?}");
+        }
+    }
+
+    #[test]
+    fn the_stiff_driven_scene_is_flown_and_its_cost_shows_why_not_to() {
+        // Theory section 1: leaves at H = 9 m after about (r/s) ln(1/(1 - s H/|p|)) = 23 s.
+        let law = Stage { static_force: -1000.0, stiffness: 100.0, viscosity: 1000.0, drag: 0.0, end: f64::INFINITY };
+        let flight = fly(&one_stage(law, 1.0, 9.0));
+        assert_eq!(flight.outcome, Outcome::Perforated);
+        // Slow rate l2 = r/2 - sqrt(r²/4 - s), and x = 10 - A exp(-l2 t) - B exp(-l1 t).
+        let root = (500.0_f64 * 500.0 - 100.0).sqrt();
+        let (fast, slow) = (500.0 + root, 100.0 / (500.0 + root));
+        let amplitude = (10.0 * fast - 1.0) / (fast - slow);
+        let time = amplitude.ln() / slow;
+        assert!(relative(flight.end.time, time) < 1e-12, "{} {time}", flight.end.time);
+        assert!((1000..20_000).contains(&flight.cost.steps), "{:?}", flight.cost);
+    }
+
+    #[test]
+    fn a_barrier_before_a_drive_decides_the_margin() {
+        // F = +8 for 1 m, then -100: W is least at the barrier's end, 16.02 - 16 = 0.02 (V0² = 16.02).
+        let mut problem = one_stage(Stage::tunnel(-100.0, 0.0), 16.02_f64.sqrt(), 3.0);
+        problem.stages.insert(0, Stage { end: 1.0, ..Stage::tunnel(8.0, 0.0) });
+        let flight = fly(&problem);
+        assert_eq!(flight.outcome, Outcome::Perforated);
+        assert!((flight.exit_margin.unwrap() - 0.02 / 16.02).abs() < 1e-14);
+        problem.impact_speed = 4.0;
+        assert_eq!(fly(&problem).outcome, Outcome::Undecided);
+    }
+
+    #[test]
+    fn only_stages_entered_cost_anything() {
+        let flight = fly(&peer_scene(60.0, f64::INFINITY).problem());
+        assert_eq!(flight.outcome, Outcome::StoppedInCrater);
+        assert_eq!(flight.cost, Cost { steps: 1, rejected_steps: 0, force_evaluations: 23 });
+        assert!(flight.trajectory.is_empty() && flight.notes.is_empty());
+        let lines = Taylor::default().explain(&peer_scene(60.0, f64::INFINITY).problem(), &flight);
+        assert!(lines.iter().any(|l| l == "stage 1: never entered, no force evaluated"), "{lines:?}");
+        // The end alone is the same end.
+        let end = Taylor::default().fly(&peer_scene(60.0, 1.0).problem(), Detail::End).unwrap();
+        assert!(end.events.is_empty());
+        assert_eq!(end.end, flight.end);
+    }
+
+    #[test]
+    fn a_looser_tolerance_is_kept_at_less_work() {
+        let mut draw = Draw::new(5);
+        let mut work = Vec::new();
+        for rtol in [1e-3, 1e-6, 1e-9, 1e-12, 0.0] {
+            let taylor = Taylor::with_rtol(rtol).unwrap();
+            let mut evaluations = 0;
+            for _ in 0..200 {
+                let scene = Concrete { exit_depth: f64::INFINITY, ..draw.concrete() };
+                let flight = taylor.fly(&scene.problem(), Detail::Events).unwrap();
+                let (depth, time) = scene.rest();
+                assert!(relative(flight.end.depth, depth) < rtol.max(5e-15), "{rtol:e} {scene:?} {flight:?}");
+                assert!(relative(flight.end.time, time) < rtol.max(1e-13), "{rtol:e} {scene:?} {flight:?}");
+                evaluations += flight.cost.force_evaluations;
+            }
+            work.push(evaluations);
+        }
+        assert!(work.windows(2).all(|w| w[0] < w[1]), "{work:?}");
+        for bad in [-1e-3, 0.2, f64::NAN] {
+            assert!(Taylor::with_rtol(bad).is_err_and(|e| e.is_usage()));
+        }
+    }
+
+    #[test]
+    fn the_same_code_runs_in_single_precision_and_in_dual_numbers() {
+        let scene = peer_scene(300.0, f64::INFINITY);
+        let single = Taylor::default().fly_in::<f32>(&scene.problem().cast(), Detail::Events).unwrap();
+        assert!(relative(single.end.depth.value(), 0.144_826_200_112_217_08) < 5e-7);
+        assert_eq!(single.outcome, Outcome::StoppedInTunnel);
+
+        // d/dV0 of the tunnel alone: X = (M/2Q) ln(1 + Q V0²/P), dX/dV0 = M V0/(P + Q V0²), dT/dV0 = M/(P + Q V0²).
+        let Concrete { mass, static_force, drag, .. } = scene;
+        let mut problem: Problem<Dual64> = Problem {
+            mass,
+            impact_speed: 300.0,
+            exit_depth: f64::INFINITY,
+            stages: [Stage::tunnel(static_force, drag)].into_iter().collect(),
+            crater: None,
+            target: Target::CraterAndTunnel,
+        }
+        .cast();
+        problem.impact_speed = Dual64::new(300.0, 1.0);
+        let flight = Taylor::default().fly_in(&problem, Detail::Events).unwrap();
+        let force = static_force + drag * 300.0 * 300.0;
+        assert!(relative(flight.end.depth.eps, mass * 300.0 / force) < 1e-14);
+        assert!(relative(flight.end.time.eps, mass / force) < 1e-14);
+
+        // And through an exit: dV_r/dV0 = (V0/V_r) exp(-2 Q H/M).
+        problem.exit_depth = Dual64::from_re(0.05);
+        let flight = Taylor::default().fly_in(&problem, Detail::Events).unwrap();
+        let slope = 300.0 / flight.end.velocity.re * (-2.0 * drag * 0.05 / mass).exp();
+        assert!(relative(flight.end.velocity.eps, slope) < 1e-14, "{} {slope}", flight.end.velocity.eps);
+        assert_eq!(flight.end.depth.eps, 0.0);
+    }
+
+    #[test]
+    fn forces_beyond_all_numbers_are_an_error_and_extreme_units_are_not() {
+        let error = Taylor::default().fly(&one_stage(Stage::tunnel(1e308, 1e308), 1e200, 1.0), Detail::Events);
+        assert!(matches!(error, Err(IntegrationError::NotFinite { .. })), "{error:?}");
+        // Scaling length by a, time by b and mass by c changes no outcome and scales depth and time.
+        let base = fly(&peer_scene(300.0, f64::INFINITY).problem());
+        for (a, b, c) in [(1e-12, 1e6, 1e-9), (1e9, 1e-12, 1e12), (1e-30, 1e-30, 1e-30)] {
+            let scene = peer_scene(300.0, f64::INFINITY);
+            let flight = fly(&Concrete {
+                mass: scene.mass * c,
+                static_force: scene.static_force * c * a / (b * b),
+                drag: scene.drag * c / a,
+                crater_depth: scene.crater_depth * a,
+                impact_speed: scene.impact_speed * a / b,
+                exit_depth: f64::INFINITY,
+            }
+            .problem());
+            assert!(relative(flight.end.depth, base.end.depth * a) < 2e-15);
+            assert!(relative(flight.end.time, base.end.time * b) < 2e-15);
+        }
     }
 }

@@ -369,7 +369,10 @@ fn spring_leg(stage: &Stage, mass: f64, entry: State, limit: f64) -> Leg {
             let v = energy.sqrt();
             // f V0 - f0 V; of the two terms the second is at worst minus half of the first.
             let crossed = xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)));
-            return Leg::Passes { time: (w * crossed).atan2(w * w * v * v0 + fault!("spring-time", f0, -f0) * f) / w, velocity: v };
+            return Leg::Passes {
+                time: (w * crossed).atan2(w * w * v * v0 + fault!("spring-time", f0, -f0) * f) / w,
+                velocity: v,
+            };
         }
     }
     let reach = f0.hypot(w * v0);
@@ -629,7 +632,9 @@ impl CraterAndTunnel {
         let squared_speed = match crater_stiffness {
             CraterStiffness::Given(_) => (v0 - w * limit) * (v0 + w * limit),
             CraterStiffness::Continuous => {
-                (v0 * v0 * (kd * mass + fault!("crater-speed", q, -q) * (kd - limit) * (kd + limit)) - limit * limit * p) / (kd * (mass + kd * q))
+                (v0 * v0 * (kd * mass + fault!("crater-speed", q, -q) * (kd - limit) * (kd + limit))
+                    - limit * limit * p)
+                    / (kd * (mass + kd * q))
             }
         };
         slack_spring_leg(w, v0, limit, squared_speed)
@@ -700,7 +705,9 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
             match crater_stiffness {
                 // H = k d = 0 is 0/0 in either form: nothing to perforate.
                 _ if h == 0.0 => 0.0,
-                CraterStiffness::Continuous => 0.5 * h * h * p / (kd + fault!("critical-in-crater", q, 0.0) / mass * (kd - h) * (kd + h)),
+                CraterStiffness::Continuous => {
+                    0.5 * h * h * p / (kd + fault!("critical-in-crater", q, 0.0) / mass * (kd - h) * (kd + h))
+                }
                 CraterStiffness::Given(c) => 0.5 * c * h * h,
             },
         );
@@ -710,7 +717,10 @@ pub fn critical(target: &CraterAndTunnel, exit_depth: f64) -> Result<Critical, C
     Critical::new(
         mass,
         match crater_stiffness {
-            CraterStiffness::Continuous => at_crater_end * (1.0 + fault!("critical-drag", kd * q / mass, 0.0)) + fault!("critical-half", 0.5, 1.0) * kd * p,
+            CraterStiffness::Continuous => {
+                at_crater_end * (1.0 + fault!("critical-drag", kd * q / mass, 0.0))
+                    + fault!("critical-half", 0.5, 1.0) * kd * p
+            }
             CraterStiffness::Given(c) => at_crater_end + 0.5 * c * kd * kd,
         },
     )

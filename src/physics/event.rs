@@ -50,7 +50,11 @@ pub enum EventKind {
 impl EventKind {
     /// The event at the end of stage `index` of `problem`.
     pub fn boundary<S: Scalar>(problem: &Problem<S>, index: usize) -> Self {
-        if fault!("crater-end-unnamed", problem.crater == Some(index), false) { Self::CraterEnd } else { Self::StageEnd(index) }
+        if fault!("crater-end-unnamed", problem.crater == Some(index), false) {
+            Self::CraterEnd
+        } else {
+            Self::StageEnd(index)
+        }
     }
 
     /// Name in the contract: `crater-end`, `stage-end`, `exit`, `rest`.

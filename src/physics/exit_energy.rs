@@ -48,7 +48,8 @@ pub fn carry(stage: &Stage, mass: f64, w: f64, from: f64, to: f64) -> f64 {
     let y = 2.0 * stage.drag * xi / mass;
     let static_at_start = stage.static_force + stage.stiffness * from;
     w * fault!("exit-energy-sign", -y, y).exp()
-        - fault!("exit-energy-factor", 2.0, 1.0) * xi / mass * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
+        - fault!("exit-energy-factor", 2.0, 1.0) * xi / mass
+            * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
 }
 
 /// The margin `min W / V0²` over the stage ends ahead and the exit; `None` without an exit or an impact speed.

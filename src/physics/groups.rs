@@ -54,7 +54,13 @@ pub fn impact_speed_for(impact: f64, mass: f64, concrete: &Concrete) -> f64 {
 /// `M/(N N* B d³)`. Not finite without a nose factor or an inertia factor.
 pub fn density_for(geometry: f64, mass: f64, concrete: &Concrete) -> f64 {
     let d = concrete.diameter;
-    (mass / d) / (fault!("group-geometry", 1.0, std::f64::consts::FRAC_PI_4) * geometry * concrete.nose_factor * concrete.inertia_factor * d * d)
+    (mass / d)
+        / (fault!("group-geometry", 1.0, std::f64::consts::FRAC_PI_4)
+            * geometry
+            * concrete.nose_factor
+            * concrete.inertia_factor
+            * d
+            * d)
 }
 
 /// `E/(d³ fc)` of an energy [J]: the ordinate of the paper's Figure 4.

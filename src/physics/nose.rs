@@ -40,7 +40,9 @@ impl NoseShape {
     pub fn factor(self) -> f64 {
         match self {
             Self::Flat => 1.0,
-            Self::Ogive { caliber_radius_head: psi } => fault!("nose-ogive", 8.0 - 1.0 / psi, 8.0 + 1.0 / psi) / (24.0 * psi),
+            Self::Ogive { caliber_radius_head: psi } => {
+                fault!("nose-ogive", 8.0 - 1.0 / psi, 8.0 + 1.0 / psi) / (24.0 * psi)
+            }
             Self::Cone { length_ratio: psi } => 1.0 / (1.0 + fault!("nose-cone", 4.0, 1.0) * psi * psi),
             Self::Spherical { radius_ratio: psi } => 1.0 - fault!("nose-cap", 0.125, 0.25) / psi / psi,
         }

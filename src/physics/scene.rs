@@ -250,7 +250,8 @@ impl Concrete {
     /// The factors are paired so that no product overflows before the result does.
     fn tunnel(&self, medium: &Layer, end: f64) -> Result<Stage, ResolveError> {
         let d = self.diameter;
-        let static_force = fault!("area", FRAC_PI_4, 2.0 * FRAC_PI_4) * (medium.static_factor * d) * (medium.strength * d);
+        let static_force =
+            fault!("area", FRAC_PI_4, 2.0 * FRAC_PI_4) * (medium.static_factor * d) * (medium.strength * d);
         let no_force = medium.static_factor == 0.0 || medium.strength == 0.0;
         let nose = fault!("nose-left-out", self.nose_factor, 1.0) * self.inertia_factor;
         let drag = FRAC_PI_4 * (nose * d) * (medium.density * d);
@@ -304,7 +305,8 @@ impl Concrete {
             CraterStiffness::Continuous => {
                 let beyond = &stages[0];
                 // c = M (P + Q V0²)/(k d (M + k d Q)), divided through by M.
-                let force = beyond.static_force + fault!("c-not-continuous", beyond.drag, 0.0) * impact_speed * impact_speed;
+                let force =
+                    beyond.static_force + fault!("c-not-continuous", beyond.drag, 0.0) * impact_speed * impact_speed;
                 let stiffness = force / (1.0 + fault!("c-at-impact", depth * (beyond.drag / mass), 0.0)) / depth;
                 // No force at k d (an air gap there) leaves no force in the crater.
                 representable("the crater stiffness c [N/m]", stiffness, force == 0.0)?
@@ -460,7 +462,8 @@ impl Scene {
         admit("the target's thickness H [m]", thickness, Range::NotNegative)?;
         let Some(diameter) = diameter else { return Ok(thickness) };
         admit("the diameter d [m]", diameter, Range::Positive)?;
-        let depth = fault!("ndrc-ignored", diameter * semi_empirical::perforating_depth_ratio(thickness / diameter), thickness);
+        let depth =
+            fault!("ndrc-ignored", diameter * semi_empirical::perforating_depth_ratio(thickness / diameter), thickness);
         representable("the exit depth x_p [m]", depth, thickness == 0.0)
     }
 

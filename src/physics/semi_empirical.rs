@@ -69,7 +69,11 @@ pub fn static_factor_validity(strength: f64) -> Validity {
 /// Depth X/d of Eq. 11-12 at impact function `impact`, for crater depth `crater_ratio` = k > 0.
 pub fn depth_ratio(impact: f64, crater_ratio: f64) -> f64 {
     let k = crater_ratio;
-    if impact <= k * FRAC_PI_4 { fault!("eq11-as-printed", (k * impact / FRAC_PI_4).sqrt(), (k / FRAC_PI_4).sqrt() * impact) } else { fault!("eq12-offset", 0.5, 1.0) * k + impact / FRAC_PI_2 }
+    if impact <= k * FRAC_PI_4 {
+        fault!("eq11-as-printed", (k * impact / FRAC_PI_4).sqrt(), (k / FRAC_PI_4).sqrt() * impact)
+    } else {
+        fault!("eq12-offset", 0.5, 1.0) * k + impact / FRAC_PI_2
+    }
 }
 
 /// Impact function I that reaches the depth X/d = `depth_ratio` by Eq. 11-12: the inverse of [`depth_ratio`].
@@ -90,7 +94,9 @@ pub fn model_difference(impact: f64, geometry: f64, crater_ratio: f64) -> f64 {
     if impact <= at_crater_end {
         fault!("approach-half", 0.5, 1.0) * (at_crater_end - impact) / geometry
     } else {
-        (at_crater_end - impact) * (at_crater_end + impact) / (fault!("approach-pi", PI, 1.0) * geometry) / depth_ratio(impact, crater_ratio)
+        (at_crater_end - impact) * (at_crater_end + impact)
+            / (fault!("approach-pi", PI, 1.0) * geometry)
+            / depth_ratio(impact, crater_ratio)
     }
 }
 

@@ -46,7 +46,9 @@ impl<S: Scalar> Stage<S> {
     /// Smooth for every argument: it is the law of this stage continued beyond its ends, never a branch on `x`.
     #[inline(always)]
     pub fn force(&self, x: S, v: S) -> S {
-        self.static_force + self.stiffness * x + fault!("drag-sign", self.viscosity + self.drag * v, self.viscosity - self.drag * v) * v
+        self.static_force
+            + self.stiffness * x
+            + fault!("drag-sign", self.viscosity + self.drag * v, self.viscosity - self.drag * v) * v
     }
 
     /// Work of the static part `∫ (p + s x) dx` [J] from depth `from` to depth `to` [m].

@@ -29,6 +29,8 @@ pub struct Environment {
     pub lock_file_hash: String,
     /// BLAKE3 of the suite.
     pub suite_hash: String,
+    /// BLAKE3 of the suite's scenes as they were understood, in SI units.
+    pub scenes_hash: String,
     /// Processor.
     pub cpu: String,
     /// Threads used.
@@ -60,6 +62,7 @@ impl Environment {
                 .collect(),
             lock_file_hash: hash(LOCK_FILE),
             suite_hash: hash(&suite.text),
+            scenes_hash: hash(&suite.scenes.iter().map(|scene| format!("{scene:?}\n")).collect::<String>()),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             floating_point: floating_point(),
@@ -106,9 +109,8 @@ fn floating_point() -> String {
 
 /// Date and time of day in UTC, `YYYY-MM-DDThh:mm:ssZ`.
 fn utc_now() -> String {
-    let seconds = std::time::SystemTime::now()
-        .duration_since(std::time::UNIX_EPOCH)
-        .map_or(0, |elapsed| elapsed.as_secs());
+    let seconds =
+        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
     utc(seconds)
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::{Run, VerifyJson};
+use super::figure::Figure;
+use super::{Run, VerifyJson, figures, junit, page, summary};
 
 /// Why there is no report.
 #[derive(Debug, Error)]
@@ -64,14 +65,13 @@ pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
         .prefix(".penetrode-report-")
         .tempdir_in(&parent)
         .map_err(|cause| failed(&parent, cause))?;
-    let mut json = serde_json::to_vec_pretty(&VerifyJson::new(run))
-        .map_err(|cause| failed(folder, io::Error::other(cause)))?;
-    json.push(b'\n');
-    let put = |name: &str, bytes: &[u8]| {
-        let path = stage.path().join(name);
-        fs::write(&path, bytes).map_err(|cause| failed(&folder.join(name), cause))
-    };
-    put("report.json", &json)?;
+    for (name, bytes) in files(run).map_err(|cause| failed(folder, cause))? {
+        let path = stage.path().join(&name);
+        if let Some(part) = path.parent() {
+            fs::create_dir_all(part).map_err(|cause| failed(part, cause))?;
+        }
+        fs::write(&path, bytes).map_err(|cause| failed(&folder.join(&name), cause))?;
+    }
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -79,6 +79,29 @@ pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
         fs::set_permissions(stage.path(), fs::Permissions::from_mode(0o755)).map_err(|cause| failed(folder, cause))?;
     }
     move_into_place(stage, folder).map_err(|cause| failed(folder, cause))
+}
+
+/// Every file of the report: its path in the folder, and its bytes.
+///
+/// # Errors
+/// Only what makes memory run out, or a figure that cannot be drawn.
+pub fn files(run: &Run<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let figures =
+        figures::all(run).into_iter().map(Figure::draw).collect::<Result<Vec<_>, _>>().map_err(io::Error::other)?;
+    let mut json = serde_json::to_vec_pretty(&VerifyJson::new(run))?;
+    json.push(b'\n');
+    let mut files = vec![
+        ("report.json".to_owned(), json),
+        ("report.html".to_owned(), page::to_html(run, &figures).into_bytes()),
+        ("junit.xml".to_owned(), junit::to_xml(run).map_err(io::Error::other)?.into_bytes()),
+        ("summary.md".to_owned(), summary::to_markdown(run).into_bytes()),
+    ];
+    for drawn in &figures {
+        let name = &drawn.figure.name;
+        files.push((format!("figures/{name}.svg"), drawn.file().into_bytes()));
+        files.push((format!("tables/{name}.csv"), drawn.figure.table.to_csv().map_err(io::Error::other)?));
+    }
+    Ok(files)
 }
 
 /// Moves the finished folder over the old one: the old is set aside first and removed last, and put back on failure.

@@ -1,8 +1,19 @@
 //! How a run of the suite is shown: JSON, and a folder with a page, figures, tables and JUnit.
 
+pub mod chart;
 pub mod environment;
+pub mod families;
+pub mod figure;
+pub mod figure_data;
+pub mod figures;
 pub mod folder;
 pub mod json;
+pub mod junit;
+pub mod page;
+pub mod plots_sweep;
+pub mod summary;
+pub mod table;
+pub mod text;
 
 pub use environment::Environment;
 pub use json::VerifyJson;

@@ -15,7 +15,7 @@ use super::grid_convergence::{
     Behaviour, EcaHoekstra, GridValue, ThreeGrids, Uncertainty, eca_hoekstra, roache, self_convergence, three_grids,
     xing_stern,
 };
-use super::order::{Class, Exclusion, OrderVerdict, STEPS_MIN, StepError, fit_at_level};
+use super::order::{Class, Exclusion, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
 use super::quantity::Quantity;
 
 /// Two-sided level of the intervals behind a verdict on one table.
@@ -358,9 +358,10 @@ impl Table {
 
     /// Sorts by step, merges equal rows, refuses two values at one step.
     fn put_in_order(&mut self, taken: &[(usize, Quantity)]) -> Result<(), AuditError> {
-        let ascending = self.rows.windows(2).all(|pair| pair[0].step <= pair[1].step);
-        let descending = self.rows.windows(2).all(|pair| pair[0].step >= pair[1].step);
-        if !ascending && !descending {
+        // From coarse to fine is an order too.
+        let rises = self.rows.windows(2).any(|pair| pair[0].step < pair[1].step);
+        let falls = self.rows.windows(2).any(|pair| pair[0].step > pair[1].step);
+        if rises && falls {
             self.remark(
                 FindingKind::Unsorted,
                 None,
@@ -456,7 +457,8 @@ fn half_last_digit(text: &str) -> f64 {
     if !mantissa.contains(|c: char| c.is_ascii_digit()) {
         return 0.0;
     }
-    let decimals = mantissa.split_once('.').map_or(0, |(_, fraction)| fraction.len()) as i32;
+    let decimals = mantissa.split_once('.').map_or(0, |(_, fraction)| fraction.len());
+    let decimals = i32::try_from(decimals).unwrap_or(i32::MAX);
     exponent.parse::<i32>().map_or(0.0, |exponent| 0.5 * 10_f64.powi(exponent.saturating_sub(decimals)))
 }
 
@@ -628,15 +630,14 @@ struct Observed {
     constant: f64,
 }
 
-fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAudit, Vec<Finding>) {
-    let column = &table.columns[index];
-    let quantity = column.quantity;
-    let mut findings = Vec::new();
-    let mut remark = |kind, message: &str| {
-        findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
-    };
-    let mut judged = QuantityAudit {
-        quantity,
+/// A column before anything is known of it: failed until shown otherwise.
+fn unjudged(table: &Table, index: usize, expectation: &Expectation) -> QuantityAudit {
+    let points = table.rows.iter().map(|row| {
+        let (dt_s, value) = (row.step, row.values[index]);
+        AuditPoint { dt_s, value, error: None, used: false, excluded: None }
+    });
+    QuantityAudit {
+        quantity: table.columns[index].quantity,
         formal_order: expectation.order,
         observed_order: None,
         interval: None,
@@ -653,26 +654,34 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
         error_bands: Vec::new(),
         three_grids: None,
         least_squares: None,
-        points: Vec::new(),
-    };
-    for row in &table.rows {
-        let (dt_s, value) = (row.step, row.values[index]);
-        judged.points.push(AuditPoint { dt_s, value, error: None, used: false, excluded: None });
+        points: points.collect(),
     }
+}
+
+/// One column of a table as grids, with the rounding of its digits.
+fn grids_of(table: &Table, index: usize) -> Vec<GridValue> {
+    let rounding = table.columns[index].rounding;
+    let grid = |row: &Row| {
+        let value = row.values[index];
+        GridValue { step: row.step, value, round_off: rounding.max(0.5 * f64::EPSILON * value.abs()) }
+    };
+    table.rows.iter().map(grid).collect()
+}
+
+fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAudit, Vec<Finding>) {
+    let quantity = table.columns[index].quantity;
+    let mut findings = Vec::new();
+    let mut remark = |kind, message: &str| {
+        findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
+    };
+    let mut judged = unjudged(table, index, expectation);
     if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.values[index].is_finite()) {
         judged.reason =
             format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.values[index], row.step);
         remark(FindingKind::NotFinite, &judged.reason);
         return (judged, findings);
     }
-    let grids: Vec<GridValue> = table
-        .rows
-        .iter()
-        .map(|row| {
-            let value = row.values[index];
-            GridValue { step: row.step, value, round_off: column.rounding.max(0.5 * f64::EPSILON * value.abs()) }
-        })
-        .collect();
+    let grids = grids_of(table, index);
     let (Ok(own), Ok(least_squares)) = (self_convergence(&grids, AUDIT_LEVEL), eca_hoekstra(&grids)) else {
         // Reading has already refused every table that these refuse.
         "the table cannot be fitted".clone_into(&mut judged.reason);
@@ -705,38 +714,12 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
         judged.class = Class::Oscillating;
         judged.reason = own.reason;
     }
-    judged.verdict = match judged.class {
-        Class::Diverging => {
-            remark(FindingKind::Diverging, &judged.reason);
-            Verdict::Failed
-        }
-        Class::Oscillating => {
-            remark(FindingKind::Oscillating, &judged.reason);
-            Verdict::Failed
-        }
-        Class::AtFloor => {
-            remark(FindingKind::ZeroError, &judged.reason);
-            Verdict::Undecided
-        }
-        Class::Undecided => {
-            let constant = own.behaviour == Behaviour::Constant;
-            remark(if constant { FindingKind::Constant } else { FindingKind::Noise }, &judged.reason);
-            Verdict::Undecided
-        }
-        Class::Converging => match (expectation.order, observed.as_ref()) {
-            (Some(formal), Some(observed)) => {
-                let (verdict, text) = against_formal(observed, formal);
-                match verdict {
-                    Verdict::Failed => remark(FindingKind::OrderMissed, &text),
-                    Verdict::Undecided => remark(FindingKind::OrderUnclear, &text),
-                    Verdict::Passed => (),
-                }
-                verdict
-            }
-            (None, Some(_)) => Verdict::Passed,
-            (_, None) => Verdict::Undecided,
-        },
-    };
+    let constant = own.behaviour == Behaviour::Constant;
+    let (verdict, finding) = verdict_of(&judged, constant, observed.as_ref());
+    judged.verdict = verdict;
+    if let Some((kind, message)) = finding {
+        remark(kind, &message);
+    }
     if judged.agrees_with_exact == Some(false) {
         let text =
             format!("the values approach {:.6e} and not the exact {:.6e}", own.limit, judged.exact.unwrap_or(f64::NAN));
@@ -753,17 +736,40 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
     (judged, findings)
 }
 
-/// Whether the band holds the formal order and not its neighbours.
-fn against_formal(observed: &Observed, formal: f64) -> (Verdict, String) {
-    let [low, high] = observed.band;
-    let holds = |order: f64| low <= order && order <= high;
-    let text = format!("order {:.2} [{low:.2}, {high:.2}] where {formal} is expected", observed.order);
-    if !holds(formal) {
-        (Verdict::Failed, text)
-    } else if holds(formal - 1.0) || holds(formal + 1.0) {
-        (Verdict::Undecided, format!("{text}: too wide to tell"))
+/// The verdict that follows from the class and, for a converging column, from the order; and what to say about it.
+fn verdict_of(
+    judged: &QuantityAudit,
+    constant: bool,
+    observed: Option<&Observed>,
+) -> (Verdict, Option<(FindingKind, String)>) {
+    let with = |kind| Some((kind, judged.reason.clone()));
+    match (judged.class, observed) {
+        (Class::Diverging, _) => (Verdict::Failed, with(FindingKind::Diverging)),
+        (Class::Oscillating, _) => (Verdict::Failed, with(FindingKind::Oscillating)),
+        (Class::AtFloor, _) => (Verdict::Undecided, with(FindingKind::ZeroError)),
+        (Class::Undecided, _) if constant => (Verdict::Undecided, with(FindingKind::Constant)),
+        (Class::Undecided, _) | (Class::Converging, None) => (Verdict::Undecided, with(FindingKind::Noise)),
+        (Class::Converging, Some(observed)) => order_verdict(observed, judged.formal_order),
+    }
+}
+
+/// Fails an order outside the wide band; passes one that the 95 % interval tells from its neighbours one away.
+///
+/// Without an expected order the interval must still be narrower than one, or nothing is known of the order.
+fn order_verdict(observed: &Observed, formal: Option<f64>) -> (Verdict, Option<(FindingKind, String)>) {
+    let ([low, high], [least, most]) = (observed.interval, observed.band);
+    let text = format!("order {:.2}, 95 % interval {low:.2} to {high:.2}", observed.order);
+    let told = match formal {
+        Some(formal) if formal < least || most < formal => {
+            return (Verdict::Failed, Some((FindingKind::OrderMissed, format!("{text}, where {formal} is expected"))));
+        }
+        Some(formal) => formal - 1.0 < low && high < formal + 1.0,
+        None => high - low < 1.0,
+    };
+    if told {
+        (Verdict::Passed, None)
     } else {
-        (Verdict::Passed, text)
+        (Verdict::Undecided, Some((FindingKind::OrderUnclear, format!("{text}: too few or too noisy rows to tell"))))
     }
 }
 
@@ -771,10 +777,13 @@ fn against_formal(observed: &Observed, formal: f64) -> (Verdict, String) {
 fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, scale: f64) -> Option<Observed> {
     let points: Vec<StepError> = grids
         .iter()
-        .map(|grid| StepError {
-            step: grid.step,
-            error: (grid.value - exact) / scale,
-            round_off: Some((grid.round_off + 0.5 * f64::EPSILON * exact.abs()) / scale),
+        .map(|grid| {
+            let error = grid.value - exact;
+            let rounding = grid.round_off + 0.5 * f64::EPSILON * exact.abs();
+            // An error within the printed digits is nothing but rounding. Above them the allowance for accumulated
+            // round-off does not apply, for digits are cut once.
+            let round_off = if error.abs() <= rounding { rounding } else { rounding / ROUND_OFF_ALLOWANCE };
+            StepError { step: grid.step, error: error / scale, round_off: Some(round_off / scale) }
         })
         .collect();
     judged.rule = "least squares of ln|error| on ln dt";
@@ -792,10 +801,6 @@ fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, sc
     }
     judged.class = fit.class;
     judged.reason.clone_from(&fit.reason);
-    // The verdict of the fit agrees with `against_formal`; only its line is needed here.
-    debug_assert!(
-        judged.formal_order.is_none_or(|order| fit.verdict(order) != OrderVerdict::Pass || fit.line.is_some())
-    );
     fit.line.map(|line| Observed {
         order: line.order,
         interval: line.interval95,
@@ -838,4 +843,258 @@ fn add_bands(judged: &mut QuantityAudit, grids: &[GridValue], least_squares: Eca
         judged.error_bands.extend(least_squares.uncertainty);
     }
     judged.least_squares = Some(least_squares);
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+    use std::fmt::Write;
+
+    use super::super::order::noise::Noise;
+    use super::*;
+
+    /// A depth table; `f` of the step in units of the coarsest.
+    fn table(rows: i32, f: impl Fn(f64, i32) -> f64) -> String {
+        let mut text = "dt_s,depth_m\n".to_owned();
+        for i in 0..rows {
+            let h = 0.5_f64.powi(i);
+            writeln!(text, "{},{}", 1e-5 * h, f(h, i)).unwrap();
+        }
+        text
+    }
+
+    fn judge_text(text: &str, order: Option<f64>, exact: Option<f64>) -> Audit {
+        let exact = exact.map(|depth| ExactValues { impact_velocity: 300.0, depth: Some(depth), ..Default::default() });
+        audit(&Table::read("run.csv", text.as_bytes()).unwrap(), &Expectation { order, exact }).unwrap()
+    }
+
+    fn refused(text: &str) -> AuditError {
+        Table::read("run.csv", text.as_bytes()).unwrap_err()
+    }
+
+    fn kinds(audit: &Audit) -> Vec<FindingKind> {
+        audit.findings.iter().map(|finding| finding.kind).collect()
+    }
+
+    const BASE: &str = "1e-6,1.01\n2e-6,1.04\n4e-6,1.16\n8e-6,1.64\n";
+
+    #[test]
+    fn clean_tables_of_either_order_pass_from_four_rows_on_with_and_without_an_exact_value() {
+        for rows in 4..=8 {
+            for order in [1.0, 2.0] {
+                // A next term of 10 %, and seven digits as Abaqus prints them.
+                let text = table(rows, |h, _| {
+                    let term = h.powf(order);
+                    ((5.0 + 0.1 * term * (1.0 + 0.1 * term)) * 1e6).round() / 1e6
+                });
+                for exact in [None, Some(5.0)] {
+                    let audit = judge_text(&text, Some(order), exact);
+                    assert_eq!(audit.exit_code(), 0, "{rows} rows, order {order}, {exact:?}: {:?}", audit.findings);
+                    assert_ne!(
+                        judge_text(&text, Some(3.0 - order), exact).exit_code(),
+                        0,
+                        "{rows} rows, order {order}"
+                    );
+                    assert_eq!(judge_text(&text, None, exact).exit_code(), 0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noisy_tables_of_twelve_rows_pass_and_miss_the_other_order() {
+        let mut noise = Noise(11);
+        for _ in 0..20 {
+            for order in [1.0, 2.0] {
+                let deviations: Vec<f64> = (0..12).map(|_| 1.0 + 0.05 * noise.normal()).collect();
+                let text = table(12, |h, i| 0.17 + 0.01 * h.powf(order) * deviations[i as usize]);
+                for exact in [None, Some(0.17)] {
+                    let audit = judge_text(&text, Some(order), exact);
+                    assert_eq!(audit.exit_code(), 0, "order {order}, {exact:?}: {:?}", audit.findings);
+                    let missed = judge_text(&text, Some(3.0 - order), exact);
+                    assert_eq!(missed.exit_code(), 3);
+                    assert_eq!(kinds(&missed), [FindingKind::OrderMissed]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_diverging_table_fails_where_its_reverse_passes() {
+        assert_eq!(judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None).exit_code(), 0);
+        let text = "dt_s,depth_m\n8e-6,1.01\n4e-6,1.04\n2e-6,1.16\n1e-6,1.64\n";
+        for (order, exact) in [(None, None), (Some(2.0), None), (None, Some(1.0)), (Some(2.0), Some(1.0))] {
+            let audit = judge_text(text, order, exact);
+            assert_eq!((audit.exit_code(), audit.quantities[0].class), (3, Class::Diverging));
+            assert_eq!(kinds(&audit), [FindingKind::Diverging]);
+            assert!(audit.quantities[0].error_bands.is_empty(), "no bar for what diverges");
+        }
+    }
+
+    #[test]
+    fn an_oscillating_table_fails_even_where_its_amplitude_falls() {
+        for decay in [0.0, 0.81, 2.0, -0.5] {
+            let text = table(6, |h, i| 1.0 + 0.1 * h.powf(decay) * f64::from(1 - 2 * (i % 2)));
+            for exact in [None, Some(1.0)] {
+                let audit = judge_text(&text, None, exact);
+                assert_eq!(audit.exit_code(), 3, "decay {decay}, {exact:?}: {:?}", audit.findings);
+                assert!(matches!(kinds(&audit)[0], FindingKind::Oscillating | FindingKind::Diverging));
+            }
+        }
+    }
+
+    #[test]
+    fn constants_and_zero_errors_are_undecided() {
+        let text = table(6, |_, _| 0.173);
+        let audit = judge_text(&text, Some(2.0), None);
+        assert_eq!((audit.exit_code(), kinds(&audit)), (4, vec![FindingKind::Constant]));
+        let audit = judge_text(&text, Some(2.0), Some(0.173));
+        assert_eq!((audit.exit_code(), kinds(&audit)), (4, vec![FindingKind::ZeroError]));
+        let audit = judge_text(&text, Some(2.0), Some(0.2));
+        assert_eq!((audit.exit_code(), kinds(&audit)), (4, vec![FindingKind::Constant]));
+    }
+
+    #[test]
+    fn noise_passes_in_fewer_than_one_table_of_a_thousand() {
+        // Of 10^4 tables a size, as PENETRODE_NOISE_TABLES=10000 judges them: at most 9 pass at four rows, 5 at five, 1 at
+        // twenty, none at eight. The few judged by default only see a rule that has come loose.
+        let count: usize = std::env::var("PENETRODE_NOISE_TABLES").ok().and_then(|n| n.parse().ok()).unwrap_or(100);
+        let mut noise = Noise(5);
+        let mut passed = [[0; 4]; 4];
+        for (size, rows) in [4, 5, 8, 20].into_iter().enumerate() {
+            for _ in 0..count {
+                let values: Vec<f64> = (0..rows).map(|_| 5.0 + 0.1 * noise.normal()).collect();
+                let text = table(rows, |_, i| values[i as usize]);
+                let cases = [(Some(1.0), None), (Some(2.0), None), (Some(2.0), Some(5.0)), (None, None)];
+                for (case, (order, exact)) in cases.into_iter().enumerate() {
+                    passed[size][case] += usize::from(judge_text(&text, order, exact).exit_code() == 0);
+                }
+            }
+        }
+        println!("{count} tables of 4, 5, 8, 20 rows; order 1, order 2, order 2 against exact, no order: {passed:?}");
+        for case in 0..3 {
+            let all: usize = passed.iter().map(|size| size[case]).sum();
+            assert!(1000 * all <= 4 * count + 3000, "{all} of {} tables of noise pass, case {case}", 4 * count);
+        }
+    }
+
+    #[test]
+    fn convergence_to_something_else_than_the_exact_value_fails() {
+        let text = table(7, |h, _| 1.01 + 0.1 * h * h);
+        assert_eq!(judge_text(&text, Some(2.0), None).exit_code(), 0);
+        let audit = judge_text(&text, None, Some(1.0));
+        assert_eq!(audit.exit_code(), 3);
+        assert!(kinds(&audit).contains(&FindingKind::WrongLimit), "{:?}", audit.findings);
+    }
+
+    #[test]
+    fn rows_that_differ_from_the_exact_value_by_their_printed_digits_only_are_left_out() {
+        let text = table(9, |h, _| ((0.173_214_1 + 0.02 * h * h) * 1e6).round() / 1e6);
+        let audit = judge_text(&text, Some(2.0), Some(0.173_214_1));
+        assert_eq!(audit.exit_code(), 0, "{:?}", audit.findings);
+        let finest = audit.quantities[0].points[0];
+        assert_eq!((finest.used, finest.excluded), (false, Some(Exclusion::RoundOffFloor)));
+    }
+
+    #[test]
+    fn not_finite_values_fail_in_every_spelling() {
+        for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
+            let audit = judge_text(&format!("dt_s,depth_m\n{BASE}16e-6,{cell}\n"), Some(2.0), Some(1.0));
+            assert_eq!((audit.exit_code(), kinds(&audit)), (3, vec![FindingKind::NotFinite]), "{cell}");
+        }
+        let audit = judge_text(&format!("dt_s,depth_m\n{BASE}nan,2\n"), None, None);
+        assert_eq!((audit.exit_code(), kinds(&audit)), (3, vec![FindingKind::NotFinite]));
+        let text = audit.quantities[0].reason.clone();
+        assert!(text.starts_with("run.csv:6: "), "{text}");
+    }
+
+    #[test]
+    fn a_bad_column_fails_the_table_and_leaves_the_good_one_judged() {
+        let text = "dt_s,depth_m,time_s\n1e-6,1.01,1\n2e-6,1.04,nan\n4e-6,1.16,1\n8e-6,1.64,1\n";
+        let audit = judge_text(text, Some(2.0), None);
+        assert_eq!(audit.exit_code(), 3);
+        assert_eq!(audit.quantities[0].verdict, Verdict::Passed);
+    }
+
+    #[test]
+    fn rows_out_of_order_and_twice_the_same_are_put_right_and_mentioned() {
+        let text = "dt_s,depth_m\n4e-6,1.16\n1e-6,1.01\n8e-6,1.64\n2e-6,1.04\n1e-6,1.01\n";
+        let audit = judge_text(text, Some(2.0), None);
+        assert_eq!((audit.exit_code(), kinds(&audit)), (0, vec![FindingKind::Unsorted, FindingKind::DuplicateRows]));
+        let straight = judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None);
+        assert_eq!(audit.quantities, straight.quantities);
+    }
+
+    #[test]
+    fn marks_line_ends_quotes_blanks_and_comments_change_nothing() {
+        let text = "\u{feff}# from the solver\r\n\"dt_s\", depth_m\r\n1e-6 ,\"1.01\"\r\n2e-6,1.04\r\n\r\n4e-6,1.16\r\n8e-6,1.64";
+        let straight = judge_text(&format!("dt_s,depth_m\n{BASE}"), None, None);
+        assert_eq!(judge_text(text, None, None), straight);
+    }
+
+    #[test]
+    fn refusals_name_file_line_and_column() {
+        let with = |row: &str| format!("dt_s,depth_m\n{BASE}{row}\n");
+        let messages = [
+            (refused(""), "run.csv: the file is empty"),
+            (refused(BASE), "run.csv:1: the first row must name the columns, and this one holds numbers"),
+            (refused("dt_s,depth_mm\n1,2\n"), "run.csv:1, column 2: there is no column `depth_mm`"),
+            (refused("dt_s;depth_m\n1;2\n"), "run.csv:1, column 1: there is no column `dt_s;depth_m`"),
+            (refused("dt_s,depth_m,depth_m\n1,2,2\n"), "run.csv:1, column 3: the column `depth_m` is there twice"),
+            (refused("depth_m\n1\n"), "run.csv:1: the column `dt_s` is missing"),
+            (refused("dt_s\n1\n"), "run.csv:1: there is no column of results"),
+            (refused(&with("16e-6")), "run.csv:6: 1 cells in a table of 2 columns"),
+            (refused(&with("16e-6,1,2")), "run.csv:6: 3 cells in a table of 2 columns"),
+            (refused(&with("16e-6,1.5 m")), "run.csv:6, column 2: `1.5 m` in `depth_m` is not a number"),
+            (refused(&with("16e-6,")), "run.csv:6, column 2: `` in `depth_m` is not a number"),
+            (refused(&with("0,1")), "run.csv:6, column 1: the step 0 s is not positive"),
+            (refused(&with("-1e-6,1")), "run.csv:6, column 1: the step -0.000001 s is not positive"),
+            (
+                refused(&with("2e-6,1.05")),
+                "run.csv:6, column 2: the step 0.000002 s has two values of `depth_m`, 1.05 here and 1.04 in line 3",
+            ),
+            (refused("dt_s,depth_m\n1e-6,1\n2e-6,2\n"), "run.csv: 2 different steps, and an order needs 4"),
+            (
+                refused("dt_s,depth_m\n1e-6,1\n2e-6,2\n3e-6,2\n3e-6,2\n"),
+                "run.csv: 3 different steps, and an order needs 4",
+            ),
+        ];
+        for (error, message) in messages {
+            assert_eq!(error.to_string(), message);
+            assert!(!error.help().is_empty());
+            assert_eq!(error.exit_code(), 2);
+        }
+        assert!(matches!(Table::read("x", b"dt_s,depth_m\n1,\xff\n").unwrap_err(), AuditError::NotCsv { .. }));
+        let table = Table::read("x", format!("dt_s,depth_m\n{BASE}").as_bytes()).unwrap();
+        for order in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(audit(&table, &Expectation { order: Some(order), exact: None }).is_err());
+        }
+    }
+
+    #[test]
+    fn an_empty_column_of_a_template_is_left_out_and_mentioned() {
+        let text = "dt_s,depth_m,velocity_m_s\n1e-6,1.01,\n2e-6,1.04,\n4e-6,1.16,\n8e-6,1.64,\n";
+        let audit = judge_text(text, Some(2.0), None);
+        assert_eq!((audit.exit_code(), kinds(&audit)), (0, vec![FindingKind::EmptyColumn]));
+    }
+
+    #[test]
+    fn the_judgement_serialises_under_the_names_of_the_contract() {
+        let json = serde_json::to_value(judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None)).unwrap();
+        assert_eq!(json["schema"], "penetrode/audit/1");
+        assert_eq!(json["verdict"], "passed");
+        let column = &json["quantities"][0];
+        assert_eq!((&column["quantity"], &column["class"]), (&"depth".into(), &"converging".into()));
+        for name in ["formal_order", "observed_order", "interval", "error_constant", "points", "error_bands"] {
+            assert!(!column[name].is_null(), "{name}");
+        }
+        assert!(column["points"][0]["dt_s"].is_number() && column["points"][0]["error"].is_number());
+    }
+
+    #[test]
+    fn the_last_digit_printed_bounds_what_a_number_means() {
+        for (text, half) in [("1.25", 0.005), ("3", 0.5), ("1.5e-6", 0.05e-6), ("2.50E+02", 0.5), ("nan", 0.0)] {
+            assert!((half_last_digit(text) - half).abs() <= 1e-15 * half, "{text}");
+        }
+    }
 }

@@ -261,10 +261,7 @@ fn at_any_speed(velocity: f64, error_bar: Option<f64>, tally: Tally, note: &'sta
 ///
 /// # Errors
 /// [`CriticalError`].
-pub fn of_scene(
-    scene: &Scene,
-    integrator: &dyn Integrator,
-) -> Result<CriticalVelocity, CriticalError<ResolveError>> {
+pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError<ResolveError>> {
     critical_velocity(|speed| scene.resolve(speed), integrator, Options::default())
 }
 

@@ -1,16 +1,23 @@
 //! What many flights show: orders of convergence, critical velocity, other people's programs and tables.
 
+pub mod applicability;
 pub mod audit;
+pub mod batch;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
+pub mod experiments;
+pub mod extreme_scenes;
 pub mod formal_order;
 pub mod grid_convergence;
 pub mod order;
+pub mod parameter;
 pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
+pub mod sensitivity;
+pub mod sweep;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;

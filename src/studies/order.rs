@@ -22,15 +22,17 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DVector, Matrix3, Vector3};
 use serde::Serialize;
 use thiserror::Error;
 
 /// Two-sided level of the band behind a verdict: the chance that a right order falls outside.
 ///
 /// A suite of 100 fits then raises a false alarm once in 10⁴ seeds. It holds for the noise that steps make and not
-/// only for a normal one: over 10⁷ fits with `U` uniform, the bands of 10⁻³ to 10⁻⁵ are missed no more often than
-/// they say (`bands_keep_their_level_for_the_noise_of_steps` repeats a part of it).
+/// only for a normal one: `ln U` is skewed, but the steps lie evenly about their mean and the slope hardly feels it.
+/// Over 10⁶ lines of 40 and of 60 points, `U` uniform or a sine, the bands of 10⁻² to 10⁻⁵ miss the order 0.1 to
+/// 0.9 times as often as they say, and no right order failed in 8·10⁴ whole fits of 60 and 120 points. With 120 points
+/// over three decades an order that is off by one half fails too (9999 of 10⁴ and more); with 60 nine in ten (`bands_keep_their_level_for_the_noise_of_steps` repeats a part of it).
 pub const FALSE_ALARM_LEVEL: f64 = 1e-6;
 
 /// Two-sided level at which a slope counts as different from zero, for the class.
@@ -61,6 +63,8 @@ const BEND_CANDIDATES: usize = 24;
 const BENDS_MAX: usize = 3;
 /// Share of the trend that the floor may still be at the finest step used.
 const FLOOR_SHARE: f64 = 0.25;
+/// Share of the trend that the law of the coarse end may still be at the coarsest step used.
+const COARSE_SHARE: f64 = 0.1;
 
 /// The error at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -230,10 +234,10 @@ impl OrderFit {
         let holds = |order: f64| low <= order && order <= high;
         match self.class {
             Class::Diverging => OrderVerdict::Fail,
-            Class::AtFloor | Class::Oscillating => OrderVerdict::Undecided,
+            // An error that does not fall misses every order that its band excludes, whatever else it does.
             Class::Converging | Class::Undecided if !holds(formal) => OrderVerdict::Fail,
             Class::Converging if !holds(formal - 1.0) && !holds(formal + 1.0) => OrderVerdict::Pass,
-            Class::Converging | Class::Undecided => OrderVerdict::Undecided,
+            _ => OrderVerdict::Undecided,
         }
     }
 
@@ -363,7 +367,11 @@ fn exclusions(sorted: &[StepError], round_off: &[f64]) -> Vec<Option<Exclusion>>
                 excluded[i] = Some(Exclusion::RoundOffFloor);
             }
         } else {
-            for &i in used.iter().filter(|&&i| sorted[i].step.ln() > bend.at) {
+            // The law of the coarse end fades out below the bend; at most half of the fine side is given up for that.
+            let fine = x.partition_point(|&x| x <= bend.at);
+            let clear = bend.at + COARSE_SHARE.ln() / (bend.coarse_slope - bend.fine_slope).abs();
+            let clear = clear.max(x[fine / 2]);
+            for &i in used.iter().filter(|&&i| sorted[i].step.ln() > clear) {
                 excluded[i] = Some(Exclusion::PreAsymptotic);
             }
         }
@@ -456,17 +464,20 @@ fn line(x: &[f64], y: &[f64]) -> Option<Line> {
         return None;
     }
     let centre = [x.iter().sum::<f64>() / n as f64, y.iter().sum::<f64>() / n as f64];
-    let design = DMatrix::from_fn(n, 2, |i, j| if j == 0 { 1.0 } else { x[i] - centre[0] });
-    let values = DVector::from_fn(n, |i, _| y[i] - centre[1]);
-    let solution = design.clone().svd(true, true).solve(&values, f64::EPSILON).ok()?;
-    let residuals = values - &design * &solution;
-    let spread = design.column(1).norm_squared();
+    // About the means the two columns are orthogonal, so that the projections are the solution. A singular value
+    // decomposition is no safer way here: that of nalgebra 0.35 gives a wrong intercept, by up to 0.5, for one in
+    // twenty such designs, because their columns are orthogonal but for rounding.
+    let x = DVector::from_iterator(n, x.iter().map(|x| x - centre[0]));
+    let y = DVector::from_iterator(n, y.iter().map(|y| y - centre[1]));
+    let spread = x.norm_squared();
     // Steps that differ only in their last digits carry no slope.
     if spread <= 1e-20 * n as f64 {
         return None;
     }
+    let slope = x.dot(&y) / spread;
     let dof = n - 2;
-    Some(Line { slope: solution[1] * fault!("fit-slope", 1.0, std::f64::consts::LN_2), centre, spread, scatter: (residuals.norm_squared() / dof as f64).sqrt(), dof })
+    let scatter = ((y - slope * x).norm_squared() / dof as f64).sqrt();
+    Some(Line { slope: slope * fault!("fit-slope", 1.0, std::f64::consts::LN_2), centre, spread, scatter, dof })
 }
 
 /// A place where the line changes its slope.
@@ -486,10 +497,7 @@ fn bend(x: &[f64], y: &[f64]) -> Option<Bend> {
     let matters = (bend.coarse_slope - bend.fine_slope).abs() > BEND_MIN;
     (tail < BEND_LEVEL && matters).then_some(bend)
 }
-#[cfg(test)]
-fn bend_tail(x: &[f64], y: &[f64]) -> Option<f64> {
-    best_bend(x, y).map(|b| b.0)
-}
+/// The bend of least squares over a grid of places, and the tail of its F.
 fn best_bend(x: &[f64], y: &[f64]) -> Option<(f64, Bend)> {
     let n = x.len();
     let side = SIDE_MIN.max(n / 8);
@@ -592,98 +600,221 @@ pub(super) mod noise {
 }
 
 #[cfg(test)]
-mod tuning {
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
     use super::noise::Noise;
     use super::*;
+
+    type Kind = fn(&mut Noise) -> f64;
+
+    /// What an event at a random place in the step makes of the error: all within a factor of (0, 1).
+    const KINDS: [(&str, Kind); 4] = [
+        ("u", |r| r.uniform()),
+        ("1 - 4 u²", |r| 1.0 - (2.0 * r.uniform() - 1.0).powi(2)),
+        ("|sin|", |r| (std::f64::consts::TAU * r.uniform()).sin().abs()),
+        ("u - 0.3", |r| r.uniform() - 0.3),
+    ];
+
+    fn power(noise: &mut Noise, n: usize, order: f64, kind: Kind) -> Vec<StepError> {
+        let steps = noise.steps(n, 1e-2, 3.0);
+        // Round-off far below, so that only the noise is looked at.
+        let point = |h: f64, u: f64| StepError { step: h, error: h.powf(order) * u, round_off: Some(1e-30) };
+        steps.into_iter().map(|h| point(h, kind(noise))).collect()
+    }
+
     #[test]
-    #[ignore]
-    fn tune() {
-        let kinds: [(&str, fn(&mut Noise) -> f64); 6] = [
-            ("u", |r| r.uniform()),
-            ("u2", |r| r.uniform().powi(2)),
-            ("sin", |r| (std::f64::consts::TAU * r.uniform()).sin().abs()),
-            ("1-4u2", |r| 1.0 - (2.0 * r.uniform() - 1.0).powi(2)),
-            ("u-.3", |r| (r.uniform() - 0.3).abs()),
-            ("ln", |r| r.normal().exp()),
-        ];
-        let fits: usize = std::env::var("FITS").unwrap().parse().unwrap();
-        let raw = std::env::var("RAW").is_ok();
-        for n in [8, 20, 40, 60] {
-            for (name, kind) in kinds {
-                let mut r = Noise(n as u64 * 77);
-                let levels = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-                let mut miss = [0; 5];
-                let (mut half, mut pass, mut fail, mut bent, mut fail_off, mut pass_off) = (0.0, 0, 0, 0, 0, 0);
-                let mut cls = 0;
-                let ts: Vec<f64> = levels.iter().map(|&l| student_t(l, n - 2)).collect();
-                for _ in 0..fits {
-                    let h = r.steps(n, 1e0, 3.0);
-                    if std::env::var("BEND").is_ok() {
-                        let mut h = h;
-                        h.sort_by(f64::total_cmp);
-                        let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
-                        let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
-                        if let Some(t) = bend_tail(&x, &y) {
-                            for (i, l) in [1e-6, 1e-8, 1e-10, 1e-12, 1e-14].into_iter().enumerate() {
-                                if t < l {
-                                    miss[i] += 1;
-                                }
-                            }
-                        }
-                        continue;
-                    }
-                    if raw {
-                        let x: Vec<f64> = h.iter().map(|h| h.ln()).collect();
-                        let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut r).ln()).collect();
-                        let (mx, my) = (x.iter().sum::<f64>() / n as f64, y.iter().sum::<f64>() / n as f64);
-                        let sxx: f64 = x.iter().map(|x| (x - mx) * (x - mx)).sum();
-                        let sxy: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
-                        let b = sxy / sxx;
-                        let s: f64 = x.iter().zip(&y).map(|(x, y)| (y - my - b * (x - mx)).powi(2)).sum();
-                        let t = (b - 2.0).abs() / (s / (n - 2) as f64 / sxx).sqrt();
-                        for i in 0..5 {
-                            if t > ts[i] {
-                                miss[i] += 1;
-                            }
-                        }
-                        continue;
-                    }
-                    let pts: Vec<_> = h.iter().map(|&h| StepError::new(h, h * h * kind(&mut r))).collect();
-                    let f = fit(&pts).unwrap();
-                    let l = f.line.unwrap();
-                    half += (l.verdict_band[1] - l.verdict_band[0]) / 2.0;
-                    if f.used() < n {
-                        bent += 1;
-                    }
-                    if f.class != Class::Converging {
-                        cls += 1;
-                    }
-                    match f.verdict(2.0) {
-                        OrderVerdict::Pass => pass += 1,
-                        OrderVerdict::Fail => fail += 1,
-                        _ => (),
-                    }
-                    match f.verdict(1.5) {
-                        OrderVerdict::Pass => pass_off += 1,
-                        OrderVerdict::Fail => fail_off += 1,
-                        _ => (),
-                    }
-                    let nu = f.used() - 2;
-                    let se = l.interval95[1] - l.order;
-                    let t = (l.order - 2.0).abs() / se * student_t(0.05, nu);
-                    for i in 0..5 {
-                        if t > student_t(levels[i], nu) {
-                            miss[i] += 1;
-                        }
+    fn residuals_of_the_line_are_orthogonal_to_both_columns() {
+        // Centred columns are orthogonal but for rounding: the case in which the decomposition of nalgebra 0.35 fails.
+        let mut noise = Noise(12);
+        for _ in 0..300 {
+            let x: Vec<f64> = noise.steps(120, 1e-2, 3.0).iter().map(|h| h.ln()).collect();
+            let y: Vec<f64> = x.iter().map(|x| 2.0 * x + noise.uniform().ln()).collect();
+            let line = line(&x, &y).unwrap();
+            let residual = |i: usize| y[i] - line.centre[1] - line.slope * (x[i] - line.centre[0]);
+            let (sum, moment, square) = (0..120)
+                .map(|i| (residual(i), x[i] - line.centre[0]))
+                .fold((0.0, 0.0, 0.0), |(sum, moment, square), (r, x)| (sum + r, moment + r * x, square + r * r));
+            assert!(f64::abs(sum) < 1e-10 && f64::abs(moment) < 1e-10, "{sum:e} {moment:e}");
+            assert!((square / 118.0 / line.scatter.powi(2) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn student_t_matches_the_tables() {
+        for (level, dof, expected) in [
+            (0.05, 1, 12.706_204_736),
+            (0.05, 2, 4.302_652_730),
+            (0.05, 3, 3.182_446_305),
+            (0.05, 58, 2.001_717_484),
+            (0.001, 4, 8.610_301_581),
+            (0.001, 30, 3.645_958_635),
+            (1e-6, 1, 636_619.772_367),
+        ] {
+            let t = student_t(level, dof);
+            assert!((t / expected - 1.0).abs() < 1e-9, "t({level}, {dof}) = {t}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn bands_keep_their_level_for_the_noise_of_steps() {
+        let mut noise = Noise(1);
+        for (name, kind) in KINDS {
+            let t = student_t(1e-3, 58);
+            let (fits, mut misses) = (25_000, 0);
+            for _ in 0..fits {
+                let x: Vec<f64> = noise.steps(60, 1e-2, 3.0).iter().map(|h| h.ln()).collect();
+                let y: Vec<f64> = x.iter().map(|x| 2.0 * x + kind(&mut noise).abs().ln()).collect();
+                let line = line(&x, &y).unwrap();
+                misses += usize::from((line.slope - 2.0).abs() > t * line.scatter / line.spread.sqrt());
+            }
+            // 25 expected of a normal noise; 45 is four standard deviations above.
+            assert!(misses <= 45, "{name}: {misses} of {fits} outside the band of 1e-3");
+        }
+    }
+
+    #[test]
+    fn a_right_order_passes_and_one_off_by_one_fails_for_every_noise() {
+        let mut noise = Noise(2);
+        for (name, kind) in KINDS {
+            for order in [1.0, 2.0] {
+                for _ in 0..300 {
+                    let fit = fit(&power(&mut noise, 120, order, kind)).unwrap();
+                    let line = fit.line.unwrap();
+                    assert_eq!(fit.verdict(order), OrderVerdict::Pass, "{name}, order {order}: {line:?}");
+                    for off in [-1.0, 1.0] {
+                        assert_eq!(fit.verdict(order + off), OrderVerdict::Fail, "{name}, order {order}: {line:?}");
                     }
                 }
-                let m: Vec<_> =
-                    miss.iter().zip(levels).map(|(&m, l)| format!("{:.2}", m as f64 / fits as f64 / l)).collect();
-                println!(
-                    "n {n} {name}: miss/level {m:?} half {:.3} pass {pass} fail {fail} bent {bent} noncls {cls} off .5: fail {fail_off} pass {pass_off}",
-                    half / fits as f64
-                );
             }
         }
+    }
+
+    #[test]
+    fn an_order_off_by_a_half_fails_with_120_points() {
+        let mut noise = Noise(3);
+        for (name, kind) in KINDS {
+            let trials = 400;
+            let caught = (0..trials)
+                .filter(|_| fit(&power(&mut noise, 120, 1.5, kind)).unwrap().verdict(2.0) == OrderVerdict::Fail)
+                .count();
+            assert!(caught * 100 >= trials * 99, "{name}: {caught} of {trials}");
+        }
+    }
+
+    #[test]
+    fn smooth_errors_give_order_and_constant_to_the_next_term() {
+        let mut noise = Noise(4);
+        for order in [1.0, 2.0] {
+            let points: Vec<_> = noise
+                .steps(60, 1e-2, 3.0)
+                .into_iter()
+                .map(|h| StepError::new(h, -3.0 * h.powf(order) * (1.0 + h)))
+                .collect();
+            let fit = fit(&points).unwrap();
+            let line = fit.line.unwrap();
+            assert!((line.order - order).abs() < 0.01, "{line:?}");
+            assert_eq!(fit.verdict(order), OrderVerdict::Pass);
+            let constant = fit.constant_at(order).unwrap();
+            assert!((constant.value / -3.0 - 1.0).abs() < 0.01, "{constant:?}");
+            assert!(constant.interval95[0] < constant.value && constant.value < constant.interval95[1]);
+            assert_eq!(fit.falling_share(), Some(1.0));
+        }
+    }
+
+    #[test]
+    fn a_round_off_floor_is_excluded_and_marked() {
+        let mut noise = Noise(5);
+        for _ in 0..50 {
+            let points: Vec<_> = noise
+                .steps(60, 1e-2, 6.0)
+                .into_iter()
+                .map(|h| StepError::new(h, h * h * (0.1 + noise.uniform()) + 1e-14 * noise.normal()))
+                .collect();
+            let fit = fit(&points).unwrap();
+            assert_eq!(fit.verdict(2.0), OrderVerdict::Pass, "{:?}", fit.line);
+            assert!(fit.points[0].excluded == Some(Exclusion::RoundOffFloor) && !fit.points[0].used);
+            assert!(fit.points.iter().filter(|p| p.used).all(|p| p.step > 1e-7), "floor in the fit");
+        }
+    }
+
+    #[test]
+    fn an_error_that_levels_off_above_round_off_is_no_floor_and_fails() {
+        // A method that converges to something else by one part in a million.
+        let mut noise = Noise(6);
+        let points: Vec<_> = noise.steps(60, 1e-1, 4.0).into_iter().map(|h| StepError::new(h, h * h + 1e-6)).collect();
+        let fit = fit(&points).unwrap();
+        assert_eq!(fit.verdict(2.0), OrderVerdict::Fail, "{:?} {}", fit.line, fit.reason);
+        assert!(fit.points.iter().all(|point| point.excluded != Some(Exclusion::RoundOffFloor)));
+    }
+
+    #[test]
+    fn the_fine_end_decides_between_two_orders() {
+        let mut noise = Noise(7);
+        let points: Vec<_> = noise
+            .steps(80, 1.0, 5.0)
+            .into_iter()
+            .map(|h| StepError::new(h, (h * h + 1e-3 * h) * (0.5 + noise.uniform())))
+            .collect();
+        let fit = fit(&points).unwrap();
+        assert_eq!(fit.verdict(1.0), OrderVerdict::Pass, "{:?}", fit.line);
+        assert_eq!(fit.points.last().unwrap().excluded, Some(Exclusion::PreAsymptotic));
+    }
+
+    #[test]
+    fn pure_round_off_and_zeros_are_at_the_floor_and_never_pass() {
+        let mut noise = Noise(8);
+        let steps = noise.steps(40, 1e-2, 3.0);
+        let round_off: Vec<_> = steps.iter().map(|&h| StepError::new(h, 1e-16 * noise.normal() / h.sqrt())).collect();
+        let zeros: Vec<_> = steps.iter().map(|&h| StepError::new(h, 0.0)).collect();
+        for points in [round_off, zeros] {
+            let fit = fit(&points).unwrap();
+            assert_eq!(fit.class, Class::AtFloor, "{}", fit.reason);
+            assert_eq!(fit.verdict(2.0), OrderVerdict::Undecided);
+        }
+    }
+
+    #[test]
+    fn diverging_constant_and_alternating_errors_never_pass() {
+        let mut noise = Noise(9);
+        let steps = noise.steps(40, 1e-2, 3.0);
+        let with =
+            |f: &dyn Fn(f64) -> f64| fit(&steps.iter().map(|&h| StepError::new(h, f(h))).collect::<Vec<_>>()).unwrap();
+        let diverging = with(&|h| 1e-4 / h);
+        assert_eq!((diverging.class, diverging.verdict(1.0)), (Class::Diverging, OrderVerdict::Fail));
+        let constant = with(&|_| 1e-4);
+        assert_eq!((constant.class, constant.verdict(2.0)), (Class::Undecided, OrderVerdict::Fail));
+        let alternating: Vec<_> = (0..12)
+            .map(|i| StepError::new(0.5_f64.powi(i), 0.1 * 0.25_f64.powi(i) * f64::from(1 - 2 * (i % 2))))
+            .collect();
+        let alternating = fit(&alternating).unwrap();
+        assert_eq!((alternating.class, alternating.verdict(2.0)), (Class::Oscillating, OrderVerdict::Undecided));
+    }
+
+    #[test]
+    fn noise_does_not_converge() {
+        let mut noise = Noise(10);
+        let fits = 3_000;
+        let converging = (0..fits)
+            .filter(|_| {
+                let points: Vec<_> =
+                    noise.steps(40, 1e-2, 3.0).into_iter().map(|h| StepError::new(h, noise.normal())).collect();
+                fit(&points).unwrap().class == Class::Converging
+            })
+            .count();
+        assert!(converging <= 8, "{converging} of {fits}");
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_an_error_and_not_a_fit() {
+        let good: Vec<_> = (1..=6).map(|i| StepError::new(f64::from(i), f64::from(i))).collect();
+        let with = |point| [good.clone(), vec![point]].concat();
+        for bad in [f64::NAN, f64::INFINITY] {
+            assert!(matches!(fit(&with(StepError::new(7.0, bad))), Err(FitError::NotFinite { index: 6, .. })));
+            assert!(matches!(fit(&with(StepError::new(bad, 7.0))), Err(FitError::BadStep { index: 6, .. })));
+        }
+        assert!(matches!(fit(&with(StepError::new(0.0, 1.0))), Err(FitError::BadStep { .. })));
+        assert_eq!(fit(&good[..3]), Err(FitError::TooFewSteps { found: 3 }));
+        assert_eq!(fit(&[]), Err(FitError::TooFewSteps { found: 0 }));
+        assert_eq!(fit(&vec![good[0]; 9]), Err(FitError::TooFewSteps { found: 1 }));
     }
 }

@@ -47,8 +47,7 @@ impl Generator {
         let thickness = (!random.chance(0.3)).then(|| concrete.diameter * random.log_uniform(0.1, 30.0));
         if random.chance(0.3) {
             let area = std::f64::consts::FRAC_PI_4 * concrete.diameter * concrete.diameter;
-            let about = area * concrete.static_factor * concrete.strength
-                / (concrete.crater_ratio * concrete.diameter);
+            let about = area * concrete.static_factor * concrete.strength / (concrete.crater_ratio * concrete.diameter);
             concrete.crater_stiffness = CraterStiffness::Given(about * random.log_uniform(0.25, 4.0));
         }
         Scene {

@@ -283,8 +283,7 @@ impl Check {
     /// One ulp in the unit of the check: no measurement is believed to be finer.
     pub fn resolution(&self) -> f64 {
         match self {
-            Self::Reference { .. } => 1.0,
-            Self::Outcome { .. } | Self::EventOrder {} => 1.0,
+            Self::Reference { .. } | Self::Outcome { .. } | Self::EventOrder {} => 1.0,
             Self::Pair { tolerance, .. } | Self::Peer { tolerance, .. } => f64::EPSILON / tolerance,
             _ => f64::EPSILON,
         }

@@ -117,7 +117,9 @@ impl Suite {
                 let shipped = SHIPPED.iter().find(|(shipped, _)| shipped == name);
                 let found = match (shipped, folder) {
                     (Some((name, text)), _) => Scene::from_toml(text, &format!("verification/scenes/{name}.toml"))?,
-                    (None, Some(folder)) if name.ends_with(".toml") => Scene::read(&folder.join(name))?,
+                    (None, Some(folder)) if Path::new(name).extension().is_some_and(|e| e == "toml") => {
+                        Scene::read(&folder.join(name))?
+                    }
                     _ => {
                         let names: Vec<_> = SHIPPED.iter().map(|(name, _)| *name).collect();
                         return Err(refuse(

@@ -8,7 +8,6 @@ with these files by default and asks the programs themselves with `--live-peers`
 import argparse
 import datetime
 import json
-import math
 import pathlib
 import platform
 import subprocess
@@ -28,65 +27,27 @@ PROGRAMS = [
 ]
 
 
-def stage(p=0.0, s=0.0, r=0.0, q=0.0, end=None):
-    return {"static_force_n": p, "stiffness_n_m": s, "viscosity_kg_s": r, "drag_kg_m": q, "end_m": end}
-
-
-def concrete(mass, diameter, nose_factor, strength, density, static_factor, velocity, inertia=1.0, c=None, ratio=2.0):
-    """Crater and tunnel of Eq. 4-5; the crater constant c continuous unless given."""
-    area = 0.25 * math.pi * diameter**2
-    force, drag = area * static_factor * strength, area * nose_factor * inertia * density
-    depth = ratio * diameter
-    if c is None:
-        c = mass * (force + drag * velocity**2) / (depth * (mass + depth * drag))
-    return [stage(s=c, end=depth), stage(p=force, q=drag)]
-
-
-BLUNT = {"mass": 2.0, "diameter": 0.05, "nose_factor": 0.72, "strength": 36e6, "density": 2300.0, "static_factor": 12.0}
-SHOT_14 = {"mass": 0.906, "diameter": 0.0269, "nose_factor": 0.15625, "strength": 35.2e6, "density": 2370.0, "static_factor": 12.0}
-
-
-def blunt(velocity, **more):
-    return concrete(**BLUNT, velocity=velocity, **more)
-
-
+# Scenes of `verification/scenes` that every program is asked for.
 SCENES = [
-    # name, what it shows, crater stage, mass, velocity, exit depth, stages
-    ("crater", "rest in the crater", 0, 2.0, 60.0, None, blunt(60.0)),
-    ("tunnel", "rest in the tunnel", 0, 2.0, 300.0, None, blunt(300.0)),
-    ("perforate", "exit at 135 m/s", 0, 2.0, 400.0, 0.18, blunt(400.0)),
-    ("graze", "exit a millionth of the depth before rest", 0, 2.0, 400.0, 0.200771166635, blunt(400.0)),
-    (
-        "constant",
-        "constant force in the tunnel, exit halfway to rest: error estimates vanish and steps jump over the end",
-        0,
-        2.0,
-        300.0,
-        0.128,
-        blunt(300.0, inertia=0.0),
-    ),
-    ("jump", "the crater constant is given, the force jumps at k d", 0, 2.0, 300.0, None, blunt(300.0, c=5e6)),
-    ("forrestal", "Forrestal 1994 shot 14, ogive", 0, 0.906, 277.0, None, concrete(**SHOT_14, velocity=277.0)),
-    ("viscous", "p + s x + r V, underdamped, one stage", None, 2.0, 60.0, None, [stage(p=5e4, s=1e6, r=500.0)]),
-    (
-        "layers",
-        "crater, hard layer, air gap, soft layer",
-        None,
-        2.0,
-        400.0,
-        None,
-        [stage(s=1.1e7, end=0.1), stage(p=9e5, q=3.3, end=0.13), stage(end=0.2), stage(p=3e5, r=200.0, q=3.0)],
-    ),
-    (
-        "driven",
-        "a thrust against a stiff viscous spring: the scene where implicit methods pay",
-        None,
-        1.0,
-        1.0,
-        9.0,
-        [stage(p=-1000.0, s=100.0, r=1000.0)],
-    ),
+    "crater",
+    "tunnel",
+    "perforate",
+    "graze",
+    "forrestal-1994-shot-14",
+    "paper-slab",
+    "perforate-no-drag",
+    "jump",
+    "viscous",
+    "layered",
+    "stiff",
 ]
+
+
+def resolved(name):
+    """The scene as the program resolves it into stages: mass, velocity, exit depth, stages, and its title."""
+    command = ["cargo", "run", "--quiet", "--", "solve", f"verification/scenes/{name}.toml", "--json"]
+    done = subprocess.run(command, cwd=HERE.parent.parent, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)["scene"]
 
 
 def environment() -> str:
@@ -109,17 +70,20 @@ def depth_scale(mass, velocity, exit_depth, stages):
 
 
 def requests(rtol):
-    for name, about, crater, mass, velocity, exit_depth, stages in SCENES:
+    for name in SCENES:
+        scene = resolved(name)
+        mass, velocity, exit_depth = scene["mass_kg"], scene["velocity_m_s"], scene["exit_depth_m"]
         request = {
             "mass_kg": mass,
             "velocity_m_s": velocity,
             "exit_depth_m": exit_depth,
             "rtol": rtol,
-            "atol": [rtol * depth_scale(mass, velocity, exit_depth, stages), rtol * velocity],
+            "atol": [rtol * depth_scale(mass, velocity, exit_depth, scene["stages"]), rtol * velocity],
             "repeats": 1,
-            "stages": stages,
+            "stages": scene["stages"],
         }
-        yield {"scene": name, "about": about, "crater": crater, "request": request}
+        crater = 0 if scene["k"] else None
+        yield {"scene": name, "about": scene["title"], "crater": crater, "request": request}
 
 
 def ask(python, command, rtol):

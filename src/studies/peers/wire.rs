@@ -205,8 +205,9 @@ pub struct Difference {
     pub quantity: String,
     /// Absolute value; depth and times relative to the reference, velocities to V0.
     pub relative: f64,
-    /// How much the problem itself magnifies a relative error of the energy in this quantity, at least 1: V0/V at a
-    /// place passed with velocity V. Divide by it before comparing with what a program can do.
+    /// How much the problem itself magnifies a relative error of the velocity or the energy in this quantity, at least
+    /// 1: V0/V at a place passed with velocity V; V0/(a T) in the time T of a rest that is reached with deceleration a.
+    /// Divide by it before comparing with what a program can do.
     pub conditioning: f64,
 }
 
@@ -238,7 +239,7 @@ impl PeerAnswer {
             return None;
         }
         let end = |answer: &Self| State { time: answer.time_s, depth: answer.depth_m, velocity: answer.velocity_m_s };
-        let mut differences = compare("", end(self), end(reference), problem.impact_speed);
+        let mut differences = compare("", end(self), end(reference), problem);
         for event in &reference.events {
             let Some(kind) = event.kind(problem) else { continue };
             if let (Some(ours), Some(theirs)) = (self.at(kind, problem), reference.at(kind, problem)) {
@@ -246,7 +247,7 @@ impl PeerAnswer {
                     EventKind::StageEnd(index) => format!("stage-end {index} "),
                     _ => format!("{} ", kind.name()),
                 };
-                differences.extend(compare(&prefix, ours, theirs, problem.impact_speed));
+                differences.extend(compare(&prefix, ours, theirs, problem));
             }
         }
         Some(differences)
@@ -254,21 +255,31 @@ impl PeerAnswer {
 }
 
 /// Depth, time and velocity of two states, each with its conditioning.
-fn compare(prefix: &str, ours: State, theirs: State, impact_speed: f64) -> Vec<Difference> {
+fn compare(prefix: &str, ours: State, theirs: State, problem: &Problem) -> Vec<Difference> {
     let relative = |ours: f64, theirs: f64, scale: f64| {
         // Equal zeros differ by nothing, whatever the scale.
         if ours == theirs { 0.0 } else { ((ours - theirs) / scale).abs() }
     };
+    let impact_speed = problem.impact_speed;
     // W = V² carries the error of the energy: dV = dW/2V, and the time at a place follows dx/V.
     let passing = if theirs.velocity > 0.0 { (impact_speed / theirs.velocity).max(1.0) } else { 1.0 };
+    let timing =
+        if theirs.velocity > 0.0 { passing } else { (impact_speed / change_to_rest(theirs, problem)).max(1.0) };
     [
         ("depth", relative(ours.depth, theirs.depth, theirs.depth), 1.0),
-        ("time", relative(ours.time, theirs.time, theirs.time), passing),
+        ("time", relative(ours.time, theirs.time, theirs.time), timing),
         ("velocity", relative(ours.velocity, theirs.velocity, impact_speed), passing),
     ]
     .into_iter()
     .map(|(name, relative, conditioning)| Difference { quantity: format!("{prefix}{name}"), relative, conditioning })
     .collect()
+}
+
+/// Velocity [m/s] that the deceleration at rest would take away in the whole time of the flight; infinite without one.
+fn change_to_rest(rest: State, problem: &Problem) -> f64 {
+    let index = problem.stages.iter().position(|stage| rest.depth <= stage.end).unwrap_or(problem.stages.len() - 1);
+    let change = problem.stages[index].force(rest.depth, 0.0).abs() / problem.mass * rest.time;
+    if change > 0.0 { change } else { f64::INFINITY }
 }
 
 /// The outcome by a name of the contract.

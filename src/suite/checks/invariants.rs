@@ -1,6 +1,6 @@
 //! What no formula is needed for: energy, reversal, similarity, composition.
 
-use super::super::claim::{Measurement, NotMeasured};
+use super::super::claim::{Evidence, Measurement, NotMeasured};
 use super::{Subject, fly};
 use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Stage, Stages, Target};
@@ -20,6 +20,7 @@ pub(super) fn energy_balance(subject: &Subject<'_>) -> Result<Measurement, NotMe
     let scale = 0.5 * problem.mass * problem.impact_speed * problem.impact_speed;
     let mut residual = 0.0_f64;
     let mut spent = 0.0;
+    let mut points = Vec::with_capacity(flight.trajectory.len());
     for rows in flight.trajectory.windows(2) {
         let (a, b) = (rows[0], rows[1]);
         let way = b.state.depth - a.state.depth;
@@ -28,13 +29,16 @@ pub(super) fn energy_balance(subject: &Subject<'_>) -> Result<Measurement, NotMe
         }
         let law = &problem.stages[stage_at(problem, a.state.depth + 0.5 * way)];
         spent += work(law, problem.mass, a.state.depth, way, a.state.velocity);
-        let kinetic = 0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
+        let kinetic =
+            0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
         residual = worse(residual, (kinetic - spent).abs() / scale);
+        points.push((b.state.depth, (kinetic - spent) / scale));
     }
     if flight.trajectory.len() < 2 {
         return Err(NotMeasured::skip("the flight has no path"));
     }
-    Ok(Measurement::new(residual).remark(format!("{} rows of the path", flight.trajectory.len())))
+    let evidence = Evidence::Series { abscissa: "depth_m", ordinate: "residual_over_initial_energy", points };
+    Ok(Measurement::new(residual).remark(format!("{} rows of the path", flight.trajectory.len())).evidence(evidence))
 }
 
 /// The larger; NaN if either is.
@@ -109,7 +113,8 @@ pub(super) fn time_reversal(subject: &Subject<'_>) -> Result<Measurement, NotMea
     let again = fly(&method, &back, Detail::End)?;
     let speed = (again.end.velocity / problem.impact_speed - 1.0).abs();
     let time = (again.end.time / there.end.time - 1.0).abs();
-    Ok(Measurement::new(worse(speed, time)).remark(format!("back at the face with V0 (1 {:+.1e})", again.end.velocity / problem.impact_speed - 1.0)))
+    Ok(Measurement::new(worse(speed, time))
+        .remark(format!("back at the face with V0 (1 {:+.1e})", again.end.velocity / problem.impact_speed - 1.0)))
 }
 
 /// Factors of length, mass and time.

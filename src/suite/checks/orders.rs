@@ -7,9 +7,7 @@ use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Step
 use crate::studies::convergence::{self, Ladder, QuantityStudy, STEPS_OVER_TIME};
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::formal_order::{Path, formal_order};
-use crate::studies::grid_convergence::{
-    GridValue, richardson, roache, self_convergence as fit_values, three_grids,
-};
+use crate::studies::grid_convergence::{GridValue, richardson, roache, self_convergence as fit_values, three_grids};
 use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;

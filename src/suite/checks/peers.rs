@@ -10,10 +10,10 @@ use crate::physics::Problem;
 use crate::studies::peers::{Peer, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
-pub const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
+pub(super) const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
 
 /// Name by which claims ask for the program given on the command line.
-pub const USER: &str = "user";
+pub(super) const USER: &str = "user";
 
 /// Relative tolerance that a running peer is asked for: tight enough to judge it, loose enough for any solver.
 const RTOL_USER: f64 = 1e-9;
@@ -82,7 +82,10 @@ impl PeerAnswers {
             .map(|(name, source)| {
                 let text = match source {
                     Source::Recorded(r) => {
-                        format!("{} {} ({}), rtol {:e}, recorded {}", r.program, r.version, r.method, r.rtol, r.recorded)
+                        format!(
+                            "{} {} ({}), rtol {:e}, recorded {}",
+                            r.program, r.version, r.method, r.rtol, r.recorded
+                        )
                     }
                     Source::Failed(why) => why.clone(),
                     Source::Running { peer, rtol } => {
@@ -114,7 +117,9 @@ impl PeerAnswers {
                     .ok_or_else(|| NotMeasured::skip(format!("{name} was not asked for {scene}")))?;
                 if !is_same(&flight.problem(), problem) {
                     let remake = &recording.recipe;
-                    return Err(NotMeasured::broken(format!("{scene} was recorded with other numbers: remake with `{remake}`")));
+                    return Err(NotMeasured::broken(format!(
+                        "{scene} was recorded with other numbers: remake with `{remake}`"
+                    )));
                 }
                 Ok(flight.answer.clone())
             }

@@ -164,9 +164,7 @@ pub(super) fn lagged_constant(subject: &Subject<'_>) -> Result<Measurement, NotM
     let predicted = match (claim.quantity, perforated) {
         (Some(Quantity::Depth), false) => -lost,
         (Some(Quantity::Time), false) => -q * (end.depth - entry.depth) / mass,
-        (Some(Quantity::Velocity), true) => {
-            -(p + q * end.velocity * end.velocity) * lost / (mass * end.velocity)
-        }
+        (Some(Quantity::Velocity), true) => -(p + q * end.velocity * end.velocity) * lost / (mass * end.velocity),
         (Some(Quantity::Time), true) => lost / end.velocity - q * (end.depth - entry.depth) / mass,
         _ => return Err(NotMeasured::skip("the scene fixes this quantity, or no constant is known for it")),
     };

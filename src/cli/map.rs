@@ -1,0 +1,169 @@
+//! `penetrode map`: how far Eq. 11-12 may be trusted, over (I, N).
+
+use std::path::PathBuf;
+
+use clap::Args;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::output::{print_json, print_text, significant, table, write_whole};
+use super::{CliError, Exit};
+use crate::physics::groups::Groups;
+use crate::report::plots_sweep;
+use crate::studies::applicability::{self, LEVELS};
+use crate::studies::experiments::{self, ExperimentError};
+
+/// Arguments of `map`.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "The error is that of the depth of Eq. 11-12 against the equation of motion with finite N, exact \
+    and not to first order. Above the N of a line the error is smaller. It vanishes at I = k pi/4 for every N.\n\n\
+    Files: --out F.csv writes the lines as level,I,N and, beside it, the contour figure F.svg with the scenes of the \
+    measured data marked."
+)]
+pub struct MapArgs {
+    /// Crater depth in diameters.
+    #[arg(long, default_value_t = 2.0)]
+    pub k: f64,
+    /// Write the lines to this CSV file and the figure beside it.
+    #[arg(long, value_name = "F.csv")]
+    pub out: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `map --json` prints.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct MapJson {
+    /// `penetrode/map/1`.
+    pub schema: &'static str,
+    /// Crater depth in diameters.
+    pub k: f64,
+    /// Lines of equal error.
+    pub lines: Vec<LineJson>,
+    /// Scenes of the measured data, each with its own k.
+    pub scenes: Vec<MarkedSceneJson>,
+}
+
+/// A stretch of a line of equal error.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LineJson {
+    /// Size of the relative error.
+    pub level: f64,
+    /// (I, N), ascending in I.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A scene of the measured data.
+#[derive(Debug, Serialize, JsonSchema)]
+#[expect(non_snake_case, reason = "the groups are named as in the paper")]
+pub struct MarkedSceneJson {
+    /// Set of data.
+    pub set: String,
+    /// Impact function.
+    pub I: f64,
+    /// Geometry function.
+    pub N: f64,
+    /// Crater depth in diameters.
+    pub k: f64,
+    /// Error of Eq. 11-12 there.
+    pub error: f64,
+}
+
+impl MapArgs {
+    /// Computes the map, writes its files, and prints it.
+    ///
+    /// # Errors
+    /// A k that is no number above zero (exit 2), a file that cannot be written (exit 1).
+    pub fn run(&self) -> Result<Exit, CliError> {
+        if !(self.k.is_finite() && self.k > 0.0) {
+            return Err(CliError::usage(format!("--k {} is not allowed", self.k), "give a number above zero"));
+        }
+        let report = self.report().map_err(|error| CliError::usage(error.to_string(), ""))?;
+        if let Some(path) = &self.out {
+            let failed = |cause| CliError::Write { path: path.display().to_string(), cause };
+            let mut sets: Vec<plots_sweep::MarkedSet<'_>> = Vec::new();
+            for scene in &report.scenes {
+                match sets.iter_mut().find(|(set, _)| *set == scene.set) {
+                    Some((_, points)) => points.push((scene.I, scene.N)),
+                    None => sets.push((&scene.set, vec![(scene.I, scene.N)])),
+                }
+            }
+            let figure =
+                plots_sweep::applicability_map(self.k, &sets).map_err(|error| failed(std::io::Error::other(error)))?;
+            let mut csv = String::from("level,I,N\n");
+            for line in &report.lines {
+                for (impact, geometry) in &line.points {
+                    csv.push_str(&format!("{},{impact},{geometry}\n", line.level));
+                }
+            }
+            write_whole(path, csv.as_bytes()).map_err(failed)?;
+            write_whole(&path.with_extension("svg"), figure.as_bytes()).map_err(failed)?;
+        }
+        if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;
+        Ok(Exit::Success)
+    }
+
+    fn report(&self) -> Result<MapJson, ExperimentError> {
+        let impacts: Vec<f64> = (0..=600).map(|i| 10f64.powf(-2.0 + f64::from(i) / 120.0)).collect();
+        let lines = LEVELS
+            .iter()
+            .flat_map(|&level| {
+                applicability::contour(level, &impacts, self.k)
+                    .into_iter()
+                    .map(move |points| LineJson { level, points })
+            })
+            .collect();
+        let marked = |shot: &experiments::Shot| {
+            let scene = shot.scene(None);
+            let groups = Groups::of(&scene, shot.velocity)?;
+            let k = shot.nose.crater_ratio();
+            let error = applicability::model_error(groups.impact, groups.geometry, k);
+            Some(MarkedSceneJson { set: shot.set.clone(), I: groups.impact, N: groups.geometry?, k, error })
+        };
+        let scenes = experiments::shipped()?.iter().filter_map(marked).collect();
+        Ok(MapJson { schema: "penetrode/map/1", k: self.k, lines, scenes })
+    }
+
+    fn text(&self, report: &MapJson) -> String {
+        let mut lines = vec![
+            format!("Error of Eq. 11-12 against the equation of motion, k = {}", self.k),
+            "  least N for an error within".to_owned(),
+        ];
+        let mut rows = table(&["  I", "1 %", "5 %", "20 %"]);
+        for impact in [0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0] {
+            let mut cells = vec![format!("  {}", significant(impact))];
+            cells.extend(
+                LEVELS.map(|level| {
+                    applicability::geometry_at(level, impact, self.k).map_or("any".to_owned(), significant)
+                }),
+            );
+            rows.add_row(cells);
+        }
+        lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.push(String::new());
+        let mut sets = table(&["  measured set", "shots", "I", "N", "error of Eq. 11-12", "within 5 %"]);
+        let mut names: Vec<&str> = report.scenes.iter().map(|scene| scene.set.as_str()).collect();
+        names.dedup();
+        for name in names {
+            let of_set: Vec<_> = report.scenes.iter().filter(|scene| scene.set == name).collect();
+            let range = |get: fn(&MarkedSceneJson) -> f64| {
+                of_set.iter().map(|s| get(s)).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+            };
+            let (impact, geometry, error) = (range(|s| s.I), range(|s| s.N), range(|s| s.error));
+            let within = of_set.iter().filter(|s| s.error.abs() <= applicability::ERROR_ALLOWED).count();
+            sets.add_row([
+                format!("  {name}"),
+                of_set.len().to_string(),
+                format!("{:.2} to {:.1}", impact.0, impact.1),
+                format!("{:.1} to {:.1}", geometry.0, geometry.1),
+                format!("{:+.1} to {:+.1} %", 100.0 * error.0, 100.0 * error.1),
+                within.to_string(),
+            ]);
+        }
+        lines.extend(sets.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.push(String::new());
+        lines.join("\n")
+    }
+}

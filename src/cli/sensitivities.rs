@@ -1,0 +1,104 @@
+//! `solve --sensitivities`: derivatives and elasticities, for people and as JSON.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::CliError;
+use super::output::table;
+use crate::physics::Scene;
+use crate::studies::sensitivity::{Sensitivity, by_closed_form, by_taylor, elasticity};
+
+/// `sensitivities` in the JSON of `solve`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SensitivitiesJson {
+    /// `taylor`: dual numbers through the integrator.
+    pub method: &'static str,
+    /// Largest difference of the elasticities from those of the closed form; `null` where it has none.
+    pub disagreement: Option<f64>,
+    /// One entry for each number of the scene.
+    pub parameters: Vec<ParameterJson>,
+    /// What was not computed, and why.
+    pub notes: Vec<String>,
+}
+
+/// Derivatives with respect to one number, SI, and elasticities d ln y/d ln p; `null` where there is no such quantity.
+#[derive(Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "named by quantity")]
+pub struct ParameterJson {
+    pub path: String,
+    pub value: f64,
+    pub depth: Option<DerivativeJson>,
+    pub velocity: Option<DerivativeJson>,
+    pub critical_velocity: Option<DerivativeJson>,
+}
+
+/// One derivative.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct DerivativeJson {
+    /// dy/dp, SI.
+    pub derivative: f64,
+    /// d ln y/d ln p.
+    pub elasticity: Option<f64>,
+}
+
+impl SensitivitiesJson {
+    /// Sensitivities of `scene` at its impact velocity.
+    ///
+    /// # Errors
+    /// As the flight of the scene.
+    pub fn new(scene: &Scene) -> Result<Self, CliError> {
+        let flown = by_taylor(scene)?;
+        let exact = by_closed_form(scene)?;
+        let q = flown.quantities;
+        let entry = |s: &Sensitivity| {
+            let of = |derivative: Option<f64>, quantity: Option<f64>| {
+                derivative.map(|d| DerivativeJson { derivative: d, elasticity: elasticity(Some(d), quantity, s.value) })
+            };
+            ParameterJson {
+                path: s.parameter.to_string(),
+                value: s.value,
+                depth: of(s.depth, q.depth),
+                velocity: of(s.velocity, q.velocity),
+                critical_velocity: of(s.critical_velocity, q.critical_velocity),
+            }
+        };
+        Ok(Self {
+            method: "taylor",
+            disagreement: exact.disagreement(&flown),
+            parameters: flown.entries.iter().map(entry).collect(),
+            notes: flown.notes,
+        })
+    }
+
+    /// The table of elasticities.
+    pub fn text(&self) -> String {
+        let mut rows = table(&["  elasticity to", "value (SI)", "X", "V_r", "V_c"]);
+        let cell = |d: &Option<DerivativeJson>| {
+            d.as_ref().and_then(|d| d.elasticity).map_or("-".to_owned(), |e| format!("{e:+.6}"))
+        };
+        for p in &self.parameters {
+            rows.add_row([
+                format!("  {}", p.path),
+                p.value.to_string(),
+                cell(&p.depth),
+                cell(&p.velocity),
+                cell(&p.critical_velocity),
+            ]);
+        }
+        let mut text = String::from("\n");
+        for line in rows.to_string().lines() {
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+        text.push_str(&match self.disagreement {
+            Some(difference) => {
+                format!("  dual numbers through taylor; {difference:.1e} from those through the closed form\n")
+            }
+            None => "  dual numbers through taylor; no closed form beside them\n".to_owned(),
+        });
+        for note in &self.notes {
+            text.push_str(&format!("  note: {note}\n"));
+        }
+        text
+    }
+}

@@ -1,0 +1,67 @@
+//! The numbers of a figure, as CSV.
+
+use std::fmt::Display;
+
+/// A table: names of the columns, and rows of the same length.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    header: Vec<&'static str>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table of these columns without rows.
+    pub fn new<const N: usize>(header: [&'static str; N]) -> Self {
+        Self { header: header.to_vec(), rows: Vec::new() }
+    }
+
+    /// Adds a row. Numbers are printed so that they read back to the same f64.
+    pub fn push<const N: usize>(&mut self, row: [&dyn Display; N]) {
+        assert!(N == self.header.len(), "a row of {N} in a table of {} columns", self.header.len());
+        self.rows.push(row.iter().map(ToString::to_string).collect());
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is nothing in it.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// As CSV (RFC 4180, lines ended by LF), quoted where a value needs it.
+    ///
+    /// # Errors
+    /// Only if memory for it cannot be had.
+    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header)?;
+        for row in &self.rows {
+            writer.write_record(row)?;
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+}
+
+/// A number, or nothing where there is none.
+pub fn or_empty(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |v| v.to_string())
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_quoted_where_they_need_it_and_numbers_read_back() {
+        let mut table = Table::new(["name", "value"]);
+        table.push([&"a,\"b\"\nc", &0.1_f64]);
+        table.push([&"plain", &1e-300_f64]);
+        let text = String::from_utf8(table.to_csv().unwrap()).unwrap();
+        assert!(text.starts_with("name,value\n\"a,\"\"b\"\"\nc\",0.1\nplain,0.000"), "{text}");
+        assert_eq!(text.lines().last().unwrap().split_once(',').unwrap().1.parse::<f64>().unwrap(), 1e-300);
+    }
+}

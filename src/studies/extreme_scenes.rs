@@ -1,0 +1,681 @@
+//! Do the integrators agree anywhere? Random scenes over the whole admissible range, half of them aimed at the edges.
+//!
+//! A scene is a function of seed and number alone, so any of a million can be remade. Its problem is flown by the
+//! closed form, the Taylor series and the energy formulation in `f64`, and by the Taylor series and the energy
+//! formulation in double-double, which judge the three; where an `f64` answer misses its limit, 50 digits
+//! ([`crate::physics::reference`]) judge again. The limits:
+//!
+//! - **outcome**: that of the double-double margin, or `undecided`;
+//! - **bar**: the margin differs from the double-double one by no more than its own stated bar;
+//! - **end and crater end**: [`ULPS_MAX`] units of round-off times the condition number of the quantity, which is the
+//!   sum over all inputs p of `|p df/dp|/|f|`, from dual numbers;
+//! - **critical velocity**: the closed form and the search through the energy formulation, within the bar of the
+//!   latter and the same units; one that leaves the range of 64-bit numbers must be refused with that cause.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use num_dual::Dual64;
+use rayon::prelude::*;
+use twofloat::TwoFloat;
+
+use super::critical_velocity;
+use super::quantity::Quantity;
+use super::random::Random;
+use crate::integrators::{ClosedForm, Detail, Energy, Flight, IntegrationError, Integrator, MethodName, Taylor};
+use crate::physics::reference::{self, Source};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scalar, Scene, groups};
+
+/// Largest error in units of round-off times max(1, condition number).
+///
+/// The closed form states 8. The integrators add a few roundings a step; the worst of 100,000 scenes is well below.
+pub const ULPS_MAX: f64 = 64.0;
+
+/// Defects that a summary keeps in full; all are counted.
+const DEFECTS_KEPT: usize = 100;
+
+/// The methods under test.
+pub const METHODS: [MethodName; 3] = [MethodName::ClosedForm, MethodName::Taylor, MethodName::Energy];
+
+/// Scene number `index` of `seed`: a plain draw if even, one aimed at an edge if odd.
+pub fn scene(seed: u64, index: u64) -> Scene {
+    let mut random = Random::for_part(seed, &format!("extreme scene {index}"));
+    let mut scene = draw(&mut random);
+    if index % 2 == 1 {
+        aim(&mut scene, &mut random);
+    }
+    scene
+}
+
+/// I 1e-9 to 1e6, N 1e-3 to 1e12 or Q = 0, H/d 1e-3 to 1e3 or none, k 1e-8 to 10, d 1 um to 1 km; c continuous, or
+/// given within a factor 100 of `P/(k d)`.
+fn draw(random: &mut Random) -> Scene {
+    let mut concrete = Concrete {
+        diameter: random.log_uniform(1e-6, 1e3),
+        nose_factor: random.log_uniform(0.01, 1.0),
+        strength: random.log_uniform(1e6, 1e9),
+        density: 0.0,
+        static_factor: random.log_uniform(1.0, 100.0),
+        inertia_factor: 1.0,
+        crater_ratio: if random.chance(0.05) { 0.0 } else { random.log_uniform(1e-8, 10.0) },
+        crater_stiffness: CraterStiffness::Continuous,
+        layers: Vec::new(),
+    };
+    // Mean densities of the projectile from aerogel to beyond any metal.
+    let mass = random.log_uniform(1.0, 1e5) * concrete.diameter.powi(3);
+    if !random.chance(0.1) {
+        let geometry = random.log_uniform(1e-3, 1e12);
+        concrete.density = groups::density_for(geometry, mass, &concrete);
+    }
+    let velocity = groups::impact_speed_for(random.log_uniform(1e-9, 1e6), mass, &concrete);
+    let thickness = (!random.chance(0.2)).then(|| concrete.diameter * random.log_uniform(1e-3, 1e3));
+    if random.chance(0.3) && concrete.crater_ratio > 0.0 {
+        let stiffness = static_force(&concrete) / concrete.crater_depth();
+        concrete.crater_stiffness = CraterStiffness::Given(stiffness * random.log_uniform(1e-2, 1e2));
+    }
+    Scene {
+        title: None,
+        mass,
+        resistance: Resistance::Concrete(concrete),
+        thickness,
+        criterion: Criterion::FullDepth,
+        velocity: Some(velocity),
+    }
+}
+
+fn static_force(concrete: &Concrete) -> f64 {
+    std::f64::consts::FRAC_PI_4 * concrete.diameter * concrete.diameter * concrete.static_factor * concrete.strength
+}
+
+/// `1 ± 10^-j`, j from 1 to 16, or up to three ulps off 1.
+fn nearly_one(random: &mut Random) -> f64 {
+    let sign = if random.chance(0.5) { 1.0 } else { -1.0 };
+    if random.chance(0.25) {
+        1.0 + sign * f64::EPSILON * random.below(4) as f64
+    } else {
+        1.0 + sign * 10f64.powf(-random.uniform(1.0, 16.0))
+    }
+}
+
+/// Moves `scene` to an edge: grazing the far side, `H = k d`, rest at `k d`, all at once, vanishing `V0` or `H`,
+/// round numbers that tie exactly, a great jump of the force at k d.
+fn aim(scene: &mut Scene, random: &mut Random) {
+    let edge = random.below(8);
+    if edge == 6 {
+        round_numbers(scene, random);
+    }
+    let Some(concrete) = scene.concrete().cloned() else { return };
+    let crater_depth = concrete.crater_depth();
+    if matches!(edge, 1 | 3) && crater_depth > 0.0 {
+        scene.thickness = Some(crater_depth * nearly_one(random));
+    }
+    match edge {
+        // Grazing, of a target with a far side.
+        0 | 1 | 6 => {
+            if scene.thickness.is_none() {
+                scene.thickness = Some(concrete.diameter * random.log_uniform(1e-3, 1e3));
+            }
+            if let Ok(critical) = critical_velocity::exact(scene)
+                && critical > 0.0
+            {
+                scene.velocity = Some(critical * if edge == 6 { 1.0 } else { nearly_one(random) });
+            }
+        }
+        // Rest at k d, where V1 vanishes.
+        2 | 3 => {
+            let work = match concrete.crater_stiffness {
+                CraterStiffness::Continuous => static_force(&concrete) * crater_depth,
+                CraterStiffness::Given(stiffness) => stiffness * crater_depth * crater_depth,
+            };
+            let speed = (work / scene.mass).sqrt() * nearly_one(random);
+            if speed > 0.0 {
+                scene.velocity = Some(speed);
+            }
+        }
+        4 => scene.velocity = scene.velocity.map(|v| v * random.log_uniform(1e-30, 1.0)),
+        5 => scene.thickness = Some(concrete.diameter * random.log_uniform(1e-30, 1e-3)),
+        _ => {
+            if let (Resistance::Concrete(c), true) = (&mut scene.resistance, crater_depth > 0.0) {
+                let stiffness = static_force(&concrete) / crater_depth * random.log_uniform(1e-8, 1e8);
+                c.crater_stiffness = CraterStiffness::Given(stiffness);
+            }
+        }
+    }
+}
+
+/// Every number a power of two, no drag in half of them: sums and products are exact, and ties are ties.
+fn round_numbers(scene: &mut Scene, random: &mut Random) {
+    let nearest = |x: f64| 2f64.powi(x.log2().round() as i32);
+    scene.mass = nearest(scene.mass);
+    scene.thickness = scene.thickness.map(nearest);
+    scene.velocity = scene.velocity.map(nearest);
+    if let Resistance::Concrete(c) = &mut scene.resistance {
+        for number in [&mut c.diameter, &mut c.strength, &mut c.static_factor] {
+            *number = nearest(*number);
+        }
+        if c.crater_ratio > 0.0 {
+            c.crater_ratio = nearest(c.crater_ratio);
+        }
+        if random.chance(0.5) {
+            c.density = 0.0;
+        }
+        c.crater_stiffness = match c.crater_stiffness {
+            CraterStiffness::Given(stiffness) => CraterStiffness::Given(nearest(stiffness)),
+            continuous @ CraterStiffness::Continuous => continuous,
+        };
+    }
+}
+
+/// What one method made of one scene.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fate {
+    /// The right outcome.
+    Right,
+    /// Inside its own error bar.
+    Undecided,
+    /// No answer, with the cause.
+    Refused(String),
+    /// An outcome that is not so.
+    Wrong(Outcome),
+}
+
+/// An answer that misses its limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Defect {
+    /// Number of the scene.
+    pub index: u64,
+    /// What is wrong, with the numbers.
+    pub what: String,
+}
+
+/// What one scene showed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Examination {
+    /// Fate of each method, in the order of [`METHODS`]; empty for a scene that does not resolve.
+    pub fates: Vec<Fate>,
+    /// Error of each quantity a method gave, in units of round-off times condition.
+    pub errors: Vec<(MethodName, Quantity, f64)>,
+    /// Limits missed.
+    pub defects: Vec<String>,
+    /// Whether the 50-digit reference was asked.
+    pub asked_reference: bool,
+    /// Why the scene has no problem, if it has none.
+    pub unresolved: Option<String>,
+    /// Whether a critical velocity was found, and if not, why; `None` without a far side.
+    pub critical: Option<Result<(), String>>,
+}
+
+/// Condition numbers of the end and of the crater's end.
+#[derive(Clone, Copy, Debug, Default)]
+struct Condition {
+    depth: f64,
+    time: f64,
+    velocity: f64,
+    crater_end_time: f64,
+    crater_end_velocity: f64,
+}
+
+impl Condition {
+    fn of(self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::Depth => self.depth,
+            Quantity::Time => self.time,
+            Quantity::Velocity => self.velocity,
+            Quantity::CraterEndTime => self.crater_end_time,
+            Quantity::CraterEndVelocity => self.crater_end_velocity,
+            Quantity::CriticalVelocity => 1.0,
+        }
+        .max(1.0)
+    }
+
+    /// From one flight in dual numbers for each input that is not zero.
+    fn measure(problem: &Problem) -> Result<Self, IntegrationError> {
+        let mut sum = Self::default();
+        let mut add = |seed: &dyn Fn(&mut Problem<Dual64>)| -> Result<(), IntegrationError> {
+            let mut dual = problem.cast::<Dual64>();
+            seed(&mut dual);
+            let flight = Taylor::default().fly_in(&dual, Detail::Events)?;
+            let relative = |number: Dual64| if number.re == 0.0 { 0.0 } else { (number.eps / number.re).abs() };
+            let speed = problem.impact_speed;
+            sum.depth += relative(flight.end.depth);
+            sum.time += relative(flight.end.time);
+            sum.velocity += (flight.end.velocity.eps / speed).abs();
+            if let Some(end) = flight.crater_end() {
+                sum.crater_end_time += relative(end.time);
+                sum.crater_end_velocity += (end.velocity.eps / speed).abs();
+            }
+            Ok(())
+        };
+        // df/dp times p: the seed is the value itself.
+        let own = |number: &mut Dual64| number.eps = number.re;
+        add(&|p| own(&mut p.mass))?;
+        add(&|p| own(&mut p.impact_speed))?;
+        if problem.has_exit() {
+            add(&|p| own(&mut p.exit_depth))?;
+        }
+        for (index, stage) in problem.stages.iter().enumerate() {
+            if stage.static_force != 0.0 {
+                add(&|p| own(&mut p.stages[index].static_force))?;
+            }
+            if stage.stiffness != 0.0 {
+                add(&|p| own(&mut p.stages[index].stiffness))?;
+            }
+            if stage.drag != 0.0 {
+                add(&|p| own(&mut p.stages[index].drag))?;
+            }
+            if stage.end.is_finite() {
+                add(&|p| own(&mut p.stages[index].end))?;
+            }
+        }
+        Ok(sum)
+    }
+}
+
+/// Errors of `flight` relative to `exact`, velocities to V0, in units of round-off.
+fn errors(flight: &Flight, exact: &Flight<TwoFloat>, speed: f64) -> Vec<(Quantity, f64)> {
+    let mut list = Vec::with_capacity(5);
+    let mut add = |quantity, value: f64, exact: TwoFloat, scale: f64| {
+        let error = (TwoFloat::from(value) - exact).value().abs();
+        let units = if error == 0.0 { 0.0 } else { error / scale.abs() / f64::EPSILON };
+        list.push((quantity, units));
+    };
+    add(Quantity::Depth, flight.end.depth, exact.end.depth, exact.end.depth.value());
+    add(Quantity::Time, flight.end.time, exact.end.time, exact.end.time.value());
+    add(Quantity::Velocity, flight.end.velocity, exact.end.velocity, speed);
+    if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
+        add(Quantity::CraterEndTime, found.time, end.time, end.time.value());
+        add(Quantity::CraterEndVelocity, found.velocity, end.velocity, speed);
+    }
+    list
+}
+
+/// The same against 50 digits, over their own condition numbers.
+fn errors_in_50_digits(problem: &Problem, flight: &Flight) -> Result<Vec<(Quantity, f64)>, String> {
+    let source = Source::Problem(problem);
+    let exact = reference::flight(source).map_err(|e| e.to_string())?;
+    if !flight.outcome.agrees_with(exact.outcome) {
+        return Err(format!("outcome {}, in 50 digits {}", flight.outcome, exact.outcome));
+    }
+    let conditions = reference::conditions(source).map_err(|e| e.to_string())?;
+    let mut list = Vec::with_capacity(5);
+    let mut add = |quantity, error: f64, condition: f64| {
+        list.push((quantity, error / f64::EPSILON / condition.max(1.0)));
+    };
+    let over = &exact.impact_speed;
+    add(Quantity::Depth, exact.end.depth.relative_error(flight.end.depth), conditions.depth);
+    add(Quantity::Time, exact.end.time.relative_error(flight.end.time), conditions.time);
+    add(Quantity::Velocity, exact.end.velocity.error_over(flight.end.velocity, over), conditions.velocity);
+    if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
+        let (time, velocity) =
+            (conditions.crater_end_time.unwrap_or(1.0), conditions.crater_end_velocity.unwrap_or(1.0));
+        add(Quantity::CraterEndTime, end.time.relative_error(found.time), time);
+        add(Quantity::CraterEndVelocity, end.velocity.error_over(found.velocity, over), velocity);
+    }
+    Ok(list)
+}
+
+/// Flies `scene` by every method and judges each.
+///
+/// A panic anywhere is a defect of the scene, not the end of the study.
+pub fn examine(scene: &Scene) -> Examination {
+    catch_unwind(AssertUnwindSafe(|| examine_unguarded(scene))).unwrap_or_else(|cause| {
+        let text = cause
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| cause.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+            .unwrap_or_default();
+        Examination { defects: vec![format!("panic: {text}")], ..Examination::default() }
+    })
+}
+
+fn examine_unguarded(scene: &Scene) -> Examination {
+    let mut seen = Examination::default();
+    let problem = match scene.problem() {
+        Ok(problem) => problem,
+        Err(error) => {
+            if error.is_usage() {
+                seen.defects.push(format!("an admissible scene is refused: {error}"));
+            }
+            seen.unresolved = Some(error.to_string());
+            return seen;
+        }
+    };
+    examine_problem(&problem, &mut seen);
+    examine_critical(scene, &mut seen);
+    seen
+}
+
+fn examine_problem(problem: &Problem, seen: &mut Examination) {
+    let fine = problem.cast::<TwoFloat>();
+    let exact = match Taylor::default().fly_in(&fine, Detail::Events) {
+        Ok(exact) => exact,
+        Err(error) => {
+            seen.defects.push(format!("no flight in double-double: {error}"));
+            return;
+        }
+    };
+    let margin = match Energy::new().exit_margin_in(&fine) {
+        Ok(margin) => margin.map(|(value, error, _)| (value, error)),
+        Err(error) => {
+            seen.defects.push(format!("no margin in double-double: {error}"));
+            return;
+        }
+    };
+    let perforates = match margin {
+        Some((value, error)) if value.value().abs() > error => value.value() > 0.0,
+        // A tie finer than double-double, or no far side.
+        Some(_) => {
+            seen.asked_reference = true;
+            match reference::flight(Source::Problem(problem)) {
+                Ok(flight) => flight.outcome == Outcome::Perforated,
+                Err(_) => exact.outcome == Outcome::Perforated,
+            }
+        }
+        None => exact.outcome == Outcome::Perforated,
+    };
+    let mut condition = None;
+    for method in METHODS {
+        let flown = match method {
+            MethodName::ClosedForm => ClosedForm.fly(problem, Detail::Events),
+            MethodName::Taylor => Taylor::default().fly(problem, Detail::Events),
+            _ => Energy::new().fly(problem, Detail::Events),
+        };
+        let flight = match flown {
+            Ok(flight) => flight,
+            Err(error) => {
+                seen.defects.push(format!("{method} gives up where others fly: {error}"));
+                seen.fates.push(Fate::Refused(error.to_string()));
+                continue;
+            }
+        };
+        let fate = match flight.outcome {
+            Outcome::Undecided => Fate::Undecided,
+            outcome if (outcome == Outcome::Perforated) == perforates => Fate::Right,
+            outcome => Fate::Wrong(outcome),
+        };
+        if let Fate::Wrong(outcome) = fate {
+            seen.defects.push(format!("{method} says {outcome} at a margin of {:?}", margin.map(|(m, _)| m.value())));
+        }
+        if let (Some((exact, _)), Some(found), Some(bar)) = (margin, flight.exit_margin, flight.exit_margin_error) {
+            let off = (TwoFloat::from(found) - exact).value().abs();
+            // Not `off > bar`, so that a NaN is a defect.
+            if !(off <= bar) {
+                seen.defects.push(format!("{method}: margin {found:e} is off by {off:.2e}, beyond its bar {bar:.2e}"));
+            }
+        }
+        let decided = fate == Fate::Right;
+        seen.fates.push(fate);
+        if !decided || !exact.outcome.agrees_with(flight.outcome) {
+            continue;
+        }
+        let mut list = errors(&flight, &exact, problem.impact_speed);
+        if list.iter().any(|(_, units)| !(*units <= ULPS_MAX)) {
+            if condition.is_none() {
+                condition = Condition::measure(problem).ok();
+            }
+            let by = condition.unwrap_or_default();
+            for (quantity, units) in &mut list {
+                *units /= by.of(*quantity);
+            }
+            if list.iter().any(|(_, units)| !(*units <= ULPS_MAX)) {
+                seen.asked_reference = true;
+                match errors_in_50_digits(problem, &flight) {
+                    Ok(again) => list = again,
+                    Err(why) => seen.defects.push(format!("{method}: {why}")),
+                }
+            }
+        }
+        for (quantity, units) in list {
+            if !(units <= ULPS_MAX) {
+                seen.defects.push(format!("{method}: {quantity} is off by {units:.1} ulp x condition"));
+            }
+            seen.errors.push((method, quantity, units));
+        }
+    }
+}
+
+fn examine_critical(scene: &Scene, seen: &mut Examination) {
+    if scene.thickness.is_none() {
+        return;
+    }
+    let exact = critical_velocity::exact(scene);
+    let found = critical_velocity::of_scene(scene, &Energy::new());
+    let (exact, found) = match (exact, found) {
+        (Ok(exact), Ok(found)) => (exact, found),
+        (Err(exact), Err(_)) => {
+            seen.critical = Some(Err(exact.to_string()));
+            return;
+        }
+        // The search tries speeds above V_c, whose flights may be out of range first.
+        (Ok(exact), Err(error)) if exact > 1e150 => {
+            seen.critical = Some(Err(error.to_string()));
+            return;
+        }
+        (Ok(exact), Err(error)) => {
+            seen.defects.push(format!("V_c = {exact:e} by the closed form, but the search says: {error}"));
+            return;
+        }
+        (Err(error), Ok(found)) => {
+            seen.defects.push(format!("V_c = {:e} by search, but the closed form says: {error}", found.velocity));
+            return;
+        }
+    };
+    seen.critical = Some(Ok(()));
+    // The drag over the thickness stands in an exponent, whose digits it takes.
+    let condition = match (scene.drag(), scene.thickness) {
+        (Some(drag), Some(thickness)) => 2.0 + 2.0 * drag * thickness / scene.mass,
+        _ => 2.0,
+    };
+    let (off, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap_or(f64::NAN));
+    let units = (off / exact / f64::EPSILON / condition).min(off / bar * ULPS_MAX);
+    let mut units = if off == 0.0 { 0.0 } else { units };
+    if !(units <= ULPS_MAX) {
+        seen.asked_reference = true;
+        let source = Source::Scene(scene, 1.0);
+        match (reference::critical(source), reference::critical_condition(source)) {
+            (Ok(reference), Ok(condition)) => {
+                let closed = reference.velocity.relative_error(exact) / f64::EPSILON / condition.max(1.0);
+                let searched = reference.velocity.relative_error(found.velocity) / f64::EPSILON / condition.max(1.0);
+                units = closed.max(searched);
+                if !(units <= ULPS_MAX) {
+                    seen.defects.push(format!(
+                        "V_c: closed form {exact:e} off by {closed:.1}, search {:e} ± {bar:.1e} off by {searched:.1} \
+                         ulp x condition",
+                        found.velocity
+                    ));
+                }
+            }
+            (Err(error), _) | (_, Err(error)) => seen.defects.push(format!("V_c has no reference: {error}")),
+        }
+    }
+    seen.errors.push((MethodName::Energy, Quantity::CriticalVelocity, units));
+}
+
+/// The worst error of a method in a quantity, and the scene that makes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worst {
+    /// In units of round-off times condition.
+    pub units: f64,
+    /// Number of the scene.
+    pub index: u64,
+}
+
+/// How often each fate befell a method.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Right outcomes.
+    pub right: u64,
+    /// Outcomes inside the method's own bar.
+    pub undecided: u64,
+    /// Scenes without an answer.
+    pub refused: u64,
+    /// Wrong outcomes.
+    pub wrong: u64,
+}
+
+/// What many scenes showed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Scenes examined.
+    pub scenes: u64,
+    /// Scenes whose coefficients leave the range of 64-bit numbers.
+    pub unresolved: u64,
+    /// Scenes for which 50 digits were asked.
+    pub asked_reference: u64,
+    /// Critical velocities that agree.
+    pub critical_found: u64,
+    /// Critical velocities refused with their cause.
+    pub critical_refused: u64,
+    /// Fates by method.
+    pub tallies: BTreeMap<MethodName, Tally>,
+    /// Worst error by method and quantity.
+    pub worst: BTreeMap<(MethodName, Quantity), Worst>,
+    /// Limits missed, all of them.
+    pub defect_count: u64,
+    /// The first of them by number.
+    pub defects: Vec<Defect>,
+}
+
+impl Summary {
+    /// With one more scene.
+    #[must_use]
+    pub fn with(mut self, index: u64, seen: Examination) -> Self {
+        self.scenes += 1;
+        self.unresolved += u64::from(seen.unresolved.is_some());
+        self.asked_reference += u64::from(seen.asked_reference);
+        match seen.critical {
+            Some(Ok(())) => self.critical_found += 1,
+            Some(Err(_)) => self.critical_refused += 1,
+            None => {}
+        }
+        for (method, fate) in METHODS.into_iter().zip(seen.fates) {
+            let tally = self.tallies.entry(method).or_default();
+            match fate {
+                Fate::Right => tally.right += 1,
+                Fate::Undecided => tally.undecided += 1,
+                Fate::Refused(_) => tally.refused += 1,
+                Fate::Wrong(_) => tally.wrong += 1,
+            }
+        }
+        for (method, quantity, units) in seen.errors {
+            self.admit((method, quantity), Worst { units, index });
+        }
+        self.defect_count += seen.defects.len() as u64;
+        self.defects.extend(seen.defects.into_iter().map(|what| Defect { index, what }));
+        self.defects.truncate(DEFECTS_KEPT);
+        self
+    }
+
+    fn admit(&mut self, key: (MethodName, Quantity), worst: Worst) {
+        let held = self.worst.entry(key).or_insert(worst);
+        // A NaN is worse than any number; of equals the first scene stays, whatever the threads did.
+        let rank = |w: &Worst| if w.units.is_nan() { f64::INFINITY } else { w.units };
+        if rank(&worst) > rank(held) || (rank(&worst) == rank(held) && worst.index < held.index) {
+            *held = worst;
+        }
+    }
+
+    /// With another part of the same study.
+    #[must_use]
+    pub fn merged(mut self, other: Self) -> Self {
+        self.scenes += other.scenes;
+        self.unresolved += other.unresolved;
+        self.asked_reference += other.asked_reference;
+        self.critical_found += other.critical_found;
+        self.critical_refused += other.critical_refused;
+        for (method, tally) in other.tallies {
+            let own = self.tallies.entry(method).or_default();
+            own.right += tally.right;
+            own.undecided += tally.undecided;
+            own.refused += tally.refused;
+            own.wrong += tally.wrong;
+        }
+        for (key, worst) in other.worst {
+            self.admit(key, worst);
+        }
+        self.defect_count += other.defect_count;
+        self.defects.extend(other.defects);
+        self.defects.sort_by_key(|defect| defect.index);
+        self.defects.truncate(DEFECTS_KEPT);
+        self
+    }
+}
+
+/// Examines scenes 0 to `cases` of `seed` on every thread; `done` is told of each.
+///
+/// Memory does not grow with the number of scenes, and the result does not depend on the threads.
+pub fn run(cases: u64, seed: u64, done: &(dyn Fn() + Sync)) -> Summary {
+    (0..cases)
+        .into_par_iter()
+        .fold(Summary::default, |summary, index| {
+            let seen = examine(&scene(seed, index));
+            done();
+            summary.with(index, seen)
+        })
+        .reduce(Summary::default, Summary::merged)
+}
+
+/// `scene`, one of a single concrete in SI units, as the text of a scene file that reads back to the same numbers.
+///
+/// `None` for a scene of stages or layers, which none here is.
+pub fn scene_text(scene: &Scene, title: &str) -> Option<String> {
+    let c = scene.concrete().filter(|c| c.layers.is_empty())?;
+    let stiffness = match c.crater_stiffness {
+        CraterStiffness::Continuous => "\"continuous\"".to_owned(),
+        CraterStiffness::Given(value) => format!("{value:e}"),
+    };
+    let thickness = scene.thickness.map(|h| format!("thickness = {h:e}\n")).unwrap_or_default();
+    let velocity = scene.velocity.map(|v| format!("\n[impact]\nvelocity = {v:e}\n")).unwrap_or_default();
+    Some(format!(
+        "title = \"{title}\"\n\n[projectile]\nmass = {:e}\ndiameter = {:e}\nnose = {{ factor = {:e} }}\n\n[target]\n\
+         strength = {:e}\ndensity = {:e}\n{thickness}\n[resistance]\nS = {:e}\nB = {:e}\nk = {:e}\n\
+         crater_stiffness = {stiffness}\n{velocity}",
+        scene.mass, c.diameter, c.nose_factor, c.strength, c.density, c.static_factor, c.inertia_factor, c.crater_ratio,
+    ))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_is_a_function_of_seed_and_number_and_reads_back_from_its_text() {
+        for index in 0..200 {
+            let made = scene(7, index);
+            assert_eq!(made, scene(7, index));
+            let title = format!("scene {index}");
+            let text = scene_text(&made, &title).unwrap();
+            let read = Scene::from_toml(&text, "made.toml").unwrap();
+            assert_eq!(read, Scene { title: Some(title), ..made });
+        }
+        assert_ne!(scene(7, 0), scene(8, 0));
+    }
+
+    #[test]
+    fn no_scene_of_the_first_thousand_misses_a_limit() {
+        let summary = run(1000, 1, &|| {});
+        assert_eq!(summary.defects, []);
+        assert_eq!(summary.scenes, 1000);
+        for (method, tally) in &summary.tallies {
+            assert!(tally.right > 700 && tally.undecided > 0, "{method} {tally:?}");
+        }
+    }
+
+    #[test]
+    fn a_summary_does_not_depend_on_how_the_scenes_are_shared_out() {
+        let one_by_one = (0..60).fold(Summary::default(), |all, i| all.with(i, examine(&scene(3, i))));
+        assert_eq!(run(60, 3, &|| {}), one_by_one);
+    }
+
+    #[test]
+    fn an_error_beyond_the_limit_is_seen() {
+        let made = scene(1, 0);
+        let problem = made.problem().unwrap();
+        let exact = Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap();
+        let mut flight = Taylor::default().fly(&problem, Detail::Events).unwrap();
+        flight.end.time *= 1.0 + 1e-10;
+        let units = errors(&flight, &exact, problem.impact_speed)[1].1;
+        assert!((units * f64::EPSILON - 1e-10).abs() < 1e-14, "{units}");
+    }
+}

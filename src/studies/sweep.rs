@@ -1,0 +1,614 @@
+//! How do the critical velocity, depth and residual velocity move along one number of a scene, or over two?
+//!
+//! Along H/d this is the paper's result: `E_c/(d³ fc)` of the simulation beside Eq. 15 (its Figure 4) and their
+//! difference (its Figure 5). A sweep computes both criteria there, and so shows what the gap consists of: the
+//! simulation asks for a path through the whole thickness, Eq. 15 for the depth from which the rest of the slab fails
+//! (theory section 4). With Q = 0 and the criterion `ndrc` the equation of motion *is* unrounded Eq. 15.
+
+use rayon::prelude::*;
+use smallvec::SmallVec;
+use thiserror::Error;
+
+use super::critical_velocity;
+use super::parameter::{Parameter, ParameterError};
+use crate::integrators::{Detail, Integrator};
+use crate::physics::groups::{Groups, dimensionless_energy};
+use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
+use crate::physics::units::number;
+use crate::physics::{Criterion, Outcome, Scene};
+
+/// Most points of one sweep: a table of a gigabyte.
+pub const POINTS_MAX: usize = 10_000_000;
+
+/// Values along one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// What is varied.
+    pub parameter: Parameter,
+    /// First value, SI.
+    pub from: f64,
+    /// Last value, SI.
+    pub to: f64,
+    /// How many, both ends among them.
+    pub count: usize,
+    /// Spaced by ratio in place of difference.
+    pub logarithmic: bool,
+}
+
+/// Why a sweep cannot be made. All are mistakes of the caller, exit code 2.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SweepError {
+    /// Not `PATH=A:B:N` or `PATH=A:B:N:log`.
+    #[error("`{text}` is not of the form PATH=A:B:N or PATH=A:B:N:log")]
+    Form {
+        /// The text.
+        text: String,
+    },
+    /// A parameter or a value.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// A number of values that no two ends have.
+    #[error("`{text}` is no number of values: two or more, or one where both ends are equal")]
+    Count {
+        /// The text.
+        text: String,
+    },
+    /// Logarithmic steps through zero.
+    #[error("logarithmic steps lead from {from} to {to} only where both are above zero")]
+    Logarithm {
+        /// First value.
+        from: f64,
+        /// Last value.
+        to: f64,
+    },
+    /// More points than fit.
+    #[error("{points} points are too many: at most {POINTS_MAX}")]
+    TooMany {
+        /// Product of the counts.
+        points: usize,
+    },
+    /// Two axes that set the same number.
+    #[error("`{first}` and `{second}` both set `{moved}`", moved = .first.moves())]
+    Twice {
+        /// One.
+        first: Parameter,
+        /// The other.
+        second: Parameter,
+    },
+}
+
+impl SweepError {
+    /// Help for a person: what to write.
+    pub fn help(&self) -> String {
+        match self {
+            Self::Parameter(error) => error.help(),
+            Self::Twice { .. } => "vary one of them".to_owned(),
+            Self::TooMany { .. } => "take fewer values".to_owned(),
+            _ => "write for example H/d=0.5:18:200 or target.strength=20MPa:60MPa:5:log".to_owned(),
+        }
+    }
+}
+
+impl std::str::FromStr for Axis {
+    type Err = SweepError;
+
+    fn from_str(text: &str) -> Result<Self, SweepError> {
+        let form = || SweepError::Form { text: text.to_owned() };
+        let (path, range) = text.split_once('=').ok_or_else(form)?;
+        let parameter: Parameter = path.trim().parse()?;
+        let parts: Vec<_> = range.split(':').collect();
+        let (from, to, count, logarithmic) = match parts[..] {
+            [from, to, count] => (from, to, count, false),
+            [from, to, count, "log"] => (from, to, count, true),
+            _ => return Err(form()),
+        };
+        let (from, to) = (parameter.parse_value(from)?, parameter.parse_value(to)?);
+        let bad_count = || SweepError::Count { text: count.to_owned() };
+        let count: usize = count.trim().parse().map_err(|_| bad_count())?;
+        if count == 0 || (count == 1 && from != to) {
+            return Err(bad_count());
+        }
+        if count > POINTS_MAX {
+            return Err(SweepError::TooMany { points: count });
+        }
+        if logarithmic && !(from > 0.0 && to > 0.0) {
+            return Err(SweepError::Logarithm { from, to });
+        }
+        Ok(Self { parameter, from, to, count, logarithmic })
+    }
+}
+
+impl Axis {
+    /// Value `index`, from 0 to `count - 1`; the ends are exact.
+    pub fn value(&self, index: usize) -> f64 {
+        if index == 0 {
+            return self.from;
+        }
+        if index + 1 >= self.count {
+            return self.to;
+        }
+        let share = index as f64 / (self.count - 1) as f64;
+        if self.logarithmic {
+            self.from * (self.to / self.from).powf(share)
+        } else {
+            self.from + (self.to - self.from) * share
+        }
+    }
+}
+
+/// One or two axes over a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    scene: Scene,
+    axes: SmallVec<[Axis; 2]>,
+}
+
+/// What a flight of a point came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flown {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Depth at the end [m].
+    pub depth: f64,
+    /// Velocity at the end [m/s].
+    pub velocity: f64,
+}
+
+/// One point of a sweep.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    /// Values of the varied parameters, SI, in the order of the axes.
+    pub values: SmallVec<[f64; 2]>,
+    /// The flight, where the scene has an impact velocity.
+    pub flight: Option<Flown>,
+    /// `V_c` [m/s], where the target has a far side.
+    pub critical_velocity: Option<f64>,
+    /// `E_c` [J].
+    pub critical_energy: Option<f64>,
+    /// `E_c/(d³ fc)` by the criterion of the scene.
+    pub dimensionless_energy: Option<f64>,
+    /// The same by x = H, in a sweep of H/d.
+    pub energy_full_depth: Option<f64>,
+    /// The same by x = `x_p(H)`, in a sweep of H/d.
+    pub energy_ndrc: Option<f64>,
+    /// Eq. 15 as printed, `E_c/(d³ fc)`.
+    pub eq15_printed: Option<f64>,
+    /// Eq. 15 unrounded, `E_c/(d³ fc)`.
+    pub eq15_unrounded: Option<f64>,
+    /// H/d.
+    pub thickness_ratio: Option<f64>,
+    /// Geometry function N; `None` without drag.
+    pub geometry: Option<f64>,
+    /// Why the point has no answer, or not all of it. Empty when all is well.
+    pub error: String,
+}
+
+impl Row {
+    /// `E_c/(d³ fc)` over Eq. 15 as printed, less one.
+    pub fn difference_printed(&self) -> Option<f64> {
+        Some(self.dimensionless_energy? / self.eq15_printed? - 1.0)
+    }
+
+    /// `E_c/(d³ fc)` over unrounded Eq. 15, less one.
+    pub fn difference_unrounded(&self) -> Option<f64> {
+        Some(self.dimensionless_energy? / self.eq15_unrounded? - 1.0)
+    }
+}
+
+impl Plan {
+    /// A sweep of `scene` over `axes`.
+    ///
+    /// # Errors
+    /// [`SweepError`]: none or more than two axes, the same number twice, too many points, or a number that the scene
+    /// does not have.
+    pub fn new(scene: Scene, axes: &[Axis]) -> Result<Self, SweepError> {
+        if axes.is_empty() || axes.len() > 2 {
+            return Err(SweepError::Form { text: format!("{} axes", axes.len()) });
+        }
+        if let [first, second] = axes
+            && first.parameter.moves() == second.parameter.moves()
+        {
+            return Err(SweepError::Twice { first: first.parameter, second: second.parameter });
+        }
+        let points = axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul);
+        if points > POINTS_MAX {
+            return Err(SweepError::TooMany { points });
+        }
+        let mut probe = scene.clone();
+        for axis in axes {
+            axis.parameter.set(&mut probe, axis.from)?;
+        }
+        Ok(Self { scene, axes: axes.iter().cloned().collect() })
+    }
+
+    /// The axes.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// The scene before anything is varied.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Whether it runs along the thickness alone: the sweep of Figures 4 and 5.
+    pub fn is_along_thickness(&self) -> bool {
+        self.axes.len() == 1 && self.axes[0].parameter.moves() == Parameter::Thickness
+    }
+
+    /// How many points; the last axis runs fastest.
+    pub fn points(&self) -> usize {
+        self.axes.iter().map(|axis| axis.count).product()
+    }
+
+    /// Whether S is moved along with the strength by Eq. 14.
+    pub fn moves_static_factor(&self) -> bool {
+        self.axes.iter().any(|axis| axis.parameter.moves_static_factor(&self.scene))
+            && self.axes.iter().all(|axis| axis.parameter != Parameter::StaticFactor)
+    }
+
+    /// The values and the scene of point `index`.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where the varied numbers take another away.
+    pub fn point(&self, index: usize) -> (SmallVec<[f64; 2]>, Result<Scene, ParameterError>) {
+        let inner = self.axes.last().map_or(1, |axis| axis.count);
+        let of_axis = |position: usize| if position + 1 == self.axes.len() { index % inner } else { index / inner };
+        let values: SmallVec<[f64; 2]> =
+            self.axes.iter().enumerate().map(|(position, axis)| axis.value(of_axis(position))).collect();
+        let mut order: SmallVec<[(Parameter, f64); 2]> =
+            self.axes.iter().map(|axis| axis.parameter).zip(values.iter().copied()).collect();
+        // S after the strength, groups after what they are made of.
+        order.sort_by_key(|(parameter, _)| *parameter);
+        let mut scene = self.scene.clone();
+        let set = order.into_iter().try_for_each(|(parameter, value)| parameter.set(&mut scene, value));
+        (values, set.map(|()| scene))
+    }
+
+    /// Flies every point on all cores. Row `i` depends on no other row, whatever the number of threads.
+    ///
+    /// A point without an answer has its reason in [`Row::error`] and stops nothing.
+    pub fn run(&self, integrator: &(dyn Integrator + Sync)) -> Vec<Row> {
+        (0..self.points()).into_par_iter().map(|index| self.row(index, integrator)).collect()
+    }
+
+    fn row(&self, index: usize, integrator: &(dyn Integrator + Sync)) -> Row {
+        let (values, scene) = self.point(index);
+        let mut row = Row { values, ..Row::default() };
+        let scene = match scene {
+            Ok(scene) => scene,
+            Err(error) => {
+                row.error = error.to_string();
+                return row;
+            }
+        };
+        if let Err(error) = fly(&scene, integrator, &mut row) {
+            row.error = error;
+            return row;
+        }
+        if scene.thickness.is_some() {
+            match critical_velocity::of_scene(&scene, integrator) {
+                Ok(found) => {
+                    row.critical_velocity = Some(found.velocity);
+                    row.critical_energy = Some(found.energy);
+                }
+                Err(error) => row.error = error.to_string(),
+            }
+        }
+        self.compare(&scene, integrator, &mut row);
+        row
+    }
+
+    /// What a slab of one concrete has beyond its critical velocity: dimensionless energies and Eq. 15.
+    fn compare(&self, scene: &Scene, integrator: &dyn Integrator, row: &mut Row) {
+        let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) else { return };
+        row.dimensionless_energy = row.critical_energy.map(|energy| dimensionless_energy(energy, concrete));
+        row.geometry = Groups::of(scene, 0.0).and_then(|groups| groups.geometry);
+        let Some(thickness) = scene.thickness else { return };
+        let ratio = thickness / concrete.diameter;
+        row.thickness_ratio = Some(ratio);
+        let finite = |value: f64| value.is_finite().then_some(value);
+        row.eq15_printed = finite(concrete.static_factor * eq15_printed(ratio));
+        row.eq15_unrounded = finite(concrete.static_factor * eq15_unrounded(ratio));
+        if self.is_along_thickness() {
+            let by = |criterion: Criterion| {
+                if scene.criterion == criterion {
+                    return row.dimensionless_energy;
+                }
+                let other = Scene { criterion, ..scene.clone() };
+                let found = critical_velocity::of_scene(&other, integrator).ok()?;
+                Some(dimensionless_energy(found.energy, concrete))
+            };
+            let (full, ndrc) = (by(Criterion::FullDepth), by(Criterion::Ndrc));
+            (row.energy_full_depth, row.energy_ndrc) = (full, ndrc);
+        }
+    }
+}
+
+/// Flies `scene` where it has an impact velocity.
+fn fly(scene: &Scene, integrator: &dyn Integrator, row: &mut Row) -> Result<(), String> {
+    let Some(speed) = scene.velocity else { return Ok(()) };
+    let problem = scene.resolve(speed).map_err(|error| error.to_string())?;
+    let flight = integrator.fly(&problem, Detail::End).map_err(|error| error.to_string())?;
+    row.flight = Some(Flown { outcome: flight.outcome, depth: flight.end.depth, velocity: flight.end.velocity });
+    Ok(())
+}
+
+/// Why a table of measured points cannot be read, with its place.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum PointsError {
+    /// A column is missing or there twice.
+    #[error("line 1: the column `{column}` is there {times} times, not once")]
+    Column {
+        /// Its name.
+        column: &'static str,
+        /// How often it is there.
+        times: usize,
+    },
+    /// A field that is no number above zero.
+    #[error("line {line}, column `{column}`: `{text}` is no number above zero")]
+    Field {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Column.
+        column: &'static str,
+        /// What is there.
+        text: String,
+    },
+    /// The table is no CSV.
+    #[error("{0}")]
+    Csv(String),
+    /// No row.
+    #[error("the table has no row")]
+    Empty,
+}
+
+/// Measured points (H/d, `E_c/(d³ fc)`) from a CSV with the columns `H/d` and `E_c/(d3 fc)`; others are ignored.
+///
+/// # Errors
+/// [`PointsError`].
+pub fn read_points(text: &str) -> Result<Vec<(f64, f64)>, PointsError> {
+    const COLUMNS: [&str; 2] = ["H/d", "E_c/(d3 fc)"];
+    let no_csv = |error: csv::Error| PointsError::Csv(error.to_string());
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+    let header = reader.headers().map_err(no_csv)?.clone();
+    let mut places = [0; 2];
+    for (place, column) in places.iter_mut().zip(COLUMNS) {
+        let found: Vec<usize> = (0..header.len()).filter(|&i| &header[i] == column).collect();
+        let [only] = found[..] else { return Err(PointsError::Column { column, times: found.len() }) };
+        *place = only;
+    }
+    let mut points = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(no_csv)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let field = |which: usize| {
+            let text = record.get(places[which]).unwrap_or_default();
+            number(text).ok().filter(|value| *value > 0.0).ok_or_else(|| PointsError::Field {
+                line,
+                column: COLUMNS[which],
+                text: text.to_owned(),
+            })
+        };
+        points.push((field(0)?, field(1)?));
+    }
+    if points.is_empty() { Err(PointsError::Empty) } else { Ok(points) }
+}
+
+/// Why the curves along H/d differ, in sentences with the numbers of this sweep; for the terminal and the report.
+///
+/// Empty for a sweep along anything else.
+pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
+    if !plan.is_along_thickness() {
+        return String::new();
+    }
+    let both = |row: &&Row| row.energy_full_depth.is_some() && row.eq15_unrounded.is_some_and(|e| e > 0.0);
+    let (Some(first), Some(last)) = (rows.iter().find(both), rows.iter().rfind(both)) else { return String::new() };
+    let over = |row: &Row, energy: Option<f64>| {
+        100.0 * (energy.unwrap_or(f64::NAN) / row.eq15_unrounded.unwrap_or(f64::NAN) - 1.0)
+    };
+    let at = |row: &Row| {
+        format!("{:+.1} % at H/d = {:.4}", over(row, row.energy_full_depth), row.thickness_ratio.unwrap_or(f64::NAN))
+    };
+    let least = rows.iter().filter(both).fold(first, |least, row| {
+        if over(row, row.energy_full_depth) < over(least, least.energy_full_depth) { row } else { least }
+    });
+    let geometry = first.geometry.map_or("infinite (no drag)".to_owned(), |n| format!("{n:.4}"));
+    let ndrc = rows
+        .iter()
+        .filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > 0.0))
+        .filter_map(|row| Some(over(row, Some(row.energy_ndrc?)).abs()))
+        .fold(0.0, f64::max);
+    format!(
+        "Why the simulation lies above Eq. 15. The simulation counts a slab as perforated when the projectile has come \
+         through the whole thickness, x = H. Eq. 15 is Eq. 11-12 with k = 2 and the ACE/NDRC relation, by which a \
+         penetration x_p < H is enough: the rest of the slab fails by itself. Against unrounded Eq. 15 the simulation \
+         stands {} and {}; the same equation of motion with the criterion `ndrc`, exit at x_p(H), differs by at most \
+         {ndrc:.1} %. Without drag and with k = 2 that remainder is nil; here N = {geometry}, and it is what finite N \
+         (and another k or a given c) adds. For N infinite the gap falls with H/d but not to zero: the ratio of the two \
+         lines tends to 1.24, the slope of the relation, never to 1 (+338 % at H/d = 3, +50 % at 10, +37 % at 18). At \
+         finite N it grows again where drag gains on strength; it is least here, {}.",
+        at(first),
+        at(last),
+        at(least),
+    )
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use super::*;
+    use crate::integrators::{ClosedForm, Energy, Taylor};
+    use crate::physics::Resistance;
+    use crate::physics::scene_file::SHIPPED;
+
+    fn slab() -> Scene {
+        Scene::from_toml(SHIPPED.iter().find(|(name, _)| *name == "paper-slab").unwrap().1, "paper-slab").unwrap()
+    }
+
+    fn plan(axes: &[&str]) -> Plan {
+        let axes: Vec<Axis> = axes.iter().map(|text| text.parse().unwrap()).collect();
+        Plan::new(slab(), &axes).unwrap()
+    }
+
+    #[test]
+    fn values_include_both_ends_exactly_and_are_spaced_as_asked() {
+        let linear: Axis = "H/d=0.1:18:7".parse().unwrap();
+        assert_eq!((linear.value(0), linear.value(6)), (0.1, 18.0));
+        assert!((linear.value(1) - linear.value(0) - 17.9 / 6.0).abs() < 1e-14);
+        let log: Axis = "target.strength=20MPa:60MPa:3:log".parse().unwrap();
+        assert_eq!((log.value(0), log.value(2)), (20e6, 60e6));
+        assert!((log.value(1) / (20e6 * 3.0_f64.sqrt()) - 1.0).abs() < 1e-15);
+        let falling: Axis = "N=30:10:2".parse().unwrap();
+        assert_eq!((falling.value(0), falling.value(1)), (30.0, 10.0));
+    }
+
+    #[test]
+    fn axes_that_say_nothing_definite_are_refused() {
+        for text in ["H/d", "H/d=1:2", "H/d=1:2:3:lin", "H/d=1:2:3:log:4"] {
+            assert!(matches!(text.parse::<Axis>(), Err(SweepError::Form { .. })), "{text}");
+        }
+        for text in ["H/d=1:2:1", "H/d=1:2:0", "H/d=1:2:-3", "H/d=1:2:x"] {
+            assert!(matches!(text.parse::<Axis>(), Err(SweepError::Count { .. })), "{text}");
+        }
+        assert!(matches!("N=0:2:3:log".parse::<Axis>(), Err(SweepError::Logarithm { .. })));
+        assert!(matches!("H/d=1:2:99999999999".parse::<Axis>(), Err(SweepError::TooMany { .. })));
+        let axis = |text: &str| text.parse::<Axis>().unwrap();
+        let refused = Plan::new(slab(), &[axis("H/d=1:2:3"), axis("target.thickness=1:2:3")]);
+        assert!(matches!(refused, Err(SweepError::Twice { .. })));
+        let refused = Plan::new(slab(), &[axis("N=1:2:10000"), axis("I=1:2:10000")]);
+        assert!(matches!(refused, Err(SweepError::TooMany { points: 100_000_000 })));
+    }
+
+    /// Unrounded Eq. 15 from the equation of motion, Q = 0, k = 2, continuous c: 1,000 thicknesses in (0, 18.06], the
+    /// ends of the branches and their neighbours among them. The criterion `ndrc` is the whole of the difference.
+    #[test]
+    fn eq_15_follows_from_the_equation_of_motion_to_round_off_at_every_thickness() {
+        let mut scene = slab();
+        let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+        concrete.density = 0.0;
+        (scene.criterion, scene.velocity) = (Criterion::Ndrc, None);
+        let edges = [2.994, 2.997_945, 3.0, 3.8, 18.06];
+        let mut ratios: Vec<f64> = (1..=985).map(|i| 18.06 * f64::from(i) / 985.0).collect();
+        ratios.extend(edges.iter().flat_map(|edge: &f64| [edge.next_down(), *edge, edge.next_up().min(18.06)]));
+        assert_eq!(ratios.len(), 1000);
+        let methods: [&dyn Integrator; 3] = [&Taylor::default(), &Energy::new(), &ClosedForm];
+        let mut worst = 0.0_f64;
+        for method in methods {
+            for &ratio in &ratios {
+                Parameter::ThicknessRatio.set(&mut scene, ratio).unwrap();
+                let found = critical_velocity::of_scene(&scene, method).unwrap();
+                let concrete = scene.concrete().unwrap();
+                // The ratio that the scene has: H = (H/d) d is rounded, and at a jump that may change the branch.
+                let ratio = scene.thickness.unwrap() / concrete.diameter;
+                let expected = 12.0 * eq15_unrounded(ratio);
+                let error = (dimensionless_energy(found.energy, concrete) / expected - 1.0).abs();
+                assert!(error < 1e-13, "{} at H/d = {ratio}: {error:e}", method.name());
+                worst = worst.max(error);
+            }
+        }
+        assert!(worst > 0.0, "an error of exactly nothing at 1,000 points compares a thing with itself");
+        assert_eq!(scene.exit_depth_warning(), None);
+        Parameter::ThicknessRatio.set(&mut scene, 18.1).unwrap();
+        assert!(scene.exit_depth_warning().is_some());
+    }
+
+    #[test]
+    fn small_thickness_keeps_its_digits() {
+        let mut scene = slab();
+        let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+        concrete.density = 0.0;
+        scene.criterion = Criterion::Ndrc;
+        for exponent in [-3, -6, -9] {
+            let ratio = 10f64.powi(exponent);
+            Parameter::ThicknessRatio.set(&mut scene, ratio).unwrap();
+            let found = critical_velocity::of_scene(&scene, &Taylor::default()).unwrap();
+            // y -> (H/d)/3.19 (1 + 0.718 (H/d)/3.19²) as H/d -> 0.
+            let y = ratio / 3.19 * (1.0 + 0.718 * ratio / (3.19 * 3.19));
+            let expected = 12.0 * std::f64::consts::PI / 16.0 * y * y;
+            let error = dimensionless_energy(found.energy, scene.concrete().unwrap()) / expected - 1.0;
+            assert!(error.abs() < 2.0 * ratio * ratio + 1e-13, "{ratio}: {error:e}");
+        }
+    }
+
+    #[test]
+    fn simulation_over_eq_15_is_338_percent_at_3_and_50_at_10_and_37_at_18_without_drag() {
+        let mut scene = slab();
+        let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+        concrete.density = 0.0;
+        for (ratio, percent) in [(3.0, 338.0), (10.0, 50.1), (18.0, 36.6)] {
+            let axis = format!("H/d={ratio}:{ratio}:1").parse().unwrap();
+            let rows = Plan::new(scene.clone(), &[axis]).unwrap().run(&Taylor::default());
+            let difference = 100.0 * rows[0].difference_printed().unwrap();
+            assert!((difference - percent).abs() < 0.5, "{ratio}: {difference}");
+            assert!((rows[0].energy_ndrc.unwrap() / rows[0].eq15_unrounded.unwrap() - 1.0).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn every_point_is_the_scene_that_one_would_write() {
+        let plan = plan(&["target.strength=20MPa:60MPa:3", "H/d=2:4:2"]);
+        assert!(plan.moves_static_factor());
+        let rows = plan.run(&Taylor::default());
+        assert_eq!(rows.len(), 6);
+        assert_eq!(rows[3].values.to_vec(), [40e6, 4.0]);
+        let mut scene = slab();
+        Parameter::Strength.set(&mut scene, 40e6).unwrap();
+        scene.thickness = Some(4.0 * 0.06);
+        assert_eq!(
+            rows[3].critical_velocity.unwrap(),
+            critical_velocity::of_scene(&scene, &Taylor::default()).unwrap().velocity
+        );
+        let exact = critical_velocity::exact(&scene).unwrap();
+        assert!((rows[3].critical_velocity.unwrap() / exact - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn order_of_the_axes_does_not_matter_to_a_point() {
+        let a = plan(&["projectile.diameter=50mm:70mm:2", "H/d=3:5:2"]).run(&Energy::new());
+        let b = plan(&["H/d=3:5:2", "projectile.diameter=50mm:70mm:2"]).run(&Energy::new());
+        assert_eq!(a[1].critical_velocity, b[2].critical_velocity);
+        assert_eq!(a[1].thickness_ratio.map(|r| (r * 1e9).round()), Some(5e9));
+    }
+
+    #[test]
+    fn a_point_without_an_answer_says_why_and_stops_nothing() {
+        let rows = plan(&["projectile.mass=-1:1:3"]).run(&Taylor::default());
+        assert!(rows[0].error.contains("mass"), "{}", rows[0].error);
+        assert!(rows[1].error.contains("mass"), "{}", rows[1].error);
+        assert!(rows[2].error.is_empty() && rows[2].critical_velocity.is_some());
+    }
+
+    #[test]
+    fn an_impact_function_moves_the_flight_and_not_the_critical_velocity() {
+        let rows = plan(&["I=1:100:5:log"]).run(&Taylor::default());
+        assert!(rows.windows(2).all(|pair| pair[0].critical_velocity == pair[1].critical_velocity));
+        assert_eq!(rows[0].flight.unwrap().outcome, Outcome::StoppedInCrater);
+        assert_eq!(rows[4].flight.unwrap().outcome, Outcome::Perforated);
+    }
+
+    #[test]
+    fn measured_points_are_read_by_column_and_refused_by_line() {
+        let points = read_points("series,E_c/(d3 fc), H/d\na,10.5,3\nb, 20,5.5\n").unwrap();
+        assert_eq!(points, [(3.0, 10.5), (5.5, 20.0)]);
+        let refused = |text: &str| read_points(text).unwrap_err().to_string();
+        assert!(refused("H/d,E\n1,2\n").contains("`E_c/(d3 fc)` is there 0 times"));
+        assert!(refused("H/d,H/d,E_c/(d3 fc)\n1,2,3\n").contains("2 times"));
+        assert!(refused("H/d,E_c/(d3 fc)\n1,2\n3,\n").contains("line 3, column `E_c/(d3 fc)`"));
+        assert!(refused("H/d,E_c/(d3 fc)\n1,nan\n").contains("`nan`"));
+        assert!(refused("H/d,E_c/(d3 fc)\n1,2,3\n").contains("line: 2"));
+        assert_eq!(read_points("H/d,E_c/(d3 fc)\n"), Err(PointsError::Empty));
+    }
+
+    #[test]
+    fn the_text_names_n_and_the_limit_of_the_ratio() {
+        let plan = plan(&["H/d=0.5:18:8"]);
+        let text = explanation(&plan, &plan.run(&Energy::new()));
+        assert!(text.contains("N = 38.58") && text.contains("1.24") && text.contains("x_p"), "{text}");
+        let other = self::plan(&["N=10:20:2"]);
+        assert_eq!(explanation(&other, &other.run(&Energy::new())), "");
+    }
+}

@@ -1,0 +1,312 @@
+//! The commands as a person or a script meets them: exit codes, JSON, refusals, files.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// Path of a shipped scene.
+fn scene(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes").join(format!("{name}.toml")).display().to_string()
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::cargo_bin("penetrode").unwrap().args(arguments).output().unwrap()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = run(arguments);
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{arguments:?}: {e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Methods of this build that adapt their steps.
+fn adaptive_methods() -> Vec<&'static str> {
+    let mut methods = vec!["taylor", "energy"];
+    if cfg!(feature = "diffsol") {
+        methods.extend(["tsit45", "bdf", "esdirk34", "tr-bdf2", "adaptive"]);
+    }
+    methods
+}
+
+#[test]
+fn forrestal_shot_14_reaches_its_published_depth_with_events_in_order() {
+    let answer = json(&["solve", &scene("forrestal-1994-shot-14"), "--json"]);
+    let ratio = answer["groups"]["X_over_d"].as_f64().unwrap();
+    assert!((ratio - 6.215_430).abs() < 1e-6, "{ratio}");
+    let events: Vec<_> = answer["events"].as_array().unwrap().iter().map(|e| e["event"].as_str().unwrap()).collect();
+    assert_eq!(events, ["crater-end", "rest"]);
+    let times: Vec<_> = answer["events"].as_array().unwrap().iter().map(|e| e["time_s"].as_f64().unwrap()).collect();
+    assert!(times[0] < times[1]);
+}
+
+#[test]
+fn a_grazing_perforation_is_never_called_a_stop() {
+    for method in adaptive_methods() {
+        let answer = json(&["solve", &scene("graze"), "--method", method, "--json"]);
+        let outcome = answer["outcome"].as_str().unwrap();
+        assert!(outcome == "perforated" || outcome == "undecided", "{method}: {outcome}");
+    }
+}
+
+#[test]
+fn every_method_finds_the_critical_velocity_of_the_slab() {
+    let mut limits = vec![("taylor", 1e-13), ("energy", 1e-13), ("closed-form", 1e-13), ("central-difference", 1e-2)];
+    if cfg!(feature = "diffsol") {
+        limits.extend([("tsit45", 1e-9), ("bdf", 1e-8), ("esdirk34", 1e-7), ("tr-bdf2", 1e-6), ("adaptive", 1e-8)]);
+    }
+    for (method, limit) in limits {
+        let answer = json(&["critical", &scene("paper-slab"), "--method", method, "--json"]);
+        let error = answer["relative_error"].as_f64().unwrap();
+        assert!(error <= limit, "{method}: {error:e}");
+        let flights = answer["evaluations"].as_u64().unwrap();
+        assert!(method == "central-difference" || flights <= 12, "{method}: {flights} flights");
+        assert!(answer["eq15"]["valid"].as_bool().unwrap());
+    }
+}
+
+#[test]
+fn what_a_command_prints_is_what_its_schema_says() {
+    for (command, arguments) in [
+        ("solve", vec!["solve", "tunnel"]),
+        ("solve", vec!["solve", "perforate"]),
+        ("solve", vec!["solve", "stiff"]),
+        ("solve", vec!["solve", "layered"]),
+        ("solve", vec!["solve", "tunnel", "--method", "central-difference"]),
+        ("critical", vec!["critical", "paper-slab"]),
+        ("converge", vec!["converge", "tunnel", "--points", "8"]),
+        ("converge", vec!["converge", "tunnel", "--method", "taylor", "--points", "8"]),
+    ] {
+        let schema = json(&["schema", command]);
+        let validator = jsonschema::validator_for(&schema).unwrap();
+        let path = scene(arguments[1]);
+        let mut all = vec![arguments[0], path.as_str()];
+        all.extend(&arguments[2..]);
+        all.push("--json");
+        let answer = json(&all);
+        let faults: Vec<_> = validator.iter_errors(&answer).map(|e| e.to_string()).collect();
+        assert!(faults.is_empty(), "{arguments:?}: {faults:?}");
+        assert_eq!(answer["schema"], format!("penetrode/{command}/1"));
+    }
+}
+
+#[test]
+fn numbers_of_json_read_back_to_the_same_bits() {
+    let answer = json(&["solve", &scene("tunnel"), "--json"]);
+    let text = answer["depth_m"].to_string();
+    assert_eq!(text.parse::<f64>().unwrap().to_bits(), answer["depth_m"].as_f64().unwrap().to_bits());
+}
+
+#[test]
+fn bad_input_is_refused_with_exit_2_an_underline_and_nothing_on_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let bad = folder.path().join("bad.toml");
+    let text = fs::read_to_string(scene("tunnel")).unwrap().replace("\"2 kg\"", "\"2 m\"");
+    fs::write(&bad, text).unwrap();
+    let trajectory = folder.path().join("path.csv");
+    let output = run(&["solve", bad.to_str().unwrap(), "--json", "--trajectory", trajectory.to_str().unwrap()]);
+    assert_eq!(code(&output), 2);
+    assert!(output.stdout.is_empty());
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("bad.toml:6:11"), "{message}");
+    assert!(message.contains("mass"), "{message}");
+    assert!(!trajectory.exists());
+}
+
+#[test]
+fn options_that_a_method_does_not_use_are_refused() {
+    for arguments in [
+        vec!["--method", "taylor", "--dt", "1us"],
+        vec!["--method", "taylor", "--velocity", "centred"],
+        vec!["--method", "central-difference", "--rtol", "1e-6"],
+        vec!["--method", "closed-form", "--rtol", "1e-6"],
+        vec!["--method", "taylor", "--rtol", "nan"],
+        vec!["--method", "taylor", "--rtol", "1e-20"],
+        vec!["--method", "central-difference", "--dt", "-1"],
+        vec!["--method", "central-difference", "--dt", "1 kg"],
+        vec!["--method", "runge-kutta"],
+    ] {
+        let path = scene("tunnel");
+        let mut all = vec!["solve", path.as_str()];
+        all.extend(&arguments);
+        let output = run(&all);
+        assert_eq!(code(&output), 2, "{arguments:?}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        assert!(!output.stderr.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_viscous_stage_is_refused_by_the_energy_form_with_the_reason() {
+    let output = run(&["solve", &scene("viscous"), "--method", "energy"]);
+    assert_eq!(code(&output), 2);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("visc"));
+}
+
+#[test]
+fn a_critical_velocity_needs_a_far_side() {
+    assert_eq!(code(&run(&["critical", &scene("tunnel")])), 2);
+}
+
+#[test]
+fn a_step_beyond_the_stability_limit_exits_3_and_still_shows_the_flight() {
+    let output = run(&["solve", &scene("crater"), "--method", "central-difference", "--dt", "2 ms", "--json"]);
+    assert_eq!(code(&output), 3);
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["method"]["stability"]["stable"], false);
+    assert!(answer["depth_m"].is_number());
+}
+
+#[test]
+fn a_flight_without_an_end_exits_1_with_the_state_reached_in_json() {
+    let text = "[projectile]\nmass = 1\n[[stage]]\ndrag = 1\n[impact]\nvelocity = 10\n";
+    let output =
+        Command::cargo_bin("penetrode").unwrap().args(["solve", "-", "--json"]).write_stdin(text).output().unwrap();
+    assert_eq!(code(&output), 1);
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["schema"], "penetrode/solve/1");
+    assert!(answer["error"]["message"].as_str().unwrap().contains("never ends"));
+}
+
+#[test]
+fn a_trajectory_has_a_row_for_each_step_and_event() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("path.csv");
+    let answer = json(&["solve", &scene("tunnel"), "--json", "--trajectory", path.to_str().unwrap()]);
+    let text = fs::read_to_string(&path).unwrap();
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("time_s,depth_m,velocity_m_s,force_n,stage"));
+    let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    assert!(rows.windows(2).all(|pair| pair[0][0] <= pair[1][0]), "times do not fall");
+    let last = rows.last().unwrap();
+    assert_eq!(last[1], answer["depth_m"].as_f64().unwrap());
+    assert_eq!(last[0], answer["time_s"].as_f64().unwrap());
+}
+
+#[test]
+fn a_crater_flight_builds_no_tunnel() {
+    let crater = json(&["solve", &scene("crater"), "--json"]);
+    let notes = crater["skipped"].to_string();
+    assert!(notes.contains("stage 1"), "{notes}");
+    let tunnel = json(&["solve", &scene("tunnel"), "--json"]);
+    let evaluations = |answer: &Value| answer["cost"]["force_evaluations"].as_u64().unwrap();
+    assert!(evaluations(&crater) < evaluations(&tunnel), "{} {}", evaluations(&crater), evaluations(&tunnel));
+}
+
+#[test]
+fn a_driven_stage_is_flown_implicitly_at_a_tenth_of_the_explicit_cost() {
+    if !cfg!(feature = "diffsol") {
+        return;
+    }
+    let evaluations = |scene_name: &str, method: &str| {
+        json(&["solve", &scene(scene_name), "--method", method, "--rtol", "1e-6", "--json"])["cost"]["force_evaluations"]
+            .as_u64()
+            .unwrap()
+    };
+    let (explicit, adaptive) = (evaluations("stiff", "tsit45"), evaluations("stiff", "adaptive"));
+    assert!(10 * adaptive <= explicit, "{adaptive} against {explicit}");
+    // A stage that only resists stays explicit, viscous or not.
+    assert_eq!(evaluations("viscous", "adaptive"), evaluations("viscous", "tsit45"));
+}
+
+#[test]
+fn nobodys_folder_is_replaced_by_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("precious");
+    fs::create_dir(&target).unwrap();
+    fs::write(target.join("thesis.txt"), "years of work").unwrap();
+    let output = run(&["verify", "--only", "eq15", "--out", target.to_str().unwrap()]);
+    assert_eq!(code(&output), 2);
+    assert_eq!(fs::read_to_string(target.join("thesis.txt")).unwrap(), "years of work");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_suite_of_ones_own_runs_on_ones_own_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(scene("tunnel"), folder.path().join("mine.toml")).unwrap();
+    let suite = folder.path().join("suite.toml");
+    let text = r#"
+        title = "mine"
+        [[claim]]
+        id = "mine"
+        statement = "my scene is solved"
+        check = { agreement = {} }
+        scenes = ["mine.toml"]
+        methods = ["taylor"]
+        quantities = ["depth"]
+        limit = 1e-3
+        reason = "good enough for me"
+    "#;
+    fs::write(&suite, text).unwrap();
+    let out: PathBuf = folder.path().join("report");
+    let output = run(&["verify", suite.to_str().unwrap(), "--out", out.to_str().unwrap(), "--json"]);
+    assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["counts"]["passed"], 1);
+    assert!(out.join("report.json").exists());
+    // Far looser than what is measured: a warning, no more.
+    assert!(String::from_utf8_lossy(&output.stderr).contains("guards nothing"));
+    // And an impossible limit is a failed criterion, with the report written all the same.
+    fs::write(&suite, text.replace("1e-3", "1e-30").replace("\"time\"", "\"depth\"")).unwrap();
+    let strict = run(&["verify", suite.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+    assert!([0, 3].contains(&code(&strict)));
+}
+
+#[test]
+fn a_suite_with_a_mistake_is_refused_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let suite = folder.path().join("suite.toml");
+    fs::write(&suite, "title = \"x\"\n[[claim]]\nid = \"a\"\nstatemnt = \"b\"\n").unwrap();
+    let output = run(&["verify", suite.to_str().unwrap(), "--out", folder.path().join("r").to_str().unwrap()]);
+    assert_eq!(code(&output), 2);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("suite.toml:4"), "{message}");
+    assert!(!folder.path().join("r").exists());
+}
+
+#[test]
+fn bad_convergence_data_never_passes() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |rows: &[(f64, f64)]| {
+        let mut text = String::from("dt_s,depth_m\n");
+        for (dt, x) in rows {
+            text.push_str(&format!("{dt},{x}\n"));
+        }
+        let path = folder.path().join("table.csv");
+        fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let steps = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125];
+    let rows = |f: &dyn Fn(f64) -> f64| steps.iter().map(|&h| (h, f(h))).collect::<Vec<_>>();
+    let exit = |rows: &[(f64, f64)]| code(&run(&["audit", &table(rows)]));
+    assert_eq!(exit(&rows(&|h| 1.0 + 0.1 * h * h)), 0, "second order converges");
+    assert_eq!(exit(&rows(&|h| 1.0 + 0.01 / h)), 3, "diverging");
+    assert_eq!(exit(&rows(&|_| 1.0)), 4, "constant");
+    assert_eq!(exit(&rows(&|h| if h < 0.2 { f64::NAN } else { 1.0 + h })), 3, "not a number");
+    assert_eq!(exit(&[(1.0, 1.0), (0.5, 1.1)]), 2, "two points");
+    assert_eq!(exit(&[(1.0, 1.0), (1.0, 1.2), (0.5, 1.1), (0.25, 1.05), (0.125, 1.02)]), 2, "one step, two values");
+}
+
+#[test]
+fn help_and_completion_are_there_for_every_command() {
+    for command in ["solve", "critical", "converge", "audit", "verify", "schema", "completions"] {
+        let output = run(&[command, "--help"]);
+        assert_eq!(code(&output), 0, "{command}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
+        assert!(widest <= 80, "{command}: a line of {widest} characters");
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(run(&["completions", shell]).stdout.len() > 1000, "{shell}");
+    }
+    assert_eq!(code(&run(&[])), 2);
+}
