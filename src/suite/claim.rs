@@ -487,26 +487,31 @@ pub struct Judged {
     pub wall_ms: f64,
 }
 
+impl Judged {
+    /// How many times looser the limit is than what was measured, taken as at least one ulp and as at least what the
+    /// measurement resolves.
+    ///
+    /// `None` where nothing was measured, and for counts and limits of zero.
+    pub fn looseness(&self) -> Option<f64> {
+        if self.claim.limit == 0.0 || matches!(self.claim.check, Check::Outcome { .. } | Check::EventOrder {}) {
+            return None;
+        }
+        let floor = self.resolution.max(self.claim.check.resolution());
+        self.measured.map(|m| self.claim.limit / m.max(floor))
+    }
+}
+
 /// Largest looseness of a limit that still guards something.
 pub const LOOSENESS_MAX: f64 = 100.0;
 
-/// How many times looser the limit of each table is than the worst that was measured for it, taken as at least one ulp
-/// and as at least what the measurement resolves.
-///
-/// A table has one limit for all of its claims, so the worst of them decides. Tables are left out in which nothing was
-/// measured, and those of counts and limits of zero.
+/// Looseness of each table that has one: a table has one limit, so the least of its claims decides.
 pub fn looseness(judged: &[Judged]) -> BTreeMap<&str, f64> {
-    let mut worst: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    let mut least = BTreeMap::new();
     for judged in judged {
-        let Claim { ref table, ref check, limit, .. } = judged.claim;
-        if limit == 0.0 || matches!(check, Check::Outcome { .. } | Check::EventOrder {}) {
-            continue;
-        }
-        if let Some(measured) = judged.measured {
-            let seen = measured.max(judged.resolution).max(check.resolution());
-            let entry = worst.entry(table).or_insert((limit, 0.0));
-            entry.1 = entry.1.max(seen);
+        if let Some(looseness) = judged.looseness() {
+            let entry = least.entry(judged.claim.table.as_str()).or_insert(f64::INFINITY);
+            *entry = looseness.min(*entry);
         }
     }
-    worst.into_iter().map(|(table, (limit, seen))| (table, limit / seen)).collect()
+    least
 }
