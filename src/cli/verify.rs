@@ -11,7 +11,7 @@ use super::{CliError, Exit};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::studies::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::suite::checks::PeerAnswers;
-use crate::suite::{Counts, Judged, Suite, Verdict, summary};
+use crate::suite::{Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness, summary};
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
@@ -74,13 +74,10 @@ impl VerifyArgs {
         };
         folder::write(&run, &self.out).map_err(folder_error)?;
         let report = VerifyJson::new(&run);
-        for claim in judged.iter().filter(|j| !suite.is_embedded && j.looseness().is_some_and(|l| l > 100.0)) {
-            eprintln!(
-                "warning: the limit {} of {} is {:.0} times what is measured: it guards nothing",
-                claim.claim.limit,
-                claim.claim.id,
-                claim.looseness().unwrap_or(f64::NAN)
-            );
+        if !suite.is_embedded {
+            for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX) {
+                eprintln!("warning: the limit of {table} is {looseness:.0} times what is measured: it guards nothing");
+            }
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&judged)) }.map_err(CliError::stdout)?;
         Ok(match report.verdict {

@@ -497,7 +497,7 @@ impl<'f, S, Make: Fn(f64) -> Result<S, DiffsolError>> Legs<'f, S, Make> {
         self.force.rate(&[xi, u], &mut dy);
         let state = solver.state_mut();
         (state.y[0], state.y[1]) = (xi, u);
-        (state.dy[0], state.dy[1]) = (dy[0], dy[1]);
+        (state.dy[0], state.dy[1]) = fault!("kink-derivative-kept", (dy[0], dy[1]), (state.dy[0], state.dy[1]));
         (*state.t, *state.h) = (0.0, h);
         Ok(solver)
     }
@@ -563,7 +563,7 @@ impl<'f, S, Make: Fn(f64) -> Result<S, DiffsolError>> Legs<'f, S, Make> {
                     solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]))
                 })
                 .map_err(|e| failure(e, epoch, before))?;
-                before = place;
+                before = fault!("event-at-step-end", place, after);
                 energy_max = energy_max.max(place.u * place.u);
                 break end;
             }

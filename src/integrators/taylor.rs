@@ -237,16 +237,16 @@ impl<S: Scalar, const K: usize> Series<S, K> {
             ($k:expr) => {{
                 let k: usize = $k;
                 let minus = -reciprocal::<S>(k + 1);
-                advance[k] = v[k] * reciprocal(k + 1);
+                advance[k] = v[k] * reciprocal(fault!("taylor-coefficient", k + 1, k + 2));
                 let mut rest = S::zero();
                 if DRAG {
                     pull[k] = twice_drag * v[k];
                     if k % 2 == 0 {
-                        rest = S::from_f64(0.5) * (pull[k / 2] * v[k / 2]);
+                        rest = S::from_f64(fault!("taylor-middle-term", 0.5, 1.0)) * (pull[k / 2] * v[k / 2]);
                     }
                     // The newest coefficient comes last: the rest of the sum is ready before it is.
                     for i in (1..k.div_ceil(2)).rev() {
-                        rest += pull[i] * v[k - i];
+                        rest += pull[i] * v[fault!("taylor-index", k - i, k - i - 1)];
                     }
                     rest = rest * minus;
                 }
@@ -391,7 +391,7 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             let exit = self.state.depth.value() >= self.problem.exit_depth.value();
             let stopped = self.state.velocity.value() <= 0.0;
             if exit {
-                self.push(EventKind::Exit);
+                self.push(fault!("events-swapped", EventKind::Exit, EventKind::Rest));
             }
             if stopped {
                 self.push(EventKind::Rest);
@@ -408,7 +408,11 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
     /// Lists the stage ends at the present depth and enters the stage beyond them.
     #[inline(always)]
     fn pass_ends(&mut self) {
-        while self.problem.stages[self.stage].end.value() <= self.state.depth.value() {
+        while fault!(
+            "stage-end-inclusive",
+            self.problem.stages[self.stage].end.value() <= self.state.depth.value(),
+            self.problem.stages[self.stage].end.value() < self.state.depth.value()
+        ) {
             self.push(EventKind::boundary(self.problem, self.stage));
             let relative = self.state.velocity.value() / self.problem.impact_speed.value();
             self.least_at_ends = self.least_at_ends.min(relative);
@@ -565,7 +569,9 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         } else {
             let scale = problem.impact_speed.value();
             let beyond = exit_energy::energy_beyond_stop(problem, self.stage, self.state.depth.value());
-            (Some(beyond / scale / scale), Some(self.bar))
+            let margin = beyond / scale / scale;
+            // What a stop lacks is carried on in f64, with a few roundings of its own.
+            (Some(margin), Some(self.bar + 8.0 * f64::EPSILON * margin.abs()))
         };
         // A margin that is no number decides nothing.
         let undecided =

@@ -38,6 +38,7 @@ pub const SHIPPED: &[(&str, &str)] = &[
     ("layer-at-crater-end", include_str!("../../verification/scenes/layer-at-crater-end.toml")),
     ("loaded-spring", include_str!("../../verification/scenes/loaded-spring.toml")),
     ("spring-and-drag", include_str!("../../verification/scenes/spring-and-drag.toml")),
+    ("overdamped", include_str!("../../verification/scenes/overdamped.toml")),
     ("constant-force", include_str!("../../verification/scenes/constant-force.toml")),
 ];
 

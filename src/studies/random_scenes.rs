@@ -5,6 +5,7 @@ use thiserror::Error;
 use super::quantity::Quantity;
 use super::random::Random;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
+use crate::physics::closed_form::{CraterAndTunnel, solve_crater_and_tunnel};
 use crate::physics::reference::{self, Conditions, ReferenceError, Source};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, ResolveError, Scene, groups};
 
@@ -109,14 +110,30 @@ pub enum ComparisonError {
     },
 }
 
-/// The closed form of `scene` (from its numbers) against 50 digits, in ulp over max(1, condition number).
+/// The closed form of `scene`, of its stages and of its numbers, against 50 digits, in ulp over max(1, condition number).
 ///
 /// # Errors
 /// [`ComparisonError`].
 pub fn closed_form_errors(scene: &Scene) -> Result<UlpErrors, ComparisonError> {
     let problem = scene.problem()?;
-    let flight = ClosedForm.fly(&problem, Detail::Events)?;
-    errors_of(scene, problem.impact_speed, &flight)
+    let mut flight = ClosedForm.fly(&problem, Detail::Events)?;
+    let mut errors = errors_of(scene, problem.impact_speed, &flight)?;
+    // Once more from the numbers of the model, where the scene is one crater and one tunnel.
+    let plain = scene.concrete().filter(|concrete| concrete.layers.is_empty());
+    if let (Some(concrete), Some(static_force), Some(drag)) = (plain, scene.static_force(), scene.drag()) {
+        let model = CraterAndTunnel {
+            mass: scene.mass,
+            crater_depth: concrete.crater_depth(),
+            static_force,
+            drag,
+            crater_stiffness: concrete.crater_stiffness,
+        };
+        let solution = solve_crater_and_tunnel(&model, problem.impact_speed, problem.exit_depth)
+            .map_err(IntegrationError::from)?;
+        (flight.outcome, flight.end, flight.events) = (solution.outcome, solution.end, solution.events);
+        errors.0.extend(errors_of(scene, problem.impact_speed, &flight)?.0);
+    }
+    Ok(errors)
 }
 
 /// `flight` of `scene` against 50 digits from the scene's numbers, in ulp over max(1, condition number).

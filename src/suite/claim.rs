@@ -3,6 +3,7 @@
 //! Claims are data. A suite file holds an array of `[[claim]]` tables; one table with several scenes, methods or
 //! quantities stands for one claim each (their product), so that a table of orders is a few lines.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Deserialize;
@@ -66,6 +67,17 @@ pub enum Check {
     Stated {
         /// The number, in SI units.
         value: f64,
+    },
+    /// Exit margin and outcome against 50 digits at `points` impact speeds from a fifth of the critical velocity to
+    /// five times it: worst error of the margin over its error bar. A wrong outcome that is not `undecided` breaks it.
+    Margin {
+        /// How many, log-uniform from the seed.
+        points: usize,
+    },
+    /// Central difference: worst relative distance of the time of step i from i dt, over `steps` steps.
+    Clock {
+        /// How many steps.
+        steps: usize,
     },
     /// N* and height of every nose shape against the integral and the circle that they stand for; worst relative
     /// difference.
@@ -263,6 +275,7 @@ impl Check {
             Self::Eq15Jump { .. } => "S",
             Self::Pair { .. } | Self::Peer { .. } => "tolerance",
             Self::SelfConvergence {} => "uncertainty",
+            Self::Margin { .. } => "error bars",
             _ => "relative",
         }
     }
@@ -282,6 +295,8 @@ impl Check {
 pub struct Claim {
     /// Name, unique.
     pub id: String,
+    /// Name of its table, which it shares with the claims that differ in scene, method, quantity or rule alone.
+    pub table: String,
     /// What is claimed.
     pub statement: String,
     /// How it is checked.
@@ -339,6 +354,7 @@ impl ClaimSpec {
                             }
                             claims.push(Claim {
                                 id,
+                                table: self.id.get_ref().clone(),
                                 statement: self.statement.clone(),
                                 check: self.check.get_ref().clone(),
                                 scene: scene.as_ref().map(|s| s.get_ref().clone()),
@@ -472,7 +488,8 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// How many times looser the limit is than what was measured, taken as at least one ulp.
+    /// How many times looser the limit is than what was measured, taken as at least one ulp and as at least what the
+    /// measurement resolves.
     ///
     /// `None` where nothing was measured, and for counts and limits of zero.
     pub fn looseness(&self) -> Option<f64> {
@@ -482,4 +499,19 @@ impl Judged {
         let floor = self.resolution.max(self.claim.check.resolution());
         self.measured.map(|m| self.claim.limit / m.max(floor))
     }
+}
+
+/// Largest looseness of a limit that still guards something.
+pub const LOOSENESS_MAX: f64 = 100.0;
+
+/// Looseness of each table that has one: a table has one limit, so the least of its claims decides.
+pub fn looseness(judged: &[Judged]) -> BTreeMap<&str, f64> {
+    let mut least = BTreeMap::new();
+    for judged in judged {
+        if let Some(looseness) = judged.looseness() {
+            let entry = least.entry(judged.claim.table.as_str()).or_insert(f64::INFINITY);
+            *entry = looseness.min(*entry);
+        }
+    }
+    least
 }

@@ -7,6 +7,6 @@ pub mod stress;
 pub mod suite;
 pub mod verdict;
 
-pub use claim::{Check, Claim, Evidence, Judged, Measurement};
+pub use claim::{Check, Claim, Evidence, Judged, LOOSENESS_MAX, Measurement, looseness};
 pub use suite::{Scenes, Suite, summary};
 pub use verdict::{Counts, Verdict};

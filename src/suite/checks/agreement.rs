@@ -10,6 +10,7 @@ use crate::physics::{EventKind, Outcome};
 use crate::studies::critical_velocity;
 use crate::studies::error::{flight_error, is_fixed, signed_error, value_of};
 use crate::studies::quantity::Quantity;
+use crate::studies::random::Random;
 use crate::studies::random_scenes;
 
 /// Closed form against the 50-digit reference: worst error in ulp over max(1, condition number), over the claim's
@@ -96,6 +97,35 @@ pub(super) fn stated(subject: &Subject<'_>, stated: f64) -> Result<Measurement, 
         value_of(quantity, &flight).ok_or_else(|| NotMeasured::broken(format!("{} has none", flight.outcome)))?
     };
     Ok(Measurement::new((value / stated - 1.0).abs()).remark(format!("{value}, stated {stated}")))
+}
+
+/// Worst error of the exit margin over its error bar at `points` impact speeds about the critical velocity.
+///
+/// Against the reference of the same stages: what a scene's numbers lose on their way into stages is no part of the bar.
+pub(super) fn margin(subject: &Subject<'_>, points: usize) -> Result<Measurement, NotMeasured> {
+    let method = subject.method(None)?;
+    let critical = critical_velocity::exact_or_refined(subject.scene).map_err(NotMeasured::broken)?;
+    let mut random = Random::for_part(subject.context.seed, "margin");
+    let mut worst = (0.0_f64, 0.0);
+    for _ in 0..points {
+        let speed = critical * random.log_uniform(0.2, 5.0);
+        let problem = subject.scene.resolve(speed).map_err(NotMeasured::broken)?;
+        let exact = reference::flight(Source::Problem(&problem)).map_err(NotMeasured::broken)?;
+        let flight = fly(&method, &problem, Detail::End)?;
+        if !(flight.outcome == Outcome::Undecided || flight.outcome.agrees_with(exact.outcome)) {
+            let remark = format!("{} at {speed} m/s, where {} is right", flight.outcome, exact.outcome);
+            return Err(NotMeasured::broken(remark));
+        }
+        let (Some(margin), Some(bar), Some(exact)) = (flight.exit_margin, flight.exit_margin_error, exact.exit_margin)
+        else {
+            return Err(NotMeasured::skip("no exit margin with an error bar"));
+        };
+        let error = exact.error_over(margin, &reference::Exact::one()) / bar;
+        if error.is_nan() || error > worst.0 {
+            worst = (error, speed);
+        }
+    }
+    Ok(Measurement::new(worst.0).remark(format!("worst at {:.3} m/s, V_c is {critical:.3} m/s", worst.1)))
 }
 
 /// 0 when the outcome is `is` or undecided, 1 when it is wrong.

@@ -58,6 +58,8 @@ pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMe
         Check::Reference { random } => agreement::reference(claim, context, random),
         Check::Agreement { rtol } => agreement::with_exact(&Subject::of(claim, context)?, rtol),
         Check::Stated { value } => agreement::stated(&Subject::of(claim, context)?, value),
+        Check::Margin { points } => agreement::margin(&Subject::of(claim, context)?, points),
+        Check::Clock { steps } => scheme::clock(&Subject::of(claim, context)?, steps),
         Check::Nose {} => formulas::nose(),
         Check::GridConvergence {} => on(orders::grid_convergence),
         Check::CraterBand {} => on(scheme::crater_band),
