@@ -6,8 +6,8 @@ use std::path::Path;
 
 use penetrode::physics::Scene;
 use penetrode::studies::extreme_scenes::{self, Fate};
-use penetrode::suite::stress::{self, JudgedCase};
 use penetrode::suite::Verdict;
+use penetrode::suite::stress::{self, JudgedCase};
 
 #[test]
 fn every_stress_case_passes_for_every_method_that_this_build_has() {

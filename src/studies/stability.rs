@@ -13,8 +13,8 @@
 //! The formulas are derived here from Eq. 6-8 alone, apart from
 //! [`crate::integrators::central_difference::stability_limit`], which states the limit in closed form.
 
-use crate::integrators::central_difference::{Boundaries, CentralDifference, VelocityAt};
 use crate::integrators::IntegrationError;
+use crate::integrators::central_difference::{Boundaries, CentralDifference, VelocityAt};
 use crate::physics::{Problem, Stage, Stages, State, Target};
 
 /// Steps of a run that decides whether amplitudes grow. At 1e-3 beyond the limit they grow by e in about 30 steps.

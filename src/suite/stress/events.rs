@@ -295,7 +295,7 @@ fn check_order(flight: &Flight, seen: &mut Violations) {
         // An ulp of depth takes less than an ulp of time.
         let rises = a.state.time <= b.state.time && a.state.depth < b.state.depth;
         let at_once = a.state.time == b.state.time && a.state.depth == b.state.depth && a.kind < b.kind;
-        seen.expect(rises || at_once, || format!("{:?} then {:?}", a, b));
+        seen.expect(rises || at_once, || format!("{a:?} then {b:?}"));
     }
 }
 
@@ -407,13 +407,7 @@ fn scaled_forces(subject: Subject) -> Result<Measurement, NotMeasured> {
         let base = subject.fly(&plain)?;
         for power in [-1000, -560, -100, 100, 980] {
             let scale = |x: f64| x * 2f64.powi(power);
-            let problem = concrete(
-                scale(1.0),
-                2.0,
-                exit,
-                (scale(8.0), 0.5),
-                (scale(4.0), scale(0.25)),
-            );
+            let problem = concrete(scale(1.0), 2.0, exit, (scale(8.0), 0.5), (scale(4.0), scale(0.25)));
             let flight = subject.fly(&problem)?;
             if !flight.outcome.agrees_with(base.outcome) || kinds(&flight) != kinds(&base) {
                 return Err(NotMeasured::broken(format!("{} became {} at 2^{power}", base.outcome, flight.outcome)));
@@ -423,11 +417,8 @@ fn scaled_forces(subject: Subject) -> Result<Measurement, NotMeasured> {
             worst = worse(worst, (flight.end.velocity - base.end.velocity).abs() / 2.0);
         }
     }
-    let subnormal = Scene {
-        mass: 1e-310,
-        resistance: Resistance::Stages(vec![Stage::tunnel(1e-310, 0.0)]),
-        ..slab(false)
-    };
+    let subnormal =
+        Scene { mass: 1e-310, resistance: Resistance::Stages(vec![Stage::tunnel(1e-310, 0.0)]), ..slab(false) };
     if subnormal.problem().is_ok() {
         return Err(NotMeasured::broken("subnormal mass and force are taken"));
     }
@@ -502,12 +493,8 @@ fn small_times_and_far_starts(subject: Subject) -> Result<Measurement, NotMeasur
             .collect(),
         ..base
     };
-    let far = staged(
-        1.0,
-        300.0,
-        1e6 + 0.25,
-        &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)],
-    );
+    let far =
+        staged(1.0, 300.0, 1e6 + 0.25, &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)]);
     // An ulp of the depth counts 4e6 times in the quarter of a metre behind 1e6 m.
     for (problem, condition) in [(tiny, 1.0), (far, 4e6)] {
         let flight = subject.fly(&problem)?;

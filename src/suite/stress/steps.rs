@@ -6,6 +6,7 @@ use crate::integrators::{
     Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, Taylor, VelocityAt,
 };
 use crate::physics::{Outcome, Problem, Scene, Stage};
+use crate::studies::extreme_scenes::exceeds;
 use crate::studies::order::{Class, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
@@ -167,7 +168,13 @@ fn growth(_: Subject) -> Result<Measurement, NotMeasured> {
             for &part in parts {
                 let dt = part * limit;
                 // Growth by a third a step, and by fourteen at twice the limit, stays within the range of the numbers.
-                let steps = if part <= 1.0 { 4000 } else if part < 1.5 { 1000 } else { 100 };
+                let steps = if part <= 1.0 {
+                    4000
+                } else if part < 1.5 {
+                    1000
+                } else {
+                    100
+                };
                 let found = stability::growth_measured(velocity, dt, drag * dt, steps).map_err(NotMeasured::broken)?;
                 let theory = stability::growth_in_theory(velocity, dt, drag * dt);
                 worst = worse(worst, (found / theory - 1.0).abs());
@@ -204,7 +211,9 @@ fn limits_are_told(_: Subject) -> Result<Measurement, NotMeasured> {
     for part in [0.5, 0.99, 1.01, 2.0] {
         for velocity in RULES {
             let told = fly(&crater, part, velocity)?.step_limit;
-            seen.expect(told.is_some_and(|t| t.stable == (part < 1.0)), || format!("crater, {velocity}, {part}: {told:?}"));
+            seen.expect(told.is_some_and(|t| t.stable == (part < 1.0)), || {
+                format!("crater, {velocity}, {part}: {told:?}")
+            });
         }
         let told: Option<StepLimit> = fly(&tunnel, part, VelocityAt::LaggedHalfStep)?.step_limit;
         seen.expect(told.is_some_and(|t| t.stable == (part < 1.0)), || format!("lagged drag at {part}: {told:?}"));
@@ -217,7 +226,9 @@ fn limits_are_told(_: Subject) -> Result<Measurement, NotMeasured> {
                 .fly(&problem, Detail::Events)
                 .map_err(NotMeasured::broken)?;
             let found = flight.outcome == Outcome::Stopped && flight.end.velocity <= 0.0 && flight.cost.steps <= 2;
-            seen.expect(found, || format!("{velocity}, {boundaries}: {} after {} steps", flight.end, flight.cost.steps));
+            seen.expect(found, || {
+                format!("{velocity}, {boundaries}: {} after {} steps", flight.end, flight.cost.steps)
+            });
             let reach = problem.impact_speed * 0.2;
             seen.expect((0.0..=reach).contains(&flight.end.depth), || format!("rest at {} m", flight.end.depth));
         }
@@ -230,9 +241,10 @@ fn closed_form_everywhere(subject: Subject) -> Result<Measurement, NotMeasured> 
     let mut at = String::new();
     for index in 0..150 {
         let scene = extreme_scenes::scene(subject.seed, 2 * index);
-        let errors = closed_form_errors(&scene).map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
+        let errors =
+            closed_form_errors(&scene).map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
         if let Some((error, quantity)) = errors.worst() {
-            if !(error <= worst) {
+            if exceeds(error, worst) {
                 at = format!("{quantity} of scene {}", 2 * index);
             }
             worst = worse(worst, error);
@@ -308,7 +320,14 @@ fn fitted(
 }
 
 /// `count` random steps over `from` to `to` of the flight time of `problem`.
-fn random_steps(seed: u64, part: &str, problem: &Problem, from: f64, to: f64, count: usize) -> Result<Vec<f64>, NotMeasured> {
+fn random_steps(
+    seed: u64,
+    part: &str,
+    problem: &Problem,
+    from: f64,
+    to: f64,
+    count: usize,
+) -> Result<Vec<f64>, NotMeasured> {
     let time = exact(problem)?.end.time.hi();
     let mut random = Random::for_part(seed, part);
     Ok((0..count).map(|_| time * random.log_uniform(from, to)).collect())
@@ -385,12 +404,13 @@ fn crossover_of_orders(subject: Subject) -> Result<Measurement, NotMeasured> {
     Ok(Measurement::new(worst).remark(remark.join(", ")))
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "one signature for every case")]
 fn random_scenes(subject: Subject) -> Result<Measurement, NotMeasured> {
     let summary = extreme_scenes::run(2000, subject.seed, &|| {});
     let undecided: u64 = summary.tallies.values().map(|tally| tally.undecided).sum();
     let mut remark = format!("{} scenes, {undecided} flights undecided", summary.scenes);
     if let Some(defect) = summary.defects.first() {
-        remark.push_str(&format!("; scene {}: {}", defect.index, defect.what));
+        remark = format!("{remark}; scene {}: {}", defect.index, defect.what);
     }
     Ok(Measurement::new(summary.defect_count as f64).remark(remark))
 }
@@ -417,15 +437,19 @@ fn viscous_resisting(subject: Subject) -> Result<Measurement, NotMeasured> {
         let law = Stage { static_force: 10.0, stiffness: 100.0, viscosity: rate, drag: 0.0, end: f64::INFINITY };
         let problem = staged(1.0, 10.0, f64::INFINITY, &[law]);
         let (flight, exact) = (subject.fly(&problem)?, exact(&problem)?.values());
-        let off = worse((flight.end.depth / exact.end.depth - 1.0).abs(), (flight.end.time / exact.end.time - 1.0).abs());
-        // Not `off > ...`, so that a NaN is refused.
-        if !(off <= 1e3 * subject.promise()) {
+        let off =
+            worse((flight.end.depth / exact.end.depth - 1.0).abs(), (flight.end.time / exact.end.time - 1.0).abs());
+        if exceeds(off, 1e3 * subject.promise()) {
             return Err(NotMeasured::broken(format!("off by {off:e} at r/M = {rate:e}")));
         }
         worst = worse(worst, flight.cost.force_evaluations as f64);
         points.push((rate, flight.cost.force_evaluations as f64));
     }
-    Ok(Measurement::new(worst).evidence(Evidence::Series { abscissa: "r/M, 1/s", ordinate: "force evaluations", points }))
+    Ok(Measurement::new(worst).evidence(Evidence::Series {
+        abscissa: "r/M, 1/s",
+        ordinate: "force evaluations",
+        points,
+    }))
 }
 
 /// The driven scene of theory section 1 with its drive in proportion to r, so that the slow motion stays the same.
@@ -435,18 +459,12 @@ fn viscous_driven(subject: Subject) -> Result<Measurement, NotMeasured> {
     let rates: &[f64] = if explicit { &[1e2, 1e3, 1e4] } else { &[1e2, 1e3, 1e4, 1e5, 1e6] };
     let mut points = Vec::new();
     for &rate in rates {
-        let law = Stage {
-            static_force: -rate,
-            stiffness: 0.1 * rate,
-            viscosity: rate,
-            drag: 0.0,
-            end: f64::INFINITY,
-        };
+        let law = Stage { static_force: -rate, stiffness: 0.1 * rate, viscosity: rate, drag: 0.0, end: f64::INFINITY };
         let problem = staged(1.0, 1.0, 9.0, &[law]);
         let flight = subject.fly(&problem)?;
         // x = 10 (1 - e^(-0.1 t)) but for the transient, of the order of M/r: t = 10 ln 10 s.
         let off = (flight.end.time / (10.0 * 10f64.ln()) - 1.0).abs();
-        if !(off <= 2.0 / rate + 1e3 * subject.promise()) {
+        if exceeds(off, 2.0 / rate + 1e3 * subject.promise()) {
             return Err(NotMeasured::broken(format!("leaves after {} s at r/M = {rate:e}", flight.end.time)));
         }
         points.push((rate, flight.cost.force_evaluations as f64));
