@@ -1,5 +1,6 @@
 //! `penetrode stress`: numerical stability and event stress cases, and random scenes by the million.
 
+use std::fmt::Write as _;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -271,25 +272,27 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
         let measured = case.measured.map_or("nothing measured".to_owned(), |m| {
             format!("{}, limit {:.1e} {}", error_text(Some(m)), case.limit, case.unit)
         });
-        text.push_str(&format!(
+        let _ = write!(
+            text,
             "{:<9} {}\n          {}\n          {measured}; {}\n",
             case.verdict.name(),
             case.id,
             case.statement,
             super::solve::escape_terminal(&case.remark)
-        ));
+        );
     }
     if let Some(summary) = random {
         text.push_str(&random_text(summary));
     }
-    text.push_str(&format!(
+    let _ = write!(
+        text,
         "{}: {} passed, {} failed, {} undecided, {} skipped\n",
         counts.verdict().name(),
         counts.passed,
         counts.failed,
         counts.undecided,
         counts.skipped
-    ));
+    );
     text
 }
 
@@ -323,7 +326,7 @@ fn random_text(summary: &Summary) -> String {
         text.push('\n');
     }
     for defect in &summary.defects {
-        text.push_str(&format!("  scene {}: {}\n", defect.index, super::solve::escape_terminal(&defect.what)));
+        let _ = write!(text, "  scene {}: {}\n", defect.index, super::solve::escape_terminal(&defect.what));
     }
     text
 }

@@ -510,6 +510,14 @@ impl<S: Scalar> Leg<S> {
             }
             let w = now.velocity * now.velocity;
             let rate = self.loss.rate(now.depth, w).value();
+            if rate > 0.0 && fall <= 0.0 {
+                // The last speed is reached before the end by round-off alone: what is left is flown at it. Going on in
+                // depth would close in on a rest that the walk does not have, without ever coming there.
+                if velocity.value() > 0.0 {
+                    now.time += (depth - now.depth).over(velocity);
+                }
+                break;
+            }
             // Speed is a variable only where it changes one way down to the end. A force that slows goes on slowing;
             // one that drives does so to the end if it still does there.
             let monotone = (rate > 0.0 && fall > 0.0) || (rate < 0.0 && fall < 0.0 && end_rate < 0.0);

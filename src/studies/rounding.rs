@@ -106,7 +106,7 @@ pub fn floor(problem: &Problem, from: u32, to: u32) -> Result<Vec<Floor>, Integr
     };
     (from..=to)
         .map(|power| {
-            let steps = 2f64.powi(power as i32);
+            let steps = 2f64.powi(power.cast_signed());
             let dt = exact.time.value() / steps;
             let fine = scheme(dt, Summation::Plain).fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end.depth;
             let off = |value: TwoFloat| ((value - fine).value() / fine.value()).abs();

@@ -295,7 +295,7 @@ fn check_order(flight: &Flight, seen: &mut Violations) {
         // An ulp of depth takes less than an ulp of time.
         let rises = a.state.time <= b.state.time && a.state.depth < b.state.depth;
         let at_once = a.state.time == b.state.time && a.state.depth == b.state.depth && a.kind < b.kind;
-        seen.expect(rises || at_once, || format!("{:?} then {:?}", a, b));
+        seen.expect(rises || at_once, || format!("{a:?} then {b:?}"));
     }
 }
 

@@ -209,10 +209,10 @@ impl Violations {
     fn measurement(self) -> Measurement {
         let mut remark = format!("{} checks", self.checks);
         for note in self.notes {
-            remark.push_str(&format!("; {note}"));
+            remark = format!("{remark}; {note}");
         }
         if self.count > 0 {
-            remark.push_str(&format!("; first violation: {}", self.first));
+            remark = format!("{remark}; first violation: {}", self.first);
         }
         // No check at all shows nothing.
         Measurement::new(if self.checks == 0 { f64::NAN } else { self.count as f64 }).remark(remark)

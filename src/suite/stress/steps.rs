@@ -6,6 +6,7 @@ use crate::integrators::{
     Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, Taylor, VelocityAt,
 };
 use crate::physics::{Outcome, Problem, Scene, Stage};
+use crate::studies::extreme_scenes::exceeds;
 use crate::studies::order::{Class, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
@@ -243,7 +244,7 @@ fn closed_form_everywhere(subject: Subject) -> Result<Measurement, NotMeasured> 
         let errors =
             closed_form_errors(&scene).map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
         if let Some((error, quantity)) = errors.worst() {
-            if !(error <= worst) {
+            if exceeds(error, worst) {
                 at = format!("{quantity} of scene {}", 2 * index);
             }
             worst = worse(worst, error);
@@ -403,12 +404,13 @@ fn crossover_of_orders(subject: Subject) -> Result<Measurement, NotMeasured> {
     Ok(Measurement::new(worst).remark(remark.join(", ")))
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "one signature for every case")]
 fn random_scenes(subject: Subject) -> Result<Measurement, NotMeasured> {
     let summary = extreme_scenes::run(2000, subject.seed, &|| {});
     let undecided: u64 = summary.tallies.values().map(|tally| tally.undecided).sum();
     let mut remark = format!("{} scenes, {undecided} flights undecided", summary.scenes);
     if let Some(defect) = summary.defects.first() {
-        remark.push_str(&format!("; scene {}: {}", defect.index, defect.what));
+        remark = format!("{remark}; scene {}: {}", defect.index, defect.what);
     }
     Ok(Measurement::new(summary.defect_count as f64).remark(remark))
 }
@@ -437,8 +439,7 @@ fn viscous_resisting(subject: Subject) -> Result<Measurement, NotMeasured> {
         let (flight, exact) = (subject.fly(&problem)?, exact(&problem)?.values());
         let off =
             worse((flight.end.depth / exact.end.depth - 1.0).abs(), (flight.end.time / exact.end.time - 1.0).abs());
-        // Not `off > ...`, so that a NaN is refused.
-        if !(off <= 1e3 * subject.promise()) {
+        if exceeds(off, 1e3 * subject.promise()) {
             return Err(NotMeasured::broken(format!("off by {off:e} at r/M = {rate:e}")));
         }
         worst = worse(worst, flight.cost.force_evaluations as f64);
@@ -463,7 +464,7 @@ fn viscous_driven(subject: Subject) -> Result<Measurement, NotMeasured> {
         let flight = subject.fly(&problem)?;
         // x = 10 (1 - e^(-0.1 t)) but for the transient, of the order of M/r: t = 10 ln 10 s.
         let off = (flight.end.time / (10.0 * 10f64.ln()) - 1.0).abs();
-        if !(off <= 2.0 / rate + 1e3 * subject.promise()) {
+        if exceeds(off, 2.0 / rate + 1e3 * subject.promise()) {
             return Err(NotMeasured::broken(format!("leaves after {} s at r/M = {rate:e}", flight.end.time)));
         }
         points.push((rate, flight.cost.force_evaluations as f64));
