@@ -4,6 +4,7 @@
 
 #[cfg(feature = "diffsol")]
 pub mod adaptive;
+pub mod batch;
 pub mod central_difference;
 pub mod closed_form;
 #[cfg(feature = "diffsol")]
