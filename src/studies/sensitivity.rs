@@ -432,10 +432,12 @@ fn fly_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Result<State<Dual64>,
     let plain = problem.cast::<f64>();
     let flight = Taylor::default().fly(&plain, Detail::Events)?;
     let unit_velocity = plain.impact_speed;
-    let mut entry = State { time: 0.0, depth: Dual64::from_re(0.0), velocity: problem.impact_speed };
+    let mut entry = State::at_impact(problem);
     for event in &flight.events {
         // At one place several events may stand; only the first is a leg.
-        let elapsed = event.state.time - entry.time;
+        let elapsed = event.state.time - entry.time.re;
+        // The law does not ask for the time: of it only the value is kept.
+        let time = Dual64::from_re(event.state.time);
         let stage = match event.kind {
             EventKind::StageEnd(index) => index,
             EventKind::CraterEnd => problem.crater.unwrap_or(0),
@@ -469,15 +471,14 @@ fn fly_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Result<State<Dual64>,
         entry = if is_rest {
             // u = 0: the depth does not move with the time of rest.
             let depth = Dual64::new(event.state.depth, entry.depth.eps + unit_depth * d_way);
-            State { time: event.state.time, depth, velocity: Dual64::from_re(0.0) }
+            State { time, depth, velocity: Dual64::from_re(0.0) }
         } else {
             let later = ((limit.eps - entry.depth.eps) / unit_depth - d_way) / u;
             let velocity = Dual64::new(event.state.velocity, unit_velocity * (d_u + rate * later));
-            State { time: event.state.time, depth: limit, velocity }
+            State { time, depth: limit, velocity }
         };
     }
-    let State { time, depth, velocity } = entry;
-    Ok(State { time: Dual64::from_re(time), depth, velocity })
+    Ok(entry)
 }
 
 /// Sensitivities by the forward sensitivities of the library `diffsol` (Tsitouras 5(4)) at tolerance `rtol`.
