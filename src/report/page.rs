@@ -456,57 +456,54 @@ fn criteria(families: &[Family<'_>]) -> Markup {
     )
 }
 
-fn of_kind<'f, 'a>(families: &'f [Family<'a>], kind: fn(&Check) -> bool) -> Vec<&'f Family<'a>> {
-    families.iter().filter(|f| kind(&f.first().claim.check)).collect()
+/// What a check is evidence of: the part of the report that shows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Exact,
+    Order,
+    Discrete,
+    Solution,
+    CrossCode,
+    Event,
+    Invariant,
+    Stability,
 }
 
-fn is_exact(check: &Check) -> bool {
-    matches!(
-        check,
+/// Every check has its place: one that is new does not compile without.
+fn kind_of(check: &Check) -> Kind {
+    match check {
         Check::Reference { .. }
-            | Check::Agreement { .. }
-            | Check::SmallImpact { .. }
-            | Check::ApproachOrder { .. }
-            | Check::ApproachConstant { .. }
-            | Check::Eq15 { .. }
-            | Check::Eq15Jump { .. }
-            | Check::NdrcCriterion { .. }
-    )
+        | Check::Agreement { .. }
+        | Check::Stated { .. }
+        | Check::Nose {}
+        | Check::SmallImpact { .. }
+        | Check::ApproachOrder { .. }
+        | Check::ApproachConstant { .. }
+        | Check::Eq15 { .. }
+        | Check::Eq15Jump { .. }
+        | Check::NdrcCriterion { .. } => Kind::Exact,
+        Check::Order { .. } | Check::Manufactured { .. } | Check::Proportionality { .. } | Check::WorkOrder { .. } => {
+            Kind::Order
+        }
+        Check::DiscreteSolution { .. } | Check::CraterConstant {} | Check::CraterBand {} | Check::LaggedConstant {} => {
+            Kind::Discrete
+        }
+        Check::SelfConvergence {} | Check::GridConvergence {} => Kind::Solution,
+        Check::Pair { .. } | Check::Peer { .. } => Kind::CrossCode,
+        Check::Outcome { .. } | Check::EventOrder {} => Kind::Event,
+        Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. } => {
+            Kind::Invariant
+        }
+        Check::StabilityLimit {} => Kind::Stability,
+    }
 }
 
-fn is_order(check: &Check) -> bool {
-    matches!(
-        check,
-        Check::Order { .. } | Check::Manufactured { .. } | Check::Proportionality { .. } | Check::WorkOrder { .. }
-    )
-}
-
-fn is_discrete(check: &Check) -> bool {
-    matches!(check, Check::DiscreteSolution { .. } | Check::CraterConstant {} | Check::LaggedConstant {})
-}
-
-fn is_solution(check: &Check) -> bool {
-    matches!(check, Check::SelfConvergence {})
-}
-
-fn is_cross(check: &Check) -> bool {
-    matches!(check, Check::Pair { .. } | Check::Peer { .. })
-}
-
-fn is_event(check: &Check) -> bool {
-    matches!(check, Check::Outcome { .. } | Check::EventOrder {})
-}
-
-fn is_invariant(check: &Check) -> bool {
-    matches!(check, Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. })
-}
-
-fn is_stability(check: &Check) -> bool {
-    matches!(check, Check::StabilityLimit {})
+fn of_kind<'f, 'a>(families: &'f [Family<'a>], kind: Kind) -> Vec<&'f Family<'a>> {
+    families.iter().filter(|f| kind_of(&f.first().claim.check) == kind).collect()
 }
 
 /// Families of a section, or a sentence where the suite has none.
-fn results(caption: &str, families: &[Family<'_>], kind: fn(&Check) -> bool) -> Markup {
+fn results(caption: &str, families: &[Family<'_>], kind: Kind) -> Markup {
     let families = of_kind(families, kind);
     html! {
         @if families.is_empty() { p { "This suite claims nothing of this kind." } }
@@ -521,17 +518,17 @@ fn code_verification(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) 
             p { "Is the equation solved right? Measured against answers known by other means: closed forms, their 50-digit
                 evaluation, manufactured paths, and the exact solutions of the scheme's own difference equation." }
             h3 { "Exact answers and formulas" }
-            (results("Errors beside the exact answer", families, is_exact))
+            (results("Errors beside the exact answer", families, Kind::Exact))
             h3 { "Orders of convergence" }
             p { "Each order is a least-squares fit over random step sizes with its 95 % interval. Orders from pairs of steps
                 are noise here, and are not shown." }
             (figures_of(run, figures, Part::CodeVerification))
             (order_tables(run))
-            (results("Orders beside the formal ones", families, is_order))
+            (results("Orders beside the formal ones", families, Kind::Order))
             h3 { "Exact discrete solutions and error constants" }
             p { "Stronger than an order: the scheme must give its own discrete solution to round-off, and its leading error
                 must have the predicted constant. A right order with a wrong constant is wrong." }
-            (results("Discrete solutions and constants", families, is_discrete))
+            (results("Discrete solutions and constants", families, Kind::Discrete))
         },
     )
 }
@@ -593,8 +590,8 @@ fn solution_verification(families: &[Family<'_>]) -> Markup {
             p { "How far is a computed answer from its limit where nothing exact is known? The values alone are fitted
                 (Eça-Hoekstra least squares, Richardson, grid convergence index); here the exact answer then tells whether the
                 stated uncertainty holds it. Measured: error over stated uncertainty." }
-            (results("Self-convergence", families, is_solution))
-            @let told: Vec<&Judged> = of_kind(families, is_solution).iter().flat_map(|f| f.members).collect();
+            (results("Self-convergence", families, Kind::Solution))
+            @let told: Vec<&Judged> = of_kind(families, Kind::Solution).iter().flat_map(|f| f.members).collect();
             @if !told.is_empty() {
                 details { summary { "Limit, band and rule of each" } (claims_table("Self-convergence, claim by claim", &told)) }
             }
@@ -611,7 +608,7 @@ fn cross_code(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Mark
                 dl.facts { @for (name, text) in &run.environment.peers { dt { (one_line(name)) } dd { (one_line(text)) } } }
             }
             (figures_of(run, figures, Part::CrossCode))
-            (results("Methods and programs beside each other", families, is_cross))
+            (results("Methods and programs beside each other", families, Kind::CrossCode))
         },
     )
 }
@@ -623,7 +620,7 @@ fn events(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Markup {
             p { "Each event must stand once, at its place, in order; an outcome may be undecided inside its error bar, but never
                 wrong. A time is as good as its event is located." }
             (figures_of(run, figures, Part::Events))
-            (results("Events and outcomes", families, is_event))
+            (results("Events and outcomes", families, Kind::Event))
         },
     )
 }
@@ -634,7 +631,7 @@ fn energy(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Markup {
         html! {
             p { "What must hold whatever the answer is: energy, reversal in time, scaling, and cutting the way in pieces." }
             (figures_of(run, figures, Part::Energy))
-            (results("Invariants", families, is_invariant))
+            (results("Invariants", families, Kind::Invariant))
         },
     )
 }
@@ -645,7 +642,7 @@ fn stability(families: &[Family<'_>]) -> Markup {
         html! {
             p { "In the crater the scheme is stable for w dt < 2, w² = c/M; the limit is found by measurement. The lagged drag
                 is monotone for 2 Q V dt/M < 1 and stable for < 2." }
-            (results("Stability limits", families, is_stability))
+            (results("Stability limits", families, Kind::Stability))
         },
     )
 }
