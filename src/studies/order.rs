@@ -360,9 +360,13 @@ fn exclusions(sorted: &[StepError], round_off: &[f64]) -> Vec<Option<Exclusion>>
             .collect();
         heights.sort_by(f64::total_cmp);
         let round_off_made = heights[heights.len() / 2] <= ROUND_OFF_ALLOWANCE;
-        if bend.fine_slope < 0.5 * bend.coarse_slope && bend.coarse_slope > 0.0 && round_off_made {
+        if bend.coarse_slope > 0.0 && round_off_made {
             // Trend and floor are equal at the bend; above it the floor's share falls with the difference in slope.
-            let clear = bend.at - FLOOR_SHARE.ln() / (bend.coarse_slope - bend.fine_slope);
+            // Where the fine side is not yet flat, single roundings bend the line and no law of its own: it alone goes,
+            // for the many points above must not yield to a few that are noise.
+            let flat = bend.fine_slope < 0.5 * bend.coarse_slope;
+            let share = if flat { FLOOR_SHARE.ln() / (bend.coarse_slope - bend.fine_slope) } else { 0.0 };
+            let clear = bend.at - share;
             for &i in used.iter().filter(|&&i| sorted[i].step.ln() <= clear) {
                 excluded[i] = Some(Exclusion::RoundOffFloor);
             }
