@@ -742,6 +742,22 @@ mod tests {
     }
 
     #[test]
+    fn a_few_points_bent_by_round_off_do_not_decide_over_the_many_above() {
+        // A tenth of the finest error is noise, and nothing levels off: an exit velocity that is nearly exact.
+        for seed in 0..400 {
+            let mut noise = Noise(seed);
+            let points: Vec<_> = noise
+                .steps(60, 1e-2, 3.0)
+                .into_iter()
+                .map(|h| StepError::new(h, 0.1 * h * h + 1e-12 * noise.normal()))
+                .collect();
+            let fit = fit(&points).unwrap();
+            assert_eq!(fit.verdict(2.0), OrderVerdict::Pass, "{seed}: {:?}", fit.line);
+            assert!(fit.used() >= 30, "{seed}: {} of 60", fit.used());
+        }
+    }
+
+    #[test]
     fn an_error_that_levels_off_above_round_off_is_no_floor_and_fails() {
         // A method that converges to something else by one part in a million.
         let mut noise = Noise(6);
