@@ -257,7 +257,7 @@ fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {
             text(c.validation_uncertainty()),
         ])?;
     }
-    writer.into_inner().map_err(|error| error.into_error())
+    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
 fn text(report: &ExperimentsJson) -> String {

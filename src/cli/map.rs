@@ -92,13 +92,12 @@ impl MapArgs {
             }
             let figure =
                 plots_sweep::applicability_map(self.k, &sets).map_err(|error| failed(std::io::Error::other(error)))?;
-            let mut csv = String::from("level,I,N\n");
+            let mut csv = vec!["level,I,N".to_owned()];
             for line in &report.lines {
-                for (impact, geometry) in &line.points {
-                    csv.push_str(&format!("{},{impact},{geometry}\n", line.level));
-                }
+                csv.extend(line.points.iter().map(|(i, n)| format!("{},{i},{n}", line.level)));
             }
-            write_whole(path, csv.as_bytes()).map_err(failed)?;
+            csv.push(String::new());
+            write_whole(path, csv.join("\n").as_bytes()).map_err(failed)?;
             write_whole(&path.with_extension("svg"), figure.as_bytes()).map_err(failed)?;
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;

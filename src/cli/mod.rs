@@ -13,6 +13,7 @@ pub mod scene_json;
 pub mod schema;
 pub mod sensitivities;
 pub mod solve;
+pub mod stress;
 pub mod sweep;
 pub mod verify;
 
@@ -210,6 +211,8 @@ pub enum Command {
     Audit(audit::AuditArgs),
     /// The verification suite and its report.
     Verify(verify::VerifyArgs),
+    /// Numerical stability and event stress cases, and random scenes by the million.
+    Stress(stress::StressArgs),
     /// JSON schema of what a command prints.
     Schema(schema::SchemaArgs),
     /// Shell completion.
@@ -228,6 +231,7 @@ impl Command {
             Self::Experiments(_) => "experiments",
             Self::Audit(_) => "audit",
             Self::Verify(_) => "verify",
+            Self::Stress(_) => "stress",
             Self::Schema(_) => "schema",
             Self::Completions(_) => "completions",
         }
@@ -243,6 +247,7 @@ impl Command {
             Self::Experiments(args) => args.json,
             Self::Audit(args) => args.json,
             Self::Verify(args) => args.json,
+            Self::Stress(args) => args.json,
             _ => false,
         }
     }
@@ -258,6 +263,7 @@ impl Command {
             Self::Experiments(args) => args.run(),
             Self::Audit(args) => args.run(),
             Self::Verify(args) => args.run(),
+            Self::Stress(args) => args.run(),
             Self::Schema(args) => args.run(),
             Self::Completions(args) => args.run(),
         }

@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, converge, critical, experiments, map, output, solve, sweep};
+use super::{CliError, Exit, converge, critical, experiments, map, output, solve, stress, sweep};
 use crate::report::VerifyJson;
 
 /// Arguments of `schema`.
@@ -31,6 +31,8 @@ pub enum Documented {
     Experiments,
     /// `verify --json`, which is `report.json`.
     Verify,
+    /// `stress --json`.
+    Stress,
 }
 
 impl SchemaArgs {
@@ -47,6 +49,7 @@ impl SchemaArgs {
             Documented::Experiments => schema_for!(experiments::ExperimentsJson),
             Documented::Map => schema_for!(map::MapJson),
             Documented::Verify => schema_for!(VerifyJson),
+            Documented::Stress => schema_for!(stress::StressJson),
         };
         output::print_json(&schema).map_err(CliError::stdout)?;
         Ok(Exit::Success)

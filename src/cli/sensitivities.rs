@@ -85,20 +85,16 @@ impl SensitivitiesJson {
                 cell(&p.critical_velocity),
             ]);
         }
-        let mut text = String::from("\n");
-        for line in rows.to_string().lines() {
-            text.push_str(line.trim_end());
-            text.push('\n');
-        }
-        text.push_str(&match self.disagreement {
+        let mut lines = vec![String::new()];
+        lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.push(match self.disagreement {
             Some(difference) => {
-                format!("  dual numbers through taylor; {difference:.1e} from those through the closed form\n")
+                format!("  dual numbers through taylor; {difference:.1e} from those through the closed form")
             }
-            None => "  dual numbers through taylor; no closed form beside them\n".to_owned(),
+            None => "  dual numbers through taylor; no closed form beside them".to_owned(),
         });
-        for note in &self.notes {
-            text.push_str(&format!("  note: {note}\n"));
-        }
-        text
+        lines.extend(self.notes.iter().map(|note| format!("  note: {note}")));
+        lines.push(String::new());
+        lines.join("\n")
     }
 }

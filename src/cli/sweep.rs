@@ -319,10 +319,7 @@ pub(super) fn wrapped(text: &str, width: usize) -> String {
 /// Refuses a table that this program cannot write.
 fn refuse_parquet(path: &Path) -> Result<(), CliError> {
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
-        return Err(CliError::usage(
-            "sweep writes its table as CSV",
-            "name a .csv file; `penetrode batch` converts to .parquet in a build with `--features parquet`",
-        ));
+        return Err(CliError::usage(format!("{}: this build writes CSV only", path.display()), "name a .csv file"));
     }
     Ok(())
 }
@@ -433,7 +430,7 @@ fn csv_of(plan: &Plan, rows: &[Row]) -> std::io::Result<Vec<u8>> {
         ]);
         writer.write_record(&cells)?;
     }
-    writer.into_inner().map_err(|error| error.into_error())
+    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
 /// What a reader of standard error should know: bad and undecided rows, and H/d beyond the relation.

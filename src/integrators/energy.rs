@@ -36,6 +36,10 @@ const DRAG_LENGTHS_MAX: f64 = 1.0;
 /// Bound on the terms of w in a step. At one drag length the term 40 is below 1e-47, under any tolerance we have.
 const TERMS_MAX: u32 = 40;
 
+/// Least change of speed, over the speed, for which speed serves as the variable of time: two bits of the difference are
+/// lost there, and depth, with the singularity at least twice as far as the end, is no worse.
+const LEAST_FALL: f64 = 0.25;
+
 /// Coefficients of the series for time. A step then takes about a fifth of the radius of convergence at round-off.
 const TIME_ORDER: usize = 24;
 
@@ -293,13 +297,15 @@ struct Loss<S> {
 impl<S: Scalar> Loss<S> {
     /// The loss of `stage` in `problem`, whose impact speed is the unit of speed.
     fn of(stage: &Stage<S>, problem: &Problem<S>) -> Result<Self, IntegrationError> {
-        let per_mass = S::from_f64(fault!("energy-factor", 2.0, 1.0)).over(problem.mass);
-        // Divided twice: the square of a speed may leave the range of the number type where the quotient does not.
-        let relative = |force: S| (per_mass * force).over(problem.impact_speed).over(problem.impact_speed);
+        // Quotients throughout: neither 1/M nor the square of a speed may leave the range of the number type where the
+        // result does not.
+        let two = S::from_f64(fault!("energy-factor", 2.0, 1.0));
+        let per_mass = |coefficient: S| two * coefficient.over(problem.mass);
+        let relative = |force: S| per_mass(force).over(problem.impact_speed).over(problem.impact_speed);
         let loss = Self {
             steady: relative(stage.static_force),
             growing: relative(stage.stiffness),
-            drag: fault!("energy-drag", per_mass, S::one().over(problem.mass)) * stage.drag,
+            drag: fault!("energy-drag", per_mass(stage.drag), stage.drag.over(problem.mass)),
         };
         if [loss.steady, loss.growing, loss.drag].iter().all(|c| c.value().is_finite()) {
             Ok(loss)
@@ -311,6 +317,16 @@ impl<S: Scalar> Loss<S> {
     /// `-dw/dx` at depth `x`; proportional to the force, with the same sign.
     fn rate(&self, x: S, w: S) -> S {
         self.steady + self.growing * x + self.drag * w
+    }
+
+    /// Whether w has come to its limit -a/κ, so that no way however long changes it: behind a stop a target may be
+    /// millions of drag lengths thick, and before one a driven projectile reaches its terminal velocity.
+    fn is_settled(&self, x: S, w: S) -> bool {
+        let drag = self.drag.value().abs();
+        drag > 0.0
+            && self.growing.value() == 0.0
+            // The limit itself is met to the rounding of w, of κ w and of the sum.
+            && self.rate(x, w).value().abs() <= 4.0 * S::EPSILON * drag * w.value().abs()
     }
 
     /// `w(x + h) - w(x)` by the Taylor series at `x`, and the number of its terms.
@@ -377,13 +393,17 @@ impl<S: Scalar> Walk<S> {
     /// With a finite limit w is carried on to it through rest, else the walk ends at rest. A w of exactly zero at the
     /// limit is an arrival, not a rest before it.
     fn cross(&mut self, loss: &Loss<S>, limit: S, tolerance: f64, seek_rest: bool) -> Result<Option<S>, Fault> {
-        let longest = DRAG_LENGTHS_MAX / loss.drag.value();
+        let longest = DRAG_LENGTHS_MAX / loss.drag.value().abs();
         let mut rest = None;
         while self.depth.value() < limit.value() {
             if self.cost.steps >= STEPS_MAX {
                 return Err(Fault::Budget);
             }
             let (x, w) = (self.depth, self.w);
+            if limit.value().is_finite() && loss.is_settled(x, w) {
+                self.depth = limit;
+                break;
+            }
             let left = limit - x;
             let mut length = longest;
             if !limit.value().is_finite() {
@@ -394,6 +414,11 @@ impl<S: Scalar> Walk<S> {
             // The step is the difference of two depths as they are stored: their rounding does not add up on the way.
             let to = if last { limit } else { x + S::from_f64(length) };
             let h = to - x;
+            if h.value() <= 0.0 && !limit.value().is_finite() {
+                // Rest is nearer than depths can tell apart; the quotient carries its derivatives.
+                rest = Some(x + w.over(loss.rate(x, w)));
+                break;
+            }
 
             // Every term of the sum, and every part of the rate, is at most of this size.
             let (a, b, drag) = (loss.steady.value().abs(), loss.growing.value(), loss.drag.value());
@@ -426,8 +451,12 @@ impl<S: Scalar> Walk<S> {
     /// There is just one: once w falls it goes on falling. Newton's method, whose derivative is the equation itself,
     /// kept inside a bracket; its last step is taken in `S` and so carries derivatives and low parts along.
     fn root(&mut self, loss: &Loss<S>, x: S, w: S, h: S, negligible: f64) -> S {
-        let (mut low, mut high) = (S::zero(), h);
-        let mut at = h * w.over(w - self.w);
+        // Half as far again as rest can be: a step may be longer than that by any power of ten, more than 80 halvings
+        // mend. Without drag the first guess is the root.
+        let reach = loss.static_reach(x.value(), w.value());
+        let nearer = |bound: f64| if bound < h.value() { S::from_f64(bound) } else { h };
+        let (mut low, mut high) = (S::zero(), nearer(1.5 * reach));
+        let mut at = nearer(reach);
         for _ in 0..80 {
             let (change, terms) = loss.change(x, w, at, negligible);
             self.cost.force_evaluations += u64::from(terms);
@@ -481,6 +510,14 @@ impl<S: Scalar> Leg<S> {
             }
             let w = now.velocity * now.velocity;
             let rate = self.loss.rate(now.depth, w).value();
+            if rate > 0.0 && fall <= 0.0 {
+                // The last speed is reached before the end by round-off alone: what is left is flown at it. Going on in
+                // depth would close in on a rest that the walk does not have, without ever coming there.
+                if velocity.value() > 0.0 {
+                    now.time += (depth - now.depth).over(velocity);
+                }
+                break;
+            }
             // Speed is a variable only where it changes one way down to the end. A force that slows goes on slowing;
             // one that drives does so to the end if it still does there.
             let monotone = (rate > 0.0 && fall > 0.0) || (rate < 0.0 && fall < 0.0 && end_rate < 0.0);
@@ -488,7 +525,9 @@ impl<S: Scalar> Leg<S> {
             let v = now.velocity.value();
             let rate_slope = 2.0 * v * (self.loss.drag.value() - self.loss.growing.value() / rate);
             let speed_radius = (rate / rate_slope).abs();
-            let by_speed = monotone && (way <= 0.0 || speed_radius / fall.abs() > depth_radius / way);
+            // Nor where it hardly changes: the fall is a difference, and its lost digits would be those of the time.
+            let falls_much = fall.abs() > LEAST_FALL * v;
+            let by_speed = monotone && (way <= 0.0 || (falls_much && speed_radius / fall.abs() > depth_radius / way));
             let done = if by_speed {
                 self.step_in_speed(&mut now, velocity, speed_radius)
             } else if way > 0.0 {

@@ -206,6 +206,9 @@ impl Method {
     /// What `problem` let this method skip on `flight`, and why.
     pub fn explain(&self, problem: &Problem, flight: &Flight, detail: Detail) -> Vec<String> {
         let mut notes = flight.notes.clone();
+        if matches!(self, Self::Taylor(_)) {
+            notes.extend(Taylor::explain(problem, flight));
+        }
         for index in flight.stage + 1..problem.stages.len() {
             notes.push(format!(
                 "stage {index} was not built: the flight ended in stage {} at x = {} m, before {} m",
@@ -233,9 +236,6 @@ impl Method {
             notes.push("Jacobian not built: the method is explicit or needs none".to_owned());
         }
         notes.push("sensitivities not computed: not asked for".to_owned());
-        if matches!(self, Self::ClosedForm(_)) {
-            notes.push("nothing integrated: every stage on the way has a closed form".to_owned());
-        }
         notes
     }
 

@@ -4,10 +4,13 @@
 
 #[cfg(feature = "diffsol")]
 pub mod adaptive;
+pub mod batch;
 pub mod central_difference;
 pub mod closed_form;
 #[cfg(feature = "diffsol")]
 pub mod diffsol;
+#[cfg(feature = "diffsol")]
+pub mod diffsol_sensitivity;
 pub mod energy;
 pub mod locate;
 pub mod method;

@@ -312,9 +312,10 @@ fn drag_time(stage: &Stage, mass: f64, xi: f64, decay: &Decay, v0: f64, v: f64) 
     }
     let tau = 2.0 * xi * decay.mean / (v + v0 * decay.end);
     if p > 0.0 {
-        return tau * atan_over(fault!("tunnel-time", p * q, p).sqrt() * tau / mass);
+        // Two roots: the product of small forces and drags underflows where the quotient by the mass does not.
+        return tau * atan_over(fault!("tunnel-time", p.sqrt() * q.sqrt(), p.sqrt()) * tau / mass);
     }
-    let rate = (-p * q).sqrt() / mass;
+    let rate = (-p).sqrt() * q.sqrt() / mass;
     let z = rate * tau;
     if z < 0.5 {
         return tau * atanh_over(z);

@@ -362,6 +362,15 @@ fn outright(stages: &[Stage], exit_depth: f64) -> Result<Stages, ResolveError> {
         admit("a stage's stiffness s [N/m]", stage.stiffness, Range::NotNegative)?;
         admit("a stage's viscosity r [kg/s]", stage.viscosity, Range::NotNegative)?;
         admit("a stage's drag q [kg/m]", stage.drag, Range::NotNegative)?;
+        // A subnormal number has lost digits already, and any product with it loses more.
+        for (quantity, value) in [
+            ("a stage's static force p [N]", stage.static_force),
+            ("a stage's stiffness s [N/m]", stage.stiffness),
+            ("a stage's viscosity r [kg/s]", stage.viscosity),
+            ("a stage's drag q [kg/m]", stage.drag),
+        ] {
+            representable(quantity, value, true)?;
+        }
         // Written so that a NaN is caught, and so is any stage behind one without an end.
         if !(stage.end >= previous && previous.is_finite()) {
             return Err(ResolveError::StageEndsFall { stage: index, end: stage.end, previous });
@@ -396,6 +405,7 @@ impl Scene {
     pub fn resolve(&self, impact_speed: f64) -> Result<Problem, ResolveError> {
         admit("the impact speed V0 [m/s]", impact_speed, Range::NotNegative)?;
         admit("the mass M [kg]", self.mass, Range::Positive)?;
+        representable("the mass M [kg]", self.mass, false)?;
         let exit_depth = self.exit_depth()?;
         let (stages, crater, target) = match &self.resistance {
             Resistance::Stages(stages) => (outright(stages, exit_depth)?, None, Target::Stages),

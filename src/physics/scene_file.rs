@@ -1061,7 +1061,7 @@ velocity = 300
         assert_eq!((problem.target, problem.crater), (Target::Stages, Some(0)));
         assert_eq!(problem.stages.iter().map(|stage| stage.end).collect::<Vec<_>>(), [0.1, 0.12, 0.2, f64::INFINITY]);
         assert_relative_eq!(problem.exit_depth, 0.4, max_relative = 1e-15);
-        let (_, text) = SHIPPED.last().unwrap();
+        let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
         let gap = text.replace("25 MPa", "0 MPa").replace("thickness = \"200 mm\"\n", "S = 10\nviscosity = 5\n");
         let scene = read(&gap.replace("velocity = \"250 m/s\"", "velocity = 1"));
         let concrete = scene.concrete().unwrap();
@@ -1441,7 +1441,7 @@ velocity = 300
 
     #[test]
     fn only_the_last_layer_goes_without_a_thickness_and_the_sum_is_finite() {
-        let (_, text) = SHIPPED.last().unwrap();
+        let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
         let error = refuse(&text.replace("thickness = \"80 mm\"\n", ""));
         assert_eq!(error.message, "[[target.layer]] has no `thickness`");
         assert_eq!(error.place.unwrap().line, 16);
@@ -1451,7 +1451,7 @@ velocity = 300
 
     #[test]
     fn a_static_factor_of_the_scene_holds_for_layers_without_their_own() {
-        let (_, text) = SHIPPED.last().unwrap();
+        let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
         let scene = read(&text.replace("k = 2.0", "k = 2.0\nS = 9.0").replacen("density", "S = 7.0\ndensity", 1));
         let factors: Vec<_> = scene.concrete().unwrap().layers.iter().map(|layer| layer.static_factor).collect();
         assert_eq!(factors, [7.0, 9.0, 9.0]);

@@ -11,19 +11,23 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use thiserror::Error;
 
-use super::text::{number, power_of_ten};
+use super::text::{number, one_line, power_of_ten};
 
 /// Units of the drawing per unit shown.
 const FINE: i32 = 4;
 /// Width of a panel [px at full size]; it fits a phone of 375 px.
-pub const WIDTH: u32 = 344;
-/// Height of a panel, unless it says otherwise.
-pub const HEIGHT: u32 = 270;
+pub const WIDTH: i32 = 344;
+/// Radius of a point, unless it says otherwise [px].
+pub const RADIUS: f64 = 2.75;
+/// Height of a panel, unless it says otherwise [px].
+pub const HEIGHT: i32 = 270;
 
 const LEFT: i32 = 44;
 const RIGHT: i32 = 10;
 const TOP: i32 = 44;
 const BOTTOM: i32 = 38;
+/// What a panel is higher than its diagram [px].
+pub const MARGINS: i32 = TOP + BOTTOM;
 /// Widths of lines [units of the drawing]. They tell dashed lines from the others, which plotters' drawing does not.
 const SOLID: u32 = 7;
 const DASHED: u32 = 5;
@@ -147,12 +151,18 @@ impl Axis {
         Self { label: label.into(), scale: Scale::Log, range: [low / 1.5, high * 1.5], numbered: true }
     }
 
-    /// Place on the axis.
-    fn place(&self, value: f64) -> f64 {
+    /// Place on the axis: the value, or its decimal logarithm.
+    pub fn place(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
             Scale::Log => value.max(f64::MIN_POSITIVE).log10(),
         }
+    }
+
+    /// `value` as a share of the axis, 0 to 1 on it.
+    pub fn share(&self, value: f64) -> f64 {
+        let [low, high] = self.places();
+        (self.place(value) - low) / (high - low)
     }
 
     fn places(&self) -> [f64; 2] {
@@ -232,8 +242,10 @@ pub enum Mark {
         shape: Shape,
         /// Whether only the outline is drawn.
         hollow: bool,
+        /// Radius [px].
+        radius: f64,
     },
-    /// A shaded polygon.
+    /// A shaded polygon, behind the grid.
     Area {
         /// Its corners.
         points: Vec<(f64, f64)>,
@@ -253,7 +265,16 @@ pub enum Mark {
     },
 }
 
-/// An entry of the legend, at the lower right of a panel.
+/// Where the legend of a panel stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KeyPlace {
+    /// In the lower right corner, one below the other.
+    Corner,
+    /// Above the diagram, side by side.
+    Head,
+}
+
+/// An entry of the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Key {
     /// Text.
@@ -281,8 +302,10 @@ pub struct Panel {
     pub marks: Vec<Mark>,
     /// Legend.
     pub keys: Vec<Key>,
+    /// Where the legend stands.
+    pub key_place: KeyPlace,
     /// Height [px at full size].
-    pub height: u32,
+    pub height: i32,
 }
 
 /// plotters could not draw.
@@ -313,11 +336,11 @@ impl Panel {
 
     /// View box of the drawing.
     pub fn view_box(&self) -> String {
-        format!("0 0 {} {}", WIDTH * FINE as u32, self.height * FINE as u32)
+        format!("0 0 {} {}", WIDTH * FINE, self.height * FINE)
     }
 
     fn draw_on(&self, drawing: &mut String) -> Drawn {
-        let size = (WIDTH * FINE as u32, self.height * FINE as u32);
+        let size = ((WIDTH * FINE).unsigned_abs(), (self.height * FINE).unsigned_abs());
         let root = SVGBackend::with_string(drawing, size).into_drawing_area();
         let [x0, x1] = self.x.places();
         let [y0, y1] = self.y.places();
@@ -336,7 +359,7 @@ impl Panel {
                 chart.draw_series([Polygon::new(corners, ink.rgb())])?;
             }
         }
-        let grid = Ink::Grid.rgb().stroke_width(FINE as u32);
+        let grid = Ink::Grid.rgb().stroke_width(FINE.unsigned_abs());
         let lines = |at: &[f64], upright: bool| -> Vec<_> {
             at.iter()
                 .map(|&t| PathElement::new(if upright { [(t, y0), (t, y1)] } else { [(x0, t), (x1, t)] }, grid))
@@ -344,7 +367,7 @@ impl Panel {
         };
         chart.draw_series(lines(&x_ticks, true))?;
         chart.draw_series(lines(&y_ticks, false))?;
-        let height = self.height as i32;
+        let height = self.height;
         let pixel = |chart: &Chart<'_, '_>, at: (f64, f64)| chart.backend_coord(&at);
         for &tick in &x_ticks {
             let (x, _) = pixel(&chart, (tick, y0));
@@ -356,16 +379,18 @@ impl Panel {
             let at = ((LEFT - 6) * FINE, y);
             write_text(&root, at, &self.y.tick_label(tick), TEXT, Ink::Muted, (HPos::Right, VPos::Center))?;
         }
-        let axis = Ink::Muted.rgb().stroke_width(FINE as u32);
+        let axis = Ink::Muted.rgb().stroke_width(FINE.unsigned_abs());
         chart.draw_series([PathElement::new(vec![(x0, y0), (x1, y0)], axis)])?;
-        for mark in &self.marks {
+        // Texts last: nothing is drawn over them.
+        let (texts, others): (Vec<_>, Vec<_>) = self.marks.iter().partition(|mark| matches!(mark, Mark::Text { .. }));
+        for mark in others.into_iter().chain(texts) {
             self.draw_mark(&mut chart, &root, mark)?;
         }
         self.draw_keys(&root)?;
         let start = (HPos::Left, VPos::Top);
         write_text(&root, (2 * FINE, 2 * FINE), &self.title, TITLE, Ink::Text, start)?;
         write_text(&root, (2 * FINE, 22 * FINE), &self.y.label, TEXT, Ink::Muted, start)?;
-        let end = ((WIDTH as i32 - RIGHT) * FINE, (height - 15) * FINE);
+        let end = ((WIDTH - RIGHT) * FINE, (height - 15) * FINE);
         write_text(&root, end, &self.x.label, TEXT, Ink::Muted, (HPos::Right, VPos::Top))?;
         root.present()
     }
@@ -384,10 +409,10 @@ impl Panel {
                 let path: Vec<_> = points.iter().map(|p| self.place(*p)).collect();
                 chart.draw_series([PathElement::new(path, style)])?;
             }
-            Mark::Points { points, ink, shape, hollow } => {
+            Mark::Points { points, ink, shape, hollow, radius } => {
                 for point in points {
                     let at = chart.backend_coord(&self.place(*point));
-                    draw_point(root, at, *ink, *shape, *hollow)?;
+                    draw_point(root, at, *ink, *shape, *hollow, *radius)?;
                 }
             }
             Mark::Text { at, text, ink, anchor } => {
@@ -405,31 +430,43 @@ impl Panel {
 
     fn draw_keys(&self, root: &Area<'_>) -> Drawn {
         const LINE: i32 = 16;
-        let right = WIDTH as i32 - RIGHT - 8;
-        for (index, key) in self.keys.iter().enumerate() {
-            let y = (self.height as i32 - BOTTOM - 12 - LINE * (self.keys.len() - 1 - index) as i32) * FINE;
+        let mut right = WIDTH - RIGHT - if self.key_place == KeyPlace::Corner { 8 } else { 4 };
+        for (index, key) in self.keys.iter().rev().enumerate() {
+            let y = match self.key_place {
+                KeyPlace::Corner => self.height - BOTTOM - 12 - LINE * whole(index),
+                KeyPlace::Head => 28,
+            } * FINE;
             let middle = (HPos::Right, VPos::Center);
-            write_text(root, ((right - 14) * FINE, y), &key.text, TEXT, Ink::Text, middle)?;
+            write_text(root, ((right - 12) * FINE, y), &key.text, TEXT, Ink::Text, middle)?;
             match key.shape {
-                Some(shape) => draw_point(root, (right * FINE - 2 * FINE, y), key.ink, shape, key.hollow)?,
+                Some(shape) => draw_point(root, (right * FINE, y), key.ink, shape, key.hollow, RADIUS)?,
                 None => root.draw(&PathElement::new(
-                    vec![((right - 9) * FINE, y), ((right + 4) * FINE, y)],
+                    vec![((right - 8) * FINE, y), ((right + 4) * FINE, y)],
                     key.ink.rgb().stroke_width(SOLID),
                 ))?,
+            }
+            if self.key_place == KeyPlace::Head {
+                // Letters of this size are six units wide on average.
+                right -= 30 + 6 * whole(key.text.chars().count());
             }
         }
         Ok(())
     }
 }
 
-fn draw_point(root: &Area<'_>, (x, y): (i32, i32), ink: Ink, shape: Shape, hollow: bool) -> Drawn {
-    const R: i32 = 11;
+/// A count as a number of pixels.
+fn whole(count: usize) -> i32 {
+    i32::try_from(count).unwrap_or(i32::MAX)
+}
+
+fn draw_point(root: &Area<'_>, (x, y): (i32, i32), ink: Ink, shape: Shape, hollow: bool, radius: f64) -> Drawn {
+    let r = (radius * f64::from(FINE)).round() as i32;
     let outline = ink.rgb().stroke_width(OUTLINE);
     let corners = match shape {
-        Shape::Circle if hollow => return root.draw(&Circle::new((x, y), R, outline)),
-        Shape::Circle => return root.draw(&Circle::new((x, y), R, ink.rgb().filled())),
-        Shape::Square => vec![(x - R, y - R), (x + R, y - R), (x + R, y + R), (x - R, y + R)],
-        Shape::Triangle => vec![(x, y - R - 3), (x + R + 2, y + R - 2), (x - R - 2, y + R - 2)],
+        Shape::Circle if hollow => return root.draw(&Circle::new((x, y), r, outline)),
+        Shape::Circle => return root.draw(&Circle::new((x, y), r, ink.rgb().filled())),
+        Shape::Square => vec![(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)],
+        Shape::Triangle => vec![(x, y - r - 3), (x + r + 2, y + r - 2), (x - r - 2, y + r - 2)],
     };
     if hollow {
         let closed: Vec<_> = corners.iter().chain(corners.first()).copied().collect();
@@ -454,7 +491,7 @@ fn write_text(
     let style = TextStyle::from(FontDesc::new(FontFamily::SansSerif, size, weight))
         .color(&colour)
         .pos(Pos::new(horizontal, vertical));
-    root.draw(&Text::new(text.to_owned(), at, style))
+    root.draw(&Text::new(one_line(text), at, style))
 }
 
 /// The elements inside plotters' `svg`, colours named by class as well, without what says nothing.

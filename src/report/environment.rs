@@ -62,7 +62,7 @@ impl Environment {
                 .collect(),
             lock_file_hash: hash(LOCK_FILE),
             suite_hash: hash(&suite.text),
-            scenes_hash: hash(&suite.scenes.iter().map(|scene| format!("{scene:?}\n")).collect::<String>()),
+            scenes_hash: hash(&format!("{:?}", suite.scenes.iter().collect::<Vec<_>>())),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             floating_point: floating_point(),
@@ -116,7 +116,7 @@ fn utc_now() -> String {
 
 /// Seconds since 1970 as `YYYY-MM-DDThh:mm:ssZ`, proleptic Gregorian (Fliegel and Van Flandern 1968).
 fn utc(seconds: u64) -> String {
-    let (days, rest) = ((seconds / 86_400) as i64, seconds % 86_400);
+    let (days, rest) = ((seconds / 86_400).cast_signed(), seconds % 86_400);
     let l = days + 2_440_588 + 68_569;
     let n = 4 * l / 146_097;
     let l = l - (146_097 * n + 3) / 4;

@@ -33,9 +33,10 @@ impl<'a> Family<'a> {
         Counts::of(self.members.iter().map(|j| j.verdict))
     }
 
-    /// The gravest of what became of them.
+    /// The gravest of what became of them; skipped only where all were.
     pub fn verdict(&self) -> Verdict {
-        self.members.iter().map(|j| j.verdict).max().unwrap_or(Verdict::Skipped)
+        let counts = self.counts();
+        if counts.skipped == self.members.len() { Verdict::Skipped } else { counts.verdict() }
     }
 
     /// The largest measured value.

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 
 use super::chart::{DrawError, Ink, Panel, WIDTH};
 use super::table::Table;
+use super::text::one_line;
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
 /// Space around panels in a file [px].
-const GAP: u32 = 16;
+const GAP: i32 = 16;
 /// Height of a line of the message in a file [px].
-const LINE: u32 = 22;
+const LINE: i32 = 22;
 
 /// The part of the report that shows a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -84,34 +85,35 @@ impl Drawn {
     /// The figure as a file of its own, light or dark as the viewer asks.
     pub fn file(&self) -> String {
         let columns = self.figure.panels.len().clamp(1, COLUMNS);
-        let width = columns as u32 * (WIDTH + GAP) + GAP;
+        let width = (0..columns).fold(GAP, |width, _| width + WIDTH + GAP);
         let message = wrapped(&self.figure.message, (width - 2 * GAP) as usize / 8);
-        let head = GAP + LINE * message.len() as u32 + GAP / 2;
+        let head = message.iter().fold(GAP + GAP / 2, |head, _| head + LINE);
         let mut body = String::new();
         let mut y = head;
         for row in (0..self.panels.len()).collect::<Vec<_>>().chunks(columns) {
-            let mut height = 0;
-            for (column, &index) in row.iter().enumerate() {
+            let (mut x, mut height) = (GAP, 0);
+            for &index in row {
                 let panel = &self.figure.panels[index];
-                let _ = write!(
+                let _ = writeln!(
                     body,
-                    "<svg x=\"{}\" y=\"{y}\" width=\"{WIDTH}\" height=\"{}\" viewBox=\"{}\">\n{}</svg>\n",
-                    GAP + column as u32 * (WIDTH + GAP),
+                    "<svg x=\"{x}\" y=\"{y}\" width=\"{WIDTH}\" height=\"{}\" viewBox=\"{}\">\n{}</svg>",
                     panel.height,
                     panel.view_box(),
                     self.panels[index]
                 );
+                x += WIDTH + GAP;
                 height = height.max(panel.height);
             }
             y += height + GAP;
         }
         let mut title = String::new();
-        for (line, text) in message.iter().enumerate() {
-            let _ = write!(
+        let mut line = GAP - 8;
+        for text in &message {
+            line += LINE;
+            let _ = writeln!(
                 title,
-                "<text x=\"{GAP}\" y=\"{}\" font-size=\"15\" font-weight=\"bold\" fill=\"#1C222A\" \
-                 class=\"f-text\">{}</text>\n",
-                GAP + LINE * (line as u32 + 1) - 8,
+                "<text x=\"{GAP}\" y=\"{line}\" font-size=\"15\" font-weight=\"bold\" fill=\"#1C222A\" \
+                 class=\"f-text\">{}</text>",
                 escape(text)
             );
         }
@@ -122,7 +124,9 @@ impl Drawn {
              <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y}\" viewBox=\"0 0 {width} {y}\" \
              role=\"img\" aria-labelledby=\"t d\" font-family=\"system-ui, 'Segoe UI', Roboto, sans-serif\">\n\
              <title id=\"t\">{}</title>\n<desc id=\"d\">{}</desc>\n\
-             <style>{}.paper{{fill:#fff}}@media screen and (prefers-color-scheme:dark){{.paper{{fill:#161a20}}}}</style>\n\
+             <style>{}:root{{--paper:#fff}}.paper{{fill:var(--paper)}}\
+             svg svg text{{paint-order:stroke;stroke:var(--paper);stroke-width:12px;stroke-linejoin:round}}\
+             @media screen and (prefers-color-scheme:dark){{:root{{--paper:#161a20}}}}</style>\n\
              <rect width=\"{width}\" height=\"{y}\" fill=\"#fff\" class=\"paper\"/>\n{title}{body}</svg>\n",
             escape(&self.figure.message),
             escape(&descriptions.join(" ")),
@@ -131,10 +135,10 @@ impl Drawn {
     }
 }
 
-/// `text` for XML and HTML, in elements and attributes.
-pub fn escape(text: &str) -> String {
+/// `text` on one line for XML and HTML, in elements and attributes.
+fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in one_line(text).chars() {
         match c {
             '&' => escaped.push_str("&amp;"),
             '<' => escaped.push_str("&lt;"),

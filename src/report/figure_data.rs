@@ -11,13 +11,11 @@ const INTERVALS: u32 = 60;
 ///
 /// From the closed form; where there is none, every step of the Taylor series. `None` when neither flies it.
 pub fn path_of(problem: &Problem) -> Option<(Vec<Sample>, Flight)> {
-    match ClosedForm.fly(problem, Detail::Events) {
-        Ok(flight) => Some((dense(problem, &flight)?, flight)),
-        Err(_) => {
-            let flight = Taylor::default().fly(problem, Detail::Trajectory).ok()?;
-            Some((flight.trajectory.clone(), flight))
-        }
+    if let Ok(flight) = ClosedForm.fly(problem, Detail::Events) {
+        return Some((dense(problem, &flight)?, flight));
     }
+    let flight = Taylor::default().fly(problem, Detail::Trajectory).ok()?;
+    Some((flight.trajectory.clone(), flight))
 }
 
 /// Impact, parts of the way between events, and the events. Towards its end each way is told in ever shorter parts:

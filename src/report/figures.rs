@@ -6,15 +6,15 @@
 use std::f64::consts::FRAC_PI_4;
 
 use super::Run;
-use super::chart::{Anchor, Axis, HEIGHT, Ink, Key, Mark, Panel, Scale, Shape};
+use super::chart::{Anchor, Axis, HEIGHT, Ink, Key, KeyPlace, MARGINS, Mark, Panel, RADIUS, Scale, Shape};
 use super::families::Family;
 use super::figure::{Figure, Part};
 use super::figure_data::path_of;
 use super::table::{Table, or_empty};
 use super::text::{count, number};
-use crate::integrators::{Boundaries, VelocityAt};
+use crate::integrators::{Boundaries, Sample, VelocityAt};
 use crate::physics::semi_empirical::{depth_ratio, model_difference};
-use crate::physics::{EventKind, Problem};
+use crate::physics::{EventKind, Outcome, Problem};
 use crate::studies::Quantity;
 use crate::studies::order::{Exclusion, FittedPoint, OrderFit};
 use crate::suite::claim::StepPattern;
@@ -62,7 +62,11 @@ fn ink_of(verdict: Verdict) -> Ink {
 fn message<'a>(judged: impl IntoIterator<Item = &'a Judged>, subject: &str, good: &str, bad: &str) -> String {
     let judged: Vec<_> = judged.into_iter().collect();
     let not = judged.iter().filter(|j| j.verdict != Verdict::Passed).count();
-    if not == 0 { format!("{subject} {good}") } else { format!("{subject}: {not} of {} {bad}", judged.len()) }
+    if not == 0 {
+        format!("{subject} {good}")
+    } else {
+        format!("{subject} {bad} ({not} of {})", count(judged.len(), "claim"))
+    }
 }
 
 fn reason_of(excluded: Option<Exclusion>) -> &'static str {
@@ -75,19 +79,19 @@ fn reason_of(excluded: Option<Exclusion>) -> &'static str {
 }
 
 /// The points of a fit as marks: hollow where excluded. Errors of zero have no place on a logarithmic axis.
-fn points_of(fit: &OrderFit, ink: Ink, shape: Shape) -> [Mark; 2] {
+fn points_of(fit: &OrderFit, ink: Ink, shape: Shape, radius: f64) -> [Mark; 2] {
     let chosen = |used: bool| -> Vec<(f64, f64)> {
         let wanted = |p: &&FittedPoint| p.used == used && p.error != 0.0;
         fit.points.iter().filter(wanted).map(|p| (p.step, p.error.abs())).collect()
     };
     [
-        Mark::Points { points: chosen(false), ink, shape, hollow: true },
-        Mark::Points { points: chosen(true), ink, shape, hollow: false },
+        Mark::Points { points: chosen(false), ink, shape, hollow: true, radius },
+        Mark::Points { points: chosen(true), ink, shape, hollow: false, radius },
     ]
 }
 
 /// The ways through the fits' axes below which an error is round-off: its own estimate, `eps` times the steps.
-fn floor(x: &Axis, y: &Axis, coarsest: f64) -> Option<Mark> {
+fn floor(x: &Axis, y: &Axis, coarsest: f64) -> Option<[Mark; 2]> {
     let size = |step: f64| f64::EPSILON * coarsest / step;
     let bottom = y.range[0];
     if size(x.range[0]) <= bottom {
@@ -96,25 +100,82 @@ fn floor(x: &Axis, y: &Axis, coarsest: f64) -> Option<Mark> {
     // Where the floor falls below the panel.
     let end = (f64::EPSILON * coarsest / bottom).min(x.range[1]);
     let points = vec![(x.range[0], bottom), (x.range[0], size(x.range[0])), (end, size(end)), (end, bottom)];
-    Some(Mark::Area { points, ink: Ink::Shade })
+    let at = (x.range[0] * (x.range[1] / x.range[0]).powf(0.02), bottom * (y.range[1] / bottom).powf(0.04));
+    Some([
+        Mark::Area { points, ink: Ink::Shade },
+        Mark::Text { at, text: "round-off".into(), ink: Ink::Muted, anchor: Anchor::Start },
+    ])
 }
 
-/// A reference line of slope `slope` through `(x, y)` as far as the panel goes, with its name on its upper side.
-fn reference(slope: f64, (x, y): (f64, f64), x_axis: &Axis, y_axis: &Axis, name: String) -> [Mark; 2] {
-    let at = |step: f64| y * (step / x).powf(slope);
-    let back = |error: f64| x * (error / y).powf(1.0 / slope);
-    let low = if y_axis.scale == Scale::Log { x_axis.range[0].max(back(y_axis.range[0])) } else { x_axis.range[0] };
-    let high = x_axis.range[1].min(back(y_axis.range[1]));
-    let label = low * (high / low).powf(0.45);
-    [
-        Mark::Line { points: vec![(low, at(low)), (high, at(high))], ink: Ink::Muted, dashed: true },
-        Mark::Text {
-            at: (label * (x_axis.range[1] / x_axis.range[0]).powf(-0.02), at(label) * 1.6),
-            text: name,
+/// A line of slope `slope` through a point, as far as the panel of two logarithmic axes goes, and its name.
+struct Reference {
+    slope: f64,
+    through: (f64, f64),
+    name: String,
+}
+
+impl Reference {
+    fn at(&self, x: f64) -> f64 {
+        self.through.1 * (x / self.through.0).powf(self.slope)
+    }
+
+    fn ends(&self, x: &Axis, y: &Axis) -> [f64; 2] {
+        let back = |error: f64| self.through.0 * (error / self.through.1).powf(1.0 / self.slope);
+        [x.range[0].max(back(y.range[0])), x.range[1].min(back(y.range[1]))]
+    }
+}
+
+/// The lines, each with its name beside it where no point and no other line is.
+fn references(lines: &[Reference], points: &[(f64, f64)], x: &Axis, y: &Axis) -> Vec<Mark> {
+    /// Size of a name and its distance from its line, as shares of the panel.
+    const WIDTH: f64 = 0.17;
+    const HEIGHT: f64 = 0.07;
+    const GAP: f64 = 0.015;
+    let mut marks = Vec::new();
+    for (index, line) in lines.iter().enumerate() {
+        let [low, high] = line.ends(x, y);
+        marks.push(Mark::Line {
+            points: vec![(low, line.at(low)), (high, line.at(high))],
             ink: Ink::Muted,
-            anchor: Anchor::End,
-        },
-    ]
+            dashed: true,
+        });
+        let width = WIDTH * line.name.chars().count() as f64 / 7.0;
+        let along = |share: f64| low * (high / low).powf(share);
+        let others = lines.iter().enumerate().filter(|(other, _)| *other != index);
+        let obstacles: Vec<(f64, f64)> = points
+            .iter()
+            .copied()
+            .chain(
+                others
+                    .flat_map(|(_, other)| (0..100).map(move |i| along(f64::from(i) / 99.0)).map(|x| (x, other.at(x)))),
+            )
+            .map(|(px, py)| (x.share(px), y.share(py)))
+            .collect();
+        // Above the line to the left of the place, or below it to the right: the line rises.
+        let places = (1..18).flat_map(|i| [(f64::from(i) * 0.05, true), (f64::from(i) * 0.05, false)]);
+        let crowd = |(share, above): (f64, bool)| {
+            let (u, v) = (x.share(along(share)), y.share(line.at(along(share))));
+            let (left, bottom) = if above { (u - width, v + GAP) } else { (u, v - GAP - HEIGHT) };
+            let inside = left >= 0.0 && left + width <= 1.0 && bottom >= 0.0 && bottom + HEIGHT <= 1.0;
+            let hits = obstacles
+                .iter()
+                .filter(|(ou, ov)| {
+                    left - 0.02 < *ou && *ou < left + width + 0.02 && bottom - 0.02 < *ov && *ov < bottom + HEIGHT
+                })
+                .count();
+            if inside { hits } else { usize::MAX }
+        };
+        let Some((share, above)) = places.min_by_key(|place| crowd(*place)) else { continue };
+        let shift = (y.range[1] / y.range[0]).powf(GAP + 0.5 * HEIGHT);
+        let at = line.at(along(share));
+        marks.push(Mark::Text {
+            at: (along(share), if above { at * shift } else { at / shift }),
+            text: line.name.clone(),
+            ink: Ink::Muted,
+            anchor: if above { Anchor::End } else { Anchor::Start },
+        });
+    }
+    marks
 }
 
 /// The order claims of `scene` and `quantity` with equal steps.
@@ -189,7 +250,7 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
     // Single errors close to a change of sign lie decades below the others; they are drawn at the lower edge.
     let mut errors: Vec<f64> = points().map(|p| p.error.abs()).filter(|e| *e > 0.0).collect();
     errors.sort_by(f64::total_cmp);
-    let low = errors[errors.len() / 50].min(f64::EPSILON * coarsest / finest);
+    let low = errors[errors.len() / 50].min(0.03 * f64::EPSILON * coarsest / finest);
     let y = Axis::log("relative error", [low, largest * 6.0]);
     let mut table = Table::new([
         "velocity_rule",
@@ -209,13 +270,13 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
         if mine.is_empty() {
             continue;
         }
-        let mut marks: Vec<Mark> = floor(&x, &y, coarsest).into_iter().collect();
+        let mut marks: Vec<Mark> = floor(&x, &y, coarsest).into_iter().flatten().collect();
         let mut keys = Vec::new();
         let mut seen = Vec::new();
-        for slope in [1.0, 2.0] {
-            let name = format!("slope {slope}");
-            marks.extend(reference(slope, (coarsest, largest * 3.0), &x, &y, name));
-        }
+        let through = (coarsest, largest * 3.0);
+        let lines = [1.0, 2.0].map(|slope| Reference { slope, through, name: format!("slope {slope}") });
+        let errors = mine.iter().flat_map(|(_, _, fit)| fit.points.iter().map(|p| (p.step, p.error.abs())));
+        marks.extend(references(&lines, &errors.collect::<Vec<_>>(), &x, &y));
         for (index, boundaries) in
             [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed].into_iter().enumerate()
         {
@@ -223,7 +284,9 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
                 continue;
             };
             let (ink, shape) = (Ink::series(index), Shape::series(index));
-            marks.extend(points_of(fit, ink, shape));
+            // Smaller from series to series, so that one shows behind another where they coincide.
+            let radius = [4.0, 3.25, 2.0][index];
+            marks.extend(points_of(fit, ink, shape, radius));
             let observed = fit.line.map(|line| line.order);
             let shown = observed.map_or_else(|| "—".to_owned(), |order| format!("{order:.2}"));
             keys.push(Key { text: format!("{boundaries}: {shown}"), ink, shape: Some(shape), hollow: false });
@@ -250,11 +313,12 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
             y: y.clone(),
             marks,
             keys,
+            key_place: KeyPlace::Corner,
             height: HEIGHT + 20,
         });
     }
     let part = if matches!(quantity, Quantity::CraterEndTime) { Part::Events } else { Part::CodeVerification };
-    let subject = format!("Scene `{scene}`, {}", words_for(quantity));
+    let subject = format!("Scene {scene}: the error of the {}", words_for(quantity));
     Some(Figure {
         name: format!("error-{}-{}", quantity.name().replace('_', "-"), slug(scene)),
         part,
@@ -262,7 +326,7 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
             judged.iter().copied(),
             &subject,
             "falls with the formal order of each variant",
-            "variants miss their formal order",
+            "is not shown to fall with the formal order of every variant",
         ),
         reading:
             "Each point is one flight; step sizes have random ratios. Numbers beside the names are observed orders. \
@@ -282,8 +346,6 @@ fn slug(name: &str) -> String {
 
 /// Observed order with its interval beside the formal order, one row a family of claims.
 fn observed_orders(run: &Run<'_>) -> Option<Figure> {
-    const ROW: f64 = 1.0;
-    const ROW_HEIGHT: u32 = 34;
     let families = Family::all(run.judged);
     let order_of = |j: &Judged| fit_of(j).filter(|(_, _, fit)| fit.line.is_some()).map(|(_, formal, _)| formal);
     let is_order = |j: &Judged| {
@@ -311,71 +373,22 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             .map(|f| (f, f.members.iter().filter(|j| is_order(j) && order_of(j) == Some(formal)).collect::<Vec<_>>()))
             .filter(|(_, members)| !members.is_empty())
             .collect();
-        let mut reach = 0.3_f64;
-        let mut marks = Vec::new();
-        let mut top = Vec::new();
-        for (row, (family, members)) in rows.iter().enumerate() {
-            let y = -(row as f64) * ROW;
-            let limit = family.first().claim.limit.min(1.0);
-            let (low, high) = (formal - limit, formal + limit);
-            let points = vec![(low, y - 0.42), (low, y - 0.02), (high, y - 0.02), (high, y - 0.42)];
-            marks.push(Mark::Area { points, ink: Ink::Shade });
-            reach = reach.max(limit);
-            for (index, judged) in members.iter().enumerate() {
-                let Some((_, _, fit)) = fit_of(judged) else { continue };
-                let Some(line) = fit.line else { continue };
-                // Spread over the height of the row: members lie on top of each other else.
-                let share = if members.len() < 2 { 0.5 } else { index as f64 / (members.len() - 1) as f64 };
-                let y = y - 0.08 - 0.28 * share;
-                let [low, high] = line.interval95;
-                let ink = ink_of(judged.verdict);
-                top.push(Mark::Line { points: vec![(low, y), (high, y)], ink, dashed: false });
-                top.push(Mark::Points { points: vec![(line.order, y)], ink, shape: Shape::Circle, hollow: false });
-                reach = reach.max((line.order - formal).abs().min(1.0) + 0.02);
-                all.push(*judged);
-                table.push([
-                    &judged.claim.id,
-                    &formal,
-                    &line.order,
-                    &low,
-                    &high,
-                    &judged.claim.limit,
-                    &fit.used(),
-                    &fit.points.len(),
-                    &judged.verdict.name(),
-                ]);
-            }
-            let text = format!("{} ({})", family.id, members.len());
-            top.push(Mark::Text { at: (formal - reach, y + 0.22), text, ink: Ink::Text, anchor: Anchor::Start });
+        for judged in rows.iter().flat_map(|(_, members)| members) {
+            let Some((line, fit)) = fit_of(judged).and_then(|(_, _, fit)| Some((fit.line?, fit))) else { continue };
+            all.push(*judged);
+            table.push([
+                &judged.claim.id,
+                &formal,
+                &line.order,
+                &line.interval95[0],
+                &line.interval95[1],
+                &judged.claim.limit,
+                &fit.used(),
+                &fit.points.len(),
+                &judged.verdict.name(),
+            ]);
         }
-        // Labels begin at the left edge, wherever that has come to lie.
-        let left = formal - reach * 1.05;
-        for mark in &mut top {
-            if let Mark::Text { at, .. } = mark {
-                at.0 = left;
-            }
-        }
-        let (bottom, height) = (-(rows.len() as f64) * ROW + 0.45, rows.len() as u32 * ROW_HEIGHT + 90);
-        marks.push(Mark::Line { points: vec![(formal, bottom), (formal, 0.0)], ink: Ink::Muted, dashed: true });
-        // An interval that leaves the panel ends at its edge.
-        let right = formal + reach * 1.05;
-        for mark in &mut top {
-            if let Mark::Line { points, .. } | Mark::Points { points, .. } = mark {
-                for point in points {
-                    point.0 = point.0.clamp(left, right);
-                }
-            }
-        }
-        marks.extend(top);
-        panels.push(Panel {
-            title: format!("formal order {formal}"),
-            description: format!("{}, each with its observed order and 95 % interval.", count(rows.len(), "row")),
-            x: Axis { label: "observed order".into(), scale: Scale::Linear, range: [left, right], numbered: true },
-            y: Axis { label: String::new(), scale: Scale::Linear, range: [bottom, 0.55], numbered: false },
-            marks,
-            keys: Vec::new(),
-            height,
-        });
+        panels.push(order_panel(formal, &rows));
     }
     if panels.is_empty() {
         return None;
@@ -387,7 +400,7 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             all.iter().copied(),
             "Observed orders",
             "are the formal ones, degraded orders included",
-            "are not shown to be the formal ones",
+            "are not all shown to be the formal ones",
         ),
         reading:
             "Each dot is one claim: the order of a least-squares fit, with its 95 % interval. The dashed line is the \
@@ -398,6 +411,67 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
         panels,
         table,
     })
+}
+
+/// Families of claims of one formal order, one below the other, each member on a line of its own.
+fn order_panel(formal: f64, rows: &[(&Family<'_>, Vec<&Judged>)]) -> Panel {
+    // Heights [px]: of a label, of a claim, between families.
+    const LABEL: f64 = 16.0;
+    const LINE: f64 = 4.0;
+    const GAP: f64 = 6.0;
+    let mut reach = 0.3_f64;
+    let mut marks = Vec::new();
+    let mut top = Vec::new();
+    // From the top edge downwards, one unit a pixel.
+    let mut y = 0.0;
+    for (family, members) in rows {
+        let height = LINE * members.len().max(2) as f64;
+        let limit = family.first().claim.limit.min(1.0);
+        let (low, high) = (formal - limit, formal + limit);
+        let text = format!("{} ({})", family.id, members.len());
+        top.push(Mark::Text { at: (f64::NEG_INFINITY, y - 0.5 * LABEL), text, ink: Ink::Text, anchor: Anchor::Start });
+        y -= LABEL;
+        let points = vec![(low, y - height), (low, y), (high, y), (high, y - height)];
+        marks.push(Mark::Area { points, ink: Ink::Shade });
+        top.push(Mark::Line { points: vec![(formal, y - height), (formal, y)], ink: Ink::Muted, dashed: true });
+        reach = reach.max(limit);
+        for (index, judged) in members.iter().enumerate() {
+            let Some((_, _, fit)) = fit_of(judged) else { continue };
+            let Some(line) = fit.line else { continue };
+            let y = y - height * (index as f64 + 0.5) / members.len() as f64;
+            let [low, high] = line.interval95;
+            let ink = ink_of(judged.verdict);
+            top.push(Mark::Line { points: vec![(low, y), (high, y)], ink, dashed: false });
+            let points = vec![(line.order, y)];
+            top.push(Mark::Points { points, ink, shape: Shape::Circle, hollow: false, radius: 2.0 });
+            reach = reach.max((line.order - formal).abs().min(1.0));
+        }
+        y -= height + GAP;
+    }
+    // What leaves the panel ends at its edge; labels begin there.
+    let (left, right) = (formal - reach * 1.05, formal + reach * 1.05);
+    for mark in &mut top {
+        match mark {
+            Mark::Line { points, .. } | Mark::Points { points, .. } => {
+                for point in points {
+                    point.0 = point.0.clamp(left, right);
+                }
+            }
+            Mark::Text { at, .. } => at.0 = left,
+            Mark::Area { .. } => {}
+        }
+    }
+    marks.extend(top);
+    Panel {
+        title: format!("formal order {formal}"),
+        description: format!("{}, each with its observed order and 95 % interval.", count(rows.len(), "row")),
+        x: Axis { label: "observed order".into(), scale: Scale::Linear, range: [left, right], numbered: true },
+        y: Axis { label: String::new(), scale: Scale::Linear, range: [y, 0.0], numbered: false },
+        marks,
+        keys: Vec::new(),
+        key_place: KeyPlace::Corner,
+        height: (-y) as i32 + MARGINS,
+    }
 }
 
 /// Error against tolerance, one panel a method.
@@ -419,13 +493,15 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
     methods.dedup();
     let mut panels = Vec::new();
     for method in methods {
-        let mut marks: Vec<Mark> = reference(1.0, (1.0, 1.0), &x, &y, "error = tolerance".to_owned()).into();
         let mut keys = Vec::new();
         let mine = judged.iter().filter(|j| j.claim.method == Some(method));
+        let shown = mine.clone().filter_map(|j| fit_of(j)).flat_map(|(_, _, fit)| &fit.points);
+        let line = Reference { slope: 1.0, through: (1.0, 1.0), name: "error = tolerance".into() };
+        let mut marks = references(&[line], &shown.map(|p| (p.step, p.error.abs())).collect::<Vec<_>>(), &x, &y);
         for (index, judged) in mine.enumerate() {
             let Some((_, _, fit)) = fit_of(judged) else { continue };
             let (ink, shape) = (Ink::series(index), Shape::series(index));
-            marks.extend(points_of(fit, ink, shape));
+            marks.extend(points_of(fit, ink, shape, RADIUS));
             let name = judged.claim.quantity.map_or("", Quantity::name);
             let slope = fit.line.map(|line| line.order);
             let shown = slope.map_or_else(|| "—".to_owned(), |slope| format!("{slope:.2}"));
@@ -452,6 +528,7 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
             y: y.clone(),
             marks,
             keys,
+            key_place: KeyPlace::Corner,
             height: HEIGHT,
         });
     }
@@ -462,7 +539,7 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
             judged.iter().copied(),
             "Errors",
             "fall in proportion to the tolerance",
-            "do not fall in proportion to the tolerance",
+            "are not all shown to fall in proportion to the tolerance",
         ),
         reading:
             "Each point is one flight. A method that keeps what is asked of it stays near the dashed line; a slope \
@@ -492,7 +569,7 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
         let at = |step: f64| constant.abs() * step;
         let mut marks =
             vec![Mark::Line { points: x.range.map(|step| (step, at(step))).to_vec(), ink: Ink::Orange, dashed: false }];
-        marks.extend(points_of(fit, Ink::Blue, Shape::Circle));
+        marks.extend(points_of(fit, Ink::Blue, Shape::Circle, RADIUS));
         let order = fit.line.map(|line| line.order);
         for point in &fit.points {
             table.push([&judged.claim.id, impact, &point.step, &point.error, &(constant * point.step), &point.used]);
@@ -521,6 +598,7 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
                     hollow: false,
                 },
             ],
+            key_place: KeyPlace::Corner,
             height: HEIGHT,
         });
         shown.push(judged);
@@ -537,7 +615,7 @@ fn approach(run: &Run<'_>) -> Option<Figure> {
             behind.iter().copied(),
             "Eq. 11-12",
             "is a limit, approached with order 1 in 1/N and with the predicted constant",
-            "claims on the approach to the limit do not hold",
+            "is not shown to be a limit with the predicted order and constant",
         ),
         reading:
             "Points: depth flown at finite N less Eq. 11-12. Line: the first term of the expansion in 1/N, not fitted."
@@ -583,7 +661,7 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
             let (ink, shape) = (Ink::series(keys.len()), Shape::series(keys.len()));
             let points: Vec<_> = points.into_iter().map(|(x, r)| (x * 1e3, r.abs().max(1e-17))).collect();
             all.extend(points.iter().copied());
-            marks.push(Mark::Points { points, ink, shape, hollow: false });
+            marks.push(Mark::Points { points, ink, shape, hollow: false, radius: RADIUS });
             keys.push(Key { text: method, ink, shape: Some(shape), hollow: false });
             limits.push(judged.claim.limit);
             behind.push(judged);
@@ -609,6 +687,7 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
             y,
             marks,
             keys,
+            key_place: KeyPlace::Head,
             height: HEIGHT,
         });
     }
@@ -622,7 +701,7 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
             behind.iter().copied(),
             "The kinetic energy lost",
             "is the work done, all along the path",
-            "flights lose other energy than the work done",
+            "is not the work done on every path",
         ),
         reading: "Each point is the end of a step: kinetic energy lost less the work of the force on the way, which is \
                   integrated apart from the method. Dashed: the limit of the claim. Residuals below 10⁻¹⁷ are drawn there."
@@ -669,7 +748,13 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
         });
         for judged in members {
             let points = vec![(shown(judged), y - 0.22)];
-            marks.push(Mark::Points { points, ink: ink_of(judged.verdict), shape: Shape::Circle, hollow: false });
+            marks.push(Mark::Points {
+                points,
+                ink: ink_of(judged.verdict),
+                shape: Shape::Circle,
+                hollow: false,
+                radius: RADIUS,
+            });
         }
     }
     let bottom = -(rows.len() as f64) + 0.45;
@@ -684,7 +769,8 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
         y: Axis { label: String::new(), scale: Scale::Linear, range: [bottom, 0.55], numbered: false },
         marks,
         keys: Vec::new(),
-        height: rows.len() as u32 * 40 + 90,
+        key_place: KeyPlace::Corner,
+        height: (-40.0 * bottom) as i32 + 90,
     };
     Some(Figure {
         name: "peer-differences".into(),
@@ -693,7 +779,7 @@ fn peers(run: &Run<'_>) -> Option<Figure> {
             behind.iter().copied(),
             "Other programs",
             "agree within their tolerance on every scene asked",
-            "flights differ by more than the limit",
+            "do not agree within their tolerance on every scene asked",
         ),
         reading:
             "Each dot is one scene: the largest difference of any quantity, divided by its conditioning and by the \
@@ -712,14 +798,22 @@ fn label_of_peer(name: &str, members: &[&Judged]) -> String {
     }
 }
 
+/// What is drawn over time: its name with its unit, the units in one of SI, and the number.
+type Curve = (&'static str, f64, fn(&Sample) -> f64);
+
 /// Depth, velocity and force over time, events marked: one scene that stops in the tunnel and one that perforates.
 fn paths(run: &Run<'_>) -> Option<Figure> {
     let mut table = Table::new(["scene", "time_s", "depth_m", "velocity_m_s", "force_n", "stage"]);
     let mut panels = Vec::new();
     let mut seen: Vec<bool> = Vec::new();
     let mut told = Vec::new();
-    for name in scenes_in_order(run) {
-        let Some(problem) = run.suite.scenes.get(&name).and_then(|scene| scene.problem().ok()) else { continue };
+    let mut problems: Vec<(String, Problem)> = scenes_in_order(run)
+        .into_iter()
+        .filter_map(|name| Some((name.clone(), run.suite.scenes.get(&name)?.problem().ok()?)))
+        .collect();
+    // Scenes with drag first: they show all that the equation has.
+    problems.sort_by_key(|(_, problem)| !problem.stages.iter().any(|stage| stage.drag > 0.0));
+    for (name, problem) in problems {
         // More than one stage on the way, and each kind of end once: that is what there is to see.
         let Some((samples, flight)) = path_of(&problem) else { continue };
         if flight.events.len() < 2 || seen.contains(&flight.outcome.is_stop()) || seen.len() == SCENES_MAX {
@@ -730,8 +824,7 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
             let s = sample.state;
             table.push([&name, &s.time, &s.depth, &s.velocity, &sample.force, &sample.stage]);
         }
-        type Shown = (&'static str, f64, fn(&crate::integrators::Sample) -> f64);
-        let curves: [Shown; 3] = [
+        let curves: [Curve; 3] = [
             ("depth [mm]", 1e3, |s| s.state.depth),
             ("velocity [m/s]", 1.0, |s| s.state.velocity),
             ("force [kN]", 1e-3, |s| s.force),
@@ -749,7 +842,7 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
                 // The text stands where there is room: left of events in the right half.
                 let right_half = time > 0.5 * (x.range[0] + x.range[1]);
                 let anchor = if right_half { Anchor::End } else { Anchor::Start };
-                let gap = 0.012 * (x.range[1] - x.range[0]) * if right_half { -1.0 } else { 1.0 };
+                let gap = 0.018 * (x.range[1] - x.range[0]) * if right_half { -1.0 } else { 1.0 };
                 let at = (time + gap, y.range[1] - 0.035 * (y.range[1] - y.range[0]));
                 marks.push(Mark::Text { at, text: words_for_event(event.kind, &problem), ink: Ink::Muted, anchor });
             }
@@ -757,18 +850,19 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
             panels.push(Panel {
                 title: format!("{name}: {}", label.split(' ').next().unwrap_or(label)),
                 description: format!(
-                    "{label} over time [ms]; the flight ends {} at {} ms.",
-                    flight.outcome,
+                    "{label} over time [ms]; the projectile {} at {} ms.",
+                    words_for_outcome(flight.outcome),
                     number(flight.end.time * 1e3, 4)
                 ),
                 x,
                 y,
                 marks,
                 keys: Vec::new(),
+                key_place: KeyPlace::Corner,
                 height: 230,
             });
         }
-        told.push(format!("`{name}` ends {}", flight.outcome));
+        told.push(format!("scene {name} {}", words_for_outcome(flight.outcome)));
     }
     if panels.is_empty() {
         return None;
@@ -796,6 +890,16 @@ pub fn scenes_in_order(run: &Run<'_>) -> Vec<String> {
         }
     }
     names
+}
+
+fn words_for_outcome(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::StoppedInCrater => "comes to rest in the crater",
+        Outcome::StoppedInTunnel => "comes to rest in the tunnel",
+        Outcome::Stopped => "comes to rest",
+        Outcome::Perforated => "leaves the target",
+        Outcome::Undecided => "ends within the error bar of leaving",
+    }
 }
 
 fn words_for_event(kind: EventKind, problem: &Problem) -> String {

@@ -30,3 +30,7 @@ pub struct Run<'a> {
     /// Where it ran and what remakes it.
     pub environment: Environment,
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+mod tests;

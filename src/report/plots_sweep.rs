@@ -322,7 +322,8 @@ pub type MarkedSet<'a> = (&'a str, Vec<Point>);
 /// # Errors
 /// [`FigureError`].
 pub fn applicability_map(crater_ratio: f64, sets: &[MarkedSet<'_>]) -> Result<String, FigureError> {
-    let (x, y) = ((0.01, 1000.0), (0.1, 10_000.0));
+    // Room above for the names: the lines meet the upper edge at the right only.
+    let (x, y) = ((0.01, 1000.0), (0.1, 100_000.0));
     let impacts: Vec<f64> = (0..=600).map(|i| 10f64.powf(-2.0 + f64::from(i) / 120.0)).collect();
     let colors = [GREEN, BLUE, RED];
     let mut lines = Vec::new();
@@ -339,7 +340,10 @@ pub fn applicability_map(crater_ratio: f64, sets: &[MarkedSet<'_>]) -> Result<St
         .zip(FAMILY.iter().cycle())
         .map(|((name, points), color)| Marks { name: (*name).to_owned(), color: *color, points: points.clone() })
         .collect();
-    let title = format!("Error of Eq. 11-12 against the equation of motion, k = {}", number(crater_ratio));
+    let title = format!(
+        "Error of Eq. 11-12 against the equation of motion: lines for k = {}, shots by their own k",
+        number(crater_ratio)
+    );
     let frame = Frame { title: &title, x: "I", y: "N", legend: SeriesLabelPosition::UpperLeft };
     logarithmic(&frame, x, y, &lines, &marks)
 }
@@ -372,4 +376,52 @@ pub fn measured_depths(sets: &[MarkedSet<'_>]) -> Result<String, FigureError> {
         legend: SeriesLabelPosition::UpperLeft,
     };
     logarithmic(&frame, range, (0.8 * range.0, 1.2 * range.1), &lines, &marks)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use super::*;
+
+    fn row(ratio: f64, energy: f64) -> Row {
+        Row {
+            thickness_ratio: Some(ratio),
+            energy_full_depth: Some(energy),
+            energy_ndrc: Some(0.5 * energy),
+            eq15_printed: Some(0.5 * energy),
+            eq15_unrounded: Some(0.5 * energy),
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn same_data_give_the_same_figure() {
+        let rows = [row(1.0, 2.0), row(2.0, 9.0), row(3.0, 20.0)];
+        let figure = critical_energy(&rows, &[(2.0, 5.0)]).unwrap();
+        assert_eq!(figure, critical_energy(&rows, &[(2.0, 5.0)]).unwrap());
+        assert_ne!(figure, critical_energy(&rows, &[]).unwrap());
+        assert!(figure.contains("E_c/(d³ f_c)") && figure.contains("#1F4E9C"));
+    }
+
+    #[test]
+    fn nothing_finite_is_no_figure() {
+        assert!(matches!(critical_energy(&[], &[]), Err(FigureError::Empty(_))));
+        assert!(matches!(critical_energy(&[row(1.0, f64::NAN)], &[]), Err(FigureError::Empty(_))));
+        assert!(matches!(critical_energy_difference(&[row(0.5, 1.0)]), Err(FigureError::Empty(_))));
+        assert!(matches!(measured_depths(&[("set", vec![(0.0, 1.0)])]), Err(FigureError::Empty(_))));
+    }
+
+    #[test]
+    fn a_single_point_has_a_figure() {
+        let figure = critical_energy(&[row(5.0, 40.0)], &[]).unwrap();
+        assert!(figure.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn ticks_are_short() {
+        assert_eq!(number(0.1 + 0.2), "0.3");
+        assert_eq!(number(-0.0), "0");
+        assert_eq!(number(2e7), "2e7");
+        assert_eq!(number(12.5), "12.5");
+    }
 }

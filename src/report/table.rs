@@ -16,6 +16,9 @@ impl Table {
     }
 
     /// Adds a row. Numbers are printed so that they read back to the same f64.
+    ///
+    /// # Panics
+    /// If the row is not as long as the header: a mistake of the caller.
     pub fn push<const N: usize>(&mut self, row: [&dyn Display; N]) {
         assert!(N == self.header.len(), "a row of {N} in a table of {} columns", self.header.len());
         self.rows.push(row.iter().map(ToString::to_string).collect());

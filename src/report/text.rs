@@ -19,7 +19,8 @@ pub fn number(value: f64, digits: usize) -> String {
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     if (-3..5).contains(&exponent) {
-        let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
+        let decimals =
+            i32::try_from(digits).unwrap_or(i32::MAX).saturating_sub(1 + exponent).max(0).unsigned_abs() as usize;
         return trimmed(&format!("{value:.decimals$}")).replace('-', "−");
     }
     let mantissa = trimmed(mantissa).replace('-', "−");

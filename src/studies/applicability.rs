@@ -94,8 +94,7 @@ pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {
         && concrete.crater_stiffness == CraterStiffness::Continuous
     {
         let error = model_error(groups.impact, groups.geometry, concrete.crater_ratio);
-        // Written so that a NaN warns.
-        if !(error.abs() <= ERROR_ALLOWED) {
+        if error.is_nan() || error.abs() > ERROR_ALLOWED {
             warnings.push(format!(
                 "the scene lies outside Eq. 11-12 and 15, the limit N >> I and N >> 1: at I = {:.4}, N = {:.4} the depth of \
                  Eq. 11-12 is {:+.1} % off the equation of motion",

@@ -18,7 +18,7 @@ use argmin::solver::brent::BrentRoot;
 use thiserror::Error;
 
 use crate::integrators::{Cost, IntegrationError, Integrator, Taylor};
-use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, closed_form};
+use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, Stage, closed_form};
 
 /// Speed [m/s] at which the target is first asked for, to learn its exit depth and static work.
 const PROBE_SPEED: f64 = 1.0;
@@ -285,11 +285,34 @@ pub fn exact(scene: &Scene) -> Result<f64, ExactError> {
         )?,
         // Layers with a continuous crater constant depend on V0 through it.
         _ if scene.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous) => {
-            return Err(ExactError::Depends);
+            return of_layers(scene, exit_depth);
         }
         _ => closed_form::critical_of_stages(&scene.resolve(PROBE_SPEED)?)?,
     };
     Ok(critical.velocity)
+}
+
+/// Exact critical velocity [m/s] of layers behind a continuous crater (theory section 2).
+///
+/// ```text
+/// H <= k d : as in one concrete, that of the layer just beyond k d
+/// H >  k d : V1c² backwards from the exit,  V_c² = (V1c² (M + k d Q) + k d P)/M
+/// ```
+fn of_layers(scene: &Scene, exit_depth: f64) -> Result<f64, ExactError> {
+    let mut problem = scene.resolve(PROBE_SPEED)?;
+    let Some(crater) = problem.crater else { return Ok(closed_form::critical_of_stages(&problem)?.velocity) };
+    let (mass, crater_depth) = (problem.mass, problem.stages[crater].end);
+    let Stage { static_force, drag, .. } = problem.stages[crater + 1];
+    if exit_depth <= crater_depth {
+        let crater_stiffness = CraterStiffness::Continuous;
+        let target = closed_form::CraterAndTunnel { mass, crater_depth, static_force, drag, crater_stiffness };
+        return Ok(closed_form::critical(&target, exit_depth)?.velocity);
+    }
+    // A crater without a force hands the demand of the layers through to the face.
+    problem.stages[crater].stiffness = 0.0;
+    let at_crater_end = closed_form::critical_of_stages(&problem)?.velocity;
+    let crater_share = crater_depth / mass;
+    Ok((at_crater_end * at_crater_end * (1.0 + crater_share * drag) + crater_share * static_force).sqrt())
 }
 
 /// Exact critical velocity of `scene` [m/s], or the one found through the Taylor series to round-off.
@@ -313,9 +336,6 @@ pub enum ExactError {
     /// The stages have none.
     #[error(transparent)]
     Closed(#[from] closed_form::CriticalError),
-    /// The stages depend on the impact speed in a way without a closed form.
-    #[error("the layers' stages depend on the impact velocity")]
-    Depends,
 }
 
 /// One flight: `u = V0²`, `W(exit)`, and the bar of W [m²/s²].

@@ -16,7 +16,9 @@ pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
+pub mod rounding;
 pub mod sensitivity;
+pub mod stability;
 pub mod sweep;
 
 pub use formal_order::{Path, Stretch, formal_order};

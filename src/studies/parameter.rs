@@ -229,6 +229,7 @@ impl Parameter {
     }
 
     /// The number whose value this one sets: a group and what it moves are the same.
+    #[must_use]
     pub fn moves(self) -> Self {
         match self {
             Self::ThicknessRatio => Self::Thickness,
@@ -407,6 +408,11 @@ impl Parameter {
             Self::Mass | Self::Velocity | Self::Thickness | Self::Stage(..) => {}
         }
         Ok(())
+    }
+
+    /// Whether it is the viscosity of a layer or a stage.
+    pub fn is_viscosity(self) -> bool {
+        matches!(self, Self::Layer(_, LayerNumber::Viscosity) | Self::Stage(_, StageNumber::Viscosity))
     }
 
     /// Whether setting it in `scene` moves an S that follows Eq. 14.

@@ -1,0 +1,142 @@
+//! The whole folder, from a few real claims and a few hostile ones.
+
+use std::path::Path;
+
+use super::{Environment, Run, folder};
+use crate::suite::checks::PeerAnswers;
+use crate::suite::{Check, Judged, Suite, Verdict};
+
+const HOSTILE: &str = "a\"b'<script>alert(1)</script>&|`*_\n\u{1b}[2J\u{202e},=1+1]]>";
+
+/// A quick part of the suite, judged; the last claims are hostile, failed and undecided.
+fn judged() -> (Suite, Vec<Judged>) {
+    let mut suite = Suite::embedded().unwrap();
+    suite.claims.retain(|c| {
+        c.id.starts_with("order/jump") && c.id.ends_with("/depth")
+            || ["small-impact/approach", "peer/", "invariant/energy"].iter().any(|start| c.id.starts_with(start))
+    });
+    let mut judged = suite.run(1, &PeerAnswers::recorded().unwrap(), &|_| ());
+    for verdict in [Verdict::Failed, Verdict::Undecided, Verdict::Skipped] {
+        let mut hostile = judged[0].clone();
+        hostile.claim.id = format!("hostile/{HOSTILE}/{}", verdict.name());
+        hostile.claim.statement = HOSTILE.to_owned();
+        hostile.claim.reason = HOSTILE.to_owned();
+        hostile.claim.scene = Some(HOSTILE.to_owned());
+        hostile.remark = HOSTILE.to_owned();
+        hostile.verdict = verdict;
+        judged.push(hostile);
+    }
+    let mut peer = judged.iter().find(|j| matches!(j.claim.check, Check::Peer { .. })).unwrap().clone();
+    peer.claim.check = Check::Peer { name: HOSTILE.to_owned(), tolerance: 1e-6 };
+    peer.measured = Some(0.5);
+    judged.push(peer);
+    suite.title = HOSTILE.to_owned();
+    (suite, judged)
+}
+
+fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
+    let environment = Environment::here(1, HOSTILE.to_owned(), suite, vec![(HOSTILE.to_owned(), HOSTILE.to_owned())]);
+    let run = Run { suite, judged, environment };
+    let files = folder::files(&run).unwrap();
+    files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect()
+}
+
+#[test]
+fn text_of_others_acts_in_no_file() {
+    let (suite, judged) = judged();
+    for (name, text) in files(&suite, &judged) {
+        let extension = Path::new(&name).extension().unwrap().to_str().unwrap();
+        if ["html", "svg", "xml", "md"].contains(&extension) {
+            assert!(!text.contains("<script"), "{name}");
+            assert!(!text.contains('\u{1b}') && !text.contains('\u{202e}'), "{name}");
+        }
+        assert_eq!(name.chars().filter(|c| !c.is_ascii_alphanumeric() && !"-./".contains(*c)).count(), 0, "{name}");
+        match extension {
+            "json" => drop(serde_json::from_str::<serde_json::Value>(&text).unwrap()),
+            "csv" => {
+                let mut rows = csv::Reader::from_reader(text.as_bytes());
+                assert!(!rows.records().collect::<Result<Vec<_>, _>>().unwrap().is_empty(), "{name}");
+            }
+            "xml" => drop(quick_junit::Report::deserialize_from_str(&text).unwrap()),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn reports_of_one_run_differ_in_times_alone() {
+    let (suite, judged) = judged();
+    let slower: Vec<Judged> = judged.iter().cloned().map(|j| Judged { wall_ms: j.wall_ms * 3.0 + 1.0, ..j }).collect();
+    let (first, second) = (files(&suite, &judged), files(&suite, &slower));
+    let names = |files: &[(String, String)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&first), names(&second));
+    for ((name, first), (_, second)) in first.into_iter().zip(second) {
+        assert_eq!(without_times(&first), without_times(&second), "{name}");
+    }
+}
+
+/// Dates, and the times of JSON and JUnit, put out of sight.
+fn without_times(text: &str) -> String {
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        let mut line = line.to_owned();
+        for (start, end) in [("\"wall_ms\": ", ""), (" time=\"", "\""), ("datetime=\"", "\"")] {
+            while let Some(at) = line.find(start) {
+                let rest = &line[at + start.len()..];
+                let length = if end.is_empty() { rest.len() } else { rest.find(end).unwrap() };
+                line.replace_range(at..at + start.len() + length, "TIME");
+            }
+        }
+        // `2026-11-21T05:09:15Z`
+        while let Some(at) = line.find('Z').filter(|at| *at >= 19 && line.as_bytes()[at - 9] == b'T') {
+            line.replace_range(at - 19..=at, "DATE");
+        }
+        lines.push(line);
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn junit_says_what_became_of_each_claim() {
+    let (suite, judged) = judged();
+    let (_, xml) = files(&suite, &judged).into_iter().find(|(name, _)| name == "junit.xml").unwrap();
+    let report = quick_junit::Report::deserialize_from_str(&xml).unwrap();
+    let count = |verdict| judged.iter().filter(|j| j.verdict == verdict).count();
+    assert_eq!(report.tests, judged.len());
+    assert_eq!(report.failures, count(Verdict::Failed));
+    assert_eq!(report.errors, count(Verdict::Undecided));
+    assert_eq!(report.skipped, count(Verdict::Skipped));
+    let failed = xml.split("<failure").nth(1).unwrap();
+    for part in ["measured", "limit", "order", "why this limit"] {
+        assert!(failed.contains(part), "{part} in {failed:.600}");
+    }
+}
+
+#[test]
+fn an_interrupted_or_refused_run_leaves_what_was_there() {
+    let (suite, judged) = judged();
+    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    let place = tempfile::tempdir().unwrap();
+    let strange = place.path().join("strange");
+    std::fs::create_dir(&strange).unwrap();
+    std::fs::write(strange.join("thesis.txt"), "years of work").unwrap();
+    assert!(matches!(folder::write(&run, &strange), Err(folder::FolderError::NotOurs { .. })));
+    assert_eq!(std::fs::read_dir(&strange).unwrap().count(), 1);
+    // Twice: a new folder, then one of ours in its place, with nothing left over beside it.
+    let ours = place.path().join("report");
+    for _ in 0..2 {
+        folder::write(&run, &ours).unwrap();
+        std::fs::write(ours.join("left-over"), "").unwrap();
+    }
+    folder::write(&run, &ours).unwrap();
+    assert!(!ours.join("left-over").exists() && ours.join("figures/observed-orders.svg").exists());
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn an_empty_run_has_a_report() {
+    let mut suite = Suite::embedded().unwrap();
+    suite.claims.clear();
+    let html = files(&suite, &[]).into_iter().find(|(name, _)| name == "report.html").unwrap().1;
+    assert!(html.contains("Nothing was decided"));
+}

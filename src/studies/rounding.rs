@@ -1,0 +1,148 @@
+//! How many digits does rounding take? The same kernels in f32, f64 and double-double, and the floor over the steps.
+//!
+//! A kernel run twice on the same inputs, once in a finer number type, differs by rounding alone: truncation and event
+//! rules are the same in both. Digits lost are `log10(error/epsilon)` of the coarser type, errors as everywhere
+//! (depth and times relative, velocities to V0).
+
+use twofloat::TwoFloat;
+
+use super::error::signed_error;
+use super::quantity::Quantity;
+use crate::integrators::central_difference::{Boundaries, CentralDifference, Summation, VelocityAt};
+use crate::integrators::{Detail, Energy, Flight, IntegrationError, MethodName, Taylor};
+use crate::physics::{Problem, Scalar};
+
+/// Digits that one kernel loses in one number type, per quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DigitsLost {
+    /// Kernel.
+    pub method: MethodName,
+    /// Number type.
+    pub number: &'static str,
+    /// Rounding unit of the type.
+    pub epsilon: f64,
+    /// Decimal digits lost of each quantity; zero where the error is below the rounding unit.
+    pub lost: Vec<(Quantity, f64)>,
+}
+
+/// Flies `problem` by `method` in `S`; the central difference lagged and located, with steps of `dt` [s].
+fn fly<S: Scalar>(method: MethodName, problem: &Problem, dt: f64) -> Result<Flight<S>, IntegrationError> {
+    let problem = problem.cast::<S>();
+    match method {
+        MethodName::Energy => Energy::new().fly_in(&problem, Detail::Events),
+        MethodName::CentralDifference => {
+            CentralDifference::uniform(dt, VelocityAt::LaggedHalfStep, Boundaries::Interpolated)
+                .fly_in(&problem, Detail::Events)
+        }
+        _ => Taylor::default().fly_in(&problem, Detail::Events),
+    }
+}
+
+/// Digits lost by the kernels of Taylor series, energy and central difference in f32 and f64, against double-double.
+///
+/// f32 is measured on the inputs as f32 rounds them, so that their rounding is not counted.
+///
+/// # Errors
+/// [`IntegrationError`] of a kernel.
+pub fn digits_lost(problem: &Problem, dt: f64) -> Result<Vec<DigitsLost>, IntegrationError> {
+    let coarse = problem.cast::<f32>().cast::<f64>();
+    let coarse_dt = f64::from(dt as f32);
+    let mut rows = Vec::new();
+    for method in [MethodName::Taylor, MethodName::Energy, MethodName::CentralDifference] {
+        let row = |number, epsilon, found: Flight, exact: Flight<TwoFloat>| DigitsLost {
+            method,
+            number,
+            epsilon,
+            lost: errors(&found, &exact, problem.impact_speed)
+                .into_iter()
+                .map(|(quantity, error)| (quantity, (error / epsilon).log10().max(0.0)))
+                .collect(),
+        };
+        let single = fly::<f32>(method, &coarse, coarse_dt)?.values();
+        rows.push(row("f32", f64::from(f32::EPSILON), single, fly(method, &coarse, coarse_dt)?));
+        rows.push(row("f64", f64::EPSILON, fly::<f64>(method, problem, dt)?, fly(method, problem, dt)?));
+    }
+    Ok(rows)
+}
+
+/// Absolute values of the errors of what both flights have.
+fn errors(found: &Flight, exact: &Flight<TwoFloat>, speed: f64) -> Vec<(Quantity, f64)> {
+    let exact = exact.values();
+    [Quantity::Depth, Quantity::Time, Quantity::Velocity, Quantity::CraterEndTime, Quantity::CraterEndVelocity]
+        .into_iter()
+        .filter_map(|quantity| {
+            let value = super::error::value_of(quantity, found)?;
+            let exact = super::error::value_of(quantity, &exact)?;
+            Some((quantity, signed_error(quantity, value, exact, speed).abs()))
+        })
+        .collect()
+}
+
+/// Rounding of the central difference after so many steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Floor {
+    /// Steps to the end of the flight.
+    pub steps: f64,
+    /// Time step [s].
+    pub dt: f64,
+    /// Truncation error of the depth, in double-double: what the floor rises against.
+    pub truncation: f64,
+    /// Rounding error of the depth with plain sums.
+    pub plain: f64,
+    /// The same with compensated sums.
+    pub compensated: f64,
+}
+
+/// Error of the depth of `problem` against the number of steps, from 2^`from` to 2^`to`, centred and landed: truncation
+/// (double-double against the exact depth) falls, rounding (f64 against double-double) rises.
+///
+/// # Errors
+/// [`IntegrationError`] of a flight.
+pub fn floor(problem: &Problem, from: u32, to: u32) -> Result<Vec<Floor>, IntegrationError> {
+    let exact = Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end;
+    let scheme = |dt: f64, summation| CentralDifference {
+        summation,
+        ..CentralDifference::uniform(dt, VelocityAt::Centred, Boundaries::Landed)
+    };
+    (from..=to)
+        .map(|power| {
+            let steps = 2f64.powi(power.cast_signed());
+            let dt = exact.time.value() / steps;
+            let fine = scheme(dt, Summation::Plain).fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end.depth;
+            let off = |value: TwoFloat| ((value - fine).value() / fine.value()).abs();
+            let coarse = |summation| -> Result<f64, IntegrationError> {
+                Ok(off(TwoFloat::from(scheme(dt, summation).fly_in(problem, Detail::End)?.end.depth)))
+            };
+            Ok(Floor {
+                steps,
+                dt,
+                truncation: off(exact.depth),
+                plain: coarse(Summation::Plain)?,
+                compensated: coarse(Summation::Compensated)?,
+            })
+        })
+        .collect()
+}
+
+/// Slope of `ln error` over `ln steps` by least squares; errors of zero are left out. NaN with fewer than two points.
+pub fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let logs: Vec<(f64, f64)> = points.filter(|(_, e)| *e > 0.0).map(|(x, e)| (x.ln(), e.ln())).collect();
+    let n = logs.len() as f64;
+    let mean = |pick: fn(&(f64, f64)) -> f64| logs.iter().map(pick).sum::<f64>() / n;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let covariance: f64 = logs.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    let variance: f64 = logs.iter().map(|p| (p.0 - x) * (p.0 - x)).sum();
+    covariance / variance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_a_power_law_is_its_power() {
+        let points = (1..9).map(|n| (f64::from(n), 3.0 * f64::from(n).powf(-1.5)));
+        assert!((slope(points) + 1.5).abs() < 1e-12);
+        assert!(slope([(1.0, 1.0)].into_iter()).is_nan());
+    }
+}

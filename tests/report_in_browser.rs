@@ -1,0 +1,375 @@
+//! The report in headless Chromium: it loads without a message, asks for nothing, and fits a phone and a desk.
+//!
+//! Where Chromium is missing, the tests say so in one line and count as ignored; with `CI=true` they fail, so that a
+//! build server cannot quietly check nothing.
+
+use std::env;
+use std::error::Error;
+use std::fs;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use penetrode::report::{Environment, Run, folder};
+use penetrode::suite::Suite;
+use penetrode::suite::checks::PeerAnswers;
+use serde_json::Value;
+
+/// What makes a test fail; every error of ours chains into it.
+type Check = Result<(), Box<dyn Error>>;
+
+/// Time that one page may take.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A claim and how it is checked.
+type Claim = (&'static str, fn(&Stage) -> Check);
+
+const CLAIMS: [Claim; 7] = [
+    ("the_page_loads_without_a_word_on_the_console", is_silent),
+    ("a_page_that_errs_is_heard", hears_a_planted_error),
+    ("no_request_leaves_the_page", asks_for_nothing),
+    ("a_page_that_asks_is_caught", catches_a_planted_request),
+    ("nothing_overflows_a_phone_or_a_desk", fits),
+    ("headings_images_and_colours_are_accessible", is_accessible),
+    ("it_prints", prints),
+];
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let required = env::var("CI").is_ok_and(|value| value == "true");
+    let stage = if arguments.list { Err("only listed".into()) } else { Stage::new() };
+    let mut trials = Vec::new();
+    match stage {
+        Ok(stage) => {
+            let stage = Arc::new(stage);
+            for (name, check) in CLAIMS {
+                let stage = Arc::clone(&stage);
+                trials.push(Trial::test(name, move || check(&stage).map_err(|error| Failed::from(error.to_string()))));
+            }
+        }
+        Err(error) => {
+            let reason = error.to_string();
+            if !required && !arguments.list {
+                eprintln!("report in a browser ignored: {reason}");
+            }
+            for (name, _) in CLAIMS {
+                let reason = reason.clone();
+                // Asked for all the same (`--ignored`), it fails: it cannot pass without having checked.
+                let trial = Trial::test(name, move || Err(Failed::from(reason)));
+                trials.push(trial.with_ignored_flag(!required && !arguments.list));
+            }
+        }
+    }
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// A report, and the browser that shows it.
+struct Stage {
+    browser: PathBuf,
+    folder: tempfile::TempDir,
+}
+
+impl Stage {
+    fn new() -> Result<Self, Box<dyn Error>> {
+        let browser = browser().ok_or("Chromium is not installed")?;
+        let mut suite = Suite::embedded()?;
+        // Every kind of section and figure; the whole suite would add length, not kinds.
+        suite.claims.retain(|claim| {
+            ["order/drag", "order/jump", "small-impact", "invariant", "peer", "closed-form", "self", "events", "stab"]
+                .iter()
+                .any(|start| claim.id.starts_with(start))
+        });
+        let judged = suite.run(1, &PeerAnswers::recorded()?, &|_| ());
+        let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
+        let folder = tempfile::tempdir()?;
+        folder::write(&Run { suite: &suite, judged: &judged, environment }, &folder.path().join("report"))?;
+        Ok(Self { browser, folder })
+    }
+
+    fn page(&self) -> PathBuf {
+        self.folder.path().join("report/report.html")
+    }
+
+    /// A copy of the page, without its policy and with `inserted` before its end.
+    fn altered(&self, name: &str, inserted: &str) -> Result<PathBuf, Box<dyn Error>> {
+        let page = fs::read_to_string(self.page())?;
+        let start = page.find("<meta http-equiv=\"Content-Security-Policy\"").ok_or("the page has no policy")?;
+        let end = start + page[start..].find('>').ok_or("the policy has no end")? + 1;
+        let altered = format!("{}{}", &page[..start], &page[end..]).replace("</body>", &format!("{inserted}</body>"));
+        let path = self.folder.path().join("report").join(name);
+        fs::write(&path, altered)?;
+        Ok(path)
+    }
+
+    /// Runs the browser on `page`; ends it when it takes too long.
+    fn show(&self, page: &Path, arguments: &[&str]) -> Result<Output, Box<dyn Error>> {
+        let profile = tempfile::tempdir()?;
+        let mut child = Command::new(&self.browser)
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--disable-default-apps",
+                "--disable-extensions",
+                "--disable-sync",
+                "--no-first-run",
+                "--no-pings",
+                "--hide-scrollbars",
+                "--virtual-time-budget=10000",
+            ])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .args(arguments)
+            .arg(format!("file://{}", page.display()))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        // Both pipes are emptied while it runs, or a long page would fill them and wait for ever.
+        let mut pipes = (child.stdout.take().ok_or("no pipe")?, child.stderr.take().ok_or("no pipe")?);
+        let stdout = thread::spawn(move || {
+            let mut text = Vec::new();
+            pipes.0.read_to_end(&mut text).map(|_| text)
+        });
+        let stderr = thread::spawn(move || {
+            let mut text = Vec::new();
+            pipes.1.read_to_end(&mut text).map(|_| text)
+        });
+        let started = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait()? {
+                break status;
+            }
+            if started.elapsed() > PATIENCE {
+                child.kill()?;
+                child.wait()?;
+                return Err(format!("the browser was still busy after {PATIENCE:?}").into());
+            }
+            thread::sleep(Duration::from_millis(20));
+        };
+        let text = |reader: thread::JoinHandle<std::io::Result<Vec<u8>>>| reader.join().map_err(|_| "reader died");
+        Ok(Output { status, stdout: text(stdout)??, stderr: text(stderr)?? })
+    }
+
+    /// What the console said.
+    fn console(&self, page: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+        let output = self.show(page, &["--enable-logging=stderr", "--dump-dom"])?;
+        if !output.status.success() || !String::from_utf8_lossy(&output.stdout).contains("</html>") {
+            return Err(format!("the browser failed: {}", String::from_utf8_lossy(&output.stderr)).into());
+        }
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        Ok(stderr.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect())
+    }
+
+    /// What was asked for over the network: all of it goes to a proxy that listens here and gives nothing.
+    ///
+    /// What the browser asks its maker of its own accord, whatever the page, is left out.
+    fn requests(&self, page: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+        let listener = TcpListener::bind("127.0.0.1:0")?;
+        let proxy = format!("--proxy-server=http://{}", listener.local_addr()?);
+        let done = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&done);
+        listener.set_nonblocking(true)?;
+        let listening = thread::spawn(move || {
+            let mut asked = Vec::new();
+            loop {
+                // Read before the queue is emptied once more: what came before the end is heard.
+                let last = told.load(Ordering::SeqCst);
+                while let Ok((stream, _)) = listener.accept() {
+                    asked.extend(refuse(stream));
+                }
+                if last {
+                    return asked;
+                }
+                thread::sleep(Duration::from_millis(5));
+            }
+        });
+        let shown = self.show(page, &[&proxy, "--dump-dom"]);
+        done.store(true, Ordering::SeqCst);
+        let mut asked = listening.join().map_err(|_| "the proxy died")?;
+        shown?;
+        asked.retain(|line| {
+            let address = line.split(' ').nth(1).unwrap_or_default();
+            let host = address.rsplit("://").next().unwrap_or_default().split(['/', ':']).next().unwrap_or_default();
+            !["google.com", "googleapis.com", "gstatic.com", "gvt1.com"].iter().any(|maker| host.ends_with(maker))
+        });
+        Ok(asked)
+    }
+
+    /// What [`MEASURE`] finds in the page when it is `width` wide.
+    fn measure(&self, width: u32, dark: bool) -> Result<Value, Box<dyn Error>> {
+        let inner = self.altered(&format!("measured-{width}-{dark}.html"), MEASURE)?;
+        let name = inner.file_name().ok_or("no name")?.to_string_lossy().into_owned();
+        // A window cannot be as narrow as a phone; a frame can.
+        let outer = self.folder.path().join("report").join(format!("frame-{width}-{dark}.html"));
+        fs::write(
+            &outer,
+            format!(
+                "<!doctype html><meta name=color-scheme content='light dark'><iframe src=\"{name}\" \
+                 style=\"width:{width}px;height:800px;border:0\"></iframe><pre id=out></pre><script>\
+                 addEventListener('message',e=>{{document.getElementById('out').textContent='FOUND'+e.data+'END'}})\
+                 </script>"
+            ),
+        )?;
+        let scheme = format!("--blink-settings=preferredColorScheme={}", i32::from(!dark));
+        let output = self.show(&outer, &["--window-size=1600,900", &scheme, "--dump-dom"])?;
+        let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+        let found = dom.split_once(">FOUND").and_then(|(_, rest)| rest.split_once("END")).map(|(found, _)| found);
+        let found = found.ok_or_else(|| format!("nothing was measured: {dom:.500}"))?;
+        Ok(serde_json::from_str(&found.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))?)
+    }
+}
+
+/// Measures the page that it stands in, everything unfolded, and tells its frame.
+const MEASURE: &str = r#"<script>addEventListener('load',()=>{
+const name=e=>e.tagName+(e.id?'#'+e.id:'')+' '+(e.textContent||'').trim().slice(0,40);
+const folded=document.documentElement.scrollWidth;
+document.querySelectorAll('details').forEach(d=>d.open=true);
+const width=document.documentElement.clientWidth, beyond=[];
+document.querySelectorAll('body *').forEach(e=>{
+  if(e.closest('.scroll')&&!e.classList.contains('scroll'))return;
+  if(e.closest('svg')&&e.tagName!='svg')return;
+  const r=e.getBoundingClientRect();
+  if(r.right>width+0.5&&r.width>0&&getComputedStyle(e).position!='absolute')beyond.push(name(e)+' '+r.right);
+});
+const texts=[];
+document.querySelectorAll('svg text').forEach(t=>{
+  const r=t.getBoundingClientRect(), s=t.closest('svg').getBoundingClientRect();
+  if(r.left<s.left-1||r.right>s.right+1||r.top<s.top-1||r.bottom>s.bottom+1)texts.push(name(t));
+});
+const rgb=c=>(c.match(/[\d.]+/g)||[]).map(Number);
+const lum=c=>{const[r,g,b]=c.map(v=>{v/=255;return v<=0.04045?v/12.92:((v+0.055)/1.055)**2.4});return 0.2126*r+0.7152*g+0.0722*b};
+const back=e=>{for(;e;e=e.parentElement){const c=rgb(getComputedStyle(e).backgroundColor);if(c.length==3||c[3]==1)return c.slice(0,3)}return[255,255,255]};
+const faint=[];
+document.querySelectorAll('body *').forEach(e=>{
+  if(![...e.childNodes].some(n=>n.nodeType==3&&n.textContent.trim()))return;
+  if(['TITLE','DESC','SCRIPT','STYLE'].includes(e.tagName.toUpperCase()))return;
+  const style=getComputedStyle(e), ink=rgb(e.closest('svg')?style.fill:style.color).slice(0,3);
+  const[a,b]=[lum(ink),lum(back(e))].sort((x,y)=>y-x), ratio=(a+0.05)/(b+0.05);
+  if(!(ratio>=4.5))faint.push(name(e)+' '+ratio.toFixed(2));
+});
+let level=0; const headings=[];
+document.querySelectorAll('h1,h2,h3,h4').forEach(h=>{const l=+h.tagName[1];if(l>level+1)headings.push(name(h));level=l});
+const ids=[...document.querySelectorAll('[id]')].map(e=>e.id), twice=ids.filter((id,i)=>ids.indexOf(id)!=i);
+const unnamed=[...document.querySelectorAll('svg')].filter(s=>s.getAttribute('role')!='img'||
+  !s.getAttribute('aria-labelledby').split(' ').every(id=>document.getElementById(id)?.textContent)).map(name);
+const dead=[...document.querySelectorAll('a[href^="\#"]')].filter(a=>!document.getElementById(a.getAttribute('href').slice(1))).map(name);
+parent.postMessage(JSON.stringify({width,folded,unfolded:document.documentElement.scrollWidth,beyond,texts,faint,
+  headings,twice,unnamed,dead,h1:document.querySelectorAll('h1').length,figures:document.querySelectorAll('figure').length,
+  svgs:document.querySelectorAll('svg').length,background:getComputedStyle(document.body).backgroundColor}),'*');
+})</script>"#;
+
+/// First line of a request, which is refused.
+fn refuse(mut stream: TcpStream) -> Option<String> {
+    stream.set_nonblocking(false).ok()?;
+    stream.set_read_timeout(Some(Duration::from_secs(1))).ok()?;
+    let mut head = [0; 512];
+    let length = stream.read(&mut head).ok()?;
+    let _ = stream.write_all(b"HTTP/1.1 502 Bad Gateway\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+    String::from_utf8_lossy(&head[..length]).lines().next().map(str::to_owned)
+}
+
+/// Chromium or Chrome, from the search path or `CHROMIUM`.
+fn browser() -> Option<PathBuf> {
+    let named = env::var_os("CHROMIUM").map(PathBuf::from).filter(|path| path.is_file());
+    let path = env::var_os("PATH").unwrap_or_default();
+    named.or_else(|| {
+        ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
+            .iter()
+            .flat_map(|name| env::split_paths(&path).map(move |folder| folder.join(name)))
+            .find(|candidate| candidate.is_file())
+    })
+}
+
+fn is_silent(stage: &Stage) -> Check {
+    let said = stage.console(&stage.page())?;
+    if said.is_empty() { Ok(()) } else { Err(said.join("\n").into()) }
+}
+
+/// Without this, a browser that writes its messages elsewhere would let everything pass.
+fn hears_a_planted_error(stage: &Stage) -> Check {
+    let page = stage.altered("errs.html", "<script>console.error('planted')</script>")?;
+    let said = stage.console(&page)?;
+    if said.iter().any(|line| line.contains("planted")) { Ok(()) } else { Err(format!("heard only {said:?}").into()) }
+}
+
+fn asks_for_nothing(stage: &Stage) -> Check {
+    let asked = stage.requests(&stage.page())?;
+    if !asked.is_empty() {
+        return Err(asked.join("\n").into());
+    }
+    // And there is nothing in it that could ask, whatever the policy says.
+    let page = fs::read_to_string(stage.page())?;
+    for word in ["<script", "<img", "<link rel=\"stylesheet", " src=", "url(", "@import", "href=\"http", "href=\"//"] {
+        if page.contains(word) {
+            return Err(format!("the page contains {word}").into());
+        }
+    }
+    Ok(())
+}
+
+fn catches_a_planted_request(stage: &Stage) -> Check {
+    let page = stage.altered("asks.html", "<img src=\"http://planted.invalid/picture\" alt=\"\">")?;
+    let asked = stage.requests(&page)?;
+    if asked.iter().any(|line| line.contains("planted.invalid")) {
+        return Ok(());
+    }
+    Err(format!("caught only {asked:?}").into())
+}
+
+fn fits(stage: &Stage) -> Check {
+    for width in [375, 1440] {
+        let found = stage.measure(width, false)?;
+        if found["width"] != width {
+            return Err(format!("measured at {} and not at {width}", found["width"]).into());
+        }
+        for key in ["folded", "unfolded"] {
+            if found[key].as_u64().is_none_or(|extent| extent > u64::from(width)) {
+                return Err(format!("{width} px: {key} the page is {} px wide", found[key]).into());
+            }
+        }
+        for key in ["beyond", "texts"] {
+            if found[key] != Value::Array(Vec::new()) {
+                return Err(format!("{width} px: {key}: {}", found[key]).into());
+            }
+        }
+        if found["figures"].as_u64() < Some(6) || found["svgs"].as_u64() < found["figures"].as_u64() {
+            return Err(format!("{} figures of {} drawings", found["figures"], found["svgs"]).into());
+        }
+    }
+    Ok(())
+}
+
+fn is_accessible(stage: &Stage) -> Check {
+    let mut backgrounds = Vec::new();
+    for dark in [false, true] {
+        let found = stage.measure(1440, dark)?;
+        for key in ["faint", "headings", "twice", "unnamed", "dead"] {
+            if found[key] != Value::Array(Vec::new()) {
+                return Err(format!("dark {dark}: {key}: {}", found[key]).into());
+            }
+        }
+        if found["h1"] != 1 {
+            return Err(format!("{} main headings", found["h1"]).into());
+        }
+        backgrounds.push(found["background"].to_string());
+    }
+    if backgrounds[0] == backgrounds[1] { Err(format!("{backgrounds:?}: nothing was dark").into()) } else { Ok(()) }
+}
+
+fn prints(stage: &Stage) -> Check {
+    let file = stage.folder.path().join("report.pdf");
+    stage.show(&stage.page(), &[&format!("--print-to-pdf={}", file.display()), "--no-pdf-header-footer"])?;
+    let bytes = fs::read(&file)?;
+    if bytes.starts_with(b"%PDF") && bytes.len() > 50_000 {
+        return Ok(());
+    }
+    Err(format!("{} bytes of PDF", bytes.len()).into())
+}
