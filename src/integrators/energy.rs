@@ -402,6 +402,7 @@ impl<S: Scalar> Walk<S> {
             let (x, w) = (self.depth, self.w);
             if limit.value().is_finite() && loss.is_settled(x, w) {
                 self.depth = limit;
+                self.error += ROUNDINGS_PER_STEP * S::EPSILON * w.value().abs();
                 break;
             }
             let left = limit - x;
@@ -1008,10 +1009,19 @@ mod tests {
         let problem = staged(1e-300, 1e-5, 1.0, &[stage(1e300, 0.0, 0.0, f64::INFINITY)]);
         let error = Energy::new().fly(&problem, Detail::Events).unwrap_err();
         assert!(matches!(error, IntegrationError::NotFinite { .. }), "{error}");
-        // Terminal speed over 1e9 drag lengths: bounded, not hung.
-        let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
+        // A drive that fades over 1e9 drag lengths, followed step by step: bounded, not hung.
+        let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 1e-10, 1.0, f64::INFINITY)]);
         let error = Energy::new().fly(&problem, Detail::Events).unwrap_err();
         assert!(matches!(error, IntegrationError::StepBudgetSpent { .. }), "{error}");
+    }
+
+    /// A terminal speed is the same however long it is kept.
+    #[test]
+    fn terminal_speed_over_a_billion_drag_lengths_takes_one_step() {
+        let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
+        let flight = Energy::new().fly(&problem, Detail::Events).unwrap();
+        assert_eq!((flight.end.time, flight.end.velocity), (1e9, 1.0));
+        assert!(flight.cost.steps < 5 && flight.exit_margin_error.unwrap() > 0.0);
     }
 
     /// A gap, a jump and a coast: each piece has an elementary time.
