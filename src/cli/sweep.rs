@@ -319,10 +319,7 @@ pub(super) fn wrapped(text: &str, width: usize) -> String {
 /// Refuses a table that this program cannot write.
 fn refuse_parquet(path: &Path) -> Result<(), CliError> {
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
-        return Err(CliError::usage(
-            format!("{}: this build writes CSV only", path.display()),
-            "name a .csv file",
-        ));
+        return Err(CliError::usage(format!("{}: this build writes CSV only", path.display()), "name a .csv file"));
     }
     Ok(())
 }
