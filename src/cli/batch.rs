@@ -5,24 +5,25 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use csv::{ByteRecord, ReaderBuilder};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::method_args::MethodArgs;
 use super::output::{persist, temporary_beside};
 use super::{CliError, Exit};
-use crate::studies::batch::{Layout, RESULT_HEADER, answer, is_undecided, result_line};
+use crate::integrators::Method;
+use crate::studies::batch::csv::{CsvScenes, Records};
+use crate::studies::batch::{Answer, PART, RESULT_HEADER, Rows, TableError, Tally, answers, result_lines};
 
-/// Rows read, flown and written at a time: the bound of the memory.
-const CHUNK: usize = 8192;
+/// Rows read, flown and written at a time: three such chunks are the bound of the memory.
+const CHUNK: usize = 16 * PART;
 
 /// Arguments of `batch`.
 #[derive(Args, Debug)]
 pub struct BatchArgs {
-    /// Scenes: a CSV table, or - for standard input.
+    /// Scenes: a table (.csv or .parquet), - for CSV on standard input, or random:N[:SEED] for N random scenes.
     pub scenes: PathBuf,
-    /// Results: a CSV table, written whole or not at all.
+    /// Results: a table (.csv or .parquet), written whole or not at all; - for CSV on standard output.
     #[arg(long, value_name = "RESULTS.csv")]
     pub out: PathBuf,
     /// Method and its options.
@@ -36,123 +37,299 @@ pub struct BatchArgs {
     pub threads: Option<u16>,
 }
 
-/// How many rows came to what.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    rows: u64,
-    bad: u64,
-    undecided: u64,
-}
-
 impl BatchArgs {
     /// Flies every row and writes the results in the same order.
     ///
     /// # Errors
     /// A table or options that cannot be used (exit 2), results that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
-        for path in [&self.scenes, &self.out] {
-            if path.extension().is_some_and(|e| e == "parquet") {
-                return Err(CliError::usage(
-                    format!("{}: this build reads and writes CSV only", path.display()),
-                    "give a .csv file",
-                ));
-            }
-        }
         if is_same_file(&self.scenes, &self.out) {
             return Err(CliError::usage("the results would replace the scenes", "give --out another name"));
         }
+        refuse_parquet_unless_built(&self.scenes)?;
+        refuse_parquet_unless_built(&self.out)?;
         let method = self.method.build()?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
             .build()
             .map_err(|error| CliError::Run { message: error.to_string(), help: String::new(), last: None })?;
-        let (input, size) = self.open()?;
-        let progress = progress_bar(size);
-        let mut reader = ReaderBuilder::new().flexible(true).from_reader(progress.wrap_read(input));
-        let layout = self.layout(&mut reader)?;
-
-        let unwritable = |cause: io::Error| CliError::Write { path: self.out.display().to_string(), cause };
-        let file = temporary_beside(&self.out).map_err(unwritable)?;
-        let mut writer = BufWriter::with_capacity(1 << 20, file);
-        writeln!(writer, "{RESULT_HEADER}").map_err(unwritable)?;
-        let mut tally = Tally::default();
-        let mut chunk: Vec<Result<ByteRecord, String>> = Vec::with_capacity(CHUNK);
-        // Ends with the file: each turn reads rows, or is the last.
-        loop {
-            chunk.clear();
-            for record in reader.byte_records().take(CHUNK) {
-                match record {
-                    Err(error) if error.is_io_error() => return Err(self.unreadable(&error.to_string())),
-                    other => chunk.push(other.map_err(|error| error.to_string())),
-                }
-            }
-            if chunk.is_empty() {
-                break;
-            }
-            let answers: Vec<_> = pool.install(|| {
-                chunk
-                    .par_iter()
-                    .map(|record| {
-                        let scene = layout.scene(record.as_ref().map_err(Clone::clone)?)?;
-                        answer(&scene, method.integrator(), self.critical)
-                    })
-                    .collect()
-            });
-            for answer in &answers {
-                tally.rows += 1;
-                tally.bad += u64::from(answer.is_err());
-                tally.undecided += u64::from(is_undecided(answer));
-                writeln!(writer, "{}", result_line(tally.rows, answer)).map_err(unwritable)?;
-            }
-        }
+        let progress = ProgressBar::no_length();
+        let mut source = Source::open(&self.scenes, &progress)?;
+        let mut sink = Sink::create(&self.out).map_err(|cause| self.unwritable(cause))?;
+        let tally = pool.install(|| self.fly_all(&mut source, &mut sink, &method))?;
+        sink.finish(&self.out).map_err(|cause| self.unwritable(cause))?;
         progress.finish_and_clear();
-        let file = writer.into_inner().map_err(|error| unwritable(error.into_error()))?;
-        persist(file, &self.out).map_err(unwritable)?;
-        eprintln!("{} rows: {} bad, {} undecided", tally.rows, tally.bad, tally.undecided);
+        eprintln!("{}", summary(&tally));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
 
-    /// The table and its size [bytes]; 0 where it has none.
-    fn open(&self) -> Result<(Box<dyn Read + Send>, u64), CliError> {
-        if self.scenes.as_os_str() == "-" {
-            return Ok((Box::new(io::stdin()), 0));
+    /// Flies one chunk while the one before is written and the next is read.
+    fn fly_all(&self, source: &mut Source, sink: &mut Sink, method: &Method) -> Result<Tally, CliError> {
+        let mut tally = Tally::default();
+        let mut rows = source.next_rows(None)?;
+        let mut flown = Flown::default();
+        let mut used = None;
+        // Ends with the table: each turn reads rows, or is the last but one.
+        while !rows.is_empty() || !flown.parts.is_empty() {
+            let first = tally.rows + flown.rows() + 1;
+            let keeps_parts = sink.wants_answers();
+            let (next_flown, moved) = rayon::join(
+                || Flown::new(&rows, first, method, self.critical, keeps_parts),
+                || -> Result<_, CliError> {
+                    sink.write(&flown).map_err(|cause| self.unwritable(cause))?;
+                    // After the last row nothing is left to read.
+                    if rows.is_empty() { Ok(None) } else { source.next_rows(used.take()).map(Some) }
+                },
+            );
+            for part in &flown.parts {
+                tally += part.tally;
+            }
+            flown = next_flown;
+            let read = moved?.unwrap_or(Rows::Random { seed: 0, rows: 0..0 });
+            used = Some(std::mem::replace(&mut rows, read));
         }
-        let metadata = fs::metadata(&self.scenes).map_err(|error| self.unreadable(&error.to_string()))?;
+        Ok(tally)
+    }
+
+    fn unwritable(&self, cause: io::Error) -> CliError {
+        CliError::Write { path: self.out.display().to_string(), cause }
+    }
+}
+
+fn summary(tally: &Tally) -> String {
+    let mut text = format!("{} rows: {} bad, {} undecided", tally.rows, tally.bad, tally.undecided);
+    if tally.unstable > 0 {
+        text.push_str(&format!(", {} with a step beyond the stability limit", tally.unstable));
+    }
+    text
+}
+
+/// Results of a chunk.
+#[derive(Default)]
+struct Flown {
+    parts: Vec<Part>,
+}
+
+/// Results of some rows: lines of text or answers, whichever is written.
+struct Part {
+    tally: Tally,
+    lines: String,
+    answers: Vec<Result<Answer, String>>,
+}
+
+impl Flown {
+    fn new(rows: &Rows, first: u64, method: &Method, critical: bool, keeps_answers: bool) -> Self {
+        let count = rows.len();
+        let parts = (0..count.div_ceil(PART))
+            .into_par_iter()
+            .map(|index| {
+                let from = index * PART;
+                let answers = answers(rows.scenes(from..count.min(from + PART)), method, critical);
+                let mut tally = Tally::default();
+                tally.count(&answers);
+                if keeps_answers {
+                    Part { tally, lines: String::new(), answers }
+                } else {
+                    let lines = result_lines(first + from as u64, &answers);
+                    Part { tally, lines, answers: Vec::new() }
+                }
+            })
+            .collect();
+        Self { parts }
+    }
+
+    fn rows(&self) -> u64 {
+        self.parts.iter().map(|part| part.tally.rows).sum()
+    }
+}
+
+/// Where the scenes come from.
+enum Source {
+    Csv(CsvScenes<Box<dyn Read + Send>>),
+    #[cfg(feature = "parquet")]
+    Parquet(crate::studies::batch::parquet::ParquetScenes, ProgressBar),
+    Random {
+        seed: u64,
+        next: u64,
+        end: u64,
+        progress: ProgressBar,
+    },
+}
+
+impl Source {
+    fn open(path: &Path, progress: &ProgressBar) -> Result<Self, CliError> {
+        let name = path.display().to_string();
+        let unreadable = |cause: String| refused(&TableError::Unreadable { file: name.clone(), cause });
+        if let Some((count, seed)) = random_table(path)? {
+            bar(progress, count, "{bar:30} {human_pos}/{human_len} rows, {eta} left");
+            return Ok(Self::Random { seed, next: 0, end: count, progress: progress.clone() });
+        }
+        if path.as_os_str() == "-" {
+            let input: Box<dyn Read + Send> = Box::new(progress.wrap_read(io::stdin()));
+            return CsvScenes::new("standard input", input).map(Self::Csv).map_err(|error| refused(&error));
+        }
+        let metadata = fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
         if metadata.is_dir() {
-            return Err(self.unreadable("is a folder"));
+            return Err(unreadable("is a folder".to_owned()));
         }
-        let file = File::open(&self.scenes).map_err(|error| self.unreadable(&error.to_string()))?;
-        Ok((Box::new(file), metadata.len()))
+        let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
+        #[cfg(feature = "parquet")]
+        if is_parquet(path) {
+            let scenes =
+                crate::studies::batch::parquet::ParquetScenes::new(&name, file).map_err(|error| refused(&error))?;
+            bar(progress, scenes.rows(), "{bar:30} {human_pos}/{human_len} rows, {eta} left");
+            return Ok(Self::Parquet(scenes, progress.clone()));
+        }
+        // A pipe or a device has no length.
+        if metadata.len() > 0 {
+            bar(progress, metadata.len(), "{bar:30} {bytes}/{total_bytes}, {eta} left");
+        }
+        let input: Box<dyn Read + Send> = Box::new(progress.wrap_read(file));
+        CsvScenes::new(&name, input).map(Self::Csv).map_err(|error| refused(&error))
     }
 
-    fn layout<R: Read>(&self, reader: &mut csv::Reader<R>) -> Result<Layout, CliError> {
-        let header = reader.headers().map_err(|error| self.unreadable(&error.to_string()))?.clone();
-        if header.is_empty() {
-            return Err(self.unreadable("is empty: the first line names the columns"));
+    /// The next chunk, empty at the end; the memory of `used` serves again.
+    fn next_rows(&mut self, used: Option<Rows>) -> Result<Rows, CliError> {
+        match self {
+            Self::Csv(scenes) => {
+                let used: Option<Records> = match used {
+                    Some(Rows::Csv(records)) => Some(records),
+                    _ => None,
+                };
+                scenes.next_rows(CHUNK, used).map(Rows::Csv).map_err(|error| refused(&error))
+            }
+            #[cfg(feature = "parquet")]
+            Self::Parquet(scenes, progress) => {
+                let columns = scenes.next_rows(CHUNK).map_err(|error| refused(&error))?;
+                progress.inc(columns.len() as u64);
+                Ok(Rows::Parquet(columns))
+            }
+            Self::Random { seed, next, end, progress } => {
+                let from = *next;
+                *next = (*end).min(from.saturating_add(CHUNK as u64));
+                progress.set_position(from);
+                Ok(Rows::Random { seed: *seed, rows: from..*next })
+            }
         }
-        Layout::new(&header).map_err(|error| {
-            CliError::usage(
-                format!("{}:1: {error}", self.scenes.display()),
-                format!("columns: {}", crate::studies::batch::COLUMNS.join(", ")),
-            )
-        })
+    }
+}
+
+/// `random:N` or `random:N:SEED`: how many scenes, and their seed (1 when not given); `None` for a file.
+fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
+    let Some(text) = path.to_str().and_then(|text| text.strip_prefix("random:")) else { return Ok(None) };
+    let (count, seed) = text.split_once(':').unwrap_or((text, "1"));
+    match (count.parse(), seed.parse()) {
+        (Ok(count), Ok(seed)) => Ok(Some((count, seed))),
+        _ => Err(CliError::usage(
+            format!("random:{text}: not a number of scenes and a seed"),
+            "write random:1000000:7 for a million scenes of seed 7",
+        )),
+    }
+}
+
+/// Where the results go.
+enum Sink {
+    File(BufWriter<tempfile::NamedTempFile>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<crate::studies::batch::parquet::ParquetResults<tempfile::NamedTempFile>>),
+    Standard(BufWriter<io::Stdout>),
+}
+
+impl Sink {
+    fn create(path: &Path) -> io::Result<Self> {
+        let mut sink = if path.as_os_str() == "-" {
+            Self::Standard(BufWriter::with_capacity(1 << 20, io::stdout()))
+        } else {
+            let file = temporary_beside(path)?;
+            #[cfg(feature = "parquet")]
+            if is_parquet(path) {
+                return crate::studies::batch::parquet::ParquetResults::new(file).map(|p| Self::Parquet(Box::new(p)));
+            }
+            Self::File(BufWriter::with_capacity(1 << 20, file))
+        };
+        sink.text(&format!("{RESULT_HEADER}\n"))?;
+        Ok(sink)
     }
 
-    fn unreadable(&self, cause: &str) -> CliError {
-        CliError::usage(format!("{}: {cause}", self.scenes.display()), "name a CSV table of scenes")
+    /// Whether answers are written, and not lines.
+    fn wants_answers(&self) -> bool {
+        match self {
+            #[cfg(feature = "parquet")]
+            Self::Parquet(_) => true,
+            _ => false,
+        }
     }
+
+    fn text(&mut self, text: &str) -> io::Result<()> {
+        match self {
+            Self::File(writer) => writer.write_all(text.as_bytes()),
+            Self::Standard(writer) => writer.write_all(text.as_bytes()),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(_) => Ok(()),
+        }
+    }
+
+    fn write(&mut self, flown: &Flown) -> io::Result<()> {
+        #[cfg(feature = "parquet")]
+        if let Self::Parquet(results) = self {
+            return results.write(flown.parts.iter().flat_map(|part| &part.answers));
+        }
+        flown.parts.iter().try_for_each(|part| self.text(&part.lines))
+    }
+
+    fn finish(self, path: &Path) -> io::Result<()> {
+        match self {
+            Self::File(writer) => persist(writer.into_inner().map_err(io::IntoInnerError::into_error)?, path),
+            Self::Standard(mut writer) => writer.flush(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(results) => persist(results.finish()?, path),
+        }
+    }
+}
+
+/// A table that cannot be used, as exit code 2.
+fn refused(error: &TableError) -> CliError {
+    CliError::usage(error.to_string(), error.help())
+}
+
+fn is_parquet(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"))
+}
+
+fn refuse_parquet_unless_built(path: &Path) -> Result<(), CliError> {
+    if is_parquet(path) && !cfg!(feature = "parquet") {
+        return Err(CliError::usage(
+            format!("{}: this build reads and writes CSV only", path.display()),
+            "build with `cargo build --release --features parquet`, or give a .csv file",
+        ));
+    }
+    Ok(())
 }
 
 /// Whether both paths are one file.
 fn is_same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    let is_standard = a.as_os_str() == "-";
+    !is_standard && (a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b))
 }
 
-/// A bar with time left, on a terminal only.
-fn progress_bar(size: u64) -> ProgressBar {
-    let bar = ProgressBar::new(size);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {bytes}/{total_bytes}, {eta} left") {
-        bar.set_style(style);
+/// Gives `progress` a length and a look; it shows on a terminal only.
+fn bar(progress: &ProgressBar, length: u64, template: &str) {
+    progress.set_length(length);
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        progress.set_style(style);
     }
-    bar
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_random_table_has_a_length_and_a_seed() {
+        assert_eq!(random_table(Path::new("random:1000:7")).unwrap(), Some((1000, 7)));
+        assert_eq!(random_table(Path::new("random:1000")).unwrap(), Some((1000, 1)));
+        assert_eq!(random_table(Path::new("scenes.csv")).unwrap(), None);
+        assert_eq!(random_table(Path::new("random:many")).unwrap_err().exit(), Exit::Usage);
+    }
 }

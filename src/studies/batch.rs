@@ -1,14 +1,24 @@
 //! Many scenes from a table: what each row asks, and what each is answered (contract, "Tables").
 //!
 //! A row is one crater and one tunnel. Its result depends on no other row, so that threads and neighbours change
-//! nothing.
+//! nothing. Tables come as CSV ([`csv`]), as Parquet (`parquet`, in a build with that feature), or from a seed
+//! ([`random_rows`]); all are read in chunks, and each turns its rows into scenes one by one.
 
-use csv::{ByteRecord, StringRecord};
+pub mod csv;
+#[cfg(feature = "parquet")]
+pub mod parquet;
+
+use std::fmt::Write as _;
+use std::ops::Range;
+
 use thiserror::Error;
 
+use super::audit::Place;
 use super::critical_velocity;
-use crate::integrators::{Detail, Flight, Integrator};
-use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Resistance, Scene, semi_empirical};
+use super::random_scenes::Generator;
+use crate::integrators::batch::{Batch, Summary};
+use crate::integrators::{Detail, Method, Taylor};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, semi_empirical};
 
 /// Columns that a table may have, in the order of the contract.
 pub const COLUMNS: [&str; 12] = [
@@ -26,6 +36,12 @@ pub const COLUMNS: [&str; 12] = [
     "criterion",
 ];
 
+/// How many of [`COLUMNS`] are numbers: all but the last.
+pub const NUMBERS: usize = COLUMNS.len() - 1;
+
+/// Index of the column of text.
+pub const CRITERION: usize = NUMBERS;
+
 /// Columns that may be left out, or left empty in a row.
 const OPTIONAL: [&str; 6] = ["thickness_m", "S", "B", "k", "crater_stiffness_n_m", "criterion"];
 
@@ -33,93 +49,189 @@ const OPTIONAL: [&str; 6] = ["thickness_m", "S", "B", "k", "crater_stiffness_n_m
 pub const RESULT_HEADER: &str = "row,outcome,depth_m,time_s,velocity_m_s,crater_end_time_s,crater_end_velocity_m_s,\
                                  exit_margin,critical_velocity_m_s,error";
 
-/// Why a table cannot be used at all.
+/// Rows that are worked on together: one block of lanes.
+pub const PART: usize = 1024;
+
+/// Why a table cannot be used at all (exit code 2).
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum HeaderError {
+#[non_exhaustive]
+pub enum TableError {
+    /// It cannot be read.
+    #[error("{file}: {cause}")]
+    Unreadable {
+        /// File.
+        file: String,
+        /// What the system said.
+        cause: String,
+    },
+    /// No line at all.
+    #[error("{file}: the table is empty: its first line must name the columns")]
+    Empty {
+        /// File.
+        file: String,
+    },
+    /// The first line is not text.
+    #[error("{place}: the first line is not UTF-8 text")]
+    NotText {
+        /// Where.
+        place: Place,
+    },
+    /// The first line holds numbers.
+    #[error("{place}: the first line must name the columns, and this one holds numbers")]
+    NoHeader {
+        /// Where.
+        place: Place,
+    },
     /// A name that is no column.
-    #[error("there is no column `{name}` (column {column} of the first line)")]
-    Unknown {
+    #[error("{place}: there is no column `{name}`{}", .near.map_or(String::new(), |n| format!("; is `{n}` meant?")))]
+    UnknownColumn {
+        /// Where.
+        place: Place,
         /// Name found.
         name: String,
-        /// Place from 1.
-        column: usize,
+        /// The name that it resembles.
+        near: Option<&'static str>,
     },
     /// A column twice.
-    #[error("the column `{name}` stands twice (column {column} of the first line)")]
-    Twice {
-        /// Name found.
+    #[error("{place}: the column `{name}` is there twice")]
+    ColumnTwice {
+        /// Where.
+        place: Place,
+        /// Name.
         name: String,
-        /// Place from 1.
-        column: usize,
     },
     /// A column that every scene needs.
-    #[error("the column `{name}` is missing")]
-    Missing {
+    #[error("{place}: the column `{name}` is missing")]
+    MissingColumn {
+        /// Where.
+        place: Place,
         /// Its name.
         name: &'static str,
     },
+    /// A column of the wrong type.
+    #[error("{file}: the column `{name}` holds {found}, not {expected}")]
+    WrongType {
+        /// File.
+        file: String,
+        /// Column.
+        name: String,
+        /// Type found.
+        found: String,
+        /// Type needed.
+        expected: &'static str,
+    },
+    /// A line beyond every reason.
+    #[error("{place}: this line has no end within 1 MiB: it is no table, or a quote is not closed")]
+    LineTooLong {
+        /// Where.
+        place: Place,
+    },
+    /// A quote that is not closed in its line, and so swallows the lines behind it.
+    #[error("{place}: a quote is opened and not closed in this line")]
+    OpenQuote {
+        /// Where.
+        place: Place,
+    },
+}
+
+impl TableError {
+    /// Help for a person: what to change.
+    pub fn help(&self) -> String {
+        match self {
+            Self::Unreadable { .. } => "name a table of scenes (.csv, or .parquet in a build with that feature), \
+                                        or - for standard input"
+                .to_owned(),
+            Self::NotText { .. } => "save the table as CSV in UTF-8".to_owned(),
+            Self::OpenQuote { .. } | Self::LineTooLong { .. } => "close the quote, or remove it".to_owned(),
+            Self::WrongType { .. } => {
+                "store numbers as DOUBLE, FLOAT or integers, and the criterion as text".to_owned()
+            }
+            _ => format!("columns: {}; the others may be left out: {}", needed_columns(), OPTIONAL.join(", ")),
+        }
+    }
+}
+
+fn needed_columns() -> String {
+    let needed: Vec<_> = COLUMNS.into_iter().filter(|name| !OPTIONAL.contains(name)).collect();
+    needed.join(", ")
 }
 
 /// Where each column of [`COLUMNS`] stands in the table at hand.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
-    places: [Option<usize>; COLUMNS.len()],
-    width: usize,
+    /// Index of each column, from 0.
+    pub places: [Option<usize>; COLUMNS.len()],
+    /// Number of columns.
+    pub width: usize,
 }
 
 impl Layout {
-    /// The layout that `header` describes.
+    /// The layout that the names of the columns describe; `place` says where column `n` (from 1) is named.
     ///
     /// # Errors
-    /// [`HeaderError`]: an unknown, doubled or missing column.
-    pub fn new(header: &StringRecord) -> Result<Self, HeaderError> {
+    /// [`TableError`]: an unknown, doubled or missing column, or numbers in place of names.
+    pub fn new<'a>(
+        names: impl IntoIterator<Item = &'a str>,
+        place: impl Fn(usize) -> Place,
+    ) -> Result<Self, TableError> {
         let mut places = [None; COLUMNS.len()];
-        for (place, name) in header.iter().enumerate() {
+        let mut width = 0;
+        for name in names {
             let name = name.trim();
-            let column = place + 1;
-            let index = COLUMNS
-                .iter()
-                .position(|known| *known == name)
-                .ok_or_else(|| HeaderError::Unknown { name: name.to_owned(), column })?;
-            if places[index].replace(place).is_some() {
-                return Err(HeaderError::Twice { name: name.to_owned(), column });
+            width += 1;
+            if name.parse::<f64>().is_ok() {
+                return Err(TableError::NoHeader { place: place(width) });
+            }
+            let Some(index) = COLUMNS.iter().position(|known| *known == name) else {
+                let near = COLUMNS
+                    .into_iter()
+                    .map(|known| (strsim::jaro_winkler(&known.to_lowercase(), &name.to_lowercase()), known))
+                    .filter(|(similarity, _)| *similarity > 0.8)
+                    .max_by(|a, b| a.0.total_cmp(&b.0));
+                let near = near.map(|(_, known)| known);
+                return Err(TableError::UnknownColumn { place: place(width), name: shortened(name), near });
+            };
+            if places[index].replace(width - 1).is_some() {
+                return Err(TableError::ColumnTwice { place: place(width), name: name.to_owned() });
             }
         }
         for (index, name) in COLUMNS.into_iter().enumerate() {
             if places[index].is_none() && !OPTIONAL.contains(&name) {
-                return Err(HeaderError::Missing { name });
+                return Err(TableError::MissingColumn { place: place(0), name });
             }
         }
-        Ok(Self { places, width: header.len() })
+        Ok(Self { places, width })
     }
+}
 
-    /// The scene of `row`.
+/// A text from a table as a message may quote it: one line, no control characters, forty characters.
+fn shortened(text: &str) -> String {
+    let mut short: String =
+        text.chars().take(40).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
+    if text.chars().count() > 40 {
+        short.push('…');
+    }
+    short
+}
+
+/// The cells of a row; empty ones are `None`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row<'a> {
+    /// The numbers, in the order of [`COLUMNS`].
+    pub numbers: [Option<f64>; NUMBERS],
+    /// The criterion.
+    pub criterion: Option<&'a str>,
+}
+
+impl Row<'_> {
+    /// The scene of the row; whether its numbers are admissible is for [`Scene::resolve`] to say.
     ///
     /// # Errors
     /// What is wrong, with the column.
-    pub fn scene(&self, row: &ByteRecord) -> Result<Scene, String> {
-        if row.len() != self.width {
-            return Err(format!("{} cells in a table of {} columns", row.len(), self.width));
-        }
-        let cell = |index: usize| -> Result<&str, String> {
-            let Some(place) = self.places[index] else { return Ok("") };
-            std::str::from_utf8(row.get(place).unwrap_or_default())
-                .map(str::trim)
-                .map_err(|_| format!("{}: not UTF-8 text", COLUMNS[index]))
+    pub fn scene(&self) -> Result<Scene, String> {
+        let needed = |index: usize| {
+            self.numbers[index].ok_or_else(|| format!("{}: empty, and every scene needs it", COLUMNS[index]))
         };
-        let number = |index: usize| -> Result<Option<f64>, String> {
-            let text = cell(index)?;
-            if text.is_empty() {
-                return if OPTIONAL.contains(&COLUMNS[index]) {
-                    Ok(None)
-                } else {
-                    Err(format!("{}: empty, and every scene needs it", COLUMNS[index]))
-                };
-            }
-            let value: f64 = text.parse().map_err(|_| format!("{}: `{text}` is not a number", COLUMNS[index]))?;
-            if value.is_finite() { Ok(Some(value)) } else { Err(format!("{}: {text} is not finite", COLUMNS[index])) }
-        };
-        let needed = |index: usize| number(index).map(Option::unwrap_or_default);
         let strength = needed(3)?;
         Ok(Scene {
             title: None,
@@ -129,134 +241,305 @@ impl Layout {
                 nose_factor: needed(2)?,
                 strength,
                 density: needed(4)?,
-                static_factor: number(6)?.unwrap_or_else(|| semi_empirical::static_factor(strength)),
-                inertia_factor: number(7)?.unwrap_or(1.0),
-                crater_ratio: number(8)?.unwrap_or(2.0),
-                crater_stiffness: number(9)?.map_or(CraterStiffness::Continuous, CraterStiffness::Given),
+                static_factor: self.numbers[6].unwrap_or_else(|| semi_empirical::static_factor(strength)),
+                inertia_factor: self.numbers[7].unwrap_or(1.0),
+                crater_ratio: self.numbers[8].unwrap_or(2.0),
+                crater_stiffness: self.numbers[9].map_or(CraterStiffness::Continuous, CraterStiffness::Given),
                 layers: Vec::new(),
             }),
-            thickness: number(5)?,
-            criterion: match cell(11)? {
-                "" | "full-depth" => Criterion::FullDepth,
-                "ndrc" => Criterion::Ndrc,
-                other => return Err(format!("criterion: `{other}` is not full-depth or ndrc")),
+            thickness: self.numbers[5],
+            criterion: match self.criterion {
+                None | Some("" | "full-depth") => Criterion::FullDepth,
+                Some("ndrc") => Criterion::Ndrc,
+                Some(other) => {
+                    return Err(format!("criterion: `{}` is not full-depth or ndrc", shortened(other)));
+                }
             },
             velocity: Some(needed(10)?),
         })
     }
 }
 
+/// Rows of a table, some thousands of them.
+#[derive(Debug)]
+pub enum Rows {
+    /// Records of a CSV table.
+    Csv(csv::Records),
+    /// Columns of a Parquet table.
+    #[cfg(feature = "parquet")]
+    Parquet(parquet::Columns),
+    /// Random scenes of a seed, by their numbers from 0; the first is a multiple of [`PART`].
+    Random {
+        /// Seed.
+        seed: u64,
+        /// Which scenes.
+        rows: Range<u64>,
+    },
+}
+
+impl Rows {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Csv(records) => records.len(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => columns.len(),
+            Self::Random { rows, .. } => (rows.end - rows.start) as usize,
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The scenes of `part`, which begins at a multiple of [`PART`] and is no longer than that.
+    pub fn scenes(&self, part: Range<usize>) -> Vec<Result<Scene, String>> {
+        match self {
+            Self::Csv(records) => part.map(|index| records.scene(index)).collect(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => part.map(|index| columns.scene(index)).collect(),
+            Self::Random { seed, rows } => {
+                let first = rows.start + part.start as u64;
+                random_rows(*seed, first / PART as u64).take(part.len()).map(Ok).collect()
+            }
+        }
+    }
+}
+
+/// The scenes of part `part` of the endless random table with `seed`; a part has [`PART`] rows.
+pub fn random_rows(seed: u64, part: u64) -> impl Iterator<Item = Scene> {
+    let mut generator = Generator::new(seed, &format!("batch {part}"));
+    std::iter::repeat_with(move || generator.next_scene()).take(PART)
+}
+
 /// What a row is answered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The flight.
-    pub flight: Flight,
+    pub flight: Summary,
     /// Critical velocity [m/s], where it was asked for and the target has a thickness.
     pub critical_velocity: Option<f64>,
+    /// Whether a fixed step kept its limit; true for every other method.
+    pub stable: bool,
 }
 
-/// Flies `scene` by `method`, and finds its critical velocity if `with_critical` and it has a thickness.
+/// Flies `scenes` by `method`, and finds the critical velocity of those with a thickness if `with_critical`.
 ///
-/// # Errors
-/// What is wrong with the row, or what could not be computed.
-pub fn answer(scene: &Scene, method: &dyn Integrator, with_critical: bool) -> Result<Answer, String> {
-    let problem = scene.problem().map_err(|error| error.to_string())?;
-    let flight = method.fly(&problem, Detail::Events).map_err(|error| error.to_string())?;
-    let critical_velocity = if with_critical && scene.thickness.is_some() {
-        let found = critical_velocity::of_scene(scene, method).map_err(|error| error.to_string())?;
-        Some(found.velocity)
-    } else {
-        None
+/// The default Taylor method flies in lanes ([`Batch`]), any other row by row. An error is what is wrong with the
+/// row, or what could not be computed; it stops no other row.
+pub fn answers(
+    scenes: Vec<Result<Scene, String>>,
+    method: &Method,
+    with_critical: bool,
+) -> Vec<Result<Answer, String>> {
+    let problems: Vec<Result<Problem, String>> = scenes
+        .iter()
+        .map(|scene| scene.as_ref().map_err(Clone::clone)?.problem().map_err(|error| error.to_string()))
+        .collect();
+    let mut answers: Vec<Result<Answer, String>> = match method {
+        Method::Taylor(taylor) if *taylor == Taylor::default() => {
+            let good: Vec<Problem> = problems.iter().filter_map(|problem| problem.as_ref().ok().cloned()).collect();
+            let mut flights = Batch::new().fly(&good).into_iter();
+            let mut next = || flights.next().map(|flight| flight.map_err(|error| error.to_string()));
+            problems
+                .into_iter()
+                .map(|problem| {
+                    problem?;
+                    let flight = next().unwrap_or_else(|| Err("no answer".to_owned()))?;
+                    Ok(Answer { flight, critical_velocity: None, stable: true })
+                })
+                .collect()
+        }
+        _ => problems
+            .into_iter()
+            .map(|problem| {
+                let flight = method.integrator().fly(&problem?, Detail::Events).map_err(|error| error.to_string())?;
+                let stable = flight.step_limit.is_none_or(|limit| limit.stable);
+                Ok(Answer { flight: Summary::from(&flight), critical_velocity: None, stable })
+            })
+            .collect(),
     };
-    Ok(Answer { flight, critical_velocity })
+    if with_critical {
+        for (answer, scene) in answers.iter_mut().zip(&scenes) {
+            let (Ok(found), Ok(scene)) = (&mut *answer, scene) else { continue };
+            if scene.thickness.is_some() {
+                match critical_velocity::of_scene(scene, method.integrator()) {
+                    Ok(critical) => found.critical_velocity = Some(critical.velocity),
+                    Err(error) => *answer = Err(error.to_string()),
+                }
+            }
+        }
+    }
+    answers
 }
 
-/// One line of results, without its end: `row` counts from 1.
-pub fn result_line(row: u64, answer: &Result<Answer, String>) -> String {
-    match answer {
-        Ok(Answer { flight, critical_velocity }) => {
-            let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-            let crater_end = flight.crater_end();
-            format!(
-                "{row},{},{},{},{},{},{},{},{},",
-                flight.outcome,
-                flight.end.depth,
-                flight.end.time,
-                flight.end.velocity,
-                number(crater_end.map(|s| s.time)),
-                number(crater_end.map(|s| s.velocity)),
-                number(flight.exit_margin),
-                number(*critical_velocity),
-            )
+/// How many rows came to what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// All rows.
+    pub rows: u64,
+    /// With a message in `error`.
+    pub bad: u64,
+    /// With the outcome `undecided`.
+    pub undecided: u64,
+    /// Flown with a step beyond the limit of the scheme.
+    pub unstable: u64,
+}
+
+impl Tally {
+    /// Counts `answers`.
+    pub fn count(&mut self, answers: &[Result<Answer, String>]) {
+        for answer in answers {
+            self.rows += 1;
+            match answer {
+                Ok(answer) => {
+                    self.undecided += u64::from(answer.flight.outcome == Outcome::Undecided);
+                    self.unstable += u64::from(!answer.stable);
+                }
+                Err(_) => self.bad += 1,
+            }
         }
-        Err(message) => format!("{row},,,,,,,,,{}", quoted(message)),
     }
 }
 
-/// A message as one CSV cell.
-fn quoted(message: &str) -> String {
-    let line: String = message.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    format!("\"{}\"", line.replace('"', "\"\""))
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.rows += other.rows;
+        self.bad += other.bad;
+        self.undecided += other.undecided;
+        self.unstable += other.unstable;
+    }
 }
 
-/// Whether a row is undecided.
-pub fn is_undecided(answer: &Result<Answer, String>) -> bool {
-    matches!(answer, Ok(answer) if answer.flight.outcome == Outcome::Undecided)
+/// Lines of results, each with its end; the first has the number `first`, from 1.
+pub fn result_lines(first: u64, answers: &[Result<Answer, String>]) -> String {
+    let mut text = String::with_capacity(160 * answers.len());
+    for (row, answer) in (first..).zip(answers) {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{row},");
+        match answer {
+            Ok(Answer { flight, critical_velocity, .. }) => {
+                text.push_str(flight.outcome.name());
+                let crater_end = flight.crater_end;
+                for value in [
+                    Some(flight.end.depth),
+                    Some(flight.end.time),
+                    Some(flight.end.velocity),
+                    crater_end.map(|s| s.time),
+                    crater_end.map(|s| s.velocity),
+                    flight.exit_margin,
+                    *critical_velocity,
+                ] {
+                    text.push(',');
+                    if let Some(value) = value {
+                        push_number(&mut text, value);
+                    }
+                }
+                text.push_str(",\n");
+            }
+            Err(message) => {
+                text.push_str(",,,,,,,,");
+                push_quoted(&mut text, message);
+                text.push('\n');
+            }
+        }
+    }
+    text
+}
+
+/// The shortest digits that read back to the same number; with an exponent where there would be many zeros.
+fn push_number(text: &mut String, value: f64) {
+    let magnitude = value.abs();
+    let _ = if value == 0.0 || (1e-7..1e17).contains(&magnitude) {
+        write!(text, "{value}")
+    } else {
+        write!(text, "{value:e}")
+    };
+}
+
+/// A message as one CSV cell.
+fn push_quoted(text: &mut String, message: &str) {
+    text.push('"');
+    for c in message.chars() {
+        match c {
+            '"' => text.push_str("\"\""),
+            c if c.is_control() => text.push(' '),
+            c => text.push(c),
+        }
+    }
+    text.push('"');
 }
 
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
     use super::*;
-    use crate::integrators::Taylor;
 
-    const HEADER: [&str; 7] =
-        ["velocity_m_s", "mass_kg", "diameter_m", "nose_factor", "strength_pa", "density_kg_m3", "S"];
-
-    fn layout() -> Layout {
-        Layout::new(&StringRecord::from(HEADER.to_vec())).unwrap()
+    fn layout(names: &str) -> Result<Layout, TableError> {
+        Layout::new(names.split(','), |column| Place { file: "t.csv".to_owned(), line: 1, column })
     }
 
     #[test]
-    fn columns_come_in_any_order_and_defaults_fill_the_rest() {
-        let row = ByteRecord::from(vec!["300", "2", "0.05", "0.72", "36e6", "2300", ""]);
-        let scene = layout().scene(&row).unwrap();
+    fn defaults_fill_what_a_row_leaves_empty() {
+        let mut row = Row::default();
+        for (index, value) in [(0, 2.0), (1, 0.05), (2, 0.72), (3, 36e6), (4, 2300.0), (10, 300.0)] {
+            row.numbers[index] = Some(value);
+        }
+        let scene = row.scene().unwrap();
         let concrete = scene.concrete().unwrap();
-        assert_eq!((scene.mass, scene.velocity, scene.thickness), (2.0, Some(300.0), None));
         // Eq. 14: 72/sqrt(36).
         assert_eq!((concrete.static_factor, concrete.inertia_factor, concrete.crater_ratio), (12.0, 1.0, 2.0));
-        let answer = answer(&scene, &Taylor::default(), true).unwrap();
+        let method = Method::Taylor(Taylor::default());
+        let answer = answers(vec![Ok(scene)], &method, true).remove(0).unwrap();
         assert!((answer.flight.end.depth - 0.144_826_200_112_217_07).abs() < 1e-15);
         assert_eq!(answer.critical_velocity, None);
+        row.numbers[0] = Some(-2.0);
+        assert!(answers(vec![row.scene()], &method, false)[0].as_ref().unwrap_err().contains("mass"));
+        row.numbers[10] = None;
+        assert_eq!(row.scene().unwrap_err(), "velocity_m_s: empty, and every scene needs it");
+        row.criterion = Some("half");
+        row.numbers[10] = Some(1.0);
+        assert_eq!(row.scene().unwrap_err(), "criterion: `half` is not full-depth or ndrc");
     }
 
     #[test]
-    fn a_bad_row_names_its_column_and_stops_nothing() {
-        for (row, expected) in [
-            (vec!["300", "2", "0.05", "0.72", "36e6", "2300"], "6 cells in a table of 7 columns"),
-            (vec!["300", "two", "0.05", "0.72", "36e6", "2300", ""], "mass_kg: `two` is not a number"),
-            (vec!["nan", "2", "0.05", "0.72", "36e6", "2300", ""], "velocity_m_s: nan is not finite"),
-            (vec!["", "2", "0.05", "0.72", "36e6", "2300", ""], "velocity_m_s: empty, and every scene needs it"),
-        ] {
-            let message = layout().scene(&ByteRecord::from(row)).unwrap_err();
-            assert_eq!(message, expected);
-            assert_eq!(result_line(3, &Err(message)), format!("3,,,,,,,,,\"{expected}\""));
-        }
-        let negative =
-            layout().scene(&ByteRecord::from(vec!["300", "-2", "0.05", "0.72", "36e6", "2300", ""])).unwrap();
-        assert!(answer(&negative, &Taylor::default(), false).unwrap_err().contains("mass"));
-    }
-
-    #[test]
-    fn a_header_with_an_unknown_doubled_or_missing_column_is_refused() {
-        let header = |names: &[&str]| Layout::new(&StringRecord::from(names.to_vec())).unwrap_err();
-        assert!(matches!(header(&["mass"]), HeaderError::Unknown { column: 1, .. }));
-        assert!(matches!(header(&["mass_kg", "mass_kg"]), HeaderError::Twice { column: 2, .. }));
-        assert!(matches!(header(&["mass_kg"]), HeaderError::Missing { name: "diameter_m" }));
+    fn a_header_that_cannot_be_used_is_refused_at_its_column() {
+        let refusal = |names: &str| layout(names).unwrap_err().to_string();
+        assert_eq!(
+            refusal("mass_kg,diametre_m"),
+            "t.csv:1, column 2: there is no column `diametre_m`; is `diameter_m` meant?"
+        );
+        assert_eq!(refusal("mass_kg,mass_kg"), "t.csv:1, column 2: the column `mass_kg` is there twice");
+        assert_eq!(refusal("mass_kg"), "t.csv:1: the column `diameter_m` is missing");
+        assert_eq!(
+            refusal("2.0,0.05"),
+            "t.csv:1, column 1: the first line must name the columns, and this one holds numbers"
+        );
+        let full = layout("velocity_m_s,mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3").unwrap();
+        assert_eq!((full.width, full.places[0], full.places[10], full.places[5]), (6, Some(1), Some(0), None));
     }
 
     #[test]
     fn a_message_is_one_cell_whatever_it_quotes() {
-        assert_eq!(quoted("a \"b\"\nc"), "\"a \"\"b\"\" c\"");
+        assert_eq!(result_lines(3, &[Err("a \"b\"\nc".to_owned())]), "3,,,,,,,,,\"a \"\"b\"\" c\"\n");
+    }
+
+    #[test]
+    fn numbers_read_back_to_the_same_number() {
+        for value in [0.0, -0.0, 1.0 / 3.0, 5e-324, 1.797e308, 1e-7, 123_456_789.125, -2.5e-12] {
+            let mut text = String::new();
+            push_number(&mut text, value);
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{text}");
+            assert!(text.len() < 26, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_random_table_is_the_same_however_it_is_cut() {
+        let whole = Rows::Random { seed: 3, rows: 0..4096 };
+        let later = Rows::Random { seed: 3, rows: 2048..4096 };
+        assert_eq!(whole.scenes(2048..3072), later.scenes(0..1024));
+        assert_ne!(whole.scenes(0..10), whole.scenes(1024..1034));
     }
 }
