@@ -75,7 +75,8 @@ impl VerifyArgs {
         folder::write(&run, &self.out).map_err(folder_error)?;
         let report = VerifyJson::new(&run);
         if !suite.is_embedded {
-            for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX) {
+            for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX)
+            {
                 eprintln!("warning: the limit of {table} is {looseness:.0} times what is measured: it guards nothing");
             }
         }

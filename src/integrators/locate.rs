@@ -319,7 +319,10 @@ pub(crate) fn passage<S: Scalar>(
 #[inline(always)]
 fn at_depth<S: Scalar>(law: &Stage<S>, point: &State<S>, jet: &Jet<S>, step: S) -> State<S> {
     let half = S::from_f64(0.5);
-    let velocity = point.velocity + step * (jet.first + step * (jet.second * fault!("passage-velocity", half, S::one()) + step * jet.third * sixth()));
+    let velocity = point.velocity
+        + step
+            * (jet.first
+                + step * (jet.second * fault!("passage-velocity", half, S::one()) + step * jet.third * sixth()));
     let velocity = if velocity.value() > 0.0 { velocity } else { S::zero() };
     State { time: point.time + step, depth: law.end, velocity }
 }
