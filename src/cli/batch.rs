@@ -13,7 +13,7 @@ use super::output::{persist, temporary_beside};
 use super::{CliError, Exit};
 use crate::integrators::Method;
 use crate::studies::batch::csv::{CsvScenes, Records};
-use crate::studies::batch::{Answer, PART, RESULT_HEADER, Rows, TableError, Tally, answers, result_lines};
+use crate::studies::batch::{PART, RESULT_HEADER, Rows, TableError, Tally, answers, result_lines};
 
 /// Rows read, flown and written at a time: three such chunks are the bound of the memory.
 const CHUNK: usize = 16 * PART;
@@ -21,9 +21,9 @@ const CHUNK: usize = 16 * PART;
 /// Arguments of `batch`.
 #[derive(Args, Debug)]
 pub struct BatchArgs {
-    /// Scenes: a table (.csv or .parquet), - for CSV on standard input, or random:N[:SEED] for N random scenes.
+    /// Scenes: a CSV table, - for on standard input, or random:N[:SEED] for N random scenes.
     pub scenes: PathBuf,
-    /// Results: a table (.csv or .parquet), written whole or not at all; - for CSV on standard output.
+    /// Results: a CSV table, written whole or not at all; - for standard output.
     #[arg(long, value_name = "RESULTS.csv")]
     pub out: PathBuf,
     /// Method and its options.
@@ -46,8 +46,8 @@ impl BatchArgs {
         if is_same_file(&self.scenes, &self.out) {
             return Err(CliError::usage("the results would replace the scenes", "give --out another name"));
         }
-        refuse_parquet_unless_built(&self.scenes)?;
-        refuse_parquet_unless_built(&self.out)?;
+        refuse_parquet(&self.scenes)?;
+        refuse_parquet(&self.out)?;
         let method = self.method.build()?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
@@ -72,9 +72,8 @@ impl BatchArgs {
         // Ends with the table: each turn reads rows, or is the last but one.
         while !rows.is_empty() || !flown.parts.is_empty() {
             let first = tally.rows + flown.rows() + 1;
-            let keeps_parts = sink.wants_answers();
             let (next_flown, moved) = rayon::join(
-                || Flown::new(&rows, first, method, self.critical, keeps_parts),
+                || Flown::new(&rows, first, method, self.critical),
                 || -> Result<_, CliError> {
                     sink.write(&flown).map_err(|cause| self.unwritable(cause))?;
                     // After the last row nothing is left to read.
@@ -110,15 +109,14 @@ struct Flown {
     parts: Vec<Part>,
 }
 
-/// Results of some rows: lines of text or answers, whichever is written.
+/// Results of some rows.
 struct Part {
     tally: Tally,
     lines: String,
-    answers: Vec<Result<Answer, String>>,
 }
 
 impl Flown {
-    fn new(rows: &Rows, first: u64, method: &Method, critical: bool, keeps_answers: bool) -> Self {
+    fn new(rows: &Rows, first: u64, method: &Method, critical: bool) -> Self {
         let count = rows.len();
         let parts = (0..count.div_ceil(PART))
             .into_par_iter()
@@ -127,12 +125,7 @@ impl Flown {
                 let answers = answers(rows.scenes(from..count.min(from + PART)), method, critical);
                 let mut tally = Tally::default();
                 tally.count(&answers);
-                if keeps_answers {
-                    Part { tally, lines: String::new(), answers }
-                } else {
-                    let lines = result_lines(first + from as u64, &answers);
-                    Part { tally, lines, answers: Vec::new() }
-                }
+                Part { tally, lines: result_lines(first + from as u64, &answers) }
             })
             .collect();
         Self { parts }
@@ -146,14 +139,7 @@ impl Flown {
 /// Where the scenes come from.
 enum Source {
     Csv(CsvScenes<Box<dyn Read + Send>>),
-    #[cfg(feature = "parquet")]
-    Parquet(crate::studies::batch::parquet::ParquetScenes, ProgressBar),
-    Random {
-        seed: u64,
-        next: u64,
-        end: u64,
-        progress: ProgressBar,
-    },
+    Random { seed: u64, next: u64, end: u64, progress: ProgressBar },
 }
 
 impl Source {
@@ -173,13 +159,6 @@ impl Source {
             return Err(unreadable("is a folder".to_owned()));
         }
         let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        #[cfg(feature = "parquet")]
-        if is_parquet(path) {
-            let scenes =
-                crate::studies::batch::parquet::ParquetScenes::new(&name, file).map_err(|error| refused(&error))?;
-            bar(progress, scenes.rows(), "{bar:30} {human_pos}/{human_len} rows, {eta} left");
-            return Ok(Self::Parquet(scenes, progress.clone()));
-        }
         // A pipe or a device has no length.
         if metadata.len() > 0 {
             bar(progress, metadata.len(), "{bar:30} {bytes}/{total_bytes}, {eta} left");
@@ -197,12 +176,6 @@ impl Source {
                     _ => None,
                 };
                 scenes.next_rows(CHUNK, used).map(Rows::Csv).map_err(|error| refused(&error))
-            }
-            #[cfg(feature = "parquet")]
-            Self::Parquet(scenes, progress) => {
-                let columns = scenes.next_rows(CHUNK).map_err(|error| refused(&error))?;
-                progress.inc(columns.len() as u64);
-                Ok(Rows::Parquet(columns))
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;
@@ -230,8 +203,6 @@ fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
 /// Where the results go.
 enum Sink {
     File(BufWriter<tempfile::NamedTempFile>),
-    #[cfg(feature = "parquet")]
-    Parquet(Box<crate::studies::batch::parquet::ParquetResults<tempfile::NamedTempFile>>),
     Standard(BufWriter<io::Stdout>),
 }
 
@@ -241,39 +212,20 @@ impl Sink {
             Self::Standard(BufWriter::with_capacity(1 << 20, io::stdout()))
         } else {
             let file = temporary_beside(path)?;
-            #[cfg(feature = "parquet")]
-            if is_parquet(path) {
-                return crate::studies::batch::parquet::ParquetResults::new(file).map(|p| Self::Parquet(Box::new(p)));
-            }
             Self::File(BufWriter::with_capacity(1 << 20, file))
         };
         sink.text(&format!("{RESULT_HEADER}\n"))?;
         Ok(sink)
     }
 
-    /// Whether answers are written, and not lines.
-    fn wants_answers(&self) -> bool {
-        match self {
-            #[cfg(feature = "parquet")]
-            Self::Parquet(_) => true,
-            _ => false,
-        }
-    }
-
     fn text(&mut self, text: &str) -> io::Result<()> {
         match self {
             Self::File(writer) => writer.write_all(text.as_bytes()),
             Self::Standard(writer) => writer.write_all(text.as_bytes()),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(_) => Ok(()),
         }
     }
 
     fn write(&mut self, flown: &Flown) -> io::Result<()> {
-        #[cfg(feature = "parquet")]
-        if let Self::Parquet(results) = self {
-            return results.write(flown.parts.iter().flat_map(|part| &part.answers));
-        }
         flown.parts.iter().try_for_each(|part| self.text(&part.lines))
     }
 
@@ -281,8 +233,6 @@ impl Sink {
         match self {
             Self::File(writer) => persist(writer.into_inner().map_err(io::IntoInnerError::into_error)?, path),
             Self::Standard(mut writer) => writer.flush(),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(results) => persist(results.finish()?, path),
         }
     }
 }
@@ -292,15 +242,11 @@ fn refused(error: &TableError) -> CliError {
     CliError::usage(error.to_string(), error.help())
 }
 
-fn is_parquet(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"))
-}
-
-fn refuse_parquet_unless_built(path: &Path) -> Result<(), CliError> {
-    if is_parquet(path) && !cfg!(feature = "parquet") {
+fn refuse_parquet(path: &Path) -> Result<(), CliError> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
         return Err(CliError::usage(
-            format!("{}: this build reads and writes CSV only", path.display()),
-            "build with `cargo build --release --features parquet`, or give a .csv file",
+            format!("{}: this version reads and writes CSV only", path.display()),
+            "give a .csv file",
         ));
     }
     Ok(())

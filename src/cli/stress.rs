@@ -284,9 +284,9 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
     if let Some(summary) = random {
         text.push_str(&random_text(summary));
     }
-    let _ = write!(
+    let _ = writeln!(
         text,
-        "{}: {} passed, {} failed, {} undecided, {} skipped\n",
+        "{}: {} passed, {} failed, {} undecided, {} skipped",
         counts.verdict().name(),
         counts.passed,
         counts.failed,
@@ -326,7 +326,7 @@ fn random_text(summary: &Summary) -> String {
         text.push('\n');
     }
     for defect in &summary.defects {
-        let _ = write!(text, "  scene {}: {}\n", defect.index, super::solve::escape_terminal(&defect.what));
+        let _ = writeln!(text, "  scene {}: {}", defect.index, super::solve::escape_terminal(&defect.what));
     }
     text
 }

@@ -24,7 +24,14 @@
 //! **Bit by bit.** A result depends on nothing but its scene: not on the neighbours, on the number of lanes, or on the
 //! processor. Products and sums are never fused, divisions and roots are rounded correctly everywhere.
 
-#![expect(clippy::inline_always, reason = "a loop over lanes is vectorised only when everything in it is inlined")]
+#![expect(
+    clippy::cast_lossless,
+    clippy::out_of_bounds_indexing,
+    clippy::needless_bitwise_bool,
+    clippy::struct_field_names,
+    clippy::trivially_copy_pass_by_ref,
+    reason = "one shape for every lane: unrolled coefficients behind a constant bound, and conditions without a branch"
+)]
 
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;

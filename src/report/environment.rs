@@ -56,7 +56,7 @@ impl Environment {
             rustc: env!("PENETRODE_RUSTC"),
             target: env!("PENETRODE_TARGET"),
             profile: env!("PENETRODE_PROFILE"),
-            features: [("diffsol", cfg!(feature = "diffsol")), ("parquet", cfg!(feature = "parquet"))]
+            features: [("diffsol", cfg!(feature = "diffsol"))]
                 .into_iter()
                 .filter_map(|(name, on)| on.then_some(name))
                 .collect(),

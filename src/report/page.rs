@@ -485,12 +485,14 @@ fn kind_of(check: &Check) -> Kind {
         Check::Order { .. } | Check::Manufactured { .. } | Check::Proportionality { .. } | Check::WorkOrder { .. } => {
             Kind::Order
         }
-        Check::DiscreteSolution { .. } | Check::CraterConstant {} | Check::CraterBand {} | Check::LaggedConstant {} => {
-            Kind::Discrete
-        }
+        Check::DiscreteSolution { .. }
+        | Check::CraterConstant {}
+        | Check::CraterBand {}
+        | Check::LaggedConstant {}
+        | Check::Clock { .. } => Kind::Discrete,
         Check::SelfConvergence {} | Check::GridConvergence {} => Kind::Solution,
         Check::Pair { .. } | Check::Peer { .. } => Kind::CrossCode,
-        Check::Outcome { .. } | Check::EventOrder {} => Kind::Event,
+        Check::Outcome { .. } | Check::EventOrder {} | Check::Margin { .. } => Kind::Event,
         Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. } => {
             Kind::Invariant
         }

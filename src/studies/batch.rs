@@ -1,12 +1,9 @@
 //! Many scenes from a table: what each row asks, and what each is answered (contract, "Tables").
 //!
 //! A row is one crater and one tunnel. Its result depends on no other row, so that threads and neighbours change
-//! nothing. Tables come as CSV ([`csv`]), as Parquet (`parquet`, in a build with that feature), or from a seed
-//! ([`random_rows`]); all are read in chunks, and each turns its rows into scenes one by one.
+//! nothing. Tables come as CSV ([`csv`]) or from a seed ([`random_rows`]); both are read in chunks, and each turns its rows into scenes one by one.
 
 pub mod csv;
-#[cfg(feature = "parquet")]
-pub mod parquet;
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -138,9 +135,7 @@ impl TableError {
     /// Help for a person: what to change.
     pub fn help(&self) -> String {
         match self {
-            Self::Unreadable { .. } => "name a table of scenes (.csv, or .parquet in a build with that feature), \
-                                        or - for standard input"
-                .to_owned(),
+            Self::Unreadable { .. } => "name a table of scenes (.csv), or - for standard input".to_owned(),
             Self::NotText { .. } => "save the table as CSV in UTF-8".to_owned(),
             Self::OpenQuote { .. } | Self::LineTooLong { .. } => "close the quote, or remove it".to_owned(),
             Self::WrongType { .. } => {
@@ -265,9 +260,6 @@ impl Row<'_> {
 pub enum Rows {
     /// Records of a CSV table.
     Csv(csv::Records),
-    /// Columns of a Parquet table.
-    #[cfg(feature = "parquet")]
-    Parquet(parquet::Columns),
     /// Random scenes of a seed, by their numbers from 0; the first is a multiple of [`PART`].
     Random {
         /// Seed.
@@ -282,8 +274,6 @@ impl Rows {
     pub fn len(&self) -> usize {
         match self {
             Self::Csv(records) => records.len(),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(columns) => columns.len(),
             Self::Random { rows, .. } => (rows.end - rows.start) as usize,
         }
     }
@@ -297,8 +287,6 @@ impl Rows {
     pub fn scenes(&self, part: Range<usize>) -> Vec<Result<Scene, String>> {
         match self {
             Self::Csv(records) => part.map(|index| records.scene(index)).collect(),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(columns) => part.map(|index| columns.scene(index)).collect(),
             Self::Random { seed, rows } => {
                 let first = rows.start + part.start as u64;
                 random_rows(*seed, first / PART as u64).take(part.len()).map(Ok).collect()
@@ -328,6 +316,7 @@ pub struct Answer {
 ///
 /// The default Taylor method flies in lanes ([`Batch`]), any other row by row. An error is what is wrong with the
 /// row, or what could not be computed; it stops no other row.
+#[expect(clippy::needless_pass_by_value, reason = "the scenes are used up, part by part")]
 pub fn answers(
     scenes: Vec<Result<Scene, String>>,
     method: &Method,

@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn growth_without_drag_is_that_of_the_theory_of_the_paper() {
         // z² - (2 - a²) z + 1 = 0 at a = 3: z = (-7 ± sqrt(45))/2.
-        let expected = (7.0 + 45f64.sqrt()) / 2.0;
+        let expected = 3.5 + 0.5 * 45f64.sqrt();
         assert!((growth_in_theory(VelocityAt::LaggedHalfStep, 3.0, 0.0) - expected).abs() < 1e-14);
         for velocity in [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep] {
             assert!((growth_measured(velocity, 3.0, 0.0, 100).unwrap() / expected - 1.0).abs() < 1e-9);

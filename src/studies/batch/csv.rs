@@ -21,6 +21,7 @@ const LINE_MAX: u64 = 1 << 20;
 #[derive(Debug)]
 pub struct Records {
     layout: Arc<Layout>,
+    #[expect(clippy::struct_field_names, reason = "the records are what the type is of")]
     records: Vec<ByteRecord>,
     /// Records in use; the others wait to be filled again.
     count: usize,
@@ -60,6 +61,7 @@ impl Records {
                 .map_err(|_| format!("{}: not UTF-8 text", COLUMNS[index]))
         };
         let mut row = Row::default();
+        #[expect(clippy::needless_range_loop, reason = "one index for the cell, its name and its place in the row")]
         for index in 0..NUMBERS {
             let text = cell(index)?;
             if !text.is_empty() {

@@ -173,6 +173,7 @@ fn composed(thickness_ratio: f64) -> f64 {
 }
 
 /// Eq. 15 against its two parents over H/d.
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
 pub(super) fn eq15(form: Eq15Form, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
     const POINTS: usize = 2000;
     let formula = match form {

@@ -50,6 +50,7 @@ impl ManufacturedPath {
     ///
     /// Behind the kink a term in (t - t_k)² joins it: x_m' has a kink there and x_m'' a jump, so that a step around it
     /// with the acceleration of one side alone shows.
+    #[expect(clippy::unused_self, reason = "the path is the manufactured problem's, whatever its law")]
     fn depth(self, stage: usize, t: Dual2_64) -> Dual2_64 {
         let path = t + (t * 3.0).sin() * 0.2;
         if stage == 0 { path } else { path + (t - KINK).powi(2) * 0.8 }

@@ -106,12 +106,12 @@ pub(super) fn crater_constant(subject: &Subject<'_>) -> Result<Measurement, NotM
 ///
 /// The deepest node is at most half a step from the deepest place of the discrete path, which is `(w dt)²/8` too deep.
 pub(super) fn crater_band(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+    const STEPS: usize = 200;
     let problem = &subject.problem;
     let exact = subject.yardstick()?.flight;
     if problem.crater != Some(0) || exact.stage != 0 || !exact.outcome.is_stop() {
         return Err(NotMeasured::skip("the flight does not come to rest in the crater"));
     }
-    const STEPS: usize = 200;
     let w = (problem.stages[0].stiffness / problem.mass).sqrt();
     let mut random = Random::for_part(subject.context.seed, "crater band");
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
