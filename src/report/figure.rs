@@ -86,7 +86,7 @@ impl Drawn {
     pub fn file(&self) -> String {
         let columns = self.figure.panels.len().clamp(1, COLUMNS);
         let width = (0..columns).fold(GAP, |width, _| width + WIDTH + GAP);
-        let message = wrapped(&self.figure.message, (width - 2 * GAP) as usize / 8);
+        let message = wrapped(&self.figure.message, (width - 2 * GAP) as usize / 9);
         let head = message.iter().fold(GAP + GAP / 2, |head, _| head + LINE);
         let mut body = String::new();
         let mut y = head;
