@@ -3,11 +3,7 @@
 //! `cargo bench` runs them; ids are `method/scene`. Besides the shipped scenes, 1,000 varied scenes from a seed: one
 //! scene repeated flatters small solvers, whose branches the processor then knows.
 
-#![expect(
-    clippy::panic,
-    missing_docs,
-    reason = "a bench that cannot be set up stops; criterion's macro writes its functions"
-)]
+#![expect(clippy::panic, reason = "a bench that cannot be set up stops")]
 
 use std::hint::black_box;
 
