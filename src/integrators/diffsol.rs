@@ -7,7 +7,7 @@
 //! du/dtau = -(p + s xi + r u + q u²),  dxi/dtau = u,  xi(0) = 0,  until xi = distance or u = 0
 //! ```
 //!
-//! `xi` counts from the start of the leg and L is the first boundary in x, else the exit depth. In these units the
+//! `xi` counts from the start of the leg and L is the first boundary in x, the exit depth among them. In these units the
 //! absolute tolerances are both `rtol`, for every scene: one problem and one solver serve a whole study, and only the
 //! four coefficients change.
 //!
@@ -267,7 +267,7 @@ struct Units {
 }
 
 impl Units {
-    /// First boundary in x, else the exit depth, else the shortest length that the first stage's law has.
+    /// First boundary in x, the exit depth among them, else the shortest length that the first stage's law has.
     fn of(problem: &Problem) -> Self {
         let speed = problem.impact_speed;
         let boundary = problem
@@ -275,7 +275,8 @@ impl Units {
             .iter()
             .map(|stage| stage.end)
             .chain([problem.exit_depth])
-            .find(|&depth| depth > 0.0 && depth.is_finite());
+            .filter(|&depth| depth > 0.0 && depth.is_finite())
+            .reduce(f64::min);
         let law = problem.stages[0];
         let (m, w) = (problem.mass, speed * speed);
         let own = [

@@ -87,9 +87,14 @@ fn without_times(text: &str) -> String {
                 line.replace_range(at..at + start.len() + length, "TIME");
             }
         }
-        // `2026-11-21T05:09:15Z`
-        while let Some(at) = line.find('Z').filter(|at| *at >= 19 && line.as_bytes()[at - 9] == b'T') {
-            line.replace_range(at - 19..=at, "DATE");
+        // `2026-11-21T05:09:15Z`, wherever it stands in the line; other Zs stay.
+        let dates: Vec<usize> = line
+            .match_indices('Z')
+            .map(|(at, _)| at)
+            .filter(|&at| at >= 19 && line.as_bytes()[at - 9] == b'T' && line.as_bytes()[at - 3] == b':')
+            .collect();
+        for at in dates.into_iter().rev() {
+            line.replace_range(at - 9..=at, "TIME");
         }
         lines.push(line);
     }
