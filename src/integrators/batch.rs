@@ -794,3 +794,162 @@ fn refill(lanes: &mut Lanes, i: usize, block: &Block, next: &mut usize) -> bool 
     lanes.put(i, IDLE);
     false
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+mod tests {
+    use super::*;
+    use crate::physics::Stage;
+    use crate::physics::reference::{self, Exact, Source};
+
+    fn scalar(problem: &Problem) -> Summary {
+        Summary::from(&Taylor::default().fly(problem, Detail::Events).unwrap())
+    }
+
+    /// Random craters and tunnels; `decades` is how far their groups spread to either side, in powers of ten.
+    fn problems(count: usize, decades: f64) -> Vec<Problem> {
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut spread = |decades: f64| 10_f64.powf(decades * (2.0 * random.f64() - 1.0));
+        let mut draw = || {
+            let (mass, static_force, impact_speed) = (spread(3.0), 1e5 * spread(3.0), 100.0 * spread(2.0));
+            // In units of M V0²/P, twice the depth of rest without drag.
+            let rest = mass * impact_speed * impact_speed / static_force;
+            let (depth, exit_depth) = (0.1 * rest * spread(0.5 * decades), 0.3 * rest * spread(0.5 * decades));
+            let has_drag = spread(1.0) > 10_f64.powf(-0.8);
+            let drag = if has_drag { static_force / impact_speed.powi(2) * spread(decades) } else { 0.0 };
+            let force = static_force + drag * impact_speed * impact_speed;
+            // Continuous, or within a factor 4 of it.
+            let factor = spread(1.0);
+            let stiffness =
+                mass * force / (depth * (mass + depth * drag)) * if factor > 1.0 { 1.0 } else { spread(0.6) };
+            let (has_crater, has_exit) = (spread(1.0) > 10_f64.powf(-0.8), spread(1.0) > 10_f64.powf(-0.4));
+            let mut problem = Problem {
+                mass,
+                impact_speed,
+                exit_depth: if has_exit { exit_depth } else { f64::INFINITY },
+                stages: [Stage::tunnel(static_force, drag)].into_iter().collect(),
+                crater: None,
+                target: Target::CraterAndTunnel,
+            };
+            if has_crater {
+                problem.stages.insert(0, Stage::crater(stiffness, depth));
+                problem.crater = Some(0);
+            }
+            problem
+        };
+        (0..count).map(|_| draw()).collect()
+    }
+
+    #[test]
+    fn every_processor_and_any_neighbours_give_the_same_bits() {
+        let problems: Vec<Problem> = problems(1500, 2.0).into_iter().chain(problems(1500, 9.0)).collect();
+        let whole = Batch::new().fly(&problems);
+        for batch in Instructions::ALL.into_iter().filter_map(Batch::with_instructions) {
+            assert_eq!(batch.fly(&problems), whole, "{batch:?}");
+        }
+        for (problem, together) in problems.iter().zip(&whole).step_by(7) {
+            assert_eq!(Batch::new().fly(std::slice::from_ref(problem))[0], *together);
+        }
+        let backwards: Vec<Problem> = problems.iter().rev().cloned().collect();
+        assert!(Batch::new().fly(&backwards).into_iter().rev().eq(whole));
+    }
+
+    #[test]
+    fn nearly_all_scenes_are_answered_by_the_lanes_themselves() {
+        let problems = problems(1500, 2.0);
+        let given_up =
+            problems.iter().zip(Batch::new().fly(&problems)).filter(|(p, f)| scalar(p) == *f.as_ref().unwrap()).count();
+        assert!(given_up <= 15, "{given_up} of 1500");
+    }
+
+    #[test]
+    fn lanes_agree_with_the_scalar_integrator_over_eighteen_orders_of_drag() {
+        let problems = problems(4000, 9.0);
+        for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
+            let (lane, alone) = (flight.unwrap(), scalar(problem));
+            assert!(lane.outcome.agrees_with(alone.outcome), "{problem:?}\n{lane:?}\n{alone:?}");
+            let depth = (lane.end.depth / alone.end.depth - 1.0).abs();
+            assert!(depth <= 1e-14, "{depth} {problem:?}");
+            assert_eq!(lane.crater_end.is_some(), alone.crater_end.is_some(), "{problem:?}");
+            // Velocities by the energy they stand for, which is well conditioned.
+            let energy = (lane.end.velocity.powi(2) - alone.end.velocity.powi(2)).abs() / problem.impact_speed.powi(2);
+            assert!(energy <= 2e-14, "{energy} {problem:?}");
+        }
+    }
+
+    #[test]
+    fn the_bar_holds_the_error_of_the_margin() {
+        let problems = problems(400, 2.0);
+        let mut judged = 0;
+        for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
+            let flight = flight.unwrap();
+            let Some((margin, bar)) = flight.exit_margin.zip(flight.exit_margin_error) else { continue };
+            let exact = reference::flight(Source::Problem(problem)).unwrap().exit_margin.unwrap();
+            // A stop's margin is carried on by a formula whose own rounding is relative to the margin.
+            let error = exact.error_over(margin, &Exact::one());
+            assert!(error <= bar + 8.0 * f64::EPSILON * margin.abs(), "{error} {bar} {margin} {problem:?}");
+            judged += 1;
+        }
+        assert!(judged > 200, "{judged}");
+    }
+
+    #[test]
+    fn what_the_lanes_cannot_prove_is_the_scalar_integrators_answer() {
+        let crater_and_tunnel = |impact_speed: f64, exit_depth: f64, stiffness: f64| Problem {
+            mass: 2.0,
+            impact_speed,
+            exit_depth,
+            stages: [Stage::crater(stiffness, 0.1), Stage::tunnel(8.5e5, 3.25)].into_iter().collect(),
+            crater: Some(0),
+            target: Target::CraterAndTunnel,
+        };
+        // V1 = 0 at k d, exactly and nearly.
+        let touching = 2.0 * 300.0 * 300.0 / 0.01;
+        let graze = scalar(&crater_and_tunnel(300.0, f64::INFINITY, 8.5e6)).end.depth;
+        let mut stages = crater_and_tunnel(300.0, 1.0, 8.5e6);
+        stages.target = Target::Stages;
+        let mut viscous = crater_and_tunnel(300.0, 1.0, 8.5e6);
+        viscous.stages[1].viscosity = 1.0;
+        for problem in [
+            crater_and_tunnel(300.0, graze, 8.5e6),
+            crater_and_tunnel(300.0, f64::INFINITY, touching),
+            crater_and_tunnel(300.0, f64::INFINITY, touching * (1.0 + 1e-9)),
+            crater_and_tunnel(0.0, 1.0, 8.5e6),
+            crater_and_tunnel(300.0, 0.0, 8.5e6),
+            crater_and_tunnel(1e-160, f64::INFINITY, 8.5e6),
+            stages,
+            viscous,
+        ] {
+            assert_eq!(Batch::new().fly(std::slice::from_ref(&problem))[0], Ok(scalar(&problem)), "{problem:?}");
+        }
+    }
+
+    #[test]
+    fn an_exit_at_the_end_of_the_crater_is_both_events() {
+        let problem = Problem {
+            mass: 2.0,
+            impact_speed: 300.0,
+            exit_depth: 0.1,
+            stages: [Stage::crater(8.5e6, 0.1), Stage::tunnel(8.5e5, 3.25)].into_iter().collect(),
+            crater: Some(0),
+            target: Target::CraterAndTunnel,
+        };
+        let flight = Batch::new().fly(std::slice::from_ref(&problem))[0].clone().unwrap();
+        assert_eq!((flight.outcome, flight.stage), (Outcome::Perforated, 0));
+        assert_eq!(flight.crater_end, Some(flight.end));
+        assert_eq!(scalar(&problem).crater_end.map(|s| s.depth), Some(0.1));
+        assert_eq!(scalar(&problem).stage, 0);
+    }
+
+    #[test]
+    fn an_endless_flight_is_the_error_of_its_own_row_only() {
+        let mut problems = problems(3, 2.0);
+        // Drag alone never brings anything to rest.
+        problems[1].stages = [Stage::tunnel(0.0, 1.0)].into_iter().collect();
+        problems[1].crater = None;
+        problems[1].exit_depth = f64::INFINITY;
+        let flights = Batch::new().fly(&problems);
+        assert!(matches!(flights[1], Err(IntegrationError::NeverEnds { .. })), "{:?}", flights[1]);
+        assert!(flights[0].is_ok() && flights[2].is_ok());
+    }
+}
