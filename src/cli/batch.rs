@@ -21,7 +21,7 @@ const CHUNK: usize = 16 * PART;
 /// Arguments of `batch`.
 #[derive(Args, Debug)]
 pub struct BatchArgs {
-    /// Scenes: a CSV table, - for on standard input, or random:N[:SEED] for N random scenes.
+    /// Scenes: a CSV table, - for standard input, or random:N[:SEED] for N random scenes.
     pub scenes: PathBuf,
     /// Results: a CSV table, written whole or not at all; - for standard output.
     #[arg(long, value_name = "RESULTS.csv")]

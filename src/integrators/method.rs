@@ -21,7 +21,7 @@ pub enum MethodName {
     Tsit45,
     /// Variable-order backward differentiation (diffsol): implicit, for driven stages.
     Bdf,
-    /// Singly diagonal implicit Runge-Kutta of order 4(3) (diffsol).
+    /// Singly diagonal implicit Runge-Kutta of order 3 (diffsol): implicit.
     Esdirk34,
     /// TR-BDF2 (diffsol): implicit, of order 2.
     TrBdf2,

@@ -417,7 +417,7 @@ fn algorithms(run: &Run<'_>) -> Markup {
                 dt { "energy" } dd { "V² over x, stage by stage: no event to find but rest; accurate to round-off." }
                 dt { "tsit45" } dd { "Tsitouras 5(4), order 5, step from the tolerance." }
                 dt { "bdf" } dd { "Backward differences, variable order, for stiff stages." }
-                dt { "esdirk34, tr-bdf2" } dd { "Implicit Runge-Kutta, orders 4 and 2, for stiff stages." }
+                dt { "esdirk34, tr-bdf2" } dd { "Implicit Runge-Kutta, orders 3 and 2, for stiff stages." }
                 dt { "adaptive" } dd { "Chooses tsit45 or bdf stage by stage." }
                 dt { "closed-form" } dd { "Nothing is integrated; what the others are measured by." }
             }
