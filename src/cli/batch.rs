@@ -253,7 +253,7 @@ fn refuse_parquet(path: &Path) -> Result<(), CliError> {
 }
 
 /// Whether both paths are one file.
-fn is_same_file(a: &Path, b: &Path) -> bool {
+pub(super) fn is_same_file(a: &Path, b: &Path) -> bool {
     let is_standard = a.as_os_str() == "-";
     !is_standard && (a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b))
 }

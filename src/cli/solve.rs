@@ -1,12 +1,13 @@
 //! `penetrode solve`: one flight, beside the exact answer.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::batch::is_same_file;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{engineering, error_text, print_json, print_text, significant, table, table_lines, write_whole};
 use super::scene_json::SceneJson;
@@ -159,6 +160,9 @@ impl SolveArgs {
     /// A scene or options that cannot be used (exit 2), a flight without an answer (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         let scene = read_scene(&self.scene)?;
+        if self.trajectory.as_deref().is_some_and(|path| is_same_file(Path::new(&self.scene), path)) {
+            return Err(CliError::usage("the trajectory would replace the scene", "give --trajectory another name"));
+        }
         let problem = scene.problem()?;
         let method = self.method.build()?;
         let detail = if self.trajectory.is_some() { Detail::Trajectory } else { Detail::Events };
