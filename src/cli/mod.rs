@@ -2,6 +2,7 @@
 
 pub mod audit;
 pub mod batch;
+pub mod bench;
 pub mod completions;
 pub mod converge;
 pub mod critical;
@@ -205,6 +206,8 @@ pub enum Command {
     Sweep(sweep::SweepArgs),
     /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
     Map(map::MapArgs),
+    /// What an accuracy costs: time and work against error, and the largest steps.
+    Bench(bench::BenchArgs),
     /// Measured penetration depths beside predicted ones: shipped data or your own.
     Experiments(experiments::ExperimentsArgs),
     /// Order, error band and verdict for step-size results of another code.
@@ -228,6 +231,7 @@ impl Command {
             Self::Converge(_) => "converge",
             Self::Sweep(_) => "sweep",
             Self::Map(_) => "map",
+            Self::Bench(_) => "bench",
             Self::Experiments(_) => "experiments",
             Self::Audit(_) => "audit",
             Self::Verify(_) => "verify",
@@ -244,6 +248,7 @@ impl Command {
             Self::Converge(args) => args.json,
             Self::Sweep(args) => args.json,
             Self::Map(args) => args.json,
+            Self::Bench(args) => args.json,
             Self::Experiments(args) => args.json,
             Self::Audit(args) => args.json,
             Self::Verify(args) => args.json,
@@ -260,6 +265,7 @@ impl Command {
             Self::Converge(args) => args.run(),
             Self::Sweep(args) => args.run(),
             Self::Map(args) => args.run(),
+            Self::Bench(args) => args.run(),
             Self::Experiments(args) => args.run(),
             Self::Audit(args) => args.run(),
             Self::Verify(args) => args.run(),

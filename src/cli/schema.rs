@@ -5,6 +5,7 @@ use schemars::schema_for;
 
 use super::{CliError, Exit, converge, critical, experiments, map, output, solve, stress, sweep};
 use crate::report::VerifyJson;
+use crate::report::bench::BenchJson;
 
 /// Arguments of `schema`.
 #[derive(Args, Debug)]
@@ -27,6 +28,8 @@ pub enum Documented {
     Sweep,
     /// `map --json`.
     Map,
+    /// `bench --json`, which is its `report.json`.
+    Bench,
     /// `experiments --json`.
     Experiments,
     /// `verify --json`, which is `report.json`.
@@ -46,6 +49,7 @@ impl SchemaArgs {
             Documented::Critical => schema_for!(critical::CriticalJson),
             Documented::Converge => schema_for!(converge::ConvergeJson),
             Documented::Sweep => schema_for!(sweep::SweepJson),
+            Documented::Bench => schema_for!(BenchJson),
             Documented::Experiments => schema_for!(experiments::ExperimentsJson),
             Documented::Map => schema_for!(map::MapJson),
             Documented::Verify => schema_for!(VerifyJson),

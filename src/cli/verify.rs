@@ -167,7 +167,7 @@ impl VerifyArgs {
     }
 }
 
-fn folder_error(error: folder::FolderError) -> CliError {
+pub(super) fn folder_error(error: folder::FolderError) -> CliError {
     match error {
         folder::FolderError::NotOurs { .. } => {
             CliError::usage(error.to_string(), "choose another folder with --out, or remove it yourself")

@@ -27,9 +27,10 @@ pub struct Environment {
     pub features: Vec<&'static str>,
     /// BLAKE3 of the lock file.
     pub lock_file_hash: String,
-    /// BLAKE3 of the suite.
-    pub suite_hash: String,
-    /// BLAKE3 of the suite's scenes as they were understood, in SI units.
+    /// BLAKE3 of the suite, where one was run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub suite_hash: Option<String>,
+    /// BLAKE3 of the scenes as they were understood, in SI units.
     pub scenes_hash: String,
     /// Processor.
     pub cpu: String,
@@ -50,6 +51,12 @@ pub struct Environment {
 impl Environment {
     /// This program, on this machine, now.
     pub fn here(seed: u64, command: String, suite: &Suite, peers: Vec<(String, String)>) -> Self {
+        let scenes = format!("{:?}", suite.scenes.iter().collect::<Vec<_>>());
+        Self { suite_hash: Some(hash(&suite.text)), ..Self::of_scenes(seed, command, &scenes, peers) }
+    }
+
+    /// This program, on this machine, now, where no suite is run; `scenes` is what was understood of them.
+    pub fn of_scenes(seed: u64, command: String, scenes: &str, peers: Vec<(String, String)>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             commit: env!("PENETRODE_COMMIT"),
@@ -61,8 +68,8 @@ impl Environment {
                 .filter_map(|(name, on)| on.then_some(name))
                 .collect(),
             lock_file_hash: hash(LOCK_FILE),
-            suite_hash: hash(&suite.text),
-            scenes_hash: hash(&format!("{:?}", suite.scenes.iter().collect::<Vec<_>>())),
+            suite_hash: None,
+            scenes_hash: hash(scenes),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             floating_point: floating_point(),

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::chart::{DrawError, Ink, Panel, WIDTH};
 use super::table::Table;
-use super::text::one_line;
+use super::text::{one_line, wrapped};
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
@@ -26,6 +26,8 @@ pub enum Part {
     Events,
     /// Energy.
     Energy,
+    /// What accuracy costs.
+    Cost,
 }
 
 /// A figure.
@@ -149,22 +151,4 @@ fn escape(text: &str) -> String {
         }
     }
     escaped
-}
-
-/// `text` in lines of `most` characters, broken at spaces.
-fn wrapped(text: &str, most: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let last = lines.len() - 1;
-        if !lines[last].is_empty() && lines[last].chars().count() + 1 + word.chars().count() > most {
-            lines.push(word.to_owned());
-        } else {
-            let line = &mut lines[last];
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines
 }

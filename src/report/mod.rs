@@ -1,5 +1,6 @@
 //! How a run of the suite is shown: JSON, and a folder with a page, figures, tables and JUnit.
 
+pub mod bench;
 pub mod chart;
 pub mod environment;
 pub mod families;

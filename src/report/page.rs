@@ -28,6 +28,44 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
     let families = Family::all(run.judged);
     let (verdict, counts) = summary(run.judged);
     let title = one_line(&run.suite.title);
+    document(
+        &title,
+        &format!("{title}: {}", verdict.name()),
+        html! { a.skip href="#verdict" { "Skip to the verdict" } },
+        identification(run),
+        html! {
+            (verdict_section(run, verdict, counts))
+            (contents())
+            (model(run, figures))
+            (algorithms(run))
+            (criteria(&families))
+            (code_verification(run, &families, figures))
+            (solution_verification(&families))
+            (cross_code(run, &families, figures))
+            (events(run, &families, figures))
+            (energy(run, &families, figures))
+            (stability(&families))
+            (deviations(run, &families))
+            (every_claim(run))
+            (reproduction(run))
+            (references())
+        },
+        html! { "Written by penetrode " (run.environment.version) ". The same numbers: "
+        a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", "
+        a href="summary.md" { "Markdown" } ", and a CSV file for each figure." },
+    )
+}
+
+/// A page of the program: its head, and these parts.
+#[expect(clippy::needless_pass_by_value, reason = "every caller makes them in place")]
+pub(super) fn document(
+    heading: &str,
+    window_title: &str,
+    skip: Markup,
+    identification: Markup,
+    main: Markup,
+    footer: Markup,
+) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -39,35 +77,14 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
                     content="default-src 'none'; style-src 'unsafe-inline'; img-src data:";
                 meta name="color-scheme" content="light dark";
                 link rel="icon" href="data:,";
-                title { (title) ": " (verdict.name()) }
+                title { (window_title) }
                 style { (PreEscaped(Ink::style_sheet())) (PreEscaped(include_str!("page.css"))) }
             }
             body {
-                a.skip href="#verdict" { "Skip to the verdict" }
-                header {
-                    h1 { (title) }
-                    (identification(run))
-                }
-                main {
-                    (verdict_section(run, verdict, counts))
-                    (contents())
-                    (model(run, figures))
-                    (algorithms(run))
-                    (criteria(&families))
-                    (code_verification(run, &families, figures))
-                    (solution_verification(&families))
-                    (cross_code(run, &families, figures))
-                    (events(run, &families, figures))
-                    (energy(run, &families, figures))
-                    (stability(&families))
-                    (deviations(run, &families))
-                    (every_claim(run))
-                    (reproduction(run))
-                    (references())
-                }
-                footer { "Written by penetrode " (run.environment.version) ". The same numbers: "
-                    a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", "
-                    a href="summary.md" { "Markdown" } ", and a CSV file for each figure." }
+                (skip)
+                header { h1 { (heading) } (identification) }
+                main { (main) }
+                footer { (footer) }
             }
         }
     };
@@ -230,23 +247,33 @@ fn tally(counts: Counts) -> String {
 fn figures_of(run: &Run<'_>, figures: &[Drawn], part: Part) -> Markup {
     html! {
         @for drawn in figures.iter().filter(|f| f.figure.part == part) {
-            @let figure = &drawn.figure;
-            figure id={ "figure-" (figure.name) } {
-                figcaption {
-                    b { (one_line(&figure.message)) }
-                    (figure.reading)
-                    span.quiet {
-                        @if let Some(first) = figure.claims.first() {
-                            "Judged by " (claims_in_words(&figure.claims))
-                            "; remade by "
-                            code { "penetrode verify --only " (one_line(first)) " --seed " (run.environment.seed) } ". "
-                        }
-                        a href={ "tables/" (figure.name) ".csv" } { (count(figure.table.len(), "row")) " as CSV" } ", "
-                        a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
-                    }
+            (figure(drawn, html! {
+                @if let Some(first) = drawn.figure.claims.first() {
+                    "Judged by " (claims_in_words(&drawn.figure.claims))
+                    "; remade by "
+                    code { "penetrode verify --only " (one_line(first)) " --seed " (run.environment.seed) } ". "
                 }
-                div.panels { @for index in 0..drawn.panels.len() { (PreEscaped(drawn.inline(index))) } }
+            }))
+        }
+    }
+}
+
+/// A figure with its message, how to read it, where it comes from, and its files.
+#[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
+pub(super) fn figure(drawn: &Drawn, origin: Markup) -> Markup {
+    let figure = &drawn.figure;
+    html! {
+        figure id={ "figure-" (figure.name) } {
+            figcaption {
+                b { (one_line(&figure.message)) }
+                (figure.reading)
+                span.quiet {
+                    (origin)
+                    a href={ "tables/" (figure.name) ".csv" } { (count(figure.table.len(), "row")) " as CSV" } ", "
+                    a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
+                }
             }
+            div.panels { @for index in 0..drawn.panels.len() { (PreEscaped(drawn.inline(index))) } }
         }
     }
 }
@@ -726,7 +753,7 @@ fn reproduction(run: &Run<'_>) -> Markup {
                 dt { "Processor" } dd { (one_line(&e.cpu)) ", " (count(e.threads, "thread")) }
                 dt { "Floating point" } dd { (e.floating_point) }
                 dt { "Lock file (BLAKE3)" } dd { code { (e.lock_file_hash) } }
-                dt { "Suite (BLAKE3)" } dd { code { (e.suite_hash) } }
+                @if let Some(hash) = &e.suite_hash { dt { "Suite (BLAKE3)" } dd { code { (hash) } } }
                 dt { "Scenes (BLAKE3)" } dd { code { (e.scenes_hash) } }
                 dt { "Date" } dd { time datetime=(e.date) { (e.date) } }
             }

@@ -3,6 +3,7 @@
 pub mod applicability;
 pub mod audit;
 pub mod batch;
+pub mod bench;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;

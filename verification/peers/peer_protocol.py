@@ -167,13 +167,15 @@ def walk(request: Request, flights: list) -> dict:
 
 
 def timed(repeats: int, flight: Callable[[], object], lanes: int = 1):
-    """Median time of one flight [ns] over the repeats."""
+    """Median and quartiles of the time of one flight [ns] over the repeats, two at least."""
     clock, times = time.perf_counter_ns, []
+    flight()
     for _ in range(repeats):
         start = clock()
         flight()
-        times.append(clock() - start)
-    return statistics.median(times) / lanes
+        times.append((clock() - start) / lanes)
+    low, median, high = statistics.quantiles(times, n=4, method="inclusive")
+    return median, [low, high]
 
 
 def fly_request(message, prepare, batch) -> dict:
@@ -181,13 +183,11 @@ def fly_request(message, prepare, batch) -> dict:
     flights = prepare(request)
     started = time.perf_counter_ns()
     answer = walk(request, flights)
-    wall_ns = time.perf_counter_ns() - started
-    if batch is not None and request.repeats > 1:
-        lanes, flight = batch(request)
-        wall_ns = timed(request.repeats, flight, lanes)
-    elif request.repeats > 1:
-        wall_ns = timed(request.repeats, lambda: walk(request, flights))
-    return {**answer, "wall_ns": wall_ns, "error": None}
+    wall_ns, quartiles = time.perf_counter_ns() - started, None
+    if request.repeats > 1:
+        lanes, flight = batch(request) if batch else (1, lambda: walk(request, flights))
+        wall_ns, quartiles = timed(request.repeats, flight, lanes)
+    return {**answer, "wall_ns": wall_ns, "wall_ns_quartiles": quartiles, "error": None}
 
 
 def refuse_token(token):

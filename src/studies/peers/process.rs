@@ -432,6 +432,7 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Lap
         events: Option<Vec<EventJson>>,
         force_evaluations: Option<u64>,
         wall_ns: Option<f64>,
+        wall_ns_quartiles: Option<[f64; 2]>,
         error: Option<String>,
     }
     let nonsense = |why: String| Lapse::nonsense(&why, line);
@@ -458,6 +459,7 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Lap
         events: answer.events.unwrap_or_default(),
         force_evaluations: answer.force_evaluations,
         wall_ns: answer.wall_ns,
+        wall_ns_quartiles: answer.wall_ns_quartiles,
     })
 }
 

@@ -196,6 +196,9 @@ pub struct PeerAnswer {
     /// Time of one flight [ns], the median of the repeats.
     #[serde(default)]
     pub wall_ns: Option<f64>,
+    /// Quartiles of that time [ns], where the peer gives its spread.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall_ns_quartiles: Option<[f64; 2]>,
 }
 
 /// How far one quantity of two answers differs.
@@ -222,6 +225,7 @@ impl PeerAnswer {
             events: flight.events.iter().map(EventJson::from).collect(),
             force_evaluations: Some(flight.cost.force_evaluations),
             wall_ns: None,
+            wall_ns_quartiles: None,
         }
     }
 
@@ -324,7 +328,16 @@ mod tests {
     }
 
     fn answer(outcome: Outcome, velocity_m_s: f64, events: Vec<EventJson>) -> PeerAnswer {
-        PeerAnswer { outcome, depth_m: 0.2, time_s: 1e-3, velocity_m_s, events, force_evaluations: None, wall_ns: None }
+        PeerAnswer {
+            outcome,
+            depth_m: 0.2,
+            time_s: 1e-3,
+            velocity_m_s,
+            events,
+            force_evaluations: None,
+            wall_ns: None,
+            wall_ns_quartiles: None,
+        }
     }
 
     fn event(name: EventName, stage: Option<usize>, time_s: f64) -> EventJson {

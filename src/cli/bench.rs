@@ -1,0 +1,457 @@
+//! `penetrode bench`: what an accuracy costs, by every method, by other programs, and by the paper's scheme.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::output::{print_json, print_text, table, table_lines};
+use super::solve::escape_terminal;
+use super::verify::folder_error;
+use super::{CliError, Exit, read_scene};
+use crate::physics::Scene;
+use crate::physics::scene_file::SHIPPED;
+use crate::report::bench::{BenchJson, CaseJson, files};
+use crate::report::text::{number, wrapped};
+use crate::report::{Environment, folder};
+use crate::studies::bench::growth::{self, Growth};
+use crate::studies::bench::step_size::{self, Held, LEVELS as STEP_LEVELS, StepStudy};
+use crate::studies::bench::work_precision::{self, Case, CaseError, Contender, LEVELS, Run, RunState, fastest};
+use crate::studies::bench::{Effort, peers};
+use crate::studies::peers::{Environment as PeerEnvironment, Peer, PeerStartError};
+
+/// Scenes that are measured where none is given: those of the comparison with other solvers, and the stiff one.
+const DEFAULT_SCENES: [&str; 5] = ["crater", "tunnel", "perforate", "graze", "stiff"];
+
+/// Varied scenes where no scene is given.
+const VARIED: usize = 1000;
+
+/// Width of a line for people.
+const WIDTH: usize = 80;
+
+/// Arguments of `bench`.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Errors are the largest of all quantities over max(1, condition number), against 50 digits; wrong \
+    outcomes and failures are shown and count at no accuracy. Times are medians after warming, and belong to this \
+    machine: pin the program (taskset -c 0) and keep the machine idle.\n\n\
+    --out writes a report folder of its own and adds nothing to that of verify: the numbers of verify are the same in \
+    every run, and no claim rests on a time.\n\n\
+    The part scaling runs `penetrode batch` with 1 and 2 threads on 1, 10, 100 ... scenes; its tables take some 300 MB \
+    in the folder for temporary files."
+)]
+pub struct BenchArgs {
+    /// Scene files [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
+    pub scenes: Vec<String>,
+    /// What is measured.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,..",
+          default_values_t = [Part::WorkPrecision, Part::StepSize])]
+    pub parts: Vec<Part>,
+    /// Also heyoka, scipy and scikit-sundae (needs Python 3.11).
+    #[arg(long)]
+    pub peers: bool,
+    /// Also another solver: a program that speaks the peer protocol.
+    #[arg(long, value_name = "CMD")]
+    pub peer: Vec<String>,
+    /// How many varied scenes [default: 1000 where no scene is given, else none].
+    #[arg(long, value_name = "N")]
+    pub varied: Option<u16>,
+    /// Seed of the varied scenes and of random steps.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Samples of each time.
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub repeats: u16,
+    /// Most scenes of the part scaling.
+    #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub most: u64,
+    /// Folder of a report with tables and figures.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A part of the bench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// Error and cost of every method at every tolerance.
+    WorkPrecision,
+    /// The paper's scheme against its step, and the largest step that holds an error.
+    StepSize,
+    /// Time a scene and memory of batch from one scene to millions.
+    Scaling,
+}
+
+impl BenchArgs {
+    /// Measures, writes the report and prints the tables.
+    ///
+    /// # Errors
+    /// A scene or a folder that cannot be used (exit 2), a scene without an answer or a report that cannot be written
+    /// (exit 1), a peer that cannot be started (exit 5).
+    pub fn run(&self) -> Result<Exit, CliError> {
+        if let Some(folder) = &self.out {
+            folder::check(folder).map_err(folder_error)?;
+        }
+        let scenes = self.scenes()?;
+        let mut peers = self.start_peers()?;
+        let report = self.measure(&scenes, &mut peers)?;
+        if let Some(folder) = &self.out {
+            let failed = |cause| CliError::Write { path: folder.display().to_string(), cause };
+            folder::write_files(files(&report).map_err(failed)?, folder).map_err(folder_error)?;
+        }
+        if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;
+        Ok(Exit::Success)
+    }
+
+    fn has(&self, part: Part) -> bool {
+        self.parts.contains(&part)
+    }
+
+    /// The scenes under names of their own.
+    fn scenes(&self) -> Result<Vec<(String, Scene)>, CliError> {
+        if self.scenes.is_empty() {
+            let shipped = SHIPPED.iter().filter(|(name, _)| DEFAULT_SCENES.contains(name));
+            let mut scenes = shipped
+                .map(|(name, text)| Ok(((*name).to_owned(), Scene::from_toml(text, name)?)))
+                .collect::<Result<Vec<_>, CliError>>()?;
+            scenes.sort_by_key(|(name, _)| DEFAULT_SCENES.iter().position(|known| known == name));
+            return Ok(scenes);
+        }
+        let mut scenes: Vec<(String, Scene)> = Vec::new();
+        for path in &self.scenes {
+            let scene = read_scene(path)?;
+            scene.problem()?;
+            let stem = Path::new(path).file_stem().map_or_else(|| path.clone(), |stem| stem.to_string_lossy().into());
+            let stem = if path == "-" { "standard-input".to_owned() } else { stem };
+            // Two files of one name in two folders are two scenes.
+            let taken = |name: &str| name == "varied" || scenes.iter().any(|(known, _)| known == name);
+            let name = if taken(&stem) {
+                // Of one number more than there are scenes, one is free.
+                let numbered = (2..=scenes.len() + 2).map(|number| format!("{stem}-{number}"));
+                numbered.into_iter().find(|name| !taken(name)).unwrap_or(stem)
+            } else {
+                stem
+            };
+            scenes.push((name, scene));
+        }
+        Ok(scenes)
+    }
+
+    fn varied(&self) -> usize {
+        self.varied.map_or(if self.scenes.is_empty() { VARIED } else { 0 }, usize::from)
+    }
+
+    /// The peers by the names of the tables. None is asked in vain: they take part in work-precision alone.
+    fn start_peers(&self) -> Result<Vec<(String, Peer)>, CliError> {
+        let mut peers = Vec::new();
+        if self.peers {
+            for (name, bundled, options) in peers::BUNDLED {
+                let environment = PeerEnvironment::ensure(bundled, &mut |line| eprintln!("{line}"))
+                    .map_err(|error| CliError::PeerMissing(error.to_string()))?;
+                let command = format!("{} {options}", environment.command(bundled));
+                peers.push((name.to_owned(), start(&command)?));
+            }
+        }
+        for command in &self.peer {
+            let peer = start(command)?;
+            let name = escape_terminal(&peer.identity().name);
+            let taken = peers.iter().filter(|(known, _): &&(String, Peer)| known.starts_with(&name)).count();
+            peers.push((if taken == 0 { name } else { format!("{name} {}", taken + 1) }, peer));
+        }
+        if !peers.is_empty() && !self.has(Part::WorkPrecision) {
+            return Err(CliError::usage("peers take part in work-precision alone", "add it to --parts"));
+        }
+        Ok(peers)
+    }
+
+    fn measure(&self, scenes: &[(String, Scene)], peers: &mut [(String, Peer)]) -> Result<BenchJson, CliError> {
+        let effort = Effort { samples: usize::from(self.repeats) };
+        let progress = ProgressBar::new(0);
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}, {eta} left {msg}") {
+            progress.set_style(style);
+        }
+        let mut cases = Vec::new();
+        if self.has(Part::WorkPrecision) {
+            progress.set_message("exact answers");
+            for (name, scene) in scenes {
+                cases.push(Case::of_scene(name, scene).map_err(case_error)?);
+            }
+            if self.varied() > 0 {
+                cases.push(Case::varied(self.varied(), self.seed).map_err(case_error)?);
+            }
+        }
+        progress.inc_length((cases.len() * (Contender::all().len() + peers.len())) as u64);
+        let mut runs = Vec::new();
+        for case in &cases {
+            for contender in Contender::all() {
+                progress.set_message(format!("{}, {}", case.name, contender.name()));
+                runs.extend(work_precision::runs(case, contender, effort));
+                progress.inc(1);
+            }
+            for (name, peer) in &mut *peers {
+                progress.set_message(format!("{}, {name}", case.name));
+                runs.extend(peers::runs(case, name, peer, effort));
+                progress.inc(1);
+            }
+        }
+        let mut studies = Vec::new();
+        if self.has(Part::StepSize) {
+            for (name, scene) in scenes {
+                progress.set_message(format!("{name}, steps"));
+                studies.extend(
+                    step_size::of_scene(name, scene, effort, self.seed, &|| progress.tick()).map_err(case_error)?,
+                );
+            }
+        }
+        let growths = if self.has(Part::Scaling) { self.growth(&progress)? } else { Vec::new() };
+        progress.finish_and_clear();
+        let told = peers.iter().map(|(name, peer)| (name.clone(), peer.identity().to_string())).collect();
+        let understood = format!("{scenes:?}, {} varied", self.varied());
+        Ok(BenchJson {
+            schema: "penetrode/bench/1",
+            scenes: cases.iter().map(CaseJson::from).collect(),
+            fastest: fastest(&runs),
+            runs,
+            step_size: studies,
+            growth: growths,
+            environment: Environment::of_scenes(self.seed, self.command(), &understood, told),
+        })
+    }
+
+    fn growth(&self, progress: &ProgressBar) -> Result<Vec<Growth>, CliError> {
+        const THREADS: [u16; 2] = [1, 2];
+        let failed = |message: String| CliError::Run { message, help: String::new(), last: None };
+        let program = std::env::current_exe().map_err(|error| failed(format!("where is this program? {error}")))?;
+        let counts = growth::counts(self.most);
+        progress.inc_length((counts.len() * THREADS.len()) as u64);
+        progress.set_message("batches");
+        growth::measure(&program, &counts, &THREADS, self.seed, &|| progress.inc(1))
+            .map_err(|error| failed(error.to_string()))
+    }
+
+    /// The command that remakes this run.
+    fn command(&self) -> String {
+        let quote = |text: &str| shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned);
+        let mut words = vec!["penetrode bench".to_owned()];
+        words.extend(self.scenes.iter().map(|path| quote(path)));
+        let parts = self.parts.iter().filter_map(ValueEnum::to_possible_value);
+        words.push(format!("--parts {}", parts.map(|part| part.get_name().to_owned()).collect::<Vec<_>>().join(",")));
+        if self.peers {
+            words.push("--peers".to_owned());
+        }
+        words.extend(self.peer.iter().map(|command| format!("--peer {}", quote(command))));
+        words.extend(self.varied.map(|count| format!("--varied {count}")));
+        words.push(format!("--seed {} --repeats {}", self.seed, self.repeats));
+        if self.has(Part::Scaling) {
+            words.push(format!("--most {}", self.most));
+        }
+        words.join(" ")
+    }
+
+    fn text(&self, report: &BenchJson) -> String {
+        let mut parts = Vec::new();
+        if report.environment.profile != "release" {
+            parts.push(vec![format!("built with profile {}: times mean little", report.environment.profile)]);
+        }
+        if !report.runs.is_empty() {
+            parts.push(vec!["Fastest median time of a flight in µs within an error, and the setting".to_owned()]);
+            parts.extend(report.scenes.iter().map(|case| case_lines(report, case)));
+        }
+        if !report.step_size.is_empty() {
+            let title = "Largest step that holds an error: step [s] or tolerance, steps, time [s]";
+            let rules = "  boundaries: end = step-end, int. = interpolated, land = landed";
+            parts.push(vec![title.to_owned(), rules.to_owned()]);
+            parts.extend(report.step_size.iter().map(study_lines));
+        }
+        if !report.growth.is_empty() {
+            parts.push(growth_lines(&report.growth));
+        }
+        if let Some(folder) = &self.out {
+            parts.push(vec![format!("report: {}", folder.join("report.html").display())]);
+        }
+        let mut text = parts.iter().map(|lines| lines.join("\n")).collect::<Vec<_>>().join("\n\n");
+        text.push('\n');
+        text
+    }
+}
+
+/// A running peer, or the exit code that its absence has.
+fn start(command: &str) -> Result<Peer, CliError> {
+    Peer::start(command).map_err(|error| match error {
+        PeerStartError::Greeting(failure) => CliError::Run {
+            message: failure.to_string(),
+            help: "see the peer protocol: verification/peers/README.md".to_owned(),
+            last: None,
+        },
+        error if error.is_usage() => {
+            CliError::usage(error.to_string(), "give a program and its arguments, quoted as for a shell")
+        }
+        error => CliError::PeerMissing(error.to_string()),
+    })
+}
+
+fn case_error(error: CaseError) -> CliError {
+    match error {
+        CaseError::Resolve(error) => error.into(),
+        CaseError::Integration(error) => error.into(),
+    }
+}
+
+fn case_lines(report: &BenchJson, case: &CaseJson) -> Vec<String> {
+    let title = case.title.as_deref().map_or(String::new(), |title| format!(": {title}"));
+    let mut lines = wrapped(&escape_terminal(&format!("{}{title}", case.name)), WIDTH);
+    if case.exact < case.problems {
+        lines.push("  no closed form: errors against a Taylor series to round-off".to_owned());
+    }
+    let mut rows = table(&["method", "1e-3", "1e-6", "1e-9", "1e-12", "least"]);
+    let mut notes = Vec::new();
+    for runs in report.runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method) {
+        if runs[0].scene != case.name {
+            continue;
+        }
+        let mut cells = vec![clipped(&runs[0].method, 18)];
+        for level in LEVELS {
+            let best = report
+                .fastest
+                .iter()
+                .find(|f| f.scene == case.name && f.method == runs[0].method && f.level == level)
+                .and_then(|f| f.time_ns.zip(f.setting.as_ref()));
+            cells.push(best.map_or("-".to_owned(), |(ns, setting)| format!("{} {setting}", micro(ns))));
+        }
+        let right = runs.iter().filter(|run| run.state == RunState::Right);
+        let least = right.filter_map(|run| run.error).min_by(f64::total_cmp);
+        cells.push(super::output::error_text(least));
+        rows.add_row(cells);
+        notes.extend(notes_of(runs));
+    }
+    lines.extend(table_lines(&rows));
+    lines.extend(notes);
+    lines
+}
+
+/// What was not right, one paragraph for each state of a method.
+fn notes_of(runs: &[Run]) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (state, word) in
+        [(RunState::Failed, "failed"), (RunState::Undecided, "undecided"), (RunState::NotRun, "not run")]
+    {
+        let of_state: Vec<&Run> = runs.iter().filter(|run| run.state == state).collect();
+        let Some(first) = of_state.first() else { continue };
+        let settings = of_state.iter().map(|run| {
+            let lost = if state == RunState::Failed { run.failed } else { run.undecided };
+            if flights_of(run) > 1 { format!("{} ({lost})", run.setting) } else { run.setting.clone() }
+        });
+        let reason = first.reason.as_deref().map_or(String::new(), |reason| format!(": {}", escape_terminal(reason)));
+        let settings = match settings.collect::<Vec<_>>() {
+            all if all.len() == runs.len() && flights_of(first) <= 1 => "every setting".to_owned(),
+            some => some.join(", "),
+        };
+        let text = format!("{word}: {} at {settings}{reason}", escape_terminal(&first.method));
+        for (index, line) in wrapped(&text, WIDTH - 4).into_iter().enumerate() {
+            lines.push(format!("{}{line}", if index == 0 { "  " } else { "    " }));
+        }
+    }
+    lines
+}
+
+fn flights_of(run: &Run) -> usize {
+    run.right + run.undecided + run.failed
+}
+
+fn study_lines(study: &StepStudy) -> Vec<String> {
+    let mut lines = vec![format!("{}: {}", clipped(&study.scene, 40), study.quantity)];
+    let mut header = vec!["method".to_owned()];
+    header.extend(STEP_LEVELS.iter().map(|level| format!("{} %", 100.0 * level)));
+    let mut rows = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for curve in &study.curves {
+        let cell = |held: &Held| match (held.size, held.steps, held.time) {
+            (Some(size), Some(steps), Some(time)) => {
+                let size = if curve.adaptive { format!("{size:.0e}") } else { compact(size) };
+                format!("{size} {} {}", compact(steps as f64), compact(1e-9 * time.median_ns))
+            }
+            _ => "none".to_owned(),
+        };
+        let mut cells = vec![short_variant(&curve.method)];
+        cells.extend(curve.held.iter().map(cell));
+        rows.add_row(cells);
+    }
+    lines.extend(table_lines(&rows));
+    lines
+}
+
+/// `predicted/int.`: names of variants are shortened to leave room for the numbers.
+fn short_variant(name: &str) -> String {
+    name.replace("interpolated", "int.").replace("step-end", "end").replace("landed", "land")
+}
+
+fn growth_lines(growths: &[Growth]) -> Vec<String> {
+    let mut rows = table(&["scenes", "source", "threads", "time [s]", "a scene [µs]", "peak memory [MB]"]);
+    for g in growths {
+        rows.add_row([
+            g.scenes.to_string(),
+            format!("{:?}", g.source).to_lowercase(),
+            g.threads.to_string(),
+            number(g.seconds, 3),
+            micro(g.ns_a_scene),
+            g.peak_bytes.map_or("-".to_owned(), |bytes| number(1e-6 * bytes as f64, 3)),
+        ]);
+    }
+    let mut lines = vec!["Cost of a batch as work grows".to_owned()];
+    lines.extend(table_lines(&rows));
+    lines
+}
+
+/// A time in µs, three digits.
+fn micro(ns: f64) -> String {
+    let us = 1e-3 * ns;
+    if us < 1e5 { number(us, 3) } else { format!("{us:.1e}") }
+}
+
+/// Two digits and the prefix of the unit: `1.2µ`, `83k`.
+fn compact(value: f64) -> String {
+    const PREFIXES: [(i32, &str); 8] =
+        [(-12, "p"), (-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
+    // Rounded first, so that 999.6 becomes 1.0k.
+    let rounded: f64 = format!("{value:.1e}").parse().unwrap_or(value);
+    if rounded == 0.0 || !rounded.is_finite() {
+        return rounded.to_string();
+    }
+    let exponent = rounded.abs().log10().floor() as i32;
+    let power = exponent.div_euclid(3) * 3;
+    match PREFIXES.iter().find(|(known, _)| *known == power) {
+        Some((_, prefix)) => {
+            let decimals = usize::from(exponent == power && (power != 0 || rounded.fract() != 0.0));
+            format!("{:.decimals$}{prefix}", rounded / 10f64.powi(power))
+        }
+        None => format!("{rounded:.1e}"),
+    }
+}
+
+/// `text` in at most `most` characters, harmless on a terminal.
+fn clipped(text: &str, most: usize) -> String {
+    let text = escape_terminal(text);
+    if text.chars().count() <= most { text } else { text.chars().take(most - 1).chain(['…']).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compact_numbers_have_two_digits_and_a_prefix() {
+        for (value, text) in [
+            (1.234e-6, "1.2µ"),
+            (8.3e4, "83k"),
+            (999.6, "1.0k"),
+            (690.0, "690"),
+            (7.0, "7"),
+            (4.5e-8, "45n"),
+            (0.0, "0"),
+            (1e-20, "1.0e-20"),
+        ] {
+            assert_eq!(compact(value), text);
+        }
+    }
+}

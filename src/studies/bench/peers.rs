@@ -1,0 +1,130 @@
+//! Error and cost of other programs, through the peer protocol.
+//!
+//! A peer times itself (`wall_ns`, and `wall_ns_quartiles` where it gives the spread): reading, writing and whatever it
+//! prepares for a question do not count, so that a compiled integrator is timed compiled. The first question of each
+//! kind asks for one flight and warms it; the second asks for as many as are worth timing.
+
+use super::timing::{Effort, Timing};
+use super::work_precision::{Case, Judgement, Known, Run, Setting, Tally};
+use crate::integrators::{Cost, Events, Flight};
+use crate::physics::{Event, Problem, State};
+use crate::studies::peers::{BundledPeer, Peer, PeerAnswer, PeerFailure, PeerRequest};
+
+/// Tolerances that peers are asked for, by their digits.
+const DIGITS: std::ops::RangeInclusive<i32> = 2..=13;
+
+/// Time that the repeats of one question may take [ns].
+const TOGETHER_NS: f64 = 1e9;
+
+/// A peer whose pass over the scenes took longer than this is not asked at finer tolerances [ns].
+const PASS_NS: f64 = 2e10;
+
+/// Flights of one question at most.
+const REPEATS_MAX: u32 = 10_000;
+
+/// Flights of one scene where a case has many.
+const REPEATS_OF_MANY: u32 = 3;
+
+/// The peers that ship, with the options that put each at its best: name, program, options.
+pub const BUNDLED: [(&str, BundledPeer, &str); 6] = [
+    ("heyoka", BundledPeer::Heyoka, ""),
+    ("heyoka, 8 lanes", BundledPeer::Heyoka, "--lanes 8"),
+    ("scipy RK45", BundledPeer::Scipy, ""),
+    ("scipy DOP853", BundledPeer::Scipy, "--method DOP853"),
+    ("sundae Adams", BundledPeer::SundaeAdams, ""),
+    ("sundae BDF", BundledPeer::SundaeBdf, ""),
+];
+
+/// Every tolerance of `peer`, called `name`, on `case`. What goes wrong is a run that failed.
+pub fn runs(case: &Case, name: &str, peer: &mut Peer, effort: Effort) -> Vec<Run> {
+    let mut runs = Vec::new();
+    let mut too_long: Option<String> = None;
+    for rtol in DIGITS.map(|digits| 10f64.powi(-digits)) {
+        let tally = Tally::new(case, name, Setting::Tolerance(rtol));
+        if let Some(why) = &too_long {
+            runs.push(tally.not_run(why));
+            continue;
+        }
+        let run = run(case, peer, rtol, effort, tally);
+        let pass = run.time.map_or(0.0, |time| time.median_ns * case.problems.len() as f64);
+        if pass > PASS_NS {
+            too_long = Some(format!("{rtol:.0e} took {:.0} s", pass * 1e-9));
+        }
+        runs.push(run);
+    }
+    runs
+}
+
+fn run(case: &Case, peer: &mut Peer, rtol: f64, effort: Effort, mut tally: Tally) -> Run {
+    let mut timings = Vec::new();
+    for known in &case.problems {
+        let request = PeerRequest::from_problem(&known.problem, rtol);
+        match ask(peer, &request, case.problems.len() > 1, effort) {
+            Ok((answer, timing)) => {
+                tally.add(judge(known, &answer), answer.force_evaluations);
+                timings.extend(timing);
+            }
+            Err(failure) => tally.add(Judgement::Failed(failure.to_string()), None),
+        }
+    }
+    tally.finish(mean(&timings))
+}
+
+/// The answer, and the time of one flight if the peer tells it.
+fn ask(
+    peer: &mut Peer,
+    request: &PeerRequest,
+    of_many: bool,
+    effort: Effort,
+) -> Result<(PeerAnswer, Option<Timing>), PeerFailure> {
+    let first = peer.ask(request)?;
+    let Some(first_ns) = first.wall_ns else { return Ok((first, None)) };
+    let fitting = (TOGETHER_NS / first_ns.max(1.0)) as u32;
+    let wanted = if of_many { REPEATS_OF_MANY } else { (effort.samples as u32).saturating_mul(100) };
+    // Two at least: the first flight of a question is not warm.
+    let repeats = wanted.min(fitting).clamp(2, REPEATS_MAX);
+    let answer = peer.ask(&request.clone().timed(repeats))?;
+    let timing = answer.wall_ns.map(|median_ns| {
+        let [low_ns, high_ns] = answer.wall_ns_quartiles.unwrap_or([median_ns; 2]);
+        Timing { median_ns, low_ns, high_ns, samples: repeats as usize }
+    });
+    Ok((answer, timing))
+}
+
+/// The mean over scenes; `None` without a time.
+fn mean(timings: &[Timing]) -> Option<Timing> {
+    let samples = timings.iter().map(|t| t.samples).min()?;
+    let sum = |of: fn(&Timing) -> f64| timings.iter().map(of).sum::<f64>();
+    let together =
+        Timing { median_ns: sum(|t| t.median_ns), low_ns: sum(|t| t.low_ns), high_ns: sum(|t| t.high_ns), samples };
+    Some(together.over(timings.len()))
+}
+
+fn judge(known: &Known, answer: &PeerAnswer) -> Judgement {
+    // Events are not compulsory: what is not listed is not judged, but the end always is.
+    known.judge(&flight_of(answer, &known.problem), !answer.events.is_empty())
+}
+
+/// The answer in the words of our flights.
+fn flight_of(answer: &PeerAnswer, problem: &Problem) -> Flight {
+    let events: Events = answer
+        .events
+        .iter()
+        .filter_map(|event| {
+            let state = State { time: event.time_s, depth: event.depth_m, velocity: event.velocity_m_s };
+            Some(Event { kind: event.kind(problem)?, state })
+        })
+        .collect();
+    Flight {
+        outcome: answer.outcome,
+        stage: 0,
+        end: State { time: answer.time_s, depth: answer.depth_m, velocity: answer.velocity_m_s },
+        events,
+        exit_margin: None,
+        exit_margin_error: None,
+        cost: Cost { force_evaluations: answer.force_evaluations.unwrap_or(0), ..Cost::default() },
+        trajectory: Vec::new(),
+        step_limit: None,
+        notes: Vec::new(),
+    }
+}

@@ -1,0 +1,507 @@
+//! Error and cost of every method at every tolerance.
+//!
+//! The error of a run is the largest relative error of its quantities, against 50 digits from the same coefficients,
+//! over max(1, condition number); of many scenes, the worst. A run with a wrong outcome, without an answer, or refused
+//! is shown as such and counts at no accuracy.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::timing::{Effort, Timing};
+use crate::integrators::batch::Batch;
+use crate::integrators::central_difference::default_time_step;
+use crate::integrators::{
+    Boundaries, CentralDifference, Detail, Flight, IntegrationError, Method, MethodName, MethodOptions, VelocityAt,
+};
+use crate::physics::reference::{self, Conditions, ExactFlight, Source};
+use crate::physics::{Outcome, Problem, ResolveError, Scene};
+use crate::studies::convergence::Yardstick;
+use crate::studies::error::{flight_error, is_fixed};
+use crate::studies::quantity::Quantity;
+use crate::studies::random_scenes::{Generator, errors_beside};
+
+/// The accuracies at which the fastest run of a method is sought.
+pub const LEVELS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
+
+/// A method whose pass over the scenes took longer than this is not tried at finer settings [s].
+const PASS_S: f64 = 5.0;
+
+/// Steps of one flight of the central difference; one that needs more is shown as failed.
+const STEPS_MAX: u64 = 10_000_000;
+
+/// Steps of the central difference over the default one ([`default_time_step`]), coarse to fine.
+const STEPS_OVER_DEFAULT: [f64; 6] = [1000.0, 100.0, 10.0, 1.0, 0.1, 0.01];
+
+/// What a flight is measured by.
+#[derive(Clone, Debug)]
+enum Ruler {
+    /// 50 digits, and how the problem itself magnifies errors of its inputs.
+    Exact(Box<ExactFlight>, Conditions),
+    /// The Taylor series to round-off, where nothing exact is known.
+    Refined(Box<Flight>),
+}
+
+/// A problem and its answer.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// The problem.
+    pub problem: Problem,
+    ruler: Ruler,
+}
+
+/// What became of one flight.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Judgement {
+    /// The right outcome, its largest error and where.
+    Right(f64, Quantity),
+    /// The method says that it cannot tell.
+    Undecided,
+    /// Another outcome than the exact one, an event too few or too many, or not a number.
+    Wrong(String),
+    /// No answer.
+    Failed(String),
+}
+
+impl Known {
+    /// `problem` with 50 digits of its answer, or with a refined one.
+    ///
+    /// # Errors
+    /// When it has neither.
+    pub fn new(problem: Problem) -> Result<Self, IntegrationError> {
+        let source = Source::Problem(&problem);
+        let ruler = match (reference::flight(source), reference::conditions(source)) {
+            (Ok(exact), Ok(conditions)) => Ruler::Exact(Box::new(exact), conditions),
+            _ => Ruler::Refined(Box::new(Yardstick::of(&problem)?.flight)),
+        };
+        Ok(Self { problem, ruler })
+    }
+
+    /// Whether the answer is known to 50 digits.
+    pub fn is_exact(&self) -> bool {
+        matches!(self.ruler, Ruler::Exact(..))
+    }
+
+    /// The error of `flight`; without `with_crater_end` the state at x = k d is left out.
+    pub fn judge(&self, flight: &Flight, with_crater_end: bool) -> Judgement {
+        if flight.outcome == Outcome::Undecided {
+            return Judgement::Undecided;
+        }
+        let exact = match &self.ruler {
+            Ruler::Exact(exact, _) => exact.outcome,
+            Ruler::Refined(refined) => refined.outcome,
+        };
+        if !flight.outcome.agrees_with(exact) {
+            return Judgement::Wrong(format!("{} in place of {exact}", flight.outcome));
+        }
+        let errors = match &self.ruler {
+            Ruler::Exact(exact, conditions) => {
+                let ulps = errors_beside(flight, exact, conditions).0;
+                ulps.into_iter().map(|(ulp, quantity)| (ulp * f64::EPSILON, quantity)).collect()
+            }
+            Ruler::Refined(refined) => self.errors_beside_refined(flight, refined),
+        };
+        let mut worst = (0.0, Quantity::Depth);
+        for (error, quantity) in errors {
+            let at_crater_end = matches!(quantity, Quantity::CraterEndTime | Quantity::CraterEndVelocity);
+            if at_crater_end && !with_crater_end {
+                continue;
+            }
+            if !error.is_finite() {
+                return Judgement::Wrong(format!("no {quantity} that can be compared"));
+            }
+            if error > worst.0 {
+                worst = (error, quantity);
+            }
+        }
+        Judgement::Right(worst.0, worst.1)
+    }
+
+    fn errors_beside_refined(&self, flight: &Flight, refined: &Flight) -> Vec<(f64, Quantity)> {
+        Quantity::ALL
+            .into_iter()
+            .filter(|quantity| !is_fixed(*quantity, refined) && *quantity != Quantity::CriticalVelocity)
+            .map(|quantity| {
+                let error = flight_error(quantity, flight, refined, self.problem.impact_speed);
+                (error.map_or(f64::NAN, f64::abs), quantity)
+            })
+            .collect()
+    }
+}
+
+/// What is flown: one scene, or many one after the other.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Name.
+    pub name: String,
+    /// Title.
+    pub title: Option<String>,
+    /// The problems and their answers.
+    pub problems: Vec<Known>,
+}
+
+/// Why a scene cannot be measured.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum CaseError {
+    /// It does not resolve.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+    /// It has no answer to measure by.
+    #[error(transparent)]
+    Integration(#[from] IntegrationError),
+}
+
+impl Case {
+    /// The case of one scene.
+    ///
+    /// # Errors
+    /// [`CaseError`].
+    pub fn of_scene(name: &str, scene: &Scene) -> Result<Self, CaseError> {
+        let problems = vec![Known::new(scene.problem()?)?];
+        Ok(Self { name: name.to_owned(), title: scene.title.clone(), problems })
+    }
+
+    /// `count` varied scenes from a seed: repeating one scene flatters a method whose branches the processor learns.
+    ///
+    /// # Errors
+    /// [`CaseError`].
+    pub fn varied(count: usize, seed: u64) -> Result<Self, CaseError> {
+        let mut generator = Generator::new(seed, "bench");
+        let scenes: Vec<Scene> = (0..count).map(|_| generator.next_scene()).collect();
+        let problems =
+            scenes.par_iter().map(|scene| Ok(Known::new(scene.problem()?)?)).collect::<Result<_, CaseError>>()?;
+        let title = Some(format!("{count} scenes from seed {seed}, worst error and mean time"));
+        Ok(Self { name: "varied".to_owned(), title, problems })
+    }
+}
+
+/// Whose runs they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Contender {
+    /// A method of the program.
+    Method(MethodName),
+    /// The paper's scheme in one variant.
+    Scheme(VelocityAt, Boundaries),
+    /// The Taylor series in lanes, many scenes at once.
+    Batch,
+}
+
+/// How accurate a contender is asked to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setting {
+    /// Relative tolerance.
+    Tolerance(f64),
+    /// As accurate as the numbers allow.
+    RoundOff,
+    /// Time step over the default one of the scene.
+    Step(f64),
+}
+
+impl std::fmt::Display for Setting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Tolerance(rtol) => write!(f, "{rtol:.0e}"),
+            Self::RoundOff => f.write_str("eps"),
+            Self::Step(factor) => write!(f, "{factor}dt"),
+        }
+    }
+}
+
+/// Flies one problem.
+pub type FlyOne<'a> = dyn FnMut(&Problem) -> Result<Flight, IntegrationError> + 'a;
+
+impl Contender {
+    /// Every contender of this build: each method, the paper's variant of its scheme and the most accurate one.
+    pub fn all() -> Vec<Self> {
+        let mut all: Vec<_> = MethodName::ALL
+            .into_iter()
+            .filter(|name| name.is_built() && *name != MethodName::CentralDifference)
+            .map(Self::Method)
+            .collect();
+        all.insert(1, Self::Batch);
+        all.push(Self::Scheme(VelocityAt::LaggedHalfStep, Boundaries::StepEnd));
+        all.push(Self::Scheme(VelocityAt::Centred, Boundaries::Landed));
+        all
+    }
+
+    /// Name in tables.
+    pub fn name(self) -> String {
+        match self {
+            Self::Method(name) => name.to_string(),
+            Self::Scheme(velocity, boundaries) => variant_name(velocity, boundaries),
+            Self::Batch => "taylor, in lanes".to_owned(),
+        }
+    }
+
+    /// Its settings, coarse to fine.
+    pub fn settings(self) -> Vec<Setting> {
+        let tolerances = |finest: i32| (2..=finest).map(|digits| Setting::Tolerance(10f64.powi(-digits)));
+        match self {
+            Self::Batch | Self::Method(MethodName::ClosedForm) => vec![Setting::RoundOff],
+            Self::Method(MethodName::Taylor | MethodName::Energy) => {
+                tolerances(15).chain([Setting::RoundOff]).collect()
+            }
+            Self::Method(_) => tolerances(14).collect(),
+            Self::Scheme(..) => STEPS_OVER_DEFAULT.into_iter().map(Setting::Step).collect(),
+        }
+    }
+
+    /// Hands `work` the function that flies one problem, with whatever the method keeps from flight to flight.
+    fn with<R>(self, setting: Setting, work: impl FnOnce(&mut FlyOne<'_>) -> R) -> Result<R, IntegrationError> {
+        match self {
+            Self::Batch => {
+                Ok(work(&mut |problem| Batch::new().fly(std::slice::from_ref(problem)).remove(0).map(|s| s.flight())))
+            }
+            Self::Scheme(velocity, boundaries) => {
+                let factor = if let Setting::Step(factor) = setting { factor } else { 1.0 };
+                Ok(work(&mut |problem| {
+                    let step = factor * default_time_step(problem, velocity);
+                    let scheme = CentralDifference::uniform(step, velocity, boundaries);
+                    CentralDifference { max_steps: STEPS_MAX, ..scheme }.fly_in(problem, Detail::Events)
+                }))
+            }
+            Self::Method(name) => {
+                let rtol = if let Setting::Tolerance(rtol) = setting { Some(rtol) } else { None };
+                match Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() })? {
+                    #[cfg(feature = "diffsol")]
+                    Method::Diffsol(method) => method.study(|fly| work(&mut |problem| fly(problem, Detail::Events))),
+                    #[cfg(feature = "diffsol")]
+                    Method::Adaptive(method) => method.study(|fly| work(&mut |problem| fly(problem, Detail::Events))),
+                    method => Ok(work(&mut |problem| method.integrator().fly(problem, Detail::Events))),
+                }
+            }
+        }
+    }
+}
+
+/// Name of a variant of the paper's scheme in tables.
+pub fn variant_name(velocity: VelocityAt, boundaries: Boundaries) -> String {
+    format!("{velocity}/{boundaries}")
+}
+
+/// What became of the flights of a run, at its worst.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RunState {
+    /// Every flight has the right outcome.
+    Right,
+    /// A flight is undecided, the others are right.
+    Undecided,
+    /// A flight has a wrong outcome or none.
+    Failed,
+    /// Not tried, because a coarser setting already took too long.
+    NotRun,
+}
+
+/// One contender at one setting on one case.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Run {
+    /// Case.
+    pub scene: String,
+    /// Contender.
+    pub method: String,
+    /// Setting in short: a tolerance, `eps` for round-off, or a step in default steps such as `10dt`.
+    pub setting: String,
+    /// Relative tolerance; `null` for round-off, an exact answer, or a fixed step.
+    pub rtol: Option<f64>,
+    /// Step over the default step of the scene, for the paper's scheme.
+    pub step_over_default: Option<f64>,
+    /// What became of it.
+    pub state: RunState,
+    /// Flights with the right outcome.
+    pub right: usize,
+    /// Flights that the method calls undecided.
+    pub undecided: usize,
+    /// Flights with a wrong outcome or none.
+    pub failed: usize,
+    /// The first reason why the run is not right; `null` when it is.
+    pub reason: Option<String>,
+    /// Largest error of the right flights, over max(1, condition number); `null` without any.
+    pub error: Option<f64>,
+    /// The quantity of that error.
+    pub quantity: Option<Quantity>,
+    /// Mean evaluations of the force a flight; `null` where they are not counted.
+    pub force_evaluations: Option<f64>,
+    /// Time of one flight, the mean over the scenes of the case; `null` when nothing was flown.
+    pub time: Option<Timing>,
+}
+
+/// Judgements of a run, added up.
+#[derive(Debug)]
+pub(super) struct Tally {
+    run: Run,
+    evaluations: u64,
+    counted: usize,
+}
+
+impl Tally {
+    pub(super) fn new(case: &Case, method: &str, setting: Setting) -> Self {
+        let run = Run {
+            scene: case.name.clone(),
+            method: method.to_owned(),
+            setting: setting.to_string(),
+            rtol: if let Setting::Tolerance(rtol) = setting { Some(rtol) } else { None },
+            step_over_default: if let Setting::Step(factor) = setting { Some(factor) } else { None },
+            state: RunState::Right,
+            right: 0,
+            undecided: 0,
+            failed: 0,
+            reason: None,
+            error: None,
+            quantity: None,
+            force_evaluations: None,
+            time: None,
+        };
+        Self { run, evaluations: 0, counted: 0 }
+    }
+
+    pub(super) fn add(&mut self, judgement: Judgement, force_evaluations: Option<u64>) {
+        let run = &mut self.run;
+        let reason = match judgement {
+            Judgement::Right(error, quantity) => {
+                run.right += 1;
+                if run.error.is_none_or(|worst| error > worst) {
+                    (run.error, run.quantity) = (Some(error), Some(quantity));
+                }
+                None
+            }
+            Judgement::Undecided => {
+                run.undecided += 1;
+                run.state = run.state.max(RunState::Undecided);
+                Some("inside its error bar".to_owned())
+            }
+            Judgement::Wrong(why) | Judgement::Failed(why) => {
+                run.failed += 1;
+                // A failure tells more than an undecided flight before it.
+                if run.state < RunState::Failed {
+                    run.reason = None;
+                }
+                run.state = RunState::Failed;
+                Some(why)
+            }
+        };
+        if run.reason.is_none() {
+            run.reason = reason;
+        }
+        if let Some(count) = force_evaluations {
+            self.evaluations += count;
+            self.counted += 1;
+        }
+    }
+
+    pub(super) fn finish(mut self, time: Option<Timing>) -> Run {
+        self.run.force_evaluations = (self.counted > 0).then(|| self.evaluations as f64 / self.counted as f64);
+        self.run.time = time;
+        self.run
+    }
+
+    /// A run that was not tried.
+    pub(super) fn not_run(mut self, why: &str) -> Run {
+        self.run.state = RunState::NotRun;
+        self.run.reason = Some(why.to_owned());
+        self.run
+    }
+}
+
+/// Every setting of `contender` on `case`, coarse to fine. Errors of the contender are runs that failed.
+pub fn runs(case: &Case, contender: Contender, effort: Effort) -> Vec<Run> {
+    let mut runs = Vec::new();
+    let mut too_long: Option<String> = None;
+    for setting in contender.settings() {
+        let tally = Tally::new(case, &contender.name(), setting);
+        if let Some(why) = &too_long {
+            runs.push(tally.not_run(why));
+            continue;
+        }
+        let started = Instant::now();
+        let run = run(case, contender, setting, effort, tally);
+        let pass = run.time.map_or(0.0, |time| time.median_ns * case.problems.len() as f64 * 1e-9);
+        if pass > PASS_S {
+            too_long = Some(format!("{} took {:.0} s", run.setting, started.elapsed().as_secs_f64()));
+        }
+        runs.push(run);
+    }
+    runs
+}
+
+fn run(case: &Case, contender: Contender, setting: Setting, effort: Effort, mut tally: Tally) -> Run {
+    let measured = contender.with(setting, |fly| {
+        for known in &case.problems {
+            let (judgement, evaluations) = match fly(&known.problem) {
+                Ok(flight) => (known.judge(&flight, true), Some(flight.cost.force_evaluations)),
+                Err(error) => (Judgement::Failed(error.to_string()), None),
+            };
+            tally.add(judgement, evaluations);
+        }
+        if contender == Contender::Batch {
+            return time_in_lanes(case, effort);
+        }
+        let timing = effort.time(&mut || {
+            for known in &case.problems {
+                let _ = std::hint::black_box(fly(std::hint::black_box(&known.problem)));
+            }
+        });
+        timing.over(case.problems.len())
+    });
+    match measured {
+        Ok(time) => tally.finish(Some(time)),
+        Err(error) => {
+            for _ in &case.problems {
+                tally.add(Judgement::Failed(error.to_string()), None);
+            }
+            tally.finish(None)
+        }
+    }
+}
+
+/// Time of a scene in lanes: the case repeated until the lanes are full.
+fn time_in_lanes(case: &Case, effort: Effort) -> Timing {
+    const FULL: usize = 1024;
+    let problems: Vec<Problem> = case.problems.iter().map(|known| known.problem.clone()).cycle().take(FULL).collect();
+    let batch = Batch::new();
+    // One pass before the clock runs, as every other method has had.
+    std::hint::black_box(batch.fly(&problems));
+    effort.time(&mut || drop(std::hint::black_box(batch.fly(std::hint::black_box(&problems))))).over(FULL)
+}
+
+/// The fastest run of a method within an accuracy.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Fastest {
+    /// Case.
+    pub scene: String,
+    /// Method.
+    pub method: String,
+    /// Largest error allowed.
+    pub level: f64,
+    /// Median time of a flight [ns]; `null` when no run is as accurate.
+    pub time_ns: Option<f64>,
+    /// Setting of that run.
+    pub setting: Option<String>,
+    /// Its evaluations of the force a flight.
+    pub force_evaluations: Option<f64>,
+}
+
+/// The fastest run of each method on each case at each of [`LEVELS`]; only runs whose flights are all right count.
+pub fn fastest(runs: &[Run]) -> Vec<Fastest> {
+    runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method)
+        .flat_map(|runs| LEVELS.into_iter().map(move |level| fastest_of(runs, level)))
+        .collect()
+}
+
+fn fastest_of(runs: &[Run], level: f64) -> Fastest {
+    let best = runs
+        .iter()
+        .filter(|run| run.state == RunState::Right && run.error.is_some_and(|error| error <= level))
+        .filter_map(|run| run.time.map(|time| (time.median_ns, run)))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    Fastest {
+        scene: runs[0].scene.clone(),
+        method: runs[0].method.clone(),
+        level,
+        time_ns: best.map(|(time, _)| time),
+        setting: best.map(|(_, run)| run.setting.clone()),
+        force_evaluations: best.and_then(|(_, run)| run.force_evaluations),
+    }
+}

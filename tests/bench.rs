@@ -1,0 +1,211 @@
+//! `bench` as a person or a script meets it: errors, failed runs, schema, report folder. No time decides a test.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// Path of a shipped scene.
+fn scene(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes").join(format!("{name}.toml")).display().to_string()
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::cargo_bin("penetrode").unwrap().args(arguments).output().unwrap()
+}
+
+fn bench(arguments: &[&str]) -> Value {
+    let mut all = vec!["bench", "--repeats", "1", "--json"];
+    all.extend(arguments);
+    let output = run(&all);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}"))
+}
+
+fn runs<'a>(report: &'a Value, scene: &str, method: &str) -> Vec<&'a Value> {
+    let mine = |run: &&Value| run["scene"] == scene && run["method"] == method;
+    report["runs"].as_array().unwrap().iter().filter(mine).collect()
+}
+
+#[test]
+fn errors_fall_with_the_tolerance_and_the_fastest_keep_their_level() {
+    let report = bench(&[&scene("tunnel"), "--varied", "40", "--parts", "work-precision"]);
+    for case in ["tunnel", "varied"] {
+        let taylor = runs(&report, case, "taylor");
+        let error = |setting: &str| {
+            let run = taylor.iter().find(|run| run["setting"] == setting).unwrap();
+            assert_eq!(run["state"], "right", "{case} at {setting}");
+            run["error"].as_f64().unwrap()
+        };
+        assert!(error("1e-4") < 1e-3 && error("1e-8") < 1e-7 && error("eps") < 1e-15, "{case}");
+        assert!(error("eps") < error("1e-4"), "{case}");
+    }
+    let all = report["runs"].as_array().unwrap();
+    for fastest in report["fastest"].as_array().unwrap() {
+        let Some(setting) = fastest["setting"].as_str() else { continue };
+        let run = all.iter().find(|run| {
+            run["scene"] == fastest["scene"] && run["method"] == fastest["method"] && run["setting"] == setting
+        });
+        let run = run.unwrap();
+        assert_eq!(run["state"], "right", "{fastest}");
+        assert!(run["error"].as_f64().unwrap() <= fastest["level"].as_f64().unwrap(), "{fastest}");
+        assert_eq!(run["time"]["median_ns"], fastest["time_ns"]);
+    }
+    // The paper's scheme never gets to 1e-12, and no time is invented for it.
+    let paper =
+        report["fastest"].as_array().unwrap().iter().find(|f| f["method"] == "lagged/step-end" && f["level"] == 1e-12);
+    assert!(paper.unwrap()["time_ns"].is_null());
+}
+
+#[test]
+fn runs_that_are_wrong_refused_or_undecided_are_shown_and_count_at_no_accuracy() {
+    let report = bench(&[&scene("graze"), &scene("stiff"), "--parts", "work-precision"]);
+    let state = |run: &Value| run["state"].as_str().unwrap().to_owned();
+    // The paper's scheme overlooks the millionth that is left to the far side, and says stopped.
+    let paper = runs(&report, "graze", "lagged/step-end");
+    let wrong = paper.iter().find(|run| state(run) == "failed").unwrap();
+    assert!(wrong["reason"].as_str().unwrap().contains("in place of perforated"), "{wrong}");
+    assert!(wrong["error"].is_null() && wrong["failed"] == 1, "{wrong}");
+    // At a loose tolerance the margin lies inside the bar.
+    assert!(runs(&report, "graze", "taylor").iter().any(|run| state(run) == "undecided"));
+    // The energy form refuses viscosity.
+    let refused = runs(&report, "stiff", "energy");
+    assert!(
+        refused.len() > 10
+            && refused.iter().all(|run| state(run) == "failed" && run["time"].is_null() | run["error"].is_null())
+    );
+    for fastest in
+        report["fastest"].as_array().unwrap().iter().filter(|f| f["scene"] == "stiff" && f["method"] == "energy")
+    {
+        assert!(fastest["time_ns"].is_null());
+    }
+    let output = run(&["bench", &scene("stiff"), "--repeats", "1", "--parts", "work-precision"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("failed: energy at every setting") && text.contains("viscosity"), "{text}");
+}
+
+#[test]
+fn the_largest_steps_follow_the_error_constants_and_the_orders() {
+    let report = bench(&[&scene("tunnel"), "--parts", "step-size"]);
+    let studies = report["step_size"].as_array().unwrap();
+    let names: Vec<_> = studies.iter().map(|study| study["quantity"].as_str().unwrap()).collect();
+    assert_eq!(names, ["depth", "time"]);
+    let held = |study: &Value, method: &str| -> Vec<f64> {
+        let curves = study["curves"].as_array().unwrap();
+        let curve = curves.iter().find(|curve| curve["method"] == method).unwrap();
+        curve["held"].as_array().unwrap().iter().map(|held| held["size"].as_f64().unwrap()).collect()
+    };
+    for boundaries in ["interpolated", "landed"] {
+        // First order: a tenth of the error needs a tenth of the step; second order: a third.
+        let lagged = held(&studies[0], &format!("lagged/{boundaries}"));
+        let centred = held(&studies[0], &format!("centred/{boundaries}"));
+        let (first, second) = (lagged[2] / lagged[3], centred[2] / centred[3]);
+        assert!((first / 10.0 - 1.0).abs() < 0.02, "lagged/{boundaries}: {first}");
+        assert!((second / 10f64.sqrt() - 1.0).abs() < 0.25, "centred/{boundaries}: {second}");
+    }
+    // The step and the error of `converge` at it: held to within the width of the search.
+    let step = held(&studies[0], "lagged/landed")[3];
+    let report = run(&[
+        "solve",
+        &scene("tunnel"),
+        "--method",
+        "central-difference",
+        "--events",
+        "landed",
+        "--dt",
+        &step.to_string(),
+        "--json",
+    ]);
+    let flight: Value = serde_json::from_slice(&report.stdout).unwrap();
+    let error = flight["relative_error"]["depth"].as_f64().unwrap();
+    assert!((0.99e-5..=1e-5).contains(&error), "{error}");
+}
+
+#[test]
+fn a_perforation_has_steps_for_time_residual_and_critical_velocity() {
+    let report = bench(&[&scene("perforate"), "--parts", "step-size"]);
+    let studies = report["step_size"].as_array().unwrap();
+    let names: Vec<_> = studies.iter().map(|study| study["quantity"].as_str().unwrap()).collect();
+    assert_eq!(names, ["time", "velocity", "critical_velocity"]);
+    let adaptive = if cfg!(feature = "diffsol") { 2 } else { 1 };
+    for study in studies {
+        let curves = study["curves"].as_array().unwrap();
+        assert_eq!(curves.len(), 9 + adaptive);
+        for curve in curves {
+            let held = curve["held"].as_array().unwrap();
+            let sizes: Vec<f64> = held.iter().filter_map(|held| held["size"].as_f64()).collect();
+            assert!(!sizes.is_empty() && sizes.windows(2).all(|pair| pair[1] <= pair[0]), "{}", curve["method"]);
+        }
+    }
+}
+
+#[test]
+fn what_bench_prints_is_what_its_schema_says_and_its_folder_holds_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("report");
+    let all = "work-precision,step-size,scaling";
+    let arguments =
+        [&scene("tunnel"), "--parts", all, "--varied", "5", "--most", "100", "--out", target.to_str().unwrap()];
+    let report = bench(&arguments);
+    let schema: Value = serde_json::from_slice(&run(&["schema", "bench"]).stdout).unwrap();
+    let faults: Vec<_> =
+        jsonschema::validator_for(&schema).unwrap().iter_errors(&report).map(|e| e.to_string()).collect();
+    assert!(faults.is_empty(), "{faults:?}");
+    assert_eq!(report["schema"], "penetrode/bench/1");
+    let written: Value = serde_json::from_slice(&fs::read(target.join("report.json")).unwrap()).unwrap();
+    assert_eq!(written, report);
+    let growth = report["growth"].as_array().unwrap();
+    assert_eq!(growth.iter().map(|g| g["scenes"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 1, 10, 10, 100, 100]);
+    assert!(growth.iter().all(|g| g["seconds"].as_f64().unwrap() > 0.0 && g["source"] == "file"));
+    let page = fs::read_to_string(target.join("report.html")).unwrap();
+    for part in ["Error against time", "The paper's scheme against its step", "Cost as work grows", "penetrode bench"] {
+        assert!(page.contains(part), "{part}");
+    }
+    // Every link of the page leads to a file of the folder, and every figure is shown.
+    for link in page.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()) {
+        assert!(link.starts_with('#') || link == "data:," || target.join(link).is_file(), "{link}");
+    }
+    assert_eq!(fs::read_dir(target.join("figures")).unwrap().count(), page.matches("<figure").count());
+    // A second run replaces its own report, and nobody's else.
+    bench(&arguments);
+    fs::write(target.join("report.json"), "{}").unwrap();
+    assert_eq!(run(&["bench", &scene("tunnel"), "--out", target.to_str().unwrap()]).status.code(), Some(2));
+}
+
+#[test]
+fn text_fits_80_columns() {
+    let output = run(&["bench", &scene("perforate"), &scene("stiff"), "--repeats", "1", "--varied", "20"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let widest = text.lines().max_by_key(|line| line.chars().count()).unwrap();
+    assert!(widest.chars().count() <= 80, "{widest}");
+}
+
+#[test]
+fn two_scenes_of_one_name_are_two_scenes() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("tunnel.toml");
+    fs::copy(scene("tunnel"), &other).unwrap();
+    let report = bench(&[&scene("tunnel"), other.to_str().unwrap(), "--parts", "work-precision"]);
+    let names: Vec<_> =
+        report["scenes"].as_array().unwrap().iter().map(|case| case["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["tunnel", "tunnel-2"]);
+    assert_eq!(runs(&report, "tunnel", "closed-form").len(), 1);
+}
+
+#[test]
+fn a_scene_or_a_request_that_cannot_be_used_is_refused_before_anything_is_measured() {
+    let code = |arguments: &[&str]| {
+        let output = run(arguments);
+        assert!(output.stdout.is_empty());
+        output.status.code()
+    };
+    assert_eq!(code(&["bench", "no-such-scene.toml"]), Some(2));
+    assert_eq!(code(&["bench", &scene("tunnel"), "--parts", "everything"]), Some(2));
+    assert_eq!(code(&["bench", &scene("tunnel"), "--repeats", "0"]), Some(2));
+    assert_eq!(code(&["bench", &scene("tunnel"), "--peer", "no-such-program"]), Some(5));
+    assert_eq!(code(&["bench", &scene("tunnel"), "--peer", ""]), Some(2));
+}
