@@ -33,7 +33,7 @@ fn runs<'a>(report: &'a Value, scene: &str, method: &str) -> Vec<&'a Value> {
 
 #[test]
 fn errors_fall_with_the_tolerance_and_the_fastest_keep_their_level() {
-    let report = bench(&[&scene("tunnel"), "--varied", "40", "--parts", "work-precision"]);
+    let report = bench(&[&scene("tunnel"), "--varied", "10", "--parts", "work-precision"]);
     for case in ["tunnel", "varied"] {
         let taylor = runs(&report, case, "taylor");
         let error = |setting: &str| {
@@ -83,7 +83,23 @@ fn runs_that_are_wrong_refused_or_undecided_are_shown_and_count_at_no_accuracy()
     {
         assert!(fastest["time_ns"].is_null());
     }
-    let output = run(&["bench", &scene("stiff"), "--repeats", "1", "--parts", "work-precision"]);
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("report");
+    let output = run(&[
+        "bench",
+        &scene("stiff"),
+        "--repeats",
+        "1",
+        "--parts",
+        "work-precision",
+        "--out",
+        target.to_str().unwrap(),
+    ]);
+    // The table of the figure has them, and the page says how many there are.
+    let table = fs::read_to_string(target.join("tables/cost-stiff.csv")).unwrap();
+    let refused = table.lines().filter(|line| line.starts_with("energy,") && line.contains(",failed,")).count();
+    assert_eq!(refused, 15, "{table}");
+    assert!(fs::read_to_string(target.join("report.html")).unwrap().contains("15 of 15"));
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("failed: energy at every setting") && text.contains("viscosity"), "{text}");
 }
@@ -208,4 +224,55 @@ fn a_scene_or_a_request_that_cannot_be_used_is_refused_before_anything_is_measur
     assert_eq!(code(&["bench", &scene("tunnel"), "--repeats", "0"]), Some(2));
     assert_eq!(code(&["bench", &scene("tunnel"), "--peer", "no-such-program"]), Some(5));
     assert_eq!(code(&["bench", &scene("tunnel"), "--peer", ""]), Some(2));
+}
+
+/// A peer in the shell that greets and answers each question with `answer`, where `$n` is its number.
+#[cfg(unix)]
+fn peer(answer: &str) -> String {
+    let script = format!(
+        "read q; echo '{{\"name\": \"fake\"}}'; n=0; while read q; do n=$((n+1)); printf '%s\\n' \"{}\"; done",
+        answer.replace('"', "\\\"")
+    );
+    format!("sh -c {}", shlex::try_quote(&script).unwrap())
+}
+
+#[test]
+#[cfg(unix)]
+fn a_peer_is_timed_by_its_own_clock_and_judged_like_any_method() {
+    let exact = run(&["solve", &scene("tunnel"), "--method", "closed-form", "--json"]);
+    let exact: Value = serde_json::from_slice(&exact.stdout).unwrap();
+    let (depth, time) = (exact["depth_m"].as_f64().unwrap(), exact["time_s"].as_f64().unwrap());
+    let numbers = format!("\"depth_m\": {}, \"time_s\": {time:e}, \"velocity_m_s\": 0", depth * (1.0 + 1e-7));
+    let clock = "\"wall_ns\": 5000, \"wall_ns_quartiles\": [4000, 7000]";
+    let right = peer(&format!("{{\"id\": $n, {numbers}, {clock}}}"));
+    let wrong = peer(&format!("{{\"id\": $n, \"outcome\": \"perforated\", {numbers}, {clock}}}"));
+    let dies = "sh -c 'read q; echo \"{\\\"name\\\": \\\"mortal\\\"}\"; read q'";
+    let report =
+        bench(&[&scene("tunnel"), "--parts", "work-precision", "--peer", &right, "--peer", &wrong, "--peer", dies]);
+    let right = runs(&report, "tunnel", "fake");
+    assert_eq!(right.len(), 12);
+    for run in right {
+        assert_eq!((run["state"].as_str(), run["quantity"].as_str()), (Some("right"), Some("depth")), "{run}");
+        // The depth is off by 1e-7, and its condition number is a few units.
+        let error = run["error"].as_f64().unwrap();
+        assert!((1e-8..=1.01e-7).contains(&error), "{run}");
+        let time = &run["time"];
+        assert_eq!((&time["median_ns"], &time["low_ns"], &time["high_ns"]), (&5e3.into(), &4e3.into(), &7e3.into()));
+    }
+    for (name, reason) in
+        [("fake 2", "perforated in place of stopped-in-tunnel"), ("mortal", "ended without an answer")]
+    {
+        let failed = runs(&report, "tunnel", name);
+        assert_eq!(failed.len(), 12);
+        for run in failed {
+            assert_eq!(run["state"], "failed");
+            assert!(run["reason"].as_str().unwrap().contains(reason), "{run}");
+        }
+    }
+    let fastest = report["fastest"].as_array().unwrap();
+    let times = |name: &str| -> Vec<bool> {
+        fastest.iter().filter(|f| f["method"] == name).map(|f| f["time_ns"].is_number()).collect()
+    };
+    assert_eq!(times("fake"), [true, true, false, false]);
+    assert_eq!(times("fake 2"), [false; 4]);
 }

@@ -331,29 +331,31 @@ fn case_lines(report: &BenchJson, case: &CaseJson) -> Vec<String> {
     lines
 }
 
-/// What was not right, one paragraph for each state of a method.
+/// What was not right, one paragraph for each reason of a method.
 fn notes_of(runs: &[Run]) -> Vec<String> {
-    let mut lines = Vec::new();
-    for (state, word) in
-        [(RunState::Failed, "failed"), (RunState::Undecided, "undecided"), (RunState::NotRun, "not run")]
-    {
-        let of_state: Vec<&Run> = runs.iter().filter(|run| run.state == state).collect();
-        let Some(first) = of_state.first() else { continue };
-        let settings = of_state.iter().map(|run| {
+    let mut groups: Vec<(RunState, &str, Vec<&Run>)> = Vec::new();
+    for run in runs.iter().filter(|run| run.state != RunState::Right) {
+        let reason = run.reason.as_deref().unwrap_or_default();
+        match groups.iter_mut().find(|(state, known, _)| *state == run.state && *known == reason) {
+            Some((.., members)) => members.push(run),
+            None => groups.push((run.state, reason, vec![run])),
+        }
+    }
+    let paragraph = |(state, reason, members): (RunState, &str, Vec<&Run>)| {
+        let settings = members.iter().map(|run| {
             let lost = if state == RunState::Failed { run.failed } else { run.undecided };
             if flights_of(run) > 1 { format!("{} ({lost})", run.setting) } else { run.setting.clone() }
         });
-        let reason = first.reason.as_deref().map_or(String::new(), |reason| format!(": {}", escape_terminal(reason)));
-        let settings = match settings.collect::<Vec<_>>() {
-            all if all.len() == runs.len() && flights_of(first) <= 1 => "every setting".to_owned(),
-            some => some.join(", "),
+        let settings = if members.len() == runs.len() && flights_of(members[0]) <= 1 {
+            "every setting".to_owned()
+        } else {
+            settings.collect::<Vec<_>>().join(", ")
         };
-        let text = format!("{word}: {} at {settings}{reason}", escape_terminal(&first.method));
-        for (index, line) in wrapped(&text, WIDTH - 4).into_iter().enumerate() {
-            lines.push(format!("{}{line}", if index == 0 { "  " } else { "    " }));
-        }
-    }
-    lines
+        let text = format!("{}: {} at {settings}: {reason}", state.name(), members[0].method);
+        let indent = |(index, line)| format!("{}{line}", if index == 0 { "  " } else { "    " });
+        wrapped(&escape_terminal(&text), WIDTH - 4).into_iter().enumerate().map(indent).collect::<Vec<_>>()
+    };
+    groups.into_iter().flat_map(paragraph).collect()
 }
 
 fn flights_of(run: &Run) -> usize {

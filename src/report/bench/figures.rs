@@ -1,6 +1,7 @@
 //! The figures of `bench`: error against time and against work, error against the step, cost as work grows.
 
 use super::BenchJson;
+use crate::integrators::MethodName;
 use crate::report::chart::{Axis, HEIGHT, Ink, Key, KeyPlace, Mark, Panel, RADIUS, Shape};
 use crate::report::figure::{Figure, Part};
 use crate::report::figures::words_for;
@@ -9,10 +10,13 @@ use crate::report::text::{count, one_line};
 use crate::studies::Quantity;
 use crate::studies::bench::growth::Growth;
 use crate::studies::bench::step_size::{BOUNDARIES, Curve, StepStudy, VELOCITIES};
-use crate::studies::bench::work_precision::{Run, RunState, variant_name};
+use crate::studies::bench::work_precision::{Contender, Run, RunState, variant_name};
 
-/// Series in one panel at most: more cannot be told apart.
-const SERIES_MAX: usize = 8;
+/// Series in one panel at most, besides the one that stands in all: more cannot be told apart.
+const SERIES_MAX: usize = 7;
+
+/// The series that stands in every panel, for comparison.
+const IN_ALL: &str = "taylor";
 
 /// Room for the legend to the right of the points, over the width of the points on the logarithmic abscissa.
 const ROOM: f64 = 0.7;
@@ -74,9 +78,10 @@ fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
     }
     let mut y = Axis::log("relative error", [LEAST]);
     y.range = [LEAST / 2.0, 3.0 * FAILED_AT];
-    let panels = methods
-        .chunks(SERIES_MAX)
-        .flat_map(|methods| COSTS.iter().map(|cost| panel(&runs, methods, cost, &y)).collect::<Vec<_>>())
+    let groups = groups(&methods);
+    let panels = COSTS
+        .iter()
+        .flat_map(|cost| groups.iter().map(|group| panel(&runs, group, cost, &y)).collect::<Vec<_>>())
         .collect();
     let mut table =
         Table::new(["method", "setting", "state", "error", "quantity", "time_us", "low_us", "high_us", "evaluations"]);
@@ -85,7 +90,7 @@ fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
         table.push([
             &run.method,
             &run.setting,
-            &state_name(run.state),
+            &run.state.name(),
             &or_empty(run.error),
             &run.quantity.map_or("", Quantity::name),
             &time(|t| t.median_ns),
@@ -110,12 +115,30 @@ fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
     })
 }
 
+/// Methods that share a panel: those of the program itself, those of diffsol, other programs.
+fn groups<'a>(methods: &[&'a str]) -> Vec<Vec<&'a str>> {
+    let own: Vec<String> = Contender::all().into_iter().map(Contender::name).collect();
+    let kind = |method: &str| match method.parse::<MethodName>() {
+        Ok(name) => usize::from(name.needs_diffsol()),
+        Err(_) => 2 * usize::from(!own.iter().any(|known| known == method)),
+    };
+    let mut groups = Vec::new();
+    for wanted in 0..3 {
+        let of_kind: Vec<&str> =
+            methods.iter().copied().filter(|method| *method != IN_ALL && kind(method) == wanted).collect();
+        groups.extend(of_kind.chunks(SERIES_MAX).map(|chunk| {
+            methods.iter().copied().filter(|method| *method == IN_ALL || chunk.contains(method)).collect()
+        }));
+    }
+    groups
+}
+
 fn panel(runs: &[&Run], methods: &[&str], cost: &Cost, y: &Axis) -> Panel {
     let (mut marks, mut keys) = (Vec::new(), Vec::new());
     let mut x = Axis::log(cost.label, runs.iter().filter_map(|run| (cost.of)(run)));
     x.range[1] *= (x.range[1] / x.range[0]).powf(ROOM);
     for (series, method) in methods.iter().enumerate() {
-        // Four colours, then the same with another shape.
+        // Four colours, then the same with another shape; the first is that of the series in all.
         let (ink, shape) = (Ink::series(series), if series < 4 { Shape::Circle } else { Shape::Triangle });
         let points = |state: &dyn Fn(RunState) -> bool, place: &dyn Fn(&Run) -> f64| -> Vec<(f64, f64)> {
             let mine = runs.iter().filter(|run| run.method == *method && state(run.state));
@@ -245,16 +268,6 @@ fn growth(growth: &[Growth]) -> Option<Figure> {
         ],
         table,
     })
-}
-
-/// Name of a state in tables.
-pub(super) fn state_name(state: RunState) -> &'static str {
-    match state {
-        RunState::Right => "right",
-        RunState::Undecided => "undecided",
-        RunState::Failed => "failed",
-        RunState::NotRun => "not run",
-    }
 }
 
 /// A name of a file from the name of a scene: letters, digits and hyphens.

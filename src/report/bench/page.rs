@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::BenchJson;
-use super::figures::{cost_figure_name, state_name, step_figure_name};
+use super::figures::{cost_figure_name, step_figure_name};
 use crate::report::figure::Drawn;
 use crate::report::figures::words_for;
 use crate::report::page::{document, figure};
@@ -119,7 +119,7 @@ fn all_runs(report: &BenchJson, scene: &str) -> Markup {
                         th scope="row" { (one_line(&run.method)) }
                         td.num { (run.setting) }
                         td { @if run.state == RunState::Right { "right" } @else {
-                            span.(if run.state == RunState::Failed { "failed" } else { "undecided" }) { (state_name(run.state)) }
+                            span.(if run.state == RunState::Failed { "failed" } else { "undecided" }) { (run.state.name()) }
                             @if run.right + run.undecided + run.failed > 1 {
                                 " (" (run.failed) " failed, " (run.undecided) " undecided of " (run.right + run.undecided + run.failed) ")"
                             }

@@ -27,10 +27,7 @@ use crate::studies::random_scenes::{Generator, errors_beside};
 pub const LEVELS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 
 /// A method whose pass over the scenes took longer than this is not tried at finer settings [s].
-const PASS_S: f64 = 5.0;
-
-/// Steps of one flight of the central difference; one that needs more is shown as failed.
-const STEPS_MAX: u64 = 10_000_000;
+const PASS_S: f64 = 2.0;
 
 /// Steps of the central difference over the default one ([`default_time_step`]), coarse to fine.
 const STEPS_OVER_DEFAULT: [f64; 6] = [1000.0, 100.0, 10.0, 1.0, 0.1, 0.01];
@@ -110,7 +107,11 @@ impl Known {
                 continue;
             }
             if !error.is_finite() {
-                return Judgement::Wrong(format!("no {quantity} that can be compared"));
+                return Judgement::Wrong(if at_crater_end {
+                    "x = k d is an event too few or too many".to_owned()
+                } else {
+                    format!("{quantity} is not a number")
+                });
             }
             if error > worst.0 {
                 worst = (error, quantity);
@@ -258,8 +259,7 @@ impl Contender {
                 let factor = if let Setting::Step(factor) = setting { factor } else { 1.0 };
                 Ok(work(&mut |problem| {
                     let step = factor * default_time_step(problem, velocity);
-                    let scheme = CentralDifference::uniform(step, velocity, boundaries);
-                    CentralDifference { max_steps: STEPS_MAX, ..scheme }.fly_in(problem, Detail::Events)
+                    CentralDifference::uniform(step, velocity, boundaries).fly_in(problem, Detail::Events)
                 }))
             }
             Self::Method(name) => {
@@ -293,6 +293,18 @@ pub enum RunState {
     Failed,
     /// Not tried, because a coarser setting already took too long.
     NotRun,
+}
+
+impl RunState {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Undecided => "undecided",
+            Self::Failed => "failed",
+            Self::NotRun => "not run",
+        }
+    }
 }
 
 /// One contender at one setting on one case.
@@ -428,25 +440,31 @@ pub fn runs(case: &Case, contender: Contender, effort: Effort) -> Vec<Run> {
 
 fn run(case: &Case, contender: Contender, setting: Setting, effort: Effort, mut tally: Tally) -> Run {
     let measured = contender.with(setting, |fly| {
+        let mut answered = false;
         for known in &case.problems {
             let (judgement, evaluations) = match fly(&known.problem) {
                 Ok(flight) => (known.judge(&flight, true), Some(flight.cost.force_evaluations)),
                 Err(error) => (Judgement::Failed(error.to_string()), None),
             };
+            answered |= evaluations.is_some();
             tally.add(judgement, evaluations);
         }
+        // How long it takes to give no answer at all is of no use to anybody.
+        if !answered {
+            return None;
+        }
         if contender == Contender::Batch {
-            return time_in_lanes(case, effort);
+            return Some(time_in_lanes(case, effort));
         }
         let timing = effort.time(&mut || {
             for known in &case.problems {
                 let _ = std::hint::black_box(fly(std::hint::black_box(&known.problem)));
             }
         });
-        timing.over(case.problems.len())
+        Some(timing.over(case.problems.len()))
     });
     match measured {
-        Ok(time) => tally.finish(Some(time)),
+        Ok(time) => tally.finish(time),
         Err(error) => {
             for _ in &case.problems {
                 tally.add(Judgement::Failed(error.to_string()), None);
