@@ -22,13 +22,15 @@ type Check = Result<(), Box<dyn Error>>;
 /// A claim, the program that it needs, and how it is checked.
 type Claim = (&'static str, BundledPeer, fn(BundledPeer, &Environment) -> Check);
 
-const CLAIMS: [Claim; 9] = [
+const CLAIMS: [Claim; 11] = [
     ("cvode_adams_still_says_what_was_recorded", BundledPeer::SundaeAdams, says_what_was_recorded),
     ("cvode_bdf_still_says_what_was_recorded", BundledPeer::SundaeBdf, says_what_was_recorded),
     ("ida_still_says_what_was_recorded", BundledPeer::SundaeIda, says_what_was_recorded),
     ("heyoka_still_says_what_was_recorded", BundledPeer::Heyoka, says_what_was_recorded),
     ("cvode_with_coincident_events_answers_or_reports_and_lives", BundledPeer::SundaeAdams, survives_coincidence),
     ("scipy_with_the_natural_events_misses_a_perforation", BundledPeer::Scipy, misses_a_perforation),
+    ("heyoka_times_itself_and_tells_the_spread", BundledPeer::Heyoka, times_itself),
+    ("scipy_times_itself_and_tells_the_spread", BundledPeer::Scipy, times_itself),
     ("scikit_sundae_answers_hostile_lines_with_an_error_and_lives", BundledPeer::SundaeAdams, survives_hostile_lines),
     ("scipy_answers_hostile_lines_with_an_error_and_lives", BundledPeer::Scipy, survives_hostile_lines),
     ("heyoka_answers_hostile_lines_with_an_error_and_lives", BundledPeer::Heyoka, survives_hostile_lines),
@@ -101,6 +103,25 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
             if difference.relative > recording.trusted_to() * difference.conditioning {
                 return Err(format!("{} against the Taylor series: {difference:?}", flight.scene).into());
             }
+        }
+    }
+    Ok(())
+}
+
+/// The numbers of a timed answer are those of an untimed one, and its quartiles enclose the median.
+fn times_itself(peer: BundledPeer, environment: &Environment) -> Check {
+    let request = flight("perforate")?.request;
+    for options in if peer == BundledPeer::Heyoka { &["", " --lanes 4"][..] } else { &[""] } {
+        let mut live = Peer::start(&format!("{}{options}", environment.command(peer)))?;
+        let (plain, timed) = (live.ask(&request)?, live.ask(&request.clone().timed(20))?);
+        if (plain.depth_m, plain.time_s, plain.velocity_m_s) != (timed.depth_m, timed.time_s, timed.velocity_m_s) {
+            return Err(format!("{timed:?} is not {plain:?}").into());
+        }
+        let (Some(median), Some([low, high])) = (timed.wall_ns, timed.wall_ns_quartiles) else {
+            return Err(format!("no time or no spread: {timed:?}").into());
+        };
+        if !(0.0 < low && low <= median && median <= high) || plain.wall_ns_quartiles.is_some() {
+            return Err(format!("{low} .. {median} .. {high} ns").into());
         }
     }
     Ok(())

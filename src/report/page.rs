@@ -2,12 +2,12 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::Run;
 use super::chart::Ink;
 use super::families::{Family, group_of};
 use super::figure::{Drawn, Part};
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::text::{count, number, one_line};
+use super::{Environment, Run};
 use crate::integrators::{Boundaries, VelocityAt};
 use crate::physics::groups::Groups;
 use crate::studies::{Path, Quantity, Stretch, formal_order};
@@ -746,10 +746,7 @@ fn reproduction(run: &Run<'_>) -> Markup {
         html! {
             pre { code { (one_line(&e.command)) } }
             dl.facts {
-                dt { "Program" } dd { "penetrode " (e.version) ", commit " code { (e.commit) } }
-                dt { "Built by" } dd { (e.rustc) ", profile " (e.profile) ", for " (e.target) }
-                dt { "Features" } dd { @if e.features.is_empty() { "none" } @else { (e.features.join(", ")) } }
-                dt { "Seed" } dd { (e.seed) }
+                (program(e))
                 dt { "Processor" } dd { (one_line(&e.cpu)) ", " (count(e.threads, "thread")) }
                 dt { "Floating point" } dd { (e.floating_point) }
                 dt { "Lock file (BLAKE3)" } dd { code { (e.lock_file_hash) } }
@@ -761,6 +758,16 @@ fn reproduction(run: &Run<'_>) -> Markup {
                 the number of threads and the times in the JSON and JUnit files differ." }
         },
     )
+}
+
+/// The program and its seed, as rows of a list of facts.
+pub(super) fn program(e: &Environment) -> Markup {
+    html! {
+        dt { "Program" } dd { "penetrode " (e.version) ", commit " code { (e.commit) } }
+        dt { "Built by" } dd { (e.rustc) ", profile " (e.profile) ", for " (e.target) }
+        dt { "Features" } dd { @if e.features.is_empty() { "none" } @else { (e.features.join(", ")) } }
+        dt { "Seed" } dd { (e.seed) }
+    }
 }
 
 fn references() -> Markup {

@@ -6,7 +6,7 @@ use super::BenchJson;
 use super::figures::{cost_figure_name, step_figure_name};
 use crate::report::figure::Drawn;
 use crate::report::figures::words_for;
-use crate::report::page::{document, figure};
+use crate::report::page::{document, figure, program};
 use crate::report::text::{count, number, one_line};
 use crate::studies::Quantity;
 use crate::studies::bench::step_size::{Curve, Held, LEVELS as STEP_LEVELS};
@@ -208,10 +208,7 @@ fn reproduction(report: &BenchJson) -> Markup {
     let body = html! {
         pre { code { (one_line(&e.command)) } }
         dl.facts {
-            dt { "Program" } dd { "penetrode " (e.version) ", commit " code { (e.commit) } }
-            dt { "Built by" } dd { (e.rustc) ", profile " (e.profile) ", for " (e.target) }
-            dt { "Features" } dd { @if e.features.is_empty() { "none" } @else { (e.features.join(", ")) } }
-            dt { "Seed" } dd { (e.seed) }
+            (program(e))
             dt { "Processor" } dd { (one_line(&e.cpu)) ", " (count(e.threads, "thread")) "; flights are timed on one" }
             dt { "Scenes (BLAKE3)" } dd { code { (e.scenes_hash) } }
             @for (name, text) in &e.peers { dt { (one_line(name)) } dd { (one_line(text)) } }
