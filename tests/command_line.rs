@@ -298,7 +298,7 @@ fn bad_convergence_data_never_passes() {
 
 #[test]
 fn help_and_completion_are_there_for_every_command() {
-    for command in ["solve", "critical", "converge", "audit", "verify", "schema", "completions"] {
+    for command in ["solve", "critical", "converge", "audit", "bench", "verify", "schema", "completions"] {
         let output = run(&[command, "--help"]);
         assert_eq!(code(&output), 0, "{command}");
         let text = String::from_utf8(output.stdout).unwrap();

@@ -37,8 +37,8 @@ const WIDTH: usize = 80;
     machine: pin the program (taskset -c 0) and keep the machine idle.\n\n\
     --out writes a report folder of its own and adds nothing to that of verify: the numbers of verify are the same in \
     every run, and no claim rests on a time.\n\n\
-    The part scaling runs `penetrode batch` with 1 and 2 threads on 1, 10, 100 ... scenes; its tables take some 300 MB \
-    in the folder for temporary files."
+    The part scaling runs `penetrode batch` with 1 and 2 threads on 1, 10, 100 ... scenes, so leave the program unpinned \
+    for it; its tables take some 300 MB in the folder for temporary files."
 )]
 pub struct BenchArgs {
     /// Scene files [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
@@ -198,11 +198,11 @@ impl BenchArgs {
         }
         let mut studies = Vec::new();
         if self.has(Part::StepSize) {
+            progress.inc_length(scenes.len() as u64);
             for (name, scene) in scenes {
                 progress.set_message(format!("{name}, steps"));
-                studies.extend(
-                    step_size::of_scene(name, scene, effort, self.seed, &|| progress.tick()).map_err(case_error)?,
-                );
+                studies.extend(step_size::of_scene(name, scene, effort, self.seed).map_err(case_error)?);
+                progress.inc(1);
             }
         }
         let growths = if self.has(Part::Scaling) { self.growth(&progress)? } else { Vec::new() };

@@ -716,7 +716,7 @@ fn deviations(run: &Run<'_>, families: &[Family<'_>]) -> Markup {
                 li { "Orders are those between the steps tried, 10⁻⁵ to 10⁻² of the time of flight; outside, nothing was measured." }
                 li { "A 95 % interval misses the truth once in twenty times. Verdicts therefore rest on wider bands." }
                 li { "Recorded answers of other programs were made once; " code { "--live-peers" } " asks the programs again." }
-                li { "Programs are not compared in speed here: times of one run say little." }
+                li { "Programs are not compared in speed here: " code { "penetrode bench" } " does, in a report of its own." }
             }
         },
     )

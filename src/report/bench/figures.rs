@@ -116,24 +116,24 @@ fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
 }
 
 /// Methods that share a panel: those of the program itself, those of diffsol, other programs.
-fn groups<'a>(methods: &[&'a str]) -> Vec<Vec<&'a str>> {
+fn groups<'a>(methods: &[&'a str]) -> Vec<(&'static str, Vec<&'a str>)> {
     let own: Vec<String> = Contender::all().into_iter().map(Contender::name).collect();
     let kind = |method: &str| match method.parse::<MethodName>() {
         Ok(name) => usize::from(name.needs_diffsol()),
         Err(_) => 2 * usize::from(!own.iter().any(|known| known == method)),
     };
     let mut groups = Vec::new();
-    for wanted in 0..3 {
+    for (wanted, title) in ["own methods", "diffsol", "other programs"].into_iter().enumerate() {
         let of_kind: Vec<&str> =
             methods.iter().copied().filter(|method| *method != IN_ALL && kind(method) == wanted).collect();
         groups.extend(of_kind.chunks(SERIES_MAX).map(|chunk| {
-            methods.iter().copied().filter(|method| *method == IN_ALL || chunk.contains(method)).collect()
+            (title, methods.iter().copied().filter(|method| *method == IN_ALL || chunk.contains(method)).collect())
         }));
     }
     groups
 }
 
-fn panel(runs: &[&Run], methods: &[&str], cost: &Cost, y: &Axis) -> Panel {
+fn panel(runs: &[&Run], (title, methods): &(&str, Vec<&str>), cost: &Cost, y: &Axis) -> Panel {
     let (mut marks, mut keys) = (Vec::new(), Vec::new());
     let mut x = Axis::log(cost.label, runs.iter().filter_map(|run| (cost.of)(run)));
     x.range[1] *= (x.range[1] / x.range[0]).powf(ROOM);
@@ -152,7 +152,7 @@ fn panel(runs: &[&Run], methods: &[&str], cost: &Cost, y: &Axis) -> Panel {
         keys.push(Key { text: one_line(method), ink, shape: Some(shape), hollow: false });
     }
     Panel {
-        title: format!("against {}", cost.words),
+        title: format!("{title}, {}", cost.words),
         description: format!("Relative error against {} for {}.", cost.words, methods.join(", ")),
         x,
         y: y.clone(),

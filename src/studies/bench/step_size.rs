@@ -118,7 +118,9 @@ impl Walk {
             held = halved(held, tried[first - 1].0, level, error);
         }
         for _ in 0..Self::ROUNDS {
-            let mut probes: Vec<f64> = (0..self.probes).map(|_| random.log_uniform(0.5 * held, held)).collect();
+            // Half of them close below, where a tooth that still fails is rarest.
+            let from = |index: usize| if index.is_multiple_of(2) { 0.9 * held } else { 0.5 * held };
+            let mut probes: Vec<f64> = (0..self.probes).map(|index| random.log_uniform(from(index), held)).collect();
             probes.sort_by(f64::total_cmp);
             let Some(failing) = probes.iter().position(|&size| !holds(error(size), level)) else { break };
             // The probes below it hold; where there is none, the whole stretch is given up.
@@ -263,17 +265,11 @@ impl Question<'_> {
     }
 }
 
-/// The studies of `scene`, one for each free quantity of [`QUANTITIES`]; `tell` hears of each curve that is done.
+/// The studies of `scene`, one for each free quantity of [`QUANTITIES`].
 ///
 /// # Errors
 /// [`CaseError`]: the scene does not resolve, or has nothing to measure by.
-pub fn of_scene(
-    name: &str,
-    scene: &Scene,
-    effort: Effort,
-    seed: u64,
-    tell: &dyn Fn(),
-) -> Result<Vec<StepStudy>, CaseError> {
+pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<Vec<StepStudy>, CaseError> {
     let problem = scene.problem()?;
     let exact = Yardstick::of(&problem)?.flight;
     let mut studies = Vec::new();
@@ -289,34 +285,27 @@ pub fn of_scene(
         let question = Question { scene, problem: &problem, exact: &exact, critical, quantity };
         let steps_max = if critical.is_some() { STEPS_MAX_CRITICAL } else { STEPS_MAX };
         let time = exact.end.time;
-        let steps = Walk { from: time, to: time / steps_max, per_decade: 12, probes: 64, seed };
+        let steps = Walk { from: time, to: time / steps_max, per_decade: 12, probes: 128, seed };
         let mut curves = Vec::new();
         for velocity in VELOCITIES {
             for boundaries in BOUNDARIES {
                 let with_size =
                     |dt| Ok(Method::CentralDifference(CentralDifference::uniform(dt, velocity, boundaries)));
                 curves.push(question.curve(variant_name(velocity, boundaries), false, steps, effort, &with_size));
-                tell();
             }
         }
         let tolerances = Walk { from: TOLERANCES[1], to: TOLERANCES[0], per_decade: 4, probes: 8, seed };
         for name in ADAPTIVE.into_iter().filter(|name| name.is_built()) {
             let with_size = |rtol| Method::new(name, &MethodOptions { rtol: Some(rtol), ..MethodOptions::default() });
             curves.push(question.curve(name.to_string(), true, tolerances, effort, &with_size));
-            tell();
         }
         studies.push(StepStudy { scene: name.to_owned(), quantity, flight_time_s: time, curves });
     }
     Ok(studies)
 }
 
-/// Curves of one study.
-pub fn curves_of_a_study() -> usize {
-    VELOCITIES.len() * BOUNDARIES.len() + ADAPTIVE.into_iter().filter(|name| name.is_built()).count()
-}
-
 /// The quantities of [`QUANTITIES`] that `exact` leaves free.
-pub fn questions(scene: &Scene, problem: &Problem, exact: &Flight) -> Vec<Quantity> {
+fn questions(scene: &Scene, problem: &Problem, exact: &Flight) -> Vec<Quantity> {
     let at_rest_at_once = exact.end.time <= 0.0;
     QUANTITIES
         .into_iter()
@@ -333,7 +322,7 @@ mod tests {
     use super::*;
 
     fn walk() -> Walk {
-        Walk { from: 1.0, to: 1e-7, per_decade: 12, probes: 64, seed: 5 }
+        Walk { from: 1.0, to: 1e-7, per_decade: 12, probes: 128, seed: 5 }
     }
 
     #[test]
@@ -357,7 +346,7 @@ mod tests {
         for (level, held) in LEVELS.into_iter().zip(held) {
             let ratio = held.unwrap() / level;
             // No step up to the level can fail; beyond it the share that fails grows with the distance.
-            assert!((1.0 - 2e-3..1.25).contains(&ratio), "{level:e}: {ratio}");
+            assert!((1.0 - 2e-3..1.1).contains(&ratio), "{level:e}: {ratio}");
             let lucky = tried.iter().find(|(_, error)| holds(*error, level)).unwrap().0;
             assert!(lucky > 1.5 * held.unwrap(), "the first lucky step {lucky} proves nothing");
         }
@@ -378,5 +367,50 @@ mod tests {
         assert!(tried.last().unwrap().0 >= 1e-7 && tried.len() > 70, "{}", tried.len());
         assert_eq!(walk().largest(&LEVELS, &mut |_| None).1, [None; 4]);
         assert_eq!(walk().largest(&LEVELS, &mut |_| Some(f64::NAN)).1, [None; 4]);
+    }
+
+    fn study(scene: &str, quantity: Quantity) -> (Problem, Flight, StepStudy) {
+        use crate::physics::scene_file::SHIPPED;
+        let text = SHIPPED.iter().find(|(name, _)| *name == scene).unwrap().1;
+        let scene_read = Scene::from_toml(text, scene).unwrap();
+        let problem = scene_read.problem().unwrap();
+        let exact = Yardstick::of(&problem).unwrap().flight;
+        let studies = of_scene(scene, &scene_read, Effort { samples: 1 }, 3).unwrap();
+        (problem, exact, studies.into_iter().find(|study| study.quantity == quantity).unwrap())
+    }
+
+    fn held_by<'a>(study: &'a StepStudy, method: &str) -> &'a [Held] {
+        &study.curves.iter().find(|curve| curve.method == method).unwrap().held
+    }
+
+    #[test]
+    fn at_rest_in_the_crater_the_largest_step_is_that_of_the_error_constant() {
+        // X(dt)/X - 1 = (w dt)²/8 with rest located, and the envelope of what step ends leave (theory, section 5).
+        let (problem, _, study) = study("crater", Quantity::Depth);
+        let w = (problem.stages[0].stiffness / problem.mass).sqrt();
+        for (boundaries, most) in [("step-end", 1.05), ("interpolated", 1.02), ("landed", 1.02)] {
+            for held in &held_by(&study, &format!("lagged/{boundaries}"))[1..] {
+                let ratio = held.size.unwrap() * w / (8.0 * held.level).sqrt();
+                assert!((0.98..most).contains(&ratio), "{boundaries} at {:e}: {ratio}", held.level);
+            }
+        }
+    }
+
+    #[test]
+    fn with_lagged_drag_the_largest_step_is_that_of_the_error_constant() {
+        // X(dt) - X = -D dt, D = V1 - P (T - t1)/M: the velocity lost to drag (theory, section 5).
+        let (problem, exact, study) = study("tunnel", Quantity::Depth);
+        let start = exact.crater_end().unwrap();
+        let lost = start.velocity - problem.stages[1].static_force * (exact.end.time - start.time) / problem.mass;
+        for boundaries in ["interpolated", "landed"] {
+            for held in &held_by(&study, &format!("lagged/{boundaries}"))[2..] {
+                let ratio = held.size.unwrap() * lost / (held.level * exact.end.depth);
+                assert!((ratio - 1.0).abs() < 0.02, "{boundaries} at {:e}: {ratio}", held.level);
+                // Steps of the flight, and what they cost, are those of that step.
+                let steps = exact.end.time / held.size.unwrap();
+                assert!((held.steps.unwrap() as f64 / steps - 1.0).abs() < 0.02, "{held:?}");
+                assert!(held.force_evaluations.unwrap() >= held.steps.unwrap() && held.time.is_some());
+            }
+        }
     }
 }
