@@ -523,3 +523,67 @@ fn fastest_of(runs: &[Run], level: f64) -> Fastest {
         force_evaluations: best.and_then(|(_, run)| run.force_evaluations),
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use super::*;
+    use crate::integrators::{ClosedForm, Integrator};
+    use crate::physics::scene_file::SHIPPED;
+
+    fn tunnel() -> Case {
+        let text = SHIPPED.iter().find(|(name, _)| *name == "tunnel").unwrap().1;
+        Case::of_scene("tunnel", &Scene::from_toml(text, "tunnel").unwrap()).unwrap()
+    }
+
+    fn run_of(judgements: &[Judgement], setting: Setting, time_ns: f64) -> Run {
+        let mut tally = Tally::new(&tunnel(), "a method", setting);
+        for judgement in judgements {
+            tally.add(judgement.clone(), Some(10));
+        }
+        tally.finish(Timing::of(vec![time_ns]))
+    }
+
+    #[test]
+    fn only_runs_that_are_right_throughout_count_as_fast_however_fast_the_others_are() {
+        let right = Judgement::Right(1e-7, Quantity::Depth);
+        let runs = [
+            run_of(&[right.clone(), Judgement::Wrong("lost".into())], Setting::Tolerance(1e-2), 1.0),
+            run_of(&[right.clone(), Judgement::Undecided], Setting::Tolerance(1e-3), 2.0),
+            run_of(&[Judgement::Failed("no end".into())], Setting::Tolerance(1e-4), 3.0),
+            run_of(&[right.clone(), Judgement::Right(1e-4, Quantity::Time)], Setting::Tolerance(1e-5), 4.0),
+            run_of(&[right.clone(), right], Setting::Tolerance(1e-6), 5.0),
+        ];
+        let states: Vec<_> = runs.iter().map(|run| run.state).collect();
+        let expected = [RunState::Failed, RunState::Undecided, RunState::Failed, RunState::Right, RunState::Right];
+        assert_eq!(states, expected);
+        assert_eq!((runs[0].right, runs[0].failed, runs[0].reason.as_deref()), (1, 1, Some("lost")));
+        // The worst of a run is its error; what is not judged right has none.
+        assert_eq!((runs[3].error, runs[3].quantity), (Some(1e-4), Some(Quantity::Time)));
+        assert_eq!(runs[2].error, None);
+        let times: Vec<_> = fastest(&runs).iter().map(|fastest| fastest.time_ns).collect();
+        assert_eq!(times, [Some(4.0), Some(5.0), None, None]);
+    }
+
+    #[test]
+    fn a_flight_is_judged_by_its_outcome_its_events_and_its_numbers() {
+        let known = &tunnel().problems[0];
+        let right = ClosedForm.fly(&known.problem, Detail::Events).unwrap();
+        assert!(matches!(known.judge(&right, true), Judgement::Right(error, _) if error < 1e-15));
+        let mut off = right.clone();
+        off.end.depth *= 1.0 + 1e-3;
+        // Over the condition number of the depth, a few units.
+        assert!(matches!(known.judge(&off, true), Judgement::Right(error, Quantity::Depth) if error > 1e-4));
+        let perforated = Flight { outcome: Outcome::Perforated, ..right.clone() };
+        assert!(matches!(known.judge(&perforated, true), Judgement::Wrong(_)));
+        let undecided = Flight { outcome: Outcome::Undecided, ..right.clone() };
+        assert_eq!(known.judge(&undecided, true), Judgement::Undecided);
+        let mut silent = right.clone();
+        silent.events.clear();
+        assert!(matches!(known.judge(&silent, true), Judgement::Wrong(_)));
+        assert!(matches!(known.judge(&silent, false), Judgement::Right(..)), "a peer need not list events");
+        let mut lost = right;
+        lost.end.time = f64::NAN;
+        assert!(matches!(known.judge(&lost, true), Judgement::Wrong(_)));
+    }
+}
