@@ -223,7 +223,7 @@ impl Source {
             Self::Parquet(scenes, progress) => {
                 let columns = scenes.next_rows(CHUNK).map_err(|error| refused(&error))?;
                 progress.inc(columns.len() as u64);
-                Ok(Rows::Parquet(columns))
+                Ok(Rows::Parquet(Box::new(columns)))
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;

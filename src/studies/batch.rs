@@ -287,7 +287,7 @@ pub enum Rows {
     Csv(csv::Records),
     /// Columns of a Parquet table.
     #[cfg(feature = "parquet")]
-    Parquet(super::parquet::Columns),
+    Parquet(Box<super::parquet::Columns>),
     /// Random scenes of a seed, by their numbers from 0; the first is a multiple of [`PART`].
     Random {
         /// Seed.

@@ -123,11 +123,9 @@ impl ParquetScenes {
             check_type(file, index, &column)?;
             unsigned[index] = UNSIGNED.contains(&column.converted_type())
                 || matches!(column.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
-            for group in metadata.row_groups() {
-                let compression = group.columns().get(at).map(|chunk| chunk.compression());
-                if let Some(found) = compression
-                    && !matches!(found, Compression::UNCOMPRESSED | Compression::SNAPPY)
-                {
+            for chunk in metadata.row_groups().iter().filter_map(|group| group.columns().get(at)) {
+                let found = chunk.compression();
+                if !matches!(found, Compression::UNCOMPRESSED | Compression::SNAPPY) {
                     let name = format!("{found:?}");
                     let name = name.split('(').next().unwrap_or_default().to_owned();
                     return Err(TableError::Compressed { file: file.to_owned(), name });

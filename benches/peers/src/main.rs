@@ -20,7 +20,8 @@ use penetrode::integrators::diffsol::{Diffsol, Scheme};
 use penetrode::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
 use penetrode::physics::reference::{self, Conditions, Source};
 use penetrode::physics::scene_file::SHIPPED;
-use penetrode::physics::{EventKind, Problem, Scene, State};
+use penetrode::physics::{EventKind, Outcome, Problem, Scene, State};
+use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::random_scenes::Generator;
 
 use leg::{Flown, Leg, LegEnd, chain};
@@ -98,6 +99,9 @@ fn configs() -> Vec<Config> {
 impl Flown {
     fn of(flight: Result<Flight, IntegrationError>) -> Result<Self, String> {
         let flight = flight.map_err(|error| error.to_string())?;
+        if flight.outcome == Outcome::Undecided {
+            return Err("undecided".to_owned());
+        }
         let boundary = |kind: EventKind| matches!(kind, EventKind::CraterEnd | EventKind::StageEnd(_));
         Ok(Self {
             perforated: !flight.outcome.is_stop(),
@@ -141,8 +145,17 @@ struct Known {
 impl Known {
     fn of(scene: &Scene) -> Self {
         let problem = scene.problem().unwrap_or_else(|error| panic!("{error}"));
-        let exact = Flown::of(ClosedForm.fly(&problem, Detail::Events)).unwrap_or_else(|error| panic!("{error}"));
-        let conditions = reference::conditions(Source::Problem(&problem)).unwrap_or_else(|error| panic!("{error}"));
+        // The closed form, or for a stage without one the Taylor series to round-off.
+        let exact = Yardstick::of(&problem).unwrap_or_else(|error| panic!("{error}")).flight;
+        let exact = Flown::of(Ok(exact)).unwrap_or_else(|error| panic!("{error}"));
+        let conditions = reference::conditions(Source::Problem(&problem)).unwrap_or(Conditions {
+            depth: 1.0,
+            time: 1.0,
+            velocity: 1.0,
+            crater_end_time: None,
+            crater_end_velocity: None,
+            exit_margin: None,
+        });
         Self { problem, exact, conditions }
     }
 
@@ -189,9 +202,8 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
-fn measure(known: &[Known]) -> Vec<Measured> {
-    // One scene alone flies many times in a row, so that what a solver keeps is kept.
-    let copies = if known.len() == 1 { 32 } else { 1 };
+/// `copies` of each scene fly in a row, so that what a solver keeps is kept.
+fn measure(known: &[Known], copies: usize) -> Vec<Measured> {
     let problems: Vec<Problem> = known.iter().flat_map(|k| std::iter::repeat_n(k.problem.clone(), copies)).collect();
     let mut measured: Vec<Measured> = Vec::new();
     for config in configs() {
@@ -204,7 +216,7 @@ fn measure(known: &[Known]) -> Vec<Measured> {
         let failed = errors.iter().filter(|error| !error.is_finite()).count() / copies;
         let error = quantile(&errors, if known.len() == 1 { 1.0 } else { SHARE });
         // Nobody times a wrong answer of ours.
-        let is_exact = config.rtol == 0.0;
+        let is_exact = config.rtol == 0.0 && (config.method == Method::Taylor || failed < known.len());
         let worst = quantile(&errors, 1.0);
         assert!(!is_exact || worst <= 1e-12, "{} is off by {worst:e}", config.row);
         measured.push(Measured { config, error, failed, times: Vec::new() });
@@ -242,57 +254,63 @@ fn show(title: &str, measured: &[Measured]) {
             continue;
         }
         seen.push(row);
-        let mut cells = [String::new(), String::new()];
+        let mut lines = [format!("{row:23}"), format!("{:23}", ""), format!("{:23}", "")];
         for level in LEVELS {
-            let (first, second) = match fastest(row, level) {
-                None => ("-".to_owned(), String::new()),
+            let cells = match fastest(row, level) {
+                None => ["-".to_owned(), String::new(), String::new()],
                 Some(one) => {
-                    let spread = quantile(&one.times, 0.75) - quantile(&one.times, 0.25);
+                    let spread = 0.5 * (quantile(&one.times, 0.75) - quantile(&one.times, 0.25)) / one.median();
                     let ratio = fastest(REFERENCE_ROW, level).map_or(f64::NAN, |ours| one.median() / ours.median());
                     let at = match one.config.rtol {
                         0.0 => String::new(),
                         rtol => format!("{} {rtol:.0e}", one.config.method.name()),
                     };
-                    (format!("{:.3}+-{:.3} {ratio:.3}x", one.median() * 1e6, 0.5 * spread * 1e6), at)
+                    let time = format!("{} +-{:.0}%", digits(one.median() * 1e6), 100.0 * spread);
+                    [time, format!("{}x", digits(ratio)), at]
                 }
             };
-            let first = shorten(&first);
-            cells[0] += &format!("{first:>14}");
-            cells[1] += &format!("{second:>14}");
+            for (line, cell) in lines.iter_mut().zip(cells) {
+                *line += &format!("{cell:>14}");
+            }
         }
-        println!("{row:23}{}", cells[0]);
-        if !cells[1].trim().is_empty() {
-            println!("{:23}{}", "", cells[1]);
+        for line in lines.iter().filter(|line| !line.trim().is_empty()) {
+            println!("{}", line.trim_end());
         }
     }
     for row in seen {
         let failed: Vec<String> = measured
             .iter()
             .filter(|one| one.config.row == row && one.failed > 0)
-            .map(|one| format!("{} {:.0e} ({})", one.config.method.name(), one.config.rtol, one.failed))
+            .map(|one| format!("{}@{:.0e}({})", one.config.method.name(), one.config.rtol, one.failed))
             .collect();
         if !failed.is_empty() {
-            println!("failed, {row}: {}", failed.join(", "));
+            println!("no outcome, or a wrong one: {row}\n{}", wrapped(&failed));
         }
     }
 }
 
-/// `12.345+-0.100 29.395x` in thirteen characters at most.
-fn shorten(text: &str) -> String {
-    let Some((time, ratio)) = text.split_once(' ') else { return text.to_owned() };
-    let Some((median, spread)) = time.split_once("+-") else { return text.to_owned() };
-    let number = |text: &str| -> String {
-        let value: f64 = text.trim_end_matches('x').parse().unwrap_or(f64::NAN);
-        match value {
-            v if v >= 100.0 => format!("{v:.0}"),
-            v if v >= 10.0 => format!("{v:.1}"),
-            v if v >= 1.0 => format!("{v:.2}"),
-            v => format!("{v:.2}").trim_start_matches('0').to_owned(),
+/// Items in lines of eighty columns.
+fn wrapped(items: &[String]) -> String {
+    let mut lines = vec![String::from(" ")];
+    for item in items {
+        match lines.last_mut() {
+            Some(line) if line.len() + item.len() + 2 <= 80 => *line += &format!(" {item}"),
+            _ => lines.push(format!("  {item}")),
         }
+    }
+    lines.join("\n")
+}
+
+/// Three digits.
+fn digits(value: f64) -> String {
+    let decimals = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
     };
-    let (median_value, spread_value): (f64, f64) =
-        (median.parse().unwrap_or(f64::NAN), spread.parse().unwrap_or(f64::NAN));
-    format!("{}~{:.0}% {}x", number(median), 100.0 * spread_value / median_value, number(ratio))
+    format!("{value:.decimals$}")
 }
 
 fn shipped(name: &str) -> Scene {
@@ -323,17 +341,19 @@ fn main() {
     let wanted: Vec<String> = arguments.into_iter().filter(|argument| !argument.starts_with("--")).collect();
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|w| w == name);
     println!(
-        "median of {ROUNDS} rounds ~ half the spread of their middle half, over taylor;\n\
-         below it method and tolerance; - : the error is not reached at any tolerance"
+        "Median of {ROUNDS} rounds and half the spread of their middle half; over the time of\n\
+         penetrode's taylor; method and tolerance. - : the error is not reached."
     );
     for name in ["tunnel", "perforate", "crater", "graze", "stiff"] {
         if is_wanted(name) {
-            show(name, &measure(&[Known::of(&shipped(name))]));
+            // An explicit method takes a millisecond there.
+            let copies = if name == "stiff" { 2 } else { 32 };
+            show(name, &measure(&[Known::of(&shipped(name))], copies));
         }
     }
     if is_wanted("varied") {
         let mut generator = Generator::new(1, "bench");
         let known: Vec<Known> = (0..1000).map(|_| Known::of(&generator.next_scene())).collect();
-        show("varied: 1000 scenes, error that 99 % of them keep; in brackets wrong outcomes", &measure(&known));
+        show("varied: 1000 scenes, an error that 99 % of them keep; in brackets: scenes", &measure(&known, 1));
     }
 }
