@@ -9,9 +9,10 @@
 
 use std::hint::black_box;
 
+use gungraun::Callgrind;
 use gungraun::prelude::*;
 use penetrode::integrators::batch::{Batch, Summary};
-use penetrode::integrators::{Detail, Flight, IntegrationError, Method, MethodName, MethodOptions, Taylor};
+use penetrode::integrators::{Detail, Flight, IntegrationError, Method, MethodName, MethodOptions};
 use penetrode::physics::scene_file::SHIPPED;
 use penetrode::physics::{Problem, Scene};
 use penetrode::studies::convergence::Yardstick;
@@ -106,7 +107,7 @@ fn varied() -> Vec<Problem> {
     (0..1000).filter_map(|_| generator.next_scene().problem().ok()).collect()
 }
 
-/// A thousand scenes each: a thousandth is a scene's.
+// A thousand scenes each: a thousandth is a scene's.
 #[library_benchmark]
 #[bench::tunnel_1000(setup_batch(vec![problem("tunnel"); 1000]))]
 #[bench::perforate_1000(setup_batch(vec![problem("perforate"); 1000]))]
@@ -179,7 +180,7 @@ fn with_sensitivities() -> Request {
 const EXPLICIT: MethodName = if cfg!(feature = "diffsol") { MethodName::Tsit45 } else { MethodName::Energy };
 const IMPLICIT: MethodName = if cfg!(feature = "diffsol") { MethodName::Bdf } else { MethodName::Energy };
 
-/// Each saving made, by the name that `--explain` gives it.
+// Each saving made, by the name that `--explain` gives it.
 #[library_benchmark]
 #[bench::stage_not_built(taylor(problem("crater")))]
 #[bench::exit_not_sought(taylor(problem("tunnel")))]
@@ -192,7 +193,7 @@ fn with_saving(request: Request) -> Vec<Result<Flight, IntegrationError>> {
     black_box(black_box(request).fly())
 }
 
-/// The same requests without it.
+// The same requests without it.
 #[library_benchmark]
 #[bench::stage_not_built(with_second_stage())]
 #[bench::exit_not_sought(taylor(with_exit()))]

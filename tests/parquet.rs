@@ -75,9 +75,14 @@ fn csv_columns(path: &Path) -> BTreeMap<String, Vec<Cell>> {
 const NEEDED: [&str; 6] = ["mass_kg", "diameter_m", "nose_factor", "strength_pa", "density_kg_m3", "velocity_m_s"];
 const GOOD: [f64; 6] = [2.0, 0.05, 0.72, 36e6, 2300.0, 300.0];
 
-/// Columns of numbers as a Parquet table; `NaN` in `nulls` stands for null.
+/// Columns of numbers in the language of schemas.
+fn optional_doubles(names: &[&str]) -> String {
+    names.iter().map(|name| format!("optional double {name};")).collect::<Vec<_>>().join(" ")
+}
+
+/// Columns of numbers as a Parquet table.
 fn write_numbers(path: &Path, names: &[&str], rows: &[Vec<Option<f64>>], compression: Compression) {
-    let fields: String = names.iter().map(|name| format!("optional double {name}; ")).collect();
+    let fields = optional_doubles(names);
     let schema = Arc::new(parse_message_type(&format!("message scenes {{ {fields} }}")).unwrap());
     let properties = Arc::new(WriterProperties::builder().set_compression(compression).build());
     let mut writer = SerializedFileWriter::new(File::create(path).unwrap(), schema, properties).unwrap();
@@ -223,7 +228,7 @@ fn a_table_that_cannot_be_used_is_refused_and_writes_nothing() {
         ("optional double mass_kg; optional double criterion;", "the column `criterion` holds DOUBLE, not text"),
         ("optional group mass_kg { optional double kg; }", "there is no column `mass_kg.kg`"),
     ] {
-        let others: String = NEEDED[1..].iter().map(|name| format!("optional double {name}; ")).collect();
+        let others = optional_doubles(&NEEDED[1..]);
         let schema = Arc::new(parse_message_type(&format!("message s {{ {column} {others} }}")).unwrap());
         let writer = SerializedFileWriter::new(File::create(&scenes).unwrap(), schema, Arc::default()).unwrap();
         writer.close().unwrap();
