@@ -1,5 +1,6 @@
 //! Records what a report must name: compiler, commit and whether the tree was clean.
 
+use std::path::Path;
 use std::process::Command;
 
 fn main() {
@@ -21,7 +22,11 @@ fn main() {
     set("PENETRODE_PROFILE", std::env::var("PROFILE").ok());
     // A source package has no repository: the version then has to do.
     set("PENETRODE_COMMIT", run("git", &["rev-parse", "--short=12", "HEAD"]));
-    println!("cargo:rerun-if-changed=.git/HEAD");
-    println!("cargo:rerun-if-changed=.git/refs/heads");
+    // A path that is not there would build the crate anew each time; in a worktree or a source package it is not `.git`.
+    for path in ["HEAD", "logs/HEAD"] {
+        if let Some(path) = run("git", &["rev-parse", "--git-path", path]).filter(|path| Path::new(path).exists()) {
+            println!("cargo:rerun-if-changed={path}");
+        }
+    }
     println!("cargo:rerun-if-changed=build.rs");
 }

@@ -1,21 +1,24 @@
-//! Time of a flight by every method, of a critical velocity, and of the closed form, each with its answer asserted first.
+//! Time of a flight by every method, in lanes, of a critical velocity and of the closed form, each with its answer
+//! asserted first.
 //!
-//! `cargo bench` runs them; ids are `method/scene`. Besides the shipped scenes, 1,000 varied scenes from a seed: one
-//! scene repeated flatters small solvers, whose branches the processor then knows.
+//! `cargo bench --bench flights` runs them; ids are `method/scene`. Besides the shipped scenes, 1,000 varied scenes from a
+//! seed: one scene repeated flatters small solvers, whose branches the processor then knows. No accuracy is given up for
+//! speed: the same run reports the worst error over the varied scenes against 50 digits.
 
 #![expect(clippy::panic, reason = "a bench that cannot be set up stops")]
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use penetrode::integrators::{ClosedForm, Detail, Integrator, Method, MethodName, MethodOptions, Taylor};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use penetrode::integrators::batch::Batch;
+use penetrode::integrators::{Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor, keeping};
 use penetrode::physics::scene_file::SHIPPED;
-use penetrode::physics::{Problem, Scene};
+use penetrode::physics::{Outcome, Problem, Scene};
 use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::critical_velocity;
 use penetrode::studies::error::{flight_error, is_fixed};
 use penetrode::studies::quantity::Quantity;
-use penetrode::studies::random_scenes::Generator;
+use penetrode::studies::random_scenes::{Generator, errors_of};
 
 /// The scenes of the comparison with other solvers.
 const SCENES: [&str; 4] = ["crater", "tunnel", "perforate", "graze"];
@@ -65,29 +68,102 @@ fn flights(criterion: &mut Criterion) {
     }
 }
 
-fn varied(criterion: &mut Criterion) {
+/// The varied scenes.
+fn varied_scenes() -> Vec<Scene> {
     let mut generator = Generator::new(1, "bench");
-    let problems: Vec<Problem> = (0..1000).filter_map(|_| generator.next_scene().problem().ok()).collect();
+    (0..1000).map(|_| generator.next_scene()).collect()
+}
+
+/// Worst error of `flights` of `scenes` over max(1, condition number), against 50 digits, reported and held to `limit`.
+fn assert_varied(name: &str, scenes: &[Scene], flights: impl IntoIterator<Item = Flight>, limit: f64) {
+    let (mut worst, mut at, mut undecided) = (0.0, Quantity::Depth, 0);
+    for (scene, flight) in scenes.iter().zip(flights) {
+        undecided += u32::from(flight.outcome == Outcome::Undecided);
+        let speed = scene.velocity.unwrap_or_else(|| panic!("a scene without a velocity"));
+        let errors = errors_of(scene, speed, &flight).unwrap_or_else(|e| panic!("{name}: {e}"));
+        for (ulps, quantity) in errors.0 {
+            let error = ulps * f64::EPSILON;
+            assert!(error <= limit, "{name}: {} is off by {error:e}", quantity.name());
+            if error > worst {
+                (worst, at) = (error, quantity);
+            }
+        }
+    }
+    println!(
+        "{name}/varied-1000: worst error {worst:.2e} ({}), {undecided} undecided, against 50 digits, over max(1, \
+         condition number)",
+        at.name()
+    );
+}
+
+fn varied(criterion: &mut Criterion) {
+    let scenes = varied_scenes();
+    let problems: Vec<Problem> = scenes.iter().filter_map(|scene| scene.problem().ok()).collect();
     assert_eq!(problems.len(), 1000);
-    for (name, method) in [("taylor", &Taylor::default() as &dyn Integrator), ("closed-form", &ClosedForm)] {
-        criterion.bench_function(&format!("{name}/varied-1000"), |bencher| {
-            bencher.iter(|| problems.iter().filter(|p| black_box(method.fly(p, Detail::Events)).is_ok()).count());
+    let mut group = criterion.benchmark_group("varied-1000");
+    group.throughput(Throughput::Elements(1000));
+    for name in MethodName::ALL.into_iter().filter(|m| m.is_built() && *m != MethodName::CentralDifference) {
+        let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let limit = match name {
+            MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm => 1e-12,
+            _ => 1e-6,
+        };
+        keeping(method.integrator(), |integrator| {
+            let fly = |p| integrator.fly(p, Detail::Events).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_varied(name.name(), &scenes, problems.iter().map(fly), limit);
+            group.bench_function(name.name(), |bencher| {
+                bencher
+                    .iter(|| problems.iter().filter(|p| black_box(integrator.fly(p, Detail::Events)).is_ok()).count());
+            });
         });
     }
+    group.finish();
+}
+
+fn batch(criterion: &mut Criterion) {
+    let scenes = varied_scenes();
+    let varied: Vec<Problem> = scenes.iter().filter_map(|scene| scene.problem().ok()).collect();
+    let fly = |problems: &[Problem]| Batch::new().fly(problems);
+    let flights = fly(&varied).into_iter().map(|flight| flight.unwrap_or_else(|e| panic!("{e}")).flight());
+    assert_varied("batch", &scenes, flights, 1e-12);
+    let mut group = criterion.benchmark_group("batch");
+    group.throughput(Throughput::Elements(1000));
+    for name in SCENES {
+        let problems = vec![problem(name); 1000];
+        let scalar = Taylor::default().fly(&problems[0], Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+        for lane in fly(&problems) {
+            let lane = lane.unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(lane.outcome, scalar.outcome);
+            assert!((lane.end.depth / scalar.end.depth - 1.0).abs() < 1e-14, "{name}: {lane:?}");
+        }
+        group.bench_function(name, |bencher| bencher.iter(|| fly(black_box(&problems))));
+    }
+    group.bench_function("varied-1000", |bencher| bencher.iter(|| fly(black_box(&varied))));
+    group.finish();
 }
 
 fn critical(criterion: &mut Criterion) {
-    let scene = scene("paper-slab");
-    let exact = critical_velocity::exact(&scene).unwrap_or_else(|e| panic!("{e}"));
+    let mut group = criterion.benchmark_group("critical");
+    // So that it prints critical velocities per second.
+    group.throughput(Throughput::Elements(1));
+    let slab = scene("paper-slab");
+    let thick: Vec<Scene> = varied_scenes().into_iter().filter(|scene| scene.thickness.is_some()).collect();
     for name in [MethodName::Taylor, MethodName::Energy, MethodName::ClosedForm] {
         let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-        let found = critical_velocity::of_scene(&scene, method.integrator()).unwrap_or_else(|e| panic!("{e}"));
-        assert!((found.velocity / exact - 1.0).abs() <= 1e-13, "{name}: {}", found.velocity);
-        criterion.bench_function(&format!("critical/{name}"), |bencher| {
-            bencher.iter(|| critical_velocity::of_scene(black_box(&scene), method.integrator()));
-        });
+        let find = |scene: &Scene| {
+            critical_velocity::of_scene(scene, method.integrator()).unwrap_or_else(|e| panic!("{e}")).velocity
+        };
+        for scene in thick.iter().chain([&slab]) {
+            let exact = critical_velocity::exact(scene).unwrap_or_else(|e| panic!("{e}"));
+            let found = find(scene);
+            assert!((found - exact).abs() <= 1e-13 * exact, "{name}: {found} and not {exact}");
+        }
+        group.bench_function(format!("{name}/paper-slab"), |bencher| bencher.iter(|| find(black_box(&slab))));
+        let mut next = thick.iter().cycle();
+        group.bench_function(format!("{name}/varied"), |bencher| bencher.iter(|| next.next().map(find)));
     }
+    group.finish();
 }
 
-criterion_group!(benches, flights, varied, critical);
+criterion_group!(benches, flights, varied, batch, critical);
 criterion_main!(benches);

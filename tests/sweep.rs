@@ -150,7 +150,10 @@ fn requests_that_cannot_be_served_exit_2_and_write_nothing() {
         assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}");
         assert!(err.contains(words), "{arguments:?}: {err}");
     }
-    assert_eq!(run(&["sweep", SLAB, "--vary", "H/d=1:2:3", "--out", &parquet]).0, 2);
+    if !cfg!(feature = "parquet") {
+        let (code, _, err) = run(&["sweep", SLAB, "--vary", "H/d=1:2:3", "--out", &parquet]);
+        assert!(code == 2 && err.contains("build with `--features parquet`"), "{err}");
+    }
     assert_eq!(run(&["sweep", SLAB]).0, 2);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

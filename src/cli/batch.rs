@@ -7,13 +7,25 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
+use tempfile::NamedTempFile;
 
 use super::method_args::MethodArgs;
-use super::output::{persist, temporary_beside};
+#[cfg(feature = "parquet")]
+use super::output::is_parquet;
+use super::output::{check_format, persist, temporary_beside};
 use super::{CliError, Exit};
 use crate::integrators::Method;
 use crate::studies::batch::csv::{CsvScenes, Records};
-use crate::studies::batch::{PART, RESULT_HEADER, Rows, TableError, Tally, answers, result_lines};
+use crate::studies::batch::{PART, Rows, TableError, Tally, answers, result_header, result_lines};
+#[cfg(feature = "parquet")]
+use crate::studies::{
+    batch::{RESULT_COLUMNS, result_columns},
+    columns::Cells,
+    parquet::{ParquetScenes, ParquetTable},
+};
+
+/// Progress over a known number of rows.
+const ROWS_BAR: &str = "{bar:30} {human_pos}/{human_len} rows, {eta} left";
 
 /// Rows read, flown and written at a time: three such chunks are the bound of the memory.
 const CHUNK: usize = 16 * PART;
@@ -21,9 +33,9 @@ const CHUNK: usize = 16 * PART;
 /// Arguments of `batch`.
 #[derive(Args, Debug)]
 pub struct BatchArgs {
-    /// Scenes: a CSV table, - for standard input, or random:N[:SEED] for N random scenes.
+    /// Scenes: a .csv or .parquet table, - for standard input (CSV), or random:N[:SEED] for N random scenes.
     pub scenes: PathBuf,
-    /// Results: a CSV table, written whole or not at all; - for standard output.
+    /// Results: a .csv or .parquet table, written whole or not at all; - for standard output (CSV).
     #[arg(long, value_name = "RESULTS.csv")]
     pub out: PathBuf,
     /// Method and its options.
@@ -46,8 +58,8 @@ impl BatchArgs {
         if is_same_file(&self.scenes, &self.out) {
             return Err(CliError::usage("the results would replace the scenes", "give --out another name"));
         }
-        refuse_parquet(&self.scenes)?;
-        refuse_parquet(&self.out)?;
+        check_format(&self.scenes)?;
+        check_format(&self.out)?;
         let method = self.method.build()?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
@@ -66,23 +78,23 @@ impl BatchArgs {
     /// Flies one chunk while the one before is written and the next is read.
     fn fly_all(&self, source: &mut Source, sink: &mut Sink, method: &Method) -> Result<Tally, CliError> {
         let mut tally = Tally::default();
+        let format = sink.format();
         let mut rows = source.next_rows(None)?;
         let mut flown = Flown::default();
         let mut used = None;
         // Ends with the table: each turn reads rows, or is the last but one.
-        while !rows.is_empty() || !flown.parts.is_empty() {
-            let first = tally.rows + flown.rows() + 1;
+        while !rows.is_empty() || !flown.results.is_empty() {
+            let first = tally.rows + flown.tally.rows + 1;
+            let results = std::mem::take(&mut flown.results);
             let (next_flown, moved) = rayon::join(
-                || Flown::new(&rows, first, method, self.critical),
+                || Flown::new(&rows, first, method, self.critical, format),
                 || -> Result<_, CliError> {
-                    sink.write(&flown).map_err(|cause| self.unwritable(cause))?;
+                    sink.write(results).map_err(|cause| self.unwritable(cause))?;
                     // After the last row nothing is left to read.
                     if rows.is_empty() { Ok(None) } else { source.next_rows(used.take()).map(Some) }
                 },
             );
-            for part in &flown.parts {
-                tally += part.tally;
-            }
+            tally += flown.tally;
             flown = next_flown;
             let read = moved?.unwrap_or(Rows::Random { seed: 0, rows: 0..0 });
             used = Some(std::mem::replace(&mut rows, read));
@@ -103,43 +115,67 @@ fn summary(tally: &Tally) -> String {
     text
 }
 
-/// Results of a chunk.
-#[derive(Default)]
-struct Flown {
-    parts: Vec<Part>,
+/// How results are written.
+#[derive(Clone, Copy)]
+enum Format {
+    Csv,
+    #[cfg(feature = "parquet")]
+    Parquet,
 }
 
 /// Results of some rows.
-struct Part {
+enum Results {
+    Lines(String),
+    #[cfg(feature = "parquet")]
+    Columns(Vec<Cells>),
+}
+
+/// Results of a chunk, part by part.
+#[derive(Default)]
+struct Flown {
     tally: Tally,
-    lines: String,
+    results: Vec<Results>,
 }
 
 impl Flown {
-    fn new(rows: &Rows, first: u64, method: &Method, critical: bool) -> Self {
+    fn new(rows: &Rows, first: u64, method: &Method, critical: bool, format: Format) -> Self {
         let count = rows.len();
-        let parts = (0..count.div_ceil(PART))
+        let parts: Vec<(Tally, Results)> = (0..count.div_ceil(PART))
             .into_par_iter()
             .map(|index| {
                 let from = index * PART;
                 let answers = answers(rows.scenes(from..count.min(from + PART)), method, critical);
                 let mut tally = Tally::default();
                 tally.count(&answers);
-                Part { tally, lines: result_lines(first + from as u64, &answers) }
+                let first = first + from as u64;
+                let results = match format {
+                    Format::Csv => Results::Lines(result_lines(first, &answers)),
+                    #[cfg(feature = "parquet")]
+                    Format::Parquet => Results::Columns(result_columns(first, &answers)),
+                };
+                (tally, results)
             })
             .collect();
-        Self { parts }
-    }
-
-    fn rows(&self) -> u64 {
-        self.parts.iter().map(|part| part.tally.rows).sum()
+        let mut flown = Self::default();
+        for (tally, results) in parts {
+            flown.tally += tally;
+            flown.results.push(results);
+        }
+        flown
     }
 }
 
 /// Where the scenes come from.
 enum Source {
     Csv(CsvScenes<Box<dyn Read + Send>>),
-    Random { seed: u64, next: u64, end: u64, progress: ProgressBar },
+    #[cfg(feature = "parquet")]
+    Parquet(Box<ParquetScenes>, ProgressBar),
+    Random {
+        seed: u64,
+        next: u64,
+        end: u64,
+        progress: ProgressBar,
+    },
 }
 
 impl Source {
@@ -147,7 +183,7 @@ impl Source {
         let name = path.display().to_string();
         let unreadable = |cause: String| refused(&TableError::Unreadable { file: name.clone(), cause });
         if let Some((count, seed)) = random_table(path)? {
-            bar(progress, count, "{bar:30} {human_pos}/{human_len} rows, {eta} left");
+            bar(progress, count, ROWS_BAR);
             return Ok(Self::Random { seed, next: 0, end: count, progress: progress.clone() });
         }
         if path.as_os_str() == "-" {
@@ -159,6 +195,12 @@ impl Source {
             return Err(unreadable("is a folder".to_owned()));
         }
         let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
+        #[cfg(feature = "parquet")]
+        if is_parquet(path) {
+            let scenes = ParquetScenes::new(&name, file).map_err(|error| refused(&error))?;
+            bar(progress, scenes.rows(), ROWS_BAR);
+            return Ok(Self::Parquet(Box::new(scenes), progress.clone()));
+        }
         // A pipe or a device has no length.
         if metadata.len() > 0 {
             bar(progress, metadata.len(), "{bar:30} {bytes}/{total_bytes}, {eta} left");
@@ -176,6 +218,12 @@ impl Source {
                     _ => None,
                 };
                 scenes.next_rows(CHUNK, used).map(Rows::Csv).map_err(|error| refused(&error))
+            }
+            #[cfg(feature = "parquet")]
+            Self::Parquet(scenes, progress) => {
+                let columns = scenes.next_rows(CHUNK).map_err(|error| refused(&error))?;
+                progress.inc(columns.len() as u64);
+                Ok(Rows::Parquet(Box::new(columns)))
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;
@@ -202,37 +250,54 @@ fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
 
 /// Where the results go.
 enum Sink {
-    File(BufWriter<tempfile::NamedTempFile>),
+    File(BufWriter<NamedTempFile>),
     Standard(BufWriter<io::Stdout>),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<ParquetTable<NamedTempFile>>),
 }
 
 impl Sink {
     fn create(path: &Path) -> io::Result<Self> {
+        #[cfg(feature = "parquet")]
+        if is_parquet(path) {
+            let table = ParquetTable::new(temporary_beside(path)?, &RESULT_COLUMNS)?;
+            return Ok(Self::Parquet(Box::new(table)));
+        }
         let mut sink = if path.as_os_str() == "-" {
             Self::Standard(BufWriter::with_capacity(1 << 20, io::stdout()))
         } else {
             let file = temporary_beside(path)?;
             Self::File(BufWriter::with_capacity(1 << 20, file))
         };
-        sink.text(&format!("{RESULT_HEADER}\n"))?;
+        sink.write(vec![Results::Lines(result_header())])?;
         Ok(sink)
     }
 
-    fn text(&mut self, text: &str) -> io::Result<()> {
+    fn format(&self) -> Format {
         match self {
-            Self::File(writer) => writer.write_all(text.as_bytes()),
-            Self::Standard(writer) => writer.write_all(text.as_bytes()),
+            Self::File(_) | Self::Standard(_) => Format::Csv,
+            #[cfg(feature = "parquet")]
+            Self::Parquet(_) => Format::Parquet,
         }
     }
 
-    fn write(&mut self, flown: &Flown) -> io::Result<()> {
-        flown.parts.iter().try_for_each(|part| self.text(&part.lines))
+    fn write(&mut self, results: Vec<Results>) -> io::Result<()> {
+        results.into_iter().try_for_each(|part| match (&mut *self, part) {
+            (Self::File(writer), Results::Lines(lines)) => writer.write_all(lines.as_bytes()),
+            (Self::Standard(writer), Results::Lines(lines)) => writer.write_all(lines.as_bytes()),
+            #[cfg(feature = "parquet")]
+            (Self::Parquet(table), Results::Columns(columns)) => table.push(columns),
+            #[cfg(feature = "parquet")]
+            _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "results of another format")),
+        })
     }
 
     fn finish(self, path: &Path) -> io::Result<()> {
         match self {
             Self::File(writer) => persist(writer.into_inner().map_err(io::IntoInnerError::into_error)?, path),
             Self::Standard(mut writer) => writer.flush(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(table) => persist(table.finish()?, path),
         }
     }
 }
@@ -240,16 +305,6 @@ impl Sink {
 /// A table that cannot be used, as exit code 2.
 fn refused(error: &TableError) -> CliError {
     CliError::usage(error.to_string(), error.help())
-}
-
-fn refuse_parquet(path: &Path) -> Result<(), CliError> {
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
-        return Err(CliError::usage(
-            format!("{}: this version reads and writes CSV only", path.display()),
-            "give a .csv file",
-        ));
-    }
-    Ok(())
 }
 
 /// Whether both paths are one file.

@@ -6,6 +6,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::CliError;
+
 /// Prints `value` as pretty JSON on standard output.
 ///
 /// # Errors
@@ -66,6 +68,25 @@ pub fn persist(file: tempfile::NamedTempFile, path: &Path) -> io::Result<()> {
         fs::set_permissions(file.path(), fs::Permissions::from_mode(mode))?;
     }
     file.persist(path).map(|_| ()).map_err(|e| e.error)
+}
+
+/// Whether the table at `path` is a Parquet table, by its name.
+pub fn is_parquet(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"))
+}
+
+/// Refuses a Parquet table in a build that does without them (exit 2).
+///
+/// # Errors
+/// As said.
+pub fn check_format(path: &Path) -> Result<(), CliError> {
+    if cfg!(feature = "parquet") || !is_parquet(path) {
+        return Ok(());
+    }
+    Err(CliError::usage(
+        format!("{}: this build reads and writes CSV only", path.display()),
+        "build with `--features parquet`, or name a .csv file",
+    ))
 }
 
 /// `value` with an SI prefix and six significant digits: `144.826 mm`, `8.48230 MN`.

@@ -7,12 +7,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{print_json, print_text, significant, table, write_whole};
+use super::output::{check_format, print_json, print_text, significant, table, write_whole};
 use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Method;
 use crate::physics::{Criterion, Outcome};
 use crate::report::plots_sweep;
+use crate::studies::columns::Cells;
 use crate::studies::sweep::{Axis, Plan, Row, SweepError, explanation, read_points};
 
 /// Rows of the table for people; all rows are in the CSV and the JSON.
@@ -38,7 +39,7 @@ pub struct SweepArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write the table to this CSV file and the figures beside it.
+    /// Write the table to this file (.csv or .parquet) and the figures beside it.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
     /// Print JSON.
@@ -162,7 +163,7 @@ impl SweepArgs {
     /// A scene, axes, data or options that cannot be used (exit 2), a file that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         if let Some(path) = &self.out {
-            refuse_parquet(path)?;
+            check_format(path)?;
         }
         let scene = read_scene(&self.scene)?;
         let axes: Vec<Axis> = self.vary.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
@@ -316,14 +317,6 @@ pub(super) fn wrapped(text: &str, width: usize) -> String {
     lines.join("\n")
 }
 
-/// Refuses a table that this program cannot write.
-fn refuse_parquet(path: &Path) -> Result<(), CliError> {
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
-        return Err(CliError::usage(format!("{}: this build writes CSV only", path.display()), "name a .csv file"));
-    }
-    Ok(())
-}
-
 /// The curves at the measured points, computed there and not interpolated.
 fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<DataJson>, CliError> {
     let mut data = Vec::with_capacity(points.len());
@@ -371,11 +364,16 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
     } else {
         vec![plots_sweep::critical_velocity(plan, rows)]
     };
-    let csv = csv_of(plan, rows).map_err(|cause| CliError::Write { path: path.display().to_string(), cause })?;
+    let columns = columns_of(plan, rows);
+    #[cfg(feature = "parquet")]
+    let bytes = if super::output::is_parquet(path) { parquet_of(columns) } else { csv_of(&columns) };
+    #[cfg(not(feature = "parquet"))]
+    let bytes = csv_of(&columns);
+    let bytes = bytes.map_err(|cause| CliError::Write { path: path.display().to_string(), cause })?;
     let write = |path: &Path, bytes: &[u8]| {
         write_whole(path, bytes).map_err(|cause| CliError::Write { path: path.display().to_string(), cause })
     };
-    write(path, &csv)?;
+    write(path, &bytes)?;
     for (figure_path, figure) in figure_paths(path, plan).iter().zip(figures) {
         match figure {
             Ok(svg) => write(figure_path, svg.as_bytes())?,
@@ -387,50 +385,52 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
 }
 
 /// The table: the columns of the contract, then those that it allows to add.
-fn csv_of(plan: &Plan, rows: &[Row]) -> std::io::Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut header: Vec<String> = plan.axes().iter().map(|axis| axis.parameter.to_string()).collect();
-    header.extend(
+fn columns_of(plan: &Plan, rows: &[Row]) -> Vec<(String, Cells)> {
+    type Number = fn(&Row) -> Option<f64>;
+    let numbers = |number: Number| Cells::Numbers(rows.iter().map(number).collect());
+    let mut columns: Vec<(String, Cells)> = Vec::new();
+    for (index, axis) in plan.axes().iter().enumerate() {
+        let values = rows.iter().map(|row| row.values.get(index).copied()).collect();
+        columns.push((axis.parameter.to_string(), Cells::Numbers(values)));
+    }
+    let outcomes = rows.iter().map(|row| row.flight.map(|f| f.outcome.name().into())).collect();
+    let errors = rows.iter().map(|row| (!row.error.is_empty()).then(|| row.error.clone().into())).collect();
+    columns.extend(
         [
-            "outcome",
-            "depth_m",
-            "velocity_m_s",
-            "critical_velocity_m_s",
-            "critical_energy_j",
-            "dimensionless_energy",
-            "eq15_printed",
-            "eq15_unrounded",
-            "error",
-            "difference_printed",
-            "difference_unrounded",
-            "energy_full_depth",
-            "energy_ndrc",
+            ("outcome", Cells::Texts(outcomes)),
+            ("depth_m", numbers(|row| row.flight.map(|f| f.depth))),
+            ("velocity_m_s", numbers(|row| row.flight.map(|f| f.velocity))),
+            ("critical_velocity_m_s", numbers(|row| row.critical_velocity)),
+            ("critical_energy_j", numbers(|row| row.critical_energy)),
+            ("dimensionless_energy", numbers(|row| row.dimensionless_energy)),
+            ("eq15_printed", numbers(|row| row.eq15_printed)),
+            ("eq15_unrounded", numbers(|row| row.eq15_unrounded)),
+            ("error", Cells::Texts(errors)),
+            ("difference_printed", numbers(Row::difference_printed)),
+            ("difference_unrounded", numbers(Row::difference_unrounded)),
+            ("energy_full_depth", numbers(|row| row.energy_full_depth)),
+            ("energy_ndrc", numbers(|row| row.energy_ndrc)),
         ]
-        .map(str::to_owned),
+        .map(|(name, cells)| (name.to_owned(), cells)),
     );
-    writer.write_record(&header)?;
-    // `Display` of f64 is the shortest text that reads back to the same number.
-    let text = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-    for row in rows {
-        let mut cells: Vec<String> = row.values.iter().map(ToString::to_string).collect();
-        cells.push(row.flight.map_or("", |f| f.outcome.name()).to_owned());
-        cells.extend([
-            text(row.flight.map(|f| f.depth)),
-            text(row.flight.map(|f| f.velocity)),
-            text(row.critical_velocity),
-            text(row.critical_energy),
-            text(row.dimensionless_energy),
-            text(row.eq15_printed),
-            text(row.eq15_unrounded),
-            row.error.clone(),
-            text(row.difference_printed()),
-            text(row.difference_unrounded()),
-            text(row.energy_full_depth),
-            text(row.energy_ndrc),
-        ]);
-        writer.write_record(&cells)?;
+    columns
+}
+
+fn csv_of(columns: &[(String, Cells)]) -> std::io::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(columns.iter().map(|(name, _)| name))?;
+    for row in 0..columns.first().map_or(0, |(_, cells)| cells.len()) {
+        writer.write_record(columns.iter().map(|(_, cells)| cells.text(row).into_owned()))?;
     }
     writer.into_inner().map_err(csv::IntoInnerError::into_error)
+}
+
+#[cfg(feature = "parquet")]
+fn parquet_of(columns: Vec<(String, Cells)>) -> std::io::Result<Vec<u8>> {
+    let kinds: Vec<_> = columns.iter().map(|(name, cells)| (name.as_str(), cells.kind())).collect();
+    let mut table = crate::studies::parquet::ParquetTable::new(Vec::new(), &kinds)?;
+    table.push(columns.into_iter().map(|(_, cells)| cells).collect())?;
+    table.finish()
 }
 
 /// What a reader of standard error should know: bad and undecided rows, and H/d beyond the relation.

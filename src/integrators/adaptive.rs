@@ -16,7 +16,7 @@
 //! Z counts the relaxation times left in the stage once the transient is over, at the least: the drive fades and the
 //! projectile slows. An explicit method of order 5 takes one step of six evaluations for every three of them.
 
-use super::diffsol::{FlyOne, MAX_STEPS, Scheme, check_rtol, fly, with_legs};
+use super::diffsol::{FlyOne, Kept, MAX_STEPS, Scheme, check_rtol, fly, with_legs};
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use crate::physics::{Problem, Stage};
 
@@ -132,6 +132,11 @@ impl Integrator for Adaptive {
 
     fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
         self.study(|fly_one| fly_one(problem, detail))?
+    }
+
+    fn keep(&self, work: &mut dyn FnMut(&dyn Integrator)) {
+        // A method that cannot start says why in each of its flights.
+        let _ = self.study(|fly_one| work(&Kept::new(self, fly_one)));
     }
 }
 

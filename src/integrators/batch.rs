@@ -226,8 +226,12 @@ impl Batch {
         match self.instructions {
             Instructions::Baseline => fly_block(block),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Instructions::Avx512` gets into a `Batch` only by `detect` or `with_instructions`, and both ask
-            // the processor for every feature that the function is compiled with.
+            // SAFETY: the one thing that a function with `target_feature` asks for is a processor that has its features.
+            // The field is private to this file, and here only `new` and `with_instructions` set it: `new` to what
+            // `detect` found, `with_instructions` to what `is_available` allows; both ask the processor for every
+            // feature that the function names, and no processor loses one. The argument is a reference and the
+            // function returns nothing, so no vector crosses a border between calling conventions. The function
+            // itself is safe code. CONTRIBUTING.md, "Tests", has the command that runs it under a sanitizer.
             Instructions::Avx512 => unsafe { fly_block_avx512(block) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above, for `Instructions::Avx2`.

@@ -41,7 +41,7 @@ impl Integrator for ClosedForm {
             cost: Cost::default(),
             trajectory,
             step_limit: None,
-            notes: if detail == Detail::End { Vec::new() } else { vec!["no integration: the closed form".to_owned()] },
+            notes: Vec::new(),
         })
     }
 }

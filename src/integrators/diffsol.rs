@@ -26,7 +26,7 @@
 //! | `dy` of the last leg survives a change of the law | it is computed anew with the new law; the law is set before a solver is made |
 //! | Newton failures are counted over a solver's life and fail it at 50, a Jacobian outlives the law | an implicit solver lives for one leg |
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 use diffsol::{
     DiffsolError, NalgebraContext, NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod,
@@ -169,6 +169,33 @@ impl Diffsol {
 /// Flies one problem of a study.
 pub type FlyOne<'a> = dyn FnMut(&Problem, Detail) -> Result<Flight, IntegrationError> + 'a;
 
+/// A study as an integrator.
+pub(super) struct Kept<'a, 's> {
+    name: &'static str,
+    order: Option<u32>,
+    fly_one: RefCell<&'a mut FlyOne<'s>>,
+}
+
+impl<'a, 's> Kept<'a, 's> {
+    pub(super) fn new(of: &dyn Integrator, fly_one: &'a mut FlyOne<'s>) -> Self {
+        Self { name: of.name(), order: of.order(), fly_one: RefCell::new(fly_one) }
+    }
+}
+
+impl Integrator for Kept<'_, '_> {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn order(&self) -> Option<u32> {
+        self.order
+    }
+
+    fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+        (self.fly_one.borrow_mut())(problem, detail)
+    }
+}
+
 impl Integrator for Diffsol {
     fn name(&self) -> &'static str {
         self.scheme.name()
@@ -180,6 +207,11 @@ impl Integrator for Diffsol {
 
     fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
         self.study(|fly_one| fly_one(problem, detail))?
+    }
+
+    fn keep(&self, work: &mut dyn FnMut(&dyn Integrator)) {
+        // A method that cannot start says why in each of its flights.
+        let _ = self.study(|fly_one| work(&Kept::new(self, fly_one)));
     }
 }
 

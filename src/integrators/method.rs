@@ -206,8 +206,10 @@ impl Method {
     /// What `problem` let this method skip on `flight`, and why.
     pub fn explain(&self, problem: &Problem, flight: &Flight, detail: Detail) -> Vec<String> {
         let mut notes = flight.notes.clone();
-        if matches!(self, Self::Taylor(_)) {
-            notes.extend(Taylor::explain(problem, flight));
+        match self {
+            Self::Taylor(_) => notes.extend(Taylor::explain(problem, flight)),
+            Self::ClosedForm(_) if flight.notes.is_empty() => notes.push("no integration: the closed form".to_owned()),
+            _ => {}
         }
         for index in flight.stage + 1..problem.stages.len() {
             notes.push(format!(

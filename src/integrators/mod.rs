@@ -25,5 +25,5 @@ pub use closed_form::ClosedForm;
 pub use diffsol::{Diffsol, Scheme};
 pub use energy::Energy;
 pub use method::{Method, MethodName, MethodOptions};
-pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};
+pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit, keeping};
 pub use taylor::Taylor;

@@ -281,4 +281,16 @@ pub trait Integrator {
         let flight = self.fly(problem, Detail::End)?;
         Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }))
     }
+
+    /// Calls `work` once with an integrator that flies as this one does and keeps what a library builds for a flight;
+    /// does nothing where there is nothing to keep. See [`keeping`].
+    fn keep(&self, _work: &mut dyn FnMut(&dyn Integrator)) {}
+}
+
+/// What `work` makes of `integrator` when it flies many problems: the same answers, with a library's problem and solver
+/// kept from flight to flight.
+pub fn keeping<R>(integrator: &dyn Integrator, mut work: impl FnMut(&dyn Integrator) -> R) -> R {
+    let mut result = None;
+    integrator.keep(&mut |kept| result = Some(work(kept)));
+    result.unwrap_or_else(|| work(integrator))
 }

@@ -32,7 +32,7 @@ const RATIO_MIN: f64 = 1.3;
 pub struct Place {
     /// File name as given.
     pub file: String,
-    /// Line, from 1.
+    /// Line, from 1; 0 in a file without lines.
     pub line: u64,
     /// Column, from 1; 0 for the whole line.
     pub column: usize,
@@ -40,7 +40,10 @@ pub struct Place {
 
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}:{}", self.file, self.line)?;
+        f.write_str(&self.file)?;
+        if self.line > 0 {
+            write!(f, ":{}", self.line)?;
+        }
         if self.column > 0 { write!(f, ", column {}", self.column) } else { Ok(()) }
     }
 }

@@ -1,20 +1,23 @@
 //! Many scenes from a table: what each row asks, and what each is answered (contract, "Tables").
 //!
 //! A row is one crater and one tunnel. Its result depends on no other row, so that threads and neighbours change
-//! nothing. Tables come as CSV ([`csv`]) or from a seed ([`random_rows`]); both are read in chunks, and each turns its rows into scenes one by one.
+//! nothing. Tables come as CSV ([`csv`]), as Parquet (feature `parquet`) or from a seed ([`random_rows`]); all are read
+//! in chunks, and each turns its rows into scenes one by one.
 
 pub mod csv;
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::ops::Range;
 
 use thiserror::Error;
 
 use super::audit::Place;
+use super::columns::{Cells, Kind};
 use super::critical_velocity;
 use super::random_scenes::Generator;
 use crate::integrators::batch::{Batch, Summary};
-use crate::integrators::{Detail, Method, Taylor};
+use crate::integrators::{Detail, Method, Taylor, keeping};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, semi_empirical};
 
 /// Columns that a table may have, in the order of the contract.
@@ -43,8 +46,21 @@ pub const CRITERION: usize = NUMBERS;
 const OPTIONAL: [&str; 6] = ["thickness_m", "S", "B", "k", "crater_stiffness_n_m", "criterion"];
 
 /// Columns of the results.
-pub const RESULT_HEADER: &str = "row,outcome,depth_m,time_s,velocity_m_s,crater_end_time_s,crater_end_velocity_m_s,\
-                                 exit_margin,critical_velocity_m_s,error";
+pub const RESULT_COLUMNS: [(&str, Kind); 10] = [
+    ("row", Kind::Count),
+    ("outcome", Kind::Text),
+    ("depth_m", Kind::Number),
+    ("time_s", Kind::Number),
+    ("velocity_m_s", Kind::Number),
+    ("crater_end_time_s", Kind::Number),
+    ("crater_end_velocity_m_s", Kind::Number),
+    ("exit_margin", Kind::Number),
+    ("critical_velocity_m_s", Kind::Number),
+    ("error", Kind::Text),
+];
+
+/// How many of [`RESULT_COLUMNS`] are numbers: all but the first two and the last.
+const RESULT_NUMBERS: usize = RESULT_COLUMNS.len() - 3;
 
 /// Rows that are worked on together: one block of lanes.
 pub const PART: usize = 1024;
@@ -117,6 +133,14 @@ pub enum TableError {
         /// Type needed.
         expected: &'static str,
     },
+    /// A compression that cannot be undone here.
+    #[error("{file}: compressed by {name}, which this program does not read")]
+    Compressed {
+        /// File.
+        file: String,
+        /// Name of the compression.
+        name: String,
+    },
     /// A line beyond every reason.
     #[error("{place}: this line has no end within 1 MiB: it is no table, or a quote is not closed")]
     LineTooLong {
@@ -135,7 +159,8 @@ impl TableError {
     /// Help for a person: what to change.
     pub fn help(&self) -> String {
         match self {
-            Self::Unreadable { .. } => "name a table of scenes (.csv), or - for standard input".to_owned(),
+            Self::Unreadable { .. } => "name a table of scenes, or - for standard input".to_owned(),
+            Self::Compressed { .. } => "write the table without compression, or with Snappy".to_owned(),
             Self::NotText { .. } => "save the table as CSV in UTF-8".to_owned(),
             Self::OpenQuote { .. } | Self::LineTooLong { .. } => "close the quote, or remove it".to_owned(),
             Self::WrongType { .. } => {
@@ -200,7 +225,7 @@ impl Layout {
 }
 
 /// A text from a table as a message may quote it: one line, no control characters, forty characters.
-fn shortened(text: &str) -> String {
+pub(super) fn shortened(text: &str) -> String {
     let mut short: String =
         text.chars().take(40).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
     if text.chars().count() > 40 {
@@ -260,6 +285,9 @@ impl Row<'_> {
 pub enum Rows {
     /// Records of a CSV table.
     Csv(csv::Records),
+    /// Columns of a Parquet table.
+    #[cfg(feature = "parquet")]
+    Parquet(Box<super::parquet::Columns>),
     /// Random scenes of a seed, by their numbers from 0; the first is a multiple of [`PART`].
     Random {
         /// Seed.
@@ -274,6 +302,8 @@ impl Rows {
     pub fn len(&self) -> usize {
         match self {
             Self::Csv(records) => records.len(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => columns.len(),
             Self::Random { rows, .. } => (rows.end - rows.start) as usize,
         }
     }
@@ -287,6 +317,8 @@ impl Rows {
     pub fn scenes(&self, part: Range<usize>) -> Vec<Result<Scene, String>> {
         match self {
             Self::Csv(records) => part.map(|index| records.scene(index)).collect(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => part.map(|index| columns.scene(index)).collect(),
             Self::Random { seed, rows } => {
                 let first = rows.start + part.start as u64;
                 random_rows(*seed, first / PART as u64).take(part.len()).map(Ok).collect()
@@ -310,6 +342,22 @@ pub struct Answer {
     pub critical_velocity: Option<f64>,
     /// Whether a fixed step kept its limit; true for every other method.
     pub stable: bool,
+}
+
+impl Answer {
+    /// Its numbers, in the order of [`RESULT_COLUMNS`].
+    fn numbers(&self) -> [Option<f64>; RESULT_NUMBERS] {
+        let Summary { end, crater_end, exit_margin, .. } = self.flight;
+        [
+            Some(end.depth),
+            Some(end.time),
+            Some(end.velocity),
+            crater_end.map(|s| s.time),
+            crater_end.map(|s| s.velocity),
+            exit_margin,
+            self.critical_velocity,
+        ]
+    }
 }
 
 /// Flies `scenes` by `method`, and finds the critical velocity of those with a thickness if `with_critical`.
@@ -340,14 +388,15 @@ pub fn answers(
                 })
                 .collect()
         }
-        _ => problems
-            .into_iter()
-            .map(|problem| {
-                let flight = method.integrator().fly(&problem?, Detail::Events).map_err(|error| error.to_string())?;
+        _ => keeping(method.integrator(), |integrator| {
+            let fly = |problem: &Result<Problem, String>| {
+                let problem = problem.as_ref().map_err(Clone::clone)?;
+                let flight = integrator.fly(problem, Detail::Events).map_err(|error| error.to_string())?;
                 let stable = flight.step_limit.is_none_or(|limit| limit.stable);
                 Ok(Answer { flight: Summary::from(&flight), critical_velocity: None, stable })
-            })
-            .collect(),
+            };
+            problems.iter().map(fly).collect()
+        }),
     };
     if with_critical {
         for (answer, scene) in answers.iter_mut().zip(&scenes) {
@@ -408,18 +457,9 @@ pub fn result_lines(first: u64, answers: &[Result<Answer, String>]) -> String {
         // Writing to a string cannot fail.
         let _ = write!(text, "{row},");
         match answer {
-            Ok(Answer { flight, critical_velocity, .. }) => {
-                text.push_str(flight.outcome.name());
-                let crater_end = flight.crater_end;
-                for value in [
-                    Some(flight.end.depth),
-                    Some(flight.end.time),
-                    Some(flight.end.velocity),
-                    crater_end.map(|s| s.time),
-                    crater_end.map(|s| s.velocity),
-                    flight.exit_margin,
-                    *critical_velocity,
-                ] {
+            Ok(answer) => {
+                text.push_str(answer.flight.outcome.name());
+                for value in answer.numbers() {
                     text.push(',');
                     if let Some(value) = value {
                         push_number(&mut text, value);
@@ -437,6 +477,32 @@ pub fn result_lines(first: u64, answers: &[Result<Answer, String>]) -> String {
     text
 }
 
+/// The same results column by column, in the order of [`RESULT_COLUMNS`].
+pub fn result_columns(first: u64, answers: &[Result<Answer, String>]) -> Vec<Cells> {
+    let mut outcomes = Vec::with_capacity(answers.len());
+    let mut numbers: [Vec<Option<f64>>; RESULT_NUMBERS] = std::array::from_fn(|_| Vec::with_capacity(answers.len()));
+    let mut errors: Vec<Option<Cow<'static, str>>> = Vec::with_capacity(answers.len());
+    for answer in answers {
+        let found = answer.as_ref().ok();
+        outcomes.push(found.map(|answer| Cow::Borrowed(answer.flight.outcome.name())));
+        let row = found.map_or([None; RESULT_NUMBERS], Answer::numbers);
+        for (column, number) in numbers.iter_mut().zip(row) {
+            column.push(number);
+        }
+        errors.push(answer.as_ref().err().map(|message| message.chars().map(printable).collect()));
+    }
+    let rows = Cells::Counts((first..).take(answers.len()).collect());
+    let mut columns = vec![rows, Cells::Texts(outcomes)];
+    columns.extend(numbers.into_iter().map(Cells::Numbers));
+    columns.push(Cells::Texts(errors));
+    columns
+}
+
+/// The first line of a CSV table of results, with its end.
+pub fn result_header() -> String {
+    RESULT_COLUMNS.map(|(name, _)| name).join(",") + "\n"
+}
+
 /// The shortest digits that read back to the same number; with an exponent where there would be many zeros.
 fn push_number(text: &mut String, value: f64) {
     let magnitude = value.abs();
@@ -447,14 +513,18 @@ fn push_number(text: &mut String, value: f64) {
     };
 }
 
+/// A character as a message in a table may have it: messages are one line.
+fn printable(c: char) -> char {
+    if c.is_control() { ' ' } else { c }
+}
+
 /// A message as one CSV cell.
 fn push_quoted(text: &mut String, message: &str) {
     text.push('"');
     for c in message.chars() {
         match c {
             '"' => text.push_str("\"\""),
-            c if c.is_control() => text.push(' '),
-            c => text.push(c),
+            c => text.push(printable(c)),
         }
     }
     text.push('"');

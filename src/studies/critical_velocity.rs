@@ -15,9 +15,10 @@ use std::fmt::Display;
 
 use argmin::core::{CostFunction, Executor, IterState, State as _, TerminationReason, TerminationStatus};
 use argmin::solver::brent::BrentRoot;
+use smallvec::SmallVec;
 use thiserror::Error;
 
-use crate::integrators::{Cost, IntegrationError, Integrator, Taylor};
+use crate::integrators::{Cost, IntegrationError, Integrator, Taylor, keeping};
 use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, Stage, closed_form};
 
 /// Speed [m/s] at which the target is first asked for, to learn its exit depth and static work.
@@ -262,7 +263,7 @@ fn at_any_speed(velocity: f64, error_bar: Option<f64>, tally: Tally, note: &'sta
 /// # Errors
 /// [`CriticalError`].
 pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError<ResolveError>> {
-    critical_velocity(|speed| scene.resolve(speed), integrator, Options::default())
+    keeping(integrator, |integrator| critical_velocity(|speed| scene.resolve(speed), integrator, Options::default()))
 }
 
 /// Exact critical velocity of `scene` [m/s], where it has a closed form.
@@ -519,7 +520,7 @@ where
             unit,
             scale: bracket.low.w.abs().max(bracket.high.w),
             known: [bracket.low, bracket.high],
-            flown: RefCell::new(Vec::with_capacity(16)),
+            flown: RefCell::default(),
             failure: RefCell::new(None),
         };
         // The solver stops at a half-width of 2 eps |b| + tol/2.
@@ -571,6 +572,9 @@ where
     }
 }
 
+/// Flights of a root finding that are remembered without an allocation; it takes six as a rule.
+const FLIGHTS_INLINE: usize = 16;
+
 /// W over u as argmin sees it: both in units near one.
 struct Objective<'a, 'b, F, E: Display> {
     shooting: &'a Shooting<'b, F>,
@@ -578,7 +582,7 @@ struct Objective<'a, 'b, F, E: Display> {
     scale: f64,
     /// The ends, flown already.
     known: [Shot; 2],
-    flown: RefCell<Vec<Shot>>,
+    flown: RefCell<SmallVec<[Shot; FLIGHTS_INLINE]>>,
     failure: RefCell<Option<CriticalError<E>>>,
 }
 

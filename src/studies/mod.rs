@@ -4,6 +4,7 @@ pub mod applicability;
 pub mod audit;
 pub mod batch;
 pub mod bench;
+pub mod columns;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
@@ -13,6 +14,8 @@ pub mod formal_order;
 pub mod grid_convergence;
 pub mod order;
 pub mod parameter;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod peers;
 pub mod quantity;
 pub mod random;

@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::critical_velocity;
 use super::parameter::{Parameter, ParameterError};
-use crate::integrators::{Detail, Integrator};
+use crate::integrators::{Detail, Integrator, keeping};
 use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::number;
@@ -270,10 +270,10 @@ impl Plan {
     ///
     /// A point without an answer has its reason in [`Row::error`] and stops nothing.
     pub fn run(&self, integrator: &(dyn Integrator + Sync)) -> Vec<Row> {
-        (0..self.points()).into_par_iter().map(|index| self.row(index, integrator)).collect()
+        (0..self.points()).into_par_iter().map(|index| keeping(integrator, |kept| self.row(index, kept))).collect()
     }
 
-    fn row(&self, index: usize, integrator: &(dyn Integrator + Sync)) -> Row {
+    fn row(&self, index: usize, integrator: &dyn Integrator) -> Row {
         let (values, scene) = self.point(index);
         let mut row = Row { values, ..Row::default() };
         let scene = match scene {

@@ -1,0 +1,387 @@
+//! Tables in Parquet: scenes read and results written, a bounded number of rows at a time.
+//!
+//! The columns are those of the CSV tables, by the same names. Numbers are DOUBLE, so that every bit survives; what CSV
+//! leaves empty is null. A table may come with FLOAT and integer columns, in row groups of any size, uncompressed or
+//! compressed by Snappy; other compressions need a C library, and are refused by name. Results are not compressed:
+//! digits of flights have no pattern to find.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use parquet::schema::types::{ColumnDescriptor, Type};
+
+use super::audit::Place;
+use super::batch::{COLUMNS, CRITERION, Layout, NUMBERS, Row, TableError, shortened};
+use super::columns::{Cells, Kind};
+use crate::physics::Scene;
+
+/// Rows of a row group that is written: some megabytes.
+const ROW_GROUP: usize = 1 << 16;
+
+/// How older writers mark integers without a sign, and those with one; newer ones say it both ways.
+const UNSIGNED: [ConvertedType; 4] =
+    [ConvertedType::UINT_8, ConvertedType::UINT_16, ConvertedType::UINT_32, ConvertedType::UINT_64];
+const SIGNED: [ConvertedType; 4] =
+    [ConvertedType::INT_8, ConvertedType::INT_16, ConvertedType::INT_32, ConvertedType::INT_64];
+
+/// What the library makes of a file, damaged ones included: its panics become errors.
+///
+/// Nothing that a panic may have left half done is looked at again: the table is refused.
+fn guarded<R>(work: impl FnOnce() -> Result<R, ParquetError>) -> Result<R, ParquetError> {
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|_| Err(ParquetError::General("the file is damaged".to_owned())))
+}
+
+/// Rows of a table, column by column.
+#[derive(Debug)]
+pub struct Columns {
+    /// Number of the first row, from 1.
+    first: u64,
+    count: usize,
+    /// In the order of [`COLUMNS`]; empty for a column that the table does not have.
+    numbers: [Vec<Option<f64>>; NUMBERS],
+    criteria: Vec<Option<String>>,
+}
+
+impl Columns {
+    /// How many rows.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The scene of row `index`, from 0.
+    ///
+    /// # Errors
+    /// What is wrong, with the row and the column.
+    pub fn scene(&self, index: usize) -> Result<Scene, String> {
+        self.read(index).map_err(|cause| format!("row {}: {cause}", self.first + index as u64))
+    }
+
+    fn read(&self, index: usize) -> Result<Scene, String> {
+        let mut row = Row::default();
+        for ((number, column), name) in row.numbers.iter_mut().zip(&self.numbers).zip(COLUMNS) {
+            *number = column.get(index).copied().flatten();
+            if let Some(value) = *number
+                && !value.is_finite()
+            {
+                return Err(format!("{name}: {value} is not finite"));
+            }
+        }
+        row.criterion = self.criteria.get(index).and_then(Option::as_deref).map(str::trim);
+        row.scene()
+    }
+}
+
+/// A Parquet table of scenes that is being read.
+pub struct ParquetScenes {
+    file: String,
+    reader: SerializedFileReader<File>,
+    layout: Layout,
+    /// Which columns hold integers without a sign, in the order of [`COLUMNS`].
+    unsigned: [bool; COLUMNS.len()],
+    /// The row group that is read next.
+    group: usize,
+    /// Columns of the present row group, in the order of [`COLUMNS`].
+    columns: Vec<Option<ColumnReader>>,
+    /// Rows left in the present row group.
+    left: usize,
+    /// Rows handed out.
+    rows: u64,
+}
+
+impl ParquetScenes {
+    /// Reads what `input` says of itself; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`TableError`] for a file that is no Parquet table, or whose columns are not those of scenes.
+    pub fn new(file: &str, input: File) -> Result<Self, TableError> {
+        let reader = guarded(|| SerializedFileReader::new(input)).map_err(|error| unreadable(file, &error))?;
+        let metadata = reader.metadata();
+        let schema = metadata.file_metadata().schema_descr_ptr();
+        let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
+        // A file without lines: its columns have numbers all the same.
+        let place = |column| Place { file: file.to_owned(), line: 0, column };
+        let layout = Layout::new(names.iter().map(String::as_str), place)?;
+        let mut unsigned = [false; COLUMNS.len()];
+        for (index, at) in layout.places.iter().enumerate() {
+            let Some(at) = *at else { continue };
+            let column = schema.column(at);
+            check_type(file, index, &column)?;
+            unsigned[index] = UNSIGNED.contains(&column.converted_type())
+                || matches!(column.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
+            for chunk in metadata.row_groups().iter().filter_map(|group| group.columns().get(at)) {
+                let found = chunk.compression();
+                if !matches!(found, Compression::UNCOMPRESSED | Compression::SNAPPY) {
+                    let name = format!("{found:?}");
+                    let name = name.split('(').next().unwrap_or_default().to_owned();
+                    return Err(TableError::Compressed { file: file.to_owned(), name });
+                }
+            }
+        }
+        let file = file.to_owned();
+        Ok(Self { file, reader, layout, unsigned, group: 0, columns: Vec::new(), left: 0, rows: 0 })
+    }
+
+    /// Rows of the whole table.
+    pub fn rows(&self) -> u64 {
+        u64::try_from(self.reader.metadata().file_metadata().num_rows()).unwrap_or(0)
+    }
+
+    /// At most `count` rows, none at the end.
+    ///
+    /// # Errors
+    /// [`TableError`] for a table that cannot be read on.
+    pub fn next_rows(&mut self, count: usize) -> Result<Columns, TableError> {
+        guarded(|| self.read(count)).map_err(|error| unreadable(&self.file, &error))
+    }
+
+    fn read(&mut self, count: usize) -> Result<Columns, ParquetError> {
+        let mut rows =
+            Columns { first: self.rows + 1, count: 0, numbers: Default::default(), criteria: Vec::default() };
+        while rows.count < count {
+            if self.left == 0 && !self.next_group()? {
+                break;
+            }
+            let part = self.left.min(count - rows.count);
+            for (index, reader) in self.columns.iter_mut().enumerate() {
+                let Some(reader) = reader else { continue };
+                match rows.numbers.get_mut(index) {
+                    Some(numbers) => read_numbers(reader, self.unsigned[index], part, numbers)?,
+                    None => read_texts(reader, part, &mut rows.criteria)?,
+                }
+            }
+            self.left -= part;
+            rows.count += part;
+        }
+        self.rows += rows.count as u64;
+        Ok(rows)
+    }
+
+    /// Opens the next row group; false at the end.
+    fn next_group(&mut self) -> Result<bool, ParquetError> {
+        let metadata = self.reader.metadata();
+        // Ends with the list of row groups.
+        while let Some(found) = metadata.row_groups().get(self.group) {
+            let group = self.reader.get_row_group(self.group)?;
+            self.group += 1;
+            self.left = usize::try_from(found.num_rows())
+                .map_err(|_| ParquetError::General("a row group has fewer than no rows".to_owned()))?;
+            if self.left > 0 {
+                let open = |at: &Option<usize>| at.map(|at| group.get_column_reader(at)).transpose();
+                self.columns = self.layout.places.iter().map(open).collect::<Result<_, _>>()?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+fn unreadable(file: &str, error: &ParquetError) -> TableError {
+    TableError::Unreadable { file: file.to_owned(), cause: format!("not a sound Parquet table: {error}") }
+}
+
+/// Refuses a column whose type is not that of column `index` of [`COLUMNS`].
+fn check_type(file: &str, index: usize, column: &ColumnDescriptor) -> Result<(), TableError> {
+    let (logical, converted) = (column.logical_type_ref(), column.converted_type());
+    let is_plain = logical.is_none() && converted == ConvertedType::NONE;
+    let is_integer = is_plain
+        || matches!(logical, Some(LogicalType::Integer(_)))
+        || (logical.is_none() && (UNSIGNED.contains(&converted) || SIGNED.contains(&converted)));
+    let is_text = is_plain || converted == ConvertedType::UTF8;
+    let fits = column.max_rep_level() == 0
+        // A column that was written without a value has no type.
+        && (logical == Some(&LogicalType::Unknown)
+            || match column.physical_type() {
+                Physical::BYTE_ARRAY => index == CRITERION && is_text,
+                Physical::DOUBLE | Physical::FLOAT => index != CRITERION && is_plain,
+                Physical::INT32 | Physical::INT64 => index != CRITERION && is_integer,
+                _ => false,
+            });
+    if fits {
+        return Ok(());
+    }
+    let found = match (column.max_rep_level(), logical) {
+        (1.., _) => "lists".to_owned(),
+        (_, Some(logical)) => format!("{} ({logical:?})", column.physical_type()),
+        (_, None) if converted == ConvertedType::NONE => column.physical_type().to_string(),
+        (_, None) => format!("{} ({converted})", column.physical_type()),
+    };
+    let expected = if index == CRITERION { "text" } else { "numbers" };
+    Err(TableError::WrongType { file: file.to_owned(), name: COLUMNS[index].to_owned(), found, expected })
+}
+
+/// Appends `count` cells of `reader` to `cells`.
+fn read_cells<T: DataType, U>(
+    reader: &mut ColumnReaderImpl<T>,
+    count: usize,
+    cells: &mut Vec<Option<U>>,
+    cell: impl Fn(T::T) -> U,
+) -> Result<(), ParquetError> {
+    let (mut values, mut levels) = (Vec::new(), Vec::new());
+    let (records, present, _) = reader.read_records(count, Some(&mut levels), None, &mut values)?;
+    if records != count {
+        return Err(ParquetError::General("a column ends before its row group".to_owned()));
+    }
+    let mut values = values.into_iter().map(cell);
+    if present == count {
+        cells.extend(values.map(Some));
+    } else {
+        cells.extend(levels.into_iter().map(|level| if level > 0 { values.next() } else { None }));
+    }
+    Ok(())
+}
+
+fn read_numbers(
+    reader: &mut ColumnReader,
+    unsigned: bool,
+    count: usize,
+    cells: &mut Vec<Option<f64>>,
+) -> Result<(), ParquetError> {
+    match reader {
+        ColumnReader::DoubleColumnReader(reader) => read_cells(reader, count, cells, |value| value),
+        ColumnReader::FloatColumnReader(reader) => read_cells(reader, count, cells, f64::from),
+        ColumnReader::Int32ColumnReader(reader) => {
+            read_cells(
+                reader,
+                count,
+                cells,
+                |value| {
+                    if unsigned { f64::from(value.cast_unsigned()) } else { f64::from(value) }
+                },
+            )
+        }
+        ColumnReader::Int64ColumnReader(reader) => {
+            read_cells(reader, count, cells, |value| if unsigned { value.cast_unsigned() as f64 } else { value as f64 })
+        }
+        _ => Err(ParquetError::General("a column changes its type".to_owned())),
+    }
+}
+
+fn read_texts(reader: &mut ColumnReader, count: usize, cells: &mut Vec<Option<String>>) -> Result<(), ParquetError> {
+    match reader {
+        ColumnReader::ByteArrayColumnReader(reader) => read_cells(reader, count, cells, |value: ByteArray| {
+            // No longer than a message quotes: a cell may be of any size.
+            shortened(&String::from_utf8_lossy(value.data()))
+        }),
+        // A column without a value.
+        ColumnReader::Int32ColumnReader(reader) => read_cells(reader, count, cells, |value| value.to_string()),
+        _ => Err(ParquetError::General("a column changes its type".to_owned())),
+    }
+}
+
+/// A Parquet table that is being written.
+pub struct ParquetTable<W: Write + Send> {
+    writer: SerializedFileWriter<W>,
+    /// Cells that do not fill a row group yet.
+    waiting: Vec<Cells>,
+}
+
+impl<W: Write + Send> ParquetTable<W> {
+    /// A table with `columns`, each with its name.
+    ///
+    /// # Errors
+    /// When `output` cannot be written.
+    pub fn new(output: W, columns: &[(&str, Kind)]) -> io::Result<Self> {
+        let fields = columns.iter().map(|(name, kind)| {
+            let (physical, repetition, logical) = match kind {
+                Kind::Count => (Physical::INT64, Repetition::REQUIRED, None),
+                Kind::Number => (Physical::DOUBLE, Repetition::OPTIONAL, None),
+                Kind::Text => (Physical::BYTE_ARRAY, Repetition::OPTIONAL, Some(LogicalType::String)),
+            };
+            let field = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+            field.with_logical_type(logical).build().map(Arc::new)
+        });
+        let fields = fields.collect::<Result<_, _>>().map_err(io::Error::other)?;
+        let schema = Type::group_type_builder("penetrode").with_fields(fields).build().map_err(io::Error::other)?;
+        let mut properties = WriterProperties::builder()
+            .set_created_by(concat!("penetrode ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true);
+        for (name, kind) in columns {
+            // Numbers hardly repeat, texts do.
+            let path = parquet::schema::types::ColumnPath::from(vec![(*name).to_owned()]);
+            properties = properties.set_column_dictionary_enabled(path, *kind == Kind::Text);
+        }
+        let writer = SerializedFileWriter::new(output, Arc::new(schema), Arc::new(properties.build()))
+            .map_err(io::Error::from)?;
+        Ok(Self { writer, waiting: columns.iter().map(|(_, kind)| Cells::empty(*kind)).collect() })
+    }
+
+    /// Adds rows: one entry a column, all of one length.
+    ///
+    /// # Errors
+    /// When the output cannot be written, or the columns are not those of the table.
+    pub fn push(&mut self, columns: Vec<Cells>) -> io::Result<()> {
+        let kinds = |columns: &[Cells]| columns.iter().map(Cells::kind).collect::<Vec<_>>();
+        if kinds(&columns) != kinds(&self.waiting) || columns.iter().any(|cells| cells.len() != columns[0].len()) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "rows of another table"));
+        }
+        for (waiting, cells) in self.waiting.iter_mut().zip(columns) {
+            match (waiting, cells) {
+                (Cells::Counts(waiting), Cells::Counts(cells)) => waiting.extend(cells),
+                (Cells::Numbers(waiting), Cells::Numbers(cells)) => waiting.extend(cells),
+                (Cells::Texts(waiting), Cells::Texts(cells)) => waiting.extend(cells),
+                _ => {}
+            }
+        }
+        if self.waiting.first().is_some_and(|cells| cells.len() >= ROW_GROUP) { self.flush() } else { Ok(()) }
+    }
+
+    /// Writes what waits as a row group.
+    fn flush(&mut self) -> io::Result<()> {
+        if self.waiting.first().is_none_or(Cells::is_empty) {
+            return Ok(());
+        }
+        let mut group = self.writer.next_row_group()?;
+        for cells in &mut self.waiting {
+            let kind = cells.kind();
+            let Some(mut column) = group.next_column()? else { break };
+            match std::mem::replace(cells, Cells::empty(kind)) {
+                Cells::Counts(counts) => {
+                    let values: Vec<i64> = counts.into_iter().map(|count| count as i64).collect();
+                    column.typed::<Int64Type>().write_batch(&values, None, None)?;
+                }
+                Cells::Numbers(numbers) => write_cells::<DoubleType, _>(&mut column, numbers, |value| value)?,
+                Cells::Texts(texts) => write_cells::<ByteArrayType, _>(&mut column, texts, |text| {
+                    ByteArray::from(text.into_owned().into_bytes())
+                })?,
+            }
+            column.close()?;
+        }
+        group.close()?;
+        Ok(())
+    }
+
+    /// Writes the rest and the footer, and gives the output back.
+    ///
+    /// # Errors
+    /// When the output cannot be written.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.flush()?;
+        Ok(self.writer.into_inner()?)
+    }
+}
+
+fn write_cells<T: DataType, U>(
+    column: &mut SerializedColumnWriter<'_>,
+    cells: Vec<Option<U>>,
+    value: impl Fn(U) -> T::T,
+) -> Result<(), ParquetError> {
+    let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
+    let values: Vec<T::T> = cells.into_iter().flatten().map(value).collect();
+    column.typed::<T>().write_batch(&values, Some(&levels), None).map(|_| ())
+}
