@@ -5,6 +5,7 @@ use schemars::schema_for;
 
 use super::{CliError, Exit, converge, critical, experiments, map, output, solve, stress, sweep};
 use crate::report::VerifyJson;
+use crate::studies::audit::Audit;
 
 /// Arguments of `schema`.
 #[derive(Args, Debug)]
@@ -29,6 +30,8 @@ pub enum Documented {
     Map,
     /// `experiments --json`.
     Experiments,
+    /// `audit --json`.
+    Audit,
     /// `verify --json`, which is `report.json`.
     Verify,
     /// `stress --json`.
@@ -48,6 +51,7 @@ impl SchemaArgs {
             Documented::Sweep => schema_for!(sweep::SweepJson),
             Documented::Experiments => schema_for!(experiments::ExperimentsJson),
             Documented::Map => schema_for!(map::MapJson),
+            Documented::Audit => schema_for!(Audit),
             Documented::Verify => schema_for!(VerifyJson),
             Documented::Stress => schema_for!(stress::StressJson),
         };

@@ -13,6 +13,7 @@ use thiserror::Error;
 use super::audit::Place;
 use super::critical_velocity;
 use super::random_scenes::Generator;
+use super::table_text::shortened;
 use crate::integrators::batch::{Batch, Summary};
 use crate::integrators::{Detail, Method, Taylor};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, semi_empirical};
@@ -68,7 +69,7 @@ pub enum TableError {
         file: String,
     },
     /// The first line is not text.
-    #[error("{place}: the first line is not UTF-8 text")]
+    #[error("{place}: the first line is not text in UTF-8")]
     NotText {
         /// Where.
         place: Place,
@@ -136,6 +137,9 @@ impl TableError {
     pub fn help(&self) -> String {
         match self {
             Self::Unreadable { .. } => "name a table of scenes (.csv), or - for standard input".to_owned(),
+            Self::UnknownColumn { name, .. } if name.contains([';', char::REPLACEMENT_CHARACTER]) => {
+                "separate the cells by commas, and write decimals with a point".to_owned()
+            }
             Self::NotText { .. } => "save the table as CSV in UTF-8".to_owned(),
             Self::OpenQuote { .. } | Self::LineTooLong { .. } => "close the quote, or remove it".to_owned(),
             Self::WrongType { .. } => {
@@ -178,8 +182,10 @@ impl Layout {
                 return Err(TableError::NoHeader { place: place(width) });
             }
             let Some(index) = COLUMNS.iter().position(|known| *known == name) else {
+                let is_word = name.chars().all(|c| c.is_alphanumeric() || "_ ()/".contains(c));
                 let near = COLUMNS
                     .into_iter()
+                    .filter(|_| is_word)
                     .map(|known| (strsim::jaro_winkler(&known.to_lowercase(), &name.to_lowercase()), known))
                     .filter(|(similarity, _)| *similarity > 0.8)
                     .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -197,16 +203,6 @@ impl Layout {
         }
         Ok(Self { places, width })
     }
-}
-
-/// A text from a table as a message may quote it: one line, no control characters, forty characters.
-fn shortened(text: &str) -> String {
-    let mut short: String =
-        text.chars().take(40).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
-    if text.chars().count() > 40 {
-        short.push('…');
-    }
-    short
 }
 
 /// The cells of a row; empty ones are `None`.
