@@ -1,22 +1,18 @@
 //! `penetrode audit`: order, error band and verdict for step-size results that another code produced.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::output::{print_json, print_text, significant, table, table_lines};
-use super::{CliError, Exit, read_scene};
+use super::input::table_bytes;
+use super::output::{escape_terminal, print_json, print_text, significant, table, table_lines, wrapped};
+use super::{CliError, Exit, problem_of, read_scene};
 use crate::physics::Problem;
 use crate::studies::audit::{Audit, AuditError, ExactValues, Expectation, Table, Verdict, audit};
 use crate::studies::convergence::Yardstick;
 use crate::studies::critical_velocity;
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::quantity::Quantity;
-
-/// Largest table that is read [bytes]: a study of step sizes is some kilobytes.
-const SIZE_MAX: u64 = 64 << 20;
 
 /// Arguments of `audit`.
 #[derive(Args, Debug)]
@@ -28,7 +24,7 @@ pub struct AuditArgs {
     #[arg(long)]
     pub scene: Option<String>,
     /// Formal order of the code; without it any order above zero converges.
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub order: Option<f64>,
     /// Print JSON.
     #[arg(long)]
@@ -42,7 +38,7 @@ impl AuditArgs {
     /// A table or a scene that cannot be used (exit 2).
     pub fn run(&self) -> Result<Exit, CliError> {
         let file = self.results.display().to_string();
-        let bytes = self.read(&file)?;
+        let bytes = table_bytes(&self.results, "name a CSV file with a column dt_s")?;
         let refuse = |error: AuditError| CliError::usage(error.to_string(), error.help());
         let results = Table::read(&file, &bytes).map_err(refuse)?;
         let exact = self.scene.as_deref().map(exact_values).transpose()?;
@@ -54,27 +50,12 @@ impl AuditArgs {
             Verdict::Undecided => Exit::Undecided,
         })
     }
-
-    fn read(&self, file: &str) -> Result<Vec<u8>, CliError> {
-        let refuse = |cause: String| CliError::usage(format!("{file}: {cause}"), "name a CSV file with a column dt_s");
-        if self.results.is_dir() {
-            return Err(refuse("is a folder".to_owned()));
-        }
-        let mut bytes = Vec::new();
-        File::open(&self.results)
-            .and_then(|f| f.take(SIZE_MAX + 1).read_to_end(&mut bytes))
-            .map_err(|error| refuse(format!("cannot be read: {error}")))?;
-        if bytes.len() as u64 > SIZE_MAX {
-            return Err(refuse("is larger than 64 MiB, which no study of step sizes is".to_owned()));
-        }
-        Ok(bytes)
-    }
 }
 
 /// What the scene at `path` gives exactly.
 fn exact_values(path: &str) -> Result<ExactValues, CliError> {
     let scene = read_scene(path)?;
-    let problem: Problem = scene.problem()?;
+    let problem: Problem = problem_of(&scene, path)?;
     let exact = Yardstick::of(&problem)?.flight;
     let value = |quantity| if is_fixed(quantity, &exact) { None } else { value_of(quantity, &exact) };
     Ok(ExactValues {
@@ -89,7 +70,7 @@ fn exact_values(path: &str) -> Result<ExactValues, CliError> {
 }
 
 fn text(file: &str, judged: &Audit) -> String {
-    let mut lines = vec![file.to_owned(), String::new()];
+    let mut lines = vec![escape_terminal(file), String::new()];
     let mut rows = table(&["quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"]);
     let verdict = |verdict: Verdict| match verdict {
         Verdict::Passed => "passed",
@@ -111,9 +92,9 @@ fn text(file: &str, judged: &Audit) -> String {
     lines.extend(table_lines(&rows));
     lines.push(String::new());
     for q in &judged.quantities {
-        lines.push(format!("  {}: {}", q.quantity.name(), q.reason));
+        lines.push(wrapped("  ", &format!("{}: {}", q.quantity.name(), q.reason)));
         for band in &q.error_bands {
-            lines.push(format!("    +- {:.2e} by {}", band.half_width, band.rule));
+            lines.push(wrapped("    ", &format!("+- {:.2e} by {}", band.half_width, band.rule)));
         }
         if let (Some(exact), Some(agrees)) = (q.exact, q.agrees_with_exact) {
             let word = if agrees { "agrees with" } else { "misses" };
@@ -121,7 +102,7 @@ fn text(file: &str, judged: &Audit) -> String {
         }
     }
     for finding in &judged.findings {
-        lines.push(format!("  note: {}", finding.message));
+        lines.push(wrapped("  note: ", &escape_terminal(&finding.message)));
     }
     lines.push(format!("  verdict    {}", verdict(judged.verdict)));
     lines.push(String::new());

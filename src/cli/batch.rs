@@ -1,6 +1,7 @@
 //! `penetrode batch`: many scenes from a table, one line of results each, in bounded memory.
 
 use std::fs::{self, File};
+use std::io::ErrorKind::BrokenPipe;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -12,11 +13,12 @@ use tempfile::NamedTempFile;
 use super::method_args::MethodArgs;
 #[cfg(feature = "parquet")]
 use super::output::is_parquet;
-use super::output::{check_format, persist, temporary_beside};
+use super::output::{check_format, check_outputs, is_standard, persist, tell, temporary_beside, unless_closed};
 use super::{CliError, Exit};
 use crate::integrators::Method;
 use crate::studies::batch::csv::{CsvScenes, Records};
 use crate::studies::batch::{PART, Rows, TableError, Tally, answers, result_header, result_lines};
+use crate::studies::table_text::counted;
 #[cfg(feature = "parquet")]
 use crate::studies::{
     batch::{RESULT_COLUMNS, result_columns},
@@ -55,11 +57,9 @@ impl BatchArgs {
     /// # Errors
     /// A table or options that cannot be used (exit 2), results that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
-        if is_same_file(&self.scenes, &self.out) {
-            return Err(CliError::usage("the results would replace the scenes", "give --out another name"));
-        }
         check_format(&self.scenes)?;
         check_format(&self.out)?;
+        check_outputs(&[("the scenes", &self.scenes)], &[("the results", &self.out)])?;
         let method = self.method.build()?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
@@ -68,10 +68,16 @@ impl BatchArgs {
         let progress = ProgressBar::no_length();
         let mut source = Source::open(&self.scenes, &progress)?;
         let mut sink = Sink::create(&self.out).map_err(|cause| self.unwritable(cause))?;
-        let tally = pool.install(|| self.fly_all(&mut source, &mut sink, &method))?;
+        let tally = match pool.install(|| self.fly_all(&mut source, &mut sink, &method)) {
+            // Whoever reads the results (`| head`) has enough.
+            Err(CliError::Write { cause, .. }) if is_standard(&self.out) && cause.kind() == BrokenPipe => {
+                return Ok(Exit::Success);
+            }
+            other => other?,
+        };
         sink.finish(&self.out).map_err(|cause| self.unwritable(cause))?;
         progress.finish_and_clear();
-        eprintln!("{}", summary(&tally));
+        tell("", &summary(&tally));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
 
@@ -103,12 +109,15 @@ impl BatchArgs {
     }
 
     fn unwritable(&self, cause: io::Error) -> CliError {
-        CliError::Write { path: self.out.display().to_string(), cause }
+        if is_standard(&self.out) { CliError::stdout(cause) } else { CliError::write(&self.out, cause) }
     }
 }
 
 fn summary(tally: &Tally) -> String {
-    let mut text = format!("{} rows: {} bad, {} undecided", tally.rows, tally.bad, tally.undecided);
+    if tally.rows == 0 {
+        return "0 rows: the table has a first line with names and no scene below it".to_owned();
+    }
+    let mut text = format!("{}: {} bad, {} undecided", counted(tally.rows, "row"), tally.bad, tally.undecided);
     if tally.unstable > 0 {
         text.push_str(&format!(", {} with a step beyond the stability limit", tally.unstable));
     }
@@ -186,7 +195,7 @@ impl Source {
             bar(progress, count, ROWS_BAR);
             return Ok(Self::Random { seed, next: 0, end: count, progress: progress.clone() });
         }
-        if path.as_os_str() == "-" {
+        if is_standard(path) {
             let input: Box<dyn Read + Send> = Box::new(progress.wrap_read(io::stdin()));
             return CsvScenes::new("standard input", input).map(Self::Csv).map_err(|error| refused(&error));
         }
@@ -263,7 +272,7 @@ impl Sink {
             let table = ParquetTable::new(temporary_beside(path)?, &RESULT_COLUMNS)?;
             return Ok(Self::Parquet(Box::new(table)));
         }
-        let mut sink = if path.as_os_str() == "-" {
+        let mut sink = if is_standard(path) {
             Self::Standard(BufWriter::with_capacity(1 << 20, io::stdout()))
         } else {
             let file = temporary_beside(path)?;
@@ -295,7 +304,7 @@ impl Sink {
     fn finish(self, path: &Path) -> io::Result<()> {
         match self {
             Self::File(writer) => persist(writer.into_inner().map_err(io::IntoInnerError::into_error)?, path),
-            Self::Standard(mut writer) => writer.flush(),
+            Self::Standard(mut writer) => unless_closed(writer.flush()),
             #[cfg(feature = "parquet")]
             Self::Parquet(table) => persist(table.finish()?, path),
         }
@@ -305,12 +314,6 @@ impl Sink {
 /// A table that cannot be used, as exit code 2.
 fn refused(error: &TableError) -> CliError {
     CliError::usage(error.to_string(), error.help())
-}
-
-/// Whether both paths are one file.
-pub(super) fn is_same_file(a: &Path, b: &Path) -> bool {
-    let is_standard = a.as_os_str() == "-";
-    !is_standard && (a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b))
 }
 
 /// Gives `progress` a length and a look; it shows on a terminal only.

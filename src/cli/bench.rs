@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::output::escape_terminal;
 use super::output::{print_json, print_text, table, table_lines};
-use super::solve::escape_terminal;
 use super::verify::folder_error;
 use super::{CliError, Exit, read_scene};
 use crate::physics::Scene;

@@ -5,14 +5,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, parse_time};
-use super::output::{print_json, print_text, table, table_lines};
-use super::solve::escape_terminal;
-use super::{CliError, Exit, read_scene};
+use super::output::{escape_terminal, print_json, print_text, table, table_lines, wrapped};
+use super::{CliError, Exit, problem_of, read_scene};
 use crate::integrators::Steps;
 use crate::integrators::method::MethodName;
-use crate::physics::{Problem, Scene};
+use crate::physics::{Problem, Scene, Shown};
+use crate::studies::Quantity;
 use crate::studies::convergence::{
     Ladder, POINTS_DEFAULT, QuantityStudy, STEPS_OVER_TIME, TOLERANCES, Yardstick, of_fixed_steps, of_tolerances,
+    why_no_critical_velocity,
 };
 use crate::studies::order::{Class, Exclusion, OrderVerdict};
 
@@ -56,6 +57,8 @@ pub struct ConvergeJson {
     pub reference: &'static str,
     pub verdict: &'static str,
     pub quantities: Vec<QuantityJson>,
+    /// What was not studied, and why.
+    pub skipped: Vec<String>,
 }
 
 /// The convergence of one quantity.
@@ -101,7 +104,7 @@ impl ConvergeArgs {
     /// A scene or options that cannot be used (exit 2), a flight without an answer (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         let scene = read_scene(&self.scene)?;
-        let problem = scene.problem()?;
+        let problem = problem_of(&scene, &self.scene)?;
         let method =
             MethodArgs { method: self.method, rtol: None, dt: None, velocity: self.velocity, events: self.events };
         if self.method == MethodName::ClosedForm {
@@ -146,6 +149,7 @@ impl ConvergeArgs {
                 _ => "undecided",
             },
             quantities,
+            skipped: if fixed { skipped(&scene)? } else { Vec::new() },
         };
         if self.json { print_json(&report) } else { print_text(&text(&scene, &problem, &report)) }
             .map_err(CliError::stdout)?;
@@ -169,6 +173,12 @@ impl ConvergeArgs {
             Err(CliError::usage(format!("--dt {text}: the first must be above zero and below the second"), help))
         }
     }
+}
+
+/// The critical velocity, where the scene has none to study.
+fn skipped(scene: &Scene) -> Result<Vec<String>, CliError> {
+    let why = why_no_critical_velocity(scene)?;
+    Ok(why.map(|why| format!("{} does not apply: {why}", Quantity::CriticalVelocity.name())).into_iter().collect())
 }
 
 fn quantity_json(study: &QuantityStudy, fixed: bool) -> QuantityJson {
@@ -248,9 +258,9 @@ fn text(scene: &Scene, problem: &Problem, report: &ConvergeJson) -> String {
         _ => String::new(),
     };
     lines.push(format!("  method     {}{rules}", report.method.name));
-    lines.push(format!("  reference  {}, V0 = {} m/s", report.reference, problem.impact_speed));
+    lines.push(format!("  reference  {}, V0 = {} m/s", report.reference, Shown(problem.impact_speed)));
     lines.push(String::new());
-    let mut rows = table(&["quantity", "formal", "observed", "95 % interval", "constant", "used", "class"]);
+    let mut rows = table(&["quantity", "formal", "found", "95 % interval", "constant", "used", "class"]);
     for q in &report.quantities {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.2}"));
         let interval = q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}"));
@@ -267,8 +277,9 @@ fn text(scene: &Scene, problem: &Problem, report: &ConvergeJson) -> String {
     }
     lines.extend(table_lines(&rows));
     for q in report.quantities.iter().filter(|q| q.verdict != "passed") {
-        lines.push(format!("  {}: {} ({})", q.quantity, q.verdict, q.reason));
+        lines.push(wrapped("  ", &format!("{}: {} ({})", q.quantity, q.verdict, q.reason)));
     }
+    lines.extend(report.skipped.iter().map(|note| wrapped("  ", note)));
     lines.push(format!("  verdict    {}", report.verdict));
     lines.push(String::new());
     lines.join("\n")

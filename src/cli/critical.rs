@@ -5,12 +5,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{engineering, error_text, print_json, print_text, significant, table, table_lines};
+use super::output::{
+    engineering, error_text, escape_terminal, print_json, print_text, significant, table, table_lines, tell, wrapped,
+};
 use super::scene_json::SceneJson;
-use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
-use crate::physics::{Criterion, Problem, Scene, groups};
+use crate::physics::{Criterion, Problem, Scene, Shown, groups};
 use crate::studies::critical_velocity::{self, CriticalVelocity};
 use crate::studies::sensitivity::{self, SensitivityError, Spread};
 use crate::studies::{applicability, parameter::ParameterError};
@@ -55,6 +56,8 @@ pub struct CriticalJson {
     pub eq15: Option<Eq15Json>,
     /// Uncertainty of V_c from the spreads asked for; `null` without any.
     pub uncertainty: Option<UncertaintyJson>,
+    /// What was asked for and not computed, and why.
+    pub skipped: Vec<String>,
 }
 
 /// Uncertainty of V_c from stated input spreads.
@@ -154,22 +157,29 @@ impl CriticalArgs {
             return Err(CliError::usage(
                 "a semi-infinite target has no critical velocity",
                 "give the target a thickness: [target] thickness = \"180 mm\"",
-            ));
+            )
+            .in_file(&self.scene));
         }
         let method = self.method.build()?;
         let spreads: Vec<Spread> = self.spread.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let exact = critical_velocity::exact(&scene).ok();
         if let Some(warning) = scene.exit_depth_warning() {
-            eprintln!("warning: {warning}");
+            tell("warning: ", &warning);
         }
         let problem = scene.resolve(found.velocity)?;
         for warning in applicability::warnings(&scene, found.velocity) {
-            eprintln!("warning: {warning}");
+            tell("warning: ", &warning);
         }
         let mut report = self.report(&scene, &problem, &found, exact)?;
         if !spreads.is_empty() {
-            report.uncertainty = Some(self.uncertainty(&scene, &spreads)?);
+            if exact == Some(0.0) || found.velocity == 0.0 {
+                report
+                    .skipped
+                    .push("the uncertainty does not apply: V_c is 0, and no spread is relative to it".to_owned());
+            } else {
+                report.uncertainty = Some(self.uncertainty(&scene, &spreads)?);
+            }
         }
         if self.json { print_json(&report) } else { print_text(&text(&scene, &report)) }.map_err(CliError::stdout)?;
         Ok(Exit::Success)
@@ -205,6 +215,7 @@ impl CriticalArgs {
                 .map(|exact| if found.velocity == exact { 0.0 } else { ((found.velocity - exact) / exact).abs() }),
             eq15: Eq15Json::new(scene),
             uncertainty: None,
+            skipped: Vec::new(),
         })
     }
 
@@ -241,16 +252,21 @@ fn text(scene: &Scene, report: &CriticalJson) -> String {
         Criterion::Ndrc => "x = x_p(H), the NDRC relation",
     };
     lines.push(format!("  method     {}, perforation at {criterion}", report.method.name));
-    let bar = report.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {bar:.1e}"));
-    lines.push(format!("  V_c        {}{bar} m/s, {} flights", report.critical_velocity_m_s, report.evaluations));
+    let bar = report.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {}", error_text(Some(bar))));
+    lines.push(format!(
+        "  V_c        {}{bar} m/s, {} flights",
+        Shown(report.critical_velocity_m_s),
+        report.evaluations
+    ));
     lines.push(format!("  E_c        {}", engineering(report.critical_energy_j, "J")));
     if !report.note.is_empty() {
-        lines.push(format!("  note       {}", report.note));
+        lines.push(wrapped("  note       ", report.note));
     }
     if let Some(exact) = &report.closed_form {
         let error = error_text(report.relative_error);
-        lines.push(format!("  exact      {} m/s, relative error {error}", exact.critical_velocity_m_s));
+        lines.push(format!("  exact      {} m/s, relative error {error}", Shown(exact.critical_velocity_m_s)));
     }
+    lines.extend(report.skipped.iter().map(|note| wrapped("  note       ", note)));
     if let Some(u) = &report.uncertainty {
         lines.push(format!("  spread     +- {:.4} m/s to first order", u.first_order_m_s));
         for part in &u.spreads {
@@ -268,14 +284,17 @@ fn text(scene: &Scene, report: &CriticalJson) -> String {
         let mut rows = table(&["E_c/(d³ fc)", "value", "simulation over it"]);
         rows.add_row(["simulation".to_owned(), significant(ours), String::new()]);
         let mut row = |name: &str, value: f64| {
-            rows.add_row([name.to_owned(), significant(value), format!("{:+.1} %", 100.0 * (ours / value - 1.0))]);
+            // A target without thickness needs no energy by either.
+            let over = ours / value - 1.0;
+            let over = if over.is_finite() { format!("{:+.1} %", 100.0 * over) } else { "-".to_owned() };
+            rows.add_row([name.to_owned(), significant(value), over]);
         };
         row("Eq. 15, printed", eq15.printed);
         row("Eq. 15, unrounded", eq15.unrounded);
         lines.push(String::new());
         lines.extend(table_lines(&rows));
         if !eq15.valid {
-            lines.push(format!("  Eq. 15 does not apply: {}", eq15.note));
+            lines.push(wrapped("  ", &format!("Eq. 15 does not apply: {}", eq15.note)));
         }
     }
     lines.push(String::new());

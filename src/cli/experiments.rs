@@ -6,12 +6,15 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::input::table_text;
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{print_json, print_text, significant, table, write_whole};
-use super::solve::escape_terminal;
-use super::sweep::wrapped;
+use super::output::{
+    check_outputs, escape_terminal, is_standard, print_json, print_text, significant, table, table_lines,
+    takes_standard_output, wrapped, write_all,
+};
 use super::{CliError, Exit};
 use crate::report::plots_sweep;
+use crate::report::table::cell;
 use crate::studies::experiments::{self, Comparison, PredictionCause, PredictionError, SetSummary, Shot};
 use crate::studies::sensitivity::{Spread, SpreadError};
 
@@ -28,7 +31,7 @@ pub struct ExperimentsArgs {
     /// Tables of shots; those that ship when left out.
     pub tables: Vec<PathBuf>,
     /// Crater depth in diameters for every shot [default: 0.707 + h/d].
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     pub k: Option<f64>,
     /// Relative standard deviation of an input, such as target.strength=5%; repeatable, for the input uncertainty.
     #[arg(long, value_name = "PATH=REL")]
@@ -36,7 +39,7 @@ pub struct ExperimentsArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write the comparison to this CSV file and the figure beside it.
+    /// Write the comparison to this CSV file and the figure beside it; - for standard output, without a figure.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
     /// Print JSON.
@@ -167,6 +170,11 @@ impl ExperimentsArgs {
     /// Tables or options that cannot be used (exit 2), a file that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         let spreads: Vec<Spread> = self.spread.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+        let is_table_printed = takes_standard_output(self.out.as_deref(), self.json)?;
+        if let Some(path) = &self.out {
+            let inputs: Vec<_> = self.tables.iter().map(|path| ("the measured table", path.as_path())).collect();
+            check_outputs(&inputs, &[("the table", path), ("the figure", &path.with_extension("svg"))])?;
+        }
         let shots = self.shots()?;
         let method = self.method.build()?;
         let comparisons = experiments::compare(&shots, self.k, &spreads, method.integrator())?;
@@ -181,20 +189,21 @@ impl ExperimentsArgs {
         if let Some(path) = &self.out {
             write_files(path, &comparisons, &summaries)?;
         }
-        if self.json { print_json(&report) } else { print_text(&text(&report)) }.map_err(CliError::stdout)?;
+        if !is_table_printed {
+            if self.json { print_json(&report) } else { print_text(&text(&report)) }.map_err(CliError::stdout)?;
+        }
         Ok(Exit::Success)
     }
 
     fn shots(&self) -> Result<Vec<Shot>, CliError> {
-        let help = "see verification/experiments/README.md for the columns";
+        let help = "see `penetrode experiments --help` for the columns, which are separated by commas";
         if self.tables.is_empty() {
             return experiments::shipped().map_err(|error| CliError::usage(error.to_string(), help));
         }
         let mut shots = Vec::new();
         for path in &self.tables {
             let name = path.display();
-            let text = std::fs::read_to_string(path)
-                .map_err(|cause| CliError::usage(format!("cannot read {name}: {cause}"), ""))?;
+            let text = table_text(path, help)?;
             let set = path.file_stem().map_or_else(|| "own".to_owned(), |stem| stem.to_string_lossy().into_owned());
             let read = experiments::read(&text, &set);
             shots.extend(read.map_err(|error| CliError::usage(format!("{name}: {error}"), help))?);
@@ -205,7 +214,6 @@ impl ExperimentsArgs {
 
 /// The table and the figure; both are made before the first is written.
 fn write_files(path: &Path, comparisons: &[Comparison], summaries: &[SetSummary]) -> Result<(), CliError> {
-    let failed = |path: &Path, cause| CliError::Write { path: path.display().to_string(), cause };
     let sets: Vec<plots_sweep::MarkedSet<'_>> = summaries
         .iter()
         .map(|summary| {
@@ -213,11 +221,14 @@ fn write_files(path: &Path, comparisons: &[Comparison], summaries: &[SetSummary]
             (summary.group.as_str(), of_set.map(|c| (c.shot.depth, c.predicted)).collect())
         })
         .collect();
-    let figure = plots_sweep::measured_depths(&sets).map_err(|error| failed(path, std::io::Error::other(error)))?;
-    let csv = csv_of(comparisons).map_err(|cause| failed(path, cause))?;
-    write_whole(path, &csv).map_err(|cause| failed(path, cause))?;
-    let beside = path.with_extension("svg");
-    write_whole(&beside, figure.as_bytes()).map_err(|cause| failed(&beside, cause))
+    let figure =
+        plots_sweep::measured_depths(&sets).map_err(|error| CliError::write(path, std::io::Error::other(error)))?;
+    let csv = csv_of(comparisons).map_err(|cause| CliError::write(path, cause))?;
+    let mut files = vec![(path.to_owned(), csv)];
+    if !is_standard(path) {
+        files.push((path.with_extension("svg"), figure.into_bytes()));
+    }
+    write_all(&files)
 }
 
 fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {
@@ -241,7 +252,7 @@ fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {
     let text = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
     for c in comparisons {
         writer.write_record([
-            c.shot.set.clone(),
+            cell(&c.shot.set).into_owned(),
             c.shot.line.to_string(),
             c.shot.velocity.to_string(),
             c.shot.depth.to_string(),
@@ -262,22 +273,28 @@ fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {
 
 fn text(report: &ExperimentsJson) -> String {
     let mut lines = vec![format!("Predicted over measured depth, method {}", report.method.name), String::new()];
-    let header = ["  set", "shots", "median", "spread", "range", "within 20 %", "in range of S", "mean E/D", "u_val/D"];
-    let mut rows = table(&header);
+    let mut ratios = table(&["set", "shots", "median", "spread", "range", "within 20 %"]);
+    let mut errors = table(&["set", "in range of S", "mean E/D", "u_val/D"]);
     for set in &report.sets {
-        rows.add_row([
-            format!("  {}", escape_terminal(&set.set)),
+        let name = escape_terminal(&set.set);
+        ratios.add_row([
+            name.clone(),
             set.shots.to_string(),
             format!("{:.2}", set.median),
             format!("{:.2}", set.spread),
             format!("{:.2} to {:.2}", set.least, set.greatest),
             set.within_20_percent.to_string(),
+        ]);
+        errors.add_row([
+            name,
             set.in_range_of_fit.to_string(),
             format!("{:+.1} %", 100.0 * set.mean_comparison_error),
             set.validation_uncertainty.map_or("not given".to_owned(), |u| format!("{:.1} %", 100.0 * u)),
         ]);
     }
-    lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+    lines.extend(table_lines(&ratios));
+    lines.push(String::new());
+    lines.extend(table_lines(&errors));
     lines.push(String::new());
     let given = |get: fn(&ShotJson) -> Option<f64>| report.shots.iter().filter_map(get).count();
     let numerical = report.shots.iter().map(|s| s.numerical_uncertainty_m / s.predicted_depth_m).fold(0.0, f64::max);
@@ -294,7 +311,7 @@ fn text(report: &ExperimentsJson) -> String {
     lines.extend(named.map(|(name, value)| format!("  {name:<18} {value}")));
     if let Some(meaning) = report.meaning {
         lines.push(String::new());
-        lines.push(wrapped(meaning, 100));
+        lines.push(wrapped("  ", meaning));
     }
     lines.push(String::new());
     lines.join("\n")

@@ -6,7 +6,10 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::output::{print_json, print_text, significant, table, write_whole};
+use super::output::{
+    check_outputs, is_standard, print_json, print_text, significant, table, table_lines, takes_standard_output,
+    write_all,
+};
 use super::{CliError, Exit};
 use crate::physics::groups::Groups;
 use crate::report::plots_sweep;
@@ -23,9 +26,9 @@ use crate::studies::experiments::{self, ExperimentError};
 )]
 pub struct MapArgs {
     /// Crater depth in diameters.
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, default_value_t = 2.0, allow_hyphen_values = true)]
     pub k: f64,
-    /// Write the lines to this CSV file and the figure beside it.
+    /// Write the lines to this CSV file and the figure beside it; - for standard output, without a figure.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
     /// Print JSON.
@@ -80,9 +83,13 @@ impl MapArgs {
         if !(self.k.is_finite() && self.k > 0.0) {
             return Err(CliError::usage(format!("--k {} is not allowed", self.k), "give a number above zero"));
         }
+        let is_table_printed = takes_standard_output(self.out.as_deref(), self.json)?;
+        if let Some(path) = &self.out {
+            check_outputs(&[], &[("the table", path), ("the figure", &path.with_extension("svg"))])?;
+        }
         let report = self.report().map_err(|error| CliError::usage(error.to_string(), ""))?;
         if let Some(path) = &self.out {
-            let failed = |cause| CliError::Write { path: path.display().to_string(), cause };
+            let failed = |cause| CliError::write(path, cause);
             let mut sets: Vec<plots_sweep::MarkedSet<'_>> = Vec::new();
             for scene in &report.scenes {
                 match sets.iter_mut().find(|(set, _)| *set == scene.set) {
@@ -97,8 +104,14 @@ impl MapArgs {
                 csv.extend(line.points.iter().map(|(i, n)| format!("{},{i},{n}", line.level)));
             }
             csv.push(String::new());
-            write_whole(path, csv.join("\n").as_bytes()).map_err(failed)?;
-            write_whole(&path.with_extension("svg"), figure.as_bytes()).map_err(failed)?;
+            let mut files = vec![(path.clone(), csv.join("\n").into_bytes())];
+            if !is_standard(path) {
+                files.push((path.with_extension("svg"), figure.into_bytes()));
+            }
+            write_all(&files)?;
+        }
+        if is_table_printed {
+            return Ok(Exit::Success);
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;
         Ok(Exit::Success)
@@ -130,9 +143,9 @@ impl MapArgs {
             format!("Error of Eq. 11-12 against the equation of motion, k = {}", self.k),
             "  least N for an error within".to_owned(),
         ];
-        let mut rows = table(&["  I", "1 %", "5 %", "20 %"]);
+        let mut rows = table(&["I", "1 %", "5 %", "20 %"]);
         for impact in [0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0] {
-            let mut cells = vec![format!("  {}", significant(impact))];
+            let mut cells = vec![significant(impact)];
             cells.extend(
                 LEVELS.map(|level| {
                     applicability::geometry_at(level, impact, self.k).map_or("any".to_owned(), significant)
@@ -140,9 +153,9 @@ impl MapArgs {
             );
             rows.add_row(cells);
         }
-        lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.extend(table_lines(&rows));
         lines.push(String::new());
-        let mut sets = table(&["  measured set", "shots", "I", "N", "error of Eq. 11-12", "within 5 %"]);
+        let mut sets = table(&["measured set", "shots", "I", "N", "error, %", "in 5 %"]);
         let mut names: Vec<&str> = report.scenes.iter().map(|scene| scene.set.as_str()).collect();
         names.dedup();
         for name in names {
@@ -153,15 +166,15 @@ impl MapArgs {
             let (impact, geometry, error) = (range(|s| s.I), range(|s| s.N), range(|s| s.error));
             let within = of_set.iter().filter(|s| s.error.abs() <= applicability::ERROR_ALLOWED).count();
             sets.add_row([
-                format!("  {name}"),
+                (*name).to_owned(),
                 of_set.len().to_string(),
                 format!("{:.2} to {:.1}", impact.0, impact.1),
                 format!("{:.1} to {:.1}", geometry.0, geometry.1),
-                format!("{:+.1} to {:+.1} %", 100.0 * error.0, 100.0 * error.1),
+                format!("{:+.1} to {:+.1}", 100.0 * error.0, 100.0 * error.1),
                 within.to_string(),
             ]);
         }
-        lines.extend(sets.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.extend(table_lines(&sets));
         lines.push(String::new());
         lines.join("\n")
     }

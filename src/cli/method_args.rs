@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::CliError;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT};
-use crate::integrators::{Flight, StepLimit};
+use crate::integrators::{Flight, IntegrationError, StepLimit};
 use crate::physics::Problem;
 use crate::physics::units::{Dimension, QuantityError, quantity};
 
@@ -18,10 +18,10 @@ pub struct MethodArgs {
     #[arg(long, value_enum, default_value_t = MethodName::Taylor)]
     pub method: MethodName,
     /// Relative tolerance (diffsol methods and adaptive: 1e-10; taylor and energy: round-off).
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", allow_hyphen_values = true)]
     pub rtol: Option<f64>,
     /// Time step of central-difference, such as "1 us" or seconds; from the stages when left out.
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub dt: Option<String>,
     /// Velocity in the drag of central-difference [default: lagged, as in the paper].
     #[arg(long, value_enum)]
@@ -54,7 +54,20 @@ impl MethodArgs {
     /// # Errors
     /// Options that the method does not use or that are out of range.
     pub fn build(&self) -> Result<Method, CliError> {
-        Ok(Method::new(self.method, &self.options()?)?)
+        let build = |options| Method::new(self.method, &options).map_err(|error| self.as_typed(error));
+        Ok(build(self.options()?)?)
+    }
+}
+
+impl MethodArgs {
+    /// `error` with the step as it was typed, `1 us` and not 1e-6.
+    fn as_typed(&self, error: IntegrationError) -> IntegrationError {
+        match (error, &self.dt) {
+            (IntegrationError::BadOption { option: "--dt", allowed, .. }, Some(typed)) => {
+                IntegrationError::BadOption { option: "--dt", value: typed.clone(), allowed }
+            }
+            (other, _) => other,
+        }
     }
 }
 

@@ -7,6 +7,7 @@ pub mod completions;
 pub mod converge;
 pub mod critical;
 pub mod experiments;
+pub mod input;
 pub mod map;
 pub mod method_args;
 pub mod output;
@@ -26,7 +27,8 @@ use serde::Serialize;
 
 use crate::integrators::IntegrationError;
 use crate::physics::State;
-use crate::physics::{ResolveError, Scene, SceneError};
+use crate::physics::{Problem, ResolveError, Scene, SceneError};
+use crate::report::folder::without_temporary_name;
 use crate::studies::convergence::ConvergenceError;
 use crate::studies::critical_velocity::CriticalError;
 
@@ -109,6 +111,10 @@ impl<E: std::fmt::Display> From<CriticalError<E>> for CliError {
         let message = error.to_string();
         let (help, last) = match &error {
             CriticalError::Flight { cause, .. } => (cause.help().to_owned(), cause.last()),
+            CriticalError::NoBracket { .. } => (
+                "the drag over the thickness is too large: check the thickness, the density and the mass".to_owned(),
+                None,
+            ),
             _ => (String::new(), None),
         };
         if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last } }
@@ -131,9 +137,28 @@ impl CliError {
         Self::Usage { message: message.into(), help: help.into() }
     }
 
+    /// A file that could not be written.
+    pub fn write(path: &std::path::Path, cause: io::Error) -> Self {
+        Self::Write { path: path.display().to_string(), cause: without_temporary_name(cause) }
+    }
+
     /// Standard output that could not be written.
     pub fn stdout(cause: io::Error) -> Self {
         Self::Write { path: "standard output".to_owned(), cause }
+    }
+
+    /// The same about the file at `path`, where it is about what the file holds.
+    #[must_use]
+    pub fn in_file(self, path: &str) -> Self {
+        let named = |message: String| match path {
+            "-" => format!("standard input: {message}"),
+            path => format!("{path}: {message}"),
+        };
+        match self {
+            Self::Usage { message, help } => Self::Usage { message: named(message), help },
+            Self::Run { message, help, last } => Self::Run { message: named(message), help, last },
+            other => other,
+        }
     }
 
     /// The exit code.
@@ -149,16 +174,22 @@ impl CliError {
     pub fn render(&self, color: bool) -> String {
         match self {
             Self::Scene(error) => error.render(color),
-            Self::Usage { message, help } | Self::Run { message, help, .. } => {
-                let mut text = format!("error: {message}\n");
-                if !help.is_empty() {
-                    text.push_str(&format!(" help: {help}\n"));
-                }
-                text
-            }
-            other => format!("error: {other}\n"),
+            Self::Usage { message, help } | Self::Run { message, help, .. } => told(message, help),
+            Self::Write { cause, .. } => told(&self.to_string(), output::write_help(cause.kind())),
+            Self::PeerMissing(message) => told(message, ""),
         }
     }
+}
+
+/// A message and what to do, for a terminal.
+fn told(message: &str, help: &str) -> String {
+    let mut text = output::wrapped("error: ", &output::escape_terminal(message));
+    text.push('\n');
+    if !help.is_empty() {
+        text.push_str(&output::wrapped(" help: ", &output::escape_terminal(help)));
+        text.push('\n');
+    }
+    text
 }
 
 /// The JSON verdict of a run that failed (exit 1).
@@ -309,6 +340,11 @@ impl Cli {
 /// The scene in the file at `path`; `-` is standard input.
 fn read_scene(path: &str) -> Result<Scene, Box<SceneError>> {
     Scene::read(std::path::Path::new(path))
+}
+
+/// The problem of `scene`, read from `path`; what is wrong with it names the file.
+fn problem_of(scene: &Scene, path: &str) -> Result<Problem, CliError> {
+    scene.problem().map_err(|error| CliError::from(error).in_file(path))
 }
 
 /// Whether standard error is a terminal that wants colour.

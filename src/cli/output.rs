@@ -2,11 +2,12 @@
 
 use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::CliError;
+use crate::report::folder::TEMPORARY;
 
 /// Prints `value` as pretty JSON on standard output.
 ///
@@ -23,20 +24,133 @@ pub fn print_json<T: Serialize>(value: &T) -> io::Result<()> {
 /// # Errors
 /// When standard output cannot be written for another reason.
 pub fn print_text(text: &str) -> io::Result<()> {
-    match io::stdout().lock().write_all(text.as_bytes()).and_then(|()| io::stdout().flush()) {
+    print_bytes(text.as_bytes())
+}
+
+/// As [`print_text`].
+fn print_bytes(bytes: &[u8]) -> io::Result<()> {
+    unless_closed(io::stdout().lock().write_all(bytes).and_then(|()| io::stdout().flush()))
+}
+
+/// `result`, a reader of the pipe that has gone away being no error.
+///
+/// # Errors
+/// Any other error of `result`.
+pub fn unless_closed(result: io::Result<()>) -> io::Result<()> {
+    match result {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         other => other,
     }
 }
 
-/// Writes `bytes` to `path` whole or not at all: into a temporary file beside it, moved into place.
+/// Width of what is printed for people [characters].
+pub const WIDTH: usize = 80;
+
+/// `text` in lines of [`WIDTH`] at most, behind `head`; further lines are indented by as much as `head` is long.
+///
+/// A word that is longer than a line stays whole: a path is copied, not read.
+pub fn wrapped(head: &str, text: &str) -> String {
+    let indent = " ".repeat(head.chars().count());
+    let mut lines = vec![head.to_owned()];
+    let mut is_first = true;
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if is_first || line.chars().count() + 1 + word.chars().count() <= WIDTH => {
+                if !is_first {
+                    line.push(' ');
+                }
+                line.push_str(word);
+            }
+            _ => lines.push(format!("{indent}{word}")),
+        }
+        is_first = false;
+    }
+    lines.join("\n")
+}
+
+/// Tells a person on standard error, `head` (`warning: `) in front.
+pub fn tell(head: &str, text: &str) {
+    eprintln!("{}", wrapped(head, text));
+}
+
+/// Whether `path` stands for standard input or output.
+pub fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Whether both paths are one file.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    !is_standard(a) && (a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b))
+}
+
+/// A file of a run and what it is, for messages: `("the scene", path)`.
+pub type Named<'a> = (&'static str, &'a Path);
+
+/// Refuses `outputs`, before any work is done, that would replace an input or one another, or have no folder to go to.
 ///
 /// # Errors
-/// When the folder cannot be written or the disk is full; the old file is then untouched.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = temporary_beside(path)?;
-    file.write_all(bytes)?;
-    persist(file, path)
+/// A file that would be replaced (exit 2); a folder that is missing, or in the place of a file (exit 1).
+pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), CliError> {
+    for (index, (what, path)) in outputs.iter().enumerate() {
+        let others = inputs.iter().chain(&outputs[..index]);
+        if let Some((other, _)) = others.into_iter().find(|(_, other)| is_same_file(other, path)) {
+            let help = match index {
+                0 => "name another file",
+                _ => "name the table .csv: a figure goes beside it, with the ending .svg",
+            };
+            return Err(CliError::usage(format!("{what} would replace {other}: both are {}", path.display()), help));
+        }
+        if is_standard(path) {
+            continue;
+        }
+        let kind = match path.parent() {
+            _ if path.is_dir() => io::ErrorKind::IsADirectory,
+            Some(folder) if !(folder.as_os_str().is_empty() || folder.exists()) => io::ErrorKind::NotFound,
+            _ => continue,
+        };
+        return Err(CliError::write(path, kind.into()));
+    }
+    Ok(())
+}
+
+/// Whether the table named `out` takes standard output, where nothing else is printed then.
+///
+/// # Errors
+/// When JSON is asked for in the same place (exit 2).
+pub fn takes_standard_output(out: Option<&Path>, json: bool) -> Result<bool, CliError> {
+    let takes = out.is_some_and(is_standard);
+    if takes && json {
+        return Err(CliError::usage("the table and the JSON cannot both go to standard output", "name a file for one"));
+    }
+    Ok(takes)
+}
+
+/// Writes `files`, all of them whole or none: each into a temporary file beside its place, then all moved into place.
+///
+/// A path `-` is standard output.
+///
+/// # Errors
+/// When a folder cannot be written or the disk is full; the old files are then untouched.
+pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), CliError> {
+    let mut written = Vec::with_capacity(files.len());
+    for (path, bytes) in files {
+        if is_standard(path) {
+            print_bytes(bytes).map_err(CliError::stdout)?;
+            continue;
+        }
+        let write = || {
+            let mut file = temporary_beside(path)?;
+            file.write_all(bytes)?;
+            // What does not fit on the disk is known here, before the first file is replaced.
+            file.as_file().sync_all()?;
+            Ok(file)
+        };
+        written.push((path, write().map_err(|cause| CliError::write(path, cause))?));
+    }
+    for (path, file) in written {
+        persist(file, path).map_err(|cause| CliError::write(path, cause))?;
+    }
+    Ok(())
 }
 
 /// A temporary file in the folder of `path`, to be moved there by [`persist`].
@@ -45,13 +159,28 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// When the folder cannot be written, or `path` names a folder.
 pub fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     if path.is_dir() {
-        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder; name a file"));
+        return Err(io::ErrorKind::IsADirectory.into());
     }
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    tempfile::Builder::new().prefix(".penetrode-").tempfile_in(folder)
+    tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder)
+}
+
+/// What to do about a file that cannot be written.
+pub fn write_help(kind: io::ErrorKind) -> &'static str {
+    use io::ErrorKind::{
+        IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull,
+    };
+    match kind {
+        NotFound => "make the folder first, or name another",
+        IsADirectory => "that is a folder: name a file in it",
+        NotADirectory => "a part of this path is a file: name a folder",
+        PermissionDenied | ReadOnlyFilesystem => "name a place where you may write",
+        StorageFull | QuotaExceeded => "make room on the disk, or name another; what was there is untouched",
+        _ => "name another place; what was there is untouched",
+    }
 }
 
 /// Moves a finished temporary file to `path`, with the permissions that an ordinary new file has.
@@ -87,6 +216,14 @@ pub fn check_format(path: &Path) -> Result<(), CliError> {
         format!("{}: this build reads and writes CSV only", path.display()),
         "build with `--features parquet`, or name a .csv file",
     ))
+}
+
+/// Characters of a text from a file that steer a terminal, made visible: a title must not drive it, nor turn its lines.
+pub fn escape_terminal(text: &str) -> String {
+    let steers = |c: char| {
+        c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
+    };
+    text.chars().map(|c| if steers(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 /// `value` with an SI prefix and six significant digits: `144.826 mm`, `8.48230 MN`.
@@ -144,6 +281,9 @@ pub fn table(header: &[&str]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     table.load_style(comfy_table::presets::NOTHING);
     table.set_header(header.iter().copied());
+    // Where a number of a strange scene makes a row too wide, its cells wrap. The indent takes one column, and the
+    // padding of the last cell is cut off.
+    table.set_content_arrangement(comfy_table::ContentArrangement::Dynamic).set_width(WIDTH as u16);
     table
 }
 

@@ -6,6 +6,7 @@ use schemars::schema_for;
 use super::{CliError, Exit, converge, critical, experiments, map, output, solve, stress, sweep};
 use crate::report::VerifyJson;
 use crate::report::bench::BenchJson;
+use crate::studies::audit::Audit;
 
 /// Arguments of `schema`.
 #[derive(Args, Debug)]
@@ -32,6 +33,8 @@ pub enum Documented {
     Bench,
     /// `experiments --json`.
     Experiments,
+    /// `audit --json`.
+    Audit,
     /// `verify --json`, which is `report.json`.
     Verify,
     /// `stress --json`.
@@ -52,6 +55,7 @@ impl SchemaArgs {
             Documented::Bench => schema_for!(BenchJson),
             Documented::Experiments => schema_for!(experiments::ExperimentsJson),
             Documented::Map => schema_for!(map::MapJson),
+            Documented::Audit => schema_for!(Audit),
             Documented::Verify => schema_for!(VerifyJson),
             Documented::Stress => schema_for!(stress::StressJson),
         };

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::CliError;
-use super::output::table;
-use crate::physics::Scene;
+use super::output::{table, table_lines, wrapped};
+use crate::physics::{Scene, Shown};
 use crate::studies::sensitivity::{Sensitivity, by_closed_form, by_taylor, elasticity};
 
 /// `sensitivities` in the JSON of `solve`.
@@ -72,28 +72,28 @@ impl SensitivitiesJson {
 
     /// The table of elasticities.
     pub fn text(&self) -> String {
-        let mut rows = table(&["  elasticity to", "value (SI)", "X", "V_r", "V_c"]);
+        let mut rows = table(&["elasticity to", "value (SI)", "X", "V_r", "V_c"]);
         let cell = |d: &Option<DerivativeJson>| {
             d.as_ref().and_then(|d| d.elasticity).map_or("-".to_owned(), |e| format!("{e:+.6}"))
         };
         for p in &self.parameters {
             rows.add_row([
-                format!("  {}", p.path),
-                p.value.to_string(),
+                p.path.clone(),
+                Shown(p.value).to_string(),
                 cell(&p.depth),
                 cell(&p.velocity),
                 cell(&p.critical_velocity),
             ]);
         }
         let mut lines = vec![String::new()];
-        lines.extend(rows.to_string().lines().map(|line| line.trim_end().to_owned()));
+        lines.extend(table_lines(&rows));
         lines.push(match self.disagreement {
             Some(difference) => {
                 format!("  dual numbers through taylor; {difference:.1e} from those through the closed form")
             }
             None => "  dual numbers through taylor; no closed form beside them".to_owned(),
         });
-        lines.extend(self.notes.iter().map(|note| format!("  note: {note}")));
+        lines.extend(self.notes.iter().map(|note| wrapped("  note: ", note)));
         lines.push(String::new());
         lines.join("\n")
     }

@@ -7,16 +7,18 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::batch::is_same_file;
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{engineering, error_text, print_json, print_text, significant, table, table_lines, write_whole};
+use super::output::{
+    check_outputs, engineering, error_text, escape_terminal, print_json, print_text, significant, table, table_lines,
+    takes_standard_output, tell, wrapped, write_all,
+};
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
-use super::{CliError, Exit, read_scene};
+use super::{CliError, Exit, problem_of, read_scene};
 use crate::integrators::closed_form::ClosedForm;
 use crate::integrators::{Detail, Flight, Integrator};
 use crate::physics::groups::Groups;
-use crate::physics::{EventKind, Outcome, Problem, Scene};
+use crate::physics::{EventKind, Outcome, Problem, Scene, Shown};
 use crate::studies::applicability;
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
@@ -29,7 +31,7 @@ pub struct SolveArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write every step and event to this CSV file.
+    /// Write every step and event to this CSV file; - for standard output, in place of the answer.
     #[arg(long, value_name = "F.csv")]
     pub trajectory: Option<PathBuf>,
     /// Say what the scene let the method skip, and why.
@@ -160,10 +162,11 @@ impl SolveArgs {
     /// A scene or options that cannot be used (exit 2), a flight without an answer (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         let scene = read_scene(&self.scene)?;
-        if self.trajectory.as_deref().is_some_and(|path| is_same_file(Path::new(&self.scene), path)) {
-            return Err(CliError::usage("the trajectory would replace the scene", "give --trajectory another name"));
+        let is_table_printed = takes_standard_output(self.trajectory.as_deref(), self.json)?;
+        if let Some(path) = &self.trajectory {
+            check_outputs(&[("the scene", Path::new(&self.scene))], &[("the trajectory", path)])?;
         }
-        let problem = scene.problem()?;
+        let problem = problem_of(&scene, &self.scene)?;
         let method = self.method.build()?;
         let detail = if self.trajectory.is_some() { Detail::Trajectory } else { Detail::Events };
         let started = Instant::now();
@@ -171,15 +174,13 @@ impl SolveArgs {
         let wall_ns = u64::try_from(started.elapsed().as_nanos()).unwrap_or(u64::MAX);
         let exact = ClosedForm.fly(&problem, Detail::Events).ok();
         if let Some(warning) = scene.exit_depth_warning() {
-            eprintln!("warning: {warning}");
+            tell("warning: ", &warning);
         }
         if let Some(path) = &self.trajectory {
-            let csv = trajectory_csv(&flight);
-            write_whole(path, csv.as_bytes())
-                .map_err(|cause| CliError::Write { path: path.display().to_string(), cause })?;
+            write_all(&[(path.clone(), trajectory_csv(&flight).into_bytes())])?;
         }
         for warning in applicability::warnings(&scene, problem.impact_speed) {
-            eprintln!("warning: {warning}");
+            tell("warning: ", &warning);
         }
         let mut skipped = method.explain(&problem, &flight, detail);
         let sensitivities = if self.sensitivities {
@@ -188,6 +189,9 @@ impl SolveArgs {
         } else {
             None
         };
+        if is_table_printed {
+            return Ok(exit_of(&flight));
+        }
         if self.json {
             let mut json = self.json(&scene, &problem, &flight, exact.as_ref(), skipped, wall_ns)?;
             json.sensitivities = sensitivities;
@@ -287,12 +291,16 @@ impl SolveArgs {
         line(&format!("  method   {}{tuning}", json.name));
         let mut outcome = flight.outcome.name().to_owned();
         if let (Some(margin), Some(bar)) = (flight.exit_margin, flight.exit_margin_error) {
-            outcome.push_str(&format!(" (exit margin {} +- {bar:.0e} of V0²)", significant(margin)));
+            outcome.push_str(&if margin.is_finite() && bar.is_finite() {
+                format!(" (exit margin {} +- {bar:.0e} of V0²)", significant(margin))
+            } else {
+                " (the exit margin leaves the range of 64-bit numbers)".to_owned()
+            });
         }
         line(&format!("  outcome  {outcome}"));
         let groups = Groups::of(scene, problem.impact_speed);
         if let Some(g) = groups {
-            let mut row = format!("  groups   I {}", significant(g.impact));
+            let mut row = format!("  groups   I {}", impact_text(g.impact, problem.impact_speed));
             if let Some(n) = g.geometry {
                 row.push_str(&format!("   N {}", significant(n)));
             }
@@ -355,16 +363,11 @@ impl SolveArgs {
             line("");
             line("  skipped");
             for note in skipped {
-                line(&format!("  - {note}"));
+                line(&wrapped("  - ", note));
             }
         }
         Ok(text)
     }
-}
-
-/// Control characters of a text from a file, made visible: a title must not drive the terminal.
-pub fn escape_terminal(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 /// 3 beyond the scheme's step limit, 4 when undecided, else 0.
@@ -378,12 +381,30 @@ fn exit_of(flight: &Flight) -> Exit {
     }
 }
 
+/// The impact function for people; where the speed is above zero it is neither zero nor infinite, only out of range.
+fn impact_text(impact: f64, impact_speed: f64) -> String {
+    if impact == 0.0 && impact_speed > 0.0 {
+        "below 1e-323".to_owned()
+    } else if impact.is_infinite() {
+        "above 1e308".to_owned()
+    } else {
+        significant(impact)
+    }
+}
+
 /// `time_s,depth_m,velocity_m_s,force_n,stage`, one row a step and one an event.
 fn trajectory_csv(flight: &Flight) -> String {
     let mut csv = String::from("time_s,depth_m,velocity_m_s,force_n,stage\n");
     for sample in &flight.trajectory {
         let s = sample.state;
-        csv.push_str(&format!("{},{},{},{},{}\n", s.time, s.depth, s.velocity, sample.force, sample.stage));
+        csv.push_str(&format!(
+            "{},{},{},{},{}\n",
+            Shown(s.time),
+            Shown(s.depth),
+            Shown(s.velocity),
+            Shown(sample.force),
+            sample.stage
+        ));
     }
     csv
 }

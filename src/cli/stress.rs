@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::output::{error_text, print_json, print_text, table, table_lines};
+use super::output::{error_text, escape_terminal, print_json, print_text, table, table_lines, wrapped};
 use super::{CliError, Exit};
 use crate::report::Environment;
 use crate::report::json::ClaimJson;
@@ -274,11 +274,11 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
         });
         let _ = write!(
             text,
-            "{:<9} {}\n          {}\n          {measured}; {}\n",
+            "{:<9} {}\n{}\n{}\n",
             case.verdict.name(),
             case.id,
-            case.statement,
-            super::solve::escape_terminal(&case.remark)
+            wrapped("          ", case.statement),
+            wrapped("          ", &format!("{measured}; {}", escape_terminal(&case.remark)))
         );
     }
     if let Some(summary) = random {
@@ -297,10 +297,11 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
 }
 
 fn random_text(summary: &Summary) -> String {
-    let mut text = format!(
-        "random scenes: {}, of which {} do not resolve; critical velocities: {} agree, {} out of range; 50 digits asked for {}\n",
+    let counts = format!(
+        "{}, of which {} do not resolve; critical velocities: {} agree, {} out of range; 50 digits asked for {}",
         summary.scenes, summary.unresolved, summary.critical_found, summary.critical_refused, summary.asked_reference
     );
+    let mut text = wrapped("random scenes: ", &counts) + "\n";
     let mut outcomes = table(&["outcomes of", "right", "undecided", "refused", "wrong"]);
     for (method, tally) in &summary.tallies {
         outcomes.add_row([
@@ -326,7 +327,7 @@ fn random_text(summary: &Summary) -> String {
         text.push('\n');
     }
     for defect in &summary.defects {
-        let _ = writeln!(text, "  scene {}: {}", defect.index, super::solve::escape_terminal(&defect.what));
+        let _ = writeln!(text, "  scene {}: {}", defect.index, escape_terminal(&defect.what));
     }
     text
 }

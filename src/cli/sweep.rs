@@ -6,9 +6,12 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::input::table_text;
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{check_format, print_json, print_text, significant, table, write_whole};
-use super::solve::escape_terminal;
+use super::output::{
+    check_format, check_outputs, escape_terminal, is_standard, print_json, print_text, significant, table, table_lines,
+    takes_standard_output, tell, wrapped, write_all,
+};
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Method;
 use crate::physics::{Criterion, Outcome};
@@ -39,7 +42,7 @@ pub struct SweepArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write the table to this file (.csv or .parquet) and the figures beside it.
+    /// Write the table to this file (.csv or .parquet) and the figures beside it; - for standard output, without figures.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
     /// Print JSON.
@@ -171,6 +174,8 @@ impl SweepArgs {
             return Err(CliError::usage("--vary may be given once or twice", "sweep the third number in another run"));
         }
         let plan = Plan::new(scene, &axes)?;
+        let is_table_printed = takes_standard_output(self.out.as_deref(), self.json)?;
+        self.check_outputs(&plan)?;
         let method = self.method.build()?;
         let points = self.points(&plan)?;
         let rows = plan.run(method.integrator());
@@ -179,12 +184,25 @@ impl SweepArgs {
         if let Some(path) = &self.out {
             write_files(path, &plan, &rows, &points)?;
         }
-        if self.json { print_json(&report) } else { print_text(&self.text(&plan, &rows, &report)) }
-            .map_err(CliError::stdout)?;
-        for note in notes(&plan, &rows) {
-            eprintln!("{note}");
+        if !is_table_printed {
+            if self.json { print_json(&report) } else { print_text(&self.text(&plan, &rows, &report)) }
+                .map_err(CliError::stdout)?;
+        }
+        for (head, note) in notes(&plan, &rows) {
+            tell(head, &note);
         }
         Ok(if report.bad_rows > 0 { Exit::Criterion } else { Exit::Success })
+    }
+
+    /// Table and figures replace neither the scene nor the measured points, nor one another.
+    fn check_outputs(&self, plan: &Plan) -> Result<(), CliError> {
+        let Some(out) = &self.out else { return Ok(()) };
+        let mut inputs = vec![("the scene", Path::new(&self.scene))];
+        inputs.extend(self.data.as_deref().map(|path| ("the measured points", path)));
+        let figures = figure_paths(out, plan);
+        let mut outputs = vec![("the table", out.as_path())];
+        outputs.extend(figures.iter().map(|path| ("the figure", path.as_path())));
+        check_outputs(&inputs, &outputs)
     }
 
     fn points(&self, plan: &Plan) -> Result<Vec<(f64, f64)>, CliError> {
@@ -195,14 +213,9 @@ impl SweepArgs {
                 "sweep H/d alone, or leave out --data",
             ));
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|cause| CliError::usage(format!("cannot read {}: {cause}", path.display()), ""))?;
-        read_points(&text).map_err(|error| {
-            CliError::usage(
-                format!("{}: {error}", path.display()),
-                "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, one number each a line",
-            )
-        })
+        let help = "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, separated by commas, one number each a line";
+        let text = table_text(path, help)?;
+        read_points(&text).map_err(|error| CliError::usage(format!("{}: {error}", path.display()), help))
     }
 
     fn report(&self, plan: &Plan, rows: &[Row], data: Vec<DataJson>) -> Result<SweepJson, CliError> {
@@ -243,42 +256,22 @@ impl SweepArgs {
         if report.static_factor_follows_strength {
             lines.push("  S follows the strength by Eq. 14".to_owned());
         }
+        lines.push("  V_c and V in m/s, X in m, E_c over d³ fc; `over it` is E_c over Eq. 15".to_owned());
         lines.push(String::new());
-        let mut header: Vec<String> = paths.iter().map(|path| format!("  {path}")).collect();
-        header.extend(
-            ["V_c [m/s]", "E_c/(d³ fc)", "Eq. 15", "over it", "outcome", "depth [m]", "V [m/s]"].map(str::to_owned),
-        );
-        let mut shown = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
-        let dash = |value: Option<f64>| value.map_or("-".to_owned(), significant);
         // Evenly, first and last among them.
         let count = rows.len().min(ROWS_SHOWN);
-        for i in 0..count {
-            let row = &rows[if count < 2 { 0 } else { i * (rows.len() - 1) / (count - 1) }];
-            let mut cells: Vec<String> = row.values.iter().map(|value| format!("  {}", significant(*value))).collect();
-            if row.error.is_empty() {
-                cells.extend([
-                    dash(row.critical_velocity),
-                    dash(row.dimensionless_energy),
-                    dash(row.eq15_printed),
-                    row.difference_printed().map_or("-".to_owned(), |d| format!("{:+.1} %", 100.0 * d)),
-                    row.flight.map_or("-", |f| f.outcome.name()).to_owned(),
-                    dash(row.flight.map(|f| f.depth)),
-                    dash(row.flight.map(|f| f.velocity)),
-                ]);
-            } else {
-                cells.push(row.error.clone());
-            }
-            shown.add_row(cells);
-        }
-        lines.extend(shown.to_string().lines().map(|line| line.trim_end().to_owned()));
+        let shown: Vec<&Row> =
+            (0..count).map(|i| &rows[if count < 2 { 0 } else { i * (rows.len() - 1) / (count - 1) }]).collect();
+        lines.extend(table_lines(&points_table(&paths, &shown)));
         if count < rows.len() {
             lines.push(format!("  {count} of {} points shown; --out and --json give all", rows.len()));
         }
         if !report.data.is_empty() {
-            let mut measured = table(&["  measured at H/d", "E_c/(d³ fc)", "full depth", "ndrc", "Eq. 15"]);
+            let mut measured = table(&["measured at H/d", "E_c/(d³ fc)", "full depth", "ndrc", "Eq. 15"]);
+            let dash = |value: Option<f64>| value.map_or("-".to_owned(), significant);
             for point in &report.data {
                 measured.add_row([
-                    format!("  {}", significant(point.thickness_ratio)),
+                    significant(point.thickness_ratio),
                     significant(point.measured),
                     dash(point.energy_full_depth),
                     dash(point.energy_ndrc),
@@ -286,35 +279,55 @@ impl SweepArgs {
                 ]);
             }
             lines.push(String::new());
-            lines.extend(measured.to_string().lines().map(|line| line.trim_end().to_owned()));
+            lines.extend(table_lines(&measured));
         }
         if !report.explanation.is_empty() {
             lines.push(String::new());
-            lines.push(wrapped(&report.explanation, 100));
+            lines.push(wrapped("  ", &report.explanation));
         }
         if let Some(path) = &self.out {
             lines.push(String::new());
-            let names: Vec<_> = figure_paths(path, plan).iter().map(|p| p.display().to_string()).collect();
-            lines.push(format!("  written: {}, {}", path.display(), names.join(", ")));
+            let mut names = vec![path.display().to_string()];
+            names.extend(figure_paths(path, plan).iter().map(|p| p.display().to_string()));
+            lines.push(wrapped("  written: ", &names.join(", ")));
         }
         lines.push(String::new());
         lines.join("\n")
     }
 }
 
-/// `text` in lines of at most `width` characters, indented by two.
-pub(super) fn wrapped(text: &str, width: usize) -> String {
-    let mut lines = vec![String::from(" ")];
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(format!("  {word}")),
+/// What a column of the table for people shows of a row; `None` where the row has no such value.
+type Column = (&'static str, fn(&Row) -> Option<String>);
+
+/// The columns behind the varied numbers.
+const TEXT_COLUMNS: [Column; 7] = [
+    ("V_c", |row| row.critical_velocity.map(significant)),
+    ("E_c", |row| row.dimensionless_energy.map(significant)),
+    ("Eq. 15", |row| row.eq15_printed.map(significant)),
+    ("over it", |row| row.difference_printed().map(|d| format!("{:+.1} %", 100.0 * d))),
+    ("ends", |row| row.flight.map(|f| f.outcome.name().replace("stopped-in-", "in "))),
+    ("X", |row| row.flight.map(|f| significant(f.depth))),
+    ("V", |row| row.flight.map(|f| significant(f.velocity))),
+];
+
+/// The rows for people: a column that no row fills is left out, and Eq. 15 where two numbers vary.
+fn points_table(paths: &[&str], rows: &[&Row]) -> comfy_table::Table {
+    let is_shown =
+        |(name, cell): &&Column| rows.iter().any(|row| cell(row).is_some()) && !(*name == "Eq. 15" && paths.len() > 1);
+    let columns: Vec<&Column> = TEXT_COLUMNS.iter().filter(is_shown).collect();
+    let mut header: Vec<&str> = paths.iter().map(|path| path.rsplit('.').next().unwrap_or(path)).collect();
+    header.extend(columns.iter().map(|(name, _)| *name));
+    let mut shown = table(&header);
+    for row in rows {
+        let mut cells: Vec<String> = row.values.iter().map(|value| significant(*value)).collect();
+        if row.error.is_empty() {
+            cells.extend(columns.iter().map(|(_, cell)| cell(row).unwrap_or_else(|| "-".to_owned())));
+        } else {
+            cells.push("no answer".to_owned());
         }
+        shown.add_row(cells);
     }
-    lines.join("\n")
+    shown
 }
 
 /// The curves at the measured points, computed there and not interpolated.
@@ -344,6 +357,9 @@ fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<Dat
 
 /// Where the figures go, beside the table at `path`.
 fn figure_paths(path: &Path, plan: &Plan) -> Vec<PathBuf> {
+    if is_standard(path) {
+        return Vec::new();
+    }
     let mut paths = vec![path.with_extension("svg")];
     if draws_eq15(plan) {
         let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -369,19 +385,16 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
     let bytes = if super::output::is_parquet(path) { parquet_of(columns) } else { csv_of(&columns) };
     #[cfg(not(feature = "parquet"))]
     let bytes = csv_of(&columns);
-    let bytes = bytes.map_err(|cause| CliError::Write { path: path.display().to_string(), cause })?;
-    let write = |path: &Path, bytes: &[u8]| {
-        write_whole(path, bytes).map_err(|cause| CliError::Write { path: path.display().to_string(), cause })
-    };
-    write(path, &bytes)?;
-    for (figure_path, figure) in figure_paths(path, plan).iter().zip(figures) {
+    let bytes = bytes.map_err(|cause| CliError::write(path, cause))?;
+    let mut files = vec![(path.to_owned(), bytes)];
+    for (figure_path, figure) in figure_paths(path, plan).into_iter().zip(figures) {
         match figure {
-            Ok(svg) => write(figure_path, svg.as_bytes())?,
+            Ok(svg) => files.push((figure_path, svg.into_bytes())),
             // A sweep of bad rows has a table, and nothing to draw.
-            Err(error) => eprintln!("warning: {} not written: {error}", figure_path.display()),
+            Err(error) => tell("warning: ", &format!("{} not written: {error}", figure_path.display())),
         }
     }
-    Ok(())
+    write_all(&files)
 }
 
 /// The table: the columns of the contract, then those that it allows to add.
@@ -434,21 +447,23 @@ fn parquet_of(columns: Vec<(String, Cells)>) -> std::io::Result<Vec<u8>> {
 }
 
 /// What a reader of standard error should know: bad and undecided rows, and H/d beyond the relation.
-fn notes(plan: &Plan, rows: &[Row]) -> Vec<String> {
+fn notes(plan: &Plan, rows: &[Row]) -> Vec<(&'static str, String)> {
     let mut notes = Vec::new();
     let bad = rows.iter().filter(|row| !row.error.is_empty()).count();
     if bad > 0 {
-        notes.push(format!("warning: {bad} of {} points have no answer; the column `error` says why", rows.len()));
+        notes
+            .push(("warning: ", format!("{bad} of {} points have no answer; the column `error` says why", rows.len())));
     }
     let undecided = |row: &&Row| row.flight.is_some_and(|f| f.outcome == Outcome::Undecided);
     let undecided = rows.iter().filter(undecided).count();
     if undecided > 0 {
-        notes.push(format!("note: {undecided} of {} flights are undecided", rows.len()));
+        notes.push(("note: ", format!("{undecided} of {} flights are undecided", rows.len())));
     }
     let end = crate::physics::semi_empirical::NDRC_END;
     let beyond = rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > end)).count();
     if beyond > 0 && (plan.scene().criterion == Criterion::Ndrc || plan.is_along_thickness()) {
-        notes.push(format!("warning: {beyond} points lie beyond the end of the perforation relation, H/d = {end}"));
+        let text = format!("{beyond} points lie beyond the end of the perforation relation, H/d = {end}");
+        notes.push(("warning: ", text));
     }
     notes
 }

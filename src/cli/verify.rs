@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::output::{print_json, print_text};
+use super::output::{escape_terminal, print_json, print_text, tell, wrapped};
 use super::{CliError, Exit};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::studies::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
@@ -65,7 +65,7 @@ impl VerifyArgs {
         let peers = self.peers()?;
         let progress = progress_bar(suite.claims.len() as u64);
         let running = Mutex::new(Counts::default());
-        let judged = suite.run(self.seed, &peers, &|judged| tell(&progress, &running, judged));
+        let judged = suite.run(self.seed, &peers, &|judged| advance(&progress, &running, judged));
         progress.finish_and_clear();
         let run = Run {
             suite: &suite,
@@ -77,7 +77,8 @@ impl VerifyArgs {
         if !suite.is_embedded {
             for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX)
             {
-                eprintln!("warning: the limit of {table} is {looseness:.0} times what is measured: it guards nothing");
+                let text = format!("the limit of {table} is {looseness:.0} times what is measured: it guards nothing");
+                tell("warning: ", &text);
             }
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&judged)) }.map_err(CliError::stdout)?;
@@ -147,11 +148,11 @@ impl VerifyArgs {
                 format!("{m:.3e}, limit {:.1e} {}", judged.claim.limit, judged.claim.check.unit())
             });
             text.push_str(&format!(
-                "{:<9} {}\n          {}\n          {measured}; {}\n",
+                "{:<9} {}\n{}\n{}\n",
                 judged.verdict.name(),
-                judged.claim.id,
-                judged.claim.statement,
-                super::solve::escape_terminal(&judged.remark)
+                escape_terminal(&judged.claim.id),
+                wrapped("          ", &escape_terminal(&judged.claim.statement)),
+                wrapped("          ", &format!("{measured}; {}", escape_terminal(&judged.remark)))
             ));
         }
         text.push_str(&format!(
@@ -170,7 +171,7 @@ impl VerifyArgs {
 pub(super) fn folder_error(error: folder::FolderError) -> CliError {
     match error {
         folder::FolderError::NotOurs { .. } => {
-            CliError::usage(error.to_string(), "choose another folder with --out, or remove it yourself")
+            CliError::usage(error.to_string(), "name another folder with --out, or move away what is there")
         }
         folder::FolderError::Write { path, cause } => CliError::Write { path, cause },
     }
@@ -185,7 +186,7 @@ fn progress_bar(length: u64) -> ProgressBar {
     bar
 }
 
-fn tell(progress: &ProgressBar, running: &Mutex<Counts>, judged: &Judged) {
+fn advance(progress: &ProgressBar, running: &Mutex<Counts>, judged: &Judged) {
     progress.inc(1);
     if judged.verdict == Verdict::Failed
         && let Ok(mut counts) = running.lock()

@@ -380,7 +380,9 @@ pub fn first_root(coefficients: &[f64], span: f64) -> Option<f64> {
             return Some(span * bisect(whole, left, left + width));
         }
         if width <= TOUCH_WIDTH || part.iter().all(|b| b.abs() <= noise) {
-            return Some(span * (left + 0.5 * width));
+            // A simple root on the corner of boxes of any width ends here, too, and is the corner itself.
+            let is_corner = part[n].abs() <= noise && part[0].abs() > noise;
+            return Some(span * (left + if is_corner { width } else { 0.5 * width }));
         }
         width *= 0.5;
     }

@@ -8,7 +8,7 @@ use super::closed_form::ClosedForm;
 use super::energy::Energy;
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
-use crate::physics::Problem;
+use crate::physics::{Problem, Shown};
 
 /// Names of the methods in the contract.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum, serde::Deserialize)]
@@ -150,17 +150,17 @@ impl Method {
     /// [`IntegrationError::Refused`] for a method that this build lacks.
     pub fn new(name: MethodName, options: &MethodOptions) -> Result<Self, IntegrationError> {
         let is_fixed_step = name == MethodName::CentralDifference;
-        refuse_unless(is_fixed_step, "--dt", options.dt, "only central-difference has a fixed step")?;
+        refuse_unless(is_fixed_step, "--dt", options.dt.map(Shown), "only central-difference has a fixed step")?;
         refuse_unless(is_fixed_step, "--velocity", options.velocity, "only central-difference has this choice")?;
         refuse_unless(is_fixed_step, "--events", options.events, "only central-difference has this choice")?;
         let has_tolerance = !matches!(name, MethodName::CentralDifference | MethodName::ClosedForm);
-        refuse_unless(has_tolerance, "--rtol", options.rtol, "only adaptive methods have a tolerance")?;
+        refuse_unless(has_tolerance, "--rtol", options.rtol.map(Shown), "only adaptive methods have a tolerance")?;
         if let Some(rtol) = options.rtol
             && !RTOL_ALLOWED.contains(&rtol)
         {
             return Err(IntegrationError::BadOption {
                 option: "--rtol",
-                value: rtol.to_string(),
+                value: Shown(rtol).to_string(),
                 allowed: "a number from 1e-15 to 0.1",
             });
         }
@@ -169,7 +169,7 @@ impl Method {
         {
             return Err(IntegrationError::BadOption {
                 option: "--dt",
-                value: dt.to_string(),
+                value: Shown(dt).to_string(),
                 allowed: "a time above zero, such as 1us or 1e-6",
             });
         }
@@ -215,8 +215,8 @@ impl Method {
             notes.push(format!(
                 "stage {index} was not built: the flight ended in stage {} at x = {} m, before {} m",
                 flight.stage,
-                flight.end.depth,
-                problem.start_of(index)
+                Shown(flight.end.depth),
+                Shown(problem.start_of(index))
             ));
         }
         if !problem.has_exit() {
@@ -256,14 +256,14 @@ impl Method {
     }
 }
 
-fn refuse_unless<T: fmt::Debug>(
+fn refuse_unless<T: fmt::Display>(
     used: bool,
     option: &'static str,
     value: Option<T>,
     allowed: &'static str,
 ) -> Result<(), IntegrationError> {
     match value {
-        Some(value) if !used => Err(IntegrationError::BadOption { option, value: format!("{value:?}"), allowed }),
+        Some(value) if !used => Err(IntegrationError::BadOption { option, value: value.to_string(), allowed }),
         _ => Ok(()),
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! This is what physics says about an event. How an integrator finds it is [`crate::integrators::locate`].
 
+use super::number::Shown;
 use super::scalar::Scalar;
 use super::stage::Problem;
 
@@ -30,7 +31,8 @@ impl<S: Scalar> State<S> {
 
 impl std::fmt::Display for State {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "t = {} s, x = {} m, V = {} m/s", self.time, self.depth, self.velocity)
+        let (time, depth, velocity) = (Shown(self.time), Shown(self.depth), Shown(self.velocity));
+        write!(f, "t = {time} s, x = {depth} m, V = {velocity} m/s")
     }
 }
 

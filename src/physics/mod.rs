@@ -5,6 +5,7 @@ pub mod event;
 pub mod exit_energy;
 pub mod groups;
 pub mod nose;
+pub mod number;
 pub mod reference;
 pub mod scalar;
 pub mod scene;
@@ -14,6 +15,7 @@ pub mod stage;
 pub mod units;
 
 pub use event::{Event, EventKind, Outcome, State};
+pub use number::Shown;
 pub use scalar::Scalar;
 pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, ResolveError, Scene};
 pub use scene_file::SceneError;

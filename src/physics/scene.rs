@@ -7,6 +7,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use thiserror::Error;
 
+use super::number::Shown;
 use super::semi_empirical;
 use super::stage::{Problem, Stage, Stages, Target};
 
@@ -133,12 +134,22 @@ impl Range {
     }
 }
 
+impl Range {
+    /// A number in the range, as a person might write it.
+    pub fn example(self) -> &'static str {
+        match self {
+            Self::UnitInterval => "0.72",
+            _ => "2.0",
+        }
+    }
+}
+
 /// Why a scene has no equation of motion.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ResolveError {
     /// A number outside its range.
-    #[error("{quantity} = {value} is not admissible: it must be {allowed}", allowed = .range.description())]
+    #[error("{quantity} = {value} is not admissible: it must be {allowed}", value = Shown(*.value), allowed = .range.description())]
     Inadmissible {
         /// Which quantity, with its unit.
         quantity: &'static str,
@@ -157,7 +168,7 @@ pub enum ResolveError {
     #[error("the scene has no stage")]
     NoStage,
     /// A stage ends before the one in front of it.
-    #[error("stage {stage} ends at {end} m, before the stage in front of it ends at {previous} m")]
+    #[error("stage {stage} ends at {} m, before the stage in front of it ends at {} m", Shown(*.end), Shown(*.previous))]
     StageEndsFall {
         /// Index of the stage, from 0.
         stage: usize,
@@ -167,13 +178,13 @@ pub enum ResolveError {
         previous: f64,
     },
     /// The last stage ends inside the target.
-    #[error("the last stage ends at {end} m, inside the target")]
+    #[error("the last stage ends at {} m, inside the target", Shown(*.end))]
     TargetGoesOn {
         /// End of the last stage [m].
         end: f64,
     },
     /// The thickness of a layered target is not the sum of its layers.
-    #[error("the layers sum up to {sum} m, the target's thickness says {thickness} m")]
+    #[error("the layers sum up to {} m, the target's thickness says {} m", Shown(*.sum), Shown(*.thickness))]
     LayersDoNotSumUp {
         /// Sum of the layers [m]; infinite when the last has no end.
         sum: f64,
@@ -181,7 +192,7 @@ pub enum ResolveError {
         thickness: f64,
     },
     /// A coefficient overflows, or underflows to where its digits are lost.
-    #[error("{quantity} comes to {value}, beyond the range of 64-bit numbers")]
+    #[error("{quantity} comes to {}, beyond the range of 64-bit numbers", Shown(*.value))]
     OutOfRange {
         /// Which coefficient, with its unit.
         quantity: &'static str,

@@ -14,6 +14,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::nose::NoseShape;
+use super::number::Shown;
 use super::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene, layer_beyond};
 use super::semi_empirical;
 use super::stage::Stage;
@@ -267,13 +268,17 @@ pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
         })
     };
     let unreadable = |error: std::io::Error| {
-        unread(format!("cannot be read: {error}"), "a readable file, or `-` for standard input", "check the path")
+        unread(
+            format!("the file cannot be read: {error}"),
+            "a readable file, or `-` for standard input",
+            "check the path",
+        )
     };
     let too_large = || {
         unread(
-            format!("larger than {SIZE_MAX} bytes, and not read"),
-            "a scene file of at most 1 MiB",
-            "check that this is a scene file",
+            "the file is larger than 1 MiB, and was not read".to_owned(),
+            "a file of at most 1 MiB",
+            "check that this is the file you mean",
         )
     };
     let mut bytes = Vec::new();
@@ -282,7 +287,11 @@ pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
     } else {
         let metadata = std::fs::metadata(path).map_err(unreadable)?;
         if metadata.is_dir() {
-            return Err(unread("is a directory".to_owned(), "a file, or `-` for standard input", "name a file in it"));
+            return Err(unread(
+                "this is a directory".to_owned(),
+                "a file, or `-` for standard input",
+                "name a file in it",
+            ));
         }
         if metadata.len() > SIZE_MAX {
             return Err(too_large());
@@ -457,7 +466,12 @@ impl<'t, 'i> Section<'t, 'i> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let Some(number) = plain_number(value.get_ref()) else {
             let wanted = format!("{}, without unit or quotes", range.description());
-            return Err(Self::wrong_type(key, value, &wanted, &format!("write for instance {key} = 2.0")));
+            return Err(Self::wrong_type(
+                key,
+                value,
+                &wanted,
+                &format!("write for instance {key} = {}", range.example()),
+            ));
         };
         let number = number.map_err(|error| {
             Fault::new(value.span(), format!("`{key}`: {error}"), range.description(), "correct the number")
@@ -481,7 +495,8 @@ impl<'t, 'i> Section<'t, 'i> {
                 return Err(Self::wrong_type(key, value, &wanted, &format!("write for instance {key} = {example}")));
             }
         };
-        self.admit(key, value, number, range, &format!("correct `{key}`; it is read in {si} as {number}")).map(Some)
+        self.admit(key, value, number, range, &format!("correct `{key}`; it is read in {si} as {}", Shown(number)))
+            .map(Some)
     }
 
     fn admit(&self, key: &str, value: &Value<'_>, number: f64, range: Range, help: &str) -> Result<f64, Fault> {
@@ -505,7 +520,9 @@ impl<'t, 'i> Section<'t, 'i> {
         let (span, message, help) = match error {
             QuantityError::UnknownUnit { unit } => {
                 let help = if unit.starts_with(',') {
-                    "write a decimal point".to_owned()
+                    "write a decimal point, and no separators between thousands".to_owned()
+                } else if unit.starts_with(|c: char| c.is_ascii_digit()) {
+                    "write the number without blanks inside".to_owned()
                 } else {
                     nearest(unit, known).map_or_else(|| format!("give it in {}", known[0]), did_you_mean)
                 };
@@ -580,12 +597,13 @@ fn unknown_key(name: &str, key: &Spanned<toml::de::DeString<'_>>, known: &[&'sta
     )
 }
 
-fn did_you_mean(known: &str) -> String {
+/// Remedy for a misspelt word.
+pub(crate) fn did_you_mean(known: &str) -> String {
     format!("did you mean `{known}`?")
 }
 
 /// The one of `known` that `text` is most likely a misspelling of.
-fn nearest(text: &str, known: &[&'static str]) -> Option<&'static str> {
+pub(crate) fn nearest<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
     // A long text is no misspelling, and not worth the comparison.
     let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
@@ -661,7 +679,14 @@ fn not_toml(text: &str, error: &toml::de::Error) -> Fault {
         return Fault::new(span, message, "each key and table once", "remove one of the two");
     }
     let message = printable(error.message());
-    Fault::new(span, format!("this is not TOML: {message}"), "TOML text", "correct the syntax; strings need quotes")
+    let help = if message.contains("recurs") {
+        "nest less deep: a scene needs three levels"
+    } else if message.contains("carriage return") {
+        "end the lines as Unix or Windows does"
+    } else {
+        "correct the syntax; strings need quotes"
+    };
+    Fault::new(span, format!("this is not TOML: {message}"), "TOML text", help)
 }
 
 fn read_criterion(section: &Section<'_, '_>, root: &Section<'_, '_>) -> Result<Criterion, Fault> {
@@ -726,8 +751,8 @@ fn outright(
         if stage.end < previous {
             return Err(Fault::new(
                 section.get("end").map_or(0..0, Spanned::span),
-                format!("this stage ends at {} m, in front of where it begins", stage.end),
-                format!("an end at {previous} m or beyond"),
+                format!("this stage ends at {} m, in front of where it begins", Shown(stage.end)),
+                format!("an end at {} m or beyond", Shown(previous)),
                 "give the ends in order, each from the impact face",
             ));
         }
@@ -1316,7 +1341,11 @@ velocity = 300
             (with("\"2 kg\"", "true"), "3:8", "`mass` is a truth value"),
             (with("\"2 kg\"", "\"nan kg\""), "3:8", "`mass`: the number is not finite in 64 bits"),
             (with("\"2 kg\"", "1e400"), "3:8", "`mass`: the number is not finite in 64 bits"),
-            (with("\"2 kg\"", "1e-400"), "3:8", "`mass`: the number is too small for 64 bits: it would be read as 0"),
+            (
+                with("\"2 kg\"", "1e-400"),
+                "3:8",
+                "`mass`: the number is too small for 64 bits: below 2.3e-308 its digits are lost",
+            ),
             (with("\"2 kg\"", "1979-05-27"), "3:8", "`mass` is a date or time"),
             (with("50 mm", "1,5 mm"), "4:14", "`,5 mm` is no unit that is known"),
             (with("title = \"tunnel stop, blunt nose\"", "title = 3"), "1:9", "`title` is an integer"),
@@ -1398,7 +1427,7 @@ velocity = 300
         let layer = "layer = [{ thickness = 1, strength = 0, density = VALUE, viscosity = 1 }]\n";
         let nose = "{ factor = 0.72 }";
         for (from, to, inside, outside) in [
-            ("\"2 kg\"", "VALUE", ["5e-324", "1e300"], ["0", "-1"]),
+            ("\"2 kg\"", "VALUE", ["2.2250738585072014e-308", "1e300"], ["0", "-1"]),
             ("\"50 mm\"", "VALUE", ["1e-6", "1e3"], ["0.0", "-1"]),
             ("\"36 MPa\"", "VALUE", ["1", "1e9"], ["-0.0", "-1"]),
             ("12.0", "VALUE", ["1e-3", "1e3"], ["0", "-12.0"]),
@@ -1466,13 +1495,13 @@ velocity = 300
             assert!(error.render(false).contains(&error.location()), "{error}");
             (error.place.clone(), error.message)
         };
-        assert_eq!(refused(folder.path()), (None, "is a directory".to_owned()));
+        assert_eq!(refused(folder.path()), (None, "this is a directory".to_owned()));
         let (place, message) = refused(&at("absent.toml"));
-        assert!(place.is_none() && message.starts_with("cannot be read: "), "{message}");
+        assert!(place.is_none() && message.starts_with("the file cannot be read: "), "{message}");
         std::fs::write(at("limit.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len())].concat()).unwrap();
         assert!(Scene::read(&at("limit.toml")).is_ok());
         std::fs::write(at("large.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len() + 1)].concat()).unwrap();
-        let too_large = (None, "larger than 1048576 bytes, and not read".to_owned());
+        let too_large = (None, "the file is larger than 1 MiB, and was not read".to_owned());
         assert_eq!(refused(&at("large.toml")), too_large);
         // A file whose length is known only by reading it.
         #[cfg(target_os = "linux")]

@@ -186,8 +186,8 @@ pub enum QuantityError {
     /// NaN, an infinity, or beyond the largest `f64`.
     #[error("the number is not finite in 64 bits")]
     NotFinite,
-    /// Not zero as written, zero as an `f64`.
-    #[error("the number is too small for 64 bits: it would be read as 0")]
+    /// Not zero as written, and zero as an `f64` or below where `f64` keeps its digits.
+    #[error("the number is too small for 64 bits: below 2.3e-308 its digits are lost")]
     TooSmall,
     /// A number alone.
     #[error("there is no unit")]
@@ -239,13 +239,16 @@ pub fn split(text: &str) -> (&str, &str) {
 ///
 /// # Errors
 /// [`QuantityError::NotFinite`] for NaN, infinities and overflow; [`QuantityError::TooSmall`] for a number that is
-/// not zero and would be read as zero; [`QuantityError::NoNumber`] for anything else that is no number.
+/// not zero and would be read as zero or with fewer digits; [`QuantityError::NoNumber`] for anything else that is no number.
 pub fn number(number: &str) -> Result<f64, QuantityError> {
     let value: f64 = number.parse().map_err(|_| QuantityError::NoNumber)?;
-    let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
+    let is_written_as_zero = || {
+        let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
+        !mantissa.contains(|digit: char| ('1'..='9').contains(&digit))
+    };
     if !value.is_finite() {
         Err(QuantityError::NotFinite)
-    } else if value == 0.0 && mantissa.contains(|digit: char| ('1'..='9').contains(&digit)) {
+    } else if value.abs() < f64::MIN_POSITIVE && !(value == 0.0 && is_written_as_zero()) {
         Err(QuantityError::TooSmall)
     } else {
         // Adding zero turns -0 into 0, which no formula needs to think about then.
@@ -433,8 +436,8 @@ mod tests {
             ("-inf mm", "the number is not finite in 64 bits"),
             ("1e400 mm", "the number is not finite in 64 bits"),
             ("1e308 km", "the number is not finite in 64 bits"),
-            ("1e-400 m", "the number is too small for 64 bits: it would be read as 0"),
-            ("1e-323 mm", "the number is too small for 64 bits: it would be read as 0"),
+            ("1e-400 m", "the number is too small for 64 bits: below 2.3e-308 its digits are lost"),
+            ("1e-323 mm", "the number is too small for 64 bits: below 2.3e-308 its digits are lost"),
             ("5", "there is no unit"),
             ("5 kg", "`kg` is a unit of mass"),
             ("5 s", "`s` is a unit of time"),

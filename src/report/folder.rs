@@ -12,11 +12,13 @@ use super::{Run, VerifyJson, figures, junit, page, summary};
 /// Why there is no report.
 #[derive(Debug, Error)]
 pub enum FolderError {
-    /// A folder that is not a report of ours: exit 2, and nothing is touched.
-    #[error("{path} exists and is not a report of penetrode")]
+    /// A folder that is not a report of ours, or holds more than one: exit 2, and nothing is touched.
+    #[error("{path} {why}")]
     NotOurs {
         /// The folder.
         path: String,
+        /// What stands in the way.
+        why: String,
     },
     /// The system refused.
     #[error("cannot write {path}: {cause}")]
@@ -36,18 +38,62 @@ pub const DEFAULT: &str = "penetrode-report";
 /// # Errors
 /// [`FolderError::NotOurs`].
 pub fn check(folder: &Path) -> Result<(), FolderError> {
-    let ours = || {
-        let text = fs::read(folder.join("report.json")).ok()?;
-        let value: serde_json::Value = serde_json::from_slice(&text).ok()?;
-        value.get("schema")?.as_str().map(|schema| schema.starts_with("penetrode/"))
-    };
+    let refuse = |why: String| Err(FolderError::NotOurs { path: folder.display().to_string(), why });
     // A link is followed for reading and would be replaced in writing: refused like any other strange thing.
     match fs::symlink_metadata(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Ok(metadata) if metadata.is_dir() && ours() == Some(true) => Ok(()),
-        _ => Err(FolderError::NotOurs { path: folder.display().to_string() }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(cause) => return Err(FolderError::Write { path: folder.display().to_string(), cause }),
+        Ok(metadata) if metadata.is_symlink() => return refuse("is a link, which a report would replace".to_owned()),
+        Ok(metadata) if !metadata.is_dir() => return refuse("is a file, and a report is a folder".to_owned()),
+        Ok(_) => {}
+    }
+    let contents =
+        contents(folder).map_err(|cause| FolderError::Write { path: folder.display().to_string(), cause })?;
+    if contents.is_empty() {
+        return Ok(());
+    }
+    let Some(written) = manifest(folder) else {
+        return refuse("exists and is not a report of penetrode".to_owned());
+    };
+    match contents.iter().find(|name| !written.contains(name)) {
+        Some(foreign) => refuse(format!("holds `{foreign}`, which is no part of the report there and would be lost")),
+        None => Ok(()),
     }
 }
+
+/// Every file under `folder` by its path in it, parts joined by `/`; a folder without files by its own name.
+fn contents(folder: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        // A report has folders of one level: what lies deeper is named by them, and is not ours.
+        if entry.file_type()?.is_dir() {
+            let inside = fs::read_dir(entry.path())?
+                .map(|inner| inner.map(|inner| format!("{name}/{}", inner.file_name().to_string_lossy())))
+                .collect::<io::Result<Vec<_>>>()?;
+            names.extend(if inside.is_empty() && !FOLDERS.contains(&name.as_str()) { vec![name] } else { inside });
+        } else {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// The folders in a report.
+const FOLDERS: [&str; 2] = ["figures", "tables"];
+
+/// What the report in `folder` consists of, by the list in it; `None` where there is no report.
+fn manifest(folder: &Path) -> Option<Vec<String>> {
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("report.json")).ok()?).ok()?;
+    let is_ours = report.get("schema")?.as_str()?.starts_with("penetrode/");
+    let list = fs::read_to_string(folder.join(MANIFEST)).unwrap_or_default();
+    is_ours.then(|| list.lines().map(str::to_owned).chain(["report.json".to_owned()]).collect())
+}
+
+/// The file that lists the files of a report, one a line: what is not in it is somebody else's.
+const MANIFEST: &str = "contents.txt";
 
 /// Writes the report of `run` to `folder`.
 ///
@@ -65,14 +111,17 @@ pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
 /// [`FolderError`]; the old report then stands untouched.
 pub fn write_files(files: Vec<(String, Vec<u8>)>, folder: &Path) -> Result<(), FolderError> {
     check(folder)?;
-    let failed = |path: &Path, cause: io::Error| FolderError::Write { path: path.display().to_string(), cause };
+    let failed = |path: &Path, cause: io::Error| FolderError::Write {
+        path: path.display().to_string(),
+        cause: without_temporary_name(cause),
+    };
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
         _ => PathBuf::from("."),
     };
     fs::create_dir_all(&parent).map_err(|cause| failed(&parent, cause))?;
     let stage = tempfile::Builder::new()
-        .prefix(".penetrode-report-")
+        .prefix(&format!("{TEMPORARY}report-"))
         .tempdir_in(&parent)
         .map_err(|cause| failed(&parent, cause))?;
     for (name, bytes) in files {
@@ -89,6 +138,14 @@ pub fn write_files(files: Vec<(String, Vec<u8>)>, folder: &Path) -> Result<(), F
         fs::set_permissions(stage.path(), fs::Permissions::from_mode(0o755)).map_err(|cause| failed(folder, cause))?;
     }
     move_into_place(stage, folder).map_err(|cause| failed(folder, cause))
+}
+
+/// Beginning of the names of temporary files and folders, which lie beside what they will become.
+pub const TEMPORARY: &str = ".penetrode-";
+
+/// What the system said, without the name of a temporary file that `error` may carry: nobody asked for that file.
+pub fn without_temporary_name(error: io::Error) -> io::Error {
+    if error.to_string().contains(TEMPORARY) { error.kind().into() } else { error }
 }
 
 /// Every file of the report: its path in the folder, and its bytes.
@@ -121,6 +178,9 @@ pub fn figure_files(figures: &[Drawn]) -> io::Result<Vec<(String, Vec<u8>)>> {
         files.push((format!("figures/{name}.svg"), drawn.file().into_bytes()));
         files.push((format!("tables/{name}.csv"), drawn.figure.table.to_csv().map_err(io::Error::other)?));
     }
+    let list: String =
+        files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
+    files.push((MANIFEST.to_owned(), list.into_bytes()));
     Ok(files)
 }
 

@@ -1,5 +1,6 @@
 //! The numbers of a figure, as CSV.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 
 /// A table: names of the columns, and rows of the same length.
@@ -34,7 +35,7 @@ impl Table {
         self.rows.is_empty()
     }
 
-    /// As CSV (RFC 4180, lines ended by LF), quoted where a value needs it.
+    /// As CSV (RFC 4180, lines ended by LF), quoted where a value needs it, each value through [`cell`].
     ///
     /// # Errors
     /// Only if memory for it cannot be had.
@@ -42,10 +43,24 @@ impl Table {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(&self.header)?;
         for row in &self.rows {
-            writer.write_record(row)?;
+            writer.write_record(row.iter().map(|value| cell(value).into_owned()))?;
         }
         writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
     }
+}
+
+/// `text` as a cell that neither a spreadsheet nor a terminal obeys.
+///
+/// A text that begins like a formula has a `'` put in front, as spreadsheets have it; a number keeps its sign. Control
+/// characters but the line feed are replaced.
+pub fn cell(text: &str) -> Cow<'_, str> {
+    let is_formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
+    let steers = |c: char| c.is_control() && c != '\n';
+    if !is_formula && !text.contains(steers) {
+        return Cow::Borrowed(text);
+    }
+    let quote = if is_formula { "'" } else { "" };
+    Cow::Owned(format!("{quote}{}", text.replace(steers, "\u{fffd}")))
 }
 
 /// A number, or nothing where there is none.
@@ -57,6 +72,22 @@ pub fn or_empty(value: Option<f64>) -> String {
 #[expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cell_is_no_formula_and_steers_no_terminal() {
+        for (text, expected) in [
+            ("=1+1", "'=1+1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("+cmd", "'+cmd"),
+            ("-1.5e-3", "-1.5e-3"),
+            ("plain = fine", "plain = fine"),
+            ("\u{1b}[31mred", "\u{fffd}[31mred"),
+            ("=\t1", "'=\u{fffd}1"),
+            ("two\nlines", "two\nlines"),
+        ] {
+            assert_eq!(cell(text), expected);
+        }
+    }
 
     #[test]
     fn values_are_quoted_where_they_need_it_and_numbers_read_back() {

@@ -131,11 +131,49 @@ fn an_interrupted_or_refused_run_leaves_what_was_there() {
     let ours = place.path().join("report");
     for _ in 0..2 {
         folder::write(&run, &ours).unwrap();
-        std::fs::write(ours.join("left-over"), "").unwrap();
+        // As a report of other claims would have left it: listed, and so replaced.
+        std::fs::write(ours.join("figures/old.svg"), "").unwrap();
+        let list = std::fs::read_to_string(ours.join("contents.txt")).unwrap();
+        std::fs::write(ours.join("contents.txt"), list + "figures/old.svg\n").unwrap();
     }
     folder::write(&run, &ours).unwrap();
-    assert!(!ours.join("left-over").exists() && ours.join("figures/observed-orders.svg").exists());
+    assert!(!ours.join("figures/old.svg").exists() && ours.join("figures/observed-orders.svg").exists());
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn a_report_never_replaces_what_is_not_its_own() {
+    let (suite, judged) = judged();
+    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    for foreign in ["notes.txt", "tables/mine.csv", "figures/deep/mine.svg", "mine", ".hidden"] {
+        let place = tempfile::tempdir().unwrap();
+        let report = place.path().join("report");
+        folder::write(&run, &report).unwrap();
+        let path = report.join(foreign);
+        if foreign == "mine" {
+            std::fs::create_dir(&path).unwrap();
+        } else {
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, "years of work").unwrap();
+        }
+        let error = folder::write(&run, &report).unwrap_err();
+        let first = foreign.split("/mine.svg").next().unwrap();
+        assert!(matches!(&error, folder::FolderError::NotOurs { why, .. } if why.contains(first)), "{error}");
+        assert!(path.exists() && report.join("report.html").exists(), "{foreign}");
+        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1, "{foreign}");
+    }
+}
+
+#[test]
+fn an_empty_folder_is_filled() {
+    let (suite, judged) = judged();
+    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    let place = tempfile::tempdir().unwrap();
+    folder::write(&run, place.path().join("empty").as_path()).unwrap();
+    let empty = place.path().join("made by hand");
+    std::fs::create_dir(&empty).unwrap();
+    folder::write(&run, &empty).unwrap();
+    assert!(empty.join("report.html").exists());
 }
 
 #[test]

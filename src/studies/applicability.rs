@@ -95,12 +95,17 @@ pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {
     {
         let error = model_error(groups.impact, groups.geometry, concrete.crater_ratio);
         if error.is_nan() || error.abs() > ERROR_ALLOWED {
+            let geometry = groups.geometry.unwrap_or(f64::INFINITY);
+            let off = match 100.0 * error {
+                percent if percent.abs() < 1e6 => format!("is {percent:+.1} % off the equation of motion"),
+                percent if percent.is_finite() => format!("is {percent:+.1e} % off the equation of motion"),
+                _ => "leaves the range of 64-bit numbers".to_owned(),
+            };
             warnings.push(format!(
-                "the scene lies outside Eq. 11-12 and 15, the limit N >> I and N >> 1: at I = {:.4}, N = {:.4} the depth of \
-                 Eq. 11-12 is {:+.1} % off the equation of motion",
-                groups.impact,
-                groups.geometry.unwrap_or(f64::INFINITY),
-                100.0 * error
+                "the scene lies outside Eq. 11-12 and 15, the limit N >> I and N >> 1: at I = {}, N = {} the depth \
+                 of Eq. 11-12 {off}",
+                rounded(groups.impact),
+                rounded(geometry),
             ));
         }
     }
@@ -111,6 +116,17 @@ pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// A group for people: four decimals, scientific where those would be hundreds of digits or none.
+fn rounded(group: f64) -> String {
+    if group.is_infinite() {
+        "infinity".to_owned()
+    } else if group == 0.0 || (1e-3..1e7).contains(&group) {
+        format!("{group:.4}")
+    } else {
+        format!("{group:.4e}")
+    }
 }
 
 #[cfg(test)]

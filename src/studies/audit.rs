@@ -8,6 +8,8 @@
 //! limit fail (3); constants, zero errors and noise leave it undecided (4). Rows out of order and rows that say the
 //! same twice are put right and mentioned.
 
+use csv::StringRecord;
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -17,6 +19,8 @@ use super::grid_convergence::{
 };
 use super::order::{Class, Exclusion, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
 use super::quantity::Quantity;
+use super::table_text::{LineEnds, counted, line_of, shortened};
+use crate::physics::Shown;
 
 /// Two-sided level of the intervals behind a verdict on one table.
 ///
@@ -26,6 +30,12 @@ pub const AUDIT_LEVEL: f64 = 1e-3;
 
 /// Grids closer than this ratio are not used in the three-grid rules (Celik et al. 2008).
 const RATIO_MIN: f64 = 1.3;
+
+/// Least order to compare with: below it halving the step moves the error by less than 7 %.
+pub const ORDER_MIN: f64 = 0.1;
+
+/// Largest order to compare with: beyond it four steps do not fit between an error of one and round-off.
+pub const ORDER_MAX: f64 = 32.0;
 
 /// Where in the file something stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,7 +83,7 @@ pub enum AuditError {
         place: Place,
     },
     /// A column of another name.
-    #[error("{place}: there is no column `{name}`")]
+    #[error("{place}: there is no column `{}`", shortened(.name))]
     UnknownColumn {
         /// Where.
         place: Place,
@@ -81,7 +91,7 @@ pub enum AuditError {
         name: String,
     },
     /// A name twice.
-    #[error("{place}: the column `{name}` is there twice")]
+    #[error("{place}: the column `{}` is there twice", shortened(.name))]
     ColumnTwice {
         /// Where.
         place: Place,
@@ -101,7 +111,7 @@ pub enum AuditError {
         place: Place,
     },
     /// A row longer or shorter than the header.
-    #[error("{place}: {found} cells in a table of {expected} columns")]
+    #[error("{place}: {} in a table of {}", counted(*.found as u64, "cell"), counted(*.expected as u64, "column"))]
     Ragged {
         /// Where.
         place: Place,
@@ -111,7 +121,7 @@ pub enum AuditError {
         expected: usize,
     },
     /// A cell that is no number.
-    #[error("{place}: `{text}` in `{name}` is not a number")]
+    #[error("{place}: {}", no_number(.text, .name))]
     NotANumber {
         /// Where.
         place: Place,
@@ -121,7 +131,7 @@ pub enum AuditError {
         text: String,
     },
     /// A step that is zero or negative.
-    #[error("{place}: the step {step} s is not positive")]
+    #[error("{place}: the step {} s is not positive", Shown(*.step))]
     BadStep {
         /// Where.
         place: Place,
@@ -129,7 +139,7 @@ pub enum AuditError {
         step: f64,
     },
     /// Two results for one step.
-    #[error("{place}: the step {step} s has two values of `{name}`, {second} here and {first} in line {other}")]
+    #[error("{place}: the step {} s has two values of `{name}`, {} here and {} in line {other}", Shown(*.step), Shown(*.second), Shown(*.first))]
     TwoValues {
         /// Where the second stands.
         place: Place,
@@ -152,12 +162,24 @@ pub enum AuditError {
         /// Steps found.
         found: usize,
     },
-    /// An order to compare with that is none.
-    #[error("the order {order} is not a positive number")]
+    /// An order to compare with that no study of step sizes can tell.
+    #[error("the order {} is not allowed: a number from {ORDER_MIN} to {ORDER_MAX}", Shown(*.order))]
     BadOrder {
         /// Order given.
         order: f64,
     },
+}
+
+/// What is wrong with the cell `text` in the column `name`.
+fn no_number(text: &str, name: &str) -> String {
+    let name = shortened(name);
+    if text.is_empty() {
+        format!("the cell in `{name}` is empty")
+    } else if text.contains('\n') {
+        format!("a quote in `{name}` is opened and not closed in this line")
+    } else {
+        format!("`{}` in `{name}` is not a number", shortened(text))
+    }
 }
 
 impl AuditError {
@@ -182,6 +204,7 @@ impl AuditError {
             }
             Self::ColumnTwice { .. } => "remove one of the two".to_owned(),
             Self::Ragged { .. } => "complete the row, or remove it".to_owned(),
+            Self::NotANumber { text, .. } if text.contains('\n') => "close the quote, or remove it".to_owned(),
             Self::NotANumber { text, .. } if text.is_empty() => {
                 "fill the cell, or remove the row or the column: a missing result is no result".to_owned()
             }
@@ -191,7 +214,7 @@ impl AuditError {
                 "keep one of them: a result that a step does not determine has no order".to_owned()
             }
             Self::TooFewSteps { .. } => "run the other code with more steps, best at ratios of 1.5 to 2".to_owned(),
-            Self::BadOrder { .. } => "give the formal order of the other scheme, 1 or 2".to_owned(),
+            Self::BadOrder { .. } => "give the formal order of the other code's scheme, such as 1 or 2".to_owned(),
         }
     }
 }
@@ -209,7 +232,7 @@ pub fn column_name(quantity: Quantity) -> &'static str {
 }
 
 /// What a finding is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FindingKind {
     /// Rows were out of order, and are sorted.
@@ -239,7 +262,7 @@ pub enum FindingKind {
 }
 
 /// One remark about the table.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Finding {
     /// What it is about.
     pub kind: FindingKind,
@@ -289,18 +312,23 @@ impl Table {
             .flexible(true)
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
-            .from_reader(bytes);
+            .from_reader(LineEnds::new(bytes));
         let mut records = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|error| AuditError::NotCsv {
-                place: place(error.position().map_or(1, csv::Position::line), 0),
+        let mut record = StringRecord::new();
+        loop {
+            let is_read = reader.read_record(&mut record);
+            let line = line_of(&reader, record.as_slice().as_bytes());
+            let is_read = is_read.map_err(|error| AuditError::NotCsv {
+                place: place(line, 0),
                 cause: match error.kind() {
                     csv::ErrorKind::Utf8 { .. } => "the file is not UTF-8 text".to_owned(),
                     _ => error.to_string(),
                 },
             })?;
-            let line = record.position().map_or(0, csv::Position::line);
-            records.push((line, record));
+            if !is_read {
+                break;
+            }
+            records.push((line, record.clone()));
         }
         let Some(((header_line, header), records)) = records.split_first() else {
             return Err(AuditError::Empty { file: file.to_owned() });
@@ -510,7 +538,7 @@ pub struct Expectation {
 }
 
 /// A judgement. The order of the variants is the order of severity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Converging, and as expected where something was expected.
@@ -522,11 +550,12 @@ pub enum Verdict {
 }
 
 /// One row of one column.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AuditPoint {
     /// Step [s].
     pub dt_s: f64,
-    /// Value in the table.
+    /// Value in the table; NaN and infinity are `null` in JSON.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
     /// Size of its error, relative as in `converge`: against the exact value, else against the limit found; `null`
     /// where there is neither.
@@ -538,7 +567,7 @@ pub struct AuditPoint {
 }
 
 /// The judgement of one column.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct QuantityAudit {
     /// Which quantity.
     pub quantity: Quantity,
@@ -579,7 +608,7 @@ pub struct QuantityAudit {
 }
 
 /// The judgement of a table: what `penetrode audit --json` prints.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Audit {
     /// `penetrode/audit/1`.
     pub schema: &'static str,
@@ -608,9 +637,9 @@ impl Audit {
 /// without, order and limit are fitted together ([`self_convergence`]).
 ///
 /// # Errors
-/// [`AuditError::BadOrder`] for an expected order that is not a positive number.
+/// [`AuditError::BadOrder`] for an expected order outside [`ORDER_MIN`] to [`ORDER_MAX`].
 pub fn audit(table: &Table, expectation: &Expectation) -> Result<Audit, AuditError> {
-    if let Some(order) = expectation.order.filter(|&order| !(order > 0.0 && order.is_finite())) {
+    if let Some(order) = expectation.order.filter(|order| !(ORDER_MIN..=ORDER_MAX).contains(order)) {
         return Err(AuditError::BadOrder { order });
     }
     let mut findings = table.findings.clone();
@@ -1046,15 +1075,15 @@ mod tests {
             (refused("dt_s,depth_m,depth_m\n1,2,2\n"), "run.csv:1, column 3: the column `depth_m` is there twice"),
             (refused("depth_m\n1\n"), "run.csv:1: the column `dt_s` is missing"),
             (refused("dt_s\n1\n"), "run.csv:1: there is no column of results"),
-            (refused(&with("16e-6")), "run.csv:6: 1 cells in a table of 2 columns"),
+            (refused(&with("16e-6")), "run.csv:6: 1 cell in a table of 2 columns"),
             (refused(&with("16e-6,1,2")), "run.csv:6: 3 cells in a table of 2 columns"),
             (refused(&with("16e-6,1.5 m")), "run.csv:6, column 2: `1.5 m` in `depth_m` is not a number"),
-            (refused(&with("16e-6,")), "run.csv:6, column 2: `` in `depth_m` is not a number"),
+            (refused(&with("16e-6,")), "run.csv:6, column 2: the cell in `depth_m` is empty"),
             (refused(&with("0,1")), "run.csv:6, column 1: the step 0 s is not positive"),
-            (refused(&with("-1e-6,1")), "run.csv:6, column 1: the step -0.000001 s is not positive"),
+            (refused(&with("-1e-6,1")), "run.csv:6, column 1: the step -1e-6 s is not positive"),
             (
                 refused(&with("2e-6,1.05")),
-                "run.csv:6, column 2: the step 0.000002 s has two values of `depth_m`, 1.05 here and 1.04 in line 3",
+                "run.csv:6, column 2: the step 2e-6 s has two values of `depth_m`, 1.05 here and 1.04 in line 3",
             ),
             (refused("dt_s,depth_m\n1e-6,1\n2e-6,2\n"), "run.csv: 2 different steps, and an order needs 4"),
             (

@@ -16,6 +16,7 @@ use super::audit::Place;
 use super::columns::{Cells, Kind};
 use super::critical_velocity;
 use super::random_scenes::Generator;
+use super::table_text::shortened;
 use crate::integrators::batch::{Batch, Summary};
 use crate::integrators::{Detail, Method, Taylor, keeping};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, semi_empirical};
@@ -84,7 +85,7 @@ pub enum TableError {
         file: String,
     },
     /// The first line is not text.
-    #[error("{place}: the first line is not UTF-8 text")]
+    #[error("{place}: the first line is not text in UTF-8")]
     NotText {
         /// Where.
         place: Place,
@@ -161,6 +162,9 @@ impl TableError {
         match self {
             Self::Unreadable { .. } => "name a table of scenes, or - for standard input".to_owned(),
             Self::Compressed { .. } => "write the table without compression, or with Snappy".to_owned(),
+            Self::UnknownColumn { name, .. } if name.contains([';', char::REPLACEMENT_CHARACTER]) => {
+                "separate the cells by commas, and write decimals with a point".to_owned()
+            }
             Self::NotText { .. } => "save the table as CSV in UTF-8".to_owned(),
             Self::OpenQuote { .. } | Self::LineTooLong { .. } => "close the quote, or remove it".to_owned(),
             Self::WrongType { .. } => {
@@ -203,8 +207,10 @@ impl Layout {
                 return Err(TableError::NoHeader { place: place(width) });
             }
             let Some(index) = COLUMNS.iter().position(|known| *known == name) else {
+                let is_word = name.chars().all(|c| c.is_alphanumeric() || "_ ()/".contains(c));
                 let near = COLUMNS
                     .into_iter()
+                    .filter(|_| is_word)
                     .map(|known| (strsim::jaro_winkler(&known.to_lowercase(), &name.to_lowercase()), known))
                     .filter(|(similarity, _)| *similarity > 0.8)
                     .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -222,16 +228,6 @@ impl Layout {
         }
         Ok(Self { places, width })
     }
-}
-
-/// A text from a table as a message may quote it: one line, no control characters, forty characters.
-pub(super) fn shortened(text: &str) -> String {
-    let mut short: String =
-        text.chars().take(40).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
-    if text.chars().count() > 40 {
-        short.push('…');
-    }
-    short
 }
 
 /// The cells of a row; empty ones are `None`.

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use crate::physics::Shown;
+
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -62,7 +64,7 @@ impl Cells {
         let absent = Cow::Borrowed("");
         match self {
             Self::Counts(cells) => Cow::Owned(cells[index].to_string()),
-            Self::Numbers(cells) => cells[index].map_or(absent, |value| Cow::Owned(value.to_string())),
+            Self::Numbers(cells) => cells[index].map_or(absent, |value| Cow::Owned(Shown(value).to_string())),
             Self::Texts(cells) => cells[index].as_deref().map_or(absent, Cow::Borrowed),
         }
     }

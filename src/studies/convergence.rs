@@ -152,6 +152,10 @@ pub fn of_fixed_steps(
     }
     if with_critical && problem.has_exit() {
         let exact_critical = critical_velocity::exact_or_refined(scene)?;
+        if exact_critical == 0.0 {
+            // Nothing to be relative to; see `why_no_critical_velocity`.
+            return Ok(studies);
+        }
         let critical_flight = Yardstick::of(&scene.resolve(exact_critical)?)?.flight;
         let path = Path::of(&scene.resolve(exact_critical)?, &critical_flight);
         let mut points = Vec::new();
@@ -170,6 +174,18 @@ pub fn of_fixed_steps(
         });
     }
     Ok(studies)
+}
+
+/// Why the critical velocity of `scene` has no order to study, where the target has a far side and it still has none.
+///
+/// # Errors
+/// As the search for it.
+pub fn why_no_critical_velocity(scene: &Scene) -> Result<Option<&'static str>, ConvergenceError> {
+    if scene.thickness.is_none() {
+        return Ok(None);
+    }
+    let is_zero = critical_velocity::exact_or_refined(scene)? == 0.0;
+    Ok(is_zero.then_some("it is 0: the target is perforated at any speed, and an error relative to it means nothing"))
 }
 
 /// Convergence of an adaptive method with its tolerance and with its work.

@@ -19,7 +19,7 @@ use smallvec::SmallVec;
 use thiserror::Error;
 
 use crate::integrators::{Cost, IntegrationError, Integrator, Taylor, keeping};
-use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, Stage, closed_form};
+use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, Shown, Stage, closed_form};
 
 /// Speed [m/s] at which the target is first asked for, to learn its exit depth and static work.
 const PROBE_SPEED: f64 = 1.0;
@@ -85,7 +85,7 @@ pub struct End {
 
 impl Display for End {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "W = {} m²/s² at {} m/s", self.exit_energy, self.velocity)
+        write!(f, "W = {} m²/s² at {} m/s", Shown(self.exit_energy), Shown(self.velocity))
     }
 }
 
@@ -97,7 +97,7 @@ pub enum CriticalError<E: Display> {
     #[error("a semi-infinite target has no critical velocity: give it a thickness")]
     NoExit,
     /// The search was asked for something impossible: a mistake of the caller, exit code 2.
-    #[error("{option} = {value} is not allowed: {allowed}")]
+    #[error("{option} = {} is not allowed: {allowed}", Shown(*.value))]
     BadOption {
         /// Field of [`Options`].
         option: &'static str,
@@ -107,7 +107,7 @@ pub enum CriticalError<E: Display> {
         allowed: &'static str,
     },
     /// The scene has no stages at this impact speed.
-    #[error("the scene cannot be resolved at {velocity} m/s: {cause}")]
+    #[error("the scene cannot be resolved at {} m/s: {cause}", Shown(*.velocity))]
     Scene {
         /// Impact speed [m/s].
         velocity: f64,
@@ -115,7 +115,7 @@ pub enum CriticalError<E: Display> {
         cause: E,
     },
     /// A flight failed.
-    #[error("the flight at {velocity} m/s failed: {cause}")]
+    #[error("the flight at {} m/s failed: {cause}", Shown(*.velocity))]
     Flight {
         /// Impact speed [m/s].
         velocity: f64,
@@ -123,7 +123,7 @@ pub enum CriticalError<E: Display> {
         cause: IntegrationError,
     },
     /// The margin of a flight was no number.
-    #[error("the exit energy at {velocity} m/s is {exit_energy}, not a finite number")]
+    #[error("the exit energy at {} m/s is {exit_energy}, not a finite number", Shown(*.velocity))]
     NotFinite {
         /// Impact speed [m/s].
         velocity: f64,
@@ -131,7 +131,7 @@ pub enum CriticalError<E: Display> {
         exit_energy: f64,
     },
     /// W has the same sign, or is zero, at all speeds up to the largest tried.
-    #[error("no finite critical velocity: {low}, and still {high}")]
+    #[error("no critical velocity up to {} m/s: {low}, and still {high}", Shown(.high.velocity))]
     NoBracket {
         /// The slowest flight.
         low: End,
@@ -924,7 +924,7 @@ mod tests {
         assert!(low.velocity < high.velocity && low.exit_energy < 0.0 && high.exit_energy < 0.0);
         // The slab of a kilometre: e^y leaves the range of the numbers.
         let refusal = search(Slab { h: 1000.0, ..SLAB }, &Energy::new()).unwrap_err();
-        assert!(!refusal.is_usage() && refusal.to_string().contains("no finite critical velocity"), "{refusal}");
+        assert!(!refusal.is_usage() && refusal.to_string().contains("no critical velocity up to"), "{refusal}");
     }
 
     #[test]

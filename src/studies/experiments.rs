@@ -17,6 +17,7 @@ use thiserror::Error;
 
 use super::parameter::Parameter;
 use super::sensitivity::{SensitivityError, Spread, by_closed_form};
+use super::table_text::{LineEnds, counted, line_of, shortened};
 use crate::integrators::{ClosedForm, Detail, IntegrationError, Integrator};
 use crate::physics::groups::Groups;
 use crate::physics::nose::NoseShape;
@@ -78,7 +79,7 @@ pub struct Shot {
 #[non_exhaustive]
 pub enum ExperimentError {
     /// A column is missing or there twice.
-    #[error("line 1: the column `{column}` is there {times} times, not once")]
+    #[error("line 1: the column `{column}` {}", if *.times == 0 { "is missing" } else { "is there more than once" })]
     Column {
         /// Its name.
         column: &'static str,
@@ -86,7 +87,7 @@ pub enum ExperimentError {
         times: usize,
     },
     /// A field that cannot be read.
-    #[error("line {line}, column `{column}`: `{text}` is not {allowed}")]
+    #[error("line {line}, column `{column}`: `{}` is not {allowed}", shortened(.text))]
     Field {
         /// Line in the file, from 1.
         line: u64,
@@ -97,11 +98,21 @@ pub enum ExperimentError {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// A row longer or shorter than the header.
+    #[error("line {line}: {} in a table of {}", counted(*.found as u64, "cell"), counted(*.expected as u64, "column"))]
+    Ragged {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Cells found.
+        found: usize,
+        /// Cells expected.
+        expected: usize,
+    },
     /// The table is no CSV.
     #[error("{0}")]
     Csv(String),
     /// No row.
-    #[error("the table has no row")]
+    #[error("the table has no row below a line of names")]
     Empty,
 }
 
@@ -153,9 +164,13 @@ impl Row<'_> {
 /// [`ExperimentError`] with line and column.
 pub fn read(text: &str, name: &str) -> Result<Vec<Shot>, ExperimentError> {
     let no_csv = |error: csv::Error| ExperimentError::Csv(error.to_string());
+    let text = text.trim_start_matches('\u{feff}');
     let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+        csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(LineEnds::new(text.as_bytes()));
     let header = reader.headers().map_err(no_csv)?.clone();
+    if header.is_empty() {
+        return Err(ExperimentError::Empty);
+    }
     let mut places = Vec::new();
     for column in REQUIRED.into_iter().chain(OPTIONAL) {
         let found: Vec<usize> = (0..header.len()).filter(|&i| &header[i] == column).collect();
@@ -166,9 +181,13 @@ pub fn read(text: &str, name: &str) -> Result<Vec<Shot>, ExperimentError> {
         }
     }
     let mut shots = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(no_csv)?;
-        let row = Row { line: record.position().map_or(0, csv::Position::line), record: &record, places: &places };
+    let mut record = StringRecord::new();
+    while reader.read_record(&mut record).map_err(no_csv)? {
+        let line = line_of(&reader, record.as_slice().as_bytes());
+        if record.len() != header.len() {
+            return Err(ExperimentError::Ragged { line, found: record.len(), expected: header.len() });
+        }
+        let row = Row { line, record: &record, places: &places };
         let uncertainty = match row.text("depth_uncertainty_mm") {
             "" => None,
             _ => Some(row.number("depth_uncertainty_mm", Range::NotNegative)? / 1e3),
@@ -509,7 +528,7 @@ mod tests {
         let good = "0.906,26.9,ogive,2,35.2,2370,277,173\n";
         assert_eq!(read(&format!("{header}{good}"), "own").unwrap()[0].set, "own");
         let refused = |text: String| read(&text, "own").unwrap_err().to_string();
-        assert!(refused(header.replace("CRH", "crh") + good).contains("`CRH` is there 0 times"));
+        assert!(refused(header.replace("CRH", "crh") + good).contains("`CRH` is missing"));
         assert!(
             refused(header.to_owned() + good + &good.replace("173", "deep"))
                 .contains("line 3, column `depth_mm`: `deep`")
@@ -519,6 +538,9 @@ mod tests {
         assert!(refused(header.to_owned() + &good.replace("0.906", "-1")).contains("a number > 0"));
         assert!(refused(header.to_owned() + &good.replace("277", "NaN")).contains("`NaN`"));
         assert_eq!(read(header, "own"), Err(ExperimentError::Empty));
-        assert!(matches!(read(&format!("{header}1,2\n"), "own"), Err(ExperimentError::Csv(_))));
+        assert!(matches!(
+            read(&format!("{header}1,2\n"), "own"),
+            Err(ExperimentError::Ragged { line: 2, found: 2, .. })
+        ));
     }
 }

@@ -18,10 +18,12 @@
 //! Computing (2010), section 8.6.4. T. Xing, F. Stern, J. Fluids Eng. 132 (2010) 061403. L. Eça, M. Hoekstra,
 //! J. Comput. Phys. 262 (2014) 104-130.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
 use super::order::{Class, ORDER_RESOLUTION, alternates, student_t};
+use crate::physics::Shown;
 
 /// A value at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +44,7 @@ impl GridValue {
 }
 
 /// What the values do as the step shrinks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Behaviour {
     /// They approach a limit from one side.
@@ -75,7 +77,7 @@ impl Behaviour {
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum GridError {
     /// NaN or infinity.
-    #[error("value {value} at step {step} is not finite")]
+    #[error("value {value} at step {} is not finite", Shown(*.step))]
     NotFinite {
         /// Step.
         step: f64,
@@ -83,7 +85,7 @@ pub enum GridError {
         value: f64,
     },
     /// A step that is none.
-    #[error("step {step} is not a positive number")]
+    #[error("step {} is not a positive number", Shown(*.step))]
     BadStep {
         /// Step.
         step: f64,
@@ -97,7 +99,7 @@ pub enum GridError {
         needed: usize,
     },
     /// One step with two values.
-    #[error("step {step} has two values, {first} and {second}")]
+    #[error("step {} has two values, {} and {}", Shown(*.step), Shown(*.first), Shown(*.second))]
     TwoValues {
         /// Step.
         step: f64,
@@ -109,7 +111,7 @@ pub enum GridError {
 }
 
 /// An error bar of the value on the finest grid, and the rule it comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Uncertainty {
     /// Half-width, in the unit of the value.
     pub half_width: f64,
@@ -122,7 +124,7 @@ pub struct Uncertainty {
 }
 
 /// The result of [`three_grids`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ThreeGrids {
     /// What the three values do.
     pub behaviour: Behaviour,
@@ -320,7 +322,7 @@ pub fn xing_stern(fine: GridValue, coarse: GridValue, observed: f64, formal: f64
 }
 
 /// The result of [`eca_hoekstra`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EcaHoekstra {
     /// What the values do.
     pub behaviour: Behaviour,
@@ -404,7 +406,7 @@ pub fn eca_hoekstra(grids: &[GridValue]) -> Result<EcaHoekstra, GridError> {
 }
 
 /// The result of [`self_convergence`].
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SelfConvergence {
     /// What the values do.
     pub behaviour: Behaviour,

@@ -24,6 +24,7 @@ pub mod rounding;
 pub mod sensitivity;
 pub mod stability;
 pub mod sweep;
+pub mod table_text;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;

@@ -23,8 +23,11 @@
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use nalgebra::{DVector, Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
+
+use crate::physics::Shown;
 
 /// Two-sided level of the band behind a verdict: the chance that a right order falls outside.
 ///
@@ -88,7 +91,7 @@ impl StepError {
 }
 
 /// What the errors do as the step shrinks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
     /// They vanish.
@@ -117,7 +120,7 @@ impl Class {
 }
 
 /// Why a point is not in the fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Exclusion {
     /// The error is zero.
@@ -196,7 +199,7 @@ pub struct OrderFit {
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum FitError {
     /// NaN or infinity.
-    #[error("error {error} at step {step} is not finite (point {index})")]
+    #[error("error {error} at step {} is not finite (point {index})", Shown(*.step))]
     NotFinite {
         /// Index from 0 in the points given.
         index: usize,
@@ -206,7 +209,7 @@ pub enum FitError {
         error: f64,
     },
     /// A step, or a round-off estimate, that is none.
-    #[error("step {step} is not a positive number (point {index})")]
+    #[error("step {} is not a positive number (point {index})", Shown(*.step))]
     BadStep {
         /// Index from 0 in the points given.
         index: usize,

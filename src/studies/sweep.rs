@@ -11,11 +11,12 @@ use thiserror::Error;
 
 use super::critical_velocity;
 use super::parameter::{Parameter, ParameterError};
+use super::table_text::{LineEnds, counted, line_of, shortened};
 use crate::integrators::{Detail, Integrator, keeping};
 use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::number;
-use crate::physics::{Criterion, Outcome, Scene};
+use crate::physics::{Criterion, Outcome, Scene, Shown};
 
 /// Most points of one sweep: a table of a gigabyte.
 pub const POINTS_MAX: usize = 10_000_000;
@@ -55,7 +56,7 @@ pub enum SweepError {
         text: String,
     },
     /// Logarithmic steps through zero.
-    #[error("logarithmic steps lead from {from} to {to} only where both are above zero")]
+    #[error("logarithmic steps lead from {} to {} only where both are above zero", Shown(*.from), Shown(*.to))]
     Logarithm {
         /// First value.
         from: f64,
@@ -340,7 +341,7 @@ fn fly(scene: &Scene, integrator: &dyn Integrator, row: &mut Row) -> Result<(), 
 #[non_exhaustive]
 pub enum PointsError {
     /// A column is missing or there twice.
-    #[error("line 1: the column `{column}` is there {times} times, not once")]
+    #[error("line 1: the column `{column}` {}", if *.times == 0 { "is missing" } else { "is there more than once" })]
     Column {
         /// Its name.
         column: &'static str,
@@ -348,7 +349,7 @@ pub enum PointsError {
         times: usize,
     },
     /// A field that is no number above zero.
-    #[error("line {line}, column `{column}`: `{text}` is no number above zero")]
+    #[error("line {line}, column `{column}`: `{}` is no number above zero", shortened(.text))]
     Field {
         /// Line in the file, from 1.
         line: u64,
@@ -357,11 +358,21 @@ pub enum PointsError {
         /// What is there.
         text: String,
     },
+    /// A row longer or shorter than the header.
+    #[error("line {line}: {} in a table of {}", counted(*.found as u64, "cell"), counted(*.expected as u64, "column"))]
+    Ragged {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Cells found.
+        found: usize,
+        /// Cells expected.
+        expected: usize,
+    },
     /// The table is no CSV.
     #[error("{0}")]
     Csv(String),
     /// No row.
-    #[error("the table has no row")]
+    #[error("the table has no row below a line of names")]
     Empty,
 }
 
@@ -372,9 +383,13 @@ pub enum PointsError {
 pub fn read_points(text: &str) -> Result<Vec<(f64, f64)>, PointsError> {
     const COLUMNS: [&str; 2] = ["H/d", "E_c/(d3 fc)"];
     let no_csv = |error: csv::Error| PointsError::Csv(error.to_string());
+    let text = text.trim_start_matches('\u{feff}');
     let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.trim_start_matches('\u{feff}').as_bytes());
+        csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(LineEnds::new(text.as_bytes()));
     let header = reader.headers().map_err(no_csv)?.clone();
+    if header.is_empty() {
+        return Err(PointsError::Empty);
+    }
     let mut places = [0; 2];
     for (place, column) in places.iter_mut().zip(COLUMNS) {
         let found: Vec<usize> = (0..header.len()).filter(|&i| &header[i] == column).collect();
@@ -382,9 +397,12 @@ pub fn read_points(text: &str) -> Result<Vec<(f64, f64)>, PointsError> {
         *place = only;
     }
     let mut points = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(no_csv)?;
-        let line = record.position().map_or(0, csv::Position::line);
+    let mut record = csv::StringRecord::new();
+    while reader.read_record(&mut record).map_err(no_csv)? {
+        let line = line_of(&reader, record.as_slice().as_bytes());
+        if record.len() != header.len() {
+            return Err(PointsError::Ragged { line, found: record.len(), expected: header.len() });
+        }
         let field = |which: usize| {
             let text = record.get(places[which]).unwrap_or_default();
             number(text).ok().filter(|value| *value > 0.0).ok_or_else(|| PointsError::Field {
@@ -595,11 +613,14 @@ mod tests {
         let points = read_points("series,E_c/(d3 fc), H/d\na,10.5,3\nb, 20,5.5\n").unwrap();
         assert_eq!(points, [(3.0, 10.5), (5.5, 20.0)]);
         let refused = |text: &str| read_points(text).unwrap_err().to_string();
-        assert!(refused("H/d,E\n1,2\n").contains("`E_c/(d3 fc)` is there 0 times"));
-        assert!(refused("H/d,H/d,E_c/(d3 fc)\n1,2,3\n").contains("2 times"));
-        assert!(refused("H/d,E_c/(d3 fc)\n1,2\n3,\n").contains("line 3, column `E_c/(d3 fc)`"));
+        assert!(refused("H/d,E\n1,2\n").contains("`E_c/(d3 fc)` is missing"));
+        assert!(refused("H/d,H/d,E_c/(d3 fc)\n1,2,3\n").contains("`H/d` is there more than once"));
+        for ends in ["\n", "\r\n"] {
+            let text = "H/d,E_c/(d3 fc)\n1,2\n3,\n".replace('\n', ends);
+            assert!(refused(&text).contains("line 3, column `E_c/(d3 fc)`"));
+        }
         assert!(refused("H/d,E_c/(d3 fc)\n1,nan\n").contains("`nan`"));
-        assert!(refused("H/d,E_c/(d3 fc)\n1,2,3\n").contains("line: 2"));
+        assert_eq!(refused("H/d,E_c/(d3 fc)\r\n\r\n1,2,3\r\n"), "line 3: 3 cells in a table of 2 columns");
         assert_eq!(read_points("H/d,E_c/(d3 fc)\n"), Err(PointsError::Empty));
     }
 

@@ -13,7 +13,8 @@ use super::claim::{Check, Claim, ClaimSpec, Judged, NotMeasured};
 use super::verdict::{Counts, Verdict};
 use crate::physics::Scene;
 use crate::physics::SceneError;
-use crate::physics::scene_file::{SHIPPED, read_text};
+use crate::physics::Shown;
+use crate::physics::scene_file::{SHIPPED, did_you_mean, nearest, read_text};
 
 /// The suite that ships.
 pub const EMBEDDED: &str = include_str!("../../verification/suite.toml");
@@ -80,13 +81,18 @@ impl Suite {
             SceneError::at(file, text, span, message, allowed, help)
         };
         let read: SuiteFile = toml::from_str(text).map_err(|error| {
-            refuse(
-                error.span().unwrap_or(0..0),
-                error.message().to_owned(),
-                "claims as in the suite that ships",
-                "compare with `verification/suite.toml` of the project, which uses every kind of claim",
-            )
+            let span = error.span().unwrap_or(0..0);
+            let (message, allowed, help) = told(error.message(), text.get(span.clone()).unwrap_or_default());
+            refuse(span, message, &allowed, &help)
         })?;
+        if read.claim.is_empty() {
+            return Err(refuse(
+                0..0,
+                "the suite has no claim".to_owned(),
+                "one [[claim]] or more",
+                "copy one from `verification/suite.toml` of the project",
+            ));
+        }
         let mut scenes = Scenes::default();
         let mut claims: Vec<Claim> = Vec::new();
         let mut ids = BTreeSet::new();
@@ -104,7 +110,7 @@ impl Suite {
             if !(limit.is_finite() && limit >= 0.0) {
                 return Err(refuse(
                     spec.limit.span(),
-                    format!("a limit of {limit} decides nothing"),
+                    format!("a limit of {} decides nothing", Shown(limit)),
                     "a finite number, zero or above",
                     "write the largest value that you would accept",
                 ));
@@ -125,8 +131,9 @@ impl Suite {
                         return Err(refuse(
                             scene.span(),
                             format!("no scene `{name}` ships"),
-                            &format!("a file that ends in .toml, or one of {}", names.join(", ")),
-                            "check the spelling",
+                            "a file that ends in .toml, or a scene that ships",
+                            &nearest(name, &names)
+                                .map_or_else(|| format!("choose from {}", names.join(", ")), did_you_mean),
                         ));
                     }
                 };
@@ -154,6 +161,35 @@ impl Suite {
                 judged
             })
             .collect()
+    }
+}
+
+/// A reader's `message` on the text `at` in the words of scene files: what is wrong, what is allowed, what to do.
+fn told(message: &str, at: &str) -> (String, String, String) {
+    const COMPARE: &str = "compare with `verification/suite.toml` of the project, which uses every kind of claim";
+    /// Longest list of words that is told in one line [bytes].
+    const KNOWN_MAX: usize = 160;
+    // The reader quotes names: the offending one first, those it expected behind it.
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    match quoted[..] {
+        [name, ref known @ ..] if message.starts_with("unknown ") && !known.is_empty() => {
+            let help = nearest(name, known).map_or_else(|| COMPARE.to_owned(), did_you_mean);
+            let mut known = known.join(", ");
+            if known.len() > KNOWN_MAX {
+                "a word of the suite that ships".clone_into(&mut known);
+            }
+            (format!("`{name}` is not known here"), format!("known: {known}"), help)
+        }
+        [name] if message.starts_with("missing field") => {
+            (format!("`{name}` is missing"), format!("`{name}` is required here"), COMPARE.to_owned())
+        }
+        _ if message == "duplicate key" => {
+            (format!("`{at}` is given twice"), "each key once".to_owned(), "remove one of the two".to_owned())
+        }
+        _ => {
+            let message = message.replace("f64", "a number").replace("invalid type: ", "this is of another type: ");
+            (message, "a suite in TOML".to_owned(), COMPARE.to_owned())
+        }
     }
 }
 

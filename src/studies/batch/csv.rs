@@ -10,8 +10,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::{COLUMNS, CRITERION, Layout, NUMBERS, Row, TableError, shortened};
+use super::super::table_text::{LineEnds, counted, line_of, shortened};
+use super::{COLUMNS, CRITERION, Layout, NUMBERS, Row, TableError};
 use crate::physics::Scene;
+use crate::physics::units::{QuantityError, number};
 use crate::studies::audit::Place;
 
 /// Longest line [bytes]: without a limit one open quote, or a file that is no table, would fill the memory.
@@ -23,6 +25,8 @@ pub struct Records {
     layout: Arc<Layout>,
     #[expect(clippy::struct_field_names, reason = "the records are what the type is of")]
     records: Vec<ByteRecord>,
+    /// Line of each.
+    lines: Vec<u64>,
     /// Records in use; the others wait to be filled again.
     count: usize,
 }
@@ -44,15 +48,13 @@ impl Records {
     /// What is wrong, with the line and the column.
     pub fn scene(&self, index: usize) -> Result<Scene, String> {
         let record = &self.records[index];
-        self.read(record).map_err(|cause| match record.position() {
-            Some(position) => format!("line {}: {cause}", position.line()),
-            None => cause,
-        })
+        self.read(record).map_err(|cause| format!("line {}: {cause}", self.lines[index]))
     }
 
     fn read(&self, record: &ByteRecord) -> Result<Scene, String> {
         if record.len() != self.layout.width {
-            return Err(format!("{} cells in a table of {} columns", record.len(), self.layout.width));
+            let (found, expected) = (record.len() as u64, self.layout.width as u64);
+            return Err(format!("{} in a table of {}", counted(found, "cell"), counted(expected, "column")));
         }
         let cell = |index: usize| -> Result<&str, String> {
             let Some(place) = self.layout.places[index] else { return Ok("") };
@@ -65,11 +67,14 @@ impl Records {
         for index in 0..NUMBERS {
             let text = cell(index)?;
             if !text.is_empty() {
-                let value: f64 =
-                    text.parse().map_err(|_| format!("{}: `{}` is not a number", COLUMNS[index], shortened(text)))?;
-                if !value.is_finite() {
-                    return Err(format!("{}: {} is not finite", COLUMNS[index], shortened(text)));
-                }
+                let value = number(text).map_err(|error| {
+                    let what = match error {
+                        QuantityError::NotFinite => "not finite",
+                        QuantityError::TooSmall => "too small for 64 bits",
+                        _ => "not a number",
+                    };
+                    format!("{}: `{}` is {what}", COLUMNS[index], shortened(text))
+                })?;
                 row.numbers[index] = Some(value);
             }
         }
@@ -107,7 +112,7 @@ impl<R: Read> Read for Limited<R> {
 /// A CSV table of scenes that is being read.
 pub struct CsvScenes<R> {
     file: String,
-    reader: Reader<Limited<R>>,
+    reader: Reader<LineEnds<Limited<R>>>,
     allowance: Allowance,
     layout: Arc<Layout>,
 }
@@ -123,14 +128,14 @@ impl<R: Read> CsvScenes<R> {
             .has_headers(false)
             .flexible(true)
             .buffer_capacity(1 << 16)
-            .from_reader(Limited { inner: input, allowance: allowance.clone() });
+            .from_reader(LineEnds::new(Limited { inner: input, allowance: allowance.clone() }));
         let mut header = ByteRecord::new();
         let place = |line| move |column| Place { file: file.to_owned(), line, column };
         let found = reader.read_byte_record(&mut header).map_err(|error| refusal(file, 1, &error))?;
         if !found {
             return Err(TableError::Empty { file: file.to_owned() });
         }
-        let line = header.position().map_or(1, csv::Position::line);
+        let line = line_of(&reader, header.as_slice());
         if header.iter().any(|name| name.contains(&b'\n')) {
             return Err(TableError::OpenQuote { place: place(line)(0) });
         }
@@ -148,7 +153,8 @@ impl<R: Read> CsvScenes<R> {
     /// # Errors
     /// [`TableError`] for a table that cannot be read on.
     pub fn next_rows(&mut self, count: usize, used: Option<Records>) -> Result<Records, TableError> {
-        let mut records = used.map_or_else(Vec::new, |used| used.records);
+        let (mut records, mut lines) = used.map_or_else(Default::default, |used| (used.records, used.lines));
+        lines.clear();
         let filled = Cell::new(0);
         while filled.get() < count {
             let index = filled.get();
@@ -162,12 +168,13 @@ impl<R: Read> CsvScenes<R> {
                 break;
             }
             if record.as_slice().contains(&b'\n') {
-                let line = record.position().map_or(line, csv::Position::line);
+                let line = line_of(&self.reader, record.as_slice());
                 return Err(TableError::OpenQuote { place: Place { file: self.file.clone(), line, column: 0 } });
             }
+            lines.push(line_of(&self.reader, b""));
             filled.set(index + 1);
         }
-        Ok(Records { layout: Arc::clone(&self.layout), records, count: filled.get() })
+        Ok(Records { layout: Arc::clone(&self.layout), records, lines, count: filled.get() })
     }
 }
 
@@ -216,13 +223,24 @@ mod tests {
     }
 
     #[test]
+    fn a_bad_row_names_the_line_that_an_editor_shows() {
+        let good = "300,2,0.05,0.72,36e6,2300,";
+        for ends in ["\n", "\r\n", "\r"] {
+            let table = format!("{HEADER}|{good}|||two{good}||{good}|2").replace('|', ends);
+            let all = rows(table).unwrap();
+            assert!(all[1].as_ref().unwrap_err().starts_with("line 5: velocity_m_s: `two300`"), "{:?}", all[1]);
+            assert!(all[3].as_ref().unwrap_err().starts_with("line 8: 1 cell in"), "{:?}", all[3]);
+        }
+    }
+
+    #[test]
     fn a_bad_row_names_its_line_and_column_and_stops_nothing() {
         let good = "300,2,0.05,0.72,36e6,2300,";
         for (row, expected) in [
             ("300,2,0.05,0.72,36e6,2300", "line 3: 6 cells in a table of 7 columns"),
             ("300,two,0.05,0.72,36e6,2300,", "line 3: mass_kg: `two` is not a number"),
-            ("nan,2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: nan is not finite"),
-            ("1e999,2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: 1e999 is not finite"),
+            ("nan,2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: `nan` is not finite"),
+            ("1e999,2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: `1e999` is not finite"),
             (",2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: empty, and every scene needs it"),
         ] {
             let all = rows(format!("{HEADER}\n{good}\n{row}\n{good}\n{good}\n")).unwrap();
@@ -239,7 +257,7 @@ mod tests {
     fn a_table_that_no_row_of_can_be_trusted_is_refused_at_its_place() {
         let refusal = |table: &[u8]| rows(table).unwrap_err().to_string();
         assert_eq!(refusal(b""), "t.csv: the table is empty: its first line must name the columns");
-        assert_eq!(refusal(b"\xff\xfem\0a\0"), "t.csv:1, column 1: the first line is not UTF-8 text");
+        assert_eq!(refusal(b"\xff\xfem\0a\0"), "t.csv:1, column 1: the first line is not text in UTF-8");
         let open = format!("{HEADER}\n300,\"2,0.05,0.72,36e6,2300,\n300,2,0.05,0.72,36e6,2300,\n");
         assert_eq!(refusal(open.as_bytes()), "t.csv:2: a quote is opened and not closed in this line");
         let endless = format!("{HEADER}\n{}", "9".repeat(3 << 20));

@@ -97,7 +97,7 @@ pub enum PeerFault {
 
 /// A question without an answer, with everything a report needs.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("{peer} {fault}{}{}", quote("; it printed ", printed), quote("; on standard error ", last_line(stderr)))]
+#[error("{peer} {fault}{}{}", quote("; it printed ", printed), quote("; on standard error ", &last_line(stderr)))]
 pub struct PeerFailure {
     /// Name of the peer, or its command before the greeting.
     pub peer: String,
@@ -225,7 +225,7 @@ impl Peer {
                 let failure = lapse.into_failure(&format!("`{command}`"), &line);
                 let missing = status.is_some_and(|status| status.code() == Some(EXIT_CODE_MISSING));
                 if missing && matches!(failure.fault, PeerFault::Died { .. }) {
-                    let said = last_line(&failure.stderr).to_owned();
+                    let said = last_line(&failure.stderr);
                     return Err(PeerStartError::Missing { command: command.to_owned(), said });
                 }
                 Err(failure.into())
@@ -495,8 +495,14 @@ fn printable(text: &str) -> String {
 }
 
 /// The last line that says something.
-fn last_line(text: &str) -> &str {
-    text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("")
+/// The last line of `text` that is not blank, bounded: a peer may write a line of megabytes.
+fn last_line(text: &str) -> String {
+    let line = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("");
+    let mut bounded: String = line.chars().take(QUOTED_CHARS).collect();
+    if line.chars().nth(QUOTED_CHARS).is_some() {
+        bounded.push('…');
+    }
+    bounded
 }
 
 /// `text` in quotes after `before`, or nothing when there is none.
@@ -570,7 +576,7 @@ mod tests {
         let limits = PeerLimits { silence: Duration::from_millis(500), ..PeerLimits::default() };
         peer.line.limits = limits;
         let failure = peer.ask(&request()).unwrap_err();
-        let question: Value = serde_json::from_str(last_line(&failure.stderr)).unwrap();
+        let question: Value = serde_json::from_str(failure.stderr.lines().last().unwrap()).unwrap();
         let stage = json!({"static_force_n": 1.0, "stiffness_n_m": 0.0, "viscosity_kg_s": 0.0, "drag_kg_m": 0.0, "end_m": null});
         let wanted = json!({"id": 1, "mass_kg": 1.0, "velocity_m_s": 1.0, "exit_depth_m": null, "rtol": 1e-9,
             "atol": [1e-9, 1e-9], "repeats": 1, "stages": [stage]});

@@ -434,11 +434,6 @@ fn digits(_: Subject) -> Result<Measurement, NotMeasured> {
 
 /// Viscosity r [kg/s] on 1 kg from 10 m/s, with 10 N and 100 N/m that resist.
 fn viscous_resisting(subject: Subject) -> Result<Measurement, NotMeasured> {
-    if subject.method() == MethodName::TrBdf2 {
-        return Err(NotMeasured::skip(
-            "of second order: at this tolerance it takes tens of thousands of steps anywhere",
-        ));
-    }
     let mut worst = 0.0;
     let mut points = Vec::new();
     for power in 0..=8 {

@@ -1,0 +1,385 @@
+//! Results that have nowhere to go, or meet something in their place, or are interrupted; and texts of a person's files
+//! on their way into terminals, pages and tables.
+//!
+//! A report or a table is the old one, the new one or none, never half of one, and nobody's file is replaced.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use libtest_mimic::{Arguments, Trial};
+
+fn program(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_penetrode"));
+    command.args(arguments).current_dir(folder);
+    command
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    program(folder, arguments).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Names of what is in `folder`.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// A folder with a scene, a table of scenes, a table of measured points and one of shots.
+fn workplace() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification");
+    fs::copy(shipped.join("scenes/paper-slab.toml"), folder.path().join("slab.toml")).unwrap();
+    fs::copy(shipped.join("experiments/huang2011_penetration.csv"), folder.path().join("shots.csv")).unwrap();
+    fs::write(folder.path().join("points.svg"), "H/d,E_c/(d3 fc)\n3,10.5\n").unwrap();
+    let rows = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,velocity_m_s\n2,0.05,0.72,36e6,2300,300\n";
+    fs::write(folder.path().join("rows.csv"), rows).unwrap();
+    folder
+}
+
+const VARY: [&str; 2] = ["--vary", "H/d=1:5:3"];
+
+/// Commands that write a table, without the name of it.
+fn table_commands() -> Vec<Vec<&'static str>> {
+    vec![
+        vec!["solve", "slab.toml", "--trajectory"],
+        vec!["batch", "rows.csv", "--out"],
+        vec!["sweep", "slab.toml", VARY[0], VARY[1], "--out"],
+        vec!["map", "--out"],
+        vec!["experiments", "shots.csv", "--out"],
+    ]
+}
+
+fn an_input_is_never_replaced() {
+    let folder = workplace();
+    let before: Vec<_> = names(folder.path()).iter().map(|n| fs::read(folder.path().join(n)).unwrap()).collect();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("slab.toml", folder.path().join("link.csv")).unwrap();
+    let sweep = |more: &[&'static str]| [&["sweep", "slab.toml", VARY[0], VARY[1]], more].concat();
+    for arguments in [
+        vec!["solve", "slab.toml", "--trajectory", "slab.toml"],
+        vec!["solve", "slab.toml", "--trajectory", "./slab.toml"],
+        vec!["solve", "slab.toml", "--trajectory", "link.csv"],
+        vec!["batch", "rows.csv", "--out", "rows.csv"],
+        sweep(&["--out", "slab.toml"]),
+        sweep(&["--out", "link.csv"]),
+        sweep(&["--data", "points.svg", "--out", "points.svg"]),
+        // The figure would land on the points.
+        sweep(&["--data", "points.svg", "--out", "points.csv"]),
+        // The figure would land on the table.
+        sweep(&["--out", "new.svg"]),
+        vec!["map", "--out", "new.svg"],
+        vec!["experiments", "shots.csv", "--out", "shots.csv"],
+        vec!["experiments", "shots.csv", "--out", "new.svg"],
+    ] {
+        let output = run(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(output.stdout.is_empty());
+        assert!(said(&output).contains("would replace") && said(&output).contains(" help: name "), "{}", said(&output));
+    }
+    fs::remove_file(folder.path().join("link.csv")).unwrap();
+    let after: Vec<_> = names(folder.path()).iter().map(|n| fs::read(folder.path().join(n)).unwrap()).collect();
+    assert!(before == after, "{:?}", names(folder.path()));
+}
+
+fn what_cannot_be_written_says_why_and_leaves_nothing() {
+    for command in table_commands() {
+        let folder = workplace();
+        fs::create_dir(folder.path().join("folder")).unwrap();
+        // A figure's place is taken by a folder: then there is no table either.
+        fs::create_dir(folder.path().join("taken.svg")).unwrap();
+        let has_figure = !["solve", "batch"].contains(&command[0]);
+        let before = names(folder.path());
+        for (path, remedy) in [
+            ("missing/out.csv", "make the folder first"),
+            ("folder", "name a file in it"),
+            ("slab.toml/out.csv", "name"),
+            ("/proc/out.csv", "name"),
+            ("taken.csv", "name a file in it"),
+        ] {
+            if path == "taken.csv" && !has_figure {
+                continue;
+            }
+            let output = run(folder.path(), &[&command[..], &[path]].concat());
+            let text = said(&output);
+            assert_eq!(output.status.code(), Some(1), "{command:?} {path}: {text}");
+            let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(words.contains("cannot write") && words.contains(remedy), "{command:?} {path}: {text}");
+            assert!(!text.contains(".penetrode-"), "the name of a temporary file: {text}");
+            assert_eq!(names(folder.path()), before, "{command:?} {path}");
+        }
+    }
+}
+
+fn a_report_goes_into_a_new_an_empty_or_its_own_folder_alone() {
+    let folder = workplace();
+    let verify = |out: &str| run(folder.path(), &["verify", "--only", "eq15", "--out", out]);
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    for out in ["new", "empty", "new", "deep/down"] {
+        let output = verify(out);
+        assert_eq!(output.status.code(), Some(0), "{out}: {}", said(&output));
+        assert!(folder.path().join(out).join("report.html").exists());
+    }
+    fs::write(folder.path().join("new/notes.txt"), "years of work").unwrap();
+    fs::create_dir(folder.path().join("thesis")).unwrap();
+    fs::write(folder.path().join("thesis/thesis.txt"), "years of work").unwrap();
+    for (out, why) in [
+        ("new", "holds `notes.txt`"),
+        ("thesis", "is not a report of penetrode"),
+        ("slab.toml", "is a file, and a report is a folder"),
+    ] {
+        let output = verify(out);
+        assert_eq!(output.status.code(), Some(2), "{out}: {}", said(&output));
+        let words = said(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains(why) && words.contains("help: name another folder with --out"), "{words}");
+        assert!(output.stdout.is_empty());
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("new/notes.txt")).unwrap(), "years of work");
+    let output = verify("/proc/report");
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(!said(&output).contains(".penetrode-"), "{}", said(&output));
+    assert!(!names(folder.path()).iter().any(|name| name.starts_with('.')), "{:?}", names(folder.path()));
+}
+
+fn a_table_may_go_to_standard_output() {
+    let folder = workplace();
+    let before = names(folder.path());
+    for command in table_commands() {
+        let output = run(folder.path(), &[&command[..], &["-"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{command:?}: {}", said(&output));
+        let mut table = csv::Reader::from_reader(&output.stdout[..]);
+        let width = table.headers().unwrap().len();
+        assert!(width > 2 && table.records().map(Result::unwrap).count() > 0, "{command:?}");
+        if command[0] != "batch" {
+            let both = run(folder.path(), &[&command[..], &["-", "--json"]].concat());
+            assert_eq!(both.status.code(), Some(2), "{command:?}");
+        }
+    }
+    assert_eq!(names(folder.path()), before);
+}
+
+fn a_reader_that_goes_away_is_no_error() {
+    let folder = workplace();
+    for command in ["solve slab.toml", "batch random:200000 --out -", "sweep slab.toml --vary H/d=1:18:2000 --out -"] {
+        let mut arguments: Vec<_> = command.split(' ').collect();
+        let mut child = program(folder.path(), &std::mem::take(&mut arguments))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{command}: {}", said(&output));
+        assert!(!said(&output).contains("error"), "{command}: {}", said(&output));
+    }
+}
+
+/// Whether `folder` holds a whole report, or does not exist.
+fn assert_whole_or_none(folder: &Path, when: Duration) {
+    if !folder.exists() {
+        return;
+    }
+    let list = fs::read_to_string(folder.join("contents.txt")).unwrap_or_else(|e| panic!("killed after {when:?}: {e}"));
+    for name in list.lines() {
+        assert!(folder.join(name).exists(), "killed after {when:?}: {name} is missing");
+    }
+    let report = fs::read(folder.join("report.json")).unwrap();
+    assert!(serde_json::from_slice::<serde_json::Value>(&report).is_ok(), "killed after {when:?}: half a report.json");
+    let page = fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.trim_end().ends_with("</html>"), "killed after {when:?}: half a page");
+}
+
+fn an_interrupted_run_leaves_the_old_results_or_none() {
+    let folder = workplace();
+    let report = folder.path().join("report");
+    let verify = ["verify", "--only", "closed-form", "--out", "report"];
+    let table = folder.path().join("out.csv");
+    let batch = ["batch", "random:60000", "--out", "out.csv"];
+    let started = Instant::now();
+    assert!([0, 3, 4].contains(&run(folder.path(), &verify).status.code().unwrap()));
+    let verify_takes = started.elapsed();
+    let started = Instant::now();
+    assert_eq!(run(folder.path(), &batch).status.code(), Some(0));
+    let batch_takes = started.elapsed();
+    let old = fs::read(&table).unwrap();
+    for signal in ["INT", "KILL"] {
+        for part in 1..=6 {
+            for (arguments, takes) in [(&verify[..], verify_takes), (&batch[..], batch_takes)] {
+                let when = takes * part / 5;
+                let mut child =
+                    program(folder.path(), arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+                thread::sleep(when);
+                // It may have ended before.
+                let _ =
+                    Command::new("kill").args(["-s", signal, &child.id().to_string()]).stderr(Stdio::null()).status();
+                child.wait().unwrap();
+                assert_whole_or_none(&report, when);
+                assert!(fs::read(&table).unwrap() == old, "{signal} after {when:?}: half a table");
+            }
+        }
+    }
+    // And what was left behind does not stand in the way of the next run.
+    assert!([0, 3, 4].contains(&run(folder.path(), &verify).status.code().unwrap()));
+    assert_whole_or_none(&report, Duration::ZERO);
+    assert!(report.exists());
+}
+
+/// A tmpfs of 256 KiB, unmounted when dropped; `None` where this user may not mount.
+struct SmallDisk(PathBuf, #[expect(dead_code, reason = "its folder lives as long")] tempfile::TempDir);
+
+impl SmallDisk {
+    fn new() -> Option<Self> {
+        let folder = tempfile::tempdir().ok()?;
+        let path = folder.path().to_owned();
+        let mounted = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", "size=256k", "tmpfs"])
+            .arg(&path)
+            .stderr(Stdio::null())
+            .status()
+            .is_ok_and(|status| status.success());
+        mounted.then_some(Self(path, folder))
+    }
+}
+
+impl Drop for SmallDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+fn a_full_disk_leaves_the_old_results() {
+    let disk = SmallDisk::new().unwrap();
+    let place = workplace();
+    let out = |name: &str| disk.0.join(name).display().to_string();
+    let (csv, report) = (out("out.csv"), out("report"));
+    // Small results fit, and are the old ones.
+    let small = ["sweep", "slab.toml", VARY[0], VARY[1], "--out", &csv];
+    assert_eq!(run(place.path(), &small).status.code(), Some(0));
+    assert_eq!(run(place.path(), &["verify", "--only", "eq15", "--out", &report]).status.code(), Some(0));
+    let old = fs::read(&csv).unwrap();
+    let before = names(&disk.0);
+    let contents = names(&disk.0.join("report"));
+    for arguments in [
+        &["batch", "random:20000", "--out", &csv][..],
+        &["sweep", "slab.toml", "--vary", "H/d=1:18:4000", "--out", &csv],
+        &["solve", "slab.toml", "--method", "central-difference", "--dt", "10 ns", "--trajectory", &csv],
+        &["verify", "--only", "e", "--out", &report],
+    ] {
+        let output = run(place.path(), arguments);
+        let text = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            ["no storage space", "No space left"].iter().any(|cause| words.contains(cause))
+                && words.contains("make room on the disk"),
+            "{text}"
+        );
+        assert!(!text.contains(".penetrode-"), "{text}");
+        assert!(fs::read(&csv).unwrap() == old, "{arguments:?}: the old table is gone");
+        assert_eq!(names(&disk.0), before, "{arguments:?}");
+        assert_eq!(names(&disk.0.join("report")), contents, "{arguments:?}");
+        assert_whole_or_none(&disk.0.join("report"), Duration::ZERO);
+    }
+}
+
+const HOSTILE: &str = "<script>alert(1)</script> ]]> & \\u001b[31m \\u0007 =1+1 \\u202e \\\" ' `x`";
+
+fn texts_of_a_scene_steer_no_terminal() {
+    let folder = workplace();
+    let scene = fs::read_to_string(folder.path().join("slab.toml")).unwrap();
+    let (_, rest) = scene.split_once("title").unwrap();
+    let (_, rest) = rest.split_once('\n').unwrap();
+    fs::write(folder.path().join("hostile.toml"), format!("title = \"{HOSTILE}\"\n{rest}")).unwrap();
+    for arguments in [
+        vec!["solve", "hostile.toml", "--explain", "--sensitivities"],
+        vec!["critical", "hostile.toml"],
+        vec!["converge", "hostile.toml", "--points", "8"],
+        vec!["sweep", "hostile.toml", VARY[0], VARY[1], "--out", "out.csv"],
+        vec!["solve", "\u{1b}[31m.toml"],
+        vec!["batch", "\u{1b}[31m.csv", "--out", "out.csv"],
+        vec!["audit", "\u{1b}[31m.csv"],
+        vec!["experiments", "\u{1b}[31m.csv"],
+        vec!["verify", "\u{1b}[31m.toml"],
+        vec!["solve", "slab.toml", "--trajectory", "\u{1b}[31m/out.csv"],
+        vec!["sweep", "slab.toml", "--vary", "\u{1b}[31m=1:2:3"],
+    ] {
+        let output = run(folder.path(), &arguments);
+        for stream in [&output.stdout, &output.stderr] {
+            let text = String::from_utf8(stream.clone()).unwrap();
+            assert!(!text.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}'), "{arguments:?}: {text:?}");
+        }
+    }
+    // JSON keeps the title as it is, its control characters written as escapes.
+    let json = run(folder.path(), &["solve", "hostile.toml", "--json"]);
+    let answer: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert!(answer["scene"]["title"].as_str().unwrap().contains("\u{1b}[31m"));
+}
+
+fn texts_of_a_suite_are_text_in_every_file_of_the_report() {
+    let folder = workplace();
+    let suite = format!(
+        "title = \"{HOSTILE}\"\n[[claim]]\nid = \"={HOSTILE}\"\nstatement = \"{HOSTILE}\"\n\
+         check = {{ agreement = {{}} }}\nscenes = [\"slab.toml\"]\nmethods = [\"taylor\"]\nquantities = [\"depth\"]\n\
+         limit = 1e-300\nreason = \"{HOSTILE}\"\n"
+    );
+    fs::write(folder.path().join("suite.toml"), suite).unwrap();
+    let output = run(folder.path(), &["verify", "suite.toml", "--out", "report"]);
+    assert!([0, 3, 4].contains(&output.status.code().unwrap()), "{}", said(&output));
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    assert!(!text.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}'), "{text:?}");
+    let report = folder.path().join("report");
+    for name in fs::read_to_string(report.join("contents.txt")).unwrap().lines() {
+        let text = fs::read_to_string(report.join(name)).unwrap();
+        assert!(!text.contains(['\u{1b}', '\u{7}']), "{name} holds control characters");
+        let ending = Path::new(name).extension().unwrap();
+        if ending != "json" && ending != "csv" {
+            assert!(!text.contains("<script>alert"), "{name} holds a script");
+        }
+        if ending == "csv" {
+            let mut table = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
+            for cell in table.records().flat_map(|row| row.unwrap().iter().map(str::to_owned).collect::<Vec<_>>()) {
+                assert!(!cell.starts_with(['=', '@']), "{name}: {cell}");
+            }
+        }
+    }
+    let xml = fs::read_to_string(report.join("junit.xml")).unwrap();
+    assert!(!xml.contains("]]> "), "raw text in CDATA: {xml}");
+}
+
+fn main() -> ExitCode {
+    let can_mount = SmallDisk::new().is_some();
+    let trial = |name: &str, claim: fn()| {
+        Trial::test(name, move || {
+            claim();
+            Ok(())
+        })
+    };
+    let trials = vec![
+        trial("an_input_is_never_replaced", an_input_is_never_replaced),
+        trial("what_cannot_be_written_says_why_and_leaves_nothing", what_cannot_be_written_says_why_and_leaves_nothing),
+        trial(
+            "a_report_goes_into_a_new_an_empty_or_its_own_folder_alone",
+            a_report_goes_into_a_new_an_empty_or_its_own_folder_alone,
+        ),
+        trial("a_table_may_go_to_standard_output", a_table_may_go_to_standard_output),
+        trial("a_reader_that_goes_away_is_no_error", a_reader_that_goes_away_is_no_error),
+        trial("an_interrupted_run_leaves_the_old_results_or_none", an_interrupted_run_leaves_the_old_results_or_none),
+        trial("a_full_disk_leaves_the_old_results", a_full_disk_leaves_the_old_results).with_ignored_flag(!can_mount),
+        trial("texts_of_a_scene_steer_no_terminal", texts_of_a_scene_steer_no_terminal),
+        trial(
+            "texts_of_a_suite_are_text_in_every_file_of_the_report",
+            texts_of_a_suite_are_text_in_every_file_of_the_report,
+        ),
+    ];
+    libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
+}
