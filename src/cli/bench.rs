@@ -311,7 +311,7 @@ fn case_lines(report: &BenchJson, case: &CaseJson) -> Vec<String> {
         if runs[0].scene != case.name {
             continue;
         }
-        let mut cells = vec![clipped(&runs[0].method, 18)];
+        let mut cells = vec![clipped(&runs[0].method, 16)];
         for level in LEVELS {
             let best = report
                 .fastest
@@ -405,10 +405,16 @@ fn growth_lines(growths: &[Growth]) -> Vec<String> {
     lines
 }
 
-/// A time in µs, three digits.
+/// A time in µs: three digits, two below one, and thousands as `17k`, so that a slow machine widens no table.
 fn micro(ns: f64) -> String {
     let us = 1e-3 * ns;
-    if us < 1e5 { number(us, 3) } else { format!("{us:.1e}") }
+    if us < 0.995 {
+        number(us, 2)
+    } else if us < 9999.5 {
+        number(us, 3)
+    } else {
+        compact(us)
+    }
 }
 
 /// Two digits and the prefix of the unit: `1.2µ`, `83k`.
@@ -455,5 +461,17 @@ mod tests {
         ] {
             assert_eq!(compact(value), text);
         }
+    }
+
+    #[test]
+    fn no_time_from_a_nanosecond_to_a_day_widens_a_table() {
+        let mut ns = 1.0;
+        while ns < 1e14 {
+            let text = micro(ns);
+            // With a setting of five or six characters and the blanks between, four columns fit.
+            assert!(text.chars().count() <= if ns < 100.0 { 6 } else { 4 }, "{ns} ns: {text}");
+            ns *= 1.37;
+        }
+        assert_eq!((micro(344.0), micro(1234.0), micro(1.7e7)), ("0.34".into(), "1.23".into(), "17k".into()));
     }
 }
