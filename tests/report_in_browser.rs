@@ -88,7 +88,10 @@ impl Stage {
         let judged = suite.run(1, &PeerAnswers::recorded()?, &|_| ());
         let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
         let folder = tempfile::tempdir()?;
-        folder::write(&Run { suite: &suite, judged: &judged, environment }, &folder.path().join("report"))?;
+        folder::write(
+            &Run { suite: &suite, judged: &judged, environment, points: &[] },
+            &folder.path().join("report"),
+        )?;
         Ok(Self { browser, folder })
     }
 

@@ -52,7 +52,7 @@ fn a_sweep_of_thickness_writes_its_table_and_figures_4_and_5() {
     assert!(lines.clone().next().unwrap().starts_with("0.5,") && lines.next_back().unwrap().starts_with("18,"));
     for (name, words) in [("fig4.svg", "simulation, full depth"), ("fig4-difference.svg", "difference [%]")] {
         let svg = std::fs::read_to_string(folder.path().join(name)).unwrap();
-        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains(words), "{name}");
+        assert!(svg.starts_with("<?xml") && svg.trim_end().ends_with("</svg>") && svg.contains(words), "{name}");
     }
 }
 
@@ -182,7 +182,7 @@ fn the_map_has_lines_of_three_errors_and_the_measured_scenes() {
     assert_eq!(value["lines"].as_array().unwrap().len(), 6);
     assert_eq!(value["scenes"].as_array().unwrap().len(), 107);
     let svg = std::fs::read_to_string(folder.path().join("map.svg")).unwrap();
-    for words in ["Eq. 11 too shallow by 1 %", "Eq. 12 too deep by 20 %", "Sliter1980"] {
+    for words in ["Eq. 11 too shallow", "Eq. 12 too deep", "20 %", "Sliter1980"] {
         assert!(svg.contains(words), "{words}");
     }
     assert!(std::fs::read_to_string(&out).unwrap().starts_with("level,I,N\n0.01,"));
@@ -200,7 +200,7 @@ fn shipped_experiments_say_what_they_validate_and_what_is_not_given() {
         assert!(text.contains(words), "{words}\n{text}");
     }
     let svg = std::fs::read_to_string(folder.path().join("exp.svg")).unwrap();
-    assert!(svg.contains("+20 %") && svg.contains("-20 %"));
+    assert!(svg.contains("±20 %"));
     conforms("experiments", &json(&["experiments", "--json"]));
 }
 

@@ -11,7 +11,8 @@ use super::output::{print_json, print_text, significant, table, write_whole};
 use super::solve::escape_terminal;
 use super::sweep::wrapped;
 use super::{CliError, Exit};
-use crate::report::plots_sweep;
+use crate::report::figure::Figure;
+use crate::report::sweep_figures;
 use crate::studies::experiments::{self, Comparison, PredictionCause, PredictionError, SetSummary, Shot};
 use crate::studies::sensitivity::{Spread, SpreadError};
 
@@ -179,7 +180,7 @@ impl ExperimentsArgs {
             meaning: self.tables.is_empty().then_some(experiments::MEANING),
         };
         if let Some(path) = &self.out {
-            write_files(path, &comparisons, &summaries)?;
+            write_files(path, &comparisons)?;
         }
         if self.json { print_json(&report) } else { print_text(&text(&report)) }.map_err(CliError::stdout)?;
         Ok(Exit::Success)
@@ -204,20 +205,16 @@ impl ExperimentsArgs {
 }
 
 /// The table and the figure; both are made before the first is written.
-fn write_files(path: &Path, comparisons: &[Comparison], summaries: &[SetSummary]) -> Result<(), CliError> {
+fn write_files(path: &Path, comparisons: &[Comparison]) -> Result<(), CliError> {
     let failed = |path: &Path, cause| CliError::Write { path: path.display().to_string(), cause };
-    let sets: Vec<plots_sweep::MarkedSet<'_>> = summaries
-        .iter()
-        .map(|summary| {
-            let of_set = comparisons.iter().filter(|c| c.group() == summary.group);
-            (summary.group.as_str(), of_set.map(|c| (c.shot.depth, c.predicted)).collect())
-        })
-        .collect();
-    let figure = plots_sweep::measured_depths(&sets).map_err(|error| failed(path, std::io::Error::other(error)))?;
+    let drawn = sweep_figures::measured_depths(comparisons).map(Figure::draw).transpose();
+    let drawn = drawn.map_err(|error| failed(path, std::io::Error::other(error)))?;
     let csv = csv_of(comparisons).map_err(|cause| failed(path, cause))?;
     write_whole(path, &csv).map_err(|cause| failed(path, cause))?;
     let beside = path.with_extension("svg");
-    write_whole(&beside, figure.as_bytes()).map_err(|cause| failed(&beside, cause))
+    drawn
+        .map_or(Ok(()), |figure| write_whole(&beside, figure.file().as_bytes()))
+        .map_err(|cause| failed(&beside, cause))
 }
 
 fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {

@@ -12,7 +12,8 @@ use super::solve::escape_terminal;
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Method;
 use crate::physics::{Criterion, Outcome};
-use crate::report::plots_sweep;
+use crate::report::figure::Figure;
+use crate::report::sweep_figures;
 use crate::studies::sweep::{Axis, Plan, Row, SweepError, explanation, read_points};
 
 /// Rows of the table for people; all rows are in the CSV and the JSON.
@@ -194,14 +195,7 @@ impl SweepArgs {
                 "sweep H/d alone, or leave out --data",
             ));
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|cause| CliError::usage(format!("cannot read {}: {cause}", path.display()), ""))?;
-        read_points(&text).map_err(|error| {
-            CliError::usage(
-                format!("{}: {error}", path.display()),
-                "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, one number each a line",
-            )
-        })
+        read_data(path)
     }
 
     fn report(&self, plan: &Plan, rows: &[Row], data: Vec<DataJson>) -> Result<SweepJson, CliError> {
@@ -301,6 +295,18 @@ impl SweepArgs {
     }
 }
 
+/// Measured points of the file at `path`.
+pub(super) fn read_data(path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|cause| CliError::usage(format!("cannot read {}: {cause}", path.display()), ""))?;
+    read_points(&text).map_err(|error| {
+        CliError::usage(
+            format!("{}: {error}", path.display()),
+            "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, one number each a line",
+        )
+    })
+}
+
 /// `text` in lines of at most `width` characters, indented by two.
 pub(super) fn wrapped(text: &str, width: usize) -> String {
     let mut lines = vec![String::from(" ")];
@@ -367,20 +373,25 @@ fn draws_eq15(plan: &Plan) -> bool {
 /// Writes table and figures; every one is drawn before the first is written.
 fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) -> Result<(), CliError> {
     let figures = if draws_eq15(plan) {
-        vec![plots_sweep::critical_energy(rows, points), plots_sweep::critical_energy_difference(rows)]
+        vec![sweep_figures::critical_energy(rows, points), sweep_figures::critical_energy_difference(rows)]
     } else {
-        vec![plots_sweep::critical_velocity(plan, rows)]
+        vec![sweep_figures::critical_velocity(plan, rows)]
     };
-    let csv = csv_of(plan, rows).map_err(|cause| CliError::Write { path: path.display().to_string(), cause })?;
-    let write = |path: &Path, bytes: &[u8]| {
-        write_whole(path, bytes).map_err(|cause| CliError::Write { path: path.display().to_string(), cause })
-    };
+    let failed = |path: &Path, cause| CliError::Write { path: path.display().to_string(), cause };
+    let draw = |figure: Option<Figure>| figure.map(Figure::draw).transpose();
+    let figures: Vec<_> = figures
+        .into_iter()
+        .map(draw)
+        .collect::<Result<_, _>>()
+        .map_err(|error| failed(path, std::io::Error::other(error)))?;
+    let csv = csv_of(plan, rows).map_err(|cause| failed(path, cause))?;
+    let write = |path: &Path, bytes: &[u8]| write_whole(path, bytes).map_err(|cause| failed(path, cause));
     write(path, &csv)?;
     for (figure_path, figure) in figure_paths(path, plan).iter().zip(figures) {
         match figure {
-            Ok(svg) => write(figure_path, svg.as_bytes())?,
+            Some(figure) => write(figure_path, figure.file().as_bytes())?,
             // A sweep of bad rows has a table, and nothing to draw.
-            Err(error) => eprintln!("warning: {} not written: {error}", figure_path.display()),
+            None => eprintln!("warning: {} not written: no point in its range", figure_path.display()),
         }
     }
     Ok(())

@@ -1,5 +1,6 @@
 //! How a run of the suite is shown: JSON, and a folder with a page, figures, tables and JUnit.
 
+mod applications;
 pub mod chart;
 pub mod environment;
 pub mod families;
@@ -10,8 +11,9 @@ pub mod folder;
 pub mod json;
 pub mod junit;
 pub mod page;
-pub mod plots_sweep;
+pub mod stability_figures;
 pub mod summary;
+pub mod sweep_figures;
 pub mod table;
 pub mod text;
 
@@ -29,6 +31,8 @@ pub struct Run<'a> {
     pub judged: &'a [Judged],
     /// Where it ran and what remakes it.
     pub environment: Environment,
+    /// A user's measured critical energies (H/d, `E_c/(d³ fc)`), shown with the paper's curve.
+    pub points: &'a [(f64, f64)],
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Run;
+use super::applications;
 use super::chart::Ink;
 use super::families::{Family, group_of};
 use super::figure::{Drawn, Part};
@@ -59,7 +60,12 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
                     (cross_code(run, &families, figures))
                     (events(run, &families, figures))
                     (energy(run, &families, figures))
-                    (stability(&families))
+                    (stability(run, &families, figures))
+                    (applications::paper_curve(run, &families, figures))
+                    (applications::applicability(run, &families, figures))
+                    (applications::measured_data(run, &families, figures))
+                    (applications::layers(run, figures))
+                    (applications::sensitivities(&families))
                     (deviations(run, &families))
                     (every_claim(run))
                     (reproduction(run))
@@ -74,7 +80,7 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
     page.into_string()
 }
 
-const SECTIONS: [(&str, &str); 14] = [
+const SECTIONS: [(&str, &str); 19] = [
     ("verdict", "Verdict"),
     ("model", "Model, assumptions, validity"),
     ("algorithms", "Algorithms and their formal orders"),
@@ -84,7 +90,12 @@ const SECTIONS: [(&str, &str); 14] = [
     ("cross-code", "Comparison with other programs"),
     ("events", "Event verification"),
     ("energy", "Energy and other invariants"),
-    ("stability", "Stability"),
+    ("stability", "Stability and rounding"),
+    ("slab", "The paper's curve: critical energy over the thickness"),
+    ("applicability", "How far Eq. 11-12 holds"),
+    ("measured", "Measured depths"),
+    ("layers", "Layered targets"),
+    ("sensitivities", "Sensitivities"),
     ("deviations", "Deviations and limits of what was shown"),
     ("claims", "Every claim"),
     ("reproduction", "Reproduction"),
@@ -100,7 +111,7 @@ fn contents() -> Markup {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
-fn section(id: &str, body: Markup) -> Markup {
+pub(super) fn section(id: &str, body: Markup) -> Markup {
     let title = SECTIONS.iter().find(|(known, _)| *known == id).map_or(id, |(_, title)| title);
     html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (body) } }
 }
@@ -125,7 +136,7 @@ fn sign(verdict: Verdict) -> &'static str {
     }
 }
 
-fn badge(verdict: Verdict) -> Markup {
+pub(super) fn badge(verdict: Verdict) -> Markup {
     html! { span.badge.(verdict.name()) { (sign(verdict)) " " (verdict.name()) } }
 }
 
@@ -213,7 +224,7 @@ fn families_table(caption: &str, families: &[&Family<'_>]) -> Markup {
 }
 
 /// `12 passed, 3 skipped`.
-fn tally(counts: Counts) -> String {
+pub(super) fn tally(counts: Counts) -> String {
     [
         (counts.failed, Verdict::Failed),
         (counts.undecided, Verdict::Undecided),
@@ -227,7 +238,7 @@ fn tally(counts: Counts) -> String {
     .join(", ")
 }
 
-fn figures_of(run: &Run<'_>, figures: &[Drawn], part: Part) -> Markup {
+pub(super) fn figures_of(run: &Run<'_>, figures: &[Drawn], part: Part) -> Markup {
     html! {
         @for drawn in figures.iter().filter(|f| f.figure.part == part) {
             @let figure = &drawn.figure;
@@ -458,7 +469,7 @@ fn criteria(families: &[Family<'_>]) -> Markup {
 
 /// What a check is evidence of: the part of the report that shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     Exact,
     Order,
     Discrete,
@@ -467,6 +478,10 @@ enum Kind {
     Event,
     Invariant,
     Stability,
+    Slab,
+    Applicability,
+    Measured,
+    Sensitivity,
 }
 
 /// Every check has its place: one that is new does not compile without.
@@ -496,7 +511,11 @@ fn kind_of(check: &Check) -> Kind {
         Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. } => {
             Kind::Invariant
         }
-        Check::StabilityLimit {} => Kind::Stability,
+        Check::StabilityLimit {} | Check::StabilityMap { .. } | Check::RoundingFloor { .. } => Kind::Stability,
+        Check::Sweep { .. } => Kind::Slab,
+        Check::Map { .. } => Kind::Applicability,
+        Check::MeasuredDepth {} => Kind::Measured,
+        Check::Sensitivities {} => Kind::Sensitivity,
     }
 }
 
@@ -505,7 +524,7 @@ fn of_kind<'f, 'a>(families: &'f [Family<'a>], kind: Kind) -> Vec<&'f Family<'a>
 }
 
 /// Families of a section, or a sentence where the suite has none.
-fn results(caption: &str, families: &[Family<'_>], kind: Kind) -> Markup {
+pub(super) fn results(caption: &str, families: &[Family<'_>], kind: Kind) -> Markup {
     let families = of_kind(families, kind);
     html! {
         @if families.is_empty() { p { "This suite claims nothing of this kind." } }
@@ -638,13 +657,16 @@ fn energy(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Markup {
     )
 }
 
-fn stability(families: &[Family<'_>]) -> Markup {
+fn stability(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Markup {
     section(
         "stability",
         html! {
             p { "In the crater the scheme is stable for w dt < 2, w² = c/M; the limit is found by measurement. The lagged drag
-                is monotone for 2 Q V dt/M < 1 and stable for < 2." }
-            (results("Stability limits", families, Kind::Stability))
+                is monotone for 2 Q V dt/M < 1 and stable for < 2. Below every step size there is the rounding of the numbers." }
+            (figures_of(run, figures, Part::Stability))
+            (results("Stability limits and rounding", families, Kind::Stability))
+            p.quiet { "Events at their edges, extreme scenes and stiffness: " code { "penetrode stress --out DIR" }
+                " writes a report of their own." }
         },
     )
 }

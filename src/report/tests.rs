@@ -36,7 +36,7 @@ fn judged() -> (Suite, Vec<Judged>) {
 
 fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
     let environment = Environment::here(1, HOSTILE.to_owned(), suite, vec![(HOSTILE.to_owned(), HOSTILE.to_owned())]);
-    let run = Run { suite, judged, environment };
+    let run = Run { suite, judged, environment, points: &[] };
     let files = folder::files(&run).unwrap();
     files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect()
 }
@@ -120,7 +120,12 @@ fn junit_says_what_became_of_each_claim() {
 #[test]
 fn an_interrupted_or_refused_run_leaves_what_was_there() {
     let (suite, judged) = judged();
-    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    let run = Run {
+        suite: &suite,
+        judged: &judged,
+        environment: Environment::here(1, String::new(), &suite, vec![]),
+        points: &[],
+    };
     let place = tempfile::tempdir().unwrap();
     let strange = place.path().join("strange");
     std::fs::create_dir(&strange).unwrap();

@@ -15,6 +15,7 @@
 use csv::StringRecord;
 use thiserror::Error;
 
+use super::applicability::model_error;
 use super::parameter::Parameter;
 use super::sensitivity::{SensitivityError, Spread, by_closed_form};
 use crate::integrators::{ClosedForm, Detail, IntegrationError, Integrator};
@@ -231,6 +232,32 @@ impl Shot {
     pub fn is_in_range_of_fit(&self) -> bool {
         semi_empirical::static_factor_validity(self.strength).valid && self.diameter < 0.0762 && self.velocity < 1200.0
     }
+}
+
+/// A shot on the map of Eq. 11-12.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MarkedScene {
+    /// Name of its set.
+    pub set: String,
+    /// Impact function I.
+    pub impact: f64,
+    /// Geometry function N.
+    pub geometry: f64,
+    /// Crater depth in diameters, by its own nose.
+    pub crater_ratio: f64,
+    /// Error of Eq. 11-12 there, relative to the depth of the equation of motion.
+    pub error: f64,
+}
+
+/// Where `shots` stand on the map; those without drag, whose N is infinite, are left out.
+pub fn marked(shots: &[Shot]) -> Vec<MarkedScene> {
+    let place = |shot: &Shot| {
+        let groups = Groups::of(&shot.scene(None), shot.velocity)?;
+        let (impact, geometry, crater_ratio) = (groups.impact, groups.geometry?, shot.nose.crater_ratio());
+        let error = model_error(impact, Some(geometry), crater_ratio);
+        Some(MarkedScene { set: shot.set.clone(), impact, geometry, crater_ratio, error })
+    };
+    shots.iter().filter_map(place).collect()
 }
 
 /// A shot beside its prediction.

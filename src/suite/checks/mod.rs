@@ -1,12 +1,13 @@
 //! How each kind of claim is measured: one function a kind, grouped by what it needs.
 
 mod agreement;
+mod applications;
 mod formulas;
 mod invariants;
 mod manufactured;
 mod orders;
 mod peers;
-mod scheme;
+pub(super) mod scheme;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -91,6 +92,12 @@ pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMe
         }
         Check::Split { pieces } => invariants::split(&Subject::of(claim, context)?, pieces),
         Check::Manufactured { path, order } => manufactured::order(claim, context, path, order),
+        Check::Sweep { from, to, points } => applications::sweep(&Subject::of(claim, context)?, [from, to], points),
+        Check::Map { points } => applications::map(claim, points),
+        Check::MeasuredDepth {} => applications::measured_depth(claim),
+        Check::Sensitivities {} => on(applications::sensitivities),
+        Check::StabilityMap { points } => scheme::stability_map(points),
+        Check::RoundingFloor { from, to } => scheme::rounding_floor(&Subject::of(claim, context)?.problem, from, to),
         Check::Peer { ref name, tolerance } => peers::agreement(&Subject::of(claim, context)?, name, tolerance),
     }
 }
