@@ -3,8 +3,9 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, converge, critical, experiments, map, output, solve, stress, sweep};
+use super::{CliError, Exit, converge, critical, experiments, map, output, solve, sweep};
 use crate::report::VerifyJson;
+use crate::report::stress::StressJson;
 
 /// Arguments of `schema`.
 #[derive(Args, Debug)]
@@ -49,7 +50,7 @@ impl SchemaArgs {
             Documented::Experiments => schema_for!(experiments::ExperimentsJson),
             Documented::Map => schema_for!(map::MapJson),
             Documented::Verify => schema_for!(VerifyJson),
-            Documented::Stress => schema_for!(stress::StressJson),
+            Documented::Stress => schema_for!(StressJson),
         };
         output::print_json(&schema).map_err(CliError::stdout)?;
         Ok(Exit::Success)

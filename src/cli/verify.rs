@@ -16,6 +16,9 @@ use crate::suite::{Check, Counts, Judged, LOOSENESS_MAX, Suite, Verdict, loosene
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
+#[command(after_help = "The report shows the claims with their figures: orders, events, other programs, the paper's \
+    curve, the range of Eq. 11-12, measured depths, layers, stability and rounding. The cases at the edges have a \
+    report of their own: penetrode stress --out DIR.")]
 pub struct VerifyArgs {
     /// Suite file (TOML) [default: the suite that ships].
     pub suite: Option<String>,
@@ -180,7 +183,7 @@ impl VerifyArgs {
     }
 }
 
-fn folder_error(error: folder::FolderError) -> CliError {
+pub(super) fn folder_error(error: folder::FolderError) -> CliError {
     match error {
         folder::FolderError::NotOurs { .. } => {
             CliError::usage(error.to_string(), "choose another folder with --out, or remove it yourself")

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::figure::Figure;
+use super::figure::{Drawn, Figure};
 use super::{Run, VerifyJson, figures, junit, page, summary};
 
 /// Why there is no report.
@@ -55,6 +55,16 @@ pub fn check(folder: &Path) -> Result<(), FolderError> {
 /// [`FolderError`]; the old report then stands untouched.
 pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
     check(folder)?;
+    let failed = |cause| FolderError::Write { path: folder.display().to_string(), cause };
+    write_files(files(run).map_err(failed)?, folder)
+}
+
+/// Writes `files`, a path in the folder and bytes each, to `folder`. `report.json` must be among them.
+///
+/// # Errors
+/// [`FolderError`]; the old report then stands untouched.
+pub fn write_files(files: Vec<(String, Vec<u8>)>, folder: &Path) -> Result<(), FolderError> {
+    check(folder)?;
     let failed = |path: &Path, cause: io::Error| FolderError::Write { path: path.display().to_string(), cause };
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
@@ -65,7 +75,7 @@ pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
         .prefix(".penetrode-report-")
         .tempdir_in(&parent)
         .map_err(|cause| failed(&parent, cause))?;
-    for (name, bytes) in files(run).map_err(|cause| failed(folder, cause))? {
+    for (name, bytes) in files {
         let path = stage.path().join(&name);
         if let Some(part) = path.parent() {
             fs::create_dir_all(part).map_err(|cause| failed(part, cause))?;
@@ -96,7 +106,17 @@ pub fn files(run: &Run<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
         ("junit.xml".to_owned(), junit::to_xml(run).map_err(io::Error::other)?.into_bytes()),
         ("summary.md".to_owned(), summary::to_markdown(run).into_bytes()),
     ];
-    for drawn in &figures {
+    files.extend(figure_files(&figures)?);
+    Ok(files)
+}
+
+/// The drawing and the numbers of each figure.
+///
+/// # Errors
+/// Only what makes memory run out.
+pub fn figure_files(figures: &[Drawn]) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    for drawn in figures {
         let name = &drawn.figure.name;
         files.push((format!("figures/{name}.svg"), drawn.file().into_bytes()));
         files.push((format!("tables/{name}.csv"), drawn.figure.table.to_csv().map_err(io::Error::other)?));

@@ -1,4 +1,4 @@
-//! How a run of the suite is shown: JSON, and a folder with a page, figures, tables and JUnit.
+//! How a run of the suite or of the stress cases is shown: JSON, and a folder with a page, figures and tables.
 
 mod applications;
 pub mod chart;
@@ -12,6 +12,8 @@ pub mod json;
 pub mod junit;
 pub mod page;
 pub mod stability_figures;
+pub mod stress;
+mod stress_page;
 pub mod summary;
 pub mod sweep_figures;
 pub mod table;

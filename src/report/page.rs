@@ -2,13 +2,13 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::Run;
 use super::applications;
 use super::chart::Ink;
 use super::families::{Family, group_of};
 use super::figure::{Drawn, Part};
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::text::{count, number, one_line};
+use super::{Environment, Run};
 use crate::integrators::{Boundaries, VelocityAt};
 use crate::physics::groups::Groups;
 use crate::studies::{Path, Quantity, Stretch, formal_order};
@@ -29,6 +29,49 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
     let families = Family::all(run.judged);
     let (verdict, counts) = summary(run.judged);
     let title = one_line(&run.suite.title);
+    document(
+        &title,
+        &format!("{title}: {}", verdict.name()),
+        html! { a.skip href="#verdict" { "Skip to the verdict" } },
+        identification(run),
+        html! {
+            (verdict_section(run, verdict, counts))
+            (contents())
+            (model(run, figures))
+            (algorithms(run))
+            (criteria(&families))
+            (code_verification(run, &families, figures))
+            (solution_verification(&families))
+            (cross_code(run, &families, figures))
+            (events(run, &families, figures))
+            (energy(run, &families, figures))
+            (stability(run, &families, figures))
+            (applications::paper_curve(run, &families, figures))
+            (applications::applicability(run, &families, figures))
+            (applications::measured_data(run, &families, figures))
+            (applications::layers(run, figures))
+            (applications::sensitivities(&families))
+            (deviations(run, &families))
+            (every_claim(run))
+            (reproduction(&run.environment))
+            (references())
+        },
+        html! { "Written by penetrode " (run.environment.version) ". The same numbers: "
+        a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", "
+        a href="summary.md" { "Markdown" } ", and a CSV file for each figure." },
+    )
+}
+
+/// A page of the program: its head, and these parts.
+#[expect(clippy::needless_pass_by_value, reason = "every caller makes them in place")]
+pub(super) fn document(
+    heading: &str,
+    window_title: &str,
+    skip: Markup,
+    identification: Markup,
+    main: Markup,
+    footer: Markup,
+) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -40,40 +83,14 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
                     content="default-src 'none'; style-src 'unsafe-inline'; img-src data:";
                 meta name="color-scheme" content="light dark";
                 link rel="icon" href="data:,";
-                title { (title) ": " (verdict.name()) }
+                title { (window_title) }
                 style { (PreEscaped(Ink::style_sheet())) (PreEscaped(include_str!("page.css"))) }
             }
             body {
-                a.skip href="#verdict" { "Skip to the verdict" }
-                header {
-                    h1 { (title) }
-                    (identification(run))
-                }
-                main {
-                    (verdict_section(run, verdict, counts))
-                    (contents())
-                    (model(run, figures))
-                    (algorithms(run))
-                    (criteria(&families))
-                    (code_verification(run, &families, figures))
-                    (solution_verification(&families))
-                    (cross_code(run, &families, figures))
-                    (events(run, &families, figures))
-                    (energy(run, &families, figures))
-                    (stability(run, &families, figures))
-                    (applications::paper_curve(run, &families, figures))
-                    (applications::applicability(run, &families, figures))
-                    (applications::measured_data(run, &families, figures))
-                    (applications::layers(run, figures))
-                    (applications::sensitivities(&families))
-                    (deviations(run, &families))
-                    (every_claim(run))
-                    (reproduction(run))
-                    (references())
-                }
-                footer { "Written by penetrode " (run.environment.version) ". The same numbers: "
-                    a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", "
-                    a href="summary.md" { "Markdown" } ", and a CSV file for each figure." }
+                (skip)
+                header { h1 { (heading) } (identification) }
+                main { (main) }
+                footer { (footer) }
             }
         }
     };
@@ -140,33 +157,40 @@ pub(super) fn badge(verdict: Verdict) -> Markup {
     html! { span.badge.(verdict.name()) { (sign(verdict)) " " (verdict.name()) } }
 }
 
+/// The verdict in large letters with what it means, and how many came to what.
+pub(super) fn banner(verdict: Verdict, counts: Counts, noun: &str) -> Markup {
+    let decided = counts.passed + counts.failed + counts.undecided;
+    let meaning = match verdict {
+        Verdict::Passed => format!("All {decided} {noun} that apply hold within their limits."),
+        Verdict::Failed => format!("{} of {decided} {noun} that apply do not hold.", counts.failed),
+        Verdict::Undecided if decided == 0 => "Nothing was decided, so nothing was shown.".to_owned(),
+        Verdict::Undecided => format!("{} of {decided} {noun} that apply could not be decided.", counts.undecided),
+        Verdict::Skipped => String::new(),
+    };
+    html! {
+        div.verdict.(verdict.name()) {
+            span.word { (sign(verdict)) " " (verdict.name()) }
+            span.sum { (meaning) }
+        }
+        ul.counts {
+            @for (verdict, number) in [
+                (Verdict::Passed, counts.passed),
+                (Verdict::Failed, counts.failed),
+                (Verdict::Undecided, counts.undecided),
+                (Verdict::Skipped, counts.skipped),
+            ] { li.(verdict.name()) { b { (number) } (verdict.name()) } }
+        }
+    }
+}
+
 fn verdict_section(run: &Run<'_>, verdict: Verdict, counts: Counts) -> Markup {
     let mut told: Vec<_> =
         run.judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)).collect();
     told.sort_by_key(|j| std::cmp::Reverse(j.verdict));
-    let decided = counts.passed + counts.failed + counts.undecided;
-    let meaning = match verdict {
-        Verdict::Passed => format!("All {decided} claims that apply hold within their limits."),
-        Verdict::Failed => format!("{} of {decided} claims that apply do not hold.", counts.failed),
-        Verdict::Undecided if decided == 0 => "Nothing was decided, so nothing was shown.".to_owned(),
-        Verdict::Undecided => format!("{} of {decided} claims that apply could not be decided.", counts.undecided),
-        Verdict::Skipped => String::new(),
-    };
     section(
         "verdict",
         html! {
-            div.verdict.(verdict.name()) {
-                span.word { (sign(verdict)) " " (verdict.name()) }
-                span.sum { (meaning) }
-            }
-            ul.counts {
-                @for (verdict, number) in [
-                    (Verdict::Passed, counts.passed),
-                    (Verdict::Failed, counts.failed),
-                    (Verdict::Undecided, counts.undecided),
-                    (Verdict::Skipped, counts.skipped),
-                ] { li.(verdict.name()) { b { (number) } (verdict.name()) } }
-            }
+            (banner(verdict, counts, "claims"))
             @if !told.is_empty() {
                 (claims_table("Claims that failed or are undecided", &told[..told.len().min(FIRST_SCREEN)]))
                 @if told.len() > FIRST_SCREEN {
@@ -179,7 +203,7 @@ fn verdict_section(run: &Run<'_>, verdict: Verdict, counts: Counts) -> Markup {
     )
 }
 
-fn measured_of(value: Option<f64>) -> String {
+pub(super) fn measured_of(value: Option<f64>) -> String {
     value.map_or_else(|| "—".to_owned(), |m| number(m, 3))
 }
 
@@ -241,23 +265,33 @@ pub(super) fn tally(counts: Counts) -> String {
 pub(super) fn figures_of(run: &Run<'_>, figures: &[Drawn], part: Part) -> Markup {
     html! {
         @for drawn in figures.iter().filter(|f| f.figure.part == part) {
-            @let figure = &drawn.figure;
-            figure id={ "figure-" (figure.name) } {
-                figcaption {
-                    b { (one_line(&figure.message)) }
-                    (figure.reading)
-                    span.quiet {
-                        @if let Some(first) = figure.claims.first() {
-                            "Judged by " (claims_in_words(&figure.claims))
-                            "; remade by "
-                            code { "penetrode verify --only " (one_line(first)) " --seed " (run.environment.seed) } ". "
-                        }
-                        a href={ "tables/" (figure.name) ".csv" } { (count(figure.table.len(), "row")) " as CSV" } ", "
-                        a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
-                    }
+            (figure(drawn, html! {
+                @if let Some(first) = drawn.figure.claims.first() {
+                    "Judged by " (claims_in_words(&drawn.figure.claims))
+                    "; remade by "
+                    code { "penetrode verify --only " (one_line(first)) " --seed " (run.environment.seed) } ". "
                 }
-                div.panels { @for index in 0..drawn.panels.len() { (PreEscaped(drawn.inline(index))) } }
+            }))
+        }
+    }
+}
+
+/// A figure with its message, how to read it, where it comes from, and its files.
+#[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
+pub(super) fn figure(drawn: &Drawn, origin: Markup) -> Markup {
+    let figure = &drawn.figure;
+    html! {
+        figure id={ "figure-" (figure.name) } {
+            figcaption {
+                b { (one_line(&figure.message)) }
+                (figure.reading)
+                span.quiet {
+                    (origin)
+                    a href={ "tables/" (figure.name) ".csv" } { (count(figure.table.len(), "row")) " as CSV" } ", "
+                    a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
+                }
             }
+            div.panels { @for index in 0..drawn.panels.len() { (PreEscaped(drawn.inline(index))) } }
         }
     }
 }
@@ -734,8 +768,8 @@ fn every_claim(run: &Run<'_>) -> Markup {
     )
 }
 
-fn reproduction(run: &Run<'_>) -> Markup {
-    let e = &run.environment;
+/// What remakes a run.
+pub(super) fn reproduction(e: &Environment) -> Markup {
     section(
         "reproduction",
         html! {

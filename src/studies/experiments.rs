@@ -22,7 +22,7 @@ use crate::integrators::{ClosedForm, Detail, IntegrationError, Integrator};
 use crate::physics::groups::Groups;
 use crate::physics::nose::NoseShape;
 use crate::physics::units::number;
-use crate::physics::{Concrete, CraterStiffness, Criterion, Range, Resistance, ResolveError, Scene, semi_empirical};
+use crate::physics::{Concrete, CraterStiffness, Range, ResolveError, Scene, semi_empirical};
 
 /// The measured data that ship: file name and content.
 pub const SHIPPED: [(&str, &str); 5] = [
@@ -208,24 +208,18 @@ pub fn shipped() -> Result<Vec<Shot>, ExperimentError> {
 impl Shot {
     /// The scene of the shot: S of Eq. 14, k = 0.707 + h/d unless `crater_ratio` says otherwise, B = 1.
     pub fn scene(&self, crater_ratio: Option<f64>) -> Scene {
-        Scene {
-            title: None,
-            mass: self.mass,
-            resistance: Resistance::Concrete(Concrete {
-                diameter: self.diameter,
-                nose_factor: self.nose.factor(),
-                strength: self.strength,
-                density: self.density,
-                static_factor: semi_empirical::static_factor(self.strength),
-                inertia_factor: 1.0,
-                crater_ratio: crater_ratio.unwrap_or_else(|| self.nose.crater_ratio()),
-                crater_stiffness: CraterStiffness::Continuous,
-                layers: Vec::new(),
-            }),
-            thickness: None,
-            criterion: Criterion::FullDepth,
-            velocity: Some(self.velocity),
-        }
+        let concrete = Concrete {
+            diameter: self.diameter,
+            nose_factor: self.nose.factor(),
+            strength: self.strength,
+            density: self.density,
+            static_factor: semi_empirical::static_factor(self.strength),
+            inertia_factor: 1.0,
+            crater_ratio: crater_ratio.unwrap_or_else(|| self.nose.crater_ratio()),
+            crater_stiffness: CraterStiffness::Continuous,
+            layers: Vec::new(),
+        };
+        Scene { velocity: Some(self.velocity), ..Scene::of_concrete(self.mass, concrete) }
     }
 
     /// Whether the shot lies in the range to which S was fitted.

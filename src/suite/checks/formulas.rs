@@ -9,7 +9,7 @@ use crate::physics::nose::NoseShape;
 use crate::physics::semi_empirical::{
     NDRC_END, NDRC_FIRST_BRANCH_END, depth_ratio, eq15_printed, eq15_unrounded, jumps, model_difference,
 };
-use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, Scene, groups};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Scene, groups};
 use crate::studies::critical_velocity;
 use crate::studies::order::{StepError, fit};
 use crate::studies::random::Random;
@@ -33,15 +33,7 @@ fn scene(geometry: Option<f64>) -> (Scene, Concrete) {
     if let Some(n) = geometry {
         concrete.density = groups::density_for(n, MASS, &concrete);
     }
-    let scene = Scene {
-        title: None,
-        mass: MASS,
-        resistance: Resistance::Concrete(concrete.clone()),
-        thickness: None,
-        criterion: Criterion::FullDepth,
-        velocity: None,
-    };
-    (scene, concrete)
+    (Scene::of_concrete(MASS, concrete.clone()), concrete)
 }
 
 /// X/d by the claim's method at impact function `impact`.

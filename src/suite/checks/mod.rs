@@ -19,6 +19,7 @@ use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Resistance, Scene};
 use crate::studies::convergence::{QuantityStudy, Yardstick};
 use crate::studies::quantity::Quantity;
+use crate::studies::relations::Units;
 
 pub use peers::PeerAnswers;
 
@@ -88,7 +89,7 @@ pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMe
         Check::EnergyBalance {} => on(invariants::energy_balance),
         Check::TimeReversal {} => on(invariants::time_reversal),
         Check::Similarity { length, mass, time } => {
-            invariants::similarity(&Subject::of(claim, context)?, invariants::Factors { length, mass, time })
+            invariants::similarity(&Subject::of(claim, context)?, Units { length, mass, time })
         }
         Check::Split { pieces } => invariants::split(&Subject::of(claim, context)?, pieces),
         Check::Manufactured { path, order } => manufactured::order(claim, context, path, order),
