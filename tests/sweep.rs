@@ -174,6 +174,22 @@ fn scenes_outside_eq_11_12_are_warned_of_on_standard_error_alone() {
 }
 
 #[test]
+fn the_report_of_the_suite_shows_measured_points_with_the_curve_or_refuses_them() {
+    let folder = TempDir::new().unwrap();
+    let (points, out) = (path(&folder, "points.csv"), path(&folder, "report"));
+    std::fs::write(&points, "H/d,E_c/(d3 fc)\n5,30.5\n10,80\n").unwrap();
+    let (code, _, err) = run(&["verify", "--only", "sweep/", "--data", &points, "--out", &out]);
+    assert_eq!(code, 0, "{err}");
+    let table = std::fs::read_to_string(folder.path().join("report/tables/critical-energy.csv")).unwrap();
+    assert!(table.contains("\n5,,,,,30.5\n"), "{table:.300}");
+    let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.contains("measured</text>") && page.contains("--data "));
+    // Nothing of the suite sweeps H/d: the points would be shown nowhere.
+    let (code, _, err) = run(&["verify", "--only", "nose/", "--data", &points, "--out", &path(&folder, "none")]);
+    assert!(code == 2 && err.contains("--data") && !folder.path().join("none").exists(), "{err}");
+}
+
+#[test]
 fn the_map_has_lines_of_three_errors_and_the_measured_scenes() {
     let folder = TempDir::new().unwrap();
     let out = path(&folder, "map.csv");

@@ -209,52 +209,13 @@ fn write_files(path: &Path, comparisons: &[Comparison]) -> Result<(), CliError> 
     let failed = |path: &Path, cause| CliError::Write { path: path.display().to_string(), cause };
     let drawn = sweep_figures::measured_depths(comparisons).map(Figure::draw).transpose();
     let drawn = drawn.map_err(|error| failed(path, std::io::Error::other(error)))?;
-    let csv = csv_of(comparisons).map_err(|cause| failed(path, cause))?;
+    let csv = sweep_figures::measured_table(comparisons).to_csv();
+    let csv = csv.map_err(|error| failed(path, std::io::Error::other(error)))?;
     write_whole(path, &csv).map_err(|cause| failed(path, cause))?;
     let beside = path.with_extension("svg");
     drawn
         .map_or(Ok(()), |figure| write_whole(&beside, figure.file().as_bytes()))
         .map_err(|cause| failed(&beside, cause))
-}
-
-fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record([
-        "test_set",
-        "line",
-        "velocity_m_s",
-        "measured_depth_m",
-        "predicted_depth_m",
-        "ratio",
-        "I",
-        "N",
-        "k",
-        "comparison_error_m",
-        "numerical_uncertainty_m",
-        "input_uncertainty_m",
-        "data_uncertainty_m",
-        "validation_uncertainty_m",
-    ])?;
-    let text = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-    for c in comparisons {
-        writer.write_record([
-            c.shot.set.clone(),
-            c.shot.line.to_string(),
-            c.shot.velocity.to_string(),
-            c.shot.depth.to_string(),
-            c.predicted.to_string(),
-            c.ratio().to_string(),
-            c.impact.to_string(),
-            text(c.geometry),
-            c.crater_ratio.to_string(),
-            c.comparison_error().to_string(),
-            c.numerical_uncertainty.to_string(),
-            text(c.input_uncertainty),
-            text(c.shot.depth_uncertainty),
-            text(c.validation_uncertainty()),
-        ])?;
-    }
-    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
 fn text(report: &ExperimentsJson) -> String {

@@ -157,6 +157,7 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
         let _ = writeln!(text, "{}", wrapped(case.statement, WIDTH));
         let _ = writeln!(text, "{}", wrapped(&format!("{measured}; {remark}"), WIDTH));
     }
+    text.push_str(&skipped_text(judged));
     if let Some(summary) = random {
         text.push_str(&random_text(summary));
     }
@@ -184,11 +185,32 @@ fn cases_table(judged: &[JudgedCase]) -> comfy_table::Table {
             format!("{} of {}", counts.passed, cases.len() - counts.skipped),
             if counts.skipped > 0 { counts.skipped.to_string() } else { String::new() },
             error_text(worst),
-            error_text(Some(cases[0].limit)),
+            limit_text(cases[0].limit),
             cases[0].unit.to_owned(),
         ]);
     }
     rows
+}
+
+/// A limit as it was set: few digits, and no exponent where none is needed.
+fn limit_text(limit: f64) -> String {
+    if limit == 0.0 || (1e-3..1e6).contains(&limit) { limit.to_string() } else { format!("{limit:e}") }
+}
+
+/// Why cases were skipped, each reason once with how many it held back.
+fn skipped_text(judged: &[JudgedCase]) -> String {
+    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    for case in judged.iter().filter(|case| case.verdict == Verdict::Skipped) {
+        match reasons.iter_mut().find(|(known, _)| *known == case.remark) {
+            Some((_, count)) => *count += 1,
+            None => reasons.push((&case.remark, 1)),
+        }
+    }
+    let lines = reasons.iter().map(|(reason, count)| {
+        let reason = super::solve::escape_terminal(reason);
+        wrapped(&format!("{count} skipped: {reason}"), WIDTH) + "\n"
+    });
+    lines.collect()
 }
 
 fn random_text(summary: &Summary) -> String {

@@ -9,6 +9,7 @@ use super::stability_figures;
 use super::stress::StressRun;
 use super::table::Table;
 use super::text::{number, one_line};
+use crate::integrators::MethodName;
 use crate::studies::extreme_scenes::{Summary, ULPS_MAX};
 use crate::suite::stress::{JudgedCase, counts};
 use crate::suite::{Counts, Evidence, Verdict};
@@ -91,12 +92,15 @@ fn stiffness(run: &StressRun<'_>) -> Option<Figure> {
             height: HEIGHT + 70,
         });
     }
+    let is_implicit = |method: &MethodName| !matches!(method, MethodName::Taylor | MethodName::Tsit45);
+    let implicit = series.iter().any(|(title, method, _)| *title == "a driven stage" && is_implicit(method));
     Some(Figure {
         name: "stiffness".into(),
         part: Part::Stability,
-        message:
-            "Viscosity alone is not stiff: a stage that resists costs no more, a driven one calls for implicit methods"
-                .into(),
+        message: format!(
+            "A stage that resists costs a logarithm more as r/M grows, a driven one in proportion by explicit methods{}",
+            if implicit { ", and no more by implicit ones" } else { "" }
+        ),
         reading:
             "Force evaluations of a flight at the default tolerance over the fast rate r/M. With a drive against the \
                   viscosity the explicit cost grows in proportion; without one, rest comes inside the fast transient."

@@ -358,28 +358,6 @@ pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene]) 
 pub fn measured_depths(comparisons: &[Comparison]) -> Option<Figure> {
     let depths = comparisons.iter().flat_map(|c| [c.shot.depth, c.predicted]).filter(|depth| *depth > 0.0);
     let [low, high] = extremes(&depths.map(|depth| (0.0, depth)).collect::<Vec<_>>())?;
-    let mut table = Table::new([
-        "set",
-        "velocity_m_s",
-        "measured_depth_m",
-        "predicted_depth_m",
-        "ratio",
-        "comparison_error_m",
-        "numerical_uncertainty_m",
-        "validation_uncertainty_m",
-    ]);
-    for c in comparisons {
-        table.push([
-            &c.group(),
-            &c.shot.velocity,
-            &c.shot.depth,
-            &c.predicted,
-            &c.ratio(),
-            &c.comparison_error(),
-            &c.numerical_uncertainty,
-            &or_empty(c.validation_uncertainty()),
-        ]);
-    }
     let axis = |label: &str| Axis::log(label, [low, high]);
     let (x, y) = (axis("measured depth [m]"), axis("predicted depth [m]"));
     let ends = x.range;
@@ -418,8 +396,47 @@ pub fn measured_depths(comparisons: &[Comparison]) -> Option<Figure> {
             key_place: KeyPlace::TopLeft,
             height: TALL + 40,
         }],
-        table,
+        table: measured_table(comparisons),
     })
+}
+
+/// The comparison of measured shots, one row a shot.
+pub fn measured_table(comparisons: &[Comparison]) -> Table {
+    let mut table = Table::new([
+        "test_set",
+        "line",
+        "velocity_m_s",
+        "measured_depth_m",
+        "predicted_depth_m",
+        "ratio",
+        "I",
+        "N",
+        "k",
+        "comparison_error_m",
+        "numerical_uncertainty_m",
+        "input_uncertainty_m",
+        "data_uncertainty_m",
+        "validation_uncertainty_m",
+    ]);
+    for c in comparisons {
+        table.push([
+            &c.shot.set,
+            &c.shot.line,
+            &c.shot.velocity,
+            &c.shot.depth,
+            &c.predicted,
+            &c.ratio(),
+            &c.impact,
+            &or_empty(c.geometry),
+            &c.crater_ratio,
+            &c.comparison_error(),
+            &c.numerical_uncertainty,
+            &or_empty(c.input_uncertainty),
+            &or_empty(c.shot.depth_uncertainty),
+            &or_empty(c.validation_uncertainty()),
+        ]);
+    }
+    table
 }
 
 #[cfg(test)]
