@@ -611,7 +611,7 @@ fn order_tables(run: &Run<'_>) -> Markup {
                         caption { "observed order, half-width of its 95 % interval, and the formal order in brackets" }
                         thead { tr { th scope="col" { "velocity" } th scope="col" { "boundaries" }
                             @for quantity in &quantities { th scope="col" { (words_for(*quantity)) } } } }
-                        tbody { @for velocity in VELOCITIES { @for boundaries in BOUNDARIES { tr {
+                        tbody { @for (velocity, boundaries) in variants(&mine) { tr {
                             th scope="row" { (velocity) } td { (boundaries) }
                             @for quantity in &quantities {
                                 td.num { @if let Some(judged) = mine.iter().find(|j| j.claim.velocity == velocity
@@ -619,12 +619,18 @@ fn order_tables(run: &Run<'_>) -> Markup {
                                     (order_cell(judged))
                                 } @else { "—" } }
                             }
-                        } } } }
+                        } } }
                     }
                 }
             }
         }
     }
+}
+
+/// The variants of the scheme that `judged` claim something of, in the order of the tables.
+fn variants(judged: &[&&Judged]) -> Vec<(VelocityAt, Boundaries)> {
+    let all = VELOCITIES.into_iter().flat_map(|velocity| BOUNDARIES.map(|boundaries| (velocity, boundaries)));
+    all.filter(|variant| judged.iter().any(|j| (j.claim.velocity, j.claim.boundaries) == *variant)).collect()
 }
 
 fn order_cell(judged: &Judged) -> Markup {
