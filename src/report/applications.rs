@@ -29,7 +29,7 @@ pub(super) fn paper_curve(run: &Run<'_>, families: &[Family<'_>], figures: &[Dra
             (figures_of(run, figures, Part::Slab))
             @if let Some(told) = told.as_deref() {
                 h3 { (WHY) }
-                p { (told.strip_prefix(WHY).unwrap_or(told).trim_start_matches(". ")) }
+                p { (told.strip_prefix(WHY).unwrap_or(told).trim_start_matches(". ").replace('`', "")) }
             }
             (results("Points of the curve", families, Kind::Slab))
             p.quiet { "Along another slab: " code { "penetrode sweep SCENE.toml --vary H/d=0.5:18:200 --out fig4.csv" }

@@ -73,9 +73,17 @@ fn stiffness(run: &StressRun<'_>) -> Option<Figure> {
     let mut y = Axis::log("force evaluations", all().map(|p| p.1));
     // Room for the legend above.
     y.range[1] *= 300.0;
+    let mut methods: Vec<MethodName> = Vec::new();
+    for (_, method, _) in &series {
+        if !methods.contains(method) {
+            methods.push(*method);
+        }
+    }
     for title in ["a stage that resists", "a driven stage"] {
         let (mut marks, mut keys) = (Vec::new(), Vec::new());
-        for (index, (_, method, points)) in series.iter().filter(|(of, ..)| *of == title).enumerate() {
+        for (_, method, points) in series.iter().filter(|(of, ..)| *of == title) {
+            // One colour a method, in both panels.
+            let index = methods.iter().position(|known| known == method).unwrap_or_default();
             let (ink, shape) = (Ink::series(index), Shape::series(index));
             marks.push(Mark::Line { points: (*points).clone(), ink, dashed: false });
             marks.push(Mark::Points { points: (*points).clone(), ink, shape, hollow: false, radius: 3.0 });
