@@ -4,6 +4,7 @@
 use approx::assert_relative_eq;
 use penetrode::integrators::{Detail, Energy, Flight, Integrator, Taylor};
 use penetrode::physics::{Outcome, Problem, Stage, Stages, Target};
+use penetrode::studies::relations::{Units, in_units};
 use proptest::prelude::*;
 
 /// Mass, V0, k d, P, Q, c: a crater and a tunnel of ordinary or less ordinary size, the force continuous at k d.
@@ -50,28 +51,6 @@ fn fly(problem: &Problem) -> Flight {
     Taylor::default().fly(problem, Detail::Events).unwrap()
 }
 
-/// Length, mass and time in other units.
-fn in_units(problem: &Problem, length: f64, mass: f64, time: f64) -> Problem {
-    let force = mass * length / (time * time);
-    Problem {
-        mass: problem.mass * mass,
-        impact_speed: problem.impact_speed * length / time,
-        exit_depth: problem.exit_depth * length,
-        stages: problem
-            .stages
-            .iter()
-            .map(|s| Stage {
-                static_force: s.static_force * force,
-                stiffness: s.stiffness * force / length,
-                viscosity: s.viscosity * mass / time,
-                drag: s.drag * mass / length,
-                end: s.end * length,
-            })
-            .collect(),
-        ..problem.clone()
-    }
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, ..ProptestConfig::default() })]
 
@@ -79,7 +58,7 @@ proptest! {
     fn other_units_fly_the_same(shot in shots(), l in -6.0..6.0f64, m in -6.0..6.0f64, t in -6.0..6.0f64) {
         let (l, m, t) = (10f64.powf(l), 10f64.powf(m), 10f64.powf(t));
         let problem = shot.problem(f64::INFINITY);
-        let (plain, scaled) = (fly(&problem), fly(&in_units(&problem, l, m, t)));
+        let (plain, scaled) = (fly(&problem), fly(&in_units(&problem, Units { length: l, mass: m, time: t })));
         assert_relative_eq!(scaled.end.depth / l, plain.end.depth, max_relative = 1e-13);
         assert_relative_eq!(scaled.end.time / t, plain.end.time, max_relative = 1e-13);
     }
@@ -88,7 +67,7 @@ proptest! {
     fn mass_and_forces_times_a_factor_leave_the_path(shot in shots(), power in -60..60) {
         let factor = 2f64.powi(power);
         let problem = shot.problem(f64::INFINITY);
-        let (plain, scaled) = (fly(&problem), fly(&in_units(&problem, 1.0, factor, 1.0)));
+        let (plain, scaled) = (fly(&problem), fly(&in_units(&problem, Units { length: 1.0, mass: factor, time: 1.0 })));
         // Powers of two round nothing.
         prop_assert_eq!(plain.end, scaled.end);
         prop_assert_eq!(plain.events, scaled.events);

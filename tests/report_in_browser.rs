@@ -1,4 +1,4 @@
-//! The report in headless Chromium: it loads without a message, asks for nothing, and fits a phone and a desk.
+//! The reports of the suite and of the stress cases in headless Chromium: each loads without a message, asks for nothing, and fits a phone and a desk.
 //!
 //! Where Chromium is missing, the tests say so in one line and count as ignored; with `CI=true` they fail, so that a
 //! build server cannot quietly check nothing.
@@ -16,9 +16,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use penetrode::report::stress::{StressRun, files};
 use penetrode::report::{Environment, Run, folder};
-use penetrode::suite::Suite;
+use penetrode::studies::extreme_scenes;
 use penetrode::suite::checks::PeerAnswers;
+use penetrode::suite::{Suite, stress};
 use serde_json::Value;
 
 /// What makes a test fail; every error of ours chains into it.
@@ -27,16 +29,42 @@ type Check = Result<(), Box<dyn Error>>;
 /// Time that one page may take.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// Folders of the pages: the report of the suite, and that of the stress cases.
+const PAGES: [&str; 2] = ["report", "stress"];
+
+/// Figures that a report must have, by their names.
+const FIGURES: [(&str, &[&str]); 2] = [
+    (
+        "report",
+        &[
+            "flights",
+            "approach-with-n",
+            "observed-orders",
+            "energy-residual",
+            "peer-differences",
+            "stability-map",
+            "rounding-floor",
+            "critical-energy",
+            "critical-energy-difference",
+            "applicability-map",
+            "measured-depths",
+            "layers-layered",
+        ],
+    ),
+    ("stress", &["stability-map", "rounding-floor", "stiffness"]),
+];
+
 /// A claim and how it is checked.
 type Claim = (&'static str, fn(&Stage) -> Check);
 
-const CLAIMS: [Claim; 7] = [
+const CLAIMS: [Claim; 8] = [
     ("the_page_loads_without_a_word_on_the_console", is_silent),
     ("a_page_that_errs_is_heard", hears_a_planted_error),
     ("no_request_leaves_the_page", asks_for_nothing),
     ("a_page_that_asks_is_caught", catches_a_planted_request),
     ("nothing_overflows_a_phone_or_a_desk", fits),
     ("headings_images_and_colours_are_accessible", is_accessible),
+    ("every_figure_has_its_place_its_files_and_words", has_its_figures),
     ("it_prints", prints),
 ];
 
@@ -81,28 +109,51 @@ impl Stage {
         let mut suite = Suite::embedded()?;
         // Every kind of section and figure; the whole suite would add length, not kinds.
         suite.claims.retain(|claim| {
-            ["order/drag", "order/jump", "small-impact", "invariant", "peer", "closed-form", "self", "events", "stab"]
-                .iter()
-                .any(|start| claim.id.starts_with(start))
+            [
+                "order/drag",
+                "order/jump",
+                "small-impact",
+                "invariant",
+                "peer",
+                "closed-form",
+                "self",
+                "events",
+                "stab",
+                "rounding",
+                "sweep",
+                "map",
+                "measured",
+                "layers",
+                "sensitivities",
+            ]
+            .iter()
+            .any(|start| claim.id.starts_with(start))
         });
         let judged = suite.run(1, &PeerAnswers::recorded()?, &|_| ());
         let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
         let folder = tempfile::tempdir()?;
-        folder::write(&Run { suite: &suite, judged: &judged, environment }, &folder.path().join("report"))?;
+        let run = Run { suite: &suite, judged: &judged, environment, points: &[(5.0, 30.0)] };
+        folder::write(&run, &folder.path().join(PAGES[0]))?;
+        let cases = stress::run(1, &|_| ());
+        let summary = extreme_scenes::run(200, 1, &|| ());
+        let environment = Environment::here(1, "penetrode stress --seed 1".to_owned(), &suite, Vec::new());
+        let run = StressRun { judged: &cases, random: Some((&summary, 1.0)), environment };
+        folder::write_files(files(&run)?, &folder.path().join(PAGES[1]))?;
         Ok(Self { browser, folder })
     }
 
-    fn page(&self) -> PathBuf {
-        self.folder.path().join("report/report.html")
+    /// The page in `folder`, one of [`PAGES`].
+    fn page(&self, folder: &str) -> PathBuf {
+        self.folder.path().join(folder).join("report.html")
     }
 
-    /// A copy of the page, without its policy and with `inserted` before its end.
-    fn altered(&self, name: &str, inserted: &str) -> Result<PathBuf, Box<dyn Error>> {
-        let page = fs::read_to_string(self.page())?;
+    /// A copy of the page in `folder`, without its policy and with `inserted` before its end.
+    fn altered(&self, folder: &str, name: &str, inserted: &str) -> Result<PathBuf, Box<dyn Error>> {
+        let page = fs::read_to_string(self.page(folder))?;
         let start = page.find("<meta http-equiv=\"Content-Security-Policy\"").ok_or("the page has no policy")?;
         let end = start + page[start..].find('>').ok_or("the policy has no end")? + 1;
         let altered = format!("{}{}", &page[..start], &page[end..]).replace("</body>", &format!("{inserted}</body>"));
-        let path = self.folder.path().join("report").join(name);
+        let path = self.folder.path().join(folder).join(name);
         fs::write(&path, altered)?;
         Ok(path)
     }
@@ -204,11 +255,11 @@ impl Stage {
     }
 
     /// What [`MEASURE`] finds in the page when it is `width` wide.
-    fn measure(&self, width: u32, dark: bool) -> Result<Value, Box<dyn Error>> {
-        let inner = self.altered(&format!("measured-{width}-{dark}.html"), MEASURE)?;
+    fn measure(&self, folder: &str, width: u32, dark: bool) -> Result<Value, Box<dyn Error>> {
+        let inner = self.altered(folder, &format!("measured-{width}-{dark}.html"), MEASURE)?;
         let name = inner.file_name().ok_or("no name")?.to_string_lossy().into_owned();
         // A window cannot be as narrow as a phone; a frame can.
-        let outer = self.folder.path().join("report").join(format!("frame-{width}-{dark}.html"));
+        let outer = self.folder.path().join(folder).join(format!("frame-{width}-{dark}.html"));
         fs::write(
             &outer,
             format!(
@@ -289,34 +340,43 @@ fn browser() -> Option<PathBuf> {
 }
 
 fn is_silent(stage: &Stage) -> Check {
-    let said = stage.console(&stage.page())?;
-    if said.is_empty() { Ok(()) } else { Err(said.join("\n").into()) }
+    for folder in PAGES {
+        let said = stage.console(&stage.page(folder))?;
+        if !said.is_empty() {
+            return Err(format!("{folder}: {}", said.join("\n")).into());
+        }
+    }
+    Ok(())
 }
 
 /// Without this, a browser that writes its messages elsewhere would let everything pass.
 fn hears_a_planted_error(stage: &Stage) -> Check {
-    let page = stage.altered("errs.html", "<script>console.error('planted')</script>")?;
+    let page = stage.altered(PAGES[0], "errs.html", "<script>console.error('planted')</script>")?;
     let said = stage.console(&page)?;
     if said.iter().any(|line| line.contains("planted")) { Ok(()) } else { Err(format!("heard only {said:?}").into()) }
 }
 
 fn asks_for_nothing(stage: &Stage) -> Check {
-    let asked = stage.requests(&stage.page())?;
-    if !asked.is_empty() {
-        return Err(asked.join("\n").into());
-    }
-    // And there is nothing in it that could ask, whatever the policy says.
-    let page = fs::read_to_string(stage.page())?;
-    for word in ["<script", "<img", "<link rel=\"stylesheet", " src=", "url(", "@import", "href=\"http", "href=\"//"] {
-        if page.contains(word) {
-            return Err(format!("the page contains {word}").into());
+    for folder in PAGES {
+        let asked = stage.requests(&stage.page(folder))?;
+        if !asked.is_empty() {
+            return Err(format!("{folder}: {}", asked.join("\n")).into());
+        }
+        // And there is nothing in it that could ask, whatever the policy says.
+        let page = fs::read_to_string(stage.page(folder))?;
+        for word in
+            ["<script", "<img", "<link rel=\"stylesheet", " src=", "url(", "@import", "href=\"http", "href=\"//"]
+        {
+            if page.contains(word) {
+                return Err(format!("{folder}: the page contains {word}").into());
+            }
         }
     }
     Ok(())
 }
 
 fn catches_a_planted_request(stage: &Stage) -> Check {
-    let page = stage.altered("asks.html", "<img src=\"http://planted.invalid/picture\" alt=\"\">")?;
+    let page = stage.altered(PAGES[0], "asks.html", "<img src=\"http://planted.invalid/picture\" alt=\"\">")?;
     let asked = stage.requests(&page)?;
     if asked.iter().any(|line| line.contains("planted.invalid")) {
         return Ok(());
@@ -325,51 +385,97 @@ fn catches_a_planted_request(stage: &Stage) -> Check {
 }
 
 fn fits(stage: &Stage) -> Check {
-    for width in [375, 1440] {
-        let found = stage.measure(width, false)?;
-        if found["width"] != width {
-            return Err(format!("measured at {} and not at {width}", found["width"]).into());
-        }
-        for key in ["folded", "unfolded"] {
-            if found[key].as_u64().is_none_or(|extent| extent > u64::from(width)) {
-                return Err(format!("{width} px: {key} the page is {} px wide", found[key]).into());
+    for (folder, figures) in FIGURES {
+        for width in [375, 1440] {
+            let found = stage.measure(folder, width, false)?;
+            if found["width"] != width {
+                return Err(format!("measured at {} and not at {width}", found["width"]).into());
             }
-        }
-        for key in ["beyond", "texts"] {
-            if found[key] != Value::Array(Vec::new()) {
-                return Err(format!("{width} px: {key}: {}", found[key]).into());
+            for key in ["folded", "unfolded"] {
+                if found[key].as_u64().is_none_or(|extent| extent > u64::from(width)) {
+                    return Err(format!("{folder}, {width} px: {key} the page is {} px wide", found[key]).into());
+                }
             }
-        }
-        if found["figures"].as_u64() < Some(6) || found["svgs"].as_u64() < found["figures"].as_u64() {
-            return Err(format!("{} figures of {} drawings", found["figures"], found["svgs"]).into());
+            for key in ["beyond", "texts"] {
+                if found[key] != Value::Array(Vec::new()) {
+                    return Err(format!("{folder}, {width} px: {key}: {}", found[key]).into());
+                }
+            }
+            let enough = found["figures"].as_u64() >= Some(figures.len() as u64);
+            if !enough || found["svgs"].as_u64() < found["figures"].as_u64() {
+                return Err(format!("{folder}: {} figures of {} drawings", found["figures"], found["svgs"]).into());
+            }
         }
     }
     Ok(())
 }
 
 fn is_accessible(stage: &Stage) -> Check {
-    let mut backgrounds = Vec::new();
-    for dark in [false, true] {
-        let found = stage.measure(1440, dark)?;
-        for key in ["faint", "headings", "twice", "unnamed", "dead"] {
-            if found[key] != Value::Array(Vec::new()) {
-                return Err(format!("dark {dark}: {key}: {}", found[key]).into());
+    for folder in PAGES {
+        let mut backgrounds = Vec::new();
+        for dark in [false, true] {
+            let found = stage.measure(folder, 1440, dark)?;
+            for key in ["faint", "headings", "twice", "unnamed", "dead"] {
+                if found[key] != Value::Array(Vec::new()) {
+                    return Err(format!("{folder}, dark {dark}: {key}: {}", found[key]).into());
+                }
+            }
+            if found["h1"] != 1 {
+                return Err(format!("{folder}: {} main headings", found["h1"]).into());
+            }
+            backgrounds.push(found["background"].to_string());
+        }
+        if backgrounds[0] == backgrounds[1] {
+            return Err(format!("{folder}: {backgrounds:?}: nothing was dark").into());
+        }
+    }
+    Ok(())
+}
+
+/// Each figure stands in the page once, with its numbers and its drawing beside it, and none is there besides.
+fn has_its_figures(stage: &Stage) -> Check {
+    for (folder, figures) in FIGURES {
+        let page = fs::read_to_string(stage.page(folder))?;
+        for name in figures {
+            if page.matches(&format!("<figure id=\"figure-{name}\">")).count() != 1 {
+                return Err(format!("{folder}: {name} is not there once").into());
             }
         }
-        if found["h1"] != 1 {
-            return Err(format!("{} main headings", found["h1"]).into());
+        for part in page.split("<figure id=\"figure-").skip(1) {
+            let name = part.split('"').next().unwrap_or_default();
+            for file in [format!("tables/{name}.csv"), format!("figures/{name}.svg")] {
+                let linked = part.contains(&format!("href=\"{file}\""));
+                if !linked || !stage.folder.path().join(folder).join(&file).is_file() {
+                    return Err(format!("{folder}: {file} is not there").into());
+                }
+            }
         }
-        backgrounds.push(found["background"].to_string());
     }
-    if backgrounds[0] == backgrounds[1] { Err(format!("{backgrounds:?}: nothing was dark").into()) } else { Ok(()) }
+    let page = fs::read_to_string(stage.page(PAGES[0]))?;
+    for words in [
+        "Why the simulation lies above Eq. 15",
+        "tends to 1.24",
+        "N = 38.58",
+        "not given",
+        "What these data validate, and what not",
+        "Through 3 layers the force jumps",
+        "Elasticities beside those of the closed form",
+    ] {
+        if !page.contains(words) {
+            return Err(format!("the report does not say: {words}").into());
+        }
+    }
+    Ok(())
 }
 
 fn prints(stage: &Stage) -> Check {
-    let file = stage.folder.path().join("report.pdf");
-    stage.show(&stage.page(), &[&format!("--print-to-pdf={}", file.display()), "--no-pdf-header-footer"])?;
-    let bytes = fs::read(&file)?;
-    if bytes.starts_with(b"%PDF") && bytes.len() > 50_000 {
-        return Ok(());
+    for folder in PAGES {
+        let file = stage.folder.path().join(format!("{folder}.pdf"));
+        stage.show(&stage.page(folder), &[&format!("--print-to-pdf={}", file.display()), "--no-pdf-header-footer"])?;
+        let bytes = fs::read(&file)?;
+        if !bytes.starts_with(b"%PDF") || bytes.len() < 50_000 {
+            return Err(format!("{folder}: {} bytes of PDF", bytes.len()).into());
+        }
     }
-    Err(format!("{} bytes of PDF", bytes.len()).into())
+    Ok(())
 }

@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use assert_cmd::Command;
 use penetrode::physics::Scene;
 use penetrode::studies::extreme_scenes::{self, Fate};
 use penetrode::suite::Verdict;
@@ -21,6 +22,42 @@ fn every_stress_case_passes_for_every_method_that_this_build_has() {
     for case in judged.iter().filter(|case| case.verdict == Verdict::Skipped) {
         assert!(case.remark.contains("leaves out") || case.remark.contains("cannot treat"), "{case:?}");
     }
+}
+
+/// One run of the command: its text fits a terminal, its folder holds the page, and what is not ours stays.
+#[test]
+fn the_command_writes_every_case_as_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let run = |arguments: &[&str]| {
+        let output = Command::cargo_bin("penetrode").unwrap().args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let (code, text, err) = run(&["stress", "--cases", "100", "--out", out.to_str().unwrap()]);
+    assert_eq!(code, 0, "{text}{err}");
+    assert!(text.contains("E17") && text.contains("random scenes: 100"), "{text}");
+    for line in text.lines().filter(|line| !line.starts_with("report: ")) {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    let report = fs::read_to_string(out.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let schema: serde_json::Value = serde_json::from_str(&run(&["schema", "stress"]).1).unwrap();
+    assert!(jsonschema::validator_for(&schema).unwrap().is_valid(&report));
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    let cases = stress::cases();
+    for case in &cases {
+        assert!(page.contains(&format!("<code>{}</code>", case.id)), "{}", case.id);
+    }
+    assert_eq!(report["claims"].as_array().unwrap().iter().filter(|c| c["id"] == "random-scenes").count(), 1);
+    for file in ["figures/stability-map.svg", "tables/rounding-floor.csv", "tables/stiffness.csv"] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+    let strange = folder.path().join("strange");
+    fs::create_dir(&strange).unwrap();
+    let (code, said, err) = run(&["stress", "--out", strange.to_str().unwrap()]);
+    assert!(code == 2 && said.is_empty() && err.contains("not a report"), "{err}");
+    assert_eq!(fs::read_dir(&strange).unwrap().count(), 0);
 }
 
 #[test]

@@ -13,8 +13,8 @@ use super::output::{
     takes_standard_output, wrapped, write_all,
 };
 use super::{CliError, Exit};
-use crate::report::plots_sweep;
-use crate::report::table::cell;
+use crate::report::figure::Figure;
+use crate::report::sweep_figures;
 use crate::studies::experiments::{self, Comparison, PredictionCause, PredictionError, SetSummary, Shot};
 use crate::studies::sensitivity::{Spread, SpreadError};
 
@@ -187,7 +187,7 @@ impl ExperimentsArgs {
             meaning: self.tables.is_empty().then_some(experiments::MEANING),
         };
         if let Some(path) = &self.out {
-            write_files(path, &comparisons, &summaries)?;
+            write_files(path, &comparisons)?;
         }
         if !is_table_printed {
             if self.json { print_json(&report) } else { print_text(&text(&report)) }.map_err(CliError::stdout)?;
@@ -213,62 +213,15 @@ impl ExperimentsArgs {
 }
 
 /// The table and the figure; both are made before the first is written.
-fn write_files(path: &Path, comparisons: &[Comparison], summaries: &[SetSummary]) -> Result<(), CliError> {
-    let sets: Vec<plots_sweep::MarkedSet<'_>> = summaries
-        .iter()
-        .map(|summary| {
-            let of_set = comparisons.iter().filter(|c| c.group() == summary.group);
-            (summary.group.as_str(), of_set.map(|c| (c.shot.depth, c.predicted)).collect())
-        })
-        .collect();
-    let figure =
-        plots_sweep::measured_depths(&sets).map_err(|error| CliError::write(path, std::io::Error::other(error)))?;
-    let csv = csv_of(comparisons).map_err(|cause| CliError::write(path, cause))?;
-    let mut files = vec![(path.to_owned(), csv)];
-    if !is_standard(path) {
-        files.push((path.with_extension("svg"), figure.into_bytes()));
+fn write_files(path: &Path, comparisons: &[Comparison]) -> Result<(), CliError> {
+    let failed = |error| CliError::write(path, std::io::Error::other(error));
+    let figure = sweep_figures::measured_depths(comparisons).map(Figure::draw).transpose().map_err(failed)?;
+    let csv = sweep_figures::measured_table(comparisons).to_csv();
+    let mut files = vec![(path.to_owned(), csv.map_err(|error| CliError::write(path, std::io::Error::other(error)))?)];
+    if let Some(figure) = figure.filter(|_| !is_standard(path)) {
+        files.push((path.with_extension("svg"), figure.file().into_bytes()));
     }
     write_all(&files)
-}
-
-fn csv_of(comparisons: &[Comparison]) -> std::io::Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record([
-        "test_set",
-        "line",
-        "velocity_m_s",
-        "measured_depth_m",
-        "predicted_depth_m",
-        "ratio",
-        "I",
-        "N",
-        "k",
-        "comparison_error_m",
-        "numerical_uncertainty_m",
-        "input_uncertainty_m",
-        "data_uncertainty_m",
-        "validation_uncertainty_m",
-    ])?;
-    let text = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-    for c in comparisons {
-        writer.write_record([
-            cell(&c.shot.set).into_owned(),
-            c.shot.line.to_string(),
-            c.shot.velocity.to_string(),
-            c.shot.depth.to_string(),
-            c.predicted.to_string(),
-            c.ratio().to_string(),
-            c.impact.to_string(),
-            text(c.geometry),
-            c.crater_ratio.to_string(),
-            c.comparison_error().to_string(),
-            c.numerical_uncertainty.to_string(),
-            text(c.input_uncertainty),
-            text(c.shot.depth_uncertainty),
-            text(c.validation_uncertainty()),
-        ])?;
-    }
-    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
 fn text(report: &ExperimentsJson) -> String {

@@ -11,10 +11,9 @@ use super::output::{
     write_all,
 };
 use super::{CliError, Exit};
-use crate::physics::groups::Groups;
-use crate::report::plots_sweep;
-use crate::studies::applicability::{self, LEVELS};
-use crate::studies::experiments::{self, ExperimentError};
+use crate::report::sweep_figures;
+use crate::studies::applicability::{self, LEVELS, Line};
+use crate::studies::experiments::{self, MarkedScene};
 
 /// Arguments of `map`.
 #[derive(Args, Debug)]
@@ -74,6 +73,25 @@ pub struct MarkedSceneJson {
     pub error: f64,
 }
 
+impl MapJson {
+    fn new(k: f64, lines: &[Line], scenes: &[MarkedScene]) -> Self {
+        let line = |line: &Line| LineJson { level: line.level, points: line.points.clone() };
+        let scene = |scene: &MarkedScene| MarkedSceneJson {
+            set: scene.set.clone(),
+            I: scene.impact,
+            N: scene.geometry,
+            k: scene.crater_ratio,
+            error: scene.error,
+        };
+        Self {
+            schema: "penetrode/map/1",
+            k,
+            lines: lines.iter().map(line).collect(),
+            scenes: scenes.iter().map(scene).collect(),
+        }
+    }
+}
+
 impl MapArgs {
     /// Computes the map, writes its files, and prints it.
     ///
@@ -87,18 +105,15 @@ impl MapArgs {
         if let Some(path) = &self.out {
             check_outputs(&[], &[("the table", path), ("the figure", &path.with_extension("svg"))])?;
         }
-        let report = self.report().map_err(|error| CliError::usage(error.to_string(), ""))?;
+        let shots = experiments::shipped().map_err(|error| CliError::usage(error.to_string(), ""))?;
+        let (lines, scenes) = (applicability::lines(self.k), experiments::marked(&shots));
+        let report = MapJson::new(self.k, &lines, &scenes);
         if let Some(path) = &self.out {
             let failed = |cause| CliError::write(path, cause);
-            let mut sets: Vec<plots_sweep::MarkedSet<'_>> = Vec::new();
-            for scene in &report.scenes {
-                match sets.iter_mut().find(|(set, _)| *set == scene.set) {
-                    Some((_, points)) => points.push((scene.I, scene.N)),
-                    None => sets.push((&scene.set, vec![(scene.I, scene.N)])),
-                }
-            }
-            let figure =
-                plots_sweep::applicability_map(self.k, &sets).map_err(|error| failed(std::io::Error::other(error)))?;
+            let figure = sweep_figures::applicability(self.k, &lines, &scenes)
+                .draw()
+                .map_err(|error| failed(std::io::Error::other(error)))?
+                .file();
             let mut csv = vec!["level,I,N".to_owned()];
             for line in &report.lines {
                 csv.extend(line.points.iter().map(|(i, n)| format!("{},{i},{n}", line.level)));
@@ -115,27 +130,6 @@ impl MapArgs {
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;
         Ok(Exit::Success)
-    }
-
-    fn report(&self) -> Result<MapJson, ExperimentError> {
-        let impacts: Vec<f64> = (0..=600).map(|i| 10f64.powf(-2.0 + f64::from(i) / 120.0)).collect();
-        let lines = LEVELS
-            .iter()
-            .flat_map(|&level| {
-                applicability::contour(level, &impacts, self.k)
-                    .into_iter()
-                    .map(move |points| LineJson { level, points })
-            })
-            .collect();
-        let marked = |shot: &experiments::Shot| {
-            let scene = shot.scene(None);
-            let groups = Groups::of(&scene, shot.velocity)?;
-            let k = shot.nose.crater_ratio();
-            let error = applicability::model_error(groups.impact, groups.geometry, k);
-            Some(MarkedSceneJson { set: shot.set.clone(), I: groups.impact, N: groups.geometry?, k, error })
-        };
-        let scenes = experiments::shipped()?.iter().filter_map(marked).collect();
-        Ok(MapJson { schema: "penetrode/map/1", k: self.k, lines, scenes })
     }
 
     fn text(&self, report: &MapJson) -> String {

@@ -3,9 +3,10 @@
 use clap::{Args, ValueEnum};
 use schemars::schema_for;
 
-use super::{CliError, Exit, converge, critical, experiments, map, output, solve, stress, sweep};
+use super::{CliError, Exit, converge, critical, experiments, map, output, solve, sweep};
 use crate::report::VerifyJson;
 use crate::report::bench::BenchJson;
+use crate::report::stress::StressJson;
 use crate::studies::audit::Audit;
 
 /// Arguments of `schema`.
@@ -57,7 +58,7 @@ impl SchemaArgs {
             Documented::Map => schema_for!(map::MapJson),
             Documented::Audit => schema_for!(Audit),
             Documented::Verify => schema_for!(VerifyJson),
-            Documented::Stress => schema_for!(stress::StressJson),
+            Documented::Stress => schema_for!(StressJson),
         };
         output::print_json(&schema).map_err(CliError::stdout)?;
         Ok(Exit::Success)

@@ -1,24 +1,27 @@
 //! `penetrode stress`: numerical stability and event stress cases, and random scenes by the million.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::output::{error_text, escape_terminal, print_json, print_text, table, table_lines, wrapped};
+use super::verify::folder_error;
 use super::{CliError, Exit};
-use crate::report::Environment;
-use crate::report::json::ClaimJson;
+use crate::report::stress::{StressJson, StressRun};
+use crate::report::{self, Environment, folder};
 use crate::studies::extreme_scenes::{self, Summary, ULPS_MAX};
 use crate::suite::stress::{self, JudgedCase};
 use crate::suite::{Counts, Suite, Verdict};
 
 /// Arguments of `stress`.
 #[derive(Args, Debug)]
+#[command(after_help = "Cases: E events at their edges, S steps, range, rounding and stiffness, V critical velocity. \
+    --out DIR writes them as a report; that of verify shows the stability map and the rounding floor too.\n\n\
+    Exit codes: 0 all hold, 3 a case failed, 4 undecided.")]
 pub struct StressArgs {
     /// Random scenes to fly besides the cases.
     #[arg(long, value_name = "N")]
@@ -29,97 +32,19 @@ pub struct StressArgs {
     /// Print random scene N of the seed as a scene file, and run nothing.
     #[arg(long, value_name = "N", conflicts_with = "cases")]
     pub show: Option<u64>,
+    /// Write the report to this folder: every case with its limit and reason, figures, JSON.
+    #[arg(long, value_name = "DIR", conflicts_with = "show")]
+    pub out: Option<PathBuf>,
     /// Print JSON.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "show")]
     pub json: bool,
-}
-
-/// What `stress --json` prints.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct StressJson {
-    /// `penetrode/stress/1`.
-    pub schema: &'static str,
-    /// Verdict of the whole.
-    pub verdict: Verdict,
-    /// How many cases came to what.
-    pub counts: Counts,
-    /// The cases, in the order of reports; last the random scenes as one.
-    pub claims: Vec<ClaimJson>,
-    /// What the random scenes showed; `null` where none were asked for.
-    pub random_scenes: Option<RandomScenesJson>,
-    /// Where it ran and what remakes it.
-    pub environment: Environment,
-}
-
-/// What many random scenes showed.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct RandomScenesJson {
-    /// Scenes examined.
-    pub scenes: u64,
-    /// Scenes whose coefficients leave the range of 64-bit numbers.
-    pub unresolved: u64,
-    /// Scenes for which 50 digits were asked.
-    pub asked_reference: u64,
-    /// Critical velocities that agree.
-    pub critical_found: u64,
-    /// Critical velocities refused with their cause, as out of range.
-    pub critical_refused: u64,
-    /// Outcomes by method.
-    pub methods: Vec<TallyJson>,
-    /// Worst errors by method and quantity.
-    pub worst: Vec<WorstJson>,
-    /// Limits missed, all of them.
-    pub defect_count: u64,
-    /// The first of them.
-    pub defects: Vec<DefectJson>,
-    /// Time spent [ms].
-    pub wall_ms: f64,
-}
-
-/// Outcomes of one method.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct TallyJson {
-    /// Name of the method.
-    pub method: &'static str,
-    /// Right outcomes.
-    pub right: u64,
-    /// Outcomes inside the method's own bar.
-    pub undecided: u64,
-    /// Scenes without an answer.
-    pub refused: u64,
-    /// Wrong outcomes.
-    pub wrong: u64,
-}
-
-/// The worst error of a method in a quantity.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct WorstJson {
-    /// Name of the method.
-    pub method: &'static str,
-    /// Quantity.
-    pub quantity: &'static str,
-    /// Error in units of round-off over max(1, condition number); `null` if it is not a number.
-    pub ulps: Option<f64>,
-    /// Number of the scene that makes it.
-    pub scene: u64,
-    /// That scene as a file; `null` if it has no such form.
-    pub text: Option<String>,
-}
-
-/// A limit missed.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct DefectJson {
-    /// Number of the scene.
-    pub scene: u64,
-    /// What is wrong.
-    pub what: String,
 }
 
 impl StressArgs {
     /// Runs the cases, and the random scenes if asked, and prints the summary.
     ///
     /// # Errors
-    /// Standard output that cannot be written (exit 1).
+    /// A folder that is no report of ours (exit 2); a report or standard output that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         if let Some(index) = self.show {
             let title = format!("random scene {index} of seed {}", self.seed);
@@ -127,24 +52,32 @@ impl StressArgs {
             print_text(&text.unwrap_or_default()).map_err(CliError::stdout)?;
             return Ok(Exit::Success);
         }
+        if let Some(out) = &self.out {
+            folder::check(out).map_err(folder_error)?;
+        }
         let mut judged = self.run_cases();
         let random = self.cases.map(|cases| self.run_random(cases));
         if let Some((summary, wall_ms)) = &random {
             judged.push(judge_random(summary, *wall_ms));
         }
         let counts = stress::counts(&judged);
+        let run = StressRun {
+            judged: &judged,
+            random: random.as_ref().map(|(summary, wall_ms)| (summary, *wall_ms)),
+            environment: Environment::here(self.seed, self.command(), &Suite::embedded()?, Vec::new()),
+        };
+        if let Some(out) = &self.out {
+            let failed = |cause| CliError::Write { path: out.display().to_string(), cause };
+            folder::write_files(report::stress::files(&run).map_err(failed)?, out).map_err(folder_error)?;
+        }
         if self.json {
-            let report = StressJson {
-                schema: "penetrode/stress/1",
-                verdict: counts.verdict(),
-                counts,
-                claims: judged.iter().map(ClaimJson::from).collect(),
-                random_scenes: random.as_ref().map(|(summary, wall_ms)| self.random_json(summary, *wall_ms)),
-                environment: Environment::here(self.seed, self.command(), &Suite::embedded()?, Vec::new()),
-            };
-            print_json(&report)
+            print_json(&StressJson::new(&run))
         } else {
-            print_text(&text(&judged, counts, random.as_ref().map(|(summary, _)| summary)))
+            let mut text = text(&judged, counts, run.random.map(|(summary, _)| summary));
+            if let Some(out) = &self.out {
+                let _ = writeln!(text, "report: {}", out.join("report.html").display());
+            }
+            print_text(&text)
         }
         .map_err(CliError::stdout)?;
         Ok(match counts.verdict() {
@@ -184,49 +117,6 @@ impl StressArgs {
         let cases = self.cases.map(|cases| format!(" --cases {cases}")).unwrap_or_default();
         format!("penetrode stress{cases} --seed {}", self.seed)
     }
-
-    fn random_json(&self, summary: &Summary, wall_ms: f64) -> RandomScenesJson {
-        let text = |index: u64| {
-            let title = format!("random scene {index} of seed {}", self.seed);
-            extreme_scenes::scene_text(&extreme_scenes::scene(self.seed, index), &title)
-        };
-        RandomScenesJson {
-            scenes: summary.scenes,
-            unresolved: summary.unresolved,
-            asked_reference: summary.asked_reference,
-            critical_found: summary.critical_found,
-            critical_refused: summary.critical_refused,
-            methods: summary
-                .tallies
-                .iter()
-                .map(|(method, tally)| TallyJson {
-                    method: method.name(),
-                    right: tally.right,
-                    undecided: tally.undecided,
-                    refused: tally.refused,
-                    wrong: tally.wrong,
-                })
-                .collect(),
-            worst: summary
-                .worst
-                .iter()
-                .map(|((method, quantity), worst)| WorstJson {
-                    method: method.name(),
-                    quantity: quantity.name(),
-                    ulps: Some(worst.units).filter(|units| units.is_finite()),
-                    scene: worst.index,
-                    text: text(worst.index),
-                })
-                .collect(),
-            defect_count: summary.defect_count,
-            defects: summary
-                .defects
-                .iter()
-                .map(|defect| DefectJson { scene: defect.index, what: defect.what.clone() })
-                .collect(),
-            wall_ms,
-        }
-    }
 }
 
 /// The random scenes as one case.
@@ -243,31 +133,17 @@ fn judge_random(summary: &Summary, wall_ms: f64) -> JudgedCase {
         unit: "defects",
         reason: "zero: an outcome is right, or inside its own bar; numbers keep to 64 ulp times their condition number",
         remark: format!("{} scenes, {} unresolved{first}", summary.scenes, summary.unresolved),
+        evidence: None,
         wall_ms,
-    }
-}
-
-impl From<&JudgedCase> for ClaimJson {
-    fn from(case: &JudgedCase) -> Self {
-        Self {
-            id: case.id.clone(),
-            statement: case.statement.to_owned(),
-            scene: None,
-            method: case.method.map(crate::integrators::MethodName::name),
-            quantity: None,
-            verdict: case.verdict,
-            measured: case.measured,
-            limit: case.limit,
-            unit: case.unit,
-            reason: case.reason.to_owned(),
-            remark: case.remark.clone(),
-            wall_ms: case.wall_ms,
-        }
     }
 }
 
 fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> String {
     let mut text = String::new();
+    for line in table_lines(&cases_table(judged)) {
+        text.push_str(&line);
+        text.push('\n');
+    }
     for case in judged.iter().filter(|case| matches!(case.verdict, Verdict::Failed | Verdict::Undecided)) {
         let measured = case.measured.map_or("nothing measured".to_owned(), |m| {
             format!("{}, limit {:.1e} {}", error_text(Some(m)), case.limit, case.unit)
@@ -281,6 +157,7 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
             wrapped("          ", &format!("{measured}; {}", escape_terminal(&case.remark)))
         );
     }
+    text.push_str(&skipped_text(judged));
     if let Some(summary) = random {
         text.push_str(&random_text(summary));
     }
@@ -294,6 +171,45 @@ fn text(judged: &[JudgedCase], counts: Counts, random: Option<&Summary>) -> Stri
         counts.skipped
     );
     text
+}
+
+/// One row a case: how many methods passed, and the largest of what was measured.
+fn cases_table(judged: &[JudgedCase]) -> comfy_table::Table {
+    let mut rows = table(&["case", "passed", "skipped", "worst", "limit", "unit"]);
+    let case_of = |case: &JudgedCase| case.id.split('/').next().unwrap_or_default().to_owned();
+    for cases in judged.chunk_by(|a, b| case_of(a) == case_of(b)) {
+        let counts = Counts::of(cases.iter().map(|case| case.verdict));
+        let worst = cases.iter().filter_map(|case| case.measured).max_by(f64::total_cmp);
+        rows.add_row([
+            case_of(&cases[0]),
+            format!("{} of {}", counts.passed, cases.len() - counts.skipped),
+            if counts.skipped > 0 { counts.skipped.to_string() } else { String::new() },
+            error_text(worst),
+            limit_text(cases[0].limit),
+            cases[0].unit.to_owned(),
+        ]);
+    }
+    rows
+}
+
+/// A limit as it was set: few digits, and no exponent where none is needed.
+fn limit_text(limit: f64) -> String {
+    if limit == 0.0 || (1e-3..1e6).contains(&limit) { limit.to_string() } else { format!("{limit:e}") }
+}
+
+/// Why cases were skipped, each reason once with how many it held back.
+fn skipped_text(judged: &[JudgedCase]) -> String {
+    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    for case in judged.iter().filter(|case| case.verdict == Verdict::Skipped) {
+        match reasons.iter_mut().find(|(known, _)| *known == case.remark) {
+            Some((_, count)) => *count += 1,
+            None => reasons.push((&case.remark, 1)),
+        }
+    }
+    let lines = reasons
+        .iter()
+        .map(|(reason, count)| wrapped("  ", &format!("{count} skipped: {}", escape_terminal(reason))) + "\n");
+    lines.collect()
 }
 
 fn random_text(summary: &Summary) -> String {
@@ -327,7 +243,8 @@ fn random_text(summary: &Summary) -> String {
         text.push('\n');
     }
     for defect in &summary.defects {
-        let _ = writeln!(text, "  scene {}: {}", defect.index, escape_terminal(&defect.what));
+        let _ =
+            writeln!(text, "{}", wrapped("  ", &format!("scene {}: {}", defect.index, escape_terminal(&defect.what))));
     }
     text
 }

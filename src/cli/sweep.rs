@@ -15,7 +15,8 @@ use super::output::{
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Method;
 use crate::physics::{Criterion, Outcome};
-use crate::report::plots_sweep;
+use crate::report::figure::Figure;
+use crate::report::sweep_figures;
 use crate::studies::columns::Cells;
 use crate::studies::sweep::{Axis, Plan, Row, SweepError, explanation, read_points};
 
@@ -213,9 +214,7 @@ impl SweepArgs {
                 "sweep H/d alone, or leave out --data",
             ));
         }
-        let help = "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, separated by commas, one number each a line";
-        let text = table_text(path, help)?;
-        read_points(&text).map_err(|error| CliError::usage(format!("{}: {error}", path.display()), help))
+        read_data(path)
     }
 
     fn report(&self, plan: &Plan, rows: &[Row], data: Vec<DataJson>) -> Result<SweepJson, CliError> {
@@ -294,6 +293,13 @@ impl SweepArgs {
         lines.push(String::new());
         lines.join("\n")
     }
+}
+
+/// Measured points of the file at `path`.
+pub(super) fn read_data(path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
+    let help = "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, separated by commas, one number each a line";
+    let text = table_text(path, help)?;
+    read_points(&text).map_err(|error| CliError::usage(format!("{}: {error}", path.display()), help))
 }
 
 /// What a column of the table for people shows of a row; `None` where the row has no such value.
@@ -376,22 +382,22 @@ fn draws_eq15(plan: &Plan) -> bool {
 /// Writes table and figures; every one is drawn before the first is written.
 fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) -> Result<(), CliError> {
     let figures = if draws_eq15(plan) {
-        vec![plots_sweep::critical_energy(rows, points), plots_sweep::critical_energy_difference(rows)]
+        vec![sweep_figures::critical_energy(rows, points), sweep_figures::critical_energy_difference(rows)]
     } else {
-        vec![plots_sweep::critical_velocity(plan, rows)]
+        vec![sweep_figures::critical_velocity(plan, rows)]
     };
     let columns = columns_of(plan, rows);
     #[cfg(feature = "parquet")]
     let bytes = if super::output::is_parquet(path) { parquet_of(columns) } else { csv_of(&columns) };
     #[cfg(not(feature = "parquet"))]
     let bytes = csv_of(&columns);
-    let bytes = bytes.map_err(|cause| CliError::write(path, cause))?;
-    let mut files = vec![(path.to_owned(), bytes)];
+    let mut files = vec![(path.to_owned(), bytes.map_err(|cause| CliError::write(path, cause))?)];
     for (figure_path, figure) in figure_paths(path, plan).into_iter().zip(figures) {
-        match figure {
-            Ok(svg) => files.push((figure_path, svg.into_bytes())),
+        let drawn = figure.map(Figure::draw).transpose();
+        match drawn.map_err(|error| CliError::write(&figure_path, std::io::Error::other(error)))? {
+            Some(figure) => files.push((figure_path, figure.file().into_bytes())),
             // A sweep of bad rows has a table, and nothing to draw.
-            Err(error) => tell("warning: ", &format!("{} not written: {error}", figure_path.display())),
+            None => tell("warning: ", &format!("{} not written: no point in its range", figure_path.display())),
         }
     }
     write_all(&files)

@@ -7,14 +7,18 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{escape_terminal, print_json, print_text, tell, wrapped};
+use super::sweep::read_data;
 use super::{CliError, Exit};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::studies::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::suite::checks::PeerAnswers;
-use crate::suite::{Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness, summary};
+use crate::suite::{Check, Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness, summary};
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
+#[command(after_help = "The report shows the claims with their figures: orders, events, other programs, the paper's \
+    curve, the range of Eq. 11-12, measured depths, layers, stability and rounding. The cases at the edges have a \
+    report of their own: penetrode stress --out DIR.")]
 pub struct VerifyArgs {
     /// Suite file (TOML) [default: the suite that ships].
     pub suite: Option<String>,
@@ -33,6 +37,9 @@ pub struct VerifyArgs {
     /// Put another solver through the suite: a program that speaks the peer protocol.
     #[arg(long, value_name = "CMD")]
     pub peer: Option<String>,
+    /// Measured points to show with the paper's curve: a CSV with the columns `H/d` and `E_c/(d3 fc)`.
+    #[arg(long, value_name = "POINTS.csv")]
+    pub data: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
@@ -62,6 +69,13 @@ impl VerifyArgs {
                 ));
             }
         }
+        let points = self.data.as_deref().map(read_data).transpose()?.unwrap_or_default();
+        if !points.is_empty() && !suite.claims.iter().any(|claim| matches!(claim.check, Check::Sweep { .. })) {
+            return Err(CliError::usage(
+                "no claim of the suite sweeps H/d, so --data would not be shown",
+                "leave out --data, or --only",
+            ));
+        }
         let peers = self.peers()?;
         let progress = progress_bar(suite.claims.len() as u64);
         let running = Mutex::new(Counts::default());
@@ -71,6 +85,7 @@ impl VerifyArgs {
             suite: &suite,
             judged: &judged,
             environment: Environment::here(self.seed, self.command(), &suite, peers.describe()),
+            points: &points,
         };
         folder::write(&run, &self.out).map_err(folder_error)?;
         let report = VerifyJson::new(&run);
@@ -136,6 +151,7 @@ impl VerifyArgs {
         if self.live_peers {
             words.push("--live-peers".to_owned());
         }
+        words.extend(self.data.as_deref().map(|path| format!("--data {}", quote(&path.to_string_lossy()))));
         words.extend(self.peer.as_deref().map(|command| format!("--peer {}", quote(command))));
         words.join(" ")
     }

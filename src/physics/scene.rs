@@ -399,6 +399,19 @@ fn outright(stages: &[Stage], exit_depth: f64) -> Result<Stages, ResolveError> {
 }
 
 impl Scene {
+    /// A projectile of `mass` [kg] and a target of `concrete` without a far side; no impact velocity, the full depth as
+    /// criterion.
+    pub fn of_concrete(mass: f64, concrete: Concrete) -> Self {
+        Self {
+            title: None,
+            mass,
+            resistance: Resistance::Concrete(concrete),
+            thickness: None,
+            criterion: Criterion::FullDepth,
+            velocity: None,
+        }
+    }
+
     /// The equation of motion at `impact_speed` [m/s]: stages and exit depth (theory section 1).
     ///
     /// ```text

@@ -31,6 +31,7 @@ pub const SHIPPED: &[(&str, &str)] = &[
     ("stiff", include_str!("../../verification/scenes/stiff.toml")),
     ("viscous", include_str!("../../verification/scenes/viscous.toml")),
     ("layered", include_str!("../../verification/scenes/layered.toml")),
+    ("air-gap", include_str!("../../verification/scenes/air-gap.toml")),
     ("tunnel-no-drag", include_str!("../../verification/scenes/tunnel-no-drag.toml")),
     ("perforate-no-drag", include_str!("../../verification/scenes/perforate-no-drag.toml")),
     ("jump", include_str!("../../verification/scenes/jump.toml")),

@@ -270,6 +270,10 @@ pub enum Mark {
 pub enum KeyPlace {
     /// In the lower right corner, one below the other.
     Corner,
+    /// In the upper left corner.
+    TopLeft,
+    /// In the upper right corner.
+    TopRight,
     /// Above the diagram, side by side.
     Head,
 }
@@ -283,8 +287,20 @@ pub struct Key {
     pub ink: Ink,
     /// Shape; `None` for a line.
     pub shape: Option<Shape>,
-    /// Whether only the outline is drawn.
+    /// Whether only the outline is drawn; of a line, whether it is dashed.
     pub hollow: bool,
+}
+
+impl Key {
+    /// The entry of points.
+    pub fn points(text: impl Into<String>, ink: Ink, shape: Shape) -> Self {
+        Self { text: text.into(), ink, shape: Some(shape), hollow: false }
+    }
+
+    /// The entry of a line.
+    pub fn line(text: impl Into<String>, ink: Ink, dashed: bool) -> Self {
+        Self { text: text.into(), ink, shape: None, hollow: dashed }
+    }
 }
 
 /// One diagram of a figure.
@@ -430,19 +446,26 @@ impl Panel {
 
     fn draw_keys(&self, root: &Area<'_>) -> Drawn {
         const LINE: i32 = 16;
-        let mut right = WIDTH - RIGHT - if self.key_place == KeyPlace::Corner { 8 } else { 4 };
-        for (index, key) in self.keys.iter().rev().enumerate() {
+        let left = if self.y.numbered { LEFT } else { RIGHT };
+        let mut right = WIDTH - RIGHT - if self.key_place == KeyPlace::Head { 4 } else { 8 };
+        for (index, key) in self.keys.iter().enumerate().rev() {
+            let from_top = TOP + 12 + LINE * whole(index);
             let y = match self.key_place {
-                KeyPlace::Corner => self.height - BOTTOM - 12 - LINE * whole(index),
+                KeyPlace::Corner => self.height - BOTTOM - 12 - LINE * whole(self.keys.len() - 1 - index),
+                KeyPlace::TopLeft | KeyPlace::TopRight => from_top,
                 KeyPlace::Head => 28,
             } * FINE;
-            let middle = (HPos::Right, VPos::Center);
-            write_text(root, ((right - 12) * FINE, y), &key.text, TEXT, Ink::Text, middle)?;
+            // The symbol stands at the edge, the text beside it.
+            let (symbol, text, side) = match self.key_place {
+                KeyPlace::TopLeft => (left + 12, left + 24, HPos::Left),
+                _ => (right, right - 12, HPos::Right),
+            };
+            write_text(root, (text * FINE, y), &key.text, TEXT, Ink::Text, (side, VPos::Center))?;
             match key.shape {
-                Some(shape) => draw_point(root, (right * FINE, y), key.ink, shape, key.hollow, RADIUS)?,
+                Some(shape) => draw_point(root, (symbol * FINE, y), key.ink, shape, key.hollow, RADIUS)?,
                 None => root.draw(&PathElement::new(
-                    vec![((right - 8) * FINE, y), ((right + 4) * FINE, y)],
-                    key.ink.rgb().stroke_width(SOLID),
+                    vec![((symbol - 8) * FINE, y), ((symbol + 4) * FINE, y)],
+                    key.ink.rgb().stroke_width(if key.hollow { DASHED } else { SOLID }),
                 ))?,
             }
             if self.key_place == KeyPlace::Head {

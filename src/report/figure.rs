@@ -28,6 +28,16 @@ pub enum Part {
     Energy,
     /// What accuracy costs.
     Cost,
+    /// The paper's curve over the thickness.
+    Slab,
+    /// Where Eq. 11-12 holds.
+    Applicability,
+    /// Measured depths.
+    Measured,
+    /// Targets of layers.
+    Layers,
+    /// Stability and rounding.
+    Stability,
 }
 
 /// A figure.
@@ -89,6 +99,8 @@ impl Drawn {
         let columns = self.figure.panels.len().clamp(1, COLUMNS);
         let width = (0..columns).fold(GAP, |width, _| width + WIDTH + GAP);
         let message = wrapped(&self.figure.message, (width - 2 * GAP) as usize / 9);
+        // A single panel is sized for a phone; a file is looked at on a desk.
+        let larger = if columns == 1 { 2 } else { 1 };
         let head = message.iter().fold(GAP + GAP / 2, |head, _| head + LINE);
         let mut body = String::new();
         let mut y = head;
@@ -123,13 +135,15 @@ impl Drawn {
             self.figure.panels.iter().map(|p| format!("{}: {}", p.title, p.description)).collect();
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-             <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{y}\" viewBox=\"0 0 {width} {y}\" \
+             <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {width} {y}\" \
              role=\"img\" aria-labelledby=\"t d\" font-family=\"system-ui, 'Segoe UI', Roboto, sans-serif\">\n\
              <title id=\"t\">{}</title>\n<desc id=\"d\">{}</desc>\n\
              <style>{}:root{{--paper:#fff}}.paper{{fill:var(--paper)}}\
              svg svg text{{paint-order:stroke;stroke:var(--paper);stroke-width:12px;stroke-linejoin:round}}\
              @media screen and (prefers-color-scheme:dark){{:root{{--paper:#161a20}}}}</style>\n\
              <rect width=\"{width}\" height=\"{y}\" fill=\"#fff\" class=\"paper\"/>\n{title}{body}</svg>\n",
+            width * larger,
+            y * larger,
             escape(&self.figure.message),
             escape(&descriptions.join(" ")),
             Ink::style_sheet(),

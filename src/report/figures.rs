@@ -12,7 +12,8 @@ use super::figure::{Figure, Part};
 use super::figure_data::path_of;
 use super::table::{Table, or_empty};
 use super::text::{count, number};
-use crate::integrators::{Boundaries, Sample, VelocityAt};
+use super::{stability_figures, sweep_figures};
+use crate::integrators::{Boundaries, Flight, Sample, VelocityAt};
 use crate::physics::semi_empirical::{depth_ratio, model_difference};
 use crate::physics::{EventKind, Outcome, Problem};
 use crate::studies::Quantity;
@@ -37,6 +38,35 @@ pub fn all(run: &Run<'_>) -> Vec<Figure> {
     figures.extend(scenes.first().and_then(|scene| errors_over_step(run, scene, Quantity::CraterEndTime)));
     figures.extend(energy(run));
     figures.extend(peers(run));
+    figures.extend(of_evidence(run));
+    figures.extend(layers(run));
+    figures
+}
+
+/// Figures that show the evidence of one claim; the first claim that has it gives it, all of its kind judge it.
+fn of_evidence(run: &Run<'_>) -> Vec<Figure> {
+    let mut figures: Vec<Figure> = Vec::new();
+    for judged in run.judged {
+        let drawn = match &judged.evidence {
+            Some(Evidence::Boundary(points)) => vec![stability_figures::boundary(points)],
+            Some(Evidence::Rounding(rows)) => vec![stability_figures::rounding(rows)],
+            Some(Evidence::Sweep { rows, .. }) => {
+                vec![sweep_figures::critical_energy(rows, run.points), sweep_figures::critical_energy_difference(rows)]
+            }
+            Some(Evidence::Map { crater_ratio, lines, scenes }) => {
+                vec![Some(sweep_figures::applicability(*crater_ratio, lines, scenes))]
+            }
+            Some(Evidence::Depths(comparisons)) => vec![sweep_figures::measured_depths(comparisons)],
+            Some(Evidence::Fit { .. } | Evidence::Series { .. }) | None => Vec::new(),
+        };
+        let claims = ids(run, [judged]);
+        for mut figure in drawn.into_iter().flatten() {
+            if !figures.iter().any(|known| known.name == figure.name) {
+                figure.claims.clone_from(&claims);
+                figures.push(figure);
+            }
+        }
+    }
     figures
 }
 
@@ -486,6 +516,7 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
     if errors.is_empty() {
         return None;
     }
+    let limit = judged.iter().map(|j| j.claim.limit).fold(0.0, f64::max);
     let x = Axis::log("tolerance", points().map(|p| p.step));
     let y = Axis::log("relative error", errors.iter().copied().chain([x.range[0], x.range[1] * 4.0]));
     let mut table = Table::new(["method", "scene", "quantity", "rtol", "relative_error", "used", "excluded", "slope"]);
@@ -538,12 +569,12 @@ fn tolerances(run: &Run<'_>) -> Option<Figure> {
         message: message(
             judged.iter().copied(),
             "Errors",
-            "fall in proportion to the tolerance",
-            "are not all shown to fall in proportion to the tolerance",
+            &format!("fall with the tolerance, with slopes within {} of 1", number(limit, 2)),
+            "are not all shown to fall with the tolerance as they should",
         ),
         reading:
             "Each point is one flight. A method that keeps what is asked of it stays near the dashed line; a slope \
-                  of 1 is proportional."
+                  of 1 is proportional. Hollow points are outside the fit."
                 .to_owned(),
         claims: ids(run, judged),
         panels,
@@ -801,67 +832,90 @@ fn label_of_peer(name: &str, members: &[&Judged]) -> String {
 /// What is drawn over time: its name with its unit, the units in one of SI, and the number.
 type Curve = (&'static str, f64, fn(&Sample) -> f64);
 
+/// The panels of one flight and its way there; `None` for a flight without an end.
+fn path_panels(name: &str, problem: &Problem, table: &mut Table) -> Option<(Vec<Panel>, Flight)> {
+    let (samples, flight) = path_of(problem)?;
+    for sample in &samples {
+        let s = sample.state;
+        table.push([&name, &s.time, &s.depth, &s.velocity, &sample.force, &sample.stage]);
+    }
+    let curves: [Curve; 3] = [
+        ("depth [mm]", 1e3, |s| s.state.depth),
+        ("velocity [m/s]", 1.0, |s| s.state.velocity),
+        ("force [kN]", 1e-3, |s| s.force),
+    ];
+    let mut panels = Vec::new();
+    for (label, unit, value) in curves {
+        let points: Vec<_> = samples.iter().map(|s| (s.state.time * 1e3, value(s) * unit)).collect();
+        let x = Axis::linear("time [ms]", points.iter().map(|p| p.0));
+        let highest = points.iter().map(|p| p.1).fold(0.0, f64::max);
+        // The names of many events stand one below the other.
+        let rows = if flight.events.len() > 2 { 3 } else { 1 };
+        let room = 1.0 + 0.12 * f64::from(rows);
+        let y = Axis::linear(label, points.iter().map(|p| p.1).chain([0.0, highest * room]));
+        let mut marks = Vec::new();
+        for (index, event) in flight.events.iter().enumerate() {
+            let time = event.state.time * 1e3;
+            let points = y.range.map(|y| (time, y)).to_vec();
+            marks.push(Mark::Line { points, ink: Ink::Muted, dashed: true });
+            // The text stands where there is room: left of events in the right half.
+            let right_half = time > 0.5 * (x.range[0] + x.range[1]);
+            let anchor = if right_half { Anchor::End } else { Anchor::Start };
+            let gap = 0.018 * (x.range[1] - x.range[0]) * if right_half { -1.0 } else { 1.0 };
+            let row = (index % rows as usize) as f64;
+            let at = (time + gap, y.range[1] - (0.035 + 0.085 * row) * (y.range[1] - y.range[0]));
+            marks.push(Mark::Text { at, text: words_for_event(event.kind, problem), ink: Ink::Muted, anchor });
+        }
+        marks.push(Mark::Line { points, ink: Ink::Blue, dashed: false });
+        panels.push(Panel {
+            title: format!("{name}: {}", label.split(' ').next().unwrap_or(label)),
+            description: format!(
+                "{label} over time [ms]; the projectile {} at {} ms.",
+                words_for_outcome(flight.outcome),
+                number(flight.end.time * 1e3, 4)
+            ),
+            x,
+            y,
+            marks,
+            keys: Vec::new(),
+            key_place: KeyPlace::Corner,
+            height: 230,
+        });
+    }
+    Some((panels, flight))
+}
+
+const PATH_COLUMNS: [&str; 6] = ["scene", "time_s", "depth_m", "velocity_m_s", "force_n", "stage"];
+const PATH_READING: &str = "Closed form, or the Taylor series where there is none. Dashed lines are events.";
+
+/// Scenes of the claims with their problems.
+fn problems(run: &Run<'_>) -> Vec<(String, Problem)> {
+    scenes_in_order(run)
+        .into_iter()
+        .filter_map(|name| Some((name.clone(), run.suite.scenes.get(&name)?.problem().ok()?)))
+        .collect()
+}
+
 /// Depth, velocity and force over time, events marked: one scene that stops in the tunnel and one that perforates.
 fn paths(run: &Run<'_>) -> Option<Figure> {
-    let mut table = Table::new(["scene", "time_s", "depth_m", "velocity_m_s", "force_n", "stage"]);
+    let mut table = Table::new(PATH_COLUMNS);
     let mut panels = Vec::new();
     let mut seen: Vec<bool> = Vec::new();
     let mut told = Vec::new();
-    let mut problems: Vec<(String, Problem)> = scenes_in_order(run)
-        .into_iter()
-        .filter_map(|name| Some((name.clone(), run.suite.scenes.get(&name)?.problem().ok()?)))
-        .collect();
-    // Scenes with drag first: they show all that the equation has.
-    problems.sort_by_key(|(_, problem)| !problem.stages.iter().any(|stage| stage.drag > 0.0));
+    let mut problems = problems(run);
+    // Scenes of a crater and one tunnel with drag first: they show all that the equation has. Layers have their own.
+    problems
+        .sort_by_key(|(_, problem)| (problem.stages.len() > 2, !problem.stages.iter().any(|stage| stage.drag > 0.0)));
     for (name, problem) in problems {
         // More than one stage on the way, and each kind of end once: that is what there is to see.
-        let Some((samples, flight)) = path_of(&problem) else { continue };
+        let mut rows = table.clone();
+        let Some((drawn, flight)) = path_panels(&name, &problem, &mut rows) else { continue };
         if flight.events.len() < 2 || seen.contains(&flight.outcome.is_stop()) || seen.len() == SCENES_MAX {
             continue;
         }
         seen.push(flight.outcome.is_stop());
-        for sample in &samples {
-            let s = sample.state;
-            table.push([&name, &s.time, &s.depth, &s.velocity, &sample.force, &sample.stage]);
-        }
-        let curves: [Curve; 3] = [
-            ("depth [mm]", 1e3, |s| s.state.depth),
-            ("velocity [m/s]", 1.0, |s| s.state.velocity),
-            ("force [kN]", 1e-3, |s| s.force),
-        ];
-        for (label, unit, value) in curves {
-            let points: Vec<_> = samples.iter().map(|s| (s.state.time * 1e3, value(s) * unit)).collect();
-            let x = Axis::linear("time [ms]", points.iter().map(|p| p.0));
-            let highest = points.iter().map(|p| p.1).fold(0.0, f64::max);
-            let y = Axis::linear(label, points.iter().map(|p| p.1).chain([0.0, highest * 1.12]));
-            let mut marks = Vec::new();
-            for event in &flight.events {
-                let time = event.state.time * 1e3;
-                let points = y.range.map(|y| (time, y)).to_vec();
-                marks.push(Mark::Line { points, ink: Ink::Muted, dashed: true });
-                // The text stands where there is room: left of events in the right half.
-                let right_half = time > 0.5 * (x.range[0] + x.range[1]);
-                let anchor = if right_half { Anchor::End } else { Anchor::Start };
-                let gap = 0.018 * (x.range[1] - x.range[0]) * if right_half { -1.0 } else { 1.0 };
-                let at = (time + gap, y.range[1] - 0.035 * (y.range[1] - y.range[0]));
-                marks.push(Mark::Text { at, text: words_for_event(event.kind, &problem), ink: Ink::Muted, anchor });
-            }
-            marks.push(Mark::Line { points, ink: Ink::Blue, dashed: false });
-            panels.push(Panel {
-                title: format!("{name}: {}", label.split(' ').next().unwrap_or(label)),
-                description: format!(
-                    "{label} over time [ms]; the projectile {} at {} ms.",
-                    words_for_outcome(flight.outcome),
-                    number(flight.end.time * 1e3, 4)
-                ),
-                x,
-                y,
-                marks,
-                keys: Vec::new(),
-                key_place: KeyPlace::Corner,
-                height: 230,
-            });
-        }
+        table = rows;
+        panels.extend(drawn);
         told.push(format!("scene {name} {}", words_for_outcome(flight.outcome)));
     }
     if panels.is_empty() {
@@ -871,7 +925,32 @@ fn paths(run: &Run<'_>) -> Option<Figure> {
         name: "flights".into(),
         part: Part::Model,
         message: format!("The force acts in stages: {}", told.join(", ")),
-        reading: "Closed form, or the Taylor series where there is none. Dashed lines are events.".to_owned(),
+        reading: PATH_READING.to_owned(),
+        claims: Vec::new(),
+        panels,
+        table,
+    })
+}
+
+/// The same for the scene of most layers.
+fn layers(run: &Run<'_>) -> Option<Figure> {
+    let layers_of = |name: &str| Some(run.suite.scenes.get(name)?.concrete()?.layers.len());
+    let mut problems = problems(run);
+    // Stable: the first of those with most layers.
+    problems.sort_by_key(|(name, _)| std::cmp::Reverse(layers_of(name)));
+    let (name, problem) = problems.into_iter().next()?;
+    let layers = layers_of(&name).filter(|layers| *layers > 0)?;
+    let mut table = Table::new(PATH_COLUMNS);
+    let (panels, flight) = path_panels(&name, &problem, &mut table)?;
+    Some(Figure {
+        name: format!("layers-{}", slug(&name)),
+        part: Part::Layers,
+        message: format!(
+            "Through {} the force jumps at each boundary: scene {name} {}",
+            count(layers, "layer"),
+            words_for_outcome(flight.outcome)
+        ),
+        reading: PATH_READING.to_owned(),
         claims: Vec::new(),
         panels,
         table,

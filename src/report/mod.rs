@@ -1,5 +1,6 @@
-//! How a run of the suite is shown: JSON, and a folder with a page, figures, tables and JUnit.
+//! How a run of the suite or of the stress cases is shown: JSON, and a folder with a page, figures and tables.
 
+mod applications;
 pub mod bench;
 pub mod chart;
 pub mod environment;
@@ -11,8 +12,11 @@ pub mod folder;
 pub mod json;
 pub mod junit;
 pub mod page;
-pub mod plots_sweep;
+pub mod stability_figures;
+pub mod stress;
+mod stress_page;
 pub mod summary;
+pub mod sweep_figures;
 pub mod table;
 pub mod text;
 
@@ -30,6 +34,8 @@ pub struct Run<'a> {
     pub judged: &'a [Judged],
     /// Where it ran and what remakes it.
     pub environment: Environment,
+    /// A user's measured critical energies (H/d, `E_c/(d³ fc)`), shown with the paper's curve.
+    pub points: &'a [(f64, f64)],
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::applications;
 use super::chart::Ink;
 use super::families::{Family, group_of};
 use super::figure::{Drawn, Part};
@@ -44,10 +45,15 @@ pub fn to_html(run: &Run<'_>, figures: &[Drawn]) -> String {
             (cross_code(run, &families, figures))
             (events(run, &families, figures))
             (energy(run, &families, figures))
-            (stability(&families))
+            (stability(run, &families, figures))
+            (applications::paper_curve(run, &families, figures))
+            (applications::applicability(run, &families, figures))
+            (applications::measured_data(run, &families, figures))
+            (applications::layers(run, figures))
+            (applications::sensitivities(&families))
             (deviations(run, &families))
             (every_claim(run))
-            (reproduction(run))
+            (reproduction(&run.environment))
             (references())
         },
         html! { "Written by penetrode " (run.environment.version) ". The same numbers: "
@@ -91,7 +97,7 @@ pub(super) fn document(
     page.into_string()
 }
 
-const SECTIONS: [(&str, &str); 14] = [
+const SECTIONS: [(&str, &str); 19] = [
     ("verdict", "Verdict"),
     ("model", "Model, assumptions, validity"),
     ("algorithms", "Algorithms and their formal orders"),
@@ -101,7 +107,12 @@ const SECTIONS: [(&str, &str); 14] = [
     ("cross-code", "Comparison with other programs"),
     ("events", "Event verification"),
     ("energy", "Energy and other invariants"),
-    ("stability", "Stability"),
+    ("stability", "Stability and rounding"),
+    ("slab", "The paper's curve: critical energy over the thickness"),
+    ("applicability", "How far Eq. 11-12 holds"),
+    ("measured", "Measured depths"),
+    ("layers", "Layered targets"),
+    ("sensitivities", "Sensitivities"),
     ("deviations", "Deviations and limits of what was shown"),
     ("claims", "Every claim"),
     ("reproduction", "Reproduction"),
@@ -117,7 +128,7 @@ fn contents() -> Markup {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
-fn section(id: &str, body: Markup) -> Markup {
+pub(super) fn section(id: &str, body: Markup) -> Markup {
     let title = SECTIONS.iter().find(|(known, _)| *known == id).map_or(id, |(_, title)| title);
     html! { section aria-labelledby=(id) { h2 id=(id) { (title) } (body) } }
 }
@@ -142,37 +153,44 @@ fn sign(verdict: Verdict) -> &'static str {
     }
 }
 
-fn badge(verdict: Verdict) -> Markup {
+pub(super) fn badge(verdict: Verdict) -> Markup {
     html! { span.badge.(verdict.name()) { (sign(verdict)) " " (verdict.name()) } }
+}
+
+/// The verdict in large letters with what it means, and how many came to what.
+pub(super) fn banner(verdict: Verdict, counts: Counts, noun: &str) -> Markup {
+    let decided = counts.passed + counts.failed + counts.undecided;
+    let meaning = match verdict {
+        Verdict::Passed => format!("All {decided} {noun} that apply hold within their limits."),
+        Verdict::Failed => format!("{} of {decided} {noun} that apply do not hold.", counts.failed),
+        Verdict::Undecided if decided == 0 => "Nothing was decided, so nothing was shown.".to_owned(),
+        Verdict::Undecided => format!("{} of {decided} {noun} that apply could not be decided.", counts.undecided),
+        Verdict::Skipped => String::new(),
+    };
+    html! {
+        div.verdict.(verdict.name()) {
+            span.word { (sign(verdict)) " " (verdict.name()) }
+            span.sum { (meaning) }
+        }
+        ul.counts {
+            @for (verdict, number) in [
+                (Verdict::Passed, counts.passed),
+                (Verdict::Failed, counts.failed),
+                (Verdict::Undecided, counts.undecided),
+                (Verdict::Skipped, counts.skipped),
+            ] { li.(verdict.name()) { b { (number) } (verdict.name()) } }
+        }
+    }
 }
 
 fn verdict_section(run: &Run<'_>, verdict: Verdict, counts: Counts) -> Markup {
     let mut told: Vec<_> =
         run.judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)).collect();
     told.sort_by_key(|j| std::cmp::Reverse(j.verdict));
-    let decided = counts.passed + counts.failed + counts.undecided;
-    let meaning = match verdict {
-        Verdict::Passed => format!("All {decided} claims that apply hold within their limits."),
-        Verdict::Failed => format!("{} of {decided} claims that apply do not hold.", counts.failed),
-        Verdict::Undecided if decided == 0 => "Nothing was decided, so nothing was shown.".to_owned(),
-        Verdict::Undecided => format!("{} of {decided} claims that apply could not be decided.", counts.undecided),
-        Verdict::Skipped => String::new(),
-    };
     section(
         "verdict",
         html! {
-            div.verdict.(verdict.name()) {
-                span.word { (sign(verdict)) " " (verdict.name()) }
-                span.sum { (meaning) }
-            }
-            ul.counts {
-                @for (verdict, number) in [
-                    (Verdict::Passed, counts.passed),
-                    (Verdict::Failed, counts.failed),
-                    (Verdict::Undecided, counts.undecided),
-                    (Verdict::Skipped, counts.skipped),
-                ] { li.(verdict.name()) { b { (number) } (verdict.name()) } }
-            }
+            (banner(verdict, counts, "claims"))
             @if !told.is_empty() {
                 (claims_table("Claims that failed or are undecided", &told[..told.len().min(FIRST_SCREEN)]))
                 @if told.len() > FIRST_SCREEN {
@@ -185,7 +203,7 @@ fn verdict_section(run: &Run<'_>, verdict: Verdict, counts: Counts) -> Markup {
     )
 }
 
-fn measured_of(value: Option<f64>) -> String {
+pub(super) fn measured_of(value: Option<f64>) -> String {
     value.map_or_else(|| "—".to_owned(), |m| number(m, 3))
 }
 
@@ -230,7 +248,7 @@ fn families_table(caption: &str, families: &[&Family<'_>]) -> Markup {
 }
 
 /// `12 passed, 3 skipped`.
-fn tally(counts: Counts) -> String {
+pub(super) fn tally(counts: Counts) -> String {
     [
         (counts.failed, Verdict::Failed),
         (counts.undecided, Verdict::Undecided),
@@ -244,7 +262,7 @@ fn tally(counts: Counts) -> String {
     .join(", ")
 }
 
-fn figures_of(run: &Run<'_>, figures: &[Drawn], part: Part) -> Markup {
+pub(super) fn figures_of(run: &Run<'_>, figures: &[Drawn], part: Part) -> Markup {
     html! {
         @for drawn in figures.iter().filter(|f| f.figure.part == part) {
             (figure(drawn, html! {
@@ -485,7 +503,7 @@ fn criteria(families: &[Family<'_>]) -> Markup {
 
 /// What a check is evidence of: the part of the report that shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     Exact,
     Order,
     Discrete,
@@ -494,6 +512,10 @@ enum Kind {
     Event,
     Invariant,
     Stability,
+    Slab,
+    Applicability,
+    Measured,
+    Sensitivity,
 }
 
 /// Every check has its place: one that is new does not compile without.
@@ -523,7 +545,11 @@ fn kind_of(check: &Check) -> Kind {
         Check::EnergyBalance {} | Check::TimeReversal {} | Check::Similarity { .. } | Check::Split { .. } => {
             Kind::Invariant
         }
-        Check::StabilityLimit {} => Kind::Stability,
+        Check::StabilityLimit {} | Check::StabilityMap { .. } | Check::RoundingFloor { .. } => Kind::Stability,
+        Check::Sweep { .. } => Kind::Slab,
+        Check::Map { .. } => Kind::Applicability,
+        Check::MeasuredDepth {} => Kind::Measured,
+        Check::Sensitivities {} => Kind::Sensitivity,
     }
 }
 
@@ -532,7 +558,7 @@ fn of_kind<'f, 'a>(families: &'f [Family<'a>], kind: Kind) -> Vec<&'f Family<'a>
 }
 
 /// Families of a section, or a sentence where the suite has none.
-fn results(caption: &str, families: &[Family<'_>], kind: Kind) -> Markup {
+pub(super) fn results(caption: &str, families: &[Family<'_>], kind: Kind) -> Markup {
     let families = of_kind(families, kind);
     html! {
         @if families.is_empty() { p { "This suite claims nothing of this kind." } }
@@ -585,7 +611,7 @@ fn order_tables(run: &Run<'_>) -> Markup {
                         caption { "observed order, half-width of its 95 % interval, and the formal order in brackets" }
                         thead { tr { th scope="col" { "velocity" } th scope="col" { "boundaries" }
                             @for quantity in &quantities { th scope="col" { (words_for(*quantity)) } } } }
-                        tbody { @for velocity in VELOCITIES { @for boundaries in BOUNDARIES { tr {
+                        tbody { @for (velocity, boundaries) in variants(&mine) { tr {
                             th scope="row" { (velocity) } td { (boundaries) }
                             @for quantity in &quantities {
                                 td.num { @if let Some(judged) = mine.iter().find(|j| j.claim.velocity == velocity
@@ -593,12 +619,18 @@ fn order_tables(run: &Run<'_>) -> Markup {
                                     (order_cell(judged))
                                 } @else { "—" } }
                             }
-                        } } } }
+                        } } }
                     }
                 }
             }
         }
     }
+}
+
+/// The variants of the scheme that `judged` claim something of, in the order of the tables.
+fn variants(judged: &[&&Judged]) -> Vec<(VelocityAt, Boundaries)> {
+    let all = VELOCITIES.into_iter().flat_map(|velocity| BOUNDARIES.map(|boundaries| (velocity, boundaries)));
+    all.filter(|variant| judged.iter().any(|j| (j.claim.velocity, j.claim.boundaries) == *variant)).collect()
 }
 
 fn order_cell(judged: &Judged) -> Markup {
@@ -665,13 +697,16 @@ fn energy(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Markup {
     )
 }
 
-fn stability(families: &[Family<'_>]) -> Markup {
+fn stability(run: &Run<'_>, families: &[Family<'_>], figures: &[Drawn]) -> Markup {
     section(
         "stability",
         html! {
             p { "In the crater the scheme is stable for w dt < 2, w² = c/M; the limit is found by measurement. The lagged drag
-                is monotone for 2 Q V dt/M < 1 and stable for < 2." }
-            (results("Stability limits", families, Kind::Stability))
+                is monotone for 2 Q V dt/M < 1 and stable for < 2. Below every step size there is the rounding of the numbers." }
+            (figures_of(run, figures, Part::Stability))
+            (results("Stability limits and rounding", families, Kind::Stability))
+            p.quiet { "Events at their edges, extreme scenes and stiffness: " code { "penetrode stress --out DIR" }
+                " writes a report of their own." }
         },
     )
 }
@@ -739,8 +774,8 @@ fn every_claim(run: &Run<'_>) -> Markup {
     )
 }
 
-fn reproduction(run: &Run<'_>) -> Markup {
-    let e = &run.environment;
+/// What remakes a run.
+pub(super) fn reproduction(e: &Environment) -> Markup {
     section(
         "reproduction",
         html! {

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
+use super::stress::StressRun;
 use super::{Environment, Run, folder};
 use crate::suite::checks::PeerAnswers;
-use crate::suite::{Check, Judged, Suite, Verdict};
+use crate::suite::stress::JudgedCase;
+use crate::suite::{Check, Evidence, Judged, Suite, Verdict};
 
 const HOSTILE: &str = "a\"b'<script>alert(1)</script>&|`*_\n\u{1b}[2J\u{202e},=1+1]]>";
 
@@ -13,7 +15,18 @@ fn judged() -> (Suite, Vec<Judged>) {
     let mut suite = Suite::embedded().unwrap();
     suite.claims.retain(|c| {
         c.id.starts_with("order/jump") && c.id.ends_with("/depth")
-            || ["small-impact/approach", "peer/", "invariant/energy"].iter().any(|start| c.id.starts_with(start))
+            || [
+                "small-impact/approach",
+                "peer/",
+                "invariant/energy",
+                "sweep/",
+                "map/",
+                "measured",
+                "rounding",
+                "stability/m",
+            ]
+            .iter()
+            .any(|start| c.id.starts_with(start))
     });
     let mut judged = suite.run(1, &PeerAnswers::recorded().unwrap(), &|_| ());
     for verdict in [Verdict::Failed, Verdict::Undecided, Verdict::Skipped] {
@@ -36,7 +49,7 @@ fn judged() -> (Suite, Vec<Judged>) {
 
 fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
     let environment = Environment::here(1, HOSTILE.to_owned(), suite, vec![(HOSTILE.to_owned(), HOSTILE.to_owned())]);
-    let run = Run { suite, judged, environment };
+    let run = Run { suite, judged, environment, points: &[(5.0, 30.0)] };
     let files = folder::files(&run).unwrap();
     files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect()
 }
@@ -79,7 +92,8 @@ fn reports_of_one_run_differ_in_times_alone() {
 fn without_times(text: &str) -> String {
     let mut lines = Vec::new();
     for line in text.lines() {
-        let mut line = line.to_owned();
+        // Markdown writes the colons of a date in its own way.
+        let mut line = line.replace("&#58;", ":");
         for (start, end) in [("\"wall_ms\": ", ""), (" time=\"", "\""), ("datetime=\"", "\"")] {
             while let Some(at) = line.find(start) {
                 let rest = &line[at + start.len()..];
@@ -102,6 +116,47 @@ fn without_times(text: &str) -> String {
 }
 
 #[test]
+fn stress_reports_of_one_run_differ_in_times_alone() {
+    // A few cases, judged, are enough: those with figures and one that failed.
+    let of = |id: &str, evidence, verdict, wall_ms| JudgedCase {
+        id: id.to_owned(),
+        statement: "a case of this test",
+        method: None,
+        verdict,
+        measured: Some(0.5),
+        limit: 1.0,
+        unit: "relative",
+        reason: "chosen for this test",
+        remark: HOSTILE.to_owned(),
+        evidence,
+        wall_ms,
+    };
+    let (_, judged) = judged();
+    let figures = judged.iter().filter_map(|j| match &j.evidence {
+        Some(evidence @ (Evidence::Boundary(_) | Evidence::Rounding(_))) => Some(evidence.clone()),
+        _ => None,
+    });
+    let figures: Vec<Evidence> = figures.collect();
+    assert_eq!(figures.len(), 2);
+    let suite = Suite::embedded().unwrap();
+    let written = |wall_ms: f64| {
+        let mut cases = vec![of("E1/taylor", None, Verdict::Failed, wall_ms)];
+        cases.extend(figures.iter().map(|figure| of("S1", Some(figure.clone()), Verdict::Passed, wall_ms)));
+        let environment = Environment::here(1, HOSTILE.to_owned(), &suite, Vec::new());
+        let files = super::stress::files(&StressRun { judged: &cases, random: None, environment }).unwrap();
+        files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect::<Vec<_>>()
+    };
+    let (first, second) = (written(1.0), written(2.0));
+    assert_eq!(first.len(), 2 + 2 * figures.len());
+    for ((name, first), (other, second)) in first.iter().zip(&second) {
+        assert_eq!((name, without_times(first)), (other, without_times(second)));
+        let acts = first.contains("<script") || first.contains('\u{1b}');
+        assert!(!acts || Path::new(name).extension().is_some_and(|e| e == "json"), "{name}");
+    }
+    assert!(first[1].1.contains("1 of 3 cases that apply do not hold"));
+}
+
+#[test]
 fn junit_says_what_became_of_each_claim() {
     let (suite, judged) = judged();
     let (_, xml) = files(&suite, &judged).into_iter().find(|(name, _)| name == "junit.xml").unwrap();
@@ -120,7 +175,12 @@ fn junit_says_what_became_of_each_claim() {
 #[test]
 fn an_interrupted_or_refused_run_leaves_what_was_there() {
     let (suite, judged) = judged();
-    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    let run = Run {
+        suite: &suite,
+        judged: &judged,
+        environment: Environment::here(1, String::new(), &suite, vec![]),
+        points: &[],
+    };
     let place = tempfile::tempdir().unwrap();
     let strange = place.path().join("strange");
     std::fs::create_dir(&strange).unwrap();
@@ -144,7 +204,8 @@ fn an_interrupted_or_refused_run_leaves_what_was_there() {
 #[test]
 fn a_report_never_replaces_what_is_not_its_own() {
     let (suite, judged) = judged();
-    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    let environment = Environment::here(1, String::new(), &suite, vec![]);
+    let run = Run { suite: &suite, judged: &judged, environment, points: &[] };
     for foreign in ["notes.txt", "tables/mine.csv", "figures/deep/mine.svg", "mine", ".hidden"] {
         let place = tempfile::tempdir().unwrap();
         let report = place.path().join("report");
@@ -167,7 +228,8 @@ fn a_report_never_replaces_what_is_not_its_own() {
 #[test]
 fn an_empty_folder_is_filled() {
     let (suite, judged) = judged();
-    let run = Run { suite: &suite, judged: &judged, environment: Environment::here(1, String::new(), &suite, vec![]) };
+    let environment = Environment::here(1, String::new(), &suite, vec![]);
+    let run = Run { suite: &suite, judged: &judged, environment, points: &[] };
     let place = tempfile::tempdir().unwrap();
     folder::write(&run, place.path().join("empty").as_path()).unwrap();
     let empty = place.path().join("made by hand");

@@ -85,6 +85,26 @@ pub fn contour(level: f64, impacts: &[f64], crater_ratio: f64) -> Vec<Stretch> {
     stretches
 }
 
+/// A stretch of a line of equal error, with its error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// Size of the relative error.
+    pub level: f64,
+    /// (I, N), ascending in I.
+    pub points: Stretch,
+}
+
+/// The map for one k: the lines of every level of [`LEVELS`] over I from 0.01 to 1000, 120 points a decade, and more
+/// about I = k pi/4, where the lines are steep.
+pub fn lines(crater_ratio: f64) -> Vec<Line> {
+    let edge = crater_ratio * FRAC_PI_4;
+    let near = (4..=20).flat_map(|i| [-1.0, 1.0].map(|side| edge * (1.0 + side * 10f64.powf(f64::from(i) / -10.0))));
+    let mut impacts: Vec<f64> = (0..=600).map(|i| 10f64.powf(-2.0 + f64::from(i) / 120.0)).chain(near).collect();
+    impacts.sort_by(f64::total_cmp);
+    let of = |level| contour(level, &impacts, crater_ratio).into_iter().map(move |points| Line { level, points });
+    LEVELS.into_iter().flat_map(of).collect()
+}
+
 /// What a user should know of `scene` at `impact_speed` [m/s], one sentence each: Eq. 11-12 and 15 outside their
 /// range, S outside the range of its fit. Empty for scenes of stages and layers, which have no Eq. 11-12.
 pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {

@@ -15,6 +15,7 @@
 use csv::StringRecord;
 use thiserror::Error;
 
+use super::applicability::model_error;
 use super::parameter::Parameter;
 use super::sensitivity::{SensitivityError, Spread, by_closed_form};
 use super::table_text::{LineEnds, counted, line_of, shortened};
@@ -22,7 +23,7 @@ use crate::integrators::{ClosedForm, Detail, IntegrationError, Integrator};
 use crate::physics::groups::Groups;
 use crate::physics::nose::NoseShape;
 use crate::physics::units::number;
-use crate::physics::{Concrete, CraterStiffness, Criterion, Range, Resistance, ResolveError, Scene, semi_empirical};
+use crate::physics::{Concrete, CraterStiffness, Range, ResolveError, Scene, semi_empirical};
 
 /// The measured data that ship: file name and content.
 pub const SHIPPED: [(&str, &str); 5] = [
@@ -226,30 +227,50 @@ pub fn shipped() -> Result<Vec<Shot>, ExperimentError> {
 impl Shot {
     /// The scene of the shot: S of Eq. 14, k = 0.707 + h/d unless `crater_ratio` says otherwise, B = 1.
     pub fn scene(&self, crater_ratio: Option<f64>) -> Scene {
-        Scene {
-            title: None,
-            mass: self.mass,
-            resistance: Resistance::Concrete(Concrete {
-                diameter: self.diameter,
-                nose_factor: self.nose.factor(),
-                strength: self.strength,
-                density: self.density,
-                static_factor: semi_empirical::static_factor(self.strength),
-                inertia_factor: 1.0,
-                crater_ratio: crater_ratio.unwrap_or_else(|| self.nose.crater_ratio()),
-                crater_stiffness: CraterStiffness::Continuous,
-                layers: Vec::new(),
-            }),
-            thickness: None,
-            criterion: Criterion::FullDepth,
-            velocity: Some(self.velocity),
-        }
+        let concrete = Concrete {
+            diameter: self.diameter,
+            nose_factor: self.nose.factor(),
+            strength: self.strength,
+            density: self.density,
+            static_factor: semi_empirical::static_factor(self.strength),
+            inertia_factor: 1.0,
+            crater_ratio: crater_ratio.unwrap_or_else(|| self.nose.crater_ratio()),
+            crater_stiffness: CraterStiffness::Continuous,
+            layers: Vec::new(),
+        };
+        Scene { velocity: Some(self.velocity), ..Scene::of_concrete(self.mass, concrete) }
     }
 
     /// Whether the shot lies in the range to which S was fitted.
     pub fn is_in_range_of_fit(&self) -> bool {
         semi_empirical::static_factor_validity(self.strength).valid && self.diameter < 0.0762 && self.velocity < 1200.0
     }
+}
+
+/// A shot on the map of Eq. 11-12.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MarkedScene {
+    /// Name of its set.
+    pub set: String,
+    /// Impact function I.
+    pub impact: f64,
+    /// Geometry function N.
+    pub geometry: f64,
+    /// Crater depth in diameters, by its own nose.
+    pub crater_ratio: f64,
+    /// Error of Eq. 11-12 there, relative to the depth of the equation of motion.
+    pub error: f64,
+}
+
+/// Where `shots` stand on the map; those without drag, whose N is infinite, are left out.
+pub fn marked(shots: &[Shot]) -> Vec<MarkedScene> {
+    let place = |shot: &Shot| {
+        let groups = Groups::of(&shot.scene(None), shot.velocity)?;
+        let (impact, geometry, crater_ratio) = (groups.impact, groups.geometry?, shot.nose.crater_ratio());
+        let error = model_error(impact, Some(geometry), crater_ratio);
+        Some(MarkedScene { set: shot.set.clone(), impact, geometry, crater_ratio, error })
+    };
+    shots.iter().filter_map(place).collect()
 }
 
 /// A shot beside its prediction.

@@ -25,7 +25,7 @@ use super::quantity::Quantity;
 use super::random::Random;
 use crate::integrators::{ClosedForm, Detail, Energy, Flight, IntegrationError, Integrator, MethodName, Taylor};
 use crate::physics::reference::{self, Source};
-use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scalar, Scene, groups};
+use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Resistance, Scalar, Scene, groups};
 
 /// Largest error in units of round-off times max(1, condition number).
 ///
@@ -88,14 +88,7 @@ fn draw(random: &mut Random) -> Scene {
         let stiffness = static_force(&concrete) / concrete.crater_depth();
         concrete.crater_stiffness = CraterStiffness::Given(stiffness * random.log_uniform(1e-2, 1e2));
     }
-    Scene {
-        title: None,
-        mass,
-        resistance: Resistance::Concrete(concrete),
-        thickness,
-        criterion: Criterion::FullDepth,
-        velocity: Some(velocity),
-    }
+    Scene { thickness, velocity: Some(velocity), ..Scene::of_concrete(mass, concrete) }
 }
 
 fn static_force(concrete: &Concrete) -> f64 {

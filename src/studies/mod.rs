@@ -20,6 +20,7 @@ pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
+pub mod relations;
 pub mod rounding;
 pub mod sensitivity;
 pub mod stability;

@@ -7,7 +7,7 @@ use super::random::Random;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
 use crate::physics::closed_form::{CraterAndTunnel, solve_crater_and_tunnel};
 use crate::physics::reference::{self, Conditions, ExactFlight, ReferenceError, Source};
-use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, ResolveError, Scene, groups};
+use crate::physics::{Concrete, CraterStiffness, ResolveError, Scene, groups};
 
 /// Draws scenes that cover the groups log-uniformly.
 ///
@@ -50,14 +50,7 @@ impl Generator {
             let about = area * concrete.static_factor * concrete.strength / (concrete.crater_ratio * concrete.diameter);
             concrete.crater_stiffness = CraterStiffness::Given(about * random.log_uniform(0.25, 4.0));
         }
-        Scene {
-            title: None,
-            mass,
-            resistance: Resistance::Concrete(concrete),
-            thickness,
-            criterion: Criterion::FullDepth,
-            velocity: Some(velocity),
-        }
+        Scene { thickness, velocity: Some(velocity), ..Scene::of_concrete(mass, concrete) }
     }
 }
 

@@ -10,7 +10,7 @@ use super::error::signed_error;
 use super::quantity::Quantity;
 use crate::integrators::central_difference::{Boundaries, CentralDifference, Summation, VelocityAt};
 use crate::integrators::{Detail, Energy, Flight, IntegrationError, MethodName, Taylor};
-use crate::physics::{Problem, Scalar};
+use crate::physics::{Problem, Scalar, State};
 
 /// Digits that one kernel loses in one number type, per quantity.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,50 +78,97 @@ fn errors(found: &Flight, exact: &Flight<TwoFloat>, speed: f64) -> Vec<(Quantity
         .collect()
 }
 
-/// Rounding of the central difference after so many steps.
+/// Errors of the depth by the central difference after so many steps, relative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
     /// Steps to the end of the flight.
     pub steps: f64,
     /// Time step [s].
     pub dt: f64,
-    /// Truncation error of the depth, in double-double: what the floor rises against.
-    pub truncation: f64,
-    /// Rounding error of the depth with plain sums.
-    pub plain: f64,
-    /// The same with compensated sums.
-    pub compensated: f64,
+    /// Truncation error of the depth, in double-double: what the floor rises against. `None` beyond the steps for which
+    /// double-double is fast enough.
+    pub truncation: Option<f64>,
+    /// In f64 with plain sums.
+    pub plain: Errors,
+    /// In f64 with compensated sums.
+    pub compensated: Errors,
+    /// In f32 with plain sums, on the inputs as f32 rounds them.
+    pub single: Errors,
+    /// In f32 with compensated sums.
+    pub single_compensated: Errors,
+}
+
+/// Relative errors of one depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// Against the same steps in double-double: rounding alone; `None` where those were not taken.
+    pub rounding: Option<f64>,
+    /// Against the exact depth: truncation and rounding.
+    pub total: f64,
 }
 
 /// Error of the depth of `problem` against the number of steps, from 2^`from` to 2^`to`, centred and landed: truncation
-/// (double-double against the exact depth) falls, rounding (f64 against double-double) rises.
+/// (double-double against the exact depth) falls, rounding (f64 and f32 against double-double) rises.
+///
+/// Beyond 2^`split` steps double-double is left out: it takes most of the time, and its truncation goes on as it began.
 ///
 /// # Errors
 /// [`IntegrationError`] of a flight.
-pub fn floor(problem: &Problem, from: u32, to: u32) -> Result<Vec<Floor>, IntegrationError> {
-    let exact = Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end;
-    let scheme = |dt: f64, summation| CentralDifference {
+pub fn floor(problem: &Problem, from: u32, split: u32, to: u32) -> Result<Vec<Floor>, IntegrationError> {
+    let scheme = |dt, summation| CentralDifference {
         summation,
         ..CentralDifference::uniform(dt, VelocityAt::Centred, Boundaries::Landed)
     };
+    let single = problem.cast::<f32>();
+    let (exact, wide) = (exact_end(problem)?, problem.cast::<TwoFloat>());
+    let (single_exact, single_wide) = (exact_end(&single.cast())?, single.cast::<TwoFloat>());
     (from..=to)
         .map(|power| {
             let steps = 2f64.powi(power.cast_signed());
             let dt = exact.time.value() / steps;
-            let fine = scheme(dt, Summation::Plain).fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end.depth;
-            let off = |value: TwoFloat| ((value - fine).value() / fine.value()).abs();
-            let coarse = |summation| -> Result<f64, IntegrationError> {
-                Ok(off(TwoFloat::from(scheme(dt, summation).fly_in(problem, Detail::End)?.end.depth)))
+            let single_dt = f64::from(dt as f32);
+            let by_double_double = |problem: &Problem<TwoFloat>, dt| -> Result<Option<TwoFloat>, IntegrationError> {
+                if power > split {
+                    return Ok(None);
+                }
+                Ok(Some(scheme(dt, Summation::Plain).fly_in(problem, Detail::End)?.end.depth))
+            };
+            let (fine, single_fine) = (by_double_double(&wide, dt)?, by_double_double(&single_wide, single_dt)?);
+            let in_double = |summation| -> Result<Errors, IntegrationError> {
+                let found = scheme(dt, summation).fly_in(problem, Detail::End)?.end.depth;
+                Ok(Errors::of(TwoFloat::from(found), fine, exact.depth))
+            };
+            let in_single = |summation| -> Result<Errors, IntegrationError> {
+                let found = scheme(single_dt, summation).fly_in(&single, Detail::End)?.end.depth;
+                Ok(Errors::of(TwoFloat::from(f64::from(found)), single_fine, single_exact.depth))
             };
             Ok(Floor {
                 steps,
                 dt,
-                truncation: off(exact.depth),
-                plain: coarse(Summation::Plain)?,
-                compensated: coarse(Summation::Compensated)?,
+                truncation: fine.map(|fine| off(fine, exact.depth)),
+                plain: in_double(Summation::Plain)?,
+                compensated: in_double(Summation::Compensated)?,
+                single: in_single(Summation::Plain)?,
+                single_compensated: in_single(Summation::Compensated)?,
             })
         })
         .collect()
+}
+
+impl Errors {
+    fn of(found: TwoFloat, fine: Option<TwoFloat>, exact: TwoFloat) -> Self {
+        Self { rounding: fine.map(|fine| off(found, fine)), total: off(found, exact) }
+    }
+}
+
+/// Relative distance of `found` from `right`.
+fn off(found: TwoFloat, right: TwoFloat) -> f64 {
+    ((found - right).value() / right.value()).abs()
+}
+
+/// The end of `problem` in double-double.
+fn exact_end(problem: &Problem) -> Result<State<TwoFloat>, IntegrationError> {
+    Ok(Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end)
 }
 
 /// Slope of `ln error` over `ln steps` by least squares; errors of zero are left out. NaN with fewer than two points.

@@ -374,15 +374,25 @@ pub fn by_taylor(scene: &Scene) -> Result<Sensitivities, SensitivityError> {
     by_flight(scene, |problem| Ok(Taylor::default().fly_in(&with_every_term(problem), Detail::End)?.end))
 }
 
-/// `problem` with a value of 1e-200 for each coefficient that is zero and has a derivative.
+/// `problem` with a small value, 1e-30 of what would be felt, for each coefficient that is zero and has a derivative.
 ///
-/// The series leaves out the terms of a stage that are zero by value, and would lose their derivatives with them.
+/// The series leaves out the terms of a stage that are zero by value, and would lose their derivatives with them. Much
+/// smaller values would set its unit of time, where nothing else acts (an air gap), beyond the squares of the numbers.
 fn with_every_term(problem: &Problem<Dual64>) -> Problem<Dual64> {
+    const UNFELT: f64 = 1e-30;
     let mut problem = problem.clone();
+    let places = problem.stages.iter().map(|law| law.end.re).chain([problem.exit_depth.re]);
+    let length = places.filter(|place| place.is_finite()).fold(0.0, f64::max);
+    let length = if length > 0.0 { length } else { 1.0 };
+    let (mass, rate) = (problem.mass.re, problem.impact_speed.re / length);
     for law in &mut problem.stages {
-        for coefficient in [&mut law.stiffness, &mut law.viscosity, &mut law.drag] {
+        for (coefficient, felt) in [
+            (&mut law.stiffness, mass * rate * rate),
+            (&mut law.viscosity, mass * rate),
+            (&mut law.drag, mass / length),
+        ] {
             if coefficient.re == 0.0 && coefficient.eps != 0.0 {
-                coefficient.re = 1e-200;
+                coefficient.re = UNFELT * felt;
             }
         }
     }

@@ -416,6 +416,9 @@ pub fn read_points(text: &str) -> Result<Vec<(f64, f64)>, PointsError> {
     if points.is_empty() { Err(PointsError::Empty) } else { Ok(points) }
 }
 
+/// What [`explanation`] explains.
+pub const WHY: &str = "Why the simulation lies above Eq. 15";
+
 /// Why the curves along H/d differ, in sentences with the numbers of this sweep; for the terminal and the report.
 ///
 /// Empty for a sweep along anything else.
@@ -441,7 +444,7 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
         .filter_map(|row| Some(over(row, Some(row.energy_ndrc?)).abs()))
         .fold(0.0, f64::max);
     format!(
-        "Why the simulation lies above Eq. 15. The simulation counts a slab as perforated when the projectile has come \
+        "{WHY}. The simulation counts a slab as perforated when the projectile has come \
          through the whole thickness, x = H. Eq. 15 is Eq. 11-12 with k = 2 and the ACE/NDRC relation, by which a \
          penetration x_p < H is enough: the rest of the slab fails by itself. Against unrounded Eq. 15 the simulation \
          stands {} and {}; the same equation of motion with the criterion `ndrc`, exit at x_p(H), differs by at most \

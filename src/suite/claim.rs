@@ -10,8 +10,13 @@ use serde::Deserialize;
 
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::MethodName;
+use crate::studies::applicability::Line;
+use crate::studies::experiments::{Comparison, MarkedScene};
 use crate::studies::order::OrderFit;
 use crate::studies::quantity::Quantity;
+use crate::studies::rounding::Floor;
+use crate::studies::stability::BoundaryPoint;
+use crate::studies::sweep::{Plan, Row};
 
 use super::verdict::Verdict;
 
@@ -211,6 +216,41 @@ pub enum Check {
     SelfConvergence {},
     /// Events in time order, each at its place, none missing or twice; number of violations.
     EventOrder {},
+    /// Critical velocity and energies of every point of a sweep of H/d against the closed form of a scene built for that
+    /// point alone; worst relative difference.
+    Sweep {
+        /// Smallest H/d.
+        from: f64,
+        /// Largest H/d.
+        to: f64,
+        /// How many, evenly.
+        points: usize,
+    },
+    /// Depth flown on the lines of equal error of Eq. 11-12: worst relative distance of its error from that of the line.
+    Map {
+        /// How many places of each line.
+        points: usize,
+    },
+    /// Median of predicted over measured depth of each set of the shipped data, shallow shots apart: worst distance
+    /// from 1.
+    MeasuredDepth {},
+    /// Elasticities of every quantity to every number of the scene, by the method against the closed form in dual
+    /// numbers: worst difference, relative to those above 1.
+    Sensitivities {},
+    /// Central difference: worst relative distance of the measured boundary of stability in w dt from the theoretical
+    /// one over the drag group Q V dt/M.
+    StabilityMap {
+        /// How many drag groups, for each velocity rule.
+        points: usize,
+    },
+    /// Central difference: rounding error of the depth with compensated sums over that with plain ones, after
+    /// 2^`from` to 2^`to` steps; nothing unless truncation falls at second order.
+    RoundingFloor {
+        /// Power of two of the fewest steps.
+        from: u32,
+        /// Power of two of the most steps.
+        to: u32,
+    },
     /// Answers of another program; difference over the tolerance.
     Peer {
         /// Name of the recorded peer, or `user` for the one given on the command line.
@@ -276,6 +316,7 @@ impl Check {
             Self::Pair { .. } | Self::Peer { .. } => "tolerance",
             Self::SelfConvergence {} => "uncertainty",
             Self::Margin { .. } => "error bars",
+            Self::RoundingFloor { .. } => "compensated/plain",
             _ => "relative",
         }
     }
@@ -466,6 +507,28 @@ pub enum Evidence {
         /// Points.
         points: Vec<(f64, f64)>,
     },
+    /// A sweep of H/d.
+    Sweep {
+        /// Scene and axis.
+        plan: Box<Plan>,
+        /// Its points.
+        rows: Vec<Row>,
+    },
+    /// Measured shots beside their predictions.
+    Depths(Vec<Comparison>),
+    /// The map of Eq. 11-12 for one k.
+    Map {
+        /// Crater depth in diameters.
+        crater_ratio: f64,
+        /// Lines of equal error.
+        lines: Vec<Line>,
+        /// Measured shots on it.
+        scenes: Vec<MarkedScene>,
+    },
+    /// The boundary of stability.
+    Boundary(Vec<BoundaryPoint>),
+    /// Errors against the number of steps.
+    Rounding(Vec<Floor>),
 }
 
 /// A claim and what became of it.

@@ -6,8 +6,10 @@ use super::{Context, build};
 use crate::integrators::Detail;
 use crate::integrators::method::MethodOptions;
 use crate::physics::nose::NoseShape;
-use crate::physics::semi_empirical::{depth_ratio, eq15_printed, eq15_unrounded, jumps, model_difference};
-use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, Scene, groups};
+use crate::physics::semi_empirical::{
+    NDRC_END, NDRC_FIRST_BRANCH_END, depth_ratio, eq15_printed, eq15_unrounded, jumps, model_difference,
+};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Scene, groups};
 use crate::studies::critical_velocity;
 use crate::studies::order::{StepError, fit};
 use crate::studies::random::Random;
@@ -31,19 +33,11 @@ fn scene(geometry: Option<f64>) -> (Scene, Concrete) {
     if let Some(n) = geometry {
         concrete.density = groups::density_for(n, MASS, &concrete);
     }
-    let scene = Scene {
-        title: None,
-        mass: MASS,
-        resistance: Resistance::Concrete(concrete.clone()),
-        thickness: None,
-        criterion: Criterion::FullDepth,
-        velocity: None,
-    };
-    (scene, concrete)
+    (Scene::of_concrete(MASS, concrete.clone()), concrete)
 }
 
 /// X/d by the claim's method at impact function `impact`.
-fn flown_depth_ratio(claim: &Claim, geometry: Option<f64>, impact: f64) -> Result<f64, NotMeasured> {
+pub(super) fn flown_depth_ratio(claim: &Claim, geometry: Option<f64>, impact: f64) -> Result<f64, NotMeasured> {
     let (scene, concrete) = scene(geometry);
     let method = build(claim.method.unwrap_or_default(), &MethodOptions::default())?;
     let speed = groups::impact_speed_for(impact, MASS, &concrete);
@@ -206,20 +200,20 @@ pub(super) fn eq15_jump(form: Eq15Form, at: f64, stated: f64) -> Result<Measurem
     Ok(Measurement::new((jump - stated).abs()).remark(format!("jump {jump:+.9} S at H/d = {at}")))
 }
 
-/// V_c with the NDRC criterion, Q = 0 and continuous c, against unrounded Eq. 15 for H/d in (0, 18.06].
+/// V_c with the NDRC criterion, Q = 0 and continuous c, against unrounded Eq. 15 for H/d in (0, 18.06], the ends of the
+/// branches and their neighbours among them.
 pub(super) fn ndrc_criterion(claim: &Claim, context: Context<'_>, points: usize) -> Result<Measurement, NotMeasured> {
     let (mut scene, concrete) = scene(None);
     scene.criterion = Criterion::Ndrc;
     let method = build(claim.method.unwrap_or_default(), &MethodOptions::default())?;
     let mut random = Random::for_part(context.seed, &claim.id);
+    let joints = [2.994, NDRC_FIRST_BRANCH_END, 3.0, 3.8]
+        .into_iter()
+        .flat_map(|joint: f64| [joint.next_down(), joint, joint.next_up()])
+        .chain([1e-3, NDRC_END]);
+    let drawn = std::iter::repeat_with(|| random.log_uniform(1e-2, NDRC_END));
     let mut worst = (0.0_f64, 0.0);
-    for index in 0..points {
-        let ratio = match index {
-            0 => 3.8,
-            1 => 18.06,
-            2 => 1e-3,
-            _ => random.log_uniform(1e-2, 18.06),
-        };
+    for ratio in joints.chain(drawn).take(points) {
         scene.thickness = Some(ratio * concrete.diameter);
         let found = critical_velocity::of_scene(&scene, method.integrator()).map_err(NotMeasured::broken)?;
         // From the thickness that the scene holds, which rounds H/d.

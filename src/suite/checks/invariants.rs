@@ -6,6 +6,7 @@ use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Stage, Stages, Target};
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::quantity::Quantity;
+use crate::studies::relations::{Units, in_units, way_back};
 
 /// Kinetic energy lost against work done, at every row of the trajectory; worst residual over M V0²/2.
 ///
@@ -77,39 +78,13 @@ fn work(stage: &Stage, mass: f64, depth: f64, way: f64, speed: f64) -> f64 {
     total
 }
 
-/// Flies back from the end of a perforation to the face: `F` is even in V for r = 0, so with y = x_end - x the way
-/// back is a flight under -F that must leave at y = x_end with V0.
+/// Flies back from the end of a perforation to the face, which must be left with V0 after the same time.
 pub(super) fn time_reversal(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
     let problem = &subject.problem;
-    if problem.stages.iter().any(|s| s.viscosity != 0.0) {
-        return Err(NotMeasured::skip("a viscous force is not even in V"));
-    }
     let method = subject.method(None)?;
     let there = subject.fly(&method, Detail::Events)?;
-    if there.outcome.is_stop() || there.end.velocity <= 0.0 {
-        return Err(NotMeasured::skip("from rest there is no way back"));
-    }
-    let far = there.end.depth;
-    let mut stages: Stages = Stages::new();
-    for index in (0..=there.stage).rev() {
-        let law = problem.stages[index];
-        stages.push(Stage {
-            // -(p + s (far - y) + q U²) in the reversed coordinate y.
-            static_force: -(law.static_force + law.stiffness * far),
-            stiffness: law.stiffness,
-            viscosity: 0.0,
-            drag: -law.drag,
-            end: if index == 0 { f64::INFINITY } else { far - problem.start_of(index) },
-        });
-    }
-    let back = Problem {
-        mass: problem.mass,
-        impact_speed: there.end.velocity,
-        exit_depth: far,
-        stages,
-        crater: None,
-        target: Target::Stages,
-    };
+    let back = way_back(problem, &there)
+        .ok_or_else(|| NotMeasured::skip("from rest, or through viscosity, there is no way back"))?;
     let again = fly(&method, &back, Detail::End)?;
     let speed = (again.end.velocity / problem.impact_speed - 1.0).abs();
     let time = (again.end.time / there.end.time - 1.0).abs();
@@ -117,38 +92,12 @@ pub(super) fn time_reversal(subject: &Subject<'_>) -> Result<Measurement, NotMea
         .remark(format!("back at the face with V0 (1 {:+.1e})", again.end.velocity / problem.impact_speed - 1.0)))
 }
 
-/// Factors of length, mass and time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Factors {
-    pub(super) length: f64,
-    pub(super) mass: f64,
-    pub(super) time: f64,
-}
-
 /// The problem in other units of length, mass and time must fly the same.
-pub(super) fn similarity(subject: &Subject<'_>, factors: Factors) -> Result<Measurement, NotMeasured> {
-    let Factors { length, mass, time } = factors;
-    let problem = &subject.problem;
-    let force = mass * length / (time * time);
-    let scaled = Problem {
-        mass: problem.mass * mass,
-        impact_speed: problem.impact_speed * length / time,
-        exit_depth: problem.exit_depth * length,
-        stages: problem
-            .stages
-            .iter()
-            .map(|s| Stage {
-                static_force: s.static_force * force,
-                stiffness: s.stiffness * force / length,
-                viscosity: s.viscosity * mass / time,
-                drag: s.drag * mass / length,
-                end: s.end * length,
-            })
-            .collect(),
-        ..problem.clone()
-    };
+pub(super) fn similarity(subject: &Subject<'_>, units: Units) -> Result<Measurement, NotMeasured> {
+    let Units { length, time, .. } = units;
     let method = subject.method(None)?;
-    let (plain, scaled) = (subject.fly(&method, Detail::Events)?, fly(&method, &scaled, Detail::Events)?);
+    let plain = subject.fly(&method, Detail::Events)?;
+    let scaled = fly(&method, &in_units(&subject.problem, units), Detail::Events)?;
     let back = Flight {
         end: crate::physics::State {
             time: scaled.end.time / time,

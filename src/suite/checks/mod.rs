@@ -1,12 +1,13 @@
 //! How each kind of claim is measured: one function a kind, grouped by what it needs.
 
 mod agreement;
+mod applications;
 mod formulas;
 mod invariants;
 mod manufactured;
 mod orders;
 mod peers;
-mod scheme;
+pub(super) mod scheme;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -18,6 +19,7 @@ use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Resistance, Scene};
 use crate::studies::convergence::{QuantityStudy, Yardstick};
 use crate::studies::quantity::Quantity;
+use crate::studies::relations::Units;
 
 pub use peers::PeerAnswers;
 
@@ -87,10 +89,16 @@ pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMe
         Check::EnergyBalance {} => on(invariants::energy_balance),
         Check::TimeReversal {} => on(invariants::time_reversal),
         Check::Similarity { length, mass, time } => {
-            invariants::similarity(&Subject::of(claim, context)?, invariants::Factors { length, mass, time })
+            invariants::similarity(&Subject::of(claim, context)?, Units { length, mass, time })
         }
         Check::Split { pieces } => invariants::split(&Subject::of(claim, context)?, pieces),
         Check::Manufactured { path, order } => manufactured::order(claim, context, path, order),
+        Check::Sweep { from, to, points } => applications::sweep(&Subject::of(claim, context)?, [from, to], points),
+        Check::Map { points } => applications::map(claim, points),
+        Check::MeasuredDepth {} => applications::measured_depth(claim),
+        Check::Sensitivities {} => on(applications::sensitivities),
+        Check::StabilityMap { points } => scheme::stability_map(points),
+        Check::RoundingFloor { from, to } => scheme::rounding_floor(&Subject::of(claim, context)?.problem, from, to),
         Check::Peer { ref name, tolerance } => peers::agreement(&Subject::of(claim, context)?, name, tolerance),
     }
 }

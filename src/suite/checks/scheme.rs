@@ -1,6 +1,6 @@
 //! What the central difference must do at any step, and its error constants (theory section 5).
 
-use super::super::claim::{Measurement, NotMeasured};
+use super::super::claim::{Evidence, Measurement, NotMeasured};
 use super::super::verdict::Verdict;
 use super::Subject;
 use crate::integrators::central_difference::stability_limit as stability_limit_of;
@@ -8,6 +8,7 @@ use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Velo
 use crate::physics::{Problem, Stage, State};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
+use crate::studies::{rounding, stability};
 
 /// Worst distance from the exact discrete solution, over its amplitude.
 ///
@@ -233,4 +234,41 @@ pub(super) fn stability_limit(subject: &Subject<'_>) -> Result<Measurement, NotM
     let stated = w * stability_limit_of(&crater, free.mass, free.impact_speed, subject.claim.velocity);
     let off = worst_of([limit, stated].into_iter().map(|limit| (limit - 2.0).abs() / 2.0));
     Ok(Measurement::new(off).remark(format!("growth sets in at w dt = {limit:.9}")))
+}
+
+/// The measured boundary of stability against theory, for every velocity rule over the drag group.
+pub(in crate::suite) fn stability_map(points: usize) -> Result<Measurement, NotMeasured> {
+    let boundary = stability::map(points).map_err(NotMeasured::broken)?;
+    let worst = worst_of(boundary.iter().map(|p| (p.measured / p.theory - 1.0).abs()));
+    Ok(Measurement::new(worst)
+        .remark(format!("{} points of the boundary", boundary.len()))
+        .evidence(Evidence::Boundary(boundary)))
+}
+
+/// What compensated sums leave of the rounding of plain ones, centred and landed; nothing unless truncation falls at
+/// second order. Beyond 2^`to` steps the error alone is followed, to where rounding outweighs it.
+pub(in crate::suite) fn rounding_floor(problem: &Problem, from: u32, to: u32) -> Result<Measurement, NotMeasured> {
+    /// Steps at which the truncation of second order has sunk to the rounding of f64.
+    const FLOOR: u32 = 22;
+    let all = rounding::floor(problem, from, to, to.max(FLOOR)).map_err(NotMeasured::broken)?;
+    let rows: Vec<_> = all
+        .iter()
+        .filter_map(|row| Some((row.steps, row.truncation?, row.plain.rounding?, row.compensated.rounding?)))
+        .collect();
+    let last = rows.last().ok_or_else(|| NotMeasured::broken("no row"))?;
+    let slope = |pick: fn(&(f64, f64, f64, f64)) -> f64| rounding::slope(rows.iter().map(|row| (row.0, pick(row))));
+    let truncation = slope(|row| row.1);
+    let remark = format!(
+        "slopes over the steps: truncation {truncation:.2}, plain rounding {:.2}, compensated {:.2}; at {} steps {:.1e} and {:.1e}",
+        slope(|row| row.2),
+        slope(|row| row.3),
+        last.0,
+        last.2,
+        last.3,
+    );
+    // The largest over the last rows: a single one may hit the exact value.
+    let tail = |pick: fn(&(f64, f64, f64, f64)) -> f64| rows.iter().rev().take(4).map(pick).fold(0.0, f64::max);
+    let gain = tail(|row| row.3) / tail(|row| row.2);
+    let value = if (truncation + 2.0).abs() < 0.05 { gain } else { f64::NAN };
+    Ok(Measurement::new(value).remark(remark).evidence(Evidence::Rounding(all)))
 }

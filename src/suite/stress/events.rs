@@ -10,7 +10,8 @@ use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
 };
 use crate::physics::scene_file::SHIPPED;
-use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage, Stages, Target};
+use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
+use crate::studies::relations::way_back;
 use crate::suite::claim::{Measurement, NotMeasured};
 
 const NONE: &[MethodName] = &[];
@@ -577,28 +578,7 @@ fn back_again(subject: Subject) -> Result<Measurement, NotMeasured> {
     let drag = subject.method() != MethodName::ClosedForm;
     let problem = resolve(&slab(drag), 600.0)?;
     let there = subject.fly(&problem)?;
-    let far = there.end.depth;
-    // In y = H - x the force has the other sign, and drag adds energy.
-    let stages: Stages = (0..problem.stages.len())
-        .rev()
-        .map(|index| {
-            let law = problem.stages[index];
-            Stage {
-                static_force: -(law.static_force + law.stiffness * far),
-                drag: -law.drag,
-                end: if index == 0 { f64::INFINITY } else { far - problem.start_of(index) },
-                ..law
-            }
-        })
-        .collect();
-    let back = Problem {
-        impact_speed: there.end.velocity,
-        exit_depth: far,
-        stages,
-        crater: None,
-        target: Target::Stages,
-        ..problem.clone()
-    };
+    let back = way_back(&problem, &there).ok_or_else(|| NotMeasured::broken("the flight does not leave"))?;
     let again = subject.fly(&back)?;
     let places: BTreeSet<_> = again.events.iter().map(|event| event.kind).collect();
     if places != BTreeSet::from([EventKind::StageEnd(0), EventKind::Exit]) {

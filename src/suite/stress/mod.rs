@@ -15,13 +15,11 @@ use std::time::Instant;
 use rayon::prelude::*;
 use twofloat::TwoFloat;
 
-use super::claim::{Measurement, NotMeasured};
+use super::claim::{Evidence, Measurement, NotMeasured};
 use super::verdict::{Counts, Verdict};
 use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT};
 use crate::integrators::{Detail, Energy, Flight, Taylor};
-use crate::physics::{
-    Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, Stage, Stages, Target,
-};
+use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Scene, Stage, Stages, Target};
 
 /// Adaptive methods and exact solutions: what can be asked for the right outcome.
 const ALL_EXACT: &[MethodName] = &[
@@ -85,6 +83,8 @@ pub struct JudgedCase {
     pub reason: &'static str,
     /// What was seen, or why it was skipped or failed.
     pub remark: String,
+    /// Data for the figures.
+    pub evidence: Option<Evidence>,
     /// Time spent [ms].
     pub wall_ms: f64,
 }
@@ -124,13 +124,13 @@ fn judge(case: &Case, subject: Subject) -> JudgedCase {
         Some(method) => Err(NotMeasured::skip(format!("this build leaves out {method}"))),
         None => (case.measure)(subject),
     };
-    let (verdict, measured, remark) = match result {
+    let (verdict, measured, remark, evidence) = match result {
         Ok(found) => {
             let verdict = found.verdict.unwrap_or_else(|| Verdict::of(found.value, case.limit));
-            (verdict, Some(found.value).filter(|v| v.is_finite()), found.remark)
+            (verdict, Some(found.value).filter(|v| v.is_finite()), found.remark, found.evidence)
         }
-        Err(NotMeasured::NotApplicable(reason)) => (Verdict::Skipped, None, reason),
-        Err(NotMeasured::Broken(reason)) => (Verdict::Failed, None, reason),
+        Err(NotMeasured::NotApplicable(reason)) => (Verdict::Skipped, None, reason, None),
+        Err(NotMeasured::Broken(reason)) => (Verdict::Failed, None, reason, None),
     };
     let id = match subject.method {
         Some(method) => format!("{}/{method}", case.id),
@@ -146,6 +146,7 @@ fn judge(case: &Case, subject: Subject) -> JudgedCase {
         unit: case.unit,
         reason: case.reason,
         remark,
+        evidence,
         wall_ms: started.elapsed().as_secs_f64() * 1e3,
     }
 }
@@ -247,24 +248,18 @@ fn is_right(outcome: Outcome, margin: f64) -> bool {
 /// The scene of the paper's size on which other programs' critical velocity was seen to be wrong: 0.9 kg, 26.9 mm,
 /// 36 MPa, S 12, k 2, H 0.30 m; an ogive of N* 0.106 in 2370 kg/m³, or no drag.
 fn slab(drag: bool) -> Scene {
-    Scene {
-        title: None,
-        mass: 0.9,
-        resistance: Resistance::Concrete(Concrete {
-            diameter: 0.0269,
-            nose_factor: 0.106,
-            strength: 36e6,
-            density: if drag { 2370.0 } else { 0.0 },
-            static_factor: 12.0,
-            inertia_factor: 1.0,
-            crater_ratio: 2.0,
-            crater_stiffness: CraterStiffness::Continuous,
-            layers: Vec::new(),
-        }),
-        thickness: Some(0.30),
-        criterion: Criterion::FullDepth,
-        velocity: Some(400.0),
-    }
+    let concrete = Concrete {
+        diameter: 0.0269,
+        nose_factor: 0.106,
+        strength: 36e6,
+        density: if drag { 2370.0 } else { 0.0 },
+        static_factor: 12.0,
+        inertia_factor: 1.0,
+        crater_ratio: 2.0,
+        crater_stiffness: CraterStiffness::Continuous,
+        layers: Vec::new(),
+    };
+    Scene { thickness: Some(0.30), velocity: Some(400.0), ..Scene::of_concrete(0.9, concrete) }
 }
 
 fn resolve(scene: &Scene, speed: f64) -> Result<Problem, NotMeasured> {

@@ -12,6 +12,7 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 use crate::studies::random_scenes::closed_form_errors;
 use crate::studies::{Path, extreme_scenes, formal_order, rounding, stability};
+use crate::suite::checks::scheme;
 use crate::suite::claim::{Evidence, Measurement, NotMeasured};
 
 const NONE: &[MethodName] = &[];
@@ -192,14 +193,7 @@ fn growth(_: Subject) -> Result<Measurement, NotMeasured> {
 }
 
 fn stability_map(_: Subject) -> Result<Measurement, NotMeasured> {
-    let points = stability::map(12).map_err(NotMeasured::broken)?;
-    let worst = points.iter().fold(0.0, |worst, p| worse(worst, (p.measured / p.theory - 1.0).abs()));
-    let lagged = points.iter().filter(|p| p.velocity == VelocityAt::LaggedHalfStep);
-    Ok(Measurement::new(worst).evidence(Evidence::Series {
-        abscissa: "Q V dt/M",
-        ordinate: "w dt at the onset of growth, lagged",
-        points: lagged.map(|p| (p.drag_group, p.measured)).collect(),
-    }))
+    scheme::stability_map(12)
 }
 
 fn limits_are_told(_: Subject) -> Result<Measurement, NotMeasured> {
@@ -277,28 +271,7 @@ fn tolerance_sweep(subject: Subject) -> Result<Measurement, NotMeasured> {
 }
 
 fn floor(_: Subject) -> Result<Measurement, NotMeasured> {
-    let problem = resolve(&Scene { thickness: None, ..slab(true) }, 400.0)?;
-    let rows = rounding::floor(&problem, 8, 17).map_err(NotMeasured::broken)?;
-    let last = rows.last().ok_or_else(|| NotMeasured::broken("no row"))?;
-    let slope = |pick: fn(&rounding::Floor) -> f64| rounding::slope(rows.iter().map(|row| (row.steps, pick(row))));
-    let truncation = slope(|row| row.truncation);
-    let remark = format!(
-        "slopes over the steps: truncation {truncation:.2}, plain rounding {:.2}, compensated {:.2}; at {} steps {:.1e} and {:.1e}",
-        slope(|row| row.plain),
-        slope(|row| row.compensated),
-        last.steps,
-        last.plain,
-        last.compensated,
-    );
-    // The largest over the last rows: a single one may hit the exact value.
-    let tail = |pick: fn(&rounding::Floor) -> f64| rows.iter().rev().take(4).map(pick).fold(0.0, f64::max);
-    let gain = tail(|row| row.compensated) / tail(|row| row.plain);
-    let value = if (truncation + 2.0).abs() < 0.05 { gain } else { f64::NAN };
-    Ok(Measurement::new(value).remark(remark).evidence(Evidence::Series {
-        abscissa: "steps",
-        ordinate: "rounding error of the depth, plain sums",
-        points: rows.iter().map(|row| (row.steps, row.plain)).collect(),
-    }))
+    scheme::rounding_floor(&resolve(&Scene { thickness: None, ..slab(true) }, 400.0)?, 8, 17)
 }
 
 /// Fitted order of `quantity` over the steps `sizes`.
