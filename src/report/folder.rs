@@ -105,12 +105,15 @@ pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
     write_files(files(run).map_err(failed)?, folder)
 }
 
-/// Writes `files`, a path in the folder and bytes each, to `folder`. `report.json` must be among them.
+/// Writes `files`, a path in the folder and bytes each, to `folder`, and their list. `report.json` must be among them.
 ///
 /// # Errors
 /// [`FolderError`]; the old report then stands untouched.
-pub fn write_files(files: Vec<(String, Vec<u8>)>, folder: &Path) -> Result<(), FolderError> {
+pub fn write_files(mut files: Vec<(String, Vec<u8>)>, folder: &Path) -> Result<(), FolderError> {
     check(folder)?;
+    let list: String =
+        files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
+    files.push((MANIFEST.to_owned(), list.into_bytes()));
     let failed = |path: &Path, cause: io::Error| FolderError::Write {
         path: path.display().to_string(),
         cause: without_temporary_name(cause),
@@ -178,9 +181,6 @@ pub fn figure_files(figures: &[Drawn]) -> io::Result<Vec<(String, Vec<u8>)>> {
         files.push((format!("figures/{name}.svg"), drawn.file().into_bytes()));
         files.push((format!("tables/{name}.csv"), drawn.figure.table.to_csv().map_err(io::Error::other)?));
     }
-    let list: String =
-        files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
-    files.push((MANIFEST.to_owned(), list.into_bytes()));
     Ok(files)
 }
 

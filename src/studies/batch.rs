@@ -160,7 +160,7 @@ impl TableError {
     /// Help for a person: what to change.
     pub fn help(&self) -> String {
         match self {
-            Self::Unreadable { .. } => "name a table of scenes, or - for standard input".to_owned(),
+            Self::Unreadable { .. } => "name a table of scenes (.csv), or - for standard input".to_owned(),
             Self::Compressed { .. } => "write the table without compression, or with Snappy".to_owned(),
             Self::UnknownColumn { name, .. } if name.contains([';', char::REPLACEMENT_CHARACTER]) => {
                 "separate the cells by commas, and write decimals with a point".to_owned()
