@@ -20,8 +20,9 @@ use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{ColumnDescriptor, Type};
 
 use super::audit::Place;
-use super::batch::{COLUMNS, CRITERION, Layout, NUMBERS, Row, TableError, shortened};
+use super::batch::{COLUMNS, CRITERION, Layout, NUMBERS, Row, TableError};
 use super::columns::{Cells, Kind};
+use super::table_text::shortened;
 use crate::physics::Scene;
 
 /// Rows of a row group that is written: some megabytes.
