@@ -400,9 +400,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
                 self.stage = entered;
                 return Ok(self.finish(exit));
             }
-            assert!(self.stage > entered, "stage {entered} was crossed and not left, at {}", self.state.values());
         }
-        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: self.state.values() })
+        Err(IntegrationError::NeverEnds { why: "a stage was crossed and not left", last: self.state.values() })
     }
 
     /// Lists the stage ends at the present depth and enters the stage beyond them.
