@@ -12,6 +12,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use penetrode::integrators::batch::Batch;
 use penetrode::integrators::{Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor, keeping};
+use penetrode::physics::reference::Source;
 use penetrode::physics::scene_file::SHIPPED;
 use penetrode::physics::{Outcome, Problem, Scene};
 use penetrode::studies::convergence::Yardstick;
@@ -80,7 +81,7 @@ fn assert_varied(name: &str, scenes: &[Scene], flights: impl IntoIterator<Item =
     for (scene, flight) in scenes.iter().zip(flights) {
         undecided += u32::from(flight.outcome == Outcome::Undecided);
         let speed = scene.velocity.unwrap_or_else(|| panic!("a scene without a velocity"));
-        let errors = errors_of(scene, speed, &flight).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let errors = errors_of(Source::Scene(scene, speed), &flight).unwrap_or_else(|e| panic!("{name}: {e}"));
         for (ulps, quantity) in errors.0 {
             let error = ulps * f64::EPSILON;
             assert!(error <= limit, "{name}: {} is off by {error:e}", quantity.name());

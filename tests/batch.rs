@@ -10,6 +10,7 @@ use std::process::Output;
 
 use assert_cmd::Command;
 use penetrode::integrators::batch::Summary;
+use penetrode::physics::reference::Source;
 use penetrode::physics::{CraterStiffness, Outcome, Scene, State};
 use penetrode::studies::random_scenes::{Generator, errors_of};
 
@@ -107,8 +108,8 @@ fn a_thousand_random_scenes_agree_with_50_digits_in_every_outcome_and_number() {
         let (found, _) = flight(line);
         assert_eq!(found.exit_margin.is_some(), scene.thickness.is_some(), "{line}");
         undecided += usize::from(found.outcome == Outcome::Undecided);
-        let errors =
-            errors_of(scene, scene.velocity.unwrap(), &found.flight()).unwrap_or_else(|e| panic!("{line}: {e}"));
+        let errors = errors_of(Source::Scene(scene, scene.velocity.unwrap()), &found.flight())
+            .unwrap_or_else(|e| panic!("{line}: {e}"));
         // In units of rounding, over max(1, condition number); the goal is 5e-15 in depth, 22 of them.
         worst = errors.0.iter().fold(worst, |worst, (error, _)| if *error <= worst { worst } else { *error });
     }

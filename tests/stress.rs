@@ -12,15 +12,17 @@ use penetrode::suite::stress::{self, JudgedCase};
 
 #[test]
 fn every_stress_case_passes_for_every_method_that_this_build_has() {
-    let judged = stress::run(1, &|_| {});
-    let bad: Vec<&JudgedCase> =
-        judged.iter().filter(|case| !matches!(case.verdict, Verdict::Passed | Verdict::Skipped)).collect();
-    assert!(bad.is_empty(), "{bad:#?}");
-    let passed = judged.iter().filter(|case| case.verdict == Verdict::Passed).count();
-    assert!(passed > 60, "{passed}");
-    // Only a method that is not built, or that has no viscosity, may be left out.
-    for case in judged.iter().filter(|case| case.verdict == Verdict::Skipped) {
-        assert!(case.remark.contains("leaves out") || case.remark.contains("cannot treat"), "{case:?}");
+    // At seed 11, k/N is 1e4 in a scene of S3: its crater constant, rounded to f64, once passed for a fault.
+    for judged in [1, 11].map(|seed| stress::run(seed, &|_| {})) {
+        let bad: Vec<&JudgedCase> =
+            judged.iter().filter(|case| !matches!(case.verdict, Verdict::Passed | Verdict::Skipped)).collect();
+        assert!(bad.is_empty(), "{bad:#?}");
+        let passed = judged.iter().filter(|case| case.verdict == Verdict::Passed).count();
+        assert!(passed > 60, "{passed}");
+        // Only a method that is not built, or that has no viscosity, may be left out.
+        for case in judged.iter().filter(|case| case.verdict == Verdict::Skipped) {
+            assert!(case.remark.contains("leaves out") || case.remark.contains("cannot treat"), "{case:?}");
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::studies::extreme_scenes::exceeds;
 use crate::studies::order::{Class, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
-use crate::studies::random_scenes::closed_form_errors;
+use crate::studies::random_scenes::closed_form_errors_at_inputs;
 use crate::studies::{Path, extreme_scenes, formal_order, rounding, stability};
 use crate::suite::checks::scheme;
 use crate::suite::claim::{Evidence, Measurement, NotMeasured};
@@ -239,8 +239,8 @@ fn closed_form_everywhere(subject: Subject) -> Result<Measurement, NotMeasured> 
     let mut at = String::new();
     for index in 0..150 {
         let scene = extreme_scenes::scene(subject.seed, 2 * index);
-        let errors =
-            closed_form_errors(&scene).map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
+        let errors = closed_form_errors_at_inputs(&scene)
+            .map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
         if let Some((error, quantity)) = errors.worst() {
             if exceeds(error, worst) {
                 at = format!("{quantity} of scene {}", 2 * index);
