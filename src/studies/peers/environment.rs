@@ -329,12 +329,12 @@ mod tests {
             cache_folder(|name| given.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).into()))
         };
         assert_eq!(folder(&[]), None);
-        assert_eq!(folder(&[("HOME", "/home/a")]), Some("/home/a/.cache/penetrode".into()));
-        assert_eq!(folder(&[("HOME", "/home/a"), ("XDG_CACHE_HOME", "/c")]), Some("/c/penetrode".into()));
+        assert_eq!(folder(&[("HOME", "/h")]), Some("/h/.cache/penetrode".into()));
+        assert_eq!(folder(&[("HOME", "/h"), ("XDG_CACHE_HOME", "/c")]), Some("/c/penetrode".into()));
         // The XDG specification: relative paths are invalid and to be ignored.
-        assert_eq!(folder(&[("HOME", "/home/a"), ("XDG_CACHE_HOME", "c")]), Some("/home/a/.cache/penetrode".into()));
-        assert_eq!(folder(&[("HOME", "/home/a"), (CACHE_VARIABLE, "here")]), Some("here".into()));
-        assert_eq!(folder(&[("HOME", "/home/a"), (CACHE_VARIABLE, "")]), Some("/home/a/.cache/penetrode".into()));
+        assert_eq!(folder(&[("HOME", "/h"), ("XDG_CACHE_HOME", "c")]), Some("/h/.cache/penetrode".into()));
+        assert_eq!(folder(&[("HOME", "/h"), (CACHE_VARIABLE, "here")]), Some("here".into()));
+        assert_eq!(folder(&[("HOME", "/h"), (CACHE_VARIABLE, "")]), Some("/h/.cache/penetrode".into()));
     }
 
     #[test]
