@@ -12,11 +12,11 @@ use penetrode::studies::order::{Class, OrderVerdict, StepError, fit};
 type Check = fn(&[u8]);
 
 /// The targets by name.
-pub(crate) const TARGETS: [(&str, Check); 5] =
+pub const TARGETS: [(&str, Check); 5] =
     [("scene", scene), ("batch", batch), ("audit", audit), ("locate", locate), ("order", order)];
 
 /// A text is a scene that has an equation of motion, or is refused at a place in it, with a remedy.
-pub(crate) fn scene(data: &[u8]) {
+pub fn scene(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     match Scene::from_toml(text, "fuzz.toml") {
         Ok(scene) => {
@@ -45,7 +45,7 @@ pub(crate) fn scene(data: &[u8]) {
 }
 
 /// A table of scenes is refused, or each of its rows is a scene or a message of one line; chunks do not matter.
-pub(crate) fn batch(data: &[u8]) {
+pub fn batch(data: &[u8]) {
     let rows = |chunk: usize| {
         let mut table = CsvScenes::new("fuzz.csv", data).map_err(|error| error.to_string())?;
         let (mut all, mut used) = (Vec::new(), None);
@@ -79,7 +79,7 @@ pub(crate) fn batch(data: &[u8]) {
 }
 
 /// A table of step sizes is refused at its place, or judged; no column with a NaN passes.
-pub(crate) fn audit(data: &[u8]) {
+pub fn audit(data: &[u8]) {
     let table = match Table::read("fuzz.csv", data) {
         Ok(table) => table,
         Err(error) => {
@@ -104,7 +104,7 @@ pub(crate) fn audit(data: &[u8]) {
 }
 
 /// The points are refused for a number that is none, or fitted; their sequence does not matter.
-pub(crate) fn order(data: &[u8]) {
+pub fn order(data: &[u8]) {
     // Sixteen bytes a point: any numbers; fewer: small ones that make a study.
     let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap_or_default());
     let points: Vec<StepError> = match data.split_first() {
@@ -147,7 +147,7 @@ pub(crate) fn order(data: &[u8]) {
 ///
 /// Coefficients are small integers, so that Sturm's sequence is exact. Where the values cannot be told from zero by
 /// their rounding error, a root found there is right, too, as [`first_root`] says.
-pub(crate) fn locate(data: &[u8]) {
+pub fn locate(data: &[u8]) {
     let count = data.len().min(COEFFICIENTS_MAX).min(12);
     let numbers = &data[..count];
     let coefficients: Vec<f64> = numbers.iter().map(|byte| f64::from(*byte as i8)).collect();

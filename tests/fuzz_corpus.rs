@@ -9,6 +9,7 @@ use std::path::Path;
 
 #[path = "../fuzz/checks.rs"]
 #[expect(clippy::expect_used, clippy::panic, reason = "a fuzz target fails by panicking")]
+#[expect(unreachable_pub, reason = "public in the library of the fuzz targets")]
 mod checks;
 
 #[test]
