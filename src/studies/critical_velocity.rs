@@ -38,6 +38,9 @@ const SLOWEST: f64 = 1e-14;
 /// leaves far less at any sensible step; an outcome in place of a margin leaves one.
 const JUMP_MAX: f64 = 0.1;
 
+/// Share of `V_c` from which an error bar leaves nothing to say.
+const UNDECIDED: f64 = 0.5;
+
 /// Where to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -151,6 +154,17 @@ pub enum CriticalError<E: Display> {
         /// Upper end of the bracket.
         high: End,
     },
+    /// The error bar leaves no digit of `V_c`: exit code 4.
+    #[error(
+        "V_c is undecided: {} m/s with an error bar of {} m/s, the exit energy lost in its round-off",
+        Shown(*.velocity), Shown(*.error_bar)
+    )]
+    Undecided {
+        /// Where the search ended [m/s].
+        velocity: f64,
+        /// Half-width of the error bar there [m/s].
+        error_bar: f64,
+    },
     /// The tolerance was not reached.
     #[error("tolerance not reached after {flights} flights ({reason}), between {low} and {high}")]
     NotConverged {
@@ -230,13 +244,15 @@ pub fn critical_velocity<E: Display>(
         return Err(CriticalError::Jump { at: root.end(), low: bracket.low.end(), high: bracket.high.end() });
     }
     let velocity = root.velocity();
+    // dV = du / 2V.
+    let error_bar = root.bar.map(|bar| ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity));
+    if let Some(error_bar) = error_bar.filter(|bar| !(*bar < UNDECIDED * velocity)) {
+        return Err(CriticalError::Undecided { velocity, error_bar });
+    }
     let tally = shooting.tally.take();
     Ok(CriticalVelocity {
         velocity,
-        error_bar: root.bar.map(|bar| {
-            // dV = du / 2V.
-            ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity)
-        }),
+        error_bar,
         energy: fault!("critical-energy", 0.5, 1.0) * probe.mass * root.u,
         evaluations: tally.flights,
         cost: tally.cost,
@@ -777,6 +793,22 @@ mod tests {
         }
         println!("{cases} cases: worst error {worst:e}, largest bar {share:e}, most flights {flights}");
         assert!(worst < 1e-13 && share < 1e-13 && flights <= 12);
+    }
+
+    #[test]
+    fn a_slab_that_damps_v0_below_its_round_off_is_undecided_in_time_and_found_over_depth() {
+        // e^y times the static work per mass is V_c²; in time the margin is known to some ulp of V0².
+        for h in [12.0, 20.0, 40.0] {
+            let slab = Slab { h, ..SLAB };
+            let (exact, drag) = (slab.critical(), 2.0 * slab.q * h / slab.mass);
+            assert!(drag > 38.0);
+            let found = search(slab, &Energy::new()).unwrap();
+            assert!((found.velocity / exact - 1.0).abs() < 1e-15 * drag, "{found:?} and not {exact}");
+            match search(slab, &Taylor::default()) {
+                Err(CriticalError::Undecided { velocity, error_bar }) => assert!(2.0 * error_bar >= velocity),
+                answer => panic!("{answer:?} where V_c = {exact}"),
+            }
+        }
     }
 
     #[test]
