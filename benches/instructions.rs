@@ -31,6 +31,9 @@ fn counted<R>(work: impl FnOnce() -> R) -> R {
     black_box(work())
 }
 
+/// Makes the problems of a case.
+type Problems = fn() -> Vec<Problem>;
+
 /// Sets a case up, asserts its answer, and does it in [`counted`].
 type Case = Box<dyn Fn()>;
 
@@ -69,8 +72,8 @@ fn right(name: MethodName, problem: &Problem, limit: f64) -> Method {
 /// Flights of `problems`, one after the other.
 fn flights(name: MethodName, problems: Vec<Problem>, detail: Detail, limit: f64) -> Case {
     Box::new(move || {
-        let method = problems.iter().map(|problem| right(name, problem, limit)).last();
-        let method = method.unwrap_or_else(|| panic!("no problem"));
+        let methods: Vec<Method> = problems.iter().map(|problem| right(name, problem, limit)).collect();
+        let method = methods.last().unwrap_or_else(|| panic!("no problem"));
         counted(|| problems.iter().filter(|p| black_box(method.integrator().fly(p, detail)).is_ok()).count());
     })
 }
@@ -154,7 +157,7 @@ fn cases() -> Vec<(String, Case)> {
         cases.push((format!("critical velocity by {name}, paper-slab"), critical(name)));
     }
     // A thousandth of each is a scene's.
-    let thousand: [(_, fn() -> Vec<Problem>); 4] = [
+    let thousand: [(&str, Problems); 4] = [
         ("crater", || vec![problem("crater"); 1000]),
         ("tunnel", || vec![problem("tunnel"); 1000]),
         ("perforate", || vec![problem("perforate"); 1000]),

@@ -120,7 +120,8 @@ impl<E: std::fmt::Display> From<CriticalError<E>> for CliError {
         let (help, last) = match &error {
             CriticalError::Flight { cause, .. } => (cause.help().to_owned(), cause.last()),
             CriticalError::Undecided { .. } => {
-                let help = "the drag leaves less of V0² than its round-off: --method taylor or energy resolves more".to_owned();
+                let help = "the drag leaves less of V0² than its round-off: --method taylor or energy resolves more"
+                    .to_owned();
                 return Self::Undecided { message, help };
             }
             CriticalError::NoBracket { .. } => (

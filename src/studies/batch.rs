@@ -360,7 +360,6 @@ impl Answer {
 ///
 /// The default Taylor method flies in lanes ([`Batch`]), any other row by row. An error is what is wrong with the
 /// row, or what could not be computed; it stops no other row.
-#[expect(clippy::needless_pass_by_value, reason = "the scenes are used up, part by part")]
 pub fn answers(scenes: &[Result<Scene, String>], method: &Method, with_critical: bool) -> Vec<Result<Answer, String>> {
     let mut problems = Vec::with_capacity(scenes.len());
     // What a scene without a problem has instead.
