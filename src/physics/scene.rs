@@ -235,6 +235,18 @@ fn representable(quantity: &'static str, value: f64, zero: bool) -> Result<f64, 
     }
 }
 
+/// Crater constant c [N/m] with which the force is continuous at `depth` = k d.
+///
+/// ```text
+/// c = M (P + Q V0²)/(k d (M + k d Q)),  divided through by M
+/// ```
+fn continuous_stiffness(depth: f64, beyond: &Stage, mass: f64, impact_speed: f64) -> Result<f64, ResolveError> {
+    let force = beyond.static_force + fault!("c-not-continuous", beyond.drag, 0.0) * impact_speed * impact_speed;
+    let stiffness = force / (1.0 + fault!("c-at-impact", depth * (beyond.drag / mass), 0.0)) / depth;
+    // No force at k d (an air gap there) leaves no force in the crater.
+    representable("the crater stiffness c [N/m]", stiffness, force == 0.0)
+}
+
 /// Index of the layer that holds `depth` [m] just beyond it, of the last where all end before; `None` without layers.
 pub(super) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
     let mut end = 0.0;
@@ -313,15 +325,7 @@ impl Concrete {
         let depth = representable("the crater depth k d [m]", self.crater_depth(), false)?;
         let stiffness = match self.crater_stiffness {
             CraterStiffness::Given(stiffness) => stiffness,
-            CraterStiffness::Continuous => {
-                let beyond = &stages[0];
-                // c = M (P + Q V0²)/(k d (M + k d Q)), divided through by M.
-                let force =
-                    beyond.static_force + fault!("c-not-continuous", beyond.drag, 0.0) * impact_speed * impact_speed;
-                let stiffness = force / (1.0 + fault!("c-at-impact", depth * (beyond.drag / mass), 0.0)) / depth;
-                // No force at k d (an air gap there) leaves no force in the crater.
-                representable("the crater stiffness c [N/m]", stiffness, force == 0.0)?
-            }
+            CraterStiffness::Continuous => continuous_stiffness(depth, &stages[0], mass, impact_speed)?,
         };
         stages.insert(0, Stage::crater(stiffness, depth));
         Ok((stages, Some(0)))
@@ -441,6 +445,22 @@ impl Scene {
             }
         };
         Ok(Problem { mass: self.mass, impact_speed, exit_depth, stages, crater, target })
+    }
+
+    /// As [`Scene::resolve`] at `impact_speed`, from this scene's `problem` at any other: of the target only a continuous
+    /// crater constant depends on the speed.
+    ///
+    /// # Errors
+    /// As [`Scene::resolve`].
+    pub(crate) fn resolve_from(&self, problem: &Problem, impact_speed: f64) -> Result<Problem, ResolveError> {
+        admit("the impact speed V0 [m/s]", impact_speed, Range::NotNegative)?;
+        let mut stages = Stages::from_slice(&problem.stages);
+        let continuous = self.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous);
+        if let (Some(crater), true) = (problem.crater, continuous) {
+            let depth = stages[crater].end;
+            stages[crater].stiffness = continuous_stiffness(depth, &stages[crater + 1], self.mass, impact_speed)?;
+        }
+        Ok(Problem { impact_speed, stages, ..*problem })
     }
 
     /// The equation of motion at the scene's own impact velocity.
@@ -572,6 +592,19 @@ pub(crate) mod tests {
 
     fn layer_force(strength: f64) -> f64 {
         FRAC_PI_4 * 0.0269 * 0.0269 * 12.0 * strength
+    }
+
+    #[test]
+    fn a_problem_at_another_speed_is_the_one_resolved_there_bit_by_bit() {
+        let given = scene_of(Concrete { crater_stiffness: CraterStiffness::Given(1e7), ..concrete() });
+        let no_crater = scene_of(Concrete { crater_ratio: 0.0, ..concrete() });
+        for scene in [scene(), given, no_crater, layered(&[0.01, 0.1, 0.2])] {
+            let probe = scene.resolve(1.0).unwrap();
+            for speed in [0.0, 1e-3, 277.0, 1e9] {
+                assert_eq!(scene.resolve_from(&probe, speed), scene.resolve(speed));
+            }
+            assert!(scene.resolve_from(&probe, f64::NAN).is_err() && scene.resolve_from(&probe, -1.0).is_err());
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! is found and its signs are checked here, u is measured in units of the predicted root, and the value at the root it
 //! returns is compared with the error bar of the flight that gave it.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::fmt::Display;
 
 use argmin::core::{CostFunction, Executor, IterState, State as _, TerminationReason, TerminationStatus};
@@ -290,7 +290,12 @@ fn at_any_speed(velocity: f64, error_bar: Option<f64>, tally: Tally, note: &'sta
 /// # Errors
 /// [`CriticalError`].
 pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError<ResolveError>> {
-    keeping(integrator, |integrator| critical_velocity(|speed| scene.resolve(speed), integrator, Options::default()))
+    let first = OnceCell::new();
+    let resolve = |speed| match first.get() {
+        Some(problem) => scene.resolve_from(problem, speed),
+        None => scene.resolve(speed).inspect(|problem| first.set(problem.clone()).unwrap_or(())),
+    };
+    keeping(integrator, |integrator| critical_velocity(resolve, integrator, Options::default()))
 }
 
 /// Exact critical velocity of `scene` [m/s], where it has a closed form.
