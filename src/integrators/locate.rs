@@ -115,7 +115,7 @@ const SERIES_MAX: f64 = 0.02;
 fn to_rest<S: Scalar>(jet: &Jet<S>, velocity: S, closing: &Closing) -> Correction<S> {
     let deceleration = -jet.first;
     let falls = deceleration.value() > 0.0;
-    let inverse = S::one() / deceleration;
+    let inverse = S::one().over(deceleration);
     let newton = velocity * inverse;
     let bent = S::from_f64(0.5) * jet.second * inverse * newton;
     let cubic = jet.third * sixth() * inverse * newton * newton;
@@ -138,9 +138,9 @@ fn to_rest<S: Scalar>(jet: &Jet<S>, velocity: S, closing: &Closing) -> Correctio
     if denominator.value() <= 0.0 {
         return Correction::guess(S::from_f64(f64::INFINITY));
     }
-    let time = (velocity + velocity) / denominator;
+    let time = (velocity + velocity).over(denominator);
     let beyond = jet.third * time * time * time * sixth();
-    let correction = beyond / slope;
+    let correction = beyond.over(slope);
     // Far away the cubic term says nothing; it may not move the trial by more than a quarter.
     let relative = correction.value().abs() / time.value().abs();
     if relative > 0.25 {
@@ -152,7 +152,7 @@ fn to_rest<S: Scalar>(jet: &Jet<S>, velocity: S, closing: &Closing) -> Correctio
 /// `1/6` to the precision of the number.
 #[inline(always)]
 fn sixth<S: Scalar>() -> S {
-    S::one() / S::from_f64(6.0)
+    S::one().over(S::from_f64(6.0))
 }
 
 /// Place of rest on `(0, span]`, searched from `start`; V is known to have at most one root there.
@@ -220,7 +220,7 @@ fn at_rest<S: Scalar>(point: &State<S>, jet: &Jet<S>, step: S) -> State<S> {
 fn to_depth<S: Scalar>(law: &Stage<S>, jet: &Jet<S>, point: &State<S>, closing: &Closing) -> Option<Correction<S>> {
     let way = law.end - point.depth;
     let v = point.velocity;
-    let inverse = S::one() / v;
+    let inverse = S::one().over(v);
     let newton = way * inverse;
     let bent = S::from_f64(0.5) * jet.first * newton * inverse;
     let cubic = jet.second * sixth() * newton * newton * inverse;
@@ -251,13 +251,13 @@ fn to_depth<S: Scalar>(law: &Stage<S>, jet: &Jet<S>, point: &State<S>, closing: 
             Correction::guess(S::zero())
         });
     }
-    let time = (way + way) / denominator;
+    let time = (way + way).over(denominator);
     let beyond = time * time * time * sixth() * (jet.second + S::from_f64(0.25) * time * jet.third);
     let slope = arrival + S::from_f64(0.5) * jet.second * time * time;
     // Far away the higher terms say nothing; they may not move the trial by more than a quarter.
     let relative = beyond.value().abs() / (time.value() * slope.value()).abs();
     if relative <= 0.25 && slope.value() > 0.0 {
-        Some(Correction { time: time - beyond / slope, error: 3.0 * relative * beyond.value().abs() })
+        Some(Correction { time: time - beyond.over(slope), error: 3.0 * relative * beyond.value().abs() })
     } else {
         Some(Correction::guess(time))
     }

@@ -197,7 +197,7 @@ const RECIPROCALS: [f64; 64] = {
 /// `1/k` in the number type: from the table unless the type is finer than `f64`.
 #[inline(always)]
 fn reciprocal<S: Scalar>(k: usize) -> S {
-    if S::EPSILON < f64::EPSILON { S::one() / S::from_f64(k as f64) } else { S::from_f64(RECIPROCALS[k]) }
+    if S::EPSILON < f64::EPSILON { S::one().over(S::from_f64(k as f64)) } else { S::from_f64(RECIPROCALS[k]) }
 }
 
 /// The polynomials of one step, in the units of the step: coefficients of V and of depth/time.
@@ -468,10 +468,10 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         let stage = &problem.stages[self.stage];
         let limit = problem.limit_of(self.stage);
         // Coefficients per unit mass, once a stage.
-        let static_force = stage.static_force / problem.mass;
-        let stiffness = stage.stiffness / problem.mass;
-        let viscosity = stage.viscosity / problem.mass;
-        let drag = stage.drag / problem.mass;
+        let static_force = stage.static_force.over(problem.mass);
+        let stiffness = stage.stiffness.over(problem.mass);
+        let viscosity = stage.viscosity.over(problem.mass);
+        let drag = stage.drag.over(problem.mass);
         let frequency = if SPRING { stiffness.value().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
@@ -1345,6 +1345,27 @@ mod tests {
         let mut course = Course::new(problem, f64::EPSILON, Detail::End);
         course.state = State { time: 0.0, depth, velocity };
         course
+    }
+
+    /// `V' = -V²` from V = 1 is `1/(1 + t)`: coefficients 1, -1, 1, ... of V and of x over its order.
+    #[test]
+    fn coefficients_keep_the_digits_of_double_double() {
+        let law = Stage::<f64>::tunnel(0.0, 1.0);
+        let wide = Stage {
+            static_force: TwoFloat::from(law.static_force),
+            stiffness: TwoFloat::from(0.0),
+            viscosity: TwoFloat::from(0.0),
+            drag: TwoFloat::from(law.drag),
+            end: TwoFloat::from(1.0),
+        };
+        let series = Series::<TwoFloat, 40>::new::<false, true, true>(&wide, TwoFloat::from(1.0));
+        for k in 0..40 {
+            let sign = TwoFloat::from(if k % 2 == 0 { 1.0 } else { -1.0 });
+            let way = series.advance[k] * TwoFloat::from((k + 1) as f64);
+            for off in [series.velocity[k] - sign, way - sign] {
+                assert!(off.value().abs() < 1e-28, "order {k}: {:e}", off.value());
+            }
+        }
     }
 
     /// Every term of the bar with its own factor, in numbers that can be followed by hand.
