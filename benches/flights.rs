@@ -8,6 +8,7 @@
 #![expect(clippy::panic, reason = "a bench that cannot be set up stops")]
 
 use std::hint::black_box;
+use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use penetrode::integrators::batch::Batch;
@@ -148,15 +149,17 @@ fn critical(criterion: &mut Criterion) {
     // So that it prints critical velocities per second.
     group.throughput(Throughput::Elements(1));
     let slab = scene("paper-slab");
-    let thick: Vec<Scene> = varied_scenes().into_iter().filter(|scene| scene.thickness.is_some()).collect();
+    let exact = |scene: &Scene| critical_velocity::exact(scene).unwrap_or_else(|e| panic!("{e}"));
+    // Beyond 100 km/s the closed form cannot tell V_c from its round-off.
+    let thick: Vec<Scene> = varied_scenes().into_iter().filter(|s| s.thickness.is_some() && exact(s) < 1e5).collect();
+    assert!(thick.len() > 400, "{}", thick.len());
     for name in [MethodName::Taylor, MethodName::Energy, MethodName::ClosedForm] {
         let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let find = |scene: &Scene| {
             critical_velocity::of_scene(scene, method.integrator()).unwrap_or_else(|e| panic!("{e}")).velocity
         };
         for scene in thick.iter().chain([&slab]) {
-            let exact = critical_velocity::exact(scene).unwrap_or_else(|e| panic!("{e}"));
-            let found = find(scene);
+            let (found, exact) = (find(scene), exact(scene));
             assert!((found - exact).abs() <= 1e-13 * exact, "{name}: {found} and not {exact}");
         }
         group.bench_function(format!("{name}/paper-slab"), |bencher| bencher.iter(|| find(black_box(&slab))));
@@ -166,5 +169,10 @@ fn critical(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, flights, varied, batch, critical);
+criterion_group! {
+    name = benches;
+    // Fifty benches of eight seconds each would be more than anybody waits for.
+    config = Criterion::default().warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(3));
+    targets = flights, varied, batch, critical
+}
 criterion_main!(benches);

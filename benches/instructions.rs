@@ -1,26 +1,41 @@
 //! Instructions of a flight by every method, of a critical velocity and of a batch, and what each saving that
-//! `--explain` names is worth: counted by Callgrind, so that no load on the machine changes them.
+//! `solve --explain` names is worth, as a pair with and without it.
 //!
-//! `cargo bench --bench instructions` runs them; it needs valgrind and the runner (CONTRIBUTING.md, "Tests"). Each answer
-//! is asserted in the setup, which is not counted.
+//! `cargo bench --bench instructions` counts them under Callgrind, each in a process of its own, so that no load on the
+//! machine changes a count; it needs valgrind, which has no 512-bit vectors: lanes are counted with 256-bit ones. Every
+//! answer is asserted before it is counted. A saving that saves nothing stops the run, and so does a sentence of
+//! `--explain` that no pair stands for.
 
 #![expect(clippy::panic, reason = "a bench that cannot be set up stops")]
-#![expect(missing_docs, reason = "the macros of the bench make public items without any")]
 
 use std::hint::black_box;
+use std::process::Command;
 
-use gungraun::Callgrind;
-use gungraun::prelude::*;
-use penetrode::integrators::batch::{Batch, Summary};
-use penetrode::integrators::{Detail, Flight, IntegrationError, Method, MethodName, MethodOptions};
+use penetrode::integrators::batch::Batch;
+use penetrode::integrators::{Detail, Method, MethodName, MethodOptions, keeping};
 use penetrode::physics::scene_file::SHIPPED;
-use penetrode::physics::{Problem, Scene};
+use penetrode::physics::{Problem, Scene, Stage, Target};
 use penetrode::studies::convergence::Yardstick;
-use penetrode::studies::critical_velocity::{self, CriticalVelocity};
+use penetrode::studies::critical_velocity;
 use penetrode::studies::error::{flight_error, is_fixed};
 use penetrode::studies::quantity::Quantity;
 use penetrode::studies::random_scenes::Generator;
 use penetrode::studies::sensitivity;
+
+/// A part of the name by which Callgrind knows [`counted`].
+const COUNTED: &str = "--toggle-collect=*instructions::counted*";
+
+/// Does `work`, the only part of the process that is counted.
+#[inline(never)]
+fn counted<R>(work: impl FnOnce() -> R) -> R {
+    black_box(work())
+}
+
+/// Makes the problems of a case.
+type Problems = fn() -> Vec<Problem>;
+
+/// Sets a case up, asserts its answer, and does it in [`counted`].
+type Case = Box<dyn Fn()>;
 
 fn scene(name: &str) -> Scene {
     let text = SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text);
@@ -31,184 +46,283 @@ fn problem(name: &str) -> Problem {
     scene(name).problem().unwrap_or_else(|e| panic!("{e}"))
 }
 
+fn varied() -> Vec<Problem> {
+    let mut generator = Generator::new(1, "bench");
+    (0..1000).filter_map(|_| generator.next_scene().problem().ok()).collect()
+}
+
 fn method(name: MethodName) -> Method {
     Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A method and a problem that it solves to `limit` in every free quantity.
-fn right(name: MethodName, problem: Problem, limit: f64) -> (Method, Problem) {
+/// The method, once it solves `problem` to `limit` in every free quantity.
+fn right(name: MethodName, problem: &Problem, limit: f64) -> Method {
     let method = method(name);
-    let exact = Yardstick::of(&problem).unwrap_or_else(|e| panic!("{e}")).flight;
-    let flight = method.integrator().fly(&problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+    let exact = Yardstick::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
+    let flight = method.integrator().fly(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
     for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
         if !is_fixed(quantity, &exact) {
             let error = flight_error(quantity, &flight, &exact, problem.impact_speed).map_or(f64::INFINITY, f64::abs);
             assert!(error <= limit, "{name}: {} is off by {error:e}", quantity.name());
         }
     }
-    (method, problem)
+    method
 }
 
-/// Every method of this build on the scenes of the comparison with other solvers.
-fn flights() -> impl Iterator<Item = (MethodName, &'static str)> {
-    MethodName::ALL.into_iter().filter(|name| name.is_built()).flat_map(|name| {
-        // The paper's scheme takes the millionth left to the far side of `graze` for a stop.
-        let scenes = ["crater", "tunnel", "perforate", "graze"].into_iter();
-        scenes.filter(move |scene| name != MethodName::CentralDifference || *scene != "graze").map(move |s| (name, s))
+/// Flights of `problems`, one after the other.
+fn flights(name: MethodName, problems: Vec<Problem>, detail: Detail, limit: f64) -> Case {
+    Box::new(move || {
+        let methods: Vec<Method> = problems.iter().map(|problem| right(name, problem, limit)).collect();
+        let method = methods.last().unwrap_or_else(|| panic!("no problem"));
+        counted(|| problems.iter().filter(|p| black_box(method.integrator().fly(p, detail)).is_ok()).count());
     })
 }
 
-fn setup_flight((name, scene): (MethodName, &str)) -> (Method, Problem) {
-    let limit = match (name, scene) {
-        (MethodName::CentralDifference, _) => 1e-2,
-        (_, "graze") => 1e-1,
-        (MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm, _) => 1e-12,
-        _ => 1e-6,
-    };
-    right(name, problem(scene), limit)
+fn flight(name: MethodName, problem: Problem) -> Case {
+    flights(name, vec![problem], Detail::Events, 1e-6)
 }
 
-#[library_benchmark]
-#[benches::scene(iter = flights(), setup = setup_flight)]
-fn flight((method, problem): (Method, Problem)) -> Result<Flight, IntegrationError> {
-    black_box(method.integrator().fly(black_box(&problem), Detail::Events))
+fn taylor(problem: Problem) -> Case {
+    flights(MethodName::Taylor, vec![problem], Detail::Events, 1e-12)
 }
 
-fn setup_critical(name: MethodName) -> (Method, Scene) {
-    let (scene, method) = (scene("paper-slab"), method(name));
-    let exact = critical_velocity::exact(&scene).unwrap_or_else(|e| panic!("{e}"));
-    let found = critical_velocity::of_scene(&scene, method.integrator()).unwrap_or_else(|e| panic!("{e}"));
-    assert!((found.velocity / exact - 1.0).abs() <= 1e-13, "{name}: {}", found.velocity);
-    (method, scene)
+fn critical(name: MethodName) -> Case {
+    Box::new(move || {
+        let (scene, method) = (scene("paper-slab"), method(name));
+        let find = || critical_velocity::of_scene(&scene, method.integrator()).unwrap_or_else(|e| panic!("{e}"));
+        let exact = critical_velocity::exact(&scene).unwrap_or_else(|e| panic!("{e}"));
+        assert!((find().velocity / exact - 1.0).abs() <= 1e-13, "{name}: {}", find().velocity);
+        counted(find);
+    })
 }
 
-#[library_benchmark]
-#[bench::taylor(setup_critical(MethodName::Taylor))]
-#[bench::energy(setup_critical(MethodName::Energy))]
-#[bench::closed_form(setup_critical(MethodName::ClosedForm))]
-fn critical((method, scene): (Method, Scene)) -> CriticalVelocity {
-    black_box(critical_velocity::of_scene(black_box(&scene), method.integrator()).unwrap_or_else(|e| panic!("{e}")))
-}
-
-/// `problems`, which lanes and the scalar series answer alike.
-fn setup_batch(problems: Vec<Problem>) -> Vec<Problem> {
-    for (lane, problem) in Batch::new().fly(&problems).into_iter().zip(&problems) {
-        let lane = lane.unwrap_or_else(|e| panic!("{e}"));
-        let scalar = right(MethodName::Taylor, problem.clone(), 1e-9).0;
-        let scalar = scalar.integrator().fly(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(lane.outcome, scalar.outcome);
-        assert!((lane.end.depth / scalar.end.depth - 1.0).abs() < 1e-13, "{lane:?}");
-    }
-    problems
-}
-
-fn varied() -> Vec<Problem> {
-    let mut generator = Generator::new(1, "bench");
-    (0..1000).filter_map(|_| generator.next_scene().problem().ok()).collect()
-}
-
-// A thousand scenes each: a thousandth is a scene's.
-#[library_benchmark]
-#[bench::tunnel_1000(setup_batch(vec![problem("tunnel"); 1000]))]
-#[bench::perforate_1000(setup_batch(vec![problem("perforate"); 1000]))]
-#[bench::crater_1000(setup_batch(vec![problem("crater"); 1000]))]
-#[bench::varied_1000(setup_batch(varied()))]
-fn batch(problems: Vec<Problem>) -> Vec<Result<Summary, IntegrationError>> {
-    black_box(Batch::new().fly(black_box(&problems)))
-}
-
-library_benchmark_group!(name = counts, benchmarks = [flight, critical, batch]);
-
-/// A flight, and what else is asked of it.
-struct Request {
-    method: Method,
-    problems: Vec<Problem>,
-    detail: Detail,
-    /// The scene whose sensitivities are computed as well.
-    sensitivities_of: Option<Scene>,
-}
-
-impl Request {
-    fn new(name: MethodName, problem: Problem) -> Self {
-        let (method, problem) = right(name, problem, 1e-6);
-        Self { method, problems: vec![problem], detail: Detail::Events, sensitivities_of: None }
-    }
-
-    fn with(self, detail: Detail) -> Self {
-        Self { detail, ..self }
-    }
-
-    fn fly(&self) -> Vec<Result<Flight, IntegrationError>> {
-        if let Some(scene) = &self.sensitivities_of {
-            let _ = black_box(sensitivity::by_taylor(scene));
+fn batch(problems: fn() -> Vec<Problem>) -> Case {
+    Box::new(move || {
+        let problems = problems();
+        let scalar = method(MethodName::Taylor);
+        for (lane, problem) in Batch::new().fly(&problems).into_iter().zip(&problems) {
+            let lane = lane.unwrap_or_else(|e| panic!("{e}"));
+            let scalar = scalar.integrator().fly(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(lane.outcome, scalar.outcome);
+            assert!((lane.end.depth / scalar.end.depth - 1.0).abs() < 1e-13, "{lane:?}");
         }
-        self.problems.iter().map(|problem| self.method.integrator().fly(problem, self.detail)).collect()
-    }
+        counted(|| Batch::new().fly(black_box(&problems)));
+    })
 }
 
-fn taylor(problem: Problem) -> Request {
-    Request::new(MethodName::Taylor, problem)
+/// A thousand varied flights, with what a library builds for the first kept for the others.
+fn kept(name: MethodName) -> Case {
+    Box::new(move || {
+        let (method, problems) = (method(name), varied());
+        let fly_all = || {
+            keeping(method.integrator(), |kept| {
+                problems.iter().filter(|p| black_box(kept.fly(p, Detail::Events)).is_ok()).count()
+            })
+        };
+        assert_eq!(fly_all(), problems.len());
+        counted(fly_all);
+    })
+}
+
+fn with_sensitivities(name: &'static str) -> Case {
+    Box::new(move || {
+        let (scene, problem) = (scene(name), problem(name));
+        let exact = sensitivity::by_closed_form(&scene).unwrap_or_else(|e| panic!("{e}"));
+        let find = || sensitivity::by_taylor(&scene).unwrap_or_else(|e| panic!("{e}"));
+        assert!(find().disagreement(&exact).is_some_and(|worst| worst < 1e-12));
+        let method = right(MethodName::Taylor, &problem, 1e-12);
+        let (_, flight) = counted(|| (find(), method.integrator().fly(&problem, Detail::Events)));
+        assert!(flight.is_ok());
+    })
+}
+
+/// Name and case of everything that is counted for itself.
+fn cases() -> Vec<(String, Case)> {
+    let mut cases = Vec::new();
+    for name in MethodName::ALL {
+        for scene in ["crater", "tunnel", "perforate", "graze"] {
+            // The paper's scheme takes the millionth left to the far side of `graze` for a stop.
+            let limit = match (name, scene) {
+                (MethodName::CentralDifference, "graze") => continue,
+                (MethodName::CentralDifference, _) => 1e-2,
+                (_, "graze") => 1e-1,
+                (MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm, _) => 1e-12,
+                _ => 1e-6,
+            };
+            let case = flights(name, vec![problem(scene)], Detail::Events, limit);
+            cases.push((format!("{name}, {scene}"), case));
+        }
+    }
+    for name in [MethodName::Taylor, MethodName::Energy, MethodName::ClosedForm] {
+        cases.push((format!("critical velocity by {name}, paper-slab"), critical(name)));
+    }
+    // A thousandth of each is a scene's.
+    let thousand: [(&str, Problems); 4] = [
+        ("crater", || vec![problem("crater"); 1000]),
+        ("tunnel", || vec![problem("tunnel"); 1000]),
+        ("perforate", || vec![problem("perforate"); 1000]),
+        ("varied", varied),
+    ];
+    for (name, problems) in thousand {
+        cases.push((format!("1000 in lanes, {name}"), batch(problems)));
+    }
+    cases
+}
+
+/// A saving: the same request with it and without.
+struct Saving {
+    name: &'static str,
+    /// Part of the sentence by which `--explain` names it; `None` for what a caller of the library saves.
+    sentence: Option<&'static str>,
+    with: Case,
+    without: Case,
+}
+
+/// One stage to rest.
+fn of_stage(law: Stage) -> Problem {
+    let stages = [law].into_iter().collect();
+    Problem { mass: 1.0, impact_speed: 2.0, exit_depth: f64::INFINITY, stages, crater: None, target: Target::Stages }
+}
+
+/// A term of the force that changes no digit, and yet is not left out.
+const TINY: f64 = 1e-60;
+
+/// `tunnel` with its far side at `share` of the depth of rest.
+fn with_exit(share: f64) -> Problem {
+    let mut problem = problem("tunnel");
+    problem.exit_depth = share * Yardstick::of(&problem).unwrap_or_else(|e| panic!("{e}")).flight.end.depth;
+    problem
 }
 
 /// `crater`, which stops before its second stage, and that stage alone beside it: what a method pays that builds it.
-fn with_second_stage() -> Request {
+fn with_second_stage() -> Case {
     let crater = problem("crater");
-    let mut second = crater.clone();
-    second.stages = crater.stages[1..].iter().copied().collect();
-    second.crater = None;
-    let mut request = taylor(crater);
-    request.problems.push(second);
-    request
+    let second = Problem { stages: crater.stages[1..].iter().copied().collect(), crater: None, ..crater.clone() };
+    flights(MethodName::Taylor, vec![crater, second], Detail::Events, 1e-12)
 }
 
-/// `tunnel` with a far side that it does not reach.
-fn with_exit() -> Problem {
-    let mut scene = scene("tunnel");
-    scene.thickness = Some(1.0);
-    scene.problem().unwrap_or_else(|e| panic!("{e}"))
+fn savings() -> Vec<Saving> {
+    let law = Stage { static_force: 3.0, stiffness: 0.0, viscosity: 0.0, drag: 0.0, end: f64::INFINITY };
+    let spring = Stage { stiffness: 5.0, ..law };
+    let damped = Stage { viscosity: 0.5, ..spring };
+    let drag = Stage { drag: 0.5, ..law };
+    let stage = |law: Stage| taylor(of_stage(law));
+    let tunnel = |detail| flights(MethodName::Taylor, vec![problem("tunnel")], detail, 1e-12);
+    let saving = |name, sentence, with, without| Saving { name, sentence, with, without };
+    vec![
+        saving("stage not reached", Some("was not built"), taylor(problem("crater")), with_second_stage()),
+        saving("no far side", Some("exit event not sought"), tunnel(Detail::Events), taylor(with_exit(2.0))),
+        saving("rest before the exit", Some("exit not located"), taylor(with_exit(1.001)), taylor(with_exit(0.999))),
+        saving("no trajectory", Some("trajectory not kept"), tunnel(Detail::Events), tunnel(Detail::Trajectory)),
+        saving(
+            "no Jacobian",
+            Some("Jacobian not built"),
+            flight(MethodName::Tsit45, problem("tunnel")),
+            flight(MethodName::Bdf, problem("tunnel")),
+        ),
+        saving(
+            "no sensitivities",
+            Some("sensitivities not computed"),
+            tunnel(Detail::Events),
+            with_sensitivities("tunnel"),
+        ),
+        saving(
+            "closed form",
+            Some("no integration"),
+            flight(MethodName::ClosedForm, problem("tunnel")),
+            tunnel(Detail::Events),
+        ),
+        saving("constant force", Some("one step serves"), stage(law), stage(Stage { drag: TINY, ..law })),
+        saving(
+            "spring alone",
+            Some("recurrence of one term"),
+            stage(spring),
+            stage(Stage { viscosity: TINY, ..spring }),
+        ),
+        saving("no drag", Some("recurrence of two terms"), stage(damped), stage(Stage { drag: TINY, ..damped })),
+        saving(
+            "no stiffness",
+            Some("no search for hidden roots"),
+            stage(drag),
+            stage(Stage { stiffness: TINY, ..drag }),
+        ),
+        saving(
+            "explicit where not stiff",
+            Some(" by tsit45"),
+            flight(MethodName::Adaptive, problem("tunnel")),
+            flight(MethodName::Bdf, problem("tunnel")),
+        ),
+        saving(
+            "implicit where stiff",
+            Some(" by bdf"),
+            flight(MethodName::Adaptive, problem("stiff")),
+            flight(MethodName::Tsit45, problem("stiff")),
+        ),
+        saving("end alone", None, tunnel(Detail::End), tunnel(Detail::Events)),
+        saving("solver kept", None, kept(MethodName::Tsit45), {
+            flights(MethodName::Tsit45, varied(), Detail::Events, 1e-6)
+        }),
+        saving("lanes", None, batch(varied), flights(MethodName::Taylor, varied(), Detail::Events, 1e-9)),
+    ]
 }
 
-/// `tunnel`, and its sensitivities by the same series in dual numbers.
-fn with_sensitivities() -> Request {
-    let by_closed_form = sensitivity::by_closed_form(&scene("tunnel")).unwrap_or_else(|e| panic!("{e}"));
-    let found = sensitivity::by_taylor(&scene("tunnel")).unwrap_or_else(|e| panic!("{e}"));
-    assert!(found.disagreement(&by_closed_form).is_some_and(|worst| worst < 1e-12));
-    Request { sensitivities_of: Some(scene("tunnel")), ..taylor(problem("tunnel")) }
+/// What stands among the savings and is none: a fixed step has no error estimate to leave out, and a stage may have it all.
+const NO_SAVING: [&str; 2] = ["error bar of the exit margin not given", "stiffness and drag"];
+
+/// Every sentence that `--explain` has for a shipped scene stands for a pair, and every pair for a sentence.
+fn assert_complete(savings: &[Saving]) {
+    let named: Vec<&str> = savings.iter().filter_map(|saving| saving.sentence).collect();
+    let mut unheard = named.clone();
+    for method in MethodName::ALL.map(method) {
+        for problem in SHIPPED.iter().filter_map(|(name, _)| scene(name).problem().ok()) {
+            let Ok(flight) = method.integrator().fly(&problem, Detail::Events) else { continue };
+            for sentence in method.explain(&problem, &flight, Detail::Events) {
+                let mut known = named.iter().chain(&NO_SAVING);
+                assert!(known.any(|part| sentence.contains(part)), "no pair with and without: {sentence}");
+                unheard.retain(|part| !sentence.contains(part));
+            }
+        }
+    }
+    assert!(unheard.is_empty(), "no longer said by --explain: {unheard:?}");
 }
 
-/// Without the library there is no method with a Jacobian to compare with.
-const EXPLICIT: MethodName = if cfg!(feature = "diffsol") { MethodName::Tsit45 } else { MethodName::Energy };
-const IMPLICIT: MethodName = if cfg!(feature = "diffsol") { MethodName::Bdf } else { MethodName::Energy };
-
-// Each saving made, by the name that `--explain` gives it.
-#[library_benchmark]
-#[bench::stage_not_built(taylor(problem("crater")))]
-#[bench::exit_not_sought(taylor(problem("tunnel")))]
-#[bench::depth_only(taylor(problem("tunnel")).with(Detail::End))]
-#[bench::trajectory_not_kept(taylor(problem("tunnel")))]
-#[bench::jacobian_not_built(Request::new(EXPLICIT, problem("tunnel")))]
-#[bench::sensitivities_not_computed(taylor(problem("tunnel")))]
-#[bench::closed_form(Request::new(MethodName::ClosedForm, problem("tunnel")))]
-fn with_saving(request: Request) -> Vec<Result<Flight, IntegrationError>> {
-    black_box(black_box(request).fly())
+/// What Callgrind counts in the case `name`.
+fn count(name: &str) -> u64 {
+    let program = std::env::current_exe().unwrap_or_else(|e| panic!("{e}"));
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", COUNTED])
+        .arg(program)
+        .args(["--count", name])
+        .output()
+        .unwrap_or_else(|e| panic!("valgrind does not start: {e}"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name}: {said}");
+    let collected = said.lines().find_map(|line| line.split_once("Collected : ")?.1.parse().ok());
+    collected.filter(|count| *count > 0).unwrap_or_else(|| panic!("{name}: nothing was counted: {said}"))
 }
 
-// The same requests without it.
-#[library_benchmark]
-#[bench::stage_not_built(with_second_stage())]
-#[bench::exit_not_sought(taylor(with_exit()))]
-#[bench::depth_only(taylor(problem("tunnel")))]
-#[bench::trajectory_not_kept(taylor(problem("tunnel")).with(Detail::Trajectory))]
-#[bench::jacobian_not_built(Request::new(IMPLICIT, problem("tunnel")))]
-#[bench::sensitivities_not_computed(with_sensitivities())]
-#[bench::closed_form(taylor(problem("tunnel")))]
-fn without_saving(request: Request) -> Vec<Result<Flight, IntegrationError>> {
-    black_box(black_box(request).fly())
+fn main() {
+    let mut cases = cases();
+    let savings = savings();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [flag, wanted] = &arguments[..]
+        && flag == "--count"
+    {
+        for Saving { name, with, without, .. } in savings {
+            cases.extend([(format!("with {name}"), with), (format!("without {name}"), without)]);
+        }
+        let (_, case) = cases.into_iter().find(|(name, _)| name == wanted).unwrap_or_else(|| panic!("no {wanted}"));
+        return case();
+    }
+    assert_complete(&savings);
+    println!("{:44}{:>14}", "request", "instructions");
+    for (name, _) in cases {
+        println!("{name:44}{:>14}", count(&name));
+    }
+    println!("\n{:30}{:>14}{:>14}{:>14}", "saving", "with", "without", "without/with");
+    for Saving { name, .. } in savings {
+        let (with, without) = (count(&format!("with {name}")), count(&format!("without {name}")));
+        println!("{name:30}{with:>14}{without:>14}{:>14.3}", without as f64 / with as f64);
+        assert!(with < without, "{name}: saves nothing");
+    }
 }
-
-library_benchmark_group!(name = savings, compare_by_id = true, benchmarks = [with_saving, without_saving]);
-
-main!(
-    config = LibraryBenchmarkConfig::default().tool(Callgrind::with_args(["--cache-sim=no"])),
-    library_benchmark_groups = [counts, savings]
-);

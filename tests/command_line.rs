@@ -417,6 +417,24 @@ fn the_search_for_a_critical_velocity_beyond_the_numbers_ends_with_its_cause() {
 }
 
 #[test]
+fn a_critical_velocity_inside_its_error_bar_is_undecided_and_not_a_number() {
+    let folder = tempfile::tempdir().unwrap();
+    // The closed form knows the margin to some ulp of V0², of which the drag leaves 1e-30.
+    let path = changed_slab(folder.path(), "\"180 mm\"", "\"25 m\"");
+    let asked = ["critical", &path, "--method", "closed-form"];
+    let output = run(&asked);
+    let text = said(&output);
+    assert_eq!((code(&output), output.stdout.len()), (4, 0), "{text}");
+    assert!(text.contains("V_c is undecided") && text.contains("--method taylor"), "{text}");
+    let answer = json(&[&asked[..], &["--json"]].concat());
+    assert!(answer["error"]["message"].as_str().unwrap().contains("V_c is undecided"));
+    for method in ["taylor", "energy"] {
+        let answer = json(&["critical", &path, "--method", method, "--json"]);
+        assert!(answer["relative_error"].as_f64().unwrap() < 1e-12, "{answer}");
+    }
+}
+
+#[test]
 fn an_option_is_repeated_as_it_was_typed() {
     let path = scene("tunnel");
     for (arguments, words) in [

@@ -286,7 +286,11 @@ fn text(scene: &Scene, report: &CriticalJson) -> String {
         let mut row = |name: &str, value: f64| {
             // A target without thickness needs no energy by either.
             let over = ours / value - 1.0;
-            let over = if over.is_finite() { format!("{:+.1} %", 100.0 * over) } else { "-".to_owned() };
+            let over = match 100.0 * over {
+                percent if !percent.is_finite() => "-".to_owned(),
+                percent if percent.abs() < 1e6 => format!("{percent:+.1} %"),
+                percent => format!("{percent:+.1e} %"),
+            };
             rows.add_row([name.to_owned(), significant(value), over]);
         };
         row("Eq. 15, printed", eq15.printed);

@@ -79,6 +79,14 @@ pub enum CliError {
         /// State reached, where there is one.
         last: Option<State>,
     },
+    /// An answer inside its own error bar: exit 4.
+    #[error("{message}")]
+    Undecided {
+        /// What cannot be told.
+        message: String,
+        /// What to try.
+        help: String,
+    },
     /// A result that could not be written: exit 1.
     #[error("cannot write {path}: {cause}")]
     Write {
@@ -111,6 +119,11 @@ impl<E: std::fmt::Display> From<CriticalError<E>> for CliError {
         let message = error.to_string();
         let (help, last) = match &error {
             CriticalError::Flight { cause, .. } => (cause.help().to_owned(), cause.last()),
+            CriticalError::Undecided { .. } => {
+                let help = "the drag leaves less of V0² than its round-off: --method taylor or energy resolves more"
+                    .to_owned();
+                return Self::Undecided { message, help };
+            }
             CriticalError::NoBracket { .. } => (
                 "the drag over the thickness is too large: check the thickness, the density and the mass".to_owned(),
                 None,
@@ -157,6 +170,7 @@ impl CliError {
         match self {
             Self::Usage { message, help } => Self::Usage { message: named(message), help },
             Self::Run { message, help, last } => Self::Run { message: named(message), help, last },
+            Self::Undecided { message, help } => Self::Undecided { message: named(message), help },
             other => other,
         }
     }
@@ -166,6 +180,7 @@ impl CliError {
         match self {
             Self::Scene(_) | Self::Usage { .. } => Exit::Usage,
             Self::Run { .. } | Self::Write { .. } => Exit::Failed,
+            Self::Undecided { .. } => Exit::Undecided,
             Self::PeerMissing(_) => Exit::PeerMissing,
         }
     }
@@ -174,7 +189,9 @@ impl CliError {
     pub fn render(&self, color: bool) -> String {
         match self {
             Self::Scene(error) => error.render(color),
-            Self::Usage { message, help } | Self::Run { message, help, .. } => told(message, help),
+            Self::Usage { message, help } | Self::Run { message, help, .. } | Self::Undecided { message, help } => {
+                told(message, help)
+            }
             Self::Write { cause, .. } => told(&self.to_string(), output::write_help(cause.kind())),
             Self::PeerMissing(message) => told(message, ""),
         }
@@ -192,7 +209,7 @@ fn told(message: &str, help: &str) -> String {
     text
 }
 
-/// The JSON verdict of a run that failed (exit 1).
+/// The JSON verdict of a run that failed (exit 1) or could not decide (exit 4).
 #[derive(Serialize)]
 struct FailureJson {
     schema: String,
@@ -313,7 +330,7 @@ impl Cli {
         match self.command.run() {
             Ok(exit) => exit,
             Err(error) => {
-                if error.exit() == Exit::Failed && self.command.wants_json() {
+                if matches!(error.exit(), Exit::Failed | Exit::Undecided) && self.command.wants_json() {
                     let last = match &error {
                         CliError::Run { last, .. } => *last,
                         _ => None,

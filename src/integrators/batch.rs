@@ -674,7 +674,7 @@ fn advance(lane: Lane) -> Lane {
         time: lane.time + unit_time * (trial + t),
         depth,
         velocity,
-        bar: lane.bar / (1.0 + 2.0 * beta * x_there) + f64::EPSILON * added,
+        bar: lane.bar / exit_energy::exp_from_below(2.0 * beta * x_there) + f64::EPSILON * added,
         status: if done { ending } else { going },
         ..lane
     }

@@ -599,7 +599,7 @@ impl<'f, S, Make: Fn(f64) -> Result<S, DiffsolError>> Legs<'f, S, Make> {
             cost.steps += 1;
             if after.u <= 0.0 || after.xi >= leg.distance {
                 let scratch = &mut self.scratch;
-                let (end, place) = locate(before, after, leg.distance, |t| {
+                let (end, place) = locate(&law, before, after, leg.distance, |t| {
                     solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]))
                 })
                 .map_err(|e| failure(e, epoch, before))?;
@@ -681,61 +681,79 @@ fn rejected_by<'a, Eqn: OdeEquations + 'a, S: OdeSolverMethod<'a, Eqn>>(solver: 
     (statistics.number_of_error_test_failures + statistics.number_of_nonlinear_solver_fails) as u64
 }
 
-/// Where a step that ends with `u <= 0` or past `distance` meets its event, on the library's interpolant.
+/// Where a step that ends with `u <= 0` or past `distance` meets its event, on the library's interpolant `at`.
 ///
 /// Rest is sought first. Up to there u > 0 and xi rises, so a boundary before it is crossed exactly once.
 fn locate(
+    law: &Law,
     before: Node,
     after: Node,
     distance: f64,
     mut at: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
 ) -> Result<(LegEnd, Node), DiffsolError> {
+    let mut node_at = |time| at(time).map(|(xi, u)| Node { time, xi, u });
     let mut last = after;
     if after.u <= 0.0 {
-        let time = bracketed_root((before.time, before.u), (after.time, after.u), |t| Ok(at(t)?.1))?;
-        last = Node { time, xi: at(time)?.0, u: 0.0 };
+        let rest = bracketed_root(before, after, before.u, |node| (node.u, law.rate(node.xi, node.u)), &mut node_at)?;
+        last = Node { u: 0.0, ..rest };
     }
     if last.xi < distance {
         return Ok((LegEnd::Rest, last));
     }
-    let time = bracketed_root((before.time, before.xi - distance), (last.time, last.xi - distance), |t| {
-        Ok(at(t)?.0 - distance)
-    })?;
-    let u = if time == last.time { last.u } else { at(time)?.1.max(0.0) };
-    Ok((LegEnd::Boundary, Node { time, xi: distance, u }))
+    let boundary = bracketed_root(before, last, distance, |node| (node.xi - distance, node.u), &mut node_at)?;
+    Ok((LegEnd::Boundary, Node { xi: distance, u: boundary.u.max(0.0), ..boundary }))
 }
 
 /// Largest number of evaluations of [`bracketed_root`]; from half of them on the bracket is halved each time.
 const ROOT_EVALUATIONS_MAX: u32 = 120;
 
-/// Root of `f` between two points `(t, f(t))` of opposite sign, zero counting as the sign of the second.
+/// Node of `at` where `f` is zero, between two nodes with values of opposite sign, zero counting as the second's.
 ///
-/// Regula falsi of the Illinois kind, eight evaluations as a rule, down to two units of the last place of t.
+/// `f` gives value and slope; `size` is what the value is rounded to the last place of. An evaluation of `at` costs as
+/// much as a third of a step, and the slope by the law nothing: the slopes at both ends give a guess and Newton's method
+/// the rest, two or three evaluations as a rule; where that leaves the bracket, the bracket is halved. No slope decides
+/// that a root is reached, for an interpolant may be far from the law.
 fn bracketed_root(
-    (mut a, mut fa): (f64, f64),
-    (mut b, mut fb): (f64, f64),
-    mut f: impl FnMut(f64) -> Result<f64, DiffsolError>,
-) -> Result<f64, DiffsolError> {
+    before: Node,
+    after: Node,
+    size: f64,
+    f: impl Fn(Node) -> (f64, f64),
+    mut at: impl FnMut(f64) -> Result<Node, DiffsolError>,
+) -> Result<Node, DiffsolError> {
+    let (mut a, mut b, mut end) = (before.time, after.time, after);
+    let ((fa, slope_a), (mut fb, slope_b)) = (f(before), f(after));
+    // The rounding of the value, and of the time over the mean slope.
+    let nothing = 2.0 * f64::EPSILON * (size + (b * (fb - fa) / (b - a)).abs());
+    let mut guess = a + (b - a) * cubic_root(fa, fb, slope_a * (b - a), slope_b * (b - a));
     for evaluation in 0..ROOT_EVALUATIONS_MAX {
-        if fb == 0.0 || (b - a).abs() <= 2.0 * f64::EPSILON * a.abs().max(b.abs()) {
+        if fb.abs() <= nothing || (b - a).abs() <= 2.0 * f64::EPSILON * a.abs().max(b.abs()) {
             break;
         }
-        let secant = b - fb * ((b - a) / (fb - fa));
-        let inside = secant > a.min(b) && secant < a.max(b);
-        let t = if inside && evaluation < ROOT_EVALUATIONS_MAX / 2 { secant } else { a + 0.5 * (b - a) };
+        let is_inside = guess > a.min(b) && guess < a.max(b) && evaluation < ROOT_EVALUATIONS_MAX / 2;
+        let t = if is_inside { guess } else { a + 0.5 * (b - a) };
         if t == a || t == b {
             break;
         }
-        let ft = f(t)?;
-        if (ft < 0.0) == (fb < 0.0) && ft != 0.0 {
-            // The same end moves twice: the weight of the other is halved, or it would never move.
-            fa *= 0.5;
-        } else {
-            (a, fa) = (b, fb);
+        let node = at(t)?;
+        let (ft, slope) = f(node);
+        guess = t - ft / slope;
+        if (ft < 0.0) != (fb < 0.0) {
+            a = b;
         }
-        (b, fb) = (t, ft);
+        (b, fb, end) = (t, ft, node);
     }
-    Ok(b)
+    Ok(end)
+}
+
+/// Root of the cubic with the values `f0` and `f1` and the slopes `d0` and `d1` at 0 and 1, by Newton's method: a guess,
+/// which may be anything where that fails.
+fn cubic_root(f0: f64, f1: f64, d0: f64, d1: f64) -> f64 {
+    let (cubic, square) = (2.0 * (f0 - f1) + d0 + d1, 3.0 * (f1 - f0) - 2.0 * d0 - d1);
+    let mut t = f0 / (f0 - f1);
+    for _ in 0..6 {
+        t -= (((cubic * t + square) * t + d0) * t + f0) / ((3.0 * cubic * t + 2.0 * square) * t + d0);
+    }
+    t
 }
 
 /// Flies `problem` leg by leg with `fly_leg`.
@@ -1205,27 +1223,64 @@ mod tests {
     #[test]
     fn boundary_crossed_twice_within_a_step_is_found_at_its_first_crossing() {
         // xi = 2 t - t², u = 2 - 2 t: past 0.75 at t = 0.5, at rest past it at t = 1, back before it at t = 1.5.
+        let law = Law { p: 2.0, ..Law::default() };
         let at = |t: f64| Ok((2.0 * t - t * t, 2.0 - 2.0 * t));
         let before = Node { time: 0.0, xi: 0.0, u: 2.0 };
         let after = Node { time: 1.9, xi: 0.19, u: -1.8 };
-        let (end, place) = locate(before, after, 0.75, at).unwrap();
+        let (end, place) = locate(&law, before, after, 0.75, at).unwrap();
         assert_eq!((end, place.xi), (LegEnd::Boundary, 0.75));
         assert!((place.time - 0.5).abs() < 1e-15 && (place.u - 1.0).abs() < 1e-15, "{place:?}");
-        let (end, place) = locate(before, after, 1.25, at).unwrap();
+        let (end, place) = locate(&law, before, after, 1.25, at).unwrap();
         assert_eq!((end, place.u), (LegEnd::Rest, 0.0));
         assert!((place.time - 1.0).abs() < 1e-15 && (place.xi - 1.0).abs() < 1e-15, "{place:?}");
         // Touching counts as reached.
-        let (end, place) = locate(before, after, 1.0, at).unwrap();
+        let (end, place) = locate(&law, before, after, 1.0, at).unwrap();
         assert_eq!(end, LegEnd::Boundary);
         assert!(place.u.abs() < 1e-7, "{place:?}");
     }
 
     #[test]
-    fn bracketed_root_is_exact_for_flat_and_steep_functions() {
+    fn bracketed_root_is_exact_for_flat_and_steep_functions_whatever_the_slopes() {
+        let node = |time| Node { time, xi: 0.0, u: 0.0 };
         for exponent in [1, 3, 9, 31] {
-            let f = |t: f64| (t - 0.3).powi(exponent);
-            let root = bracketed_root((0.0, f(0.0)), (1.0, f(1.0)), |t| Ok(f(t))).unwrap();
-            assert!(f(root).abs() < 1e-15, "{exponent}: {root}");
+            let value = |t: f64| (t - 0.3).powi(exponent);
+            let slope = |t: f64| f64::from(exponent) * (t - 0.3).powi(exponent - 1);
+            // Right, wrong, far too flat or steep, and none.
+            for share in [1.0, -3.0, 1e-3, 1e3, 1e300, 0.0, f64::INFINITY, f64::NAN] {
+                let f = |node: Node| (value(node.time), share * slope(node.time));
+                let mut evaluations = 0;
+                let at = |t| {
+                    evaluations += 1;
+                    Ok(node(t))
+                };
+                let root = bracketed_root(node(0.0), node(1.0), 0.0, f, at).unwrap();
+                assert!(value(root.time).abs() < 1e-15, "{exponent}, {share}: {}", root.time);
+                assert!(evaluations <= ROOT_EVALUATIONS_MAX);
+            }
+        }
+    }
+
+    #[test]
+    fn an_event_takes_few_evaluations_of_the_interpolant() {
+        // u' = -(p + q u²) from u = 1 in one step past rest, and in one to a depth before it.
+        let law = Law { p: 1.0, q: 0.5, ..Law::default() };
+        let (root, speed) = (0.5_f64.sqrt(), 0.5_f64.sqrt().atan());
+        let u = |t: f64| (speed - root * t).tan() / root;
+        let xi = |t: f64| 2.0 * ((speed - root * t).cos() / speed.cos()).ln();
+        let rest = speed / root;
+        let node = |share: f64| Node { time: share * rest, xi: xi(share * rest), u: u(share * rest) };
+        // Rest, a boundary well before it, and one that it has all but reached.
+        for (after, distance, most) in [(1.05, 1.0, 3), (0.95, xi(0.9 * rest), 3), (1.05, 0.999 * xi(rest), 12)] {
+            let mut evaluations = 0;
+            let at = |t: f64| {
+                evaluations += 1;
+                Ok((xi(t), u(t)))
+            };
+            let (end, place) = locate(&law, node(0.8), node(after), distance, at).unwrap();
+            assert_eq!(end, if distance == 1.0 { LegEnd::Rest } else { LegEnd::Boundary });
+            let f = if distance == 1.0 { u(place.time) } else { xi(place.time) - distance };
+            assert!(f.abs() < 1e-15, "{place:?}");
+            assert!(evaluations <= most, "{after}, {distance}: {evaluations}");
         }
     }
 

@@ -355,9 +355,24 @@ struct Course<'a, S, const K: usize, const L: usize> {
     cost: Cost,
     /// Error bar of `W/V0²` so far.
     bar: f64,
-    /// Least `V/V0` at the stage ends passed so far, and the greatest bar there.
-    least_at_ends: f64,
-    bar_at_ends: f64,
+    /// Least `W/V0²` at the stage ends passed so far.
+    least_at_ends: Barred,
+}
+
+/// A value within an error bar.
+#[derive(Clone, Copy)]
+struct Barred {
+    value: f64,
+    bar: f64,
+}
+
+impl Barred {
+    /// The lesser of the two. The bar of the greater counts as far as it reaches below that of the lesser.
+    fn min(self, other: Self) -> Self {
+        let (lesser, greater) = if self.value <= other.value { (self, other) } else { (other, self) };
+        let bar = lesser.bar.max(greater.bar - (greater.value - lesser.value));
+        Self { bar, ..lesser }
+    }
 }
 
 impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
@@ -373,8 +388,7 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             trajectory: Vec::new(),
             cost: Cost::default(),
             bar: 0.0,
-            least_at_ends: f64::INFINITY,
-            bar_at_ends: 0.0,
+            least_at_ends: Barred { value: f64::INFINITY, bar: 0.0 },
         }
     }
 
@@ -404,6 +418,13 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         Err(IntegrationError::NeverEnds { why: "a stage was crossed and not left", last: self.state.values() })
     }
 
+    /// `W/V0²` here.
+    #[inline(always)]
+    fn energy(&self) -> Barred {
+        let relative = self.state.velocity.value() / self.problem.impact_speed.value();
+        Barred { value: relative * relative, bar: self.bar }
+    }
+
     /// Lists the stage ends at the present depth and enters the stage beyond them.
     #[inline(always)]
     fn pass_ends(&mut self) {
@@ -413,9 +434,7 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
             self.problem.stages[self.stage].end.value() < self.state.depth.value()
         ) {
             self.push(EventKind::boundary(self.problem, self.stage));
-            let relative = self.state.velocity.value() / self.problem.impact_speed.value();
-            self.least_at_ends = self.least_at_ends.min(relative);
-            self.bar_at_ends = self.bar_at_ends.max(self.bar);
+            self.least_at_ends = self.least_at_ends.min(self.energy());
             self.stage += 1;
         }
     }
@@ -536,8 +555,10 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
     /// Adds the error of one step to the bar of `W/V0²`, in energy over depth, where it never grows:
     ///
     /// ```text
-    /// d(dW)/dx = -(r/V + 2 q) dW/M,  so  dW -> dW/(1 + r t/M + 2 q x/M) at most over the step
+    /// d(dW)/dx = -(r/V + 2 q) dW/M,  so  dW -> dW e^-(r t/M + 2 q x/M)  over the step
     /// ```
+    ///
+    /// bounded by [`exit_energy::exp_from_below`], so that drag which takes 1e30 of W takes nearly as much of its error.
     ///
     /// A step adds `2 V dV` for V: three roundings of the greatest (the sum of the series cannot exceed a few times V,
     /// the time of the step is short of its radius) and one tolerance of truncation; and `2 F dx/M`, `F` the sum of the
@@ -554,7 +575,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         let relative = unit_velocity / self.problem.impact_speed.value();
         let rounding = 6.0 * fastest * fastest + 3.0 * force * (depth + 2.0 * way);
         let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * fastest * fastest;
-        self.bar = self.bar / (1.0 + r * end.time.value() + 2.0 * q * way) + relative * relative * added;
+        self.bar =
+            self.bar / exit_energy::exp_from_below(r * end.time.value() + 2.0 * q * way) + relative * relative * added;
     }
 
     #[inline(always)]
@@ -563,8 +585,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         let (margin, bar) = if !problem.has_exit() {
             (None, None)
         } else if through {
-            let least = self.least_at_ends.min(self.state.velocity.value() / problem.impact_speed.value());
-            (Some(least * least), Some(self.bar.max(self.bar_at_ends)))
+            let least = self.least_at_ends.min(self.energy());
+            (Some(least.value), Some(least.bar))
         } else {
             let scale = problem.impact_speed.value();
             let beyond = exit_energy::energy_beyond_stop(problem, self.stage, self.state.depth.value());

@@ -18,6 +18,14 @@ pub(crate) fn expm1_over(z: f64) -> f64 {
     if z == 0.0 { 1.0 } else { z.exp_m1() / z }
 }
 
+/// `(1 + z/8)^8`, which is below `e^z` for z > 0, by 6 % at z = 1; a bound in four multiplications.
+#[inline(always)]
+pub(crate) fn exp_from_below(z: f64) -> f64 {
+    let root = 1.0 + 0.125 * z;
+    let fourth = (root * root) * (root * root);
+    fourth * fourth
+}
+
 /// `(y + expm1(-y))/y²`, 1/2 at zero.
 ///
 /// Below |y| = 0.3 by its Taylor series, whose first neglected term is under 1e-18; above, the subtraction costs at

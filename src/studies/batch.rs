@@ -18,7 +18,7 @@ use super::critical_velocity;
 use super::random_scenes::Generator;
 use super::table_text::shortened;
 use crate::integrators::batch::{Batch, Summary};
-use crate::integrators::{Detail, Method, Taylor, keeping};
+use crate::integrators::{Detail, IntegrationError, Method, Taylor, keeping};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, semi_empirical};
 
 /// Columns that a table may have, in the order of the contract.
@@ -64,7 +64,7 @@ pub const RESULT_COLUMNS: [(&str, Kind); 10] = [
 const RESULT_NUMBERS: usize = RESULT_COLUMNS.len() - 3;
 
 /// Rows that are worked on together: one block of lanes.
-pub const PART: usize = 1024;
+pub const PART: usize = 256;
 
 /// Why a table cannot be used at all (exit code 2).
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -360,42 +360,39 @@ impl Answer {
 ///
 /// The default Taylor method flies in lanes ([`Batch`]), any other row by row. An error is what is wrong with the
 /// row, or what could not be computed; it stops no other row.
-#[expect(clippy::needless_pass_by_value, reason = "the scenes are used up, part by part")]
-pub fn answers(
-    scenes: Vec<Result<Scene, String>>,
-    method: &Method,
-    with_critical: bool,
-) -> Vec<Result<Answer, String>> {
-    let problems: Vec<Result<Problem, String>> = scenes
+pub fn answers(scenes: &[Result<Scene, String>], method: &Method, with_critical: bool) -> Vec<Result<Answer, String>> {
+    let mut problems = Vec::with_capacity(scenes.len());
+    // What a scene without a problem has instead.
+    let causes: Vec<Option<String>> = scenes
         .iter()
-        .map(|scene| scene.as_ref().map_err(Clone::clone)?.problem().map_err(|error| error.to_string()))
+        .map(|scene| match scene {
+            Ok(scene) => scene.problem().map(|problem| problems.push(problem)).err().map(|error| error.to_string()),
+            Err(cause) => Some(cause.clone()),
+        })
         .collect();
-    let mut answers: Vec<Result<Answer, String>> = match method {
+    let answer = |flight, stable| Answer { flight, critical_velocity: None, stable };
+    let flown: Vec<Result<Answer, IntegrationError>> = match method {
         Method::Taylor(taylor) if *taylor == Taylor::default() => {
-            let good: Vec<Problem> = problems.iter().filter_map(|problem| problem.as_ref().ok().cloned()).collect();
-            let mut flights = Batch::new().fly(&good).into_iter();
-            let mut next = || flights.next().map(|flight| flight.map_err(|error| error.to_string()));
-            problems
-                .into_iter()
-                .map(|problem| {
-                    problem?;
-                    let flight = next().unwrap_or_else(|| Err("no answer".to_owned()))?;
-                    Ok(Answer { flight, critical_velocity: None, stable: true })
-                })
-                .collect()
+            Batch::new().fly(&problems).into_iter().map(|flight| Ok(answer(flight?, true))).collect()
         }
         _ => keeping(method.integrator(), |integrator| {
-            let fly = |problem: &Result<Problem, String>| {
-                let problem = problem.as_ref().map_err(Clone::clone)?;
-                let flight = integrator.fly(problem, Detail::Events).map_err(|error| error.to_string())?;
-                let stable = flight.step_limit.is_none_or(|limit| limit.stable);
-                Ok(Answer { flight: Summary::from(&flight), critical_velocity: None, stable })
+            let fly = |problem: &Problem| {
+                let flight = integrator.fly(problem, Detail::Events)?;
+                Ok(answer(Summary::from(&flight), flight.step_limit.is_none_or(|limit| limit.stable)))
             };
             problems.iter().map(fly).collect()
         }),
     };
+    let mut flown = flown.into_iter();
+    let mut answers: Vec<Result<Answer, String>> = causes
+        .into_iter()
+        .map(|cause| match cause {
+            Some(cause) => Err(cause),
+            None => flown.next().map_or_else(|| Err("no answer".to_owned()), |a| a.map_err(|error| error.to_string())),
+        })
+        .collect();
     if with_critical {
-        for (answer, scene) in answers.iter_mut().zip(&scenes) {
+        for (answer, scene) in answers.iter_mut().zip(scenes) {
             let (Ok(found), Ok(scene)) = (&mut *answer, scene) else { continue };
             if scene.thickness.is_some() {
                 match critical_velocity::of_scene(scene, method.integrator()) {
@@ -501,12 +498,9 @@ pub fn result_header() -> String {
 
 /// The shortest digits that read back to the same number; with an exponent where there would be many zeros.
 fn push_number(text: &mut String, value: f64) {
-    let magnitude = value.abs();
-    let _ = if value == 0.0 || (1e-7..1e17).contains(&magnitude) {
-        write!(text, "{value}")
-    } else {
-        write!(text, "{value:e}")
-    };
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format(value);
+    text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
 }
 
 /// A character as a message in a table may have it: messages are one line.
@@ -546,11 +540,11 @@ mod tests {
         // Eq. 14: 72/sqrt(36).
         assert_eq!((concrete.static_factor, concrete.inertia_factor, concrete.crater_ratio), (12.0, 1.0, 2.0));
         let method = Method::Taylor(Taylor::default());
-        let answer = answers(vec![Ok(scene)], &method, true).remove(0).unwrap();
+        let answer = answers(&[Ok(scene)], &method, true).remove(0).unwrap();
         assert!((answer.flight.end.depth - 0.144_826_200_112_217_07).abs() < 1e-15);
         assert_eq!(answer.critical_velocity, None);
         row.numbers[0] = Some(-2.0);
-        assert!(answers(vec![row.scene()], &method, false)[0].as_ref().unwrap_err().contains("mass"));
+        assert!(answers(&[row.scene()], &method, false)[0].as_ref().unwrap_err().contains("mass"));
         row.numbers[10] = None;
         assert_eq!(row.scene().unwrap_err(), "velocity_m_s: empty, and every scene needs it");
         row.criterion = Some("half");

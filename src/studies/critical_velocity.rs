@@ -28,6 +28,9 @@ const PROBE_SPEED: f64 = 1.0;
 /// narrow enough for one secant step to leave nothing of an affine function's error.
 const PREDICTION_WIDTH: f64 = 1.0 / 1_048_576.0;
 
+/// Flights in which the root of an affine W is found and confirmed: the secant, its correction, one beside it.
+const AT_ONCE_MAX: u32 = 4;
+
 /// Expansions of the bracket, the factor squared each time: from 4 to beyond the range of the numbers.
 const EXPANSIONS_MAX: u32 = 12;
 
@@ -37,6 +40,9 @@ const SLOWEST: f64 = 1e-14;
 /// Jump of W over u tolerated where a method states no error bar. A scheme that sees the exit at the end of its step
 /// leaves far less at any sensible step; an outcome in place of a margin leaves one.
 const JUMP_MAX: f64 = 0.1;
+
+/// Share of `V_c` from which an error bar leaves nothing to say.
+const UNDECIDED: f64 = 0.5;
 
 /// Where to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,6 +157,17 @@ pub enum CriticalError<E: Display> {
         /// Upper end of the bracket.
         high: End,
     },
+    /// The error bar leaves no digit of `V_c`: exit code 4.
+    #[error(
+        "V_c is undecided: {} m/s with an error bar of {} m/s, the exit energy lost in its round-off",
+        Shown(*.velocity), Shown(*.error_bar)
+    )]
+    Undecided {
+        /// Where the search ended [m/s].
+        velocity: f64,
+        /// Half-width of the error bar there [m/s].
+        error_bar: f64,
+    },
     /// The tolerance was not reached.
     #[error("tolerance not reached after {flights} flights ({reason}), between {low} and {high}")]
     NotConverged {
@@ -187,7 +204,7 @@ impl<E: Display> CriticalError<E> {
 /// The root of W(exit) over V0², to the round-off of W or the error bar of the integrator. An exit depth of zero, and a
 /// target that is perforated at any speed (it only drives or drags), give `V_c = 0` with a note.
 ///
-/// Flights: six as a rule where W is affine in V0², about twelve where viscosity bends it, up to fifty where the
+/// Flights: four as a rule where W is affine in V0², about twelve where viscosity bends it, up to fifty where the
 /// integrator's W jumps.
 ///
 /// # Errors
@@ -217,10 +234,18 @@ pub fn critical_velocity<E: Display>(
         let slowest = shooting.tally.borrow().last.velocity();
         return Ok(at_any_speed(0.0, Some(slowest), shooting.tally.take(), "the target is perforated at any speed"));
     };
+    // Of an affine W the secant of any bracket is the root, and a flight beside it confirms that. Where the error bars
+    // hide it the method of Brent halves the bracket down, which is short once that is closed in on.
     let affine = probe.stages.iter().all(|stage| stage.viscosity == 0.0);
-    let bracket = shooting.narrow(bracket, affine)?;
+    let at_once = if affine { shooting.refine(bracket, options.rtol, AT_ONCE_MAX)? } else { None };
+    let (bracket, (root, slope)) = if let Some(found) = at_once {
+        (bracket, found)
+    } else {
+        let bracket = shooting.narrow(bracket, affine)?;
+        let found = shooting.refine(bracket, options.rtol, options.flights_max)?;
+        (bracket, found.ok_or_else(|| shooting.not_converged("the flights allowed are spent".to_owned(), bracket))?)
+    };
     let resolution = bracket.resolution(options.rtol);
-    let (root, slope) = shooting.refine(bracket, resolution)?;
 
     let is_root = match root.bar {
         Some(bar) => slope > 0.0 && root.w.abs() <= 2.0 * (bar + slope * resolution),
@@ -230,13 +255,15 @@ pub fn critical_velocity<E: Display>(
         return Err(CriticalError::Jump { at: root.end(), low: bracket.low.end(), high: bracket.high.end() });
     }
     let velocity = root.velocity();
+    // dV = du / 2V.
+    let error_bar = root.bar.map(|bar| ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity));
+    if let Some(error_bar) = error_bar.filter(|bar| !(*bar < UNDECIDED * velocity)) {
+        return Err(CriticalError::Undecided { velocity, error_bar });
+    }
     let tally = shooting.tally.take();
     Ok(CriticalVelocity {
         velocity,
-        error_bar: root.bar.map(|bar| {
-            // dV = du / 2V.
-            ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity)
-        }),
+        error_bar,
         energy: fault!("critical-energy", 0.5, 1.0) * probe.mass * root.u,
         evaluations: tally.flights,
         cost: tally.cost,
@@ -512,8 +539,15 @@ where
         Ok(narrower.with(self.shoot(root * (1.0 - width))?))
     }
 
-    /// The flight at the root within a bracket, by the method of Brent, and dW/du there.
-    fn refine(&self, bracket: Bracket, resolution: f64) -> Result<(Shot, f64), CriticalError<E>> {
+    fn not_converged(&self, reason: String, bracket: Bracket) -> CriticalError<E> {
+        let flights = self.tally.borrow().flights;
+        CriticalError::NotConverged { flights, reason, low: bracket.low.end(), high: bracket.high.end() }
+    }
+
+    /// The flight at the root within a bracket, by the method of Brent, and dW/du there; `None` when `flights_max` more
+    /// flights do not tell it.
+    fn refine(&self, bracket: Bracket, rtol: f64, flights_max: u32) -> Result<Option<(Shot, f64)>, CriticalError<E>> {
+        let resolution = bracket.resolution(rtol);
         let unit = bracket.secant_root();
         let objective = Objective {
             shooting: self,
@@ -526,18 +560,14 @@ where
         // The solver stops at a half-width of 2 eps |b| + tol/2.
         let tolerance = 2.0 * resolution / unit - 4.0 * f64::EPSILON;
         let solver = BrentRoot::new(bracket.low.u / unit, bracket.high.u / unit, tolerance.max(0.0));
-        let flights_max = u64::from(self.flights_max);
+        // The iteration that sees the end flies no more.
+        let iterations = u64::from(flights_max) + 1;
         let run = Executor::new(&objective, solver)
-            .configure(|state: IterState<f64, (), (), (), (), f64>| state.max_iters(flights_max))
+            .configure(|state: IterState<f64, (), (), (), (), f64>| state.max_iters(iterations))
             .ctrlc(false)
             .timer(false)
             .run();
-        let failed = |reason: String| CriticalError::NotConverged {
-            flights: self.tally.borrow().flights,
-            reason,
-            low: bracket.low.end(),
-            high: bracket.high.end(),
-        };
+        let failed = |reason: String| self.not_converged(reason, bracket);
         if let Some(failure) = objective.failure.take() {
             return Err(match failure {
                 CriticalError::NotConverged { reason, .. } => failed(reason),
@@ -545,8 +575,10 @@ where
             });
         }
         let state = run.map_err(|error| failed(error.to_string()))?.state;
-        if *state.get_termination_status() != TerminationStatus::Terminated(TerminationReason::SolverConverged) {
-            return Err(failed(state.get_termination_status().to_string()));
+        match state.get_termination_status() {
+            TerminationStatus::Terminated(TerminationReason::SolverConverged) => {}
+            TerminationStatus::Terminated(TerminationReason::MaxItersReached) => return Ok(None),
+            other => return Err(failed(other.to_string())),
         }
         // The last value and not the best one, which is the same for a root: where W jumps the best may be the first
         // flight that landed on the lower tread, while the last stands at the jump.
@@ -568,11 +600,11 @@ where
                 slope = (other.w - shot.w) / (other.u - shot.u);
             }
         }
-        Ok((shot, slope))
+        Ok(Some((shot, slope)))
     }
 }
 
-/// Flights of a root finding that are remembered without an allocation; it takes six as a rule.
+/// Flights of a root finding that are remembered without an allocation; it takes four as a rule.
 const FLIGHTS_INLINE: usize = 16;
 
 /// W over u as argmin sees it: both in units near one.
@@ -780,9 +812,35 @@ mod tests {
     }
 
     #[test]
-    fn usual_slab_takes_six_flights() {
+    fn a_slab_that_takes_nearly_all_of_v0_is_searched_in_time_or_over_depth() {
+        // e^y times the static work per mass is V_c², e^130 of it at last.
+        for h in [12.0, 20.0, 40.0] {
+            let slab = Slab { h, ..SLAB };
+            let (exact, drag) = (slab.critical(), 2.0 * slab.q * h / slab.mass);
+            assert!(drag > 38.0);
+            let integrators: [&dyn Integrator; 2] = [&Energy::new(), &Taylor::default()];
+            for integrator in integrators {
+                let found = search(slab, integrator).unwrap();
+                assert!((found.velocity / exact - 1.0).abs() < 1e-15 * drag, "{found:?} and not {exact}");
+                assert!((found.velocity - exact).abs() < found.error_bar.unwrap(), "{found:?} and not {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_error_bar_that_leaves_no_digit_is_undecided_and_not_a_number() {
+        // A bar of some ulp of V0², where the drag takes 1e17 of that.
+        let slab = Slab { h: 12.0, ..SLAB };
+        let coarse = Oracle(|problem: &Problem| (true_margin(problem), Some(1e-15)));
+        let refusal = search(slab, &coarse).unwrap_err();
+        let CriticalError::Undecided { velocity, error_bar } = refusal else { panic!("{refusal}") };
+        assert!(2.0 * error_bar >= velocity, "{velocity} {error_bar}");
+    }
+
+    #[test]
+    fn usual_slab_takes_four_flights() {
         let found = search(SLAB, &Energy::new()).unwrap();
-        assert_eq!(found.evaluations, 6);
+        assert_eq!(found.evaluations, 4);
         assert_eq!(found.note, "");
         assert!(found.bracket.0 < found.velocity && found.velocity < found.bracket.1);
         assert!(found.cost.force_evaluations > 0);
@@ -929,9 +987,9 @@ mod tests {
 
     #[test]
     fn flights_are_bounded() {
-        let options = Options { flights_max: 5, ..Options::default() };
+        let options = Options { flights_max: 3, ..Options::default() };
         let refusal = critical_velocity(|v0| SLAB.at(v0), &Energy::new(), options).unwrap_err();
-        assert!(matches!(refusal, CriticalError::NotConverged { flights: 5, .. }), "{refusal}");
+        assert!(matches!(refusal, CriticalError::NotConverged { flights: 3, .. }), "{refusal}");
     }
 
     #[test]

@@ -83,7 +83,8 @@ def stage_flight(stage, request, lanes):
             integrator.time = t
         else:
             integrator.set_time(t)
-        fired = propagate(integrator, lanes, t, natural_time(x, v))
+        # Under a constant force rest is at the natural time itself, and an event on the end of a window is lost.
+        fired = propagate(integrator, lanes, t, 1.0625 * natural_time(x, v))
         if lanes == 1:
             (end_x, end_v), end_t = state.tolist(), integrator.time
         else:

@@ -318,7 +318,8 @@ fn shipped(name: &str) -> Scene {
     Scene::from_toml(text, name).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// `--count ROW METHOD RTOL SCENE FLIGHTS`: that many flights and nothing else, for Callgrind to count.
+/// `--count ROW METHOD RTOL SCENE FLIGHTS`: that many flights and nothing else, for Callgrind to count. The scene `varied`
+/// is another in each flight.
 fn count(arguments: &[String]) {
     let [row, method, rtol, scene, flights] = arguments else {
         panic!("--count ROW METHOD RTOL SCENE FLIGHTS, such as --count 'diffsol by hand' tsit45 1e-6 tunnel 1000");
@@ -326,8 +327,14 @@ fn count(arguments: &[String]) {
     let rtol: f64 = rtol.parse().expect("a tolerance");
     let is_asked = |one: &Config| one.row == row && one.method.name() == method && one.rtol == rtol;
     let config = configs().into_iter().find(is_asked).unwrap_or_else(|| panic!("no {row}, {method}, at {rtol}"));
-    let problem = shipped(scene).problem().unwrap_or_else(|error| panic!("{error}"));
-    let problems = vec![problem; flights.parse().expect("a number of flights")];
+    let flights: usize = flights.parse().expect("a number of flights");
+    let mut generator = Generator::new(1, "bench");
+    let scenes: Vec<Scene> = match scene.as_str() {
+        "varied" => (0..flights).map(|_| generator.next_scene()).collect(),
+        name => vec![shipped(name); flights],
+    };
+    let problems: Vec<Problem> =
+        scenes.iter().map(|scene| scene.problem().unwrap_or_else(|error| panic!("{error}"))).collect();
     fly_all(config, &problems, |found| {
         let _ = black_box(found);
     });
