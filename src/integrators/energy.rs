@@ -232,7 +232,7 @@ pub fn exit_energy_of<S: Scalar>(problem: &Problem<S>) -> Result<Option<S>, Inte
 /// Refuses a problem with viscosity before its exit.
 fn refuse_viscosity<S: Scalar>(problem: &Problem<S>) -> Result<(), IntegrationError> {
     for (index, stage) in problem.stages.iter().enumerate() {
-        if index > 0 && problem.start_of(index).value() >= problem.exit_depth.value() {
+        if problem.start_of(index).value() >= problem.exit_depth.value() {
             break;
         }
         if stage.viscosity.value() != 0.0 {
@@ -877,6 +877,34 @@ mod tests {
         assert!(depth < 5e-15, "depth {depth:e}");
         assert!(time < 1e-13, "time {time:e}");
         assert!(speed < 2e-14, "velocity {speed:e}");
+    }
+
+    #[test]
+    fn stages_that_the_flight_does_not_reach_are_not_asked() {
+        // Over M V0² the second force is beyond the range of f64.
+        let stages = [stage(0.1, 0.0, 0.0, 0.5), stage(1e300, 0.0, 0.0, f64::INFINITY)];
+        let of = |exit| staged(1e-200, 1e100, exit, &stages);
+        assert!(matches!(Energy::new().fly(&of(0.6), Detail::End), Err(IntegrationError::NotFinite { .. })));
+        assert_eq!(Energy::new().fly(&of(0.4), Detail::End).unwrap().outcome, Outcome::Perforated);
+        assert!(Energy::new().exit_margin_in(&of(0.4)).unwrap().is_some());
+        let stopping = [stage(1e6, 0.0, 0.0, 0.5), stages[1]];
+        assert_eq!(Energy::new().fly(&staged(1e-9, 10.0, f64::INFINITY, &stopping), Detail::End).unwrap().stage, 0);
+        // Nor is their viscosity, which is not flown through.
+        let viscous = [Stage { viscosity: 1.0, ..stage(1.0, 0.0, 0.0, f64::INFINITY) }];
+        assert!(Energy::new().fly(&staged(2.0, 10.0, 0.0, &viscous), Detail::End).is_ok());
+    }
+
+    #[test]
+    fn a_margin_out_of_range_is_an_error_with_the_last_speed() {
+        let endless = [stage(0.0, 1e300, 0.0, f64::INFINITY)];
+        let error = Energy::new().exit_margin_in(&staged(1.0, 3.0, 1e10, &endless)).unwrap_err();
+        assert!(matches!(error, IntegrationError::NotFinite { what: "V²", .. }), "{error}");
+        assert_eq!(error.last().map(|last| (last.depth, last.velocity)), Some((0.0, 3.0)));
+    }
+
+    #[test]
+    fn the_root_of_nothing_has_no_infinite_derivative() {
+        assert_eq!(root_of(Dual64::new(0.0, 1.0)).eps, 0.0);
     }
 
     /// The bar of the margin is a bound: the same code in double-double, from the same coefficients, is the reference.

@@ -294,3 +294,67 @@ pub fn keeping<R>(integrator: &dyn Integrator, mut work: impl FnMut(&dyn Integra
     integrator.keep(&mut |kept| result = Some(work(kept)));
     result.unwrap_or_else(|| work(integrator))
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::physics::{Stage, Target};
+
+    fn problem(ends: &[f64], impact_speed: f64, exit_depth: f64) -> Problem {
+        let stages = ends.iter().map(|&end| Stage { end, ..Stage::tunnel(1.0, 0.0) }).collect();
+        Problem { mass: 1.0, impact_speed, exit_depth, stages, crater: None, target: Target::Stages }
+    }
+
+    #[test]
+    fn a_flight_that_never_starts_lists_what_lies_at_the_face() {
+        let flight = |ends: &[f64], speed, exit| Flight::at_once(&problem(ends, speed, exit)).unwrap();
+        let kinds = |flight: &Flight| flight.events.iter().map(|e| e.kind).collect::<Vec<_>>();
+        let still = flight(&[0.0, 1.0, f64::INFINITY], 0.0, 2.0);
+        assert_eq!((still.outcome, still.stage, still.exit_margin), (Outcome::Stopped, 1, None));
+        assert_eq!(kinds(&still), [EventKind::StageEnd(0), EventKind::Rest]);
+        assert_eq!(still.exit_margin_error, None);
+        let bare = flight(&[f64::INFINITY], 3.0, 0.0);
+        assert_eq!(
+            (bare.outcome, bare.exit_margin, bare.exit_margin_error),
+            (Outcome::Perforated, Some(1.0), Some(0.0))
+        );
+        assert_eq!(kinds(&bare), [EventKind::Exit]);
+        let neither = flight(&[f64::INFINITY], 0.0, 0.0);
+        assert_eq!((neither.outcome, neither.exit_margin), (Outcome::Perforated, None));
+        assert_eq!(neither.exit_margin_error, None);
+        assert_eq!(kinds(&neither), [EventKind::Exit, EventKind::Rest]);
+        assert_eq!(Flight::at_once(&problem(&[f64::INFINITY], 3.0, 2.0)), None);
+        // A list whose last stage ends breaks an invariant; the stage named is one of the list all the same.
+        assert_eq!(flight(&[0.0], 0.0, 2.0).stage, 0);
+    }
+
+    #[test]
+    fn a_method_of_variable_order_names_none() {
+        assert_eq!(crate::integrators::Taylor::default().order(), None);
+    }
+
+    #[test]
+    fn costs_add_up_kind_by_kind() {
+        let mut cost = Cost { steps: 2, rejected_steps: 3, force_evaluations: 5 };
+        cost += Cost { steps: 7, rejected_steps: 11, force_evaluations: 13 };
+        assert_eq!(cost, Cost { steps: 9, rejected_steps: 14, force_evaluations: 18 });
+    }
+
+    #[test]
+    fn an_error_knows_whose_fault_it_is_and_what_to_change() {
+        let last = State { time: 1.0, depth: 2.0, velocity: 3.0 };
+        for (error, usage, help) in [
+            (IntegrationError::StepBudgetSpent { max_steps: 1, last }, false, "longer step"),
+            (IntegrationError::NotFinite { what: "x", last }, false, "range of 64-bit"),
+            (IntegrationError::NeverEnds { why: "x", last }, false, "thickness"),
+            (IntegrationError::SolverFailed { method: "m", cause: String::new(), last }, false, "--rtol"),
+            (IntegrationError::Refused { method: "m", why: String::new() }, true, ""),
+            (IntegrationError::BadOption { option: "o", value: String::new(), allowed: "a" }, true, ""),
+        ] {
+            assert_eq!(error.is_usage(), usage, "{error}");
+            assert_eq!(error.last(), (!usage).then_some(last), "{error}");
+            assert!(if help.is_empty() { error.help().is_empty() } else { error.help().contains(help) }, "{error}");
+        }
+    }
+}

@@ -197,7 +197,7 @@ const RECIPROCALS: [f64; 64] = {
 /// `1/k` in the number type: from the table unless the type is finer than `f64`.
 #[inline(always)]
 fn reciprocal<S: Scalar>(k: usize) -> S {
-    if S::EPSILON < f64::EPSILON { S::one() / S::from_f64(k as f64) } else { S::from_f64(RECIPROCALS[k]) }
+    if S::EPSILON < f64::EPSILON { S::one().over(S::from_f64(k as f64)) } else { S::from_f64(RECIPROCALS[k]) }
 }
 
 /// The polynomials of one step, in the units of the step: coefficients of V and of depth/time.
@@ -487,10 +487,10 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
         let stage = &problem.stages[self.stage];
         let limit = problem.limit_of(self.stage);
         // Coefficients per unit mass, once a stage.
-        let static_force = stage.static_force / problem.mass;
-        let stiffness = stage.stiffness / problem.mass;
-        let viscosity = stage.viscosity / problem.mass;
-        let drag = stage.drag / problem.mass;
+        let static_force = stage.static_force.over(problem.mass);
+        let stiffness = stage.stiffness.over(problem.mass);
+        let viscosity = stage.viscosity.over(problem.mass);
+        let drag = stage.drag.over(problem.mass);
         let frequency = if SPRING { stiffness.value().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
@@ -1355,5 +1355,94 @@ mod tests {
             assert!(relative(flight.end.depth, base.end.depth * a) < 2e-15);
             assert!(relative(flight.end.time, base.end.time * b) < 2e-15);
         }
+    }
+
+    /// Mass 2, one stage: a problem for the parts of a course that are asked directly.
+    fn alone(stage: Stage, exit_depth: f64) -> Problem {
+        let stages = Stages::from_slice(&[stage]);
+        Problem { mass: 2.0, impact_speed: 300.0, exit_depth, stages, crater: None, target: Target::Stages }
+    }
+
+    fn course_at(problem: &Problem, depth: f64, velocity: f64) -> Course<'_, f64, 22, 24> {
+        let mut course = Course::new(problem, f64::EPSILON, Detail::End);
+        course.state = State { time: 0.0, depth, velocity };
+        course
+    }
+
+    /// `V' = -V²` from V = 1 is `1/(1 + t)`: coefficients 1, -1, 1, ... of V and of x over its order.
+    #[test]
+    fn coefficients_keep_the_digits_of_double_double() {
+        let law = Stage::<f64>::tunnel(0.0, 1.0);
+        let wide = Stage {
+            static_force: TwoFloat::from(law.static_force),
+            stiffness: TwoFloat::from(0.0),
+            viscosity: TwoFloat::from(0.0),
+            drag: TwoFloat::from(law.drag),
+            end: TwoFloat::from(1.0),
+        };
+        let series = Series::<TwoFloat, 40>::new::<false, true, true>(&wide, TwoFloat::from(1.0));
+        for k in 0..40 {
+            let sign = TwoFloat::from(if k % 2 == 0 { 1.0 } else { -1.0 });
+            let way = series.advance[k] * TwoFloat::from((k + 1) as f64);
+            for off in [series.velocity[k] - sign, way - sign] {
+                assert!(off.value().abs() < 1e-28, "order {k}: {:e}", off.value());
+            }
+        }
+    }
+
+    /// Every term of the bar with its own factor, in numbers that can be followed by hand.
+    #[test]
+    fn a_step_adds_its_roundings_to_a_bar_that_fades() {
+        let problem = alone(Stage::tunnel(1.0, 0.0), f64::INFINITY);
+        let mut course = course_at(&problem, 0.0, 300.0);
+        course.bar = f64::EPSILON;
+        let law = Stage { static_force: -1.1, stiffness: 0.7, viscosity: 0.3, drag: 0.9, end: 1.0 };
+        let start = State { time: 0.0, depth: 0.0, velocity: 1.5 };
+        let end = State { time: 0.4, depth: 0.6, velocity: 1.2 };
+        course.widen_bar(&law, &start, &end, 30.0, 0.8);
+        // Force 1.1 + 0.42 + 2.475; roundings 6 V² + 3 F (0.8 + 1.2), truncation 2 V²; a hundredth of it, for V/V0 = 0.1.
+        let added = 0.01 * (6.0 * 2.25 + 3.0 * 3.995 * 2.0 + 2.0 * 2.25);
+        let expected = 1.0 / (1.0 + 0.3 * 0.4 + 2.0 * 0.9 * 0.6) + added;
+        assert!(
+            (course.bar / f64::EPSILON / expected - 1.0).abs() < 1e-14,
+            "{} for {expected}",
+            course.bar / f64::EPSILON
+        );
+    }
+
+    /// M = 2, r = 10, s = 8, p = -16: equilibrium 2 m, fast rate 2.5 + sqrt(6.25 - 4) = 4 /s.
+    #[test]
+    fn a_creep_begins_at_the_line_of_the_fast_rate_and_only_before_the_equilibrium() {
+        let stage = Stage { static_force: -16.0, stiffness: 8.0, viscosity: 10.0, drag: 0.0, end: f64::INFINITY };
+        let problem = alone(stage, f64::INFINITY);
+        for (depth, velocity, limit, creeps) in [
+            (0.5, 6.0, 2.0, true),
+            (0.5, 6.0_f64.next_up(), 2.0, false),
+            (0.5, 6.0, 2.0_f64.next_down(), false),
+            (2.0, 0.0, f64::INFINITY, false),
+        ] {
+            let refused = course_at(&problem, depth, velocity).refuse_creep(&stage, limit);
+            assert_eq!(refused.is_err(), creeps, "{depth}, {velocity}, {limit}");
+        }
+    }
+
+    /// M V/r = 4 m are left to a viscosity alone, from x = 0.5 on.
+    #[test]
+    fn a_stage_without_static_force_is_refused_for_its_own_reason() {
+        let stage = |p, r, q| Stage { viscosity: r, ..Stage::tunnel(p, q) };
+        let refused = |stage: Stage, exit: f64| course_at(&alone(stage, exit), 0.5, 3.0).refuse_endless(&stage);
+        for (stage, why) in [
+            (stage(-1.0, 0.0, 0.0), "drives"),
+            (stage(-1.0, 1.5, 0.0), "drives"),
+            (stage(0.0, 0.0, 0.0), "no resistance"),
+            (stage(0.0, 1.5, 0.0), "vanishes with the velocity"),
+            (stage(0.0, 0.0, 1.0), "vanishes with the velocity"),
+        ] {
+            let error = refused(stage, f64::INFINITY).unwrap_err().to_string();
+            assert!(error.contains(why), "{error}");
+        }
+        assert!(refused(stage(0.0, 1.5, 0.0), 4.5).is_err());
+        assert!(refused(stage(0.0, 1.5, 0.0), 4.5_f64.next_down()).is_ok());
+        assert!(refused(stage(-1.0, 1.5, 0.0), 4.5).is_ok());
     }
 }
