@@ -1402,7 +1402,8 @@ mod tests {
         course.widen_bar(&law, &start, &end, 30.0, 0.8);
         // Force 1.1 + 0.42 + 2.475; roundings 6 V² + 3 F (0.8 + 1.2), truncation 2 V²; a hundredth of it, for V/V0 = 0.1.
         let added = 0.01 * (6.0 * 2.25 + 3.0 * 3.995 * 2.0 + 2.0 * 2.25);
-        let expected = 1.0 / (1.0 + 0.3 * 0.4 + 2.0 * 0.9 * 0.6) + added;
+        let fading = (1.0_f64 + (0.3 * 0.4 + 2.0 * 0.9 * 0.6) / 8.0).powi(8);
+        let expected = 1.0 / fading + added;
         assert!(
             (course.bar / f64::EPSILON / expected - 1.0).abs() < 1e-14,
             "{} for {expected}",
