@@ -463,7 +463,7 @@ impl Damped {
     /// Way [m] and speed [m/s] after time `t` [s].
     fn after(&self, t: f64) -> (f64, f64) {
         let Self { v0, f0, w2, g, m, .. } = *self;
-        if (g + w2.sqrt()) * t < 0.5 {
+        if (g + w2.sqrt()) * t < 1.0 {
             // Taylor series of u: 20 terms leave less than 1e-18 of the sum, and nothing cancels to first order.
             let (mut u1, mut u2) = (v0 * t, -0.5 * (2.0 * g * v0 + f0) * t * t);
             let (mut way, mut speed) = (u1 + u2, u1 + 2.0 * u2);
