@@ -462,20 +462,36 @@ impl Damped {
 
     /// Way [m] and speed [m/s] after time `t` [s].
     fn after(&self, t: f64) -> (f64, f64) {
-        let Self { v0, f0, w2, g, m, .. } = *self;
-        if (g + w2.sqrt()) * t < 1.0 {
-            // Taylor series of u: 20 terms leave less than 1e-18 of the sum, and nothing cancels to first order.
-            let (mut u1, mut u2) = (v0 * t, -0.5 * (2.0 * g * v0 + f0) * t * t);
-            let (mut way, mut speed) = (u1 + u2, u1 + 2.0 * u2);
-            for n in 1..20_u32 {
-                let n = f64::from(n);
-                let u3 = -(2.0 * g * t * (n + 1.0) * u2 + w2 * t * t * u1) / ((n + 2.0) * (n + 1.0));
-                way += u3;
-                speed += (n + 2.0) * u3;
-                (u1, u2) = (u2, u3);
-            }
-            return (way, speed / t);
+        // The way cancels against the exponentials up to there, the speed loses more in the series from half of it on.
+        let span = (self.g + self.w2.sqrt()) * t;
+        if span < 0.5 {
+            self.series_after(t)
+        } else if span < 1.0 {
+            (self.series_after(t).0, self.exponentials_after(t).1)
+        } else {
+            self.exponentials_after(t)
         }
+    }
+
+    /// [`Damped::after`] by the Taylor series of u: 20 terms leave less than 1e-18 of the sum, and nothing cancels to
+    /// first order.
+    fn series_after(&self, t: f64) -> (f64, f64) {
+        let Self { v0, f0, w2, g, .. } = *self;
+        let (mut u1, mut u2) = (v0 * t, -0.5 * (2.0 * g * v0 + f0) * t * t);
+        let (mut way, mut speed) = (u1 + u2, u1 + 2.0 * u2);
+        for n in 1..20_u32 {
+            let n = f64::from(n);
+            let u3 = -(2.0 * g * t * (n + 1.0) * u2 + w2 * t * t * u1) / ((n + 2.0) * (n + 1.0));
+            way += u3;
+            speed += (n + 2.0) * u3;
+            (u1, u2) = (u2, u3);
+        }
+        (way, speed / t)
+    }
+
+    /// [`Damped::after`] by exponentials.
+    fn exponentials_after(&self, t: f64) -> (f64, f64) {
+        let Self { v0, f0, w2, g, m, .. } = *self;
         // Sums of two decays; nearer to critical damping their difference would cancel.
         if self.damping.is_gt() && m * t > 0.1 {
             let (fast, slow) = (self.fast, self.slow);
