@@ -262,4 +262,34 @@ mod tests {
         let drag = of_stages(1.0, 5000.0, &[stage(-10.0, 0.0, 0.0, 10.0, f64::INFINITY)]);
         assert_eq!(Choice::of(&drag, 0, 0.0, 1.0).scheme, IMPLICIT);
     }
+
+    #[test]
+    fn stiffness_is_the_relaxation_times_left_after_the_transient() {
+        // By hand: terminal speed Vt, rate (r + 2 q Vt)/M, Z = (rate way - V)/Vt.
+        for (law, mass, depth, velocity, way, stiffness) in [
+            (stage(-1000.0, 100.0, 1000.0, 0.0, f64::INFINITY), 1.0, 0.0, 1.0, 9.0, Some(8999.0)),
+            (stage(-100.0, 0.0, 0.0, 4.0, f64::INFINITY), 2.0, 0.0, 4.0, 3.0, Some(11.2)),
+            (stage(-10.0, 0.0, 3.0, 1.0, f64::INFINITY), 0.5, 0.0, 1.0, 1.5, Some(10.0)),
+            // The drive is spent after 10/2 metres, however far the stage goes on.
+            (stage(-12.0, 2.0, 10.0, 0.0, f64::INFINITY), 1.0, 1.0, 20.0, 7.0, Some(30.0)),
+            (stage(-1.0, 0.0, 1.0, 0.0, f64::INFINITY), 1.0, 0.0, 5.0, 1.0, Some(0.0)),
+            (stage(-1.0, 0.0, 0.0, 0.0, f64::INFINITY), 1.0, 0.0, 5.0, 1.0, Some(0.0)),
+            (stage(1.0, 0.0, 1e9, 0.0, f64::INFINITY), 1.0, 0.0, 5.0, 1.0, None),
+        ] {
+            assert_eq!(super::stiffness(&law, mass, depth, velocity, way), stiffness, "{law:?}");
+        }
+    }
+
+    #[test]
+    fn kept_it_flies_as_it_does_alone() {
+        let method = Adaptive::new(1e-6);
+        let mut kept_once = 0;
+        method.keep(&mut |kept| {
+            kept_once += 1;
+            assert_eq!((kept.name(), kept.order()), ("adaptive", None));
+            let flights = [&method, kept].map(|by| by.fly(&stiff_scene(), Detail::End).unwrap().end);
+            assert_eq!(flights[0], flights[1]);
+        });
+        assert_eq!(kept_once, 1);
+    }
 }

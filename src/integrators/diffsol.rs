@@ -1527,4 +1527,122 @@ mod tests {
         let flight = Diffsol::new(Scheme::Esdirk34, 1e-8).fly(&at_rest, Detail::Events).unwrap();
         assert_eq!((flight.outcome, flight.cost), (Outcome::StoppedInCrater, Cost::default()));
     }
+
+    const INF: f64 = f64::INFINITY;
+
+    fn law(p: f64, s: f64, r: f64, q: f64) -> Law {
+        Law { p, s, r, q }
+    }
+
+    #[test]
+    fn a_kept_method_bears_the_name_and_the_order_of_the_method_and_flies_as_it_does() {
+        let problem = of_stages(1.0, 2.0, INF, &[stage(3.0, 0.0, 1.0, 0.0, INF)]);
+        let schemes = [
+            (Scheme::Tsit45, "tsit45", Some(5)),
+            (Scheme::Bdf, "bdf", None),
+            (Scheme::Esdirk34, "esdirk34", Some(3)),
+            (Scheme::TrBdf2, "tr-bdf2", Some(2)),
+        ];
+        for (scheme, name, order) in schemes {
+            let method = Diffsol::new(scheme, 1e-6);
+            let mut kept_once = 0;
+            method.keep(&mut |kept| {
+                kept_once += 1;
+                for method in [&method, kept] {
+                    assert_eq!((method.name(), method.order()), (name, order));
+                }
+                assert_eq!(
+                    kept.fly(&problem, Detail::End).unwrap().end,
+                    method.fly(&problem, Detail::End).unwrap().end
+                );
+            });
+            assert_eq!(kept_once, 1);
+        }
+    }
+
+    #[test]
+    fn law_gives_force_per_mass_and_is_finite_only_as_a_whole() {
+        assert_eq!(law(1.0, 2.0, 4.0, 5.0).rate(3.0, 6.0), -211.0);
+        assert!(law(1.0, 2.0, 4.0, 5.0).is_finite());
+        for place in 0..4 {
+            let mut c = [1.0; 4];
+            c[place] = INF;
+            assert!(!law(c[0], c[1], c[2], c[3]).is_finite(), "{c:?}");
+        }
+    }
+
+    #[test]
+    fn only_an_underdamped_spring_bounds_the_step() {
+        assert_eq!(law(-1.0, 4.0, 3.0, 0.0).longest_step(), 0.5);
+        for unbounded in [law(0.0, 4.0, 4.0, 0.0), law(0.0, 4.0, 5.0, 0.0), law(-1.0, 0.0, 0.0, 1.0)] {
+            assert_eq!(unbounded.longest_step(), INF, "{unbounded:?}");
+        }
+    }
+
+    #[test]
+    fn speed_hangs_where_no_static_force_is_left_and_a_creep_ends_where_the_drive_does() {
+        for hangs in [law(0.0, 0.0, 1.0, 0.0), law(0.0, 4.0, 0.0, 0.0), law(-1.0, 4.0, 4.0, 0.0)] {
+            assert!(hangs.may_hang(), "{hangs:?}");
+        }
+        for ends in [law(-1.0, 4.0, 3.0, 0.0), law(-1.0, 0.0, 1.0, 0.0), law(1.0, 4.0, 9.0, 0.0)] {
+            assert!(!ends.may_hang(), "{ends:?}");
+        }
+        let at = |xi: f64, u: f64| Node { time: 0.0, xi, u };
+        for (law, at, reach) in [
+            (law(-8.0, 2.0, 1.0, 0.0), at(1.0, 3.0), 3.0),
+            (law(-8.0, 2.0, 1.0, 0.0), at(5.0, 3.0), 0.0),
+            (law(-8.0, 0.0, 1.0, 0.0), at(1.0, 3.0), INF),
+            (law(0.0, 2.0, 2.0, 0.0), at(1.0, 3.0), 1.5),
+            (law(0.0, 0.0, 0.0, 1.0), at(1.0, 3.0), INF),
+        ] {
+            assert_eq!(law.reach(at), reach, "{law:?}");
+        }
+    }
+
+    #[test]
+    fn first_step_is_a_share_of_the_fastest_time_that_keeps_its_local_error_at_the_tolerance() {
+        for (law, u, distance, time) in [
+            (law(0.0, 0.0, 0.0, 0.0), 2.0, 0.5, 0.25),
+            (law(-3.0, 0.0, 0.0, 0.0), 1.0, INF, 1.0 / 3.0),
+            (law(-3.0, 0.0, 0.0, 0.0), 0.5, INF, 1.0 / 6.0),
+            (law(-3.0, 0.0, 0.0, 0.0), 2.0, INF, 1.0 / 3.0),
+            (law(0.0, 25.0, 0.0, 0.0), 1.0, INF, 0.2),
+            (law(0.0, 0.0, 1.0, 2.0), 3.0, INF, 1.0 / 13.0),
+            (law(0.0, 0.0, 0.0, 0.0), 0.0, 1.0, 1.0),
+        ] {
+            assert_eq!(law.shortest_time(u, distance), time, "{law:?}, {u}");
+        }
+        // Orders 5, 1, 3 and 2, at the tolerance asked of the library.
+        for (scheme, rtol, share) in [
+            (Scheme::Tsit45, 1e-6, 0.05),
+            (Scheme::Bdf, 1e-6, 0.0005),
+            (Scheme::Esdirk34, 1e-3, 0.05),
+            (Scheme::TrBdf2, 1e-2 / 3.0, 0.5 * 1e-4_f64.cbrt()),
+        ] {
+            let off = scheme.first_step_share(rtol) / share - 1.0;
+            assert!(off.abs() < 1e-14, "{scheme:?}: {off:e}");
+        }
+    }
+
+    #[test]
+    fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
+        let unit = |exit, stages: &[Stage]| Units::of(&of_stages(2.0, 3.0, exit, stages)).length;
+        let still = stage(0.0, 0.0, 0.0, 0.0, INF);
+        assert_eq!(unit(5.0, &[Stage { end: 0.0, ..still }, Stage { end: 4.0, ..still }, still]), 4.0);
+        assert_eq!(unit(0.5, &[Stage { end: 4.0, ..still }, still]), 0.5);
+        for (law, length) in [
+            (stage(4.0, 0.0, 0.0, 0.0, INF), 2.25),
+            (stage(-4.0, 0.0, 0.0, 0.0, INF), 2.25),
+            (stage(0.0, 8.0, 0.0, 0.0, INF), 1.5),
+            (stage(0.0, 0.0, 12.0, 0.0, INF), 0.5),
+            (stage(0.0, 0.0, 0.0, 8.0, INF), 0.25),
+            (stage(4.0, 8.0, 1.0, 0.0, INF), 1.5),
+            (still, 1.0),
+        ] {
+            assert_eq!(unit(INF, &[law]), length, "{law:?}");
+        }
+        let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
+        let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, xi: 5.0, u: 6.0 });
+        assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
+    }
 }

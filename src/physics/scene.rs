@@ -258,6 +258,15 @@ pub(super) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
 }
 
 impl Concrete {
+    /// S of a concrete of compressive strength `strength` [Pa] for which none is given (Eq. 14).
+    ///
+    /// # Errors
+    /// [`ResolveError::Inadmissible`] for a strength that is not positive.
+    pub fn usual_static_factor(strength: f64) -> Result<f64, ResolveError> {
+        admit("the strength fc [Pa]", strength, Range::Positive)?;
+        Ok(semi_empirical::static_factor(strength))
+    }
+
     /// Crater depth k d [m].
     pub fn crater_depth(&self) -> f64 {
         self.crater_ratio * fault!("crater-radii", self.diameter, 0.5 * self.diameter)

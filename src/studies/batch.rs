@@ -19,7 +19,7 @@ use super::random_scenes::Generator;
 use super::table_text::shortened;
 use crate::integrators::batch::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, Taylor, keeping};
-use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, semi_empirical};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene};
 
 /// Columns that a table may have, in the order of the contract.
 pub const COLUMNS: [&str; 12] = [
@@ -240,7 +240,8 @@ pub struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// The scene of the row; whether its numbers are admissible is for [`Scene::resolve`] to say.
+    /// The scene of the row, S by its strength where it gives none; whether its other numbers are admissible is for
+    /// [`Scene::resolve`] to say.
     ///
     /// # Errors
     /// What is wrong, with the column.
@@ -249,6 +250,10 @@ impl Row<'_> {
             self.numbers[index].ok_or_else(|| format!("{}: empty, and every scene needs it", COLUMNS[index]))
         };
         let strength = needed(3)?;
+        let static_factor = match self.numbers[6] {
+            Some(given) => given,
+            None => Concrete::usual_static_factor(strength).map_err(|error| error.to_string())?,
+        };
         Ok(Scene {
             title: None,
             mass: needed(0)?,
@@ -257,7 +262,7 @@ impl Row<'_> {
                 nose_factor: needed(2)?,
                 strength,
                 density: needed(4)?,
-                static_factor: self.numbers[6].unwrap_or_else(|| semi_empirical::static_factor(strength)),
+                static_factor,
                 inertia_factor: self.numbers[7].unwrap_or(1.0),
                 crater_ratio: self.numbers[8].unwrap_or(2.0),
                 crater_stiffness: self.numbers[9].map_or(CraterStiffness::Continuous, CraterStiffness::Given),

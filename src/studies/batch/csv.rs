@@ -242,6 +242,12 @@ mod tests {
             ("nan,2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: `nan` is not finite"),
             ("1e999,2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: `1e999` is not finite"),
             (",2,0.05,0.72,36e6,2300,", "line 3: velocity_m_s: empty, and every scene needs it"),
+            // S would follow from the strength: no scene with a NaN.
+            (
+                "300,2,0.05,0.72,-36e6,2300,",
+                "line 3: the strength fc [Pa] = -36000000 is not admissible: it must be a number > 0",
+            ),
+            ("300,2,0.05,0.72,0,2300,", "line 3: the strength fc [Pa] = 0 is not admissible: it must be a number > 0"),
         ] {
             let all = rows(format!("{HEADER}\n{good}\n{row}\n{good}\n{good}\n")).unwrap();
             assert_eq!(all.len(), 4);
