@@ -282,6 +282,28 @@ impl Law {
         }
     }
 
+    /// What `u = 0` is worth where rtol allows the library to be wrong by `noise`, relative: no force may have brought it
+    /// about, but the tolerance alone.
+    ///
+    /// It is a rest where the static force resists. Elsewhere speed was lost in the tolerance. The boundary then
+    /// counts as reached with no speed, so that the margin, zero within its bar, says `undecided`; out of reach, the
+    /// place is approached for ever.
+    fn settle(&self, end: LegEnd, at: Node, distance: f64, noise: f64) -> (LegEnd, Node) {
+        if end != LegEnd::Rest {
+            return (end, at);
+        }
+        let resists = self.p > 0.0 || (self.p == 0.0 && self.s > 0.0);
+        let least_brake = if self.may_hang() { noise * (self.p.abs() + self.s * at.xi.abs()) } else { 0.0 };
+        if resists || self.p + self.s * at.xi > least_brake {
+            return (LegEnd::Rest, Node { xi: at.xi.max(0.0), u: 0.0, ..at });
+        }
+        let in_reach = distance - at.xi <= self.reach(at) + noise * (1.0 + at.xi.abs());
+        if in_reach && distance.is_finite() {
+            return (LegEnd::Boundary, Node { xi: distance, u: 0.0, ..at });
+        }
+        (LegEnd::Approach, at)
+    }
+
     /// The shortest time in which something happens at speed `u` [L/V0].
     fn shortest_time(&self, u: f64, distance: f64) -> f64 {
         let rates = [
@@ -575,9 +597,8 @@ impl<'f, S, Make: Fn(f64) -> Result<S, DiffsolError>> Legs<'f, S, Make> {
             let next_step = state.h;
             // Backwards with u > 0 at both ends: u was negative in between. Where it was lost in the tolerance already
             // (an explicit method at its stability limit), that is the rest; elsewhere the step was too long.
-            let lost = before.u <= 10.0 * self.rtol * energy_max.sqrt();
             let backwards = after.xi < before.xi && after.u > 0.0;
-            if backwards && lost {
+            if backwards && is_lost(before.u, self.rtol, energy_max) {
                 cost.steps += 1;
                 break LegEnd::Rest;
             }
@@ -621,7 +642,7 @@ impl<'f, S, Make: Fn(f64) -> Result<S, DiffsolError>> Legs<'f, S, Make> {
         if !self.scheme.is_implicit() && end != LegEnd::NotFinite {
             self.kept = Some(solver);
         }
-        let (end, place) = self.settle(&law, end, before, leg.distance);
+        let (end, place) = law.settle(end, before, leg.distance, self.scheme.margin_error(self.rtol));
         let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
         Ok(LegReport {
             end,
@@ -633,32 +654,11 @@ impl<'f, S, Make: Fn(f64) -> Result<S, DiffsolError>> Legs<'f, S, Make> {
             note: None,
         })
     }
+}
 
-    /// What rtol allows the library to be wrong by, relative.
-    fn noise(&self) -> f64 {
-        self.scheme.margin_error(self.rtol)
-    }
-
-    /// What `u = 0` is worth: no force may have brought it about, but the tolerance alone.
-    ///
-    /// It is a rest where the static force resists. Elsewhere speed was lost in the tolerance. The boundary then
-    /// counts as reached with no speed, so that the margin, zero within its bar, says `undecided`; out of reach, the
-    /// place is approached for ever.
-    fn settle(&self, law: &Law, end: LegEnd, at: Node, distance: f64) -> (LegEnd, Node) {
-        if end != LegEnd::Rest {
-            return (end, at);
-        }
-        let resists = law.p > 0.0 || (law.p == 0.0 && law.s > 0.0);
-        let least_brake = if law.may_hang() { self.noise() * (law.p.abs() + law.s * at.xi.abs()) } else { 0.0 };
-        if resists || law.p + law.s * at.xi > least_brake {
-            return (LegEnd::Rest, Node { xi: at.xi.max(0.0), u: 0.0, ..at });
-        }
-        let in_reach = distance - at.xi <= law.reach(at) + self.noise() * (1.0 + at.xi.abs());
-        if in_reach && distance.is_finite() {
-            return (LegEnd::Boundary, Node { xi: distance, u: 0.0, ..at });
-        }
-        (LegEnd::Approach, at)
-    }
+/// Whether speed `u` is lost in the tolerance where `energy_max` is the largest u² so far.
+fn is_lost(u: f64, rtol: f64, energy_max: f64) -> bool {
+    u <= 10.0 * rtol * energy_max.sqrt()
 }
 
 /// A step's end in the units of the leg.
@@ -1242,6 +1242,10 @@ mod tests {
     #[test]
     fn bracketed_root_is_exact_for_flat_and_steep_functions_whatever_the_slopes() {
         let node = |time| Node { time, xi: 0.0, u: 0.0 };
+        // A time of a millionth has its digits too: no absolute width ends the search.
+        let f = |node: Node| (node.time - 3e-7, 0.0);
+        let root = bracketed_root(node(0.0), node(1e-6), 0.0, f, |t| Ok(node(t))).unwrap();
+        assert!((root.time / 3e-7 - 1.0).abs() < 1e-15, "{root:?}");
         for exponent in [1, 3, 9, 31] {
             let value = |t: f64| (t - 0.3).powi(exponent);
             let slope = |t: f64| f64::from(exponent) * (t - 0.3).powi(exponent - 1);
@@ -1361,6 +1365,9 @@ mod tests {
         let kinds: Vec<_> = flight.events.iter().map(|event| event.kind).collect();
         assert_eq!(kinds, [EventKind::CraterEnd, EventKind::Exit]);
         assert_eq!(flight.events[0].state, flight.events[1].state);
+        // Inside the crater the exit comes alone.
+        let flight = Diffsol::new(Scheme::Tsit45, 1e-10).fly(&tunnel_scene(0.05), Detail::Events).unwrap();
+        assert!(flight.events.iter().map(|event| event.kind).eq([EventKind::Exit]));
         let empty_stages = of_stages(
             1.0,
             2.0,
@@ -1442,6 +1449,7 @@ mod tests {
         // Past rest the law would creep back at p/r, far below the tolerance: at the stability limit of the method u is
         // then positive at every step's end while xi falls for ever.
         let mut random = Random(5);
+        let mut rejected = 0;
         for _ in 0..300 {
             let viscosity = random.log_between(3.0, 300.0);
             let law = stage(viscosity * random.log_between(1e-6, 1e-2), 0.0, viscosity, 0.0, f64::INFINITY);
@@ -1451,7 +1459,10 @@ mod tests {
             let z = viscosity / law.static_force;
             let exact = (z - z.ln_1p()) / (z * viscosity);
             assert!((flight.end.depth - exact).abs() < 1e-2, "{law:?}: {} not {exact}", flight.end);
+            assert!(flight.cost.rejected_steps < 1000, "{law:?}: {:?}", flight.cost);
+            rejected += flight.cost.rejected_steps;
         }
+        assert!(rejected > 0);
     }
 
     #[test]
@@ -1488,7 +1499,10 @@ mod tests {
 
     #[test]
     fn force_beyond_the_range_of_numbers_is_an_error_and_no_nan() {
-        // Each coefficient is finite, their sum is not.
+        // The coefficient over the mass is beyond the range; then each is within it and their sum is not.
+        let over_mass = of_stages(1e-300, 1.0, 1.0, &[stage(1e300, 0.0, 0.0, 0.0, f64::INFINITY)]);
+        let error = Diffsol::new(Scheme::Bdf, 1e-6).fly(&over_mass, Detail::End).unwrap_err();
+        assert!(matches!(error, IntegrationError::NotFinite { what: "the force over the mass", .. }), "{error}");
         let problem = of_stages(1.0, 1.0, 1.0, &[stage(1.5e308, 0.0, 0.0, 1.5e308, f64::INFINITY)]);
         for scheme in Scheme::ALL {
             let error = Diffsol::new(scheme, 1e-6).fly(&problem, Detail::Events).unwrap_err();
@@ -1644,5 +1658,48 @@ mod tests {
         let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
         let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, xi: 5.0, u: 6.0 });
         assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
+    }
+
+    #[test]
+    fn standstill_is_a_rest_where_a_force_above_the_noise_holds_it() {
+        let at = |xi: f64| Node { time: 1.0, xi, u: -1e-9 };
+        let (rest, boundary, approach) = (LegEnd::Rest, LegEnd::Boundary, LegEnd::Approach);
+        let noise = 0.01;
+        for (law, xi, distance, end) in [
+            // The static force resists from the start.
+            (law(1.0, 0.0, 1.0, 0.0), 2.0, 9.0, rest),
+            (law(0.0, 1.0, 1.0, 0.0), 2.0, 9.0, rest),
+            // A drive that springs out of balance: -8 + 2 xi.
+            (law(-8.0, 2.0, 1.0, 0.0), 4.01, 9.0, rest),
+            (law(-8.0, 2.0, 1.0, 0.0), 3.99, 9.0, approach),
+            (law(-8.0, 2.0, 1.0, 0.0), 3.99, 4.0, boundary),
+            // Overdamped it may hang: the brake must exceed a hundredth of 8 + 2 xi.
+            (law(-8.0, 2.0, 9.0, 0.0), 4.05, 9.0, approach),
+            (law(-8.0, 2.0, 9.0, 0.0), 4.12, 9.0, rest),
+            // Beyond its reach by the noise, a hundredth of 1 + xi, and by more.
+            (law(-8.0, 2.0, 9.0, 0.0), 3.5, 4.044, boundary),
+            (law(-8.0, 2.0, 9.0, 0.0), 3.5, 4.046, approach),
+            (law(-8.0, 2.0, 9.0, 0.0), 1.0, 4.019, boundary),
+            (law(-8.0, 2.0, 9.0, 0.0), 1.0, 4.022, approach),
+            // A drive alone goes on for ever.
+            (law(-8.0, 0.0, 1.0, 0.0), 1.0, 9.0, boundary),
+            (law(-8.0, 0.0, 1.0, 0.0), 1.0, INF, approach),
+        ] {
+            let (found, place) = law.settle(rest, at(xi), distance, noise);
+            assert_eq!(found, end, "{law:?}, {xi}, {distance}");
+            let (depth, speed) = match end {
+                LegEnd::Boundary => (distance, 0.0),
+                LegEnd::Rest => (xi, 0.0),
+                _ => (xi, -1e-9),
+            };
+            assert_eq!((place.xi, place.u), (depth, speed));
+            assert_eq!(law.settle(LegEnd::BudgetSpent, at(xi), distance, noise).0, LegEnd::BudgetSpent);
+        }
+    }
+
+    #[test]
+    fn speed_is_lost_below_ten_tolerances_of_the_greatest() {
+        assert!(is_lost(0.3, 0.01, 9.0) && !is_lost(0.31, 0.01, 9.0));
+        assert!(is_lost(0.9e-5, 1e-6, 1.0) && !is_lost(1.1e-5, 1e-6, 1.0));
     }
 }
