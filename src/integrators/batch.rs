@@ -386,7 +386,8 @@ impl Block {
             end,
             crater_end,
             exit_margin: margin,
-            exit_margin_error: margin.map(|_| bar),
+            // What a stop lacks is carried on with a few roundings of its own, as in the scalar integrator.
+            exit_margin_error: margin.map(|m| if through { bar } else { bar + 8.0 * f64::EPSILON * m.abs() }),
             cost: Cost {
                 steps: crater_steps + tunnel_steps,
                 rejected_steps: 0,
@@ -886,18 +887,17 @@ mod tests {
 
     #[test]
     fn the_bar_holds_the_error_of_the_margin() {
-        let problems = problems(400, 2.0);
+        let problems: Vec<Problem> = problems(300, 2.0).into_iter().chain(problems(300, 9.0)).collect();
         let mut judged = 0;
         for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
             let flight = flight.unwrap();
             let Some((margin, bar)) = flight.exit_margin.zip(flight.exit_margin_error) else { continue };
             let exact = reference::flight(Source::Problem(problem)).unwrap().exit_margin.unwrap();
-            // A stop's margin is carried on by a formula whose own rounding is relative to the margin.
             let error = exact.error_over(margin, &Exact::one());
-            assert!(error <= bar + 8.0 * f64::EPSILON * margin.abs(), "{error} {bar} {margin} {problem:?}");
+            assert!(error <= bar, "{error} {bar} {margin} {problem:?}");
             judged += 1;
         }
-        assert!(judged > 200, "{judged}");
+        assert!(judged > 300, "{judged}");
     }
 
     #[test]
@@ -1055,9 +1055,7 @@ mod tests {
             if alone.cost.steps > 1 + lane.stage as u64 || lane == alone {
                 continue;
             }
-            let carried =
-                if lane.outcome.is_stop() { 8.0 * f64::EPSILON * lane.exit_margin.unwrap().abs() } else { 0.0 };
-            let (bar, expected) = (lane.exit_margin_error.unwrap(), alone.exit_margin_error.unwrap() - carried);
+            let (bar, expected) = (lane.exit_margin_error.unwrap(), alone.exit_margin_error.unwrap());
             let kind = usize::from(crater) + 2 * lane.stage;
             worst[kind] = worst[kind].max((bar / expected - 1.0).abs());
             judged[kind] += 1;
