@@ -33,6 +33,8 @@
     reason = "one shape for every lane: unrolled coefficients behind a constant bound, and conditions without a branch"
 )]
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
 use crate::physics::{Event, EventKind, Outcome, Problem, State, Target, exit_energy};
@@ -468,21 +470,16 @@ fn crater(limit: f64) -> CraterEnd {
         y = y * t2 + ODD[j];
     }
     let y = y * trial;
-    // u' = -y, u'' = -u, u''' = y, u'''' = u;  y' = u, y'' = -y, y''' = -u, y'''' = y.
-    let approach = if passes {
-        Approach { way: goal - y, slope: u, second: y, third: u, fourth: -y }
-    } else {
-        Approach { way: u, slope: y, second: -u, third: y, fourth: u }
-    };
-    let (t, accepted) = approach.solve();
+    // y' = u, y'' = -y, y''' = -u, y'''' = y.
+    let (t, accepted) = Approach { way: goal - y, slope: u, second: y, third: u, fourth: -y }.solve();
     let velocity = u - t * (y + t * (0.5 * u - t * ((1.0 / 6.0) * y)));
-    let depth = y + t * (u - t * (0.5 * y + t * ((1.0 / 6.0) * u)));
     let clear = (limit - 1.0).abs() > TOUCH;
     CraterEnd {
-        time: trial + t,
-        depth: if passes { limit } else { depth },
+        // Rest is at a quarter period and depth 1, whatever the limit.
+        time: if passes { trial + t } else { FRAC_PI_2 },
+        depth: goal,
         velocity: if passes { velocity } else { 0.0 },
-        status: if !(accepted & clear) {
+        status: if !((accepted | !passes) & clear) {
             status::GIVEN_UP
         } else if passes {
             status::FLYING
@@ -534,7 +531,7 @@ fn cross_craters(block: &mut Block) {
         block.velocity.0[i] = velocity;
         block.crater_velocity.0[i] = velocity;
         let passed = end.status == status::FLYING;
-        block.depth.0[i] = if passed { block.first_limit.0[i] } else { speed * (period * end.depth) };
+        block.depth.0[i] = if passed { block.first_limit.0[i] } else { speed * period };
         // As in the scalar integrator, in these units: greatest force and depth are the same number.
         block.bar.0[i] = f64::EPSILON * if none { 0.0 } else { 8.0 + 9.0 * end.depth * end.depth };
         let through = passed & (block.first_limit.0[i] >= block.exit_depth.0[i]);
@@ -648,13 +645,13 @@ fn advance(lane: Lane) -> Lane {
     let u1 = -(alpha + beta * u * u);
     let u2 = pull * u * u1;
     let u3 = pull * (u1 * u1 + u * u2);
-    let u4 = pull * (3.0 * u1 * u2 + u * u3);
     let (t, accepted) = Approach {
         way: if exits { way - x } else { u },
         slope: if exits { u } else { -u1 },
         second: if exits { -u1 } else { u2 },
         third: if exits { -u2 } else { u3 },
-        fourth: if exits { -u3 } else { u4 },
+        // The guess of rest, where it is used, is good to 2e-7: the fourth derivative moves nothing.
+        fourth: if exits { -u3 } else { 0.0 },
     }
     .solve();
     let done = lands & accepted;
@@ -1033,10 +1030,11 @@ mod tests {
 
     #[test]
     fn every_crater_ends_within_two_roundings_of_fifty_digits() {
-        let limits = (1..=120).map(|i| f64::from(i) / 113.5);
+        // Denser where the trial is poor and V still great.
+        let limits = (1..=120).map(|i| f64::from(i) / 113.5).chain((0..40).map(|i| 0.58 + f64::from(i) / 800.0));
         let craters: Vec<Problem> =
             limits.flat_map(|limit| [0.25, f64::INFINITY].map(|exit| crater_of(limit, exit))).collect();
-        assert_within(roundings(&craters), [1.5, 2.0, 2.0, 1.5, 2.0]);
+        assert_within(roundings(&craters), [1.5, 1.5, 1.6, 1.5, 1.6]);
     }
 
     #[test]
@@ -1048,6 +1046,8 @@ mod tests {
     fn the_bar_is_that_of_the_scalar_integrator_where_both_take_one_step_a_stage() {
         let mut problems = problems(1000, 2.0);
         problems.retain(Problem::has_exit);
+        // Where the guess of the exit is poorest.
+        problems.extend((0..24).flat_map(|j| [0.4, 0.44, 0.47].map(|way| tunnel(f64::from(j) / 256.0, way))));
         let (mut judged, mut worst) = ([0; 4], [0.0_f64; 4]);
         for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
             let (lane, alone) = (flight.unwrap(), scalar(problem));
@@ -1062,7 +1062,7 @@ mod tests {
         }
         // Tunnel alone, crater only, crater and tunnel.
         assert!(judged[0] > 30 && judged[1] > 200 && judged[3] > 150, "{judged:?}");
-        assert!(worst.iter().all(|&worst| worst < 1e-13), "{worst:?}");
+        assert!(worst.iter().all(|&worst| worst < 2e-14), "{worst:?}");
     }
 
     #[test]
