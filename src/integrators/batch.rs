@@ -33,6 +33,8 @@
     reason = "one shape for every lane: unrolled coefficients behind a constant bound, and conditions without a branch"
 )]
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
 use crate::physics::{Event, EventKind, Outcome, Problem, State, Target, exit_energy};
@@ -386,7 +388,8 @@ impl Block {
             end,
             crater_end,
             exit_margin: margin,
-            exit_margin_error: margin.map(|_| bar),
+            // What a stop lacks is carried on with a few roundings of its own, as in the scalar integrator.
+            exit_margin_error: margin.map(|m| if through { bar } else { bar + 8.0 * f64::EPSILON * m.abs() }),
             cost: Cost {
                 steps: crater_steps + tunnel_steps,
                 rejected_steps: 0,
@@ -467,21 +470,16 @@ fn crater(limit: f64) -> CraterEnd {
         y = y * t2 + ODD[j];
     }
     let y = y * trial;
-    // u' = -y, u'' = -u, u''' = y, u'''' = u;  y' = u, y'' = -y, y''' = -u, y'''' = y.
-    let approach = if passes {
-        Approach { way: goal - y, slope: u, second: y, third: u, fourth: -y }
-    } else {
-        Approach { way: u, slope: y, second: -u, third: y, fourth: u }
-    };
-    let (t, accepted) = approach.solve();
+    // y' = u, y'' = -y, y''' = -u, y'''' = y.
+    let (t, accepted) = Approach { way: goal - y, slope: u, second: y, third: u, fourth: -y }.solve();
     let velocity = u - t * (y + t * (0.5 * u - t * ((1.0 / 6.0) * y)));
-    let depth = y + t * (u - t * (0.5 * y + t * ((1.0 / 6.0) * u)));
     let clear = (limit - 1.0).abs() > TOUCH;
     CraterEnd {
-        time: trial + t,
-        depth: if passes { limit } else { depth },
+        // Rest is at a quarter period and depth 1, whatever the limit.
+        time: if passes { trial + t } else { FRAC_PI_2 },
+        depth: goal,
         velocity: if passes { velocity } else { 0.0 },
-        status: if !(accepted & clear) {
+        status: if !((accepted | !passes) & clear) {
             status::GIVEN_UP
         } else if passes {
             status::FLYING
@@ -533,7 +531,7 @@ fn cross_craters(block: &mut Block) {
         block.velocity.0[i] = velocity;
         block.crater_velocity.0[i] = velocity;
         let passed = end.status == status::FLYING;
-        block.depth.0[i] = if passed { block.first_limit.0[i] } else { speed * (period * end.depth) };
+        block.depth.0[i] = if passed { block.first_limit.0[i] } else { speed * period };
         // As in the scalar integrator, in these units: greatest force and depth are the same number.
         block.bar.0[i] = f64::EPSILON * if none { 0.0 } else { 8.0 + 9.0 * end.depth * end.depth };
         let through = passed & (block.first_limit.0[i] >= block.exit_depth.0[i]);
@@ -647,13 +645,13 @@ fn advance(lane: Lane) -> Lane {
     let u1 = -(alpha + beta * u * u);
     let u2 = pull * u * u1;
     let u3 = pull * (u1 * u1 + u * u2);
-    let u4 = pull * (3.0 * u1 * u2 + u * u3);
     let (t, accepted) = Approach {
         way: if exits { way - x } else { u },
         slope: if exits { u } else { -u1 },
         second: if exits { -u1 } else { u2 },
         third: if exits { -u2 } else { u3 },
-        fourth: if exits { -u3 } else { u4 },
+        // The guess of rest, where it is used, is good to 2e-7: the fourth derivative moves nothing.
+        fourth: if exits { -u3 } else { 0.0 },
     }
     .solve();
     let done = lands & accepted;
@@ -802,6 +800,7 @@ fn refill(lanes: &mut Lanes, i: usize, block: &Block, next: &mut usize) -> bool 
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
+    use super::super::taylor::Series;
     use super::*;
     use crate::physics::Stage;
     use crate::physics::reference::{self, Exact, Source};
@@ -873,7 +872,7 @@ mod tests {
         let problems = problems(4000, 9.0);
         for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
             let (lane, alone) = (flight.unwrap(), scalar(problem));
-            assert!(lane.outcome.agrees_with(alone.outcome), "{problem:?}\n{lane:?}\n{alone:?}");
+            assert_eq!((lane.outcome, lane.stage), (alone.outcome, alone.stage), "{problem:?}\n{lane:?}\n{alone:?}");
             let depth = (lane.end.depth / alone.end.depth - 1.0).abs();
             assert!(depth <= 1e-14, "{depth} {problem:?}");
             assert_eq!(lane.crater_end.is_some(), alone.crater_end.is_some(), "{problem:?}");
@@ -885,18 +884,17 @@ mod tests {
 
     #[test]
     fn the_bar_holds_the_error_of_the_margin() {
-        let problems = problems(400, 2.0);
+        let problems: Vec<Problem> = problems(300, 2.0).into_iter().chain(problems(300, 9.0)).collect();
         let mut judged = 0;
         for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
             let flight = flight.unwrap();
             let Some((margin, bar)) = flight.exit_margin.zip(flight.exit_margin_error) else { continue };
             let exact = reference::flight(Source::Problem(problem)).unwrap().exit_margin.unwrap();
-            // A stop's margin is carried on by a formula whose own rounding is relative to the margin.
             let error = exact.error_over(margin, &Exact::one());
-            assert!(error <= bar + 8.0 * f64::EPSILON * margin.abs(), "{error} {bar} {margin} {problem:?}");
+            assert!(error <= bar, "{error} {bar} {margin} {problem:?}");
             judged += 1;
         }
-        assert!(judged > 200, "{judged}");
+        assert!(judged > 300, "{judged}");
     }
 
     #[test]
@@ -916,7 +914,18 @@ mod tests {
         stages.target = Target::Stages;
         let mut viscous = crater_and_tunnel(300.0, 1.0, 8.5e6);
         viscous.stages[1].viscosity = 1.0;
+        let with_crater = |crater: Stage| {
+            let mut problem = crater_and_tunnel(300.0, 1.0, 8.5e6);
+            problem.stages[0] = crater;
+            problem
+        };
+        let crater = Stage::crater(8.5e6, 0.1);
         for problem in [
+            with_crater(Stage { static_force: 1e4, ..crater }),
+            with_crater(Stage { viscosity: 1e2, ..crater }),
+            with_crater(Stage { drag: 1.0, ..crater }),
+            with_crater(Stage { stiffness: 1e60, ..crater }),
+            with_crater(Stage { end: 1e-60, ..crater }),
             crater_and_tunnel(300.0, graze, 8.5e6),
             crater_and_tunnel(300.0, f64::INFINITY, touching),
             crater_and_tunnel(300.0, f64::INFINITY, touching * (1.0 + 1e-9)),
@@ -957,5 +966,246 @@ mod tests {
         let flights = Batch::new().fly(&problems);
         assert!(matches!(flights[1], Err(IntegrationError::NeverEnds { .. })), "{:?}", flights[1]);
         assert!(flights[0].is_ok() && flights[2].is_ok());
+    }
+
+    /// M = 2, V0 = 1, P + Q = 2: `beta` is the share of the drag, `way` the exit depth over V0²/(P + Q V0²), all exact.
+    fn tunnel(beta: f64, way: f64) -> Problem {
+        Problem {
+            mass: 2.0,
+            impact_speed: 1.0,
+            exit_depth: way,
+            stages: [Stage::tunnel(2.0 - 2.0 * beta, 2.0 * beta)].into_iter().collect(),
+            crater: None,
+            target: Target::CraterAndTunnel,
+        }
+    }
+
+    /// V0 = 1, c/M = 1: the crater ends at `limit`, in its own units.
+    fn crater_of(limit: f64, exit_depth: f64) -> Problem {
+        let mut problem = tunnel(0.0, exit_depth);
+        problem.stages.insert(0, Stage::crater(2.0, limit));
+        problem.crater = Some(0);
+        problem
+    }
+
+    /// Greatest errors in rounding units, against 50 digits: of the time (where it is known only as well as the depth,
+    /// over V/V0), of the depth, and of V²/V0²; at the end and at the end of the crater.
+    fn roundings(problems: &[Problem]) -> [f64; 5] {
+        let mut worst = [0.0_f64; 5];
+        for (problem, flight) in problems.iter().zip(Batch::new().fly(problems)) {
+            let flight = flight.unwrap();
+            let exact = reference::flight(Source::Problem(problem)).unwrap();
+            assert_eq!((flight.outcome, flight.stage), (exact.outcome, exact.stage), "{problem:?}");
+            let of = |state: &State, exact_state: &reference::ExactState| {
+                let share = state.velocity / problem.impact_speed;
+                [
+                    exact_state.time.relative_error(state.time) * if share > 0.0 { share } else { 1.0 },
+                    2.0 * share * exact_state.velocity.error_over(state.velocity, &exact.impact_speed),
+                ]
+            };
+            let [time, energy] = of(&flight.end, &exact.end);
+            let depth = exact.end.depth.relative_error(flight.end.depth);
+            assert_eq!(flight.crater_end.is_some(), exact.crater_end().is_some(), "{problem:?}");
+            let [crater_time, crater_energy] =
+                flight.crater_end.zip(exact.crater_end()).map_or([0.0; 2], |(state, exact)| of(&state, exact));
+            for (worst, error) in worst.iter_mut().zip([time, depth, energy, crater_time, crater_energy]) {
+                *worst = worst.max(error / f64::EPSILON);
+            }
+        }
+        worst
+    }
+
+    fn assert_within(worst: [f64; 5], limits: [f64; 5]) {
+        assert!(worst.iter().zip(limits).all(|(&worst, limit)| worst <= limit), "{worst:?} of {limits:?}");
+    }
+
+    #[test]
+    fn every_tunnel_ends_within_two_roundings_of_fifty_digits() {
+        // In one step up to a share of 0.055, or through the exit; in several beyond.
+        let shares = (0..16).map(|j| f64::from(j) / 256.0).chain((2..32).map(|j| f64::from(j) / 32.0));
+        let ways = [f64::INFINITY, 0.0625, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.46875, 0.515625, 0.5625];
+        let tunnels: Vec<Problem> = shares.flat_map(|beta| ways.map(|way| tunnel(beta, way))).collect();
+        assert_within(roundings(&tunnels), [1.5, 1.7, 2.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn every_crater_ends_within_two_roundings_of_fifty_digits() {
+        // Denser where the trial is poor and V still great.
+        let limits = (1..=120).map(|i| f64::from(i) / 113.5).chain((0..40).map(|i| 0.58 + f64::from(i) / 800.0));
+        let craters: Vec<Problem> =
+            limits.flat_map(|limit| [0.25, f64::INFINITY].map(|exit| crater_of(limit, exit))).collect();
+        assert_within(roundings(&craters), [1.5, 1.5, 1.6, 1.5, 1.6]);
+    }
+
+    #[test]
+    fn craters_and_tunnels_in_any_units_end_within_few_roundings_of_fifty_digits() {
+        assert_within(roundings(&problems(300, 2.0)), [3.5, 4.5, 2.5, 2.5, 3.0]);
+    }
+
+    #[test]
+    fn the_bar_is_that_of_the_scalar_integrator_where_both_take_one_step_a_stage() {
+        let mut problems = problems(1000, 2.0);
+        problems.retain(Problem::has_exit);
+        // Where the guess of the exit is poorest.
+        problems.extend((0..24).flat_map(|j| [0.4, 0.44, 0.47].map(|way| tunnel(f64::from(j) / 256.0, way))));
+        let (mut judged, mut worst) = ([0; 4], [0.0_f64; 4]);
+        for (problem, flight) in problems.iter().zip(Batch::new().fly(&problems)) {
+            let (lane, alone) = (flight.unwrap(), scalar(problem));
+            let crater = problem.crater.is_some();
+            if alone.cost.steps > 1 + lane.stage as u64 || lane == alone {
+                continue;
+            }
+            let (bar, expected) = (lane.exit_margin_error.unwrap(), alone.exit_margin_error.unwrap());
+            let kind = usize::from(crater) + 2 * lane.stage;
+            worst[kind] = worst[kind].max((bar / expected - 1.0).abs());
+            judged[kind] += 1;
+        }
+        // Tunnel alone, crater only, crater and tunnel.
+        assert!(judged[0] > 30 && judged[1] > 200 && judged[3] > 150, "{judged:?}");
+        assert!(worst.iter().all(|&worst| worst < 2e-14), "{worst:?}");
+    }
+
+    #[test]
+    fn a_margin_of_ten_bars_is_not_yet_proven() {
+        let problem = tunnel(0.25, 0.125);
+        let mut block = Block::default();
+        block.prepare(std::slice::from_ref(&problem));
+        block.status.0[0] = status::EXIT;
+        block.velocity.0[0] = 1.0;
+        for (bar, proven) in [(0.1, false), (0.1_f64.next_down(), true)] {
+            block.bar.0[0] = bar;
+            assert_eq!(block.summary(0, &problem).is_some(), proven, "{bar}");
+        }
+    }
+
+    #[test]
+    fn work_is_a_crater_and_the_steps_of_the_tunnel() {
+        // 21 for a crater, 23 for a step in the tunnel: stopped in each, and through each.
+        for (problem, steps, force_evaluations) in [
+            (crater_of(2.0, f64::INFINITY), 1, 21),
+            (crater_of(0.5, f64::INFINITY), 2, 44),
+            (crater_of(0.5, 0.25), 1, 21),
+            (crater_of(0.5, 0.625), 2, 44),
+            (tunnel(0.0, f64::INFINITY), 1, 23),
+            (tunnel(0.0, 0.125), 1, 23),
+        ] {
+            let flight = Batch::new().fly(std::slice::from_ref(&problem))[0].clone();
+            assert_eq!(flight.map(|f| f.cost), Ok(Cost { steps, rejected_steps: 0, force_evaluations }), "{problem:?}");
+        }
+    }
+
+    /// The events again, but for rest and exit at one place.
+    #[test]
+    fn a_summary_gives_the_flight_back() {
+        let graze = scalar(&tunnel(0.5, f64::INFINITY)).end.depth;
+        let mut kinds = Vec::new();
+        for problem in [
+            crater_of(2.0, 3.0),
+            crater_of(0.5, f64::INFINITY),
+            crater_of(0.5, 0.25),
+            crater_of(0.5, 0.625),
+            tunnel(0.5, graze * (1.0 - 1e-15)),
+            tunnel(0.5, graze * (1.0 + 1e-15)),
+        ] {
+            let flight = Taylor::default().fly(&problem, Detail::Events).unwrap();
+            assert_eq!(Summary::from(&flight).flight(), flight);
+            kinds.push((flight.outcome, flight.events.last().unwrap().kind));
+        }
+        assert_eq!(kinds[4..], [(Outcome::Undecided, EventKind::Exit), (Outcome::Undecided, EventKind::Rest)]);
+    }
+
+    #[test]
+    fn a_batch_flies_with_the_instructions_it_was_given() {
+        assert!(Instructions::Baseline.is_available());
+        for kind in Instructions::ALL {
+            let batch = Batch::with_instructions(kind);
+            assert_eq!(batch.map(|b| b.instructions), kind.is_available().then_some(kind));
+            assert!(kind <= Instructions::detect() || batch.is_none());
+        }
+        assert_eq!(Batch::new().instructions, Instructions::detect());
+    }
+
+    /// From a time and a law follow `e`, `b`, `c` and `d`; they give the time back but for the terms left out.
+    #[test]
+    fn an_approach_finds_the_time_up_to_the_order_that_it_names() {
+        for t in [0.02, -0.01, 3e-4] {
+            for (slope, second, third, fourth) in
+                [0.8, 1.25].into_iter().flat_map(|g| [-1.5, 0.0, 2.0].map(|g2| (g, g2))).flat_map(|(g, g2)| {
+                    [-30.0, 0.0, 20.0].into_iter().flat_map(move |g3| [-900.0, 0.0, 700.0].map(|g4| (g, g2, g3, g4)))
+                })
+            {
+                let way = t * (slope - t * (second / 2.0 + t * (third / 6.0 + t * fourth / 24.0)));
+                let (time, _) = Approach { way, slope, second, third, fourth }.solve();
+                let b: f64 = second * t / 2.0 / slope;
+                let c: f64 = third * t * t / 6.0 / slope;
+                let d: f64 = fourth * t * t * t / 24.0 / slope;
+                let left_out =
+                    14.0 * b.powi(4) + 21.0 * b * b * c.abs() + 3.0 * c * c + 6.0 * (b * d).abs() + 10.0 * d * d;
+                let error = (time / t - 1.0).abs();
+                assert!(
+                    error <= 1.5 * left_out + 4.0 * f64::EPSILON,
+                    "{t} {slope} {second} {third} {fourth}: {error:e} {left_out:e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn an_approach_is_accepted_only_where_it_meets_the_event_and_is_short() {
+        let mut accepted = 0;
+        for way_in_time in [-4e-4, -1e-6, 1e-9, 3e-5, 4e-4] {
+            for slope in [1.0, 0.02] {
+                for b in [0.0, 1e-4, 0.01, 0.2] {
+                    for c in [-0.04, -1e-4, 0.0, 1e-8, 1e-4, 0.04] {
+                        let e: f64 = way_in_time;
+                        let approach = Approach {
+                            way: slope * e,
+                            slope,
+                            second: 2.0 * b * slope / e,
+                            third: 6.0 * c * slope / (e * e),
+                            fourth: 0.0,
+                        };
+                        let (t, is_met) = approach.solve();
+                        let Approach { way, second, third, .. } = approach;
+                        let missed = (t * (slope - t * (second / 2.0 + t * third / 6.0)) - way).abs();
+                        assert!(
+                            !is_met || missed <= f64::EPSILON,
+                            "{missed:e} after {t:e}: e = {e:e}, g = {slope}, b = {b}, c = {c}"
+                        );
+                        accepted += i32::from(is_met);
+                    }
+                }
+            }
+        }
+        assert!(accepted > 50, "{accepted} of 240");
+        let straight = |way| Approach { way, slope: 1.0, second: 0.0, third: 0.0, fourth: 0.0 }.solve();
+        assert_eq!(straight(REACH), (REACH, true));
+        assert_eq!(straight(-REACH.next_up()), (-REACH.next_up(), false));
+    }
+
+    #[test]
+    fn rough_powers_and_logarithms_keep_their_bounds() {
+        for j in 0..=3200 {
+            let y = f64::from(j - 1600) / 16.0 * 9.9;
+            let factor = rough_exp2(y) / y.exp2();
+            assert!((0.94 - 1e-11..=1.0).contains(&factor), "2^{y}: {factor}");
+            let x = y.exp2();
+            let off = rough_log2(-x) - 1023.0 - y;
+            assert!((-0.0861..=1e-11).contains(&off), "log2 of 2^{y}: {off}");
+        }
+    }
+
+    /// A step that no event cuts short is as long as that of the scalar integrator with as many coefficients.
+    #[test]
+    fn a_step_in_the_tunnel_is_as_long_as_the_last_two_orders_allow() {
+        for j in 8..=128 {
+            let beta = f64::from(j) / 128.0;
+            let law = Stage::tunnel(1.0 - beta, beta);
+            let series = Series::<f64, COEFFICIENTS>::new::<false, true, true>(&law, 1.0);
+            let lane = Lane { static_force: 1.0 - beta, drag: beta, ..IDLE };
+            let reached = advance(lane);
+            let span = series.span(f64::EPSILON);
+            assert!((reached.time / span - 1.0).abs() < 1e-11, "{beta}: {} {span}", reached.time);
+        }
     }
 }
