@@ -282,9 +282,8 @@ pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
             "check that this is the file you mean",
         )
     };
-    let mut bytes = Vec::new();
-    if from_stdin {
-        std::io::stdin().lock().take(SIZE_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    let bytes = if from_stdin {
+        bounded(std::io::stdin().lock())
     } else {
         let metadata = std::fs::metadata(path).map_err(unreadable)?;
         if metadata.is_dir() {
@@ -298,12 +297,20 @@ pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
             return Err(too_large());
         }
         // A device or a pipe has no length beforehand.
-        File::open(path).map_err(unreadable)?.take(SIZE_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        File::open(path).and_then(bounded)
     }
+    .map_err(unreadable)?;
     if bytes.len() as u64 > SIZE_MAX {
         return Err(too_large());
     }
     text_of(bytes, &file).map(|text| (file, text))
+}
+
+/// What `source` holds, up to one byte more than is allowed.
+fn bounded(source: impl Read) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    source.take(SIZE_MAX + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// `bytes` as UTF-8, without a byte order mark.
@@ -557,7 +564,7 @@ impl<'t, 'i> Section<'t, 'i> {
         let whole = value.span();
         let raw = self.text.get(whole.clone()).unwrap_or_default();
         match (raw.find(text), text.rfind(part)) {
-            (Some(start), Some(offset)) if !text.is_empty() => {
+            (Some(start), Some(offset)) => {
                 let start = whole.start + start + offset;
                 start..start + part.len()
             }
