@@ -104,3 +104,42 @@ pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: 
     }
     least
 }
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+    use smallvec::smallvec;
+
+    use super::*;
+    use crate::physics::Target;
+
+    #[test]
+    fn a_stop_is_carried_on_by_the_static_work_through_viscous_stages_and_by_the_drag_through_others() {
+        // At rest 0.5 m deep in a first stage to 1 m, then to the exit at 3 m; M = 2 kg, p = 5 N, s = 4 N/m, q = 3 kg/m.
+        let law = Stage { static_force: 5.0, stiffness: 4.0, viscosity: 0.0, drag: 3.0, end: f64::INFINITY };
+        let beyond = |viscosity: [f64; 2]| {
+            let [first, second] = viscosity.map(|viscosity| Stage { viscosity, ..law });
+            let problem = Problem {
+                mass: 2.0,
+                impact_speed: 1.0,
+                exit_depth: 3.0,
+                stages: smallvec![Stage { end: 1.0, ..first }, second],
+                crater: None,
+                target: Target::Stages,
+            };
+            energy_beyond_stop(&problem, 0, 0.5)
+        };
+        // Work of p + s x: 4 J from 0.5 m to 1 m, 26 J from there to 3 m.
+        let viscous = beyond([7.0, 7.0]);
+        assert_relative_eq!(viscous, -2.0 * (4.0 + 26.0) / 2.0, max_relative = 1e-15);
+        // W' = -(5 + 4 x) - 3 W has W = (4 - 15)/9 - 4 x/3 + A e^(-3 x).
+        let after = |start: f64, w: f64, end: f64| {
+            let particular = |x: f64| -11.0 / 9.0 - 4.0 * x / 3.0;
+            particular(end) + (w - particular(start)) * (-3.0 * (end - start)).exp()
+        };
+        let dry = after(0.5, 0.0, 3.0);
+        assert_relative_eq!(beyond([0.0, 0.0]), dry, max_relative = 1e-14);
+        assert_relative_eq!(beyond([7.0, 0.0]), after(1.0, -4.0, 3.0), max_relative = 1e-14);
+        assert_relative_eq!(beyond([0.0, 7.0]), after(0.5, 0.0, 1.0) - 26.0, max_relative = 1e-14);
+    }
+}

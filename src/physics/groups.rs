@@ -99,11 +99,22 @@ mod tests {
     }
 
     #[test]
+    fn geometry_function_is_the_mass_over_that_of_nose_inertia_and_concrete() {
+        // 2/(0.5 · 1.25 · 3200 · 0.1³)
+        let concrete =
+            Concrete { diameter: 0.1, nose_factor: 0.5, inertia_factor: 1.25, density: 3200.0, ..concrete() };
+        assert_relative_eq!(density_for(1.0, 2.0, &concrete), 3200.0, max_relative = 1e-15);
+        let groups = Groups::of(&Scene::of_concrete(2.0, concrete), 1.0).unwrap();
+        assert_relative_eq!(groups.geometry.unwrap(), 1.0, max_relative = 1e-15);
+    }
+
+    #[test]
     fn a_wanted_group_is_the_group_one_gets() {
         let mut wanted = scene();
-        let speed = impact_speed_for(3.5, wanted.mass, &concrete());
-        let density = density_for(17.0, wanted.mass, &concrete());
-        wanted.resistance = Resistance::Concrete(Concrete { density, ..concrete() });
+        let given = Concrete { inertia_factor: 1.3, ..concrete() };
+        let speed = impact_speed_for(3.5, wanted.mass, &given);
+        let density = density_for(17.0, wanted.mass, &given);
+        wanted.resistance = Resistance::Concrete(Concrete { density, ..given });
         let groups = Groups::of(&wanted, speed).unwrap();
         assert_relative_eq!(groups.impact, 3.5, max_relative = 1e-15);
         assert_relative_eq!(groups.geometry.unwrap(), 17.0, max_relative = 1e-15);

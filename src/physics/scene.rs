@@ -867,6 +867,79 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_layer_without_strength_or_without_static_factor_is_an_air_gap() {
+        for (strength, static_factor) in [(0.0, 12.0), (30e6, 0.0), (0.0, 0.0)] {
+            let mut scene = layered(&[0.1, 0.1, 0.1]);
+            let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+            concrete.layers[1] = Layer { strength, static_factor, ..concrete.layers[1] };
+            let forces: Vec<_> = scene.problem().unwrap().stages.iter().map(|stage| stage.static_force).collect();
+            assert!(forces[1] > 0.0 && forces[2] == 0.0 && forces[3] > 0.0, "{forces:?}");
+        }
+    }
+
+    #[test]
+    fn no_target_at_all_is_left_at_the_face_and_a_target_too_thin_for_numbers_is_refused() {
+        let ndrc =
+            |thickness: f64| Scene { thickness: Some(thickness), criterion: Criterion::Ndrc, ..scene() }.exit_depth();
+        assert_eq!(ndrc(0.0), Ok(0.0));
+        // x_p = H/3.19 there, and f64 keeps its digits down to 2.3e-308.
+        assert_relative_eq!(ndrc(7.2e-308).unwrap(), 7.2e-308 / 3.19, max_relative = 1e-15);
+        assert!(matches!(ndrc(7e-308), Err(ResolveError::OutOfRange { .. })));
+    }
+
+    #[test]
+    fn the_example_of_a_range_lies_in_it() {
+        for range in [Range::Finite, Range::NotNegative, Range::Positive, Range::UnitInterval, Range::AtLeastHalf] {
+            assert!(range.contains(range.example().parse().unwrap()), "{range:?}");
+        }
+    }
+
+    /// Each error as a person sees it.
+    #[test]
+    fn errors_name_the_numbers_and_the_remedy_and_only_overflow_is_no_usage() {
+        let usage = [
+            (
+                ResolveError::Inadmissible { quantity: "the mass M [kg]", value: -1.0, range: Range::Positive },
+                "the mass M [kg] = -1 is not admissible: it must be a number > 0",
+                "give a value in the range",
+            ),
+            (
+                ResolveError::NoImpactSpeed,
+                "the scene gives no impact velocity",
+                "add [impact] with velocity = \"300 m/s\"",
+            ),
+            (
+                ResolveError::NoDiameter,
+                "the criterion `ndrc` needs a projectile diameter, and a scene of stages has none",
+                "take the criterion `full-depth`",
+            ),
+            (ResolveError::NoStage, "the scene has no stage", "give at least one stage"),
+            (
+                ResolveError::StageEndsFall { stage: 1, end: 0.3, previous: 0.4 },
+                "stage 1 ends at 0.3 m, before the stage in front of it ends at 0.4 m",
+                "order the stages by their ends, and leave out only the last end",
+            ),
+            (
+                ResolveError::TargetGoesOn { end: 0.4 },
+                "the last stage ends at 0.4 m, inside the target",
+                "leave out the end of the last stage, or end the target there",
+            ),
+            (
+                ResolveError::LayersDoNotSumUp { sum: 0.3, thickness: 1.0 },
+                "the layers sum up to 0.3 m, the target's thickness says 1 m",
+                "leave out the thickness; it follows from the layers",
+            ),
+        ];
+        for (error, message, help) in usage {
+            assert_eq!((error.to_string().as_str(), error.help(), error.is_usage()), (message, help, true));
+        }
+        let error = ResolveError::OutOfRange { quantity: "the drag Q [kg/m]", value: 1e-310 };
+        assert_eq!(error.to_string(), "the drag Q [kg/m] comes to 1e-310, beyond the range of 64-bit numbers");
+        assert_eq!(error.help(), "check the units of the scene; its numbers lie too far apart");
+        assert!(!error.is_usage());
+    }
+
+    #[test]
     fn a_scene_tells_whether_its_static_factor_is_the_one_of_eq_14() {
         assert!(!concrete().follows_eq14());
         assert!(Concrete { strength: 36e6, ..concrete() }.follows_eq14());

@@ -282,9 +282,8 @@ pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
             "check that this is the file you mean",
         )
     };
-    let mut bytes = Vec::new();
-    if from_stdin {
-        std::io::stdin().lock().take(SIZE_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    let bytes = if from_stdin {
+        bounded(std::io::stdin().lock())
     } else {
         let metadata = std::fs::metadata(path).map_err(unreadable)?;
         if metadata.is_dir() {
@@ -298,12 +297,20 @@ pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
             return Err(too_large());
         }
         // A device or a pipe has no length beforehand.
-        File::open(path).map_err(unreadable)?.take(SIZE_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        File::open(path).and_then(bounded)
     }
+    .map_err(unreadable)?;
     if bytes.len() as u64 > SIZE_MAX {
         return Err(too_large());
     }
     text_of(bytes, &file).map(|text| (file, text))
+}
+
+/// What `source` holds, up to one byte more than is allowed.
+fn bounded(source: impl Read) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    source.take(SIZE_MAX + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// `bytes` as UTF-8, without a byte order mark.
@@ -557,7 +564,7 @@ impl<'t, 'i> Section<'t, 'i> {
         let whole = value.span();
         let raw = self.text.get(whole.clone()).unwrap_or_default();
         match (raw.find(text), text.rfind(part)) {
-            (Some(start), Some(offset)) if !text.is_empty() => {
+            (Some(start), Some(offset)) => {
                 let start = whole.start + start + offset;
                 start..start + part.len()
             }
@@ -1538,6 +1545,78 @@ velocity = 300
                 assert!(!shown.chars().any(steers), "{shown:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_carriage_return_stays_only_as_part_of_a_line_end() {
+        assert_eq!(printable("a\rb\r\nc\n\rd\r"), "a?b\r\nc\n?d?");
+    }
+
+    #[test]
+    fn a_quoted_piece_is_cut_after_60_characters_and_says_so() {
+        for (length, shown, end) in [(59, 59, ""), (60, 60, ""), (61, 60, "…"), (62, 60, "…"), (200, 60, "…")] {
+            assert_eq!(quoted(&"ü".repeat(length)), format!("`{}{end}`", "ü".repeat(shown)), "{length}");
+        }
+    }
+
+    #[test]
+    fn a_line_is_underlined_up_to_240_characters() {
+        // Neither the line before, which ends in a letter of two bytes, nor the one behind counts.
+        for (length, underlined) in [(1, true), (239, true), (240, true), (241, false), (242, false)] {
+            let line = if length == 1 { "x".to_owned() } else { format!("x = 1 # {}", "ü".repeat(length - 8)) };
+            let error = SceneError::at("f", &format!("# é\n{line}\ny = 1\n"), 5..6, "no", "yes", "go");
+            assert_eq!(error.location(), "f:2:1");
+            assert_eq!(error.render(false).contains("│ ┬"), underlined, "{}", error.render(false));
+        }
+    }
+
+    #[test]
+    fn a_span_within_a_letter_begins_at_the_letter() {
+        for start in 8..11 {
+            let error = SceneError::at("f", "a = 1\nä€ = 2", start..14, "no", "yes", "go");
+            assert_eq!((error.location().as_str(), error.place.unwrap().span), ("f:2:2", 8..14));
+        }
+    }
+
+    #[test]
+    fn a_key_over_several_lines_is_refused_in_its_first() {
+        let error = refuse("a = 1\n\"\"\"b\nc\"\"\" = 2\nd = 3\n");
+        assert!(error.message.starts_with("this is not TOML: keys cannot be multi-line"), "{error}");
+        assert_eq!(error.place.unwrap(), Place { line: 2, column: 1, span: 6..10 });
+    }
+
+    #[test]
+    fn a_number_in_place_of_a_table_is_told_how_to_write_it() {
+        for (text, help) in [
+            (with("{ factor = 0.72 }", "0.72"), "write nose = { factor = 0.72 }"),
+            ("projectile = 3".to_owned(), "write [projectile]"),
+            ("impact = 3".to_owned(), "write [impact]"),
+        ] {
+            assert_eq!(refuse(&text).help, help, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_misspelling_has_one_slip_in_three_letters_and_never_in_all() {
+        for (text, known, likely) in [
+            ("xyzdefghi", "abcdefghi", true),
+            ("xyzwefghi", "abcdefghi", false),
+            ("xycdefgh", "abcdefgh", true),
+            ("xyzdefgh", "abcdefgh", false),
+            ("xbcd", "abcd", true),
+            ("xycd", "abcd", false),
+            ("xb", "ab", true),
+            ("xy", "ab", false),
+            ("A", "a", true),
+            ("x", "a", false),
+            ("bacd", "abcd", true),
+        ] {
+            assert_eq!(nearest(text, &[known]), likely.then_some(known), "{text} for {known}");
+        }
+        assert_eq!(nearest("abd", &["xyz", "abc", "abde"]), Some("abc"));
+        let long = "a".repeat(60);
+        assert_eq!(nearest(&long, &[&long]), Some(long.as_str()));
+        assert_eq!(nearest(&"a".repeat(61), &[&long]), None);
     }
 
     #[test]

@@ -378,5 +378,7 @@ mod tests {
         assert!(!perforation_validity(0.0).valid && !perforation_validity(f64::NAN).valid);
         let thin = perforation_validity(1.0);
         assert!(thin.valid && thin.note.contains("extrapolates"), "{}", thin.note);
+        assert!(perforation_validity(1.7_f64.next_down()).note.contains("extrapolates"));
+        assert_eq!(perforation_validity(1.7).note, "H/d lies between 0 and H/d = 18.06 (y = 13.5)");
     }
 }

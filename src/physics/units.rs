@@ -370,6 +370,12 @@ mod tests {
             (".5 kg/m", Dimension::Drag, 0.5),
             ("5. g/cm", Dimension::Drag, 0.5),
             ("  3 \u{a0} µs ", Dimension::Time, 3e-6),
+            ("3 us", Dimension::Time, 3e-6),
+            // The f64 product of either with 0.001 is another number.
+            ("0.9 mm", Dimension::Length, 0.0009),
+            ("1.3e0 mm", Dimension::Length, 0.0013),
+            // Digits that are no exponents.
+            ("2 in Hg (32 °F)", Dimension::Pressure, 6772.76),
         ] {
             assert_eq!(quantity(text, dimension), Ok(value), "{text}");
         }
@@ -469,6 +475,16 @@ mod tests {
         assert_eq!(split("5e"), ("5", "e"));
         assert_eq!(split("5e-3mm"), ("5e-3", "mm"));
         assert_eq!(split("-.5e+3"), ("-.5e+3", ""));
+        assert_eq!(split("5e- mm"), ("5", "e- mm"));
         assert_eq!(split("e5"), ("", "e5"));
+    }
+
+    #[test]
+    fn a_point_without_digits_is_no_number() {
+        for text in [".", ". mm", "-.", "+.mm", ".e5"] {
+            assert_eq!(split(text), ("", text));
+        }
+        assert_eq!(split(".5mm"), (".5", "mm"));
+        assert_eq!(split("-5.mm"), ("-5.", "mm"));
     }
 }

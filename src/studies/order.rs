@@ -398,8 +398,10 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     let Some(line) = line(x, y) else {
         return if at_floor > 0 {
             (Class::AtFloor, format!("{at_floor} of {} errors are zero or round-off", excluded.len()))
-        } else {
+        } else if x.len() < STEPS_MIN {
             (Class::Undecided, format!("{} points are too few", x.len()))
+        } else {
+            (Class::Undecided, "the steps are too much alike to carry a slope".to_owned())
         };
     };
     let [low, high] = line.slope_band(CLASS_LEVEL);
@@ -863,5 +865,344 @@ mod tests {
         assert_eq!(fit(&good[..3]), Err(FitError::TooFewSteps { found: 3 }));
         assert_eq!(fit(&[]), Err(FitError::TooFewSteps { found: 0 }));
         assert_eq!(fit(&vec![good[0]; 9]), Err(FitError::TooFewSteps { found: 1 }));
+    }
+
+    /// A fit of these errors at the steps 1, 2, 3, ..., all of them used, as if made by [`fit`].
+    fn of_errors(errors: &[f64]) -> OrderFit {
+        let point =
+            |(i, &error): (usize, &f64)| FittedPoint { step: 1.0 + i as f64, error, used: true, excluded: None };
+        let points = errors.iter().enumerate().map(point).collect();
+        OrderFit { line: None, class: Class::Undecided, reason: String::new(), points }
+    }
+
+    #[track_caller]
+    fn assert_close(values: &[f64], expected: &[f64]) {
+        for (value, expected) in values.iter().zip(expected) {
+            assert!((value / expected - 1.0).abs() < 1e-13, "{value:?}, not {expected:?}, in {values:?}");
+        }
+    }
+
+    /// Errors `h^slope` on both sides of h = 1, `counts` of them and evenly spaced in ln h, `height` times their
+    /// round-off: the bend is at ln h = 0, halfway between two points.
+    fn bent(counts: [usize; 2], spacing: f64, slopes: [f64; 2], height: impl Fn(usize) -> f64) -> Vec<StepError> {
+        (0..counts[0] + counts[1])
+            .map(|i| {
+                let x = spacing * (i as f64 - counts[0] as f64 + 0.5);
+                let error = (slopes[usize::from(x > 0.0)] * x).exp();
+                StepError { step: x.exp(), error, round_off: Some(error / height(i)) }
+            })
+            .collect()
+    }
+
+    /// How many of `points`, ascending in step, go for `reason`; no other reason occurs, and none is left beside them.
+    fn excluded_for(reason: Exclusion, points: &[StepError]) -> usize {
+        let excluded = exclusions(points, &round_off(points));
+        let count = excluded.iter().filter(|&&e| e == Some(reason)).count();
+        assert!(excluded.iter().all(|&e| e.is_none() || e == Some(reason)), "{excluded:?}");
+        let one_block = match reason {
+            Exclusion::PreAsymptotic => excluded[points.len() - count..].iter().all(Option::is_some),
+            _ => excluded[..count].iter().all(Option::is_some),
+        };
+        assert!(one_block, "{excluded:?}");
+        count
+    }
+
+    #[test]
+    fn order_constant_and_their_intervals_are_those_of_the_normal_equations() {
+        // The uncentred normal equations of five points and their covariance, t by the incomplete beta function: 50 digits.
+        let errors = [0.5, -1.0, 3.0, -7.5, 15.0];
+        let points: Vec<_> =
+            [2.0, 3.0, 5.0, 7.0, 11.0].iter().zip(errors).map(|(&h, error)| StepError::new(h, error)).collect();
+        let fit = fit_at_level(&points, 0.01).unwrap();
+        let line = fit.line.unwrap();
+        assert_close(&[line.order, line.residual_scatter], &[2.068_194_788_581_501_3, 0.126_385_349_190_982_39]);
+        assert_close(&line.interval95, &[1.769_819_522_684_142_8, 2.366_570_054_478_859_7]);
+        assert_close(&line.verdict_band, &[1.520_571_136_461_884_1, 2.615_818_440_701_118_4]);
+        assert_close(&[line.error_constant], &[0.113_273_365_139_022_55]);
+        assert_close(&line.constant_interval, &[0.068_982_412_445_190_83, 0.186_001_834_309_766_05]);
+        let constant = fit.constant_at(2.0).unwrap();
+        assert_close(&[constant.value], &[0.125_893_690_361_844_93]);
+        assert_close(&constant.interval95, &[0.108_639_711_124_912_03, 0.145_887_918_044_083_63]);
+        let negative: Vec<_> = points.iter().map(|p| StepError::new(p.step, -p.error.abs())).collect();
+        let turned = super::fit(&negative).unwrap().constant_at(2.0).unwrap();
+        let [low, high] = constant.interval95;
+        assert_eq!(turned, ErrorConstant { value: -constant.value, interval95: [-high, -low] });
+    }
+
+    #[test]
+    fn a_constant_needs_two_points_and_of_two_is_known_in_closed_form() {
+        assert_eq!(of_errors(&[]).constant_at(1.0), None);
+        assert_eq!(of_errors(&[3.0]).constant_at(1.0), None);
+        // C = 2 and 8: the mean of the logarithms is ln 4, its standard error ln 2; with one degree of freedom
+        // t = tan(0.475 pi).
+        // Constants of any size: the two logarithms near -693 differ as much.
+        let factor = 2.0_f64.powf((0.475 * std::f64::consts::PI).tan());
+        for size in [1.0, 2.0_f64.powi(-1000)] {
+            let ErrorConstant { value, interval95: [low, high] } =
+                of_errors(&[2.0 * size, 16.0 * size]).constant_at(1.0).unwrap();
+            for (bound, expected) in [(low, 4.0 / factor), (value, 4.0), (high, 4.0 * factor)] {
+                assert!((bound / size / expected - 1.0).abs() < 1e-12, "{bound:e}, not {expected:e} times {size:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn falling_share_counts_only_pairs_that_fall_and_needs_one() {
+        assert_eq!(of_errors(&[]).falling_share(), None);
+        assert_eq!(of_errors(&[1.0]).falling_share(), None);
+        assert_eq!(of_errors(&[2.0, 1.0]).falling_share(), Some(0.0));
+        // Rising, equal, falling, rising in size, from the fine end: two of four.
+        assert_eq!(of_errors(&[1.0, -2.0, 2.0, 1.5, 3.0]).falling_share(), Some(0.5));
+        let mut one_left = of_errors(&[1.0, 2.0]);
+        one_left.points[0].used = false;
+        assert_eq!(one_left.falling_share(), None);
+    }
+
+    #[test]
+    fn an_order_passes_only_where_its_band_holds_neither_neighbour() {
+        let verdict = |class: Class, verdict_band: [f64; 2]| {
+            let points: Vec<_> = (1..9).map(|i| StepError::new(f64::from(i), f64::from(i))).collect();
+            let line = fit(&points).unwrap().line.map(|line| PowerLaw { verdict_band, ..line });
+            OrderFit { line, class, ..of_errors(&[]) }.verdict(2.0)
+        };
+        for (band, expected) in [
+            ([1.5, 2.5], OrderVerdict::Pass),
+            ([2.0, 2.9], OrderVerdict::Pass),
+            ([1.1, 2.0], OrderVerdict::Pass),
+            ([1.0, 2.1], OrderVerdict::Undecided),
+            ([1.9, 3.0], OrderVerdict::Undecided),
+            ([0.5, 3.5], OrderVerdict::Undecided),
+            ([2.1, 2.9], OrderVerdict::Fail),
+            ([1.1, 1.9], OrderVerdict::Fail),
+        ] {
+            assert_eq!(verdict(Class::Converging, band), expected, "{band:?}");
+            let undecided = if expected == OrderVerdict::Fail { expected } else { OrderVerdict::Undecided };
+            assert_eq!(verdict(Class::Undecided, band), undecided, "{band:?}");
+            assert_eq!(verdict(Class::Diverging, band), OrderVerdict::Fail);
+            for class in [Class::Oscillating, Class::AtFloor] {
+                assert_eq!(verdict(class, band), OrderVerdict::Undecided);
+            }
+        }
+    }
+
+    #[test]
+    fn names_of_the_classes_are_those_of_the_contract() {
+        for class in [Class::Converging, Class::Diverging, Class::Oscillating, Class::AtFloor, Class::Undecided] {
+            assert_eq!(serde_json::to_value(class).unwrap(), class.name());
+        }
+        assert_eq!(Class::AtFloor.name(), "at-floor");
+    }
+
+    #[test]
+    fn a_round_off_is_a_finite_size_and_may_be_zero() {
+        let with = |size: f64| {
+            let points: Vec<_> = (1..=6)
+                .map(|i| StepError {
+                    round_off: (i == 3).then_some(size),
+                    ..StepError::new(f64::from(i), f64::from(i))
+                })
+                .collect();
+            fit(&points).map(|fit| fit.used())
+        };
+        assert_eq!(with(0.0), Ok(6));
+        for size in [-1e-300, -1.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN] {
+            assert!(matches!(with(size), Err(FitError::NotFinite { index: 2, .. })), "{size}");
+        }
+    }
+
+    #[test]
+    fn one_error_near_round_off_among_many_above_is_no_floor() {
+        // The median decides, of 8 points and of 9: 1e-4 is 1e12 times the round-off, the one error below 100 times.
+        for n in [8, 9] {
+            let points: Vec<_> = (1..=n)
+                .map(|i| StepError {
+                    step: f64::from(i),
+                    error: if i == 5 { 1e-14 } else { 1e-4 },
+                    round_off: Some(1e-16),
+                })
+                .collect();
+            let fit = fit(&points).unwrap();
+            assert_eq!((fit.class, fit.used()), (Class::Undecided, points.len()), "{}", fit.reason);
+        }
+    }
+
+    #[test]
+    fn noisy_points_go_up_to_half_of_all_and_beyond_that_pure_round_off_alone() {
+        let run = |heights: [f64; 8]| {
+            let point = |(i, height): (usize, f64)| StepError {
+                step: 1.0 + i as f64,
+                error: if i % 2 == 0 { height } else { -height },
+                round_off: Some(1.0),
+            };
+            let points: Vec<_> = heights.into_iter().enumerate().map(point).collect();
+            excluded_for(Exclusion::RoundOffFloor, &points)
+        };
+        let high = 1e6;
+        assert_eq!(run([50.0, 4.0, 9.0, 100.0, high, high, high, high]), 4);
+        assert_eq!(run([50.0, 4.0, 9.0, 100.1, high, high, high, high]), 3);
+        assert_eq!(run([50.0, 4.0, 9.0, 100.0, 7.0, high, high, high]), 0);
+        assert_eq!(run([3.0, 1.0, 0.5, 3.0, 3.0, 3.1, high, high]), 5);
+    }
+
+    #[test]
+    fn a_floor_goes_with_the_points_where_it_is_a_quarter_of_the_trend() {
+        // Above the bend the floor's share falls as h^-(coarse - fine): to 1/4 at ln h = ln 4/(coarse - fine).
+        let floor = |slopes| excluded_for(Exclusion::RoundOffFloor, &bent([17, 17], 0.1, slopes, |_| 300.0));
+        // Round-off that grows as steps are added: 0.4621, beyond 5 points.
+        assert_eq!(floor([-1.0, 2.0]), 17 + 5);
+        // 0.9242, beyond 9 points.
+        assert_eq!(floor([0.5, 2.0]), 17 + 9);
+        // The fine side falls at more than half the slope of the trend: no floor, and it goes alone.
+        assert_eq!(floor([1.2, 2.0]), 17);
+    }
+
+    #[test]
+    fn the_law_of_the_coarse_end_goes_where_it_is_a_tenth_or_in_half_of_the_fine_side() {
+        let coarse = |slopes| excluded_for(Exclusion::PreAsymptotic, &bent([24, 10], 0.1, slopes, |_| 1e6));
+        // Its share falls to 1/10 at ln h = -ln 10/3 = -0.7675, 8 points below the bend.
+        assert_eq!(coarse([1.0, 4.0]), 10 + 8);
+        assert_eq!(coarse([4.0, 1.0]), 10 + 8);
+        // -ln 10/0.5 = -4.6 is beyond the finest step: of the 24 points below the bend the lower half and the next one stay.
+        assert_eq!(coarse([1.0, 1.5]), 10 + 11);
+    }
+
+    #[test]
+    fn the_median_above_round_off_tells_a_floor_from_another_law() {
+        // Of the 24 points below the bend k are 10 times their round-off, the others 1e6 times.
+        let points = |k: usize| bent([24, 10], 0.1, [1.0, 4.0], |i| if (1..=k).contains(&i) { 10.0 } else { 1e6 });
+        assert_eq!(excluded_for(Exclusion::PreAsymptotic, &points(12)), 10 + 8);
+        // ln 4/3 = 0.4621 above the bend: 5 points.
+        assert_eq!(excluded_for(Exclusion::RoundOffFloor, &points(13)), 24 + 5);
+    }
+
+    #[test]
+    fn what_is_left_of_too_few_points_says_so() {
+        let of = |errors: &[f64]| {
+            let point = |(i, &error): (usize, &f64)| StepError { step: 1.0 + i as f64, error, round_off: Some(1.0) };
+            let fit = fit(&errors.iter().enumerate().map(point).collect::<Vec<_>>()).unwrap();
+            assert_eq!((fit.line, fit.used(), fit.verdict(1.0)), (None, 0, OrderVerdict::Undecided));
+            (fit.class, fit.reason)
+        };
+        // Three zeros and two errors of the size of their round-off.
+        let floor = (Class::AtFloor, "5 of 8 errors are zero or round-off".to_owned());
+        assert_eq!(of(&[0.0, 1.0, 0.0, -1.0, 0.0, 1e6, 2e6, 3e6]), floor);
+        // Of five points below a bend two give way to the law above it, and three make no line.
+        let bend = fit(&bent([5, 5], 0.1, [1.0, 1.5], |_| 1e6)).unwrap();
+        assert_eq!((bend.line, bend.class), (None, Class::Undecided));
+        assert_eq!(bend.reason, "3 points are too few");
+    }
+
+    #[test]
+    fn a_slope_no_larger_than_the_resolution_is_not_told_from_zero() {
+        // Without noise the half-width is ORDER_RESOLUTION: 0.05 - 0.05 = 0 is not above zero, nor -0.05 + 0.05 below.
+        let class = |slope: f64| {
+            let x = [-2.0, -1.0, 1.0, 2.0];
+            classify(&x, &x.map(|x| slope * x), &[false; 4], 1e9, &[None; 4]).0
+        };
+        for (slope, expected) in [
+            (ORDER_RESOLUTION, Class::Undecided),
+            (-ORDER_RESOLUTION, Class::Undecided),
+            (0.0, Class::Undecided),
+            (0.051, Class::Converging),
+            (-0.051, Class::Diverging),
+        ] {
+            assert_eq!(class(slope), expected, "{slope}");
+        }
+    }
+
+    #[test]
+    fn steps_alike_to_ten_digits_carry_no_slope() {
+        // Standard deviation of ln h on either side of 1e-10, for four points and for forty.
+        for n in [4, 40] {
+            let y: Vec<f64> = (0..n).map(f64::from).collect();
+            let has_slope = |sigma: f64| {
+                let x: Vec<f64> = (0..n).map(|i| if i % 2 == 0 { sigma } else { -sigma }).collect();
+                line(&x, &y).is_some()
+            };
+            assert!(!has_slope(0.0) && !has_slope(0.99e-10) && has_slope(1.01e-10), "{n}");
+        }
+        let steps = [1.0, 1.0_f64.next_up(), 1.0 + 2.0 * f64::EPSILON, 1.0 + 3.0 * f64::EPSILON];
+        let fit = fit(&steps.map(|h| StepError::new(h, h))).unwrap();
+        assert_eq!((fit.line, fit.class, fit.used()), (None, Class::Undecided, 0));
+        assert_eq!(fit.reason, "the steps are too much alike to carry a slope");
+    }
+
+    #[test]
+    fn a_bend_is_the_least_squares_one_with_the_tail_of_its_f() {
+        // Ten points leave one place, between the fifth and the sixth. Slopes and sums by the normal equations in 40 digits.
+        let x = [0.0, 1.0, 3.0, 4.0, 6.0, 9.0, 10.0, 12.0, 15.0, 16.0];
+        let y = [0.0, 2.0, 3.0, 4.0, 7.0, 9.0, 12.0, 18.0, 27.0, 28.0];
+        let (tail, bend) = best_bend(&x, &y).unwrap();
+        assert_eq!(bend.at, 7.5);
+        assert_close(&[bend.fine_slope], &[0.740_037_695_207_323_6]);
+        assert_close(&[bend.coarse_slope], &[0.740_037_695_207_323_6 + 1.861_066_235_864_297_3]);
+        // (7.8160/58.757)^3
+        assert!((tail / 0.002_353_811_879_770_368_3 - 1.0).abs() < 1e-12, "{tail}");
+        assert!(best_bend(&x[1..], &y[1..]).is_none());
+    }
+
+    #[test]
+    fn a_bend_of_steps_of_any_size_is_as_sharp() {
+        for (base, n) in [(-690.0, 10), (-690.0, 34), (690.0, 34), (0.0, 34)] {
+            let x: Vec<f64> = (0..n).map(|i| base + 0.1 * f64::from(i)).collect();
+            let middle = x.len() / 2;
+            let at = 0.5 * (x[middle - 1] + x[middle]);
+            let y: Vec<f64> = x.iter().map(|x| (x - at) + 2.0 * (x - at).max(0.0)).collect();
+            let (_, bend) = best_bend(&x, &y).unwrap();
+            assert_eq!(bend.at, at);
+            assert!((bend.fine_slope - 1.0).abs() < 1e-12 && (bend.coarse_slope - 3.0).abs() < 1e-12, "{bend:?}");
+        }
+    }
+
+    #[test]
+    fn an_eighth_of_the_points_stays_on_either_side_of_a_bend() {
+        // 80 points and a kink behind 7 of them, from either end: the nearest place looked at is behind 10.
+        let x: Vec<f64> = (0..80).map(f64::from).collect();
+        for (kink, nearest) in [(6.5, 9.5), (72.5, 69.5)] {
+            let y: Vec<f64> = x.iter().map(|x| (x - kink).max(0.0)).collect();
+            assert_eq!(best_bend(&x, &y).unwrap().1.at, nearest);
+        }
+    }
+
+    #[test]
+    fn slopes_that_meet_a_limit_exactly_are_on_its_near_side() {
+        // Fits whose slopes stand at a limit to the last bit; rounding makes a part of these lines such.
+        let (mut flat, mut half, mut tenth) = (0, 0, 0);
+        for k in 0..300 {
+            let spacing = 0.1 + 1e-3 * f64::from(k);
+            let fitted = |slopes: [f64; 2], height: f64| {
+                let points = bent([9, 9], spacing, slopes, |_| height);
+                let x: Vec<f64> = points.iter().map(|point| point.step.ln()).collect();
+                let y: Vec<f64> = points.iter().map(|point| point.error.ln()).collect();
+                (best_bend(&x, &y).unwrap(), bend(&x, &y).is_some(), points)
+            };
+            // A coarse end that does not fall is no trend that a floor could end.
+            let ((_, bend), _, points) = fitted([1.0, 0.0], 300.0);
+            if bend.coarse_slope == 0.0 {
+                flat += 1;
+                assert!(excluded_for(Exclusion::PreAsymptotic, &points) >= 9);
+            }
+            // At half the slope of the trend the fine side is not flat, and goes alone.
+            let ((_, bend), _, points) = fitted([1.0, 2.0], 300.0);
+            if bend.fine_slope == 0.5 * bend.coarse_slope {
+                half += 1;
+                assert_eq!(excluded_for(Exclusion::RoundOffFloor, &points), 9);
+            }
+            // Slopes a tenth apart are one line.
+            let ((tail, bend), bends, _) = fitted([0.0, BEND_MIN], 1e6);
+            if bend.coarse_slope - bend.fine_slope == BEND_MIN {
+                tenth += 1;
+                assert!(tail < BEND_LEVEL && !bends);
+            }
+        }
+        assert!(flat > 0 && half > 0 && tenth > 0, "{flat} {half} {tenth}");
+    }
+
+    #[test]
+    fn zero_is_exceeded_with_certainty() {
+        for dof in [1, 2, 58] {
+            let t = student_t(1.0, dof);
+            assert!((0.0..1e-18).contains(&t), "{t:e}");
+        }
     }
 }
