@@ -442,17 +442,11 @@ fn restrict(whole: &[f64], from: f64, to: f64, part: &mut [f64]) {
     }
 }
 
-/// Changes of sign in a sequence, zeros left out.
+/// Changes of sign in a sequence, zeros left out. Signs themselves are compared: the product of two numbers below 1e-162
+/// is zero.
 fn changes(sequence: &[f64]) -> usize {
-    let mut count = 0;
-    let mut last = 0.0;
-    for value in sequence.iter().copied().filter(|v| *v != 0.0) {
-        if last * value < 0.0 {
-            count += 1;
-        }
-        last = value;
-    }
-    count
+    let signs = sequence.iter().filter(|value| **value != 0.0).map(|value| value.is_sign_negative());
+    signs.clone().zip(signs.skip(1)).filter(|(last, next)| last != next).count()
 }
 
 /// The one change of sign in `[from, to]`, by halving down to neighbouring numbers.
@@ -577,9 +571,20 @@ mod tests {
 
     #[test]
     fn the_scale_of_a_polynomial_does_not_matter() {
-        for scale in [1e-300, 1e-170, 1.0, 1e170] {
+        for scale in [1e-300, 1e-170, 1.0, 1e170, 1e300] {
             let root = first_root(&[-0.06 * scale, 0.5 * scale, -scale], 1.0).unwrap();
-            assert!((root - 0.2).abs() < 1e-12, "{root} at scale {scale}");
+            assert!((root - 0.2).abs() < 2e-16, "{root} at scale {scale}");
+        }
+        // A power of two rounds nothing: simple, double and triple roots, the end, a near miss.
+        let (apart, double, triple) =
+            (product(&[0.2, 0.3], &[]), product(&[0.25, 0.25, 0.75], &[]), product(&[0.7; 3], &[]));
+        for polynomial in [apart, double, triple, product(&[1.0], &[]), product(&[0.375, 0.5, 0.625], &[(0.1, 0.01)])] {
+            let root = first_root(&polynomial, 1.0);
+            assert!(root.is_some());
+            for exponent in [-900, -500, 500, 900] {
+                let scaled: Vec<f64> = polynomial.iter().map(|c| c * 2_f64.powi(exponent)).collect();
+                assert_eq!(first_root(&scaled, 1.0), root, "{polynomial:?} times 2^{exponent}");
+            }
         }
     }
 
