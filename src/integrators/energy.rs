@@ -1297,7 +1297,7 @@ mod tests {
         Loss { steady, growing, drag }
     }
 
-    /// Two stages of any kind in one step's reach, driven ones among them; M = 1.
+    /// Two stages of any kind, driven ones among them, of a few drag lengths at most; M = 1.
     fn general(random: &mut Random) -> Problem {
         let v0 = random.between(0.5, 2.0);
         let mut law = |end: f64| {

@@ -1594,7 +1594,7 @@ mod tests {
         assert_eq!((flight.end.depth, flight.cost.steps), (exit, 2));
     }
 
-    /// F = 1, M = 1, V0 = 1: W/V0² = 1 - 2 H, of which nine units are rounding.
+    /// F = 1, M = 1, V0 = 1: W/V0² = 1 - 2 H. Eight roundings of it are allowed, and a few of 1 for the way to rest.
     #[test]
     fn the_bar_of_a_deep_stop_is_that_of_the_way_it_lacks() {
         let flight = fly(&one_stage(Stage::tunnel(1.0, 0.0), 1.0, 1000.0));
