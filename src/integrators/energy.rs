@@ -732,6 +732,7 @@ mod tests {
     use num_dual::Dual64;
     use twofloat::TwoFloat;
 
+    use super::super::taylor::Taylor;
     use super::*;
     use crate::physics::exit_energy::{self, expm1_over};
     use crate::physics::{Stages, Target};
@@ -1290,5 +1291,255 @@ mod tests {
         }
         println!("{flights} flights, worst time error {worst:e}");
         assert!(flights > 2000);
+    }
+
+    fn loss(steady: f64, growing: f64, drag: f64) -> Loss<f64> {
+        Loss { steady, growing, drag }
+    }
+
+    /// Two stages of any kind, driven ones among them, of a few drag lengths at most; M = 1.
+    fn general(random: &mut Random) -> Problem {
+        let v0 = random.between(0.5, 2.0);
+        let mut law = |end: f64| {
+            let force = v0 * v0 * (4.0 * random.unit() - 2.0);
+            let stiffness = if random.unit() < 0.6 { v0 * v0 * random.between(0.1, 10.0) } else { 0.0 };
+            let drag = if random.unit() < 0.7 { random.between(0.05, 5.0) } else { 0.0 };
+            stage(force, stiffness, drag, end)
+        };
+        let stages = [law(0.3), law(f64::INFINITY)];
+        staged(1.0, v0, 0.3 + random.between(0.05, 1.0), &stages)
+    }
+
+    #[test]
+    fn what_a_flight_costs_is_counted() {
+        let cost = |problem: &Problem| Energy::new().fly(problem, Detail::End).unwrap().cost;
+        let counted = |steps, force_evaluations| Cost { steps, rejected_steps: 0, force_evaluations };
+        // A gap: one step of two terms for w, one of 24 for the time.
+        assert_eq!(cost(&staged(1.0, 2.0, 1.0, &[stage(0.0, 0.0, 0.0, f64::INFINITY)])), counted(2, 26));
+        // Constant forces, w = 1/4 behind the first, rest in the second: two steps each, and one trial of two terms.
+        let stages = [stage(0.75, 0.0, 0.0, 1.0), stage(0.5, 0.0, 0.0, f64::INFINITY)];
+        assert_eq!(cost(&staged(2.0, 1.0, f64::INFINITY, &stages)), counted(4, 54));
+        assert_eq!(Energy::new().name(), "energy");
+    }
+
+    #[test]
+    fn of_equal_margins_the_first_is_kept_with_its_bar() {
+        let mut least = Least::default();
+        assert!(least.take(0.5, 0.125) && !least.take(0.5, 0.25) && !least.take(0.75, 0.5));
+        assert_eq!((least.value, least.error), (0.5, 0.125));
+    }
+
+    /// At one drag length, from w = 1 with drag alone, the terms are 1/n!.
+    #[test]
+    fn a_sum_ends_with_the_first_term_that_is_negligible_and_within_its_bound() {
+        let law = loss(0.0, 0.0, 1.0);
+        for (negligible, terms) in [(0.6, 2), (0.5, 2), (0.4, 3), (1e-3, 7), (0.0, TERMS_MAX)] {
+            assert_eq!(law.change(0.0, 1.0, 1.0, negligible).1, terms, "{negligible}");
+        }
+    }
+
+    #[test]
+    fn the_static_reach_is_the_way_on_which_the_static_force_takes_all() {
+        for (a, b, x, w) in [
+            (3.0, 0.0, 0.0, 2.5),
+            (3.0, 2.0, 0.5, 0.7),
+            (-3.0, 2.0, 0.5, 0.7),
+            (-3.0, 2.0, 4.0, 0.7),
+            (0.0, 2.0, 0.0, 1e-3),
+            (-1e3, 5.0, 1.0, 4.0),
+        ] {
+            let reach = loss(a, b, 0.7).static_reach(x, w);
+            let (steady, growing) = ((a + b * x) * reach, 0.5 * b * reach * reach);
+            let off = (steady + growing - w).abs() / (steady.abs() + growing + w);
+            assert!(reach > 0.0 && off < 1e-15, "{a}, {b}, {x}, {w}: {reach}, {off:e}");
+        }
+        for a in [0.0, -1.0] {
+            assert_eq!(loss(a, 0.0, 1.0).static_reach(0.5, 1.0), f64::INFINITY);
+        }
+    }
+
+    /// Powers of two as units of length and speed: no number rounds differently, and no trial is taken more.
+    #[test]
+    fn units_are_free_to_the_bit() {
+        let mut random = Random(8);
+        for case in 0..200 {
+            let mut problem = general(&mut random);
+            if case % 2 == 0 {
+                problem.exit_depth = f64::INFINITY;
+            }
+            let Ok(flight) = Energy::new().fly(&problem, Detail::Events) else { continue };
+            for (length, speed) in [(67, 0), (-67, 0), (3, 40), (-2, -40)] {
+                let (l, v) = (2_f64.powi(length), 2_f64.powi(speed));
+                let mut scaled = problem.clone();
+                scaled.impact_speed *= v;
+                scaled.exit_depth *= l;
+                for law in &mut scaled.stages {
+                    law.static_force *= v * v / l;
+                    law.stiffness *= v * v / l / l;
+                    law.drag /= l;
+                    law.end *= l;
+                }
+                let other = Energy::new().fly(&scaled, Detail::Events).unwrap();
+                let end = State {
+                    time: flight.end.time / v * l,
+                    depth: flight.end.depth * l,
+                    velocity: flight.end.velocity * v,
+                };
+                assert_eq!((other.end, other.cost), (end, flight.cost), "case {case}, 2^{length} m, 2^{speed} m/s");
+                assert_eq!(other.exit_margin_error, flight.exit_margin_error, "case {case}");
+            }
+        }
+    }
+
+    /// Two methods that share neither a variable nor a line.
+    #[test]
+    fn times_of_driven_and_resisted_flights_are_those_of_the_equation_in_time() {
+        let mut random = Random(9);
+        let (mut flights, mut worst) = (0, 0.0_f64);
+        for case in 0..600 {
+            let problem = general(&mut random);
+            let flight = Energy::new().fly(&problem, Detail::Events).unwrap();
+            let exact = Taylor::default().fly(&problem, Detail::Events).unwrap();
+            let slowest = exact.events.iter().map(|e| e.state.velocity).filter(|v| *v > 0.0).fold(1.0, f64::min);
+            if flight.exit_margin.unwrap().abs() < 1e-3 || slowest < 0.05 {
+                continue;
+            }
+            flights += 1;
+            assert_eq!(flight.outcome, exact.outcome, "case {case}");
+            let off = flight.end.time / exact.end.time - 1.0;
+            worst = worst.max(off.abs());
+            assert!(off.abs() < 2e-14, "case {case}: {off:e} {problem:?}");
+        }
+        println!("{flights} flights, worst {worst:e}");
+        assert!(flights > 550, "{flights}");
+        // Out past the fastest point, half as fast again as at impact: -dw/dx = -10 + 5 x + w. A step of a loose tolerance
+        // could take the speed at the end for the same on the way up.
+        let problem = staged(1.0, 1.0, 2.2, &[stage(-5.0, 2.5, 0.5, f64::INFINITY)]);
+        let exact = Taylor::default().fly(&problem, Detail::End).unwrap().end.time;
+        for (method, limit) in [(Energy::new(), 2e-14), (Energy::with_rtol(1e-3).unwrap(), 1e-3)] {
+            let off = method.fly(&problem, Detail::End).unwrap().end.time / exact - 1.0;
+            assert!(off.abs() < limit, "{method:?}: {off:e}");
+        }
+    }
+
+    /// `V' = 1 - V²`: V = coth or tanh of t + c, `x = ln sinh(t + c)` or `ln cosh(t + c)` less the same at c.
+    #[test]
+    fn a_speed_that_comes_to_its_limit_is_kept_at_no_cost() {
+        for (v0, ahead) in [(2.0, (2.0_f64 / 3.0).ln()), (0.5, (4.0_f64 / 3.0).ln())] {
+            for depth in [40.0, 1e3, 1e9] {
+                let problem = staged(1.0, v0, depth, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
+                let flight = Energy::new().fly(&problem, Detail::End).unwrap();
+                let time = depth + ahead;
+                assert!((flight.end.time / time - 1.0).abs() < 1e-13, "{v0}, {depth:e}: {:e}", flight.end.time - time);
+                assert!((flight.end.velocity - 1.0).abs() < 1e-15, "{v0}, {depth:e}: {:e}", flight.end.velocity);
+                assert!(flight.cost.steps < 200, "{v0}, {depth:e}: {:?}", flight.cost);
+            }
+        }
+    }
+
+    /// w = 2^-53 is left at 1 m, and takes 2^-53 m more, which is less than depths can tell apart.
+    #[test]
+    fn a_rest_that_rounds_onto_a_boundary_has_its_time_beyond_it() {
+        let left = 2.0_f64.powi(-53);
+        let stages = [stage(0.5 * (1.0 - left), 0.0, 0.0, 1.0), stage(0.5, 0.0, 0.0, f64::INFINITY)];
+        let flight = Energy::new().fly(&staged(1.0, 1.0, f64::INFINITY, &stages), Detail::Events).unwrap();
+        let v1 = left.sqrt();
+        assert_eq!((flight.end.depth, flight.outcome), (1.0, Outcome::Stopped));
+        let (before, after) = (flight.events[0].state.time, flight.end.time - flight.events[0].state.time);
+        assert!((before * 0.5 * (1.0 + v1) - 1.0).abs() < 1e-14, "{before}");
+        assert!((after / (2.0 * v1) - 1.0).abs() < 1e-7, "{after:e}");
+    }
+
+    /// `dX/dV0 = M V0 e^(-κ X)/(p + s X)` from the energy at X, in one stage; behind another M V0 over the force there.
+    #[test]
+    fn the_depth_of_rest_moves_with_the_impact_speed() {
+        let derived = |problem: Problem| {
+            let mut dual = problem.cast::<Dual64>();
+            dual.impact_speed = dual.impact_speed.derivative();
+            Energy::new().fly_in(&dual, Detail::End).unwrap().end.depth
+        };
+        for (p, s, q) in [(2.0, 30.0, 0.7), (0.0, 30.0, 0.0), (-3.0, 30.0, 0.4), (5.0, 0.0, 0.6)] {
+            let depth = derived(staged(1.0, 5.0, f64::INFINITY, &[stage(p, s, q, f64::INFINITY)]));
+            let exact = 5.0 * (-2.0 * q * depth.re).exp() / (p + s * depth.re);
+            assert!((depth.eps / exact - 1.0).abs() < 1e-13, "{p}, {s}, {q}: {:e} {exact:e}", depth.eps);
+        }
+        // As above, nearer to the boundary than depths can tell apart.
+        let first = stage(0.5 * (1.0 - 2.0_f64.powi(-53)), 0.0, 0.0, 1.0);
+        let depth = derived(staged(1.0, 1.0, f64::INFINITY, &[first, stage(500.0, 0.0, 0.0, f64::INFINITY)]));
+        assert!(depth.re == 1.0 && (depth.eps * 500.0 - 1.0).abs() < 1e-13, "{depth:?}");
+    }
+
+    /// `w = 4 e^-x - 1`, over four drag lengths, where a tangent leads out of the bracket; and a stage of every term, in
+    /// which halving would take five times the work. A trial is a sum of some 20 terms.
+    #[test]
+    fn the_root_of_w_is_found_in_few_trials() {
+        let mut walk = Walk::from_impact();
+        let root = walk.root(&loss(1.0, 0.0, 1.0), 0.0, 3.0, 4.0, 1e-18);
+        assert!((root / 4.0_f64.ln() - 1.0).abs() < 1e-15, "{root}");
+        assert!(walk.cost.force_evaluations <= 150, "{:?}", walk.cost);
+        let problem = staged(1.0, 5.0, f64::INFINITY, &[stage(2.0, 30.0, 0.7, f64::INFINITY)]);
+        let cost = Energy::new().fly(&problem, Detail::End).unwrap().cost;
+        assert!(cost.force_evaluations <= 210, "{cost:?}");
+    }
+
+    #[test]
+    fn a_bar_or_a_time_beyond_all_numbers_is_an_error() {
+        // w = 1 + 0.6e308 behind a drive of 1.2e308 that fades; the sum of the magnitudes is beyond f64.
+        let problem = staged(2.0, 1.0, 1.0, &[stage(-1.2e308, 1.2e308, 0.0, f64::INFINITY)]);
+        let error = Energy::new().exit_margin_in(&problem).unwrap_err();
+        assert!(matches!(error, IntegrationError::NotFinite { what: "V²", .. }), "{error}");
+        // 1e305 m at 1e-5 m/s.
+        let stages = [stage(0.5 * (1.0 - 1e-10), 0.0, 0.0, 1.0), stage(0.0, 0.0, 0.0, f64::INFINITY)];
+        let error = Energy::new().fly(&staged(1.0, 1.0, 1e305, &stages), Detail::End).unwrap_err();
+        assert!(matches!(error, IntegrationError::NotFinite { what: "time or speed", .. }), "{error}");
+    }
+
+    /// `tolerance^(1/n)` of the radius, n the last order of which a coefficient is left.
+    #[test]
+    fn a_step_in_time_follows_the_last_two_coefficients() {
+        let leg = Leg { loss: loss(1.0, 0.0, 0.0), index: 0, tolerance: 1e-12 };
+        let length = |last: f64, before: f64| {
+            let mut series = [3.0; TIME_ORDER];
+            series[TIME_ORDER - 1] = last;
+            series[TIME_ORDER - 2] = before;
+            leg.step_length(&series, 1.0)
+        };
+        for (last, before, expected) in [
+            (3.0, 3.0, 1e-12_f64.powf(1.0 / 22.0)),
+            (3.0, 0.0, 1e-12_f64.powf(1.0 / 23.0)),
+            (0.0, -3.0, 1e-12_f64.powf(1.0 / 22.0)),
+        ] {
+            let (found, done) = length(last, before);
+            assert!((found / expected - 1.0).abs() < 1e-14 && !done, "{last}, {before}: {found}");
+        }
+        assert_eq!(length(0.0, 0.0), (1.0, true));
+    }
+
+    /// The walk and the clock differ by rounding: where no way is left no time passes, and a way left at the last speed is
+    /// flown at it.
+    #[test]
+    fn a_clock_that_comes_to_its_end_too_early_goes_on_at_the_last_speed() {
+        let problem = staged(1.0, 1.0, 3.0, &[stage(0.5, 0.0, 0.0, f64::INFINITY)]);
+        let elapse = |steady, depth, velocity| {
+            let leg = Leg { loss: loss(steady, 0.0, 0.0), index: 0, tolerance: f64::EPSILON };
+            let now = State { time: 2.0, depth: 1.0, velocity: 0.5 };
+            leg.elapse(now, depth, velocity, &mut Log::new(&problem, Detail::End)).unwrap()
+        };
+        let slower = 0.5_f64.next_down();
+        assert_eq!(elapse(-1.0, 1.0, slower), State { time: 2.0, depth: 1.0, velocity: slower });
+        assert_eq!(elapse(1e-3, 3.0, 0.5), State { time: 6.0, depth: 3.0, velocity: 0.5 });
+    }
+
+    /// Steps as measured: the variable that is not chosen takes more, by one part in a hundred over scenes as varied as
+    /// these.
+    #[test]
+    fn the_variable_of_time_is_the_one_that_takes_less_steps() {
+        let mut random = Random(10);
+        let (mut concrete, mut any) = (Cost::default(), Cost::default());
+        for _ in 0..300 {
+            concrete += Energy::new().fly(&random.scene(true), Detail::End).unwrap().cost;
+            any += Energy::new().fly(&general(&mut random), Detail::End).unwrap().cost;
+        }
+        assert!(concrete.steps <= 3450 && any.steps <= 2472, "{concrete:?}, {any:?}");
     }
 }

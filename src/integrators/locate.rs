@@ -442,17 +442,11 @@ fn restrict(whole: &[f64], from: f64, to: f64, part: &mut [f64]) {
     }
 }
 
-/// Changes of sign in a sequence, zeros left out.
+/// Changes of sign in a sequence, zeros left out. Signs themselves are compared: the product of two numbers below 1e-162
+/// is zero.
 fn changes(sequence: &[f64]) -> usize {
-    let mut count = 0;
-    let mut last = 0.0;
-    for value in sequence.iter().copied().filter(|v| *v != 0.0) {
-        if last * value < 0.0 {
-            count += 1;
-        }
-        last = value;
-    }
-    count
+    let signs = sequence.iter().filter(|value| **value != 0.0).map(|value| value.is_sign_negative());
+    signs.clone().zip(signs.skip(1)).filter(|(last, next)| last != next).count()
 }
 
 /// The one change of sign in `[from, to]`, by halving down to neighbouring numbers.
@@ -577,9 +571,20 @@ mod tests {
 
     #[test]
     fn the_scale_of_a_polynomial_does_not_matter() {
-        for scale in [1e-300, 1e-170, 1.0, 1e170] {
+        for scale in [1e-300, 1e-170, 1.0, 1e170, 1e300] {
             let root = first_root(&[-0.06 * scale, 0.5 * scale, -scale], 1.0).unwrap();
-            assert!((root - 0.2).abs() < 1e-12, "{root} at scale {scale}");
+            assert!((root - 0.2).abs() < 2e-16, "{root} at scale {scale}");
+        }
+        // A power of two rounds nothing: simple, double and triple roots, the end, a near miss.
+        let (apart, double, triple) =
+            (product(&[0.2, 0.3], &[]), product(&[0.25, 0.25, 0.75], &[]), product(&[0.7; 3], &[]));
+        for polynomial in [apart, double, triple, product(&[1.0], &[]), product(&[0.375, 0.5, 0.625], &[(0.1, 0.01)])] {
+            let root = first_root(&polynomial, 1.0);
+            assert!(root.is_some());
+            for exponent in [-900, -500, 500, 900] {
+                let scaled: Vec<f64> = polynomial.iter().map(|c| c * 2_f64.powi(exponent)).collect();
+                assert_eq!(first_root(&scaled, 1.0), root, "{polynomial:?} times 2^{exponent}");
+            }
         }
     }
 
@@ -669,5 +674,109 @@ mod tests {
                 ((to.time - passage) / passage.powi(5), to.error / (at(to.time).depth - law.end).abs());
             assert!(near(order, constant) && near(bound, stated), "{velocity}, {part}: {order}, {bound}");
         }
+    }
+
+    /// A near miss has the boxes narrowed, and they must widen behind it, or their number runs out.
+    #[test]
+    fn a_simple_root_on_a_corner_behind_a_near_miss_is_the_corner_itself() {
+        for (near, off) in [(0.1, 1e-3), (0.1, 1e-5), (0.1, 1e-6), (0.296_875, 1.0 / 512.0)] {
+            assert_eq!(first_root(&product(&[0.5], &[(near, off)]), 1.0), Some(0.5), "{near}, {off}");
+        }
+        for root in [0.8, 0.95] {
+            let found = first_root(&product(&[root], &[(0.1, 1e-5)]), 1.0).unwrap();
+            assert!((found - root).abs() < 1e-15, "{found} for {root}");
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_told_from_zero_the_root_is_the_middle() {
+        assert_eq!(first_root(&product(&[0.5; 40], &[]), 1.0), Some(0.5));
+    }
+
+    fn jet(first: f64, second: f64, third: f64) -> Jet<f64> {
+        Jet { first, second, third }
+    }
+
+    /// Polynomials whose roots are known: the quadratic is exact where the cubic term is nothing, and one that would move
+    /// the trial by more than a quarter is left out.
+    #[test]
+    fn a_trial_far_from_rest_is_the_root_of_the_parabola() {
+        let to = |velocity, jet: Jet<f64>| {
+            let correction = to_rest(&jet, velocity, &Closing::new(1e-8));
+            (correction.time, correction.error)
+        };
+        assert_eq!(to(1.0, jet(-1.0, 0.0, 1.5)), (1.25, 0.1875));
+        assert_eq!(to(1.0, jet(-1.0, 0.0, 3.0)), (1.0, f64::INFINITY));
+        assert_eq!(to(1.0, jet(0.0, 1.0, 0.0)), (f64::INFINITY, f64::INFINITY));
+        // 3 t² - t + 0.004925: so near that the series serves, were its error not ten times the tolerance.
+        assert!((to(0.004_925, jet(-1.0, 6.0, 0.0)).0 - 0.005).abs() < 1e-17);
+    }
+
+    /// The same for a boundary, `D = t + ...`.
+    #[test]
+    fn a_trial_far_from_a_boundary_is_the_root_of_the_parabola() {
+        let to = |end, jet: Jet<f64>, tolerance| {
+            let start = State { time: 0.0, depth: 0.0, velocity: 1.0 };
+            let correction = to_depth(&constant_force(end), &jet, &start, &Closing::new(tolerance)).unwrap();
+            (correction.time, correction.error)
+        };
+        // Higher terms that move the trial by half, or turn the speed round.
+        assert_eq!(to(1.0, jet(0.0, -1.2, 0.0), 1e-8), (1.0, f64::INFINITY));
+        assert_eq!(to(1.0, jet(0.0, -10.0, 40.0), 1e-8), (1.0, f64::INFINITY));
+        // t - 3 t² = 0.004925: the series would be off by three times the tolerance.
+        assert!((to(0.004_925, jet(-6.0, 0.0, 0.0), 1e-9).0 - 0.005).abs() < 1e-17);
+    }
+
+    fn uniform(t: f64) -> State {
+        State { time: t, depth: t, velocity: 1.0 }
+    }
+
+    fn no_force(end: f64) -> Stage {
+        Stage { static_force: 0.0, ..constant_force(end) }
+    }
+
+    #[test]
+    fn an_event_at_the_end_of_a_step_is_on_it_and_one_within_reach_behind_it_is_not() {
+        let closing = Closing::new(1e-8);
+        let law = constant_force(f64::INFINITY);
+        assert_eq!(rest(&law, parabola, parabola(0.0), 1.0, &closing), Found::Inside(parabola(1.0)));
+        assert_eq!(rest(&law, parabola, parabola(0.995), 0.999, &closing), Found::Beyond(parabola(0.999)));
+        let pass = |end, from, span| passage(&no_force(end), uniform, uniform(from), span, false, &closing);
+        assert_eq!(pass(1.0, 0.0, 1.0), Found::Inside(uniform(1.0)));
+        assert_eq!(pass(0.9995, 0.995, 0.999), Found::Beyond(uniform(0.999)));
+        // The speed vanishes at the end, short of the boundary; the law says nothing of the brake.
+        assert_eq!(passage(&no_force(0.6), parabola, parabola(0.0), 1.0, false, &closing), Found::RestFirst);
+    }
+
+    /// Drag alone, M = 1, q = 2: V = 1/(1 + 2 t), x = ln(1 + 2 t)/2. The parabola at impact ends at x = 1/4.
+    #[test]
+    fn a_boundary_beyond_the_parabola_is_found_if_it_is_known_to_be_reached() {
+        let law = Stage { drag: 2.0, ..no_force(0.6) };
+        let at = |t: f64| State { time: t, depth: 0.5 * (2.0 * t).ln_1p(), velocity: 1.0 / (1.0 + 2.0 * t) };
+        let find = |reached| passage(&law, at, at(0.0), 2.0, reached, &Closing::new(1e-16));
+        assert_eq!(find(false), Found::RestFirst);
+        let Found::Inside(passed) = find(true) else { panic!("no passage found") };
+        assert!((passed.time - 0.5 * 1.2_f64.exp_m1()).abs() < 1e-14, "{passed:?}");
+        assert!((passed.velocity - (-1.2_f64).exp()).abs() < 1e-14 && passed.depth == 0.6, "{passed:?}");
+    }
+
+    /// Laws a million times too weak, so that each correction leads out of the bracket.
+    #[test]
+    fn where_corrections_lead_astray_halving_finds_the_place() {
+        let closing = Closing::new(1e-16);
+        let weak = Stage { static_force: 1e-6, ..constant_force(0.3125) };
+        let at = |t| State { time: t, depth: t, velocity: 0.3125 - t };
+        let expected = State { time: 0.3125, depth: 0.3125, velocity: 0.0 };
+        assert_eq!(rest(&weak, at, at(0.0), 1.0, &closing), Found::Inside(expected));
+        let at = |t| State { time: t, depth: t, velocity: 1e-6 };
+        let expected = State { velocity: 1e-6, ..expected };
+        assert_eq!(passage(&no_force(0.3125), at, at(0.0), 1.0, false, &closing), Found::Inside(expected));
+    }
+
+    #[test]
+    fn a_boundary_touched_has_a_speed_of_zero_without_a_sign() {
+        let touching = State { time: 0.0, depth: 1.0, velocity: -0.0 };
+        let touched = at_depth(&constant_force(1.0), &touching, &jet(-1.0, 0.0, 0.0), 0.0);
+        assert_eq!(touched.velocity.to_bits(), 0);
     }
 }

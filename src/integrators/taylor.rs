@@ -748,6 +748,7 @@ mod tests {
     use proptest::test_runner::{RngAlgorithm, TestRng};
     use twofloat::TwoFloat;
 
+    use super::super::energy::Energy;
     use super::*;
     use crate::physics::{Stages, Target};
 
@@ -1445,5 +1446,192 @@ mod tests {
         assert!(refused(stage(0.0, 1.5, 0.0), 4.5).is_err());
         assert!(refused(stage(0.0, 1.5, 0.0), 4.5_f64.next_down()).is_ok());
         assert!(refused(stage(-1.0, 1.5, 0.0), 4.5).is_ok());
+    }
+
+    /// Orders as tabled, in evaluations a step; a tolerance at the seam takes the higher.
+    #[test]
+    fn the_order_follows_from_the_tolerance() {
+        let drag = one_stage(Stage::tunnel(1.0, 1.0), 10.0, f64::INFINITY);
+        let spring = one_stage(Stage { stiffness: 1.0, ..Stage::tunnel(1.0, 0.0) }, 10.0, f64::INFINITY);
+        let orders = |taylor: Taylor| {
+            [&drag, &spring].map(|problem| {
+                let cost = taylor.fly(problem, Detail::End).unwrap().cost;
+                cost.force_evaluations as f64 / cost.steps as f64
+            })
+        };
+        for (rtol, expected) in [
+            (1e-3, [7.0, 9.0]),
+            (5e-6, [11.0, 17.0]),
+            (1e-7, [11.0, 17.0]),
+            (5e-10, [15.0, 19.0]),
+            (1e-11, [15.0, 19.0]),
+            (5e-14, [21.0, 23.0]),
+            (0.0, [21.0, 23.0]),
+        ] {
+            assert_eq!(orders(Taylor::with_rtol(rtol).unwrap()), expected, "{rtol:e}");
+        }
+        for (rtol, expected) in [(1e-17, 21), (5e-18, 39), (0.0, 39)] {
+            let wide = Taylor::with_rtol(rtol).unwrap().fly_in::<TwoFloat>(&drag.cast(), Detail::End).unwrap();
+            assert_eq!(wide.cost.force_evaluations, expected * wide.cost.steps, "{rtol:e}");
+        }
+    }
+
+    #[test]
+    fn every_kind_of_stage_is_explained() {
+        let law = |s, r, q, end| Stage { static_force: 1.0, stiffness: s, viscosity: r, drag: q, end };
+        let stages = [
+            law(0.0, 0.0, 0.0, 0.1),
+            law(1.0, 0.0, 0.0, 0.2),
+            law(1.0, 1.0, 0.0, 0.3),
+            law(0.0, 1.0, 1.0, 0.4),
+            law(1.0, 0.0, 1.0, f64::INFINITY),
+        ];
+        let problem = Problem { stages: Stages::from_slice(&stages), ..one_stage(stages[0], 10.0, 0.5) };
+        assert_eq!(
+            Taylor::explain(&problem, &fly(&problem)),
+            [
+                "stage 0: constant force: the series ends, one step serves",
+                "stage 1: a spring alone: recurrence of one term, no convolution",
+                "stage 2: no drag: recurrence of two terms, no convolution",
+                "stage 3: no stiffness: V monotone, no search for hidden roots",
+                "stage 4: stiffness and drag: earliest root isolated on every step",
+            ]
+        );
+        assert_eq!(Taylor::default().name(), "taylor");
+    }
+
+    #[test]
+    fn a_flight_that_ends_at_impact_lists_its_events_only_where_asked() {
+        let problem = peer_scene(300.0, 0.0).problem();
+        assert_eq!(kinds(&fly(&problem)), [EventKind::Exit]);
+        assert!(Taylor::default().fly(&problem, Detail::End).unwrap().events.is_empty());
+    }
+
+    /// `(tolerance v[0]/|v[k]|)^(1/k)` in full precision; logarithms off by 1 % of h, a power short by up to 6 %.
+    #[test]
+    fn a_span_keeps_the_tolerance_in_each_of_the_last_two_orders() {
+        let span = |first, before, last, tolerance| {
+            let velocity = [first, 0.0, 0.0, 0.0, 0.0, 0.0, before, last];
+            Series { velocity, advance: [0.0; 8] }.span(tolerance)
+        };
+        for tolerance in [1e-3, 1e-9, 1e-16] {
+            for first in [1.0, 1.3, 1.9] {
+                for size in [1e-2, 1.0, 7e3_f64] {
+                    let exact = |order: f64| (tolerance * first / size).powf(1.0 / order);
+                    let last = span(first, 0.0, -size, tolerance) / exact(7.0);
+                    let before = span(first, size, 0.0, tolerance) / exact(6.0);
+                    for ratio in [last, before] {
+                        assert!(ratio > 0.93 && ratio < 1.01, "{ratio}: {tolerance:e}, {first}, {size}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_unit_has_an_inverse_that_is_a_normal_number() {
+        for x in [f64::MIN_POSITIVE, 0.75, 1.0, 1.5, f64::MAX, f64::INFINITY] {
+            let unit = power_of_two_below(x);
+            assert!(unit <= x && (1.0 / unit).is_normal(), "{unit:e} for {x:e}");
+        }
+    }
+
+    #[test]
+    fn the_lesser_margin_has_the_bar_of_the_greater_as_far_as_it_reaches_below() {
+        let barred = |value, bar| Barred { value, bar };
+        for (greater, bar) in [(barred(1.5, 0.75), 0.25), (barred(1.5, 0.125), 0.125), (barred(3.0, 0.5), 0.125)] {
+            let lesser = barred(1.0, 0.125);
+            for least in [lesser.min(greater), greater.min(lesser)] {
+                assert_eq!((least.value, least.bar), (1.0, bar), "{}", greater.value);
+            }
+        }
+    }
+
+    /// Theory section 2, `p, s, r` with p < 0: it swings through the balance at 10 m, on to rest.
+    #[test]
+    fn an_underdamped_drive_is_no_creep() {
+        let (p, s, r, v) = (-1000.0, 100.0, 15.0, 0.1_f64);
+        let law = Stage { static_force: p, stiffness: s, viscosity: r, drag: 0.0, end: f64::INFINITY };
+        let flight = fly(&one_stage(law, v, f64::INFINITY));
+        let (g, w, u) = (0.5 * r, s.sqrt(), p / s);
+        let m = (s - g * g).sqrt();
+        let time = (m * v).atan2(g * v + s * u) / m;
+        let depth = (-g * time).exp() * (v * (v + 2.0 * g * u) + s * u * u).sqrt() / w - u;
+        assert!(relative(flight.end.time, time) < 1e-14 && relative(flight.end.depth, depth) < 1e-14, "{flight:?}");
+    }
+
+    #[test]
+    fn the_last_step_of_the_budget_may_end_a_flight_and_no_other_follows() {
+        let problem = alone(Stage::tunnel(1.0, 0.0), f64::INFINITY);
+        let mut course = course_at(&problem, 0.0, 3.0);
+        course.cost.steps = STEPS_MAX - 1;
+        assert!(course.cross_stage().is_ok());
+        let mut course = course_at(&problem, 0.0, 3.0);
+        course.cost.steps = STEPS_MAX;
+        assert!(matches!(course.cross_stage(), Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, .. })));
+    }
+
+    /// Depth over speed, near both ends of the range of numbers, and a depth that is a multiple of a small speed.
+    #[test]
+    fn a_gap_of_any_size_is_crossed_at_any_speed() {
+        for (speed, depth) in [(1e200, 1e-100), (1e-50, 1e150), (2.0_f64.powi(-60), 1.0)] {
+            let flight = fly(&one_stage(Stage::tunnel(0.0, 0.0), speed, depth));
+            assert_eq!((flight.end.depth, flight.end.velocity), (depth, speed));
+            assert!(relative(flight.end.time, depth / speed) < 1e-15, "{:e}", flight.end.time);
+        }
+    }
+
+    /// `d + (H - d)`, each rounded, is one spacing short of H.
+    #[test]
+    fn an_exit_is_at_its_own_depth_where_the_way_to_it_is_rounded() {
+        let (d, exit) = (0.5 * f64::EPSILON, 1.0 + 3.0 * f64::EPSILON);
+        assert!(d + (exit - d) < exit);
+        let gap = Stage::tunnel(0.0, 0.0);
+        let mut problem = one_stage(gap, 1.0, exit);
+        problem.stages.insert(0, Stage { end: d, ..gap });
+        let flight = fly(&problem);
+        assert_eq!(kinds(&flight), [EventKind::StageEnd(0), EventKind::Exit]);
+        assert_eq!((flight.end.depth, flight.cost.steps), (exit, 2));
+    }
+
+    /// F = 1, M = 1, V0 = 1: W/V0² = 1 - 2 H. Eight roundings of it are allowed, and a few of 1 for the way to rest.
+    #[test]
+    fn the_bar_of_a_deep_stop_is_that_of_the_way_it_lacks() {
+        let flight = fly(&one_stage(Stage::tunnel(1.0, 0.0), 1.0, 1000.0));
+        assert_eq!(flight.exit_margin, Some(-1999.0));
+        let units = flight.exit_margin_error.unwrap() / f64::EPSILON / 1999.0;
+        assert!(units > 8.0 && units < 8.02, "{units}");
+    }
+
+    /// Theory section 2, `p, s`: a boundary at which a twentieth of the energy is left, in units that are not the step's.
+    #[test]
+    fn a_boundary_that_takes_nearly_all_energy_is_within_reach() {
+        let (p, s, v, way) = (6.0, 400.0_f64, 10.0, 0.473);
+        let law = Stage { static_force: p, stiffness: s, viscosity: 0.0, drag: 0.0, end: way };
+        let series = Series::<f64, 24>::new::<true, false, false>(&law, v);
+        let start = State { time: 0.0, depth: 0.0, velocity: v };
+        let w = s.sqrt();
+        let Step::Limit(found) = search(&law, &series, start, PHASE_MAX / w, &Closing::new(f64::EPSILON)) else {
+            panic!("the boundary is missed")
+        };
+        let (u0, u) = (p / s, way + p / s);
+        let velocity = (v * v - way * (2.0 * p + s * way)).sqrt();
+        let time = (w * (u * v - u0 * velocity)).atan2(velocity * v + s * u * u0) / w;
+        assert!(relative(found.velocity, velocity) < 1e-13 && relative(found.time, time) < 1e-14, "{found:?}");
+    }
+
+    /// The method over depth has no root to isolate in time.
+    #[test]
+    fn rest_against_stiffness_and_drag_is_found_to_the_digits_of_double_double() {
+        for (p, s, q) in [(7.0, 11.0, 0.5), (0.0, 3.0, 2.0), (-4.0, 30.0, 0.1)] {
+            let law = Stage { static_force: p, stiffness: s, viscosity: 0.0, drag: q, end: f64::INFINITY };
+            let problem = one_stage(law, 5.0, f64::INFINITY).cast::<TwoFloat>();
+            let end = Taylor::default().fly_in(&problem, Detail::End).unwrap().end;
+            let other = Energy::new().fly_in(&problem, Detail::End).unwrap().end;
+            for (value, exact) in [(end.depth, other.depth), (end.time, other.time)] {
+                let off = (value - exact).value().abs() / exact.value();
+                assert!(off < 1e-28, "{p}, {s}, {q}: {off:e}");
+            }
+        }
     }
 }
