@@ -2038,4 +2038,147 @@ pub(crate) mod tests {
         println!("f32, 20 000 steps: plain {plain:.1e}, compensated {compensated:.1e}");
         assert!(compensated * 10.0 < plain, "plain {plain:e}, compensated {compensated:e}");
     }
+
+    #[test]
+    fn each_scale_of_a_stage_sets_the_default_step_where_it_is_the_shortest() {
+        // M = 2, all numbers chosen by hand so that one scale is the shortest, a power of two. In front of a stage
+        // that starts deeper lies one without any force.
+        let none = f64::INFINITY;
+        let free = |end| stage(0.0, 0.0, 0.0, 0.0, end);
+        let cases: [(&[Stage], f64, f64, f64); 7] = [
+            // The second of two stages is crossed in (5/4 - 1)/V0.
+            (&[free(1.0), free(none)], 4.0, 1.25, 1.0 / 16.0),
+            // sqrt(M/s), as the drive leaves no more than 256 N at either end.
+            (&[stage(-256.0, 8192.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 64.0),
+            // M V0/(p + s x) with 64 N where the spring is compressed most, at x = 4 + V0 sqrt(M/s) = 6.
+            (&[free(4.0), stage(16.0, 8.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 8.0),
+            // The same where it is compressed least, with -32 N at x = 4 and -16 N at x = 6.
+            (&[free(4.0), stage(-64.0, 8.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 4.0),
+            // M/r, and M/(q V0).
+            (&[stage(0.0, 0.0, 64.0, 0.0, none)], 4.0, none, 1.0 / 32.0),
+            (&[stage(0.0, 0.0, 0.0, 16.0, none)], 4.0, none, 1.0 / 32.0),
+            // Without speed no time is needed to stop: M/r alone.
+            (&[stage(4.0, 0.0, 2.0, 1.0, none)], 0.0, none, 1.0),
+        ];
+        for (list, speed, exit_depth, scale) in cases {
+            let problem = stages(list.iter().copied().collect(), speed, exit_depth);
+            assert_eq!(default_time_step(&problem, VelocityAt::Centred), scale / 1e3, "{list:?}");
+        }
+        // A film of 2^-20 m or a fast dashpot deserves no more than 1e6 steps in what lies behind it.
+        let film = free(2.0_f64.powi(-20));
+        let cases: [(&[Stage], f64, f64); 3] = [
+            // M V0/p, and M/sqrt(p q), which also is there without speed.
+            (&[film, stage(2.0, 0.0, 0.0, 0.0, none)], 4.0, 4.0),
+            (&[film, stage(2.0, 0.0, 0.0, 8.0, none)], 4.0, 0.5),
+            (&[stage(0.0, 0.0, 2.0_f64.powi(24), 0.0, 1.0), stage(4.0, 0.0, 0.0, 1.0, none)], 0.0, 1.0),
+        ];
+        for (list, speed, scale) in cases {
+            let problem = stages(list.iter().copied().collect(), speed, none);
+            assert_eq!(default_time_step(&problem, VelocityAt::Centred), scale / 1e6, "{list:?}");
+        }
+    }
+
+    #[test]
+    fn the_limit_itself_is_unstable_and_a_stage_without_a_step_has_none() {
+        let w = 1024.0;
+        let flown = |problem: &Problem, step| {
+            scheme(step, VelocityAt::Centred, Boundaries::StepEnd)
+                .fly(problem, Detail::End)
+                .unwrap()
+                .step_limit
+                .unwrap()
+        };
+        let told = flown(&spring(w), 2.0 / w);
+        assert_eq!((told.limit, told.stable), (2.0 / w, false));
+        assert!(flown(&spring(w), (2.0 / w).next_down()).stable);
+        let layer = stage(0.0, 1e12, 0.0, 0.0, 0.0);
+        let faced = stages(smallvec![layer, Stage::tunnel(STRENGTH, 0.0)], SPEED, f64::INFINITY);
+        assert_eq!(flown(&faced, 1e-5).limit, f64::INFINITY);
+    }
+
+    #[test]
+    fn what_lies_behind_the_exit_is_never_felt() {
+        let law = stage(STRENGTH, 1e7, 30.0, DRAG, f64::INFINITY);
+        let exit_depth: f64 = 0.01;
+        for (velocity, boundaries) in combinations() {
+            let scheme = CentralDifference { max_steps: 1000, ..scheme(3.3e-6, velocity, boundaries) };
+            let alone = scheme.fly(&stages(smallvec![law], SPEED, exit_depth), Detail::Events).unwrap();
+            for end in [exit_depth, exit_depth.next_up(), 0.0101] {
+                let list = smallvec![Stage { end, ..law }, Stage::tunnel(1e9, 1e3)];
+                let backed = scheme.fly(&stages(list, SPEED, exit_depth), Detail::Events).unwrap();
+                assert_eq!((backed.end, backed.stage), (alone.end, 0), "{velocity} {boundaries} {end}");
+                assert_eq!((backed.cost, backed.exit_margin), (alone.cost, alone.exit_margin));
+            }
+        }
+    }
+
+    #[test]
+    fn an_outer_force_that_grows_with_time_gives_the_exact_discrete_cubic() {
+        // M x'' = 6 M k t: the second difference of t³ is 6 t dt² exactly, and V(1/2) = V0 asks for x = V0 dt after
+        // the first step, so x(i) = V0 t + k t (t² - dt²).
+        let (k, step) = (64.0, 1.0 / 64.0);
+        let free = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 8.0, f64::INFINITY);
+        for velocity in VELOCITIES {
+            let scheme = scheme(step, velocity, Boundaries::Landed);
+            let states = scheme.forced_states(&free, |_, t| 6.0 * MASS * k * t, &[0.25]).unwrap();
+            assert_eq!(states.len(), 17);
+            for (i, state) in states.iter().enumerate() {
+                let t = i as f64 * step;
+                assert_eq!((state.time, state.depth), (t, 8.0 * t + k * t * (t * t - step * step)), "{velocity}");
+            }
+            // Sixteen steps are enough for sixteen, fifteen are not.
+            for (max_steps, enough) in [(16, true), (15, false)] {
+                let scheme = CentralDifference { max_steps, ..scheme.clone() };
+                assert_eq!(scheme.forced_states(&free, |_, _| 0.0, &[0.25]).is_ok(), enough);
+            }
+        }
+    }
+
+    #[test]
+    fn a_flight_without_an_end_is_told_where_it_begins_to_be_one() {
+        let endless = |scheme: &CentralDifference, problem: &Problem| {
+            let error = scheme.fly(problem, Detail::End).unwrap_err();
+            let IntegrationError::NeverEnds { last, .. } = error else { unreachable!("{error}") };
+            last
+        };
+        for last in [stage(0.0, 0.0, 1.0, 1.0, f64::INFINITY), stage(-5.0, 0.0, 1.0, 1.0, f64::INFINITY)] {
+            let problem = stages(smallvec![last], SPEED, f64::INFINITY);
+            for (velocity, boundaries) in combinations() {
+                let scheme = CentralDifference { max_steps: 10, ..scheme(1e-6, velocity, boundaries) };
+                assert_eq!(endless(&scheme, &problem), State::at_impact(&problem));
+            }
+        }
+        // A dashpot with r dt/M = 2 takes all of V in the first half step, and nothing would hold the projectile there.
+        let dashpot = stages(smallvec![stage(0.0, 0.0, 256.0, 0.0, f64::INFINITY)], 8.0, 10.0);
+        let short = scheme(1.0 / 64.0, VelocityAt::LaggedHalfStep, Boundaries::StepEnd);
+        assert_eq!(endless(&short, &dashpot), State::at_impact(&dashpot));
+        // The slowest of all speeds moves nothing in a step of 1 ms: told after 2^20 of them.
+        let slowest = f64::from_bits(1);
+        let creep = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], slowest, 1.0);
+        let scheme =
+            CentralDifference { max_steps: 3 << 20, ..scheme(1e-3, VelocityAt::LaggedHalfStep, Boundaries::StepEnd) };
+        let last = endless(&scheme, &creep);
+        assert_eq!(last, State { time: 1_048_576.0 * 1e-3, depth: 0.0, velocity: slowest });
+        // As many steps that do move are no standstill: 3/2 2^20 of them to a place one metre away.
+        let slow = Problem { impact_speed: 2.0_f64.powi(20) / 1.5, exit_depth: 1.0, ..creep };
+        let step = 2.0_f64.powi(-40);
+        let flight = CentralDifference { steps: Steps::Uniform(step), ..scheme }.fly(&slow, Detail::End).unwrap();
+        assert!(flight.cost.steps.abs_diff(3 << 19) <= 1, "{}", flight.cost.steps);
+    }
+
+    #[test]
+    fn the_quadratic_of_the_centred_rule_has_a_finite_derivative_where_its_roots_meet() {
+        // half q V² + V = u - half p with half = 1/2, p = 4, q = 1/2, u = 1: V = -2 twice. F = p + q V² = 6 there, and
+        // by V = 2 (u - half p), the vertex, dF/du = 2 q V dV/du = -4.
+        let law = stage(4.0, 0.0, 0.0, 0.5, f64::INFINITY);
+        let law = stages(smallvec![law], 1.0, 1.0).cast::<num_dual::Dual64>().stages[0];
+        let zero = num_dual::Dual64::from_re(0.0);
+        let force = Centred::deceleration(&law, zero, num_dual::Dual64::from_re(1.0).derivative(), zero + 0.5);
+        assert_eq!((force.re, force.eps), (6.0, -4.0));
+    }
+
+    #[test]
+    fn the_method_has_its_name() {
+        assert_eq!(CentralDifference::default().name(), "central-difference");
+    }
 }
