@@ -399,10 +399,10 @@ pub fn stability_limit<S: Scalar>(stage: &Stage<S>, mass: f64, speed: f64, veloc
 /// The force rule of one stage, divided by the mass: [`Stage::force`] of it is the deceleration [m/s²].
 fn per_mass<S: Scalar>(stage: &Stage<S>, mass: S) -> Stage<S> {
     Stage {
-        static_force: stage.static_force / mass,
-        stiffness: stage.stiffness / mass,
-        viscosity: stage.viscosity / mass,
-        drag: stage.drag / mass,
+        static_force: stage.static_force.over(mass),
+        stiffness: stage.stiffness.over(mass),
+        viscosity: stage.viscosity.over(mass),
+        drag: stage.drag.over(mass),
         end: stage.end,
     }
 }
@@ -441,7 +441,7 @@ impl Rule for Centred {
             linear * linear + S::from_f64(fault!("centred-quadratic", 4.0, 2.0)) * half * law.drag * known;
         // Without a real root the step goes far past rest; the vertex of the parabola is as negative as it gets.
         let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
-        law.force(x, fault!("lag-added", S::from_f64(2.0) * known / (linear + root), u))
+        law.force(x, fault!("lag-added", (S::from_f64(2.0) * known).over(linear + root), u))
     }
 }
 
@@ -687,7 +687,7 @@ impl<S: Scalar> Step<S> {
         (self.to.velocity.value() <= 0.0).then(|| {
             fault!(
                 "rest-not-located",
-                self.size * self.from.velocity / (self.from.velocity - self.to.velocity),
+                (self.size * self.from.velocity).over(self.from.velocity - self.to.velocity),
                 self.size
             )
         })
@@ -705,7 +705,8 @@ impl<S: Scalar> Step<S> {
     /// Velocity after `tau`, on the chord; not below zero.
     fn velocity(&self, tau: S) -> S {
         let v = self.from.velocity
-            + fault!("velocity-not-interpolated", tau / self.size, S::one()) * (self.to.velocity - self.from.velocity);
+            + fault!("velocity-not-interpolated", tau.over(self.size), S::one())
+                * (self.to.velocity - self.from.velocity);
         if v.value() > 0.0 { v } else { S::zero() }
     }
 
@@ -715,7 +716,11 @@ impl<S: Scalar> Step<S> {
         let v = self.from.velocity;
         let discriminant = v * v - S::from_f64(2.0) * self.deceleration * distance;
         (discriminant.value() >= 0.0).then(|| {
-            S::from_f64(2.0) * distance / fault!("passage-wrong-root", v + discriminant.sqrt(), v - discriminant.sqrt())
+            (S::from_f64(2.0) * distance).over(fault!(
+                "passage-wrong-root",
+                v + discriminant.sqrt(),
+                v - discriminant.sqrt()
+            ))
         })
     }
 
@@ -906,7 +911,7 @@ impl<S: Scalar, F: Fn(usize, S) -> S> Job<S> for Forced<'_, F> {
         for (stage, &end) in self.ends.iter().enumerate() {
             let law = per_mass(&scheme.problem.stages[stage], mass);
             // At a given time the outer force is one more static force, whatever the velocity rule makes of the rest.
-            let law_at = |time| Stage { static_force: law.static_force - (self.source)(stage, time) / mass, ..law };
+            let law_at = |time| Stage { static_force: law.static_force - (self.source)(stage, time).over(mass), ..law };
             let start = scheme.state();
             scheme.law = law_at(start.time);
             scheme.start(start);
@@ -2180,5 +2185,76 @@ pub(crate) mod tests {
     #[test]
     fn the_method_has_its_name() {
         assert_eq!(CentralDifference::default().name(), "central-difference");
+    }
+
+    #[test]
+    fn nodes_in_double_double_are_the_exact_discrete_solution_to_30_digits() {
+        // Equations 6 to 8 in 256 bits from the same numbers, V* by its definition; M = 3, so that no coefficient
+        // divided by it is a double-double.
+        type Big = dashu_float::FBig<dashu_float::round::mode::HalfEven, 2>;
+        let big = |value: f64| Big::try_from(value).unwrap().with_precision(256).value();
+        let step = 7e-6;
+        let law = stage(8e5, 7e6, 400.0, 3.1, f64::INFINITY);
+        let problem = Problem { mass: 3.0, ..stages(smallvec![law], SPEED, f64::INFINITY) };
+        let [m, h, p, s, r, q, v0, two] =
+            [3.0, step, law.static_force, law.stiffness, law.viscosity, law.drag, SPEED, 2.0].map(big);
+        let half = &h / &two;
+        let deceleration = |x: &Big, v: &Big| (&p + &s * x + &r * v + &q * v * v) / &m;
+        for velocity in VELOCITIES {
+            let evaluated_at = |x: &Big, u: &Big| match velocity {
+                VelocityAt::LaggedHalfStep => u.clone(),
+                VelocityAt::PredictedHalfStep => u - &half * deceleration(x, u),
+                VelocityAt::Centred => {
+                    // The root of V + dt/2 F(x, V)/M = u.
+                    let (a, b) = (&half * &q / &m, big(1.0) + &half * &r / &m);
+                    let c = &half * (&p + &s * x) / &m - u;
+                    ((&b * &b - &two * &two * &a * c).sqrt() - b) / (&two * a)
+                }
+            };
+            let scheme = scheme(step, velocity, Boundaries::StepEnd);
+            let states = scheme.free_states(&problem.cast::<twofloat::TwoFloat>(), 101).unwrap();
+            let (mut x, mut v) = (big(0.0), v0.clone());
+            let mut d = deceleration(&x, &v);
+            let mut u = &v0 + &half * &d;
+            for state in &states {
+                let off = |number: twofloat::TwoFloat, exact: &Big, scale: &Big| {
+                    ((big(number.hi()) + big(number.lo()) - exact) / scale).to_f64().value().abs()
+                };
+                let errors = (off(state.depth, &x, &(&v0 * &h)), off(state.velocity, &v, &v0));
+                assert!(errors.0 < 1e-29 && errors.1 < 1e-30, "{velocity}: {errors:?}");
+                u -= &h * &d;
+                x += &h * &u;
+                d = deceleration(&x, &evaluated_at(&x, &u));
+                v = &u - &half * &d;
+            }
+        }
+    }
+
+    #[test]
+    fn places_located_in_double_double_are_those_of_the_parabola_to_30_digits() {
+        // A constant force: X = M V0²/(2 p), T = M V0/p, and V² = V0² - 2 p x/M at the end of a stage on the way.
+        use twofloat::TwoFloat;
+        let law = |end| stage(7e5, 0.0, 0.0, 0.0, end);
+        let two_stages = stages(smallvec![law(0.05), law(f64::INFINITY)], SPEED, f64::INFINITY);
+        let problem = Problem { mass: 3.0, ..two_stages }.cast::<TwoFloat>();
+        let (mass, speed, force) = (problem.mass, problem.impact_speed, problem.stages[0].static_force);
+        let depth = (mass * speed * speed).over(force + force);
+        let time = (mass * speed).over(force);
+        for velocity in VELOCITIES {
+            for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
+                let flight = scheme(7e-6, velocity, boundaries).fly_in(&problem, Detail::Events).unwrap();
+                let at_end = flight.events[0].state;
+                let squared = speed * speed - ((force + force) * at_end.depth).over(mass);
+                let passed = (speed - at_end.velocity) * mass.over(force);
+                let off = [
+                    (flight.end.depth - depth).over(depth),
+                    (flight.end.time - time).over(time),
+                    (at_end.velocity * at_end.velocity - squared).over(squared),
+                    (at_end.time - passed).over(passed),
+                ]
+                .map(|error| error.value().abs());
+                assert!(off.iter().all(|error| *error < 1e-29), "{velocity} {boundaries}: {off:?}");
+            }
+        }
     }
 }
