@@ -856,10 +856,11 @@ impl<'a, S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Scheme<'a, S, A, C, R> {
         self.node = self.arrive(x, u, h);
     }
 
-    /// The step from the present node to `next`.
-    fn step_to(&self, next: &Node<S, A>, time: S) -> Step<S> {
-        let to = State { time, depth: next.x.value(), velocity: next.v };
-        Step { from: self.state(), to, deceleration: self.node.d, size: next.h }
+    /// The step from the present node to `next`; its time is told by the clock, once that has ticked.
+    fn step_to(&self, next: &Node<S, A>) -> Step<S> {
+        let from = self.state();
+        let to = State { depth: next.x.value(), velocity: next.v, ..from };
+        Step { from, to, deceleration: self.node.d, size: next.h }
     }
 
     fn finite(&self, what: &'static str, number: S) -> Result<(), IntegrationError> {
@@ -971,7 +972,8 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             self.push(EventKind::boundary(problem, index), State::at_impact(problem), index);
         }
         self.record_node();
-        let mut unchanged = 0;
+        // Steps up to the last change of x or V.
+        let mut moved = 0;
         loop {
             self.refuse_endless()?;
             let left = self.scheme.options.max_steps - self.scheme.cost.steps;
@@ -981,7 +983,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             }
             let allowance = if self.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
             let limit = problem.limit_of(self.scheme.stage).value();
-            let before = (self.scheme.state(), self.scheme.cost.steps);
+            let before = self.scheme.state();
             let ended = match self.scheme.cruise(limit, allowance) {
                 Pause::Allowance => false,
                 Pause::Crossing { x, u } => {
@@ -999,9 +1001,11 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             self.record_node();
             let after = self.scheme.state();
             let still =
-                (after.depth.value(), after.velocity.value()) == (before.0.depth.value(), before.0.velocity.value());
-            unchanged = if still { unchanged + self.scheme.cost.steps - before.1 } else { 0 };
-            if unchanged >= STUCK_STEPS {
+                (after.depth.value(), after.velocity.value()) == (before.depth.value(), before.velocity.value());
+            if !still {
+                moved = self.scheme.cost.steps;
+            }
+            if self.scheme.cost.steps - moved >= STUCK_STEPS {
                 let why = "a step no longer changes depth or velocity, which only approach their limits";
                 return Err(IntegrationError::NeverEnds { why, last: after.values() });
             }
@@ -1026,9 +1030,9 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         let lands = self.scheme.options.boundaries == Boundaries::Landed
             && end.value() < self.scheme.problem.exit_depth.value();
         if lands {
-            // What the velocity will be there does not matter for the place.
+            // Time and velocity at its end do not matter for the place.
             let here = self.scheme.state();
-            let to = State { time: here.time + h, depth: x.value(), velocity: here.velocity };
+            let to = State { depth: x.value(), ..here };
             let step = Step { from: here, to, deceleration: self.scheme.node.d, size: h };
             return self.land(end, step.reach(end).unwrap_or(h));
         }
@@ -1044,7 +1048,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
     /// The next step, to the node `next`, comes to rest before any stage end or exit. Whether the flight ends in it.
     fn come_to_rest(&mut self, next: Node<S, A>) -> Result<bool, IntegrationError> {
         self.scheme.cost.force_evaluations += R::EVALUATIONS;
-        let step = self.scheme.step_to(&next, self.scheme.clock.now() + next.h);
+        let step = self.scheme.step_to(&next);
         let end = self.scheme.problem.stages[self.scheme.stage].end;
         if self.scheme.options.boundaries == Boundaries::Landed
             && end.value() < self.scheme.problem.exit_depth.value()
@@ -1087,14 +1091,10 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
     /// Completes the step to the node `next`, with the events that `boundaries` sees in it, from stage `first` on.
     /// Whether the flight ends in it.
     fn settle(&mut self, next: Node<S, A>, first: usize) -> bool {
-        let before = self.scheme.state();
         self.scheme.cost.steps += 1;
-        let step = {
-            let mut step = self.scheme.step_to(&next, before.time);
-            self.scheme.clock.tick();
-            step.to.time = self.scheme.clock.now();
-            step
-        };
+        let mut step = self.scheme.step_to(&next);
+        self.scheme.clock.tick();
+        step.to.time = self.scheme.clock.now();
         let ended = match self.scheme.options.boundaries {
             Boundaries::StepEnd => self.see_at_step_end(&step, first),
             Boundaries::Interpolated | Boundaries::Landed => self.locate(&step, first),
