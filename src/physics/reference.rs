@@ -659,20 +659,14 @@ fn fly(model: &Model) -> Result<Raw, ReferenceError> {
             }
         }
         if law.end.is_some() && law.end.as_ref() == limit {
+            // Even at the exit: that is left to the last stage there, of no length, so that every end is told before.
             events.push((model.boundary(index), now.clone()));
-        }
-        let ends_by_exit = |law: &Law| match (&law.end, &model.exit) {
-            (Some(end), Some(exit)) => end <= exit,
-            _ => false,
-        };
-        let more_here = ends_by_exit(law) && model.stages.get(index + 1).is_some_and(ends_by_exit);
-        if model.exit.is_some() && limit == model.exit.as_ref() && !more_here {
-            let at_face = events.len().min(model.stages.len() - 1);
+        } else if limit.is_some() {
             events.push((EventKind::Exit, now.clone()));
             if is_zero(&now.velocity) {
                 events.push((EventKind::Rest, now.clone()));
             }
-            return Ok(finish(Outcome::Perforated, flown.unwrap_or(at_face), now, events));
+            return Ok(finish(Outcome::Perforated, flown.unwrap_or(index), now, events));
         }
     }
     Err(ReferenceError::NeverEnds)
@@ -788,14 +782,13 @@ fn passage_time(model: &Model, law: &Law, from: &Point, to: &Big, velocity: &Big
 
 /// `∫ dx/V` by the tanh-sinh rule, whose double exponential swallows the root of W at rest.
 ///
-/// With `x = a + (b - a) z`, `z = 1/(1 + e^{-2 sigma})`, `sigma = (pi/2) sinh(h j)`; W near its zero is summed from
-/// there, so that `1 - z` is taken as it is and not as a difference.
+/// With `x = a + (b - a) z`, `z = 1/(1 + e^{-2 sigma})`, `sigma = (pi/2) sinh(h j)`. W near its zero is a difference,
+/// which costs the time of rest half of its bits: the attempts with more of them make up for it.
 fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
     let bits = model.bits;
     let one = int(1, bits);
     let length = to - &from.depth;
-    let (gain, loss) = squared_speed_terms(law, &model.mass, &square(&from.velocity), &from.depth, to, bits);
-    let w_end = gain - loss;
+    let squared = square(&from.velocity);
     let half_pi = half(Big::pi(bits));
     // The rule's error is e^{-2 pi a/h}, with the distance a of the nearest singularity from the real axis at most pi/2
     // and less where W has its zero just beyond `to`. At |h j| = 5.5 the weights are below 2^-500.
@@ -810,16 +803,9 @@ fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
         let far = twice(sigma).exp();
         let near_end = &one / (&one + &far);
         let z = &far / (&one + &far);
-        // W from whichever end is nearer.
-        let w = if near_end < z {
-            let x = to - &length * &near_end;
-            let (gain, loss) = squared_speed_terms(law, &model.mass, &w_end, to, &x, bits);
-            gain - loss
-        } else {
-            let x = &from.depth + &length * &z;
-            let (gain, loss) = squared_speed_terms(law, &model.mass, &square(&from.velocity), &from.depth, &x, bits);
-            gain - loss
-        };
+        let x = &from.depth + &length * &z;
+        let (gain, loss) = squared_speed_terms(law, &model.mass, &squared, &from.depth, &x, bits);
+        let w = gain - loss;
         if !is_positive(&w) {
             continue;
         }
@@ -996,7 +982,6 @@ fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[
         for index in stage..model.stages.len() {
             let law = &model.stages[index];
             let to = model.limit(index)?.clone();
-            let to = if to < from { from.clone() } else { to };
             if is_positive(&law.r) {
                 let work = &law.p * (&to - &from) + half(&law.s * (square(&to) - square(&from)));
                 w -= twice(work) / &model.mass;
