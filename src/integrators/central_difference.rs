@@ -399,10 +399,10 @@ pub fn stability_limit<S: Scalar>(stage: &Stage<S>, mass: f64, speed: f64, veloc
 /// The force rule of one stage, divided by the mass: [`Stage::force`] of it is the deceleration [m/s²].
 fn per_mass<S: Scalar>(stage: &Stage<S>, mass: S) -> Stage<S> {
     Stage {
-        static_force: stage.static_force / mass,
-        stiffness: stage.stiffness / mass,
-        viscosity: stage.viscosity / mass,
-        drag: stage.drag / mass,
+        static_force: stage.static_force.over(mass),
+        stiffness: stage.stiffness.over(mass),
+        viscosity: stage.viscosity.over(mass),
+        drag: stage.drag.over(mass),
         end: stage.end,
     }
 }
@@ -441,7 +441,7 @@ impl Rule for Centred {
             linear * linear + S::from_f64(fault!("centred-quadratic", 4.0, 2.0)) * half * law.drag * known;
         // Without a real root the step goes far past rest; the vertex of the parabola is as negative as it gets.
         let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
-        law.force(x, fault!("lag-added", S::from_f64(2.0) * known / (linear + root), u))
+        law.force(x, fault!("lag-added", (S::from_f64(2.0) * known).over(linear + root), u))
     }
 }
 
@@ -687,7 +687,7 @@ impl<S: Scalar> Step<S> {
         (self.to.velocity.value() <= 0.0).then(|| {
             fault!(
                 "rest-not-located",
-                self.size * self.from.velocity / (self.from.velocity - self.to.velocity),
+                (self.size * self.from.velocity).over(self.from.velocity - self.to.velocity),
                 self.size
             )
         })
@@ -705,7 +705,8 @@ impl<S: Scalar> Step<S> {
     /// Velocity after `tau`, on the chord; not below zero.
     fn velocity(&self, tau: S) -> S {
         let v = self.from.velocity
-            + fault!("velocity-not-interpolated", tau / self.size, S::one()) * (self.to.velocity - self.from.velocity);
+            + fault!("velocity-not-interpolated", tau.over(self.size), S::one())
+                * (self.to.velocity - self.from.velocity);
         if v.value() > 0.0 { v } else { S::zero() }
     }
 
@@ -715,7 +716,11 @@ impl<S: Scalar> Step<S> {
         let v = self.from.velocity;
         let discriminant = v * v - S::from_f64(2.0) * self.deceleration * distance;
         (discriminant.value() >= 0.0).then(|| {
-            S::from_f64(2.0) * distance / fault!("passage-wrong-root", v + discriminant.sqrt(), v - discriminant.sqrt())
+            (S::from_f64(2.0) * distance).over(fault!(
+                "passage-wrong-root",
+                v + discriminant.sqrt(),
+                v - discriminant.sqrt()
+            ))
         })
     }
 
@@ -851,10 +856,11 @@ impl<'a, S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Scheme<'a, S, A, C, R> {
         self.node = self.arrive(x, u, h);
     }
 
-    /// The step from the present node to `next`.
-    fn step_to(&self, next: &Node<S, A>, time: S) -> Step<S> {
-        let to = State { time, depth: next.x.value(), velocity: next.v };
-        Step { from: self.state(), to, deceleration: self.node.d, size: next.h }
+    /// The step from the present node to `next`; its time is told by the clock, once that has ticked.
+    fn step_to(&self, next: &Node<S, A>) -> Step<S> {
+        let from = self.state();
+        let to = State { depth: next.x.value(), velocity: next.v, ..from };
+        Step { from, to, deceleration: self.node.d, size: next.h }
     }
 
     fn finite(&self, what: &'static str, number: S) -> Result<(), IntegrationError> {
@@ -906,7 +912,7 @@ impl<S: Scalar, F: Fn(usize, S) -> S> Job<S> for Forced<'_, F> {
         for (stage, &end) in self.ends.iter().enumerate() {
             let law = per_mass(&scheme.problem.stages[stage], mass);
             // At a given time the outer force is one more static force, whatever the velocity rule makes of the rest.
-            let law_at = |time| Stage { static_force: law.static_force - (self.source)(stage, time) / mass, ..law };
+            let law_at = |time| Stage { static_force: law.static_force - (self.source)(stage, time).over(mass), ..law };
             let start = scheme.state();
             scheme.law = law_at(start.time);
             scheme.start(start);
@@ -966,7 +972,8 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             self.push(EventKind::boundary(problem, index), State::at_impact(problem), index);
         }
         self.record_node();
-        let mut unchanged = 0;
+        // Steps up to the last change of x or V.
+        let mut moved = 0;
         loop {
             self.refuse_endless()?;
             let left = self.scheme.options.max_steps - self.scheme.cost.steps;
@@ -976,7 +983,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             }
             let allowance = if self.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
             let limit = problem.limit_of(self.scheme.stage).value();
-            let before = (self.scheme.state(), self.scheme.cost.steps);
+            let before = self.scheme.state();
             let ended = match self.scheme.cruise(limit, allowance) {
                 Pause::Allowance => false,
                 Pause::Crossing { x, u } => {
@@ -994,9 +1001,11 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             self.record_node();
             let after = self.scheme.state();
             let still =
-                (after.depth.value(), after.velocity.value()) == (before.0.depth.value(), before.0.velocity.value());
-            unchanged = if still { unchanged + self.scheme.cost.steps - before.1 } else { 0 };
-            if unchanged >= STUCK_STEPS {
+                (after.depth.value(), after.velocity.value()) == (before.depth.value(), before.velocity.value());
+            if !still {
+                moved = self.scheme.cost.steps;
+            }
+            if self.scheme.cost.steps - moved >= STUCK_STEPS {
                 let why = "a step no longer changes depth or velocity, which only approach their limits";
                 return Err(IntegrationError::NeverEnds { why, last: after.values() });
             }
@@ -1021,9 +1030,9 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         let lands = self.scheme.options.boundaries == Boundaries::Landed
             && end.value() < self.scheme.problem.exit_depth.value();
         if lands {
-            // What the velocity will be there does not matter for the place.
+            // Time and velocity at its end do not matter for the place.
             let here = self.scheme.state();
-            let to = State { time: here.time + h, depth: x.value(), velocity: here.velocity };
+            let to = State { depth: x.value(), ..here };
             let step = Step { from: here, to, deceleration: self.scheme.node.d, size: h };
             return self.land(end, step.reach(end).unwrap_or(h));
         }
@@ -1039,7 +1048,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
     /// The next step, to the node `next`, comes to rest before any stage end or exit. Whether the flight ends in it.
     fn come_to_rest(&mut self, next: Node<S, A>) -> Result<bool, IntegrationError> {
         self.scheme.cost.force_evaluations += R::EVALUATIONS;
-        let step = self.scheme.step_to(&next, self.scheme.clock.now() + next.h);
+        let step = self.scheme.step_to(&next);
         let end = self.scheme.problem.stages[self.scheme.stage].end;
         if self.scheme.options.boundaries == Boundaries::Landed
             && end.value() < self.scheme.problem.exit_depth.value()
@@ -1082,14 +1091,10 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
     /// Completes the step to the node `next`, with the events that `boundaries` sees in it, from stage `first` on.
     /// Whether the flight ends in it.
     fn settle(&mut self, next: Node<S, A>, first: usize) -> bool {
-        let before = self.scheme.state();
         self.scheme.cost.steps += 1;
-        let step = {
-            let mut step = self.scheme.step_to(&next, before.time);
-            self.scheme.clock.tick();
-            step.to.time = self.scheme.clock.now();
-            step
-        };
+        let mut step = self.scheme.step_to(&next);
+        self.scheme.clock.tick();
+        step.to.time = self.scheme.clock.now();
         let ended = match self.scheme.options.boundaries {
             Boundaries::StepEnd => self.see_at_step_end(&step, first),
             Boundaries::Interpolated | Boundaries::Landed => self.locate(&step, first),
@@ -2037,5 +2042,219 @@ pub(crate) mod tests {
         let (plain, compensated) = (worst(Summation::Plain), worst(Summation::Compensated));
         println!("f32, 20 000 steps: plain {plain:.1e}, compensated {compensated:.1e}");
         assert!(compensated * 10.0 < plain, "plain {plain:e}, compensated {compensated:e}");
+    }
+
+    #[test]
+    fn each_scale_of_a_stage_sets_the_default_step_where_it_is_the_shortest() {
+        // M = 2, all numbers chosen by hand so that one scale is the shortest, a power of two. In front of a stage
+        // that starts deeper lies one without any force.
+        let none = f64::INFINITY;
+        let free = |end| stage(0.0, 0.0, 0.0, 0.0, end);
+        let cases: [(&[Stage], f64, f64, f64); 7] = [
+            // The second of two stages is crossed in (5/4 - 1)/V0.
+            (&[free(1.0), free(none)], 4.0, 1.25, 1.0 / 16.0),
+            // sqrt(M/s), as the drive leaves no more than 256 N at either end.
+            (&[stage(-256.0, 8192.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 64.0),
+            // M V0/(p + s x) with 64 N where the spring is compressed most, at x = 4 + V0 sqrt(M/s) = 6.
+            (&[free(4.0), stage(16.0, 8.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 8.0),
+            // The same where it is compressed least, with -32 N at x = 4 and -16 N at x = 6.
+            (&[free(4.0), stage(-64.0, 8.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 4.0),
+            // M/r, and M/(q V0).
+            (&[stage(0.0, 0.0, 64.0, 0.0, none)], 4.0, none, 1.0 / 32.0),
+            (&[stage(0.0, 0.0, 0.0, 16.0, none)], 4.0, none, 1.0 / 32.0),
+            // Without speed no time is needed to stop: M/r alone.
+            (&[stage(4.0, 0.0, 2.0, 1.0, none)], 0.0, none, 1.0),
+        ];
+        for (list, speed, exit_depth, scale) in cases {
+            let problem = stages(list.iter().copied().collect(), speed, exit_depth);
+            assert_eq!(default_time_step(&problem, VelocityAt::Centred), scale / 1e3, "{list:?}");
+        }
+        // A film of 2^-20 m or a fast dashpot deserves no more than 1e6 steps in what lies behind it.
+        let film = free(2.0_f64.powi(-20));
+        let cases: [(&[Stage], f64, f64); 3] = [
+            // M V0/p, and M/sqrt(p q), which also is there without speed.
+            (&[film, stage(2.0, 0.0, 0.0, 0.0, none)], 4.0, 4.0),
+            (&[film, stage(2.0, 0.0, 0.0, 8.0, none)], 4.0, 0.5),
+            (&[stage(0.0, 0.0, 2.0_f64.powi(24), 0.0, 1.0), stage(4.0, 0.0, 0.0, 1.0, none)], 0.0, 1.0),
+        ];
+        for (list, speed, scale) in cases {
+            let problem = stages(list.iter().copied().collect(), speed, none);
+            assert_eq!(default_time_step(&problem, VelocityAt::Centred), scale / 1e6, "{list:?}");
+        }
+    }
+
+    #[test]
+    fn the_limit_itself_is_unstable_and_a_stage_without_a_step_has_none() {
+        let w = 1024.0;
+        let flown = |problem: &Problem, step| {
+            scheme(step, VelocityAt::Centred, Boundaries::StepEnd)
+                .fly(problem, Detail::End)
+                .unwrap()
+                .step_limit
+                .unwrap()
+        };
+        let told = flown(&spring(w), 2.0 / w);
+        assert_eq!((told.limit, told.stable), (2.0 / w, false));
+        assert!(flown(&spring(w), (2.0 / w).next_down()).stable);
+        let layer = stage(0.0, 1e12, 0.0, 0.0, 0.0);
+        let faced = stages(smallvec![layer, Stage::tunnel(STRENGTH, 0.0)], SPEED, f64::INFINITY);
+        assert_eq!(flown(&faced, 1e-5).limit, f64::INFINITY);
+    }
+
+    #[test]
+    fn what_lies_behind_the_exit_is_never_felt() {
+        let law = stage(STRENGTH, 1e7, 30.0, DRAG, f64::INFINITY);
+        let exit_depth: f64 = 0.01;
+        for (velocity, boundaries) in combinations() {
+            let scheme = CentralDifference { max_steps: 1000, ..scheme(3.3e-6, velocity, boundaries) };
+            let alone = scheme.fly(&stages(smallvec![law], SPEED, exit_depth), Detail::Events).unwrap();
+            for end in [exit_depth, exit_depth.next_up(), 0.0101] {
+                let list = smallvec![Stage { end, ..law }, Stage::tunnel(1e9, 1e3)];
+                let backed = scheme.fly(&stages(list, SPEED, exit_depth), Detail::Events).unwrap();
+                assert_eq!((backed.end, backed.stage), (alone.end, 0), "{velocity} {boundaries} {end}");
+                assert_eq!((backed.cost, backed.exit_margin), (alone.cost, alone.exit_margin));
+            }
+        }
+    }
+
+    #[test]
+    fn an_outer_force_that_grows_with_time_gives_the_exact_discrete_cubic() {
+        // M x'' = 6 M k t: the second difference of t³ is 6 t dt² exactly, and V(1/2) = V0 asks for x = V0 dt after
+        // the first step, so x(i) = V0 t + k t (t² - dt²).
+        let (k, step) = (64.0, 1.0 / 64.0);
+        let free = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 8.0, f64::INFINITY);
+        for velocity in VELOCITIES {
+            let scheme = scheme(step, velocity, Boundaries::Landed);
+            let states = scheme.forced_states(&free, |_, t| 6.0 * MASS * k * t, &[0.25]).unwrap();
+            assert_eq!(states.len(), 17);
+            for (i, state) in states.iter().enumerate() {
+                let t = i as f64 * step;
+                assert_eq!((state.time, state.depth), (t, 8.0 * t + k * t * (t * t - step * step)), "{velocity}");
+            }
+            // Sixteen steps are enough for sixteen, fifteen are not.
+            for (max_steps, enough) in [(16, true), (15, false)] {
+                let scheme = CentralDifference { max_steps, ..scheme.clone() };
+                assert_eq!(scheme.forced_states(&free, |_, _| 0.0, &[0.25]).is_ok(), enough);
+            }
+        }
+    }
+
+    #[test]
+    fn a_flight_without_an_end_is_told_where_it_begins_to_be_one() {
+        let endless = |scheme: &CentralDifference, problem: &Problem| {
+            let error = scheme.fly(problem, Detail::End).unwrap_err();
+            let IntegrationError::NeverEnds { last, .. } = error else { unreachable!("{error}") };
+            last
+        };
+        for last in [stage(0.0, 0.0, 1.0, 1.0, f64::INFINITY), stage(-5.0, 0.0, 1.0, 1.0, f64::INFINITY)] {
+            let problem = stages(smallvec![last], SPEED, f64::INFINITY);
+            for (velocity, boundaries) in combinations() {
+                let scheme = CentralDifference { max_steps: 10, ..scheme(1e-6, velocity, boundaries) };
+                assert_eq!(endless(&scheme, &problem), State::at_impact(&problem));
+            }
+        }
+        // A dashpot with r dt/M = 2 takes all of V in the first half step, and nothing would hold the projectile there.
+        let dashpot = stages(smallvec![stage(0.0, 0.0, 256.0, 0.0, f64::INFINITY)], 8.0, 10.0);
+        let short = scheme(1.0 / 64.0, VelocityAt::LaggedHalfStep, Boundaries::StepEnd);
+        assert_eq!(endless(&short, &dashpot), State::at_impact(&dashpot));
+        // The slowest of all speeds moves nothing in a step of 1 ms: told after 2^20 of them.
+        let slowest = f64::from_bits(1);
+        let creep = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], slowest, 1.0);
+        let scheme =
+            CentralDifference { max_steps: 3 << 20, ..scheme(1e-3, VelocityAt::LaggedHalfStep, Boundaries::StepEnd) };
+        let last = endless(&scheme, &creep);
+        assert_eq!(last, State { time: 1_048_576.0 * 1e-3, depth: 0.0, velocity: slowest });
+        // As many steps that do move are no standstill: 3/2 2^20 of them to a place one metre away.
+        let slow = Problem { impact_speed: 2.0_f64.powi(20) / 1.5, exit_depth: 1.0, ..creep };
+        let step = 2.0_f64.powi(-40);
+        let flight = CentralDifference { steps: Steps::Uniform(step), ..scheme }.fly(&slow, Detail::End).unwrap();
+        assert!(flight.cost.steps.abs_diff(3 << 19) <= 1, "{}", flight.cost.steps);
+    }
+
+    #[test]
+    fn the_quadratic_of_the_centred_rule_has_a_finite_derivative_where_its_roots_meet() {
+        // half q V² + V = u - half p with half = 1/2, p = 4, q = 1/2, u = 1: V = -2 twice. F = p + q V² = 6 there, and
+        // by V = 2 (u - half p), the vertex, dF/du = 2 q V dV/du = -4.
+        let law = stage(4.0, 0.0, 0.0, 0.5, f64::INFINITY);
+        let law = stages(smallvec![law], 1.0, 1.0).cast::<num_dual::Dual64>().stages[0];
+        let zero = num_dual::Dual64::from_re(0.0);
+        let force = Centred::deceleration(&law, zero, num_dual::Dual64::from_re(1.0).derivative(), zero + 0.5);
+        assert_eq!((force.re, force.eps), (6.0, -4.0));
+    }
+
+    #[test]
+    fn the_method_has_its_name() {
+        assert_eq!(CentralDifference::default().name(), "central-difference");
+    }
+
+    #[test]
+    fn nodes_in_double_double_are_the_exact_discrete_solution_to_30_digits() {
+        // Equations 6 to 8 in 256 bits from the same numbers, V* by its definition; M = 3, so that no coefficient
+        // divided by it is a double-double.
+        type Big = dashu_float::FBig<dashu_float::round::mode::HalfEven, 2>;
+        let big = |value: f64| Big::try_from(value).unwrap().with_precision(256).value();
+        let step = 7e-6;
+        let law = stage(8e5, 7e6, 400.0, 3.1, f64::INFINITY);
+        let problem = Problem { mass: 3.0, ..stages(smallvec![law], SPEED, f64::INFINITY) };
+        let [m, h, p, s, r, q, v0, two] =
+            [3.0, step, law.static_force, law.stiffness, law.viscosity, law.drag, SPEED, 2.0].map(big);
+        let half = &h / &two;
+        let deceleration = |x: &Big, v: &Big| (&p + &s * x + &r * v + &q * v * v) / &m;
+        for velocity in VELOCITIES {
+            let evaluated_at = |x: &Big, u: &Big| match velocity {
+                VelocityAt::LaggedHalfStep => u.clone(),
+                VelocityAt::PredictedHalfStep => u - &half * deceleration(x, u),
+                VelocityAt::Centred => {
+                    // The root of V + dt/2 F(x, V)/M = u.
+                    let (a, b) = (&half * &q / &m, big(1.0) + &half * &r / &m);
+                    let c = &half * (&p + &s * x) / &m - u;
+                    ((&b * &b - &two * &two * &a * c).sqrt() - b) / (&two * a)
+                }
+            };
+            let scheme = scheme(step, velocity, Boundaries::StepEnd);
+            let states = scheme.free_states(&problem.cast::<twofloat::TwoFloat>(), 101).unwrap();
+            let (mut x, mut v) = (big(0.0), v0.clone());
+            let mut d = deceleration(&x, &v);
+            let mut u = &v0 + &half * &d;
+            for state in &states {
+                let off = |number: twofloat::TwoFloat, exact: &Big, scale: &Big| {
+                    ((big(number.hi()) + big(number.lo()) - exact) / scale).to_f64().value().abs()
+                };
+                let errors = (off(state.depth, &x, &(&v0 * &h)), off(state.velocity, &v, &v0));
+                assert!(errors.0 < 1e-29 && errors.1 < 1e-30, "{velocity}: {errors:?}");
+                u -= &h * &d;
+                x += &h * &u;
+                d = deceleration(&x, &evaluated_at(&x, &u));
+                v = &u - &half * &d;
+            }
+        }
+    }
+
+    #[test]
+    fn places_located_in_double_double_are_those_of_the_parabola_to_30_digits() {
+        // A constant force: X = M V0²/(2 p), T = M V0/p, and V² = V0² - 2 p x/M at the end of a stage on the way.
+        use twofloat::TwoFloat;
+        let law = |end| stage(7e5, 0.0, 0.0, 0.0, end);
+        let two_stages = stages(smallvec![law(0.05), law(f64::INFINITY)], SPEED, f64::INFINITY);
+        let problem = Problem { mass: 3.0, ..two_stages }.cast::<TwoFloat>();
+        let (mass, speed, force) = (problem.mass, problem.impact_speed, problem.stages[0].static_force);
+        let depth = (mass * speed * speed).over(force + force);
+        let time = (mass * speed).over(force);
+        for velocity in VELOCITIES {
+            for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
+                let flight = scheme(7e-6, velocity, boundaries).fly_in(&problem, Detail::Events).unwrap();
+                let at_end = flight.events[0].state;
+                let squared = speed * speed - ((force + force) * at_end.depth).over(mass);
+                let passed = (speed - at_end.velocity) * mass.over(force);
+                let off = [
+                    (flight.end.depth - depth).over(depth),
+                    (flight.end.time - time).over(time),
+                    (at_end.velocity * at_end.velocity - squared).over(squared),
+                    (at_end.time - passed).over(passed),
+                ]
+                .map(|error| error.value().abs());
+                assert!(off.iter().all(|error| *error < 1e-29), "{velocity} {boundaries}: {off:?}");
+            }
+        }
     }
 }
