@@ -1023,7 +1023,7 @@ mod tests {
     fn every_tunnel_ends_within_two_roundings_of_fifty_digits() {
         // In one step up to a share of 0.055, or through the exit; in several beyond.
         let shares = (0..16).map(|j| f64::from(j) / 256.0).chain((2..32).map(|j| f64::from(j) / 32.0));
-        let ways = [f64::INFINITY, 0.0625, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.46875, 0.515625, 0.5625];
+        let ways = [f64::INFINITY, 0.0625, 0.1875, 0.25, 0.3125, 0.375, 0.4375, 0.468_75, 0.515_625, 0.5625];
         let tunnels: Vec<Problem> = shares.flat_map(|beta| ways.map(|way| tunnel(beta, way))).collect();
         assert_within(roundings(&tunnels), [1.5, 1.7, 2.0, 0.0, 0.0]);
     }
