@@ -1208,4 +1208,15 @@ mod tests {
             assert!((reached.time / span - 1.0).abs() < 1e-11, "{beta}: {} {span}", reached.time);
         }
     }
+
+    #[test]
+    fn the_tables_of_the_crater_are_the_reciprocals_of_factorials_with_signs_in_turn() {
+        for (table, first) in [(EVEN, 0), (ODD, 1)] {
+            for (j, entry) in (0_u128..).zip(table) {
+                let factorial = (1..=2 * j + first).product::<u128>() as f64;
+                let sign = if j % 2 == 0 { 1.0 } else { -1.0 };
+                assert!((entry * factorial - sign).abs() <= f64::EPSILON, "{j}, {first}: {entry}");
+            }
+        }
+    }
 }
