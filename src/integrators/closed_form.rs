@@ -67,7 +67,8 @@ fn trajectory(
     let mut samples = Vec::with_capacity((events.len() + 1) * INTERVALS as usize);
     let mut stage = 0;
     let mut push = |state: State| {
-        while stage + 1 < problem.stages.len() && problem.stages[stage].end <= state.depth && state.depth < end.depth {
+        // The last stage has no end.
+        while problem.stages[stage].end <= state.depth && state.depth < end.depth {
             stage += 1;
         }
         samples.push(Sample { state, force: problem.stages[stage].force(state.depth, state.velocity), stage });
@@ -154,5 +155,34 @@ mod tests {
         assert_eq!((boundary.state.depth, boundary.stage), (0.1, 1));
         assert_eq!(boundary.force, 1e5 + boundary.state.velocity.powi(2));
         assert_eq!(samples.last().unwrap().state.depth, 0.3);
+    }
+
+    #[test]
+    fn a_trajectory_gives_no_depth_twice_and_stays_at_its_end_in_the_stage_it_ended_in() {
+        assert_eq!(ClosedForm.name(), "closed-form");
+        let stages = [
+            Stage::crater(8.0e6, 0.1),
+            Stage { end: 0.1, ..Stage::tunnel(3e5, 0.0) },
+            Stage { end: 0.2, ..Stage::tunnel(1e5, 1.0) },
+            Stage::tunnel(2e5, 0.0),
+        ];
+        let next = 0.1_f64.next_up();
+        // Exits at a stage end, behind it, one spacing behind it, and where two stages end.
+        for (exit_depth, last) in [(0.2, 2), (0.3, 3), (next, 2), (0.1, 0)] {
+            let problem = Problem { stages: stages.into_iter().collect(), exit_depth, ..perforating(400.0) };
+            let samples = ClosedForm.fly(&problem, Detail::Trajectory).unwrap().trajectory;
+            assert!(samples.windows(2).all(|w| w[0].state.depth < w[1].state.depth), "{exit_depth}");
+            for sample in &samples {
+                let State { depth, velocity, .. } = sample.state;
+                let stage = match depth {
+                    x if x == exit_depth => last,
+                    x if x < 0.1 => 0,
+                    x if x < 0.2 => 2,
+                    _ => 3,
+                };
+                assert_eq!(sample.stage, stage, "{depth} of {exit_depth}");
+                assert_eq!(sample.force, stages[stage].force(depth, velocity));
+            }
+        }
     }
 }

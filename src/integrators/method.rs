@@ -267,3 +267,105 @@ fn refuse_unless<T: fmt::Display>(
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
+    use super::*;
+    use crate::physics::{Stage, Stages, Target};
+
+    const NAMES: &str = "taylor, tsit45, bdf, esdirk34, tr-bdf2, adaptive, energy, central-difference, closed-form";
+
+    fn slab(exit_depth: f64, speed: f64) -> Problem {
+        let stages = Stages::from_slice(&[Stage::crater(8e6, 0.1), Stage::tunnel(1e5, 1.0)]);
+        Problem { mass: 2.0, impact_speed: speed, exit_depth, stages, crater: Some(0), target: Target::CraterAndTunnel }
+    }
+
+    #[test]
+    fn names_are_those_of_the_contract_and_read_back() {
+        let names = MethodName::ALL.map(|name| name.to_string());
+        assert_eq!(names.join(", "), NAMES);
+        for name in MethodName::ALL {
+            assert_eq!(name.name().parse(), Ok(name));
+            let from_diffsol = ["tsit45", "bdf", "esdirk34", "tr-bdf2", "adaptive"].contains(&name.name());
+            assert_eq!(name.needs_diffsol(), from_diffsol);
+            assert_eq!(name.is_built(), cfg!(feature = "diffsol") || !from_diffsol);
+            assert_eq!(Method::new(name, &MethodOptions::default()).is_ok(), name.is_built());
+        }
+        let unknown = "euler".parse::<MethodName>().unwrap_err();
+        assert_eq!(unknown, format!("unknown method 'euler': choose from {NAMES}"));
+    }
+
+    #[test]
+    fn an_option_reaches_the_methods_that_use_it_and_the_others_refuse_it() {
+        let fixed = MethodOptions {
+            dt: Some(1e-5),
+            velocity: Some(VelocityAt::Centred),
+            events: Some(Boundaries::Interpolated),
+            rtol: None,
+        };
+        let expected = CentralDifference {
+            steps: Steps::Uniform(1e-5),
+            velocity: VelocityAt::Centred,
+            boundaries: Boundaries::Interpolated,
+            ..CentralDifference::default()
+        };
+        assert_ne!(fixed.central_difference(), CentralDifference::default());
+        assert_eq!(fixed.central_difference(), expected);
+        let refused = |name: MethodName, options: &MethodOptions| match Method::new(name, options) {
+            Err(IntegrationError::BadOption { option, .. }) => Some(option),
+            Err(_) | Ok(_) => None,
+        };
+        let only = MethodOptions::default;
+        for name in [MethodName::Taylor, MethodName::Energy, MethodName::ClosedForm, MethodName::CentralDifference] {
+            let steps = name == MethodName::CentralDifference;
+            let adapts = matches!(name, MethodName::Taylor | MethodName::Energy);
+            for (option, options, used) in [
+                ("--dt", MethodOptions { dt: fixed.dt, ..only() }, steps),
+                ("--velocity", MethodOptions { velocity: fixed.velocity, ..only() }, steps),
+                ("--events", MethodOptions { events: fixed.events, ..only() }, steps),
+                ("--rtol", MethodOptions { rtol: Some(1e-6), ..only() }, adapts),
+                ("--dt", MethodOptions { dt: Some(0.0), ..only() }, false),
+                ("--rtol", MethodOptions { rtol: Some(0.2), ..only() }, false),
+            ] {
+                assert_eq!(refused(name, &options), (!used).then_some(option), "{name}, {options:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn it_is_said_what_was_skipped_and_why() {
+        let explain = |name: MethodName, problem: &Problem, detail: Detail| {
+            let method = Method::new(name, &MethodOptions::default()).unwrap();
+            let flight = method.integrator().fly(problem, detail).unwrap();
+            method.explain(problem, &flight, detail)
+        };
+        let closed_form = "no integration: the closed form";
+        let no_jacobian = "Jacobian not built: the method is explicit or needs none";
+        let no_sensitivities = "sensitivities not computed: not asked for";
+        let no_trajectory = "trajectory not kept: not asked for";
+        let rest_first = "exit not located: rest comes first";
+        // At rest in the crater: V0/w = 0.05 m.
+        let stopped = explain(MethodName::ClosedForm, &slab(0.3, 100.0), Detail::Events);
+        let unbuilt = "stage 1 was not built: the flight ended in stage 0 at x = 0.05 m, before 0.1 m";
+        assert_eq!(stopped, [closed_form, unbuilt, rest_first, no_trajectory, no_jacobian, no_sensitivities]);
+        let endless = explain(MethodName::ClosedForm, &slab(f64::INFINITY, 400.0), Detail::Trajectory);
+        let no_exit = "exit event not sought: the target has no far side";
+        assert_eq!(endless, [closed_form, no_exit, no_jacobian, no_sensitivities]);
+        let through = explain(MethodName::Taylor, &slab(0.3, 400.0), Detail::Trajectory);
+        let shapes = [
+            "stage 0: a spring alone: recurrence of one term, no convolution",
+            "stage 1: no stiffness: V monotone, no search for hidden roots",
+        ];
+        assert_eq!(through, [shapes[0], shapes[1], no_jacobian, no_sensitivities]);
+        // A flight that is over at impact has said so: no closed form was asked.
+        let at_once = explain(MethodName::ClosedForm, &slab(0.0, 400.0), Detail::Events);
+        assert!(!at_once.iter().any(|note| note == closed_form), "{at_once:?}");
+        #[cfg(feature = "diffsol")]
+        for (name, has_jacobian) in [(MethodName::Tsit45, false), (MethodName::Bdf, true), (MethodName::Adaptive, true)]
+        {
+            let notes = explain(name, &slab(0.3, 400.0), Detail::Events);
+            assert_eq!(notes.iter().any(|note| note == no_jacobian), !has_jacobian, "{name}: {notes:?}");
+        }
+    }
+}

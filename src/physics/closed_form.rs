@@ -539,7 +539,7 @@ impl Damped {
     /// only approached.
     fn time_over(&self, way: f64, rest: Option<f64>) -> Option<f64> {
         // It creeps towards the depth where spring and drive balance, and rounding would let it arrive.
-        if rest.is_none() && self.w2 > 0.0 && self.w2 * way >= -self.f0 {
+        if rest.is_none() && self.w2 * way >= -self.f0 {
             return None;
         }
         let mut low = 0.0;
@@ -1354,6 +1354,12 @@ mod tests {
         let stiff = Stage { static_force: -1000.0, stiffness: 100.0, viscosity: 1000.0, drag: 0.0, end: f64::INFINITY };
         assert_eq!(solve(&problem(&[stiff], 1.0, 1.0, 9.0)).unwrap().outcome, Outcome::Perforated);
         assert!(matches!(solve(&problem(&[stiff], 1.0, 1.0, 10.0)), Err(ClosedFormError::NeverEnds { .. })));
+        // Critical damping, and a drive that V0 just balances: x = 10 (1 - e^-t).
+        let critical = Stage { stiffness: 1.0, viscosity: 2.0, ..Stage::tunnel(-10.0, 0.0) };
+        let half = solve(&problem(&[critical], 1.0, 10.0, 5.0)).unwrap().end;
+        let off = [half.time / std::f64::consts::LN_2 - 1.0, half.velocity / 5.0 - 1.0];
+        assert!(off.iter().all(|off| off.abs() < 1e-15), "{half}");
+        assert!(matches!(solve(&problem(&[critical], 1.0, 10.0, 20.0)), Err(ClosedFormError::NeverEnds { .. })));
         let both = Stage { viscosity: 1.0, ..Stage::tunnel(1.0, 1.0) };
         let error = solve(&problem(&[Stage::crater(1.0, 1.0), both], 1.0, 10.0, 3.0)).unwrap_err();
         assert_eq!(error.to_string(), "stage 1 has no closed form: viscosity and drag act together");

@@ -122,3 +122,15 @@ impl std::fmt::Display for Outcome {
         f.write_str(self.name())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_and_outcomes_are_shown_by_their_numbers_with_units_and_their_names() {
+        let state = State { time: 0.5, depth: 0.25, velocity: 100.0 };
+        assert_eq!(state.to_string(), "t = 0.5 s, x = 0.25 m, V = 100 m/s");
+        assert_eq!(Outcome::StoppedInCrater.to_string(), "stopped-in-crater");
+    }
+}

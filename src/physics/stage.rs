@@ -160,3 +160,14 @@ impl<S: Scalar> Problem<S> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stage_resists_unless_its_static_force_drives() {
+        let resists = |static_force: f64| Stage::tunnel(static_force, 1.0).resists();
+        assert!(resists(1.0) && resists(0.0) && !resists(-1e-9));
+    }
+}
