@@ -221,7 +221,7 @@ impl Method {
         }
         if !problem.has_exit() {
             notes.push("exit event not sought: the target has no far side".to_owned());
-        } else if flight.outcome.is_stop() && flight.end.depth < problem.limit_of(flight.stage) {
+        } else if flight.outcome.is_stop() {
             notes.push("exit not located: rest comes first".to_owned());
         }
         if detail < Detail::Trajectory {
