@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::escape_terminal;
-use super::output::{print_json, print_text, table, table_lines};
+use super::output::{print_json, print_text, table, table_lines, tell_line};
 use super::verify::folder_error;
 use super::{CliError, Exit, read_scene};
 use crate::physics::Scene;
@@ -148,7 +148,7 @@ impl BenchArgs {
         let mut peers = Vec::new();
         if self.peers {
             for (name, bundled, options) in peers::BUNDLED {
-                let environment = PeerEnvironment::ensure(bundled, &mut |line| eprintln!("{line}"))
+                let environment = PeerEnvironment::ensure(bundled, &mut |line| tell_line(line))
                     .map_err(|error| CliError::PeerMissing(error.to_string()))?;
                 let command = format!("{} {options}", environment.command(bundled));
                 peers.push((name.to_owned(), start(&command)?));

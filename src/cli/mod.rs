@@ -347,7 +347,7 @@ impl Cli {
                     // The message below still reaches the person if standard output is gone.
                     let _ = output::print_json(&failure);
                 }
-                eprint!("{}", error.render(is_terminal_stderr()));
+                output::tell_line(error.render(is_terminal_stderr()).trim_end_matches('\n'));
                 error.exit()
             }
         }

@@ -70,7 +70,12 @@ pub fn wrapped(head: &str, text: &str) -> String {
 
 /// Tells a person on standard error, `head` (`warning: `) in front.
 pub fn tell(head: &str, text: &str) {
-    eprintln!("{}", wrapped(head, text));
+    tell_line(&wrapped(head, text));
+}
+
+/// A line as it is on standard error. If that is gone nobody is left to be told, and the work goes on.
+pub fn tell_line(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// Whether `path` stands for standard input or output.
@@ -89,7 +94,8 @@ pub type Named<'a> = (&'static str, &'a Path);
 /// Refuses `outputs`, before any work is done, that would replace an input or one another, or have no folder to go to.
 ///
 /// # Errors
-/// A file that would be replaced (exit 2); a folder that is missing, or in the place of a file (exit 1).
+/// A file that would be replaced, or that is none, such as a device (exit 2); a folder that is missing, or in the place
+/// of a file (exit 1).
 pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), CliError> {
     for (index, (what, path)) in outputs.iter().enumerate() {
         let others = inputs.iter().chain(&outputs[..index]);
@@ -102,6 +108,12 @@ pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), 
         }
         if is_standard(path) {
             continue;
+        }
+        if fs::symlink_metadata(path).is_ok()
+            && !fs::metadata(path).is_ok_and(|found| found.is_file() || found.is_dir())
+        {
+            let message = format!("{what} cannot go to {}: it is a device, a pipe or a broken link", path.display());
+            return Err(CliError::usage(message, "name a file, or - for standard output"));
         }
         let kind = match path.parent() {
             _ if path.is_dir() => io::ErrorKind::IsADirectory,
@@ -153,6 +165,11 @@ pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), CliError> {
     Ok(())
 }
 
+/// The file itself where `path` is a link to it, which stays.
+fn followed(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
 /// A temporary file in the folder of `path`, to be moved there by [`persist`].
 ///
 /// # Errors
@@ -161,6 +178,7 @@ pub fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     if path.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
     }
+    let path = followed(path);
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -196,7 +214,7 @@ pub fn persist(file: tempfile::NamedTempFile, path: &Path) -> io::Result<()> {
         let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
         fs::set_permissions(file.path(), fs::Permissions::from_mode(mode))?;
     }
-    file.persist(path).map(|_| ()).map_err(|e| e.error)
+    file.persist(followed(path)).map(|_| ()).map_err(|e| e.error)
 }
 
 /// Whether the table at `path` is a Parquet table, by its name.

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::output::{escape_terminal, print_json, print_text, tell, wrapped};
+use super::output::{escape_terminal, print_json, print_text, tell, tell_line, wrapped};
 use super::sweep::read_data;
 use super::{CliError, Exit};
 use crate::report::{Environment, Run, VerifyJson, folder};
@@ -130,7 +130,7 @@ impl VerifyArgs {
                 ("sundae-ida", BundledPeer::SundaeIda),
                 ("heyoka-taylor", BundledPeer::Heyoka),
             ] {
-                let environment = PeerEnvironment::ensure(peer, &mut |line| eprintln!("{line}"))
+                let environment = PeerEnvironment::ensure(peer, &mut |line| tell_line(line))
                     .map_err(|error| CliError::PeerMissing(error.to_string()))?;
                 start(&mut peers, name, &environment.command(peer))?;
             }
