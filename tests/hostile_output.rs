@@ -121,6 +121,40 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
     }
 }
 
+#[cfg(target_os = "linux")]
+fn a_pipe_and_a_broken_link_are_no_files_and_a_link_stays() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
+    let folder = workplace();
+    let place = |name: &str| folder.path().join(name);
+    assert!(Command::new("mkfifo").arg(place("pipe.csv")).status().unwrap().success());
+    symlink("nowhere.csv", place("broken.csv")).unwrap();
+    for command in table_commands() {
+        for name in ["pipe.csv", "broken.csv"] {
+            let output = run(folder.path(), &[&command[..], &[name]].concat());
+            assert_eq!(output.status.code(), Some(2), "{command:?} {name}");
+            assert!(said(&output).contains("it is a device, a pipe"), "{}", said(&output));
+        }
+    }
+    assert!(fs::symlink_metadata(place("pipe.csv")).unwrap().file_type().is_fifo());
+    assert!(!place("nowhere.csv").exists());
+
+    fs::write(place("real.csv"), "old").unwrap();
+    symlink("real.csv", place("link.csv")).unwrap();
+    assert!(run(folder.path(), &["batch", "rows.csv", "--out", "link.csv"]).status.success());
+    assert!(fs::symlink_metadata(place("link.csv")).unwrap().is_symlink());
+    assert!(fs::read_to_string(place("real.csv")).unwrap().starts_with("row,outcome"));
+}
+
+#[cfg(target_os = "linux")]
+fn a_standard_error_that_cannot_be_written_changes_no_exit_code() {
+    let folder = workplace();
+    for (arguments, code) in [(&["solve", "missing.toml"][..], 2), (&["batch", "rows.csv", "--out", "t.csv"], 0)] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let status = program(folder.path(), arguments).stdout(Stdio::null()).stderr(full).status().unwrap();
+        assert_eq!(status.code(), Some(code), "{arguments:?}");
+    }
+}
+
 fn a_report_goes_into_a_new_an_empty_or_its_own_folder_alone() {
     let folder = workplace();
     let verify = |out: &str| run(folder.path(), &["verify", "--only", "eq15", "--out", out]);
@@ -364,7 +398,8 @@ fn main() -> ExitCode {
             Ok(())
         })
     };
-    let trials = vec![
+    #[cfg_attr(not(target_os = "linux"), expect(unused_mut, reason = "two more trials on Linux"))]
+    let mut trials = vec![
         trial("an_input_is_never_replaced", an_input_is_never_replaced),
         trial("what_cannot_be_written_says_why_and_leaves_nothing", what_cannot_be_written_says_why_and_leaves_nothing),
         trial(
@@ -381,5 +416,16 @@ fn main() -> ExitCode {
             texts_of_a_suite_are_text_in_every_file_of_the_report,
         ),
     ];
+    #[cfg(target_os = "linux")]
+    trials.extend([
+        trial(
+            "a_pipe_and_a_broken_link_are_no_files_and_a_link_stays",
+            a_pipe_and_a_broken_link_are_no_files_and_a_link_stays,
+        ),
+        trial(
+            "a_standard_error_that_cannot_be_written_changes_no_exit_code",
+            a_standard_error_that_cannot_be_written_changes_no_exit_code,
+        ),
+    ]);
     libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
 }
