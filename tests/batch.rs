@@ -197,9 +197,34 @@ fn a_bad_row_says_what_is_wrong_and_the_others_are_answered() {
     let text = fs::read_to_string(folder.path().join("results.csv")).unwrap();
     let lines: Vec<&str> = text.lines().skip(1).collect();
     assert_eq!(lines[0][1..], lines[3][1..]);
-    assert_eq!(lines[1], "2,,,,,,,,,\"the nose factor N* = 1.72 is not admissible: it must be a number from 0 to 1\"");
+    assert_eq!(
+        lines[1],
+        "2,,,,,,,,,\"line 3: the nose factor N* = 1.72 is not admissible: it must be a number from 0 to 1\""
+    );
     assert_eq!(lines[2], "3,,,,,,,,,\"line 4: 2 cells in a table of 11 columns\"");
     assert_eq!(lines[4], "5,,,,,,,,,\"line 6: mass_kg: `2 kg` is not a number\"");
+}
+
+#[test]
+fn a_flight_stays_where_its_critical_velocity_fails_or_is_undecided() {
+    // Drag over 2 km takes all that a number can hold; over 40 m, what the closed form's margin can resolve.
+    let of_thickness = |thickness: &str| format!("2,0.05,0.72,36e6,2300,{thickness},,,,,300");
+    let folder = tempfile::tempdir().unwrap();
+    for (thickness, bad, undecided, cause) in [("2000", 1, 0, "no critical velocity"), ("40", 0, 1, "V_c is undecided")]
+    {
+        let scenes = format!("{HEADER}\n{}\n{}\n", of_thickness(""), of_thickness(thickness));
+        fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
+        let output = run(folder.path(), &["scenes.csv", "--out", "r.csv", "--critical", "--method", "closed-form"]);
+        let said = format!("2 rows: {bad} bad, {undecided} undecided\n");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), said);
+        assert_eq!(output.status.code(), Some(if bad > 0 { 3 } else { 0 }));
+        let text = fs::read_to_string(folder.path().join("r.csv")).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.splitn(10, ',').collect()).collect();
+        // The flight of the thick slab ends in it as in the semi-infinite target.
+        assert_eq!(rows[1][1..7], rows[0][1..7]);
+        assert_eq!((rows[0][8], rows[0][9], rows[1][8]), ("", "", ""));
+        assert!(rows[1][9].starts_with(&format!("\"line 3: {cause}")), "{}", rows[1][9]);
+    }
 }
 
 #[test]

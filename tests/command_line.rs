@@ -49,6 +49,24 @@ fn forrestal_shot_14_reaches_its_published_depth_with_events_in_order() {
 }
 
 #[test]
+fn a_table_to_audit_may_come_from_standard_input_and_the_scene_not_as_well() {
+    let table = "dt_s,depth_m\n1e-6,1.01\n2e-6,1.04\n4e-6,1.16\n8e-6,1.64\n";
+    let audit = |arguments: &[&str], input: &str| {
+        Command::cargo_bin("penetrode").unwrap().arg("audit").args(arguments).write_stdin(input).output().unwrap()
+    };
+    let passed = audit(&["-", "--order", "2"], table);
+    assert_eq!(code(&passed), 0, "{}", String::from_utf8_lossy(&passed.stderr));
+    assert!(String::from_utf8_lossy(&passed.stdout).starts_with("standard input\n"));
+    let said = |output: &Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let refused = audit(&["-"], "dt_s,depth_m\n1e-6\n");
+    assert_eq!(code(&refused), 2);
+    assert!(said(&refused).starts_with("error: standard input:2: 1 cell"), "{}", said(&refused));
+    let both = audit(&["-", "--scene", "-"], table);
+    assert_eq!(code(&both), 2);
+    assert!(said(&both).contains("cannot both come from standard input"), "{}", said(&both));
+}
+
+#[test]
 fn a_grazing_perforation_is_never_called_a_stop() {
     for method in adaptive_methods() {
         let answer = json(&["solve", &scene("graze"), "--method", method, "--json"]);

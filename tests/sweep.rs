@@ -159,10 +159,10 @@ fn requests_that_cannot_be_served_exit_2_and_write_nothing() {
 }
 
 #[test]
-fn a_table_that_cannot_be_written_is_exit_1() {
+fn a_table_without_a_folder_to_go_to_is_refused() {
     let (code, _, err) = run(&["sweep", SLAB, "--vary", "H/d=1:2:3", "--out", "no/such/folder/t.csv"]);
-    assert_eq!(code, 1);
-    assert!(err.contains("cannot write"), "{err}");
+    assert_eq!(code, 2);
+    assert!(err.contains("there is no folder"), "{err}");
 }
 
 #[test]

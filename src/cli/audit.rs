@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::input::table_bytes;
-use super::output::{escape_terminal, print_json, print_text, significant, table, table_lines, wrapped};
+use super::input::{input_name, table_bytes};
+use super::output::{escape_terminal, is_standard, print_json, print_text, significant, table, table_lines, wrapped};
 use super::{CliError, Exit, problem_of, read_scene};
 use crate::physics::Problem;
 use crate::studies::audit::{Audit, AuditError, ExactValues, Expectation, Table, Verdict, audit};
@@ -18,7 +18,7 @@ use crate::studies::quantity::Quantity;
 #[derive(Args, Debug)]
 pub struct AuditArgs {
     /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
-    /// critical_velocity_m_s.
+    /// critical_velocity_m_s; - for standard input.
     pub results: PathBuf,
     /// Scene whose exact answer the results must approach.
     #[arg(long)]
@@ -37,7 +37,13 @@ impl AuditArgs {
     /// # Errors
     /// A table or a scene that cannot be used (exit 2).
     pub fn run(&self) -> Result<Exit, CliError> {
-        let file = self.results.display().to_string();
+        if is_standard(&self.results) && self.scene.as_deref() == Some("-") {
+            return Err(CliError::usage(
+                "the results and the scene cannot both come from standard input",
+                "name a file for one",
+            ));
+        }
+        let file = input_name(&self.results);
         let bytes = table_bytes(&self.results, "name a CSV file with a column dt_s")?;
         let refuse = |error: AuditError| CliError::usage(error.to_string(), error.help());
         let results = Table::read(&file, &bytes).map_err(refuse)?;

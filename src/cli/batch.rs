@@ -17,7 +17,7 @@ use super::output::{check_format, check_outputs, is_standard, persist, tell, tem
 use super::{CliError, Exit};
 use crate::integrators::Method;
 use crate::studies::batch::csv::{CsvScenes, Records};
-use crate::studies::batch::{PART, Rows, TableError, Tally, answers, result_header, result_lines};
+use crate::studies::batch::{PART, Rows, TableError, Tally, result_header, result_lines};
 use crate::studies::table_text::counted;
 #[cfg(feature = "parquet")]
 use crate::studies::{
@@ -67,8 +67,10 @@ impl BatchArgs {
             .map_err(|error| CliError::Run { message: error.to_string(), help: String::new(), last: None })?;
         let progress = ProgressBar::no_length();
         let mut source = Source::open(&self.scenes, &progress)?;
+        // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
+        let rows = source.next_rows(None)?;
         let mut sink = Sink::create(&self.out).map_err(|cause| self.unwritable(cause))?;
-        let tally = match pool.install(|| self.fly_all(&mut source, &mut sink, &method)) {
+        let tally = match pool.install(|| self.fly_all(rows, &mut source, &mut sink, &method)) {
             // Whoever reads the results (`| head`) has enough.
             Err(CliError::Write { cause, .. }) if is_standard(&self.out) && cause.kind() == BrokenPipe => {
                 return Ok(Exit::Success);
@@ -81,12 +83,17 @@ impl BatchArgs {
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
 
-    /// Flies one chunk while the one before is written and the next is read.
-    fn fly_all(&self, source: &mut Source, sink: &mut Sink, method: &Method) -> Result<Tally, CliError> {
+    /// Flies one chunk, `rows` to begin with, while the one before is written and the next is read.
+    fn fly_all(
+        &self,
+        mut rows: Rows,
+        source: &mut Source,
+        sink: &mut Sink,
+        method: &Method,
+    ) -> Result<Tally, CliError> {
         keep_freed_memory();
         let mut tally = Tally::default();
         let format = sink.format();
-        let mut rows = source.next_rows(None)?;
         let mut flown = Flown::default();
         let mut used = None;
         // Ends with the table: each turn reads rows, or is the last but one.
@@ -162,8 +169,7 @@ impl Flown {
             .with_max_len(1)
             .map(|index| {
                 let from = index * PART;
-                let scenes = rows.scenes(from..count.min(from + PART));
-                let answers = answers(&scenes, method, critical);
+                let answers = rows.answers(from..count.min(from + PART), method, critical);
                 let mut tally = Tally::default();
                 tally.count(&answers);
                 let first = first + from as u64;

@@ -139,6 +139,9 @@ impl From<SensitivityError> for CliError {
             SensitivityError::Resolve(error) => error.into(),
             SensitivityError::Flight(error) => error.into(),
             SensitivityError::Parameter(error) => error.into(),
+            SensitivityError::NoInput => {
+                Self::usage(error.to_string(), "leave its spread out: V_c is sought whatever the impact velocity")
+            }
             SensitivityError::NoCritical(_) => {
                 Self::Run { message: error.to_string(), help: String::new(), last: None }
             }
@@ -161,7 +164,7 @@ impl CriticalArgs {
             .in_file(&self.scene));
         }
         let method = self.method.build()?;
-        let spreads: Vec<Spread> = self.spread.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+        let spreads = sensitivity::spreads(&self.spread)?;
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let exact = critical_velocity::exact(&scene).ok();
         if let Some(warning) = scene.exit_depth_warning() {

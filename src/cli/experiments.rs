@@ -16,7 +16,7 @@ use super::{CliError, Exit};
 use crate::report::figure::Figure;
 use crate::report::sweep_figures;
 use crate::studies::experiments::{self, Comparison, PredictionCause, PredictionError, SetSummary, Shot};
-use crate::studies::sensitivity::{Spread, SpreadError};
+use crate::studies::sensitivity::{self, SpreadError};
 
 /// Arguments of `experiments`.
 #[derive(Args, Debug)]
@@ -145,6 +145,7 @@ impl From<SpreadError> for CliError {
     fn from(error: SpreadError) -> Self {
         let help = match &error {
             SpreadError::Parameter(error) => error.help(),
+            SpreadError::Twice(_) => "leave one of the two out".to_owned(),
             _ => "write for example --spread target.strength=5%".to_owned(),
         };
         Self::Usage { message: error.to_string(), help }
@@ -169,7 +170,7 @@ impl ExperimentsArgs {
     /// # Errors
     /// Tables or options that cannot be used (exit 2), a file that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
-        let spreads: Vec<Spread> = self.spread.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+        let spreads = sensitivity::spreads(&self.spread)?;
         let is_table_printed = takes_standard_output(self.out.as_deref(), self.json)?;
         if let Some(path) = &self.out {
             let inputs: Vec<_> = self.tables.iter().map(|path| ("the measured table", path.as_path())).collect();

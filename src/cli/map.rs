@@ -11,6 +11,7 @@ use super::output::{
     write_all,
 };
 use super::{CliError, Exit};
+use crate::physics::Shown;
 use crate::report::sweep_figures;
 use crate::studies::applicability::{self, LEVELS, Line};
 use crate::studies::experiments::{self, MarkedScene};
@@ -99,7 +100,7 @@ impl MapArgs {
     /// A k that is no number above zero (exit 2), a file that cannot be written (exit 1).
     pub fn run(&self) -> Result<Exit, CliError> {
         if !(self.k.is_finite() && self.k > 0.0) {
-            return Err(CliError::usage(format!("--k {} is not allowed", self.k), "give a number above zero"));
+            return Err(CliError::usage(format!("--k {} is not allowed", Shown(self.k)), "give a number above zero"));
         }
         let is_table_printed = takes_standard_output(self.out.as_deref(), self.json)?;
         if let Some(path) = &self.out {
@@ -134,7 +135,7 @@ impl MapArgs {
 
     fn text(&self, report: &MapJson) -> String {
         let mut lines = vec![
-            format!("Error of Eq. 11-12 against the equation of motion, k = {}", self.k),
+            format!("Error of Eq. 11-12 against the equation of motion, k = {}", Shown(self.k)),
             "  least N for an error within".to_owned(),
         ];
         let mut rows = table(&["I", "1 %", "5 %", "20 %"]);

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::CliError;
 use crate::report::folder::TEMPORARY;
+use crate::studies::table_text::steers;
 
 /// Prints `value` as pretty JSON on standard output.
 ///
@@ -94,8 +95,8 @@ pub type Named<'a> = (&'static str, &'a Path);
 /// Refuses `outputs`, before any work is done, that would replace an input or one another, or have no folder to go to.
 ///
 /// # Errors
-/// A file that would be replaced, or that is none, such as a device (exit 2); a folder that is missing, or in the place
-/// of a file (exit 1).
+/// A file that would be replaced, or that is none, such as a device; a folder that is missing, or in the place of a file
+/// (exit 2).
 pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), CliError> {
     for (index, (what, path)) in outputs.iter().enumerate() {
         let others = inputs.iter().chain(&outputs[..index]);
@@ -109,20 +110,27 @@ pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), 
         if is_standard(path) {
             continue;
         }
-        if fs::symlink_metadata(path).is_ok()
-            && !fs::metadata(path).is_ok_and(|found| found.is_file() || found.is_dir())
-        {
-            let message = format!("{what} cannot go to {}: it is a device, a pipe or a broken link", path.display());
-            return Err(CliError::usage(message, "name a file, or - for standard output"));
+        if let Some((why, help)) = obstacle(path) {
+            return Err(CliError::usage(format!("{what} cannot go to {}: {why}", path.display()), help));
         }
-        let kind = match path.parent() {
-            _ if path.is_dir() => io::ErrorKind::IsADirectory,
-            Some(folder) if !(folder.as_os_str().is_empty() || folder.exists()) => io::ErrorKind::NotFound,
-            _ => continue,
-        };
-        return Err(CliError::write(path, kind.into()));
     }
     Ok(())
+}
+
+/// Why no file can be written at `path`, as far as can be told before trying, and what to do.
+fn obstacle(path: &Path) -> Option<(String, &'static str)> {
+    if path.is_dir() {
+        return Some(("it is a folder".to_owned(), "name a file in it"));
+    }
+    if fs::symlink_metadata(path).is_ok() && !path.is_file() {
+        return Some(("it is a device, a pipe or a broken link".to_owned(), "name a file, or - for standard output"));
+    }
+    let folder = path.parent().filter(|folder| !(folder.as_os_str().is_empty() || folder.is_dir()))?;
+    Some(if folder.exists() {
+        (format!("{} is a file", folder.display()), "name a folder")
+    } else {
+        (format!("there is no folder {}", folder.display()), "make the folder first, or name another")
+    })
 }
 
 /// Whether the table named `out` takes standard output, where nothing else is printed then.
@@ -238,9 +246,6 @@ pub fn check_format(path: &Path) -> Result<(), CliError> {
 
 /// Characters of a text from a file that steer a terminal, made visible: a title must not drive it, nor turn its lines.
 pub fn escape_terminal(text: &str) -> String {
-    let steers = |c: char| {
-        c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
-    };
     text.chars().map(|c| if steers(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 

@@ -313,6 +313,23 @@ impl CentralDifference {
     }
 }
 
+/// Whether `time` [s] is less than a thousandth of what any flight lasts: told after the first steps and not after a
+/// hundred million, which take half a minute where their changes of depth are numbers of less than 53 bits.
+///
+/// While every stage only resists, `x <= V0 t` and `V >= V0 - t F_max/M`, `F_max` the largest force up to that depth at
+/// V0: neither the exit is reached nor rest.
+fn cannot_end<S: Scalar>(problem: &Problem<S>, time: f64) -> bool {
+    let (mass, speed, time) = (problem.mass.value(), problem.impact_speed.value(), 1e3 * time);
+    let reach = speed * time;
+    let mut met =
+        (0..problem.stages.len()).filter(|&i| problem.start_of(i).value() <= reach).map(|i| &problem.stages[i]);
+    let stays_in_flight = |law: &Stage<S>| {
+        let force = law.force(S::from_f64(reach), problem.impact_speed).value();
+        law.static_force.value() >= 0.0 && time * force < mass * speed
+    };
+    reach < problem.exit_depth.value() && met.all(stays_in_flight)
+}
+
 /// The default time step [s], from the coefficients of the stages and the impact speed alone.
 ///
 /// A thousandth of the shortest time scale among the stages that start before the exit: `sqrt(M/s)` (half of 2/w),
@@ -974,6 +991,7 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
         self.record_node();
         // Steps up to the last change of x or V.
         let mut moved = 0;
+        let mut is_hope_weighed = false;
         loop {
             self.refuse_endless()?;
             let left = self.scheme.options.max_steps - self.scheme.cost.steps;
@@ -1008,6 +1026,15 @@ impl<S: Scalar, A: Sum<S>, C: Clock<S>, R: Rule> Log<'_, S, A, C, R> {
             if self.scheme.cost.steps - moved >= STUCK_STEPS {
                 let why = "a step no longer changes depth or velocity, which only approach their limits";
                 return Err(IntegrationError::NeverEnds { why, last: after.values() });
+            }
+            if !is_hope_weighed && self.scheme.cost.steps >= STUCK_STEPS {
+                is_hope_weighed = true;
+                let max_steps = self.scheme.options.max_steps;
+                if let Steps::Uniform(step) = self.scheme.options.steps
+                    && cannot_end(problem, step * max_steps as f64)
+                {
+                    return Err(IntegrationError::StepBudgetSpent { max_steps, last: after.values() });
+                }
             }
         }
     }
@@ -1901,6 +1928,27 @@ pub(crate) mod tests {
             let error = scheme(1e-3, velocity, Boundaries::Landed).fly(&dashpot, Detail::End).unwrap_err();
             assert!(matches!(error, IntegrationError::NeverEnds { .. }), "{velocity}: {error}");
         }
+    }
+
+    #[test]
+    fn a_step_that_no_budget_suffices_for_is_refused_after_the_first_steps() {
+        let semi_infinite = concrete(DRAG, 1.0, SPEED, f64::INFINITY);
+        for problem in [semi_infinite.clone(), Problem { exit_depth: 0.05, ..semi_infinite.clone() }] {
+            // The flight lasts 8e-4 s, or 2e-4 s, and a hundred million such steps a ten-thousandth of it at most.
+            for step in [1e-16, 1e-300, f64::from_bits(10)] {
+                for velocity in VELOCITIES {
+                    let error = scheme(step, velocity, Boundaries::StepEnd).fly(&problem, Detail::End).unwrap_err();
+                    let IntegrationError::StepBudgetSpent { last, .. } = error else { unreachable!("{error}") };
+                    assert!(last.time < 1.1e6 * step && last.velocity > 0.99 * SPEED, "{last}");
+                }
+            }
+        }
+        // No time of the flight is too short where it ends, and none is known where the first stage drives.
+        assert!(!cannot_end(&semi_infinite, 8.3e-7) && cannot_end(&semi_infinite, 2e-7));
+        assert!(!cannot_end(&Problem { exit_depth: 5e-8, ..semi_infinite.clone() }, 2e-13));
+        let mut driven = semi_infinite;
+        driven.stages[0].static_force = -1e-300;
+        assert!(!cannot_end(&driven, 1e-300));
     }
 
     #[test]

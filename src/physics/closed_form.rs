@@ -1081,12 +1081,14 @@ mod tests {
         ended
     }
 
+    /// Springs and dashpots about critical damping, where differences of rates vanish, pushed and pulled, from hardly
+    /// any speed to much; left close before and behind rest, where the speed is none for Newton's method to divide by.
     #[test]
     fn oscillators_about_critical_damping_are_within_8_ulp_times_condition_of_50_digits() {
         let mut dice = Dice(6);
         let mut problems = Vec::new();
         for off in [0.0, 1e-12, -1e-12, 1e-8, 1e-5, -1e-5, 1e-3, -1e-3, 2e-2, 0.1] {
-            for _ in 0..15 + CASES / 200 {
+            for _ in 0..CASES / 50 {
                 // The frequency a whole number and M = 1: critical damping is met exactly.
                 let w = dice.log(1.0, 10.0).floor();
                 let speed = dice.log(1e-6, 1e2);

@@ -37,6 +37,9 @@ pub const ORDER_MIN: f64 = 0.1;
 /// Largest order to compare with: beyond it four steps do not fit between an error of one and round-off.
 pub const ORDER_MAX: f64 = 32.0;
 
+/// Rows of a table at most: each costs some tens of microseconds, and an order is as sure with a hundred.
+pub const ROWS_MAX: usize = 10_000;
+
 /// Where in the file something stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -120,6 +123,18 @@ pub enum AuditError {
         /// Cells expected.
         expected: usize,
     },
+    /// A quote that is not closed in its line, and so swallows the lines behind it.
+    #[error("{place}: a quote is opened and not closed in this line")]
+    OpenQuote {
+        /// Where.
+        place: Place,
+    },
+    /// More rows than any study of step sizes has.
+    #[error("{place}: more than {ROWS_MAX} rows")]
+    TooManyRows {
+        /// Where the first of the others stands.
+        place: Place,
+    },
     /// A cell that is no number.
     #[error("{place}: {}", no_number(.text, .name))]
     NotANumber {
@@ -175,8 +190,6 @@ fn no_number(text: &str, name: &str) -> String {
     let name = shortened(name);
     if text.is_empty() {
         format!("the cell in `{name}` is empty")
-    } else if text.contains('\n') {
-        format!("a quote in `{name}` is opened and not closed in this line")
     } else {
         format!("`{}` in `{name}` is not a number", shortened(text))
     }
@@ -204,7 +217,8 @@ impl AuditError {
             }
             Self::ColumnTwice { .. } => "remove one of the two".to_owned(),
             Self::Ragged { .. } => "complete the row, or remove it".to_owned(),
-            Self::NotANumber { text, .. } if text.contains('\n') => "close the quote, or remove it".to_owned(),
+            Self::OpenQuote { .. } => "close the quote, or remove it".to_owned(),
+            Self::TooManyRows { .. } => "an order needs tens of steps, not thousands: keep every tenth row".to_owned(),
             Self::NotANumber { text, .. } if text.is_empty() => {
                 "fill the cell, or remove the row or the column: a missing result is no result".to_owned()
             }
@@ -303,7 +317,8 @@ impl Table {
     ///
     /// # Errors
     /// [`AuditError`] with the place: every cell must be a number (`nan` and `inf` are read, and fail later), every row
-    /// complete, every name known and there once, every step positive, with one value, and four of them different.
+    /// complete, every name known and there once, every step positive, with one value, and four of them different; of
+    /// [`ROWS_MAX`] rows at most.
     pub fn read(file: &str, bytes: &[u8]) -> Result<Self, AuditError> {
         let place = |line, column| Place { file: file.to_owned(), line, column };
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
@@ -327,6 +342,13 @@ impl Table {
             })?;
             if !is_read {
                 break;
+            }
+            if record.iter().any(|cell| cell.contains('\n')) {
+                return Err(AuditError::OpenQuote { place: place(line, 0) });
+            }
+            // The first is the header.
+            if records.len() > ROWS_MAX {
+                return Err(AuditError::TooManyRows { place: place(line, 0) });
             }
             records.push((line, record.clone()));
         }
@@ -435,8 +457,14 @@ impl Table {
     }
 }
 
+/// Lines by their numbers, ten of them at most.
 fn lines(lines: &[String]) -> String {
-    if lines.len() == 1 { format!("line {}", lines[0]) } else { format!("each of lines {}", lines.join(", ")) }
+    let named = lines[..lines.len().min(10)].join(", ");
+    match lines.len() {
+        1 => format!("line {named}"),
+        2..=10 => format!("each of lines {named}"),
+        count => format!("each of lines {named} and {} more", count - 10),
+    }
 }
 
 /// The quantity of each column, `None` for the one of steps.
@@ -906,6 +934,22 @@ mod tests {
 
     fn kinds(audit: &Audit) -> Vec<FindingKind> {
         audit.findings.iter().map(|finding| finding.kind).collect()
+    }
+
+    #[test]
+    fn more_rows_than_any_study_has_are_refused_at_the_first_of_them() {
+        let rows = |count: usize| (1..=count).fold("dt_s,depth_m\n".to_owned(), |text, i| format!("{text}{i}e-9,1\n"));
+        assert!(Table::read("run.csv", rows(ROWS_MAX).as_bytes()).is_ok());
+        assert_eq!(refused(&rows(ROWS_MAX + 1)).to_string(), "run.csv:10002: more than 10000 rows");
+    }
+
+    #[test]
+    fn merged_lines_are_named_up_to_ten() {
+        let repeated = |count: usize| format!("dt_s,depth_m\n{BASE}{}", "1e-6,1.01\n".repeat(count));
+        let message = |count| Table::read("run.csv", repeated(count).as_bytes()).unwrap().findings[1].message.clone();
+        assert_eq!(message(1), "line 6 repeated another row and was merged with it");
+        assert!(message(10).starts_with("each of lines 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 repeated"));
+        assert!(message(11).starts_with("each of lines 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 and 1 more repeated"));
     }
 
     const BASE: &str = "1e-6,1.01\n2e-6,1.04\n4e-6,1.16\n8e-6,1.64\n";

@@ -14,9 +14,9 @@ use thiserror::Error;
 
 use super::audit::Place;
 use super::columns::{Cells, Kind};
-use super::critical_velocity;
+use super::critical_velocity::{self, CriticalError};
 use super::random_scenes::Generator;
-use super::table_text::shortened;
+use super::table_text::{shortened, steers};
 use crate::integrators::batch::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, Taylor, keeping};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene};
@@ -314,6 +314,30 @@ impl Rows {
         self.len() == 0
     }
 
+    /// Where row `index` stands in its table, for messages; a random scene stands in none.
+    fn place(&self, index: usize) -> Option<String> {
+        match self {
+            Self::Csv(records) => Some(format!("line {}", records.line(index))),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => Some(format!("row {}", columns.row(index))),
+            Self::Random { .. } => None,
+        }
+    }
+
+    /// What the rows `part` are answered, as by [`answers`]; messages name the row's place in its table.
+    ///
+    /// `part` begins at a multiple of [`PART`] and is no longer than that.
+    pub fn answers(&self, part: Range<usize>, method: &Method, with_critical: bool) -> Vec<Result<Answer, String>> {
+        let mut answers = answers(&self.scenes(part.clone()), method, with_critical);
+        for (index, answer) in part.zip(&mut answers) {
+            let (Err(message) | Ok(Answer { critical: Some(Err(Gap { message, .. })), .. })) = answer else { continue };
+            if let Some(place) = self.place(index) {
+                message.insert_str(0, &format!("{place}: "));
+            }
+        }
+        answers
+    }
+
     /// The scenes of `part`, which begins at a multiple of [`PART`] and is no longer than that.
     pub fn scenes(&self, part: Range<usize>) -> Vec<Result<Scene, String>> {
         match self {
@@ -339,10 +363,19 @@ pub fn random_rows(seed: u64, part: u64) -> impl Iterator<Item = Scene> {
 pub struct Answer {
     /// The flight.
     pub flight: Summary,
-    /// Critical velocity [m/s], where it was asked for and the target has a thickness.
-    pub critical_velocity: Option<f64>,
+    /// Critical velocity [m/s], where it was asked for and the target has a thickness, or why there is none.
+    pub critical: Option<Result<f64, Gap>>,
     /// Whether a fixed step kept its limit; true for every other method.
     pub stable: bool,
+}
+
+/// Why a critical velocity is missing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// The cause.
+    pub message: String,
+    /// Whether it lies within its error bar, and nothing failed.
+    pub is_undecided: bool,
 }
 
 impl Answer {
@@ -356,8 +389,21 @@ impl Answer {
             crater_end.map(|s| s.time),
             crater_end.map(|s| s.velocity),
             exit_margin,
-            self.critical_velocity,
+            self.critical.as_ref().and_then(|critical| critical.as_ref().ok()).copied(),
         ]
+    }
+
+    /// Why its critical velocity is missing, if that was asked for.
+    fn gap(&self) -> Option<&Gap> {
+        self.critical.as_ref()?.as_ref().err()
+    }
+}
+
+/// The message of an answer: why it is none, or what it lacks.
+fn message(answer: &Result<Answer, String>) -> Option<&str> {
+    match answer {
+        Ok(answer) => answer.gap().map(|gap| gap.message.as_str()),
+        Err(message) => Some(message),
     }
 }
 
@@ -375,7 +421,7 @@ pub fn answers(scenes: &[Result<Scene, String>], method: &Method, with_critical:
             Err(cause) => Some(cause.clone()),
         })
         .collect();
-    let answer = |flight, stable| Answer { flight, critical_velocity: None, stable };
+    let answer = |flight, stable| Answer { flight, critical: None, stable };
     let flown: Vec<Result<Answer, IntegrationError>> = match method {
         Method::Taylor(taylor) if *taylor == Taylor::default() => {
             Batch::new().fly(&problems).into_iter().map(|flight| Ok(answer(flight?, true))).collect()
@@ -398,12 +444,13 @@ pub fn answers(scenes: &[Result<Scene, String>], method: &Method, with_critical:
         .collect();
     if with_critical {
         for (answer, scene) in answers.iter_mut().zip(scenes) {
-            let (Ok(found), Ok(scene)) = (&mut *answer, scene) else { continue };
+            let (Ok(found), Ok(scene)) = (answer, scene) else { continue };
             if scene.thickness.is_some() {
-                match critical_velocity::of_scene(scene, method.integrator()) {
-                    Ok(critical) => found.critical_velocity = Some(critical.velocity),
-                    Err(error) => *answer = Err(error.to_string()),
-                }
+                let critical = critical_velocity::of_scene(scene, method.integrator());
+                found.critical = Some(critical.map(|critical| critical.velocity).map_err(|error| Gap {
+                    message: error.to_string(),
+                    is_undecided: matches!(error, CriticalError::Undecided { .. }),
+                }));
             }
         }
     }
@@ -415,9 +462,9 @@ pub fn answers(scenes: &[Result<Scene, String>], method: &Method, with_critical:
 pub struct Tally {
     /// All rows.
     pub rows: u64,
-    /// With a message in `error`.
+    /// Without a flight, or without the critical velocity that was asked for.
     pub bad: u64,
-    /// With the outcome `undecided`.
+    /// With the outcome or the critical velocity undecided.
     pub undecided: u64,
     /// Flown with a step beyond the limit of the scheme.
     pub unstable: u64,
@@ -428,12 +475,16 @@ impl Tally {
     pub fn count(&mut self, answers: &[Result<Answer, String>]) {
         for answer in answers {
             self.rows += 1;
-            match answer {
-                Ok(answer) => {
-                    self.undecided += u64::from(answer.flight.outcome == Outcome::Undecided);
-                    self.unstable += u64::from(!answer.stable);
+            let Ok(answer) = answer else {
+                self.bad += 1;
+                continue;
+            };
+            self.unstable += u64::from(!answer.stable);
+            match answer.gap() {
+                Some(gap) if !gap.is_undecided => self.bad += 1,
+                gap => {
+                    self.undecided += u64::from(gap.is_some() || answer.flight.outcome == Outcome::Undecided);
                 }
-                Err(_) => self.bad += 1,
             }
         }
     }
@@ -463,14 +514,15 @@ pub fn result_lines(first: u64, answers: &[Result<Answer, String>]) -> String {
                         push_number(&mut text, value);
                     }
                 }
-                text.push_str(",\n");
             }
-            Err(message) => {
-                text.push_str(",,,,,,,,");
-                push_quoted(&mut text, message);
-                text.push('\n');
-            }
+            // No outcome and no number.
+            Err(_) => text.push_str(",,,,,,,"),
         }
+        text.push(',');
+        if let Some(message) = message(answer) {
+            push_quoted(&mut text, message);
+        }
+        text.push('\n');
     }
     text
 }
@@ -487,7 +539,7 @@ pub fn result_columns(first: u64, answers: &[Result<Answer, String>]) -> Vec<Cel
         for (column, number) in numbers.iter_mut().zip(row) {
             column.push(number);
         }
-        errors.push(answer.as_ref().err().map(|message| message.chars().map(printable).collect()));
+        errors.push(message(answer).map(|message| message.chars().map(printable).collect()));
     }
     let rows = Cells::Counts((first..).take(answers.len()).collect());
     let mut columns = vec![rows, Cells::Texts(outcomes)];
@@ -510,7 +562,7 @@ fn push_number(text: &mut String, value: f64) {
 
 /// A character as a message in a table may have it: messages are one line.
 fn printable(c: char) -> char {
-    if c.is_control() { ' ' } else { c }
+    if steers(c) { ' ' } else { c }
 }
 
 /// A message as one CSV cell.
@@ -547,7 +599,7 @@ mod tests {
         let method = Method::Taylor(Taylor::default());
         let answer = answers(&[Ok(scene)], &method, true).remove(0).unwrap();
         assert!((answer.flight.end.depth - 0.144_826_200_112_217_07).abs() < 1e-15);
-        assert_eq!(answer.critical_velocity, None);
+        assert_eq!(answer.critical, None);
         row.numbers[0] = Some(-2.0);
         assert!(answers(&[row.scene()], &method, false)[0].as_ref().unwrap_err().contains("mass"));
         row.numbers[10] = None;
@@ -576,7 +628,7 @@ mod tests {
 
     #[test]
     fn a_message_is_one_cell_whatever_it_quotes() {
-        assert_eq!(result_lines(3, &[Err("a \"b\"\nc".to_owned())]), "3,,,,,,,,,\"a \"\"b\"\" c\"\n");
+        assert_eq!(result_lines(3, &[Err("a \"b\"\nc\u{202e}".to_owned())]), "3,,,,,,,,,\"a \"\"b\"\" c \"\n");
     }
 
     #[test]

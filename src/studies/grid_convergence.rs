@@ -465,7 +465,7 @@ pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergen
     let [low, high] = interval95;
     let p = best.order;
     let (behaviour, reason) = if model.range() <= 4.0 * table.iter().fold(0.0, |m, grid| grid.round_off.max(m)) {
-        (Behaviour::Constant, "the values agree within their rounding".to_owned())
+        (Behaviour::Constant, "the values agree within two units of their last digit".to_owned())
     } else if model.alternates() {
         if model.differences_shrink() {
             (Behaviour::OscillatingConverging, "the values alternate, with falling amplitude".to_owned())

@@ -64,15 +64,16 @@ impl Columns {
         self.count == 0
     }
 
+    /// Number of row `index` in its table, from 1.
+    pub fn row(&self, index: usize) -> u64 {
+        self.first + index as u64
+    }
+
     /// The scene of row `index`, from 0.
     ///
     /// # Errors
-    /// What is wrong, with the row and the column.
+    /// What is wrong, with the column.
     pub fn scene(&self, index: usize) -> Result<Scene, String> {
-        self.read(index).map_err(|cause| format!("row {}: {cause}", self.first + index as u64))
-    }
-
-    fn read(&self, index: usize) -> Result<Scene, String> {
         let mut row = Row::default();
         for ((number, column), name) in row.numbers.iter_mut().zip(&self.numbers).zip(COLUMNS) {
             *number = column.get(index).copied().flatten();

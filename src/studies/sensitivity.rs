@@ -93,6 +93,9 @@ pub enum SensitivityError {
     /// No critical velocity to be sure of.
     #[error("there is no critical velocity: {0}")]
     NoCritical(String),
+    /// A spread of the impact velocity, in place of which V_c is sought.
+    #[error("V_c does not depend on `{}`", Parameter::Velocity)]
+    NoInput,
 }
 
 /// The problem of `scene` at `speed` [m/s] in any number type; `number` lifts a number of the scene into it.
@@ -568,6 +571,25 @@ pub enum SpreadError {
     /// A group, which is no input.
     #[error("`{0}` is a group of inputs: give the spreads of the numbers themselves")]
     Group(Parameter),
+    /// A number twice: which of the two is meant nobody can tell.
+    #[error("`{0}` has two spreads")]
+    Twice(Parameter),
+}
+
+/// Reads `texts` as spreads of different numbers.
+///
+/// # Errors
+/// [`SpreadError`].
+pub fn spreads(texts: &[String]) -> Result<Vec<Spread>, SpreadError> {
+    let mut all: Vec<Spread> = Vec::with_capacity(texts.len());
+    for text in texts {
+        let spread: Spread = text.parse()?;
+        if all.iter().any(|earlier| earlier.parameter == spread.parameter) {
+            return Err(SpreadError::Twice(spread.parameter));
+        }
+        all.push(spread);
+    }
+    Ok(all)
 }
 
 impl std::str::FromStr for Spread {
@@ -623,13 +645,17 @@ const CHUNK: usize = 4096;
 /// method. The same seed gives the same numbers on any number of threads.
 ///
 /// # Errors
-/// [`SensitivityError`]: no critical velocity, a number that the scene lacks, or no admissible sample at all.
+/// [`SensitivityError`]: no critical velocity, a number that the scene lacks or that V_c does not depend on, or no
+/// admissible sample at all.
 pub fn uncertainty(
     scene: &Scene,
     spreads: &[Spread],
     samples: usize,
     seed: u64,
 ) -> Result<Uncertainty, SensitivityError> {
+    if spreads.iter().any(|spread| spread.parameter == Parameter::Velocity) {
+        return Err(SensitivityError::NoInput);
+    }
     // Titles and velocities have no part in V_c, and a clone without a title allocates nothing.
     let base = Scene { title: None, velocity: None, ..scene.clone() };
     let mut spreads: Vec<(usize, Spread)> = spreads.iter().copied().enumerate().collect();
@@ -879,6 +905,16 @@ mod tests {
         let flown = by_taylor(&scene).unwrap();
         assert!(flown.entries.iter().any(|e| e.depth.is_some_and(|d| d < 0.0)));
         assert_eq!(exact.disagreement(&flown), None);
+    }
+
+    #[test]
+    fn a_spread_is_of_an_input_of_v_c_and_there_once() {
+        let texts = |all: &[&str]| spreads(&all.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>());
+        let twice = texts(&["target.strength=2%", "projectile.mass=1%", "target.strength=0.02"]);
+        assert_eq!(twice, Err(SpreadError::Twice(Parameter::Strength)));
+        let two = texts(&["target.strength=2%", "impact.velocity=1%"]).unwrap();
+        assert_eq!(uncertainty(&shipped("paper-slab"), &two, 10, 1), Err(SensitivityError::NoInput));
+        assert!(uncertainty(&shipped("paper-slab"), &two[..1], 10, 1).is_ok());
     }
 
     #[test]

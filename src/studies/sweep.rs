@@ -49,6 +49,14 @@ pub enum SweepError {
     /// A parameter or a value.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
+    /// One end with a unit and one without: a bare number is SI, which is hardly meant.
+    #[error("`{from}:{to}` has one unit and needs two")]
+    OneUnit {
+        /// Text of the first value.
+        from: String,
+        /// Text of the last value.
+        to: String,
+    },
     /// A number of values that no two ends have.
     #[error("`{text}` is no number of values: two or more, or one where both ends are equal")]
     Count {
@@ -86,6 +94,7 @@ impl SweepError {
             Self::Parameter(error) => error.help(),
             Self::Twice { .. } => "vary one of them".to_owned(),
             Self::TooMany { .. } => "take fewer values".to_owned(),
+            Self::OneUnit { .. } => "give both ends a unit, or neither for SI".to_owned(),
             _ => "write for example H/d=0.5:18:200 or target.strength=20MPa:60MPa:5:log".to_owned(),
         }
     }
@@ -104,7 +113,14 @@ impl std::str::FromStr for Axis {
             [from, to, count, "log"] => (from, to, count, true),
             _ => return Err(form()),
         };
+        let texts = [from, to];
         let (from, to) = (parameter.parse_value(from)?, parameter.parse_value(to)?);
+        let [from_is_bare, to_is_bare] = texts.map(|text| number(text.trim()).is_ok());
+        // Zero is zero in every unit.
+        if from_is_bare != to_is_bare && from != 0.0 && to != 0.0 {
+            let [from, to] = texts.map(str::to_owned);
+            return Err(SweepError::OneUnit { from, to });
+        }
         let bad_count = || SweepError::Count { text: count.to_owned() };
         let count: usize = count.trim().parse().map_err(|_| bad_count())?;
         if count == 0 || (count == 1 && from != to) {
@@ -496,6 +512,12 @@ mod tests {
             assert!(matches!(text.parse::<Axis>(), Err(SweepError::Count { .. })), "{text}");
         }
         assert!(matches!("N=0:2:3:log".parse::<Axis>(), Err(SweepError::Logarithm { .. })));
+        for text in ["target.strength=20MPa:60:3", "target.strength=20e6:60 MPa:3"] {
+            assert!(matches!(text.parse::<Axis>(), Err(SweepError::OneUnit { .. })), "{text}");
+        }
+        for text in ["target.thickness=0:60mm:3", "target.thickness=60 mm:0:3", "target.strength=20e6:60e6:3"] {
+            assert!(text.parse::<Axis>().is_ok(), "{text}");
+        }
         assert!(matches!("H/d=1:2:99999999999".parse::<Axis>(), Err(SweepError::TooMany { .. })));
         let axis = |text: &str| text.parse::<Axis>().unwrap();
         let refused = Plan::new(slab(), &[axis("H/d=1:2:3"), axis("target.thickness=1:2:3")]);

@@ -79,14 +79,19 @@ pub fn line_of<R: Read>(reader: &Reader<R>, cells: &[u8]) -> u64 {
     reader.position().line().saturating_sub(breaks + u64::from(!is_cut_short)).max(1)
 }
 
-/// A text from a table as a message may quote it: one line, no control characters, forty characters.
+/// A text from a table as a message may quote it: one line, nothing that steers a terminal, forty characters.
 pub fn shortened(text: &str) -> String {
     let mut short: String =
-        text.chars().take(40).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
+        text.chars().take(40).map(|c| if steers(c) { char::REPLACEMENT_CHARACTER } else { c }).collect();
     if text.chars().count() > 40 {
         short.push('…');
     }
     short
+}
+
+/// Whether `c` drives a terminal, ends a line or turns its direction.
+pub fn steers(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
 }
 
 /// `1 cell`, `2 cells`.

@@ -42,16 +42,17 @@ impl Records {
         self.count == 0
     }
 
+    /// Line of record `index`, from 1.
+    pub fn line(&self, index: usize) -> u64 {
+        self.lines[index]
+    }
+
     /// The scene of record `index`, from 0.
     ///
     /// # Errors
-    /// What is wrong, with the line and the column.
+    /// What is wrong, with the column.
     pub fn scene(&self, index: usize) -> Result<Scene, String> {
         let record = &self.records[index];
-        self.read(record).map_err(|cause| format!("line {}: {cause}", self.lines[index]))
-    }
-
-    fn read(&self, record: &ByteRecord) -> Result<Scene, String> {
         if record.len() != self.layout.width {
             let (found, expected) = (record.len() as u64, self.layout.width as u64);
             return Err(format!("{} in a table of {}", counted(found, "cell"), counted(expected, "column")));
@@ -204,7 +205,8 @@ mod tests {
             if records.is_empty() {
                 return Ok(all);
             }
-            all.extend((0..records.len()).map(|index| records.scene(index)));
+            let placed = |index| records.scene(index).map_err(|cause| format!("line {}: {cause}", records.line(index)));
+            all.extend((0..records.len()).map(placed));
             used = Some(records);
         }
     }

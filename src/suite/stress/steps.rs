@@ -7,7 +7,7 @@ use crate::integrators::{
 };
 use crate::physics::{Outcome, Problem, Scene, Stage};
 use crate::studies::extreme_scenes::exceeds;
-use crate::studies::order::{Class, StepError, fit};
+use crate::studies::order::{OrderVerdict, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 use crate::studies::random_scenes::closed_form_errors_at_inputs;
@@ -339,10 +339,11 @@ fn orders_by_rule(subject: Subject) -> Result<Measurement, NotMeasured> {
             for boundaries in [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed] {
                 for quantity in [Quantity::Depth, Quantity::Time] {
                     let Some(formal) = formal_order(velocity, boundaries, &path, quantity) else { continue };
-                    let sizes = random_steps(subject.seed, "S7", &problem, 3e-5, 1e-2, 60)?;
+                    // Above 3e-3 the next power still bends the depth of a lagged drag: 26 of 202 seeds missed the order.
+                    // Over 1,002 seeds these 90 steps bear out each order.
+                    let sizes = random_steps(subject.seed, "S7", &problem, 3e-5, 3e-3, 90)?;
                     let (order, fit) = fitted(&problem, (velocity, boundaries), quantity, &sizes)?;
-                    let holds = fit.line.is_some_and(|l| l.verdict_band[0] <= formal && formal <= l.verdict_band[1]);
-                    seen.expect(holds && fit.class == Class::Converging, || {
+                    seen.expect(fit.verdict(formal) == OrderVerdict::Pass, || {
                         format!("{velocity}, {boundaries}, {quantity}: {order:.2} of {formal}, {}", fit.reason)
                     });
                 }
@@ -461,4 +462,20 @@ fn viscous_driven(subject: Subject) -> Result<Measurement, NotMeasured> {
         ordinate: "force evaluations",
         points,
     }))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a case that cannot be measured has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_by_rule_are_borne_out_whatever_the_seed() {
+        let case = CASES.iter().find(|case| case.id == "S7").unwrap();
+        // The last two once fell on steps outside the asymptotic range.
+        for seed in [1, 2, 3, 4, u64::MAX - 1, u64::MAX] {
+            let measured = (case.measure)(Subject { method: None, seed }).unwrap();
+            assert!(measured.value <= case.limit, "seed {seed}: {}", measured.remark);
+        }
+    }
 }
