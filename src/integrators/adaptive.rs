@@ -281,6 +281,23 @@ mod tests {
     }
 
     #[test]
+    fn the_way_counts_from_where_the_stage_is_entered_and_the_limit_itself_is_explicit() {
+        // Terminal velocity 1 m/s, rate 128/s: Z = 128 way - 1, which is 200 for a way of 201/128 m behind 1 m.
+        let exit_depth: f64 = 1.0 + 201.0 / 128.0;
+        for (exit_depth, scheme, words) in [
+            (exit_depth, EXPLICIT, "tsit45: it drives but is not stiff"),
+            (exit_depth.next_up(), IMPLICIT, "bdf: it drives and is stiff"),
+        ] {
+            let problem = of_stages(1.0, exit_depth, &[stage(-128.0, 0.0, 128.0, 0.0, f64::INFINITY)]);
+            let choice = Choice::of(&problem, 0, 1.0, 1.0);
+            assert_eq!(choice.scheme, scheme);
+            assert!((choice.stiffness.unwrap() - STIFFNESS_LIMIT).abs() < 1e-12, "{choice:?}");
+            let told = choice.explain(3);
+            assert!(told.starts_with(&format!("stage 3 by {words}, with 2.000e2 relaxation times")), "{told}");
+        }
+    }
+
+    #[test]
     fn kept_it_flies_as_it_does_alone() {
         let method = Adaptive::new(1e-6);
         let mut kept_once = 0;
