@@ -265,9 +265,9 @@ fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
     let Some(text) = path.to_str().and_then(|text| text.strip_prefix("random:")) else { return Ok(None) };
     let (count, seed) = text.split_once(':').unwrap_or((text, "1"));
     match (count.parse(), seed.parse()) {
-        (Ok(count), Ok(seed)) => Ok(Some((count, seed))),
+        (Ok(count), Ok(seed)) if count > 0 => Ok(Some((count, seed))),
         _ => Err(CliError::usage(
-            format!("random:{text}: not a number of scenes and a seed"),
+            format!("random:{text}: not a number of scenes above zero and a seed"),
             "write random:1000000:7 for a million scenes of seed 7",
         )),
     }
@@ -350,6 +350,8 @@ mod tests {
         assert_eq!(random_table(Path::new("random:1000:7")).unwrap(), Some((1000, 7)));
         assert_eq!(random_table(Path::new("random:1000")).unwrap(), Some((1000, 1)));
         assert_eq!(random_table(Path::new("scenes.csv")).unwrap(), None);
-        assert_eq!(random_table(Path::new("random:many")).unwrap_err().exit(), Exit::Usage);
+        for text in ["random:many", "random:0", "random:1:x"] {
+            assert_eq!(random_table(Path::new(text)).unwrap_err().exit(), Exit::Usage);
+        }
     }
 }

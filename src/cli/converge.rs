@@ -117,6 +117,13 @@ impl ConvergeArgs {
             return Err(CliError::usage("only central-difference has a fixed step", "leave out --dt"));
         }
         let yardstick = Yardstick::of(&problem)?;
+        if yardstick.flight.end.time <= 0.0 {
+            return Err(CliError::usage(
+                "the flight takes no time, and has no order of convergence",
+                "give it a velocity and a target",
+            )
+            .in_file(&self.scene));
+        }
         let studies = if fixed {
             let [from, to] = self.steps(yardstick.flight.end.time)?;
             of_fixed_steps(

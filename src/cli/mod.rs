@@ -120,12 +120,14 @@ impl<E: std::fmt::Display> From<CriticalError<E>> for CliError {
         let (help, last) = match &error {
             CriticalError::Flight { cause, .. } => (cause.help().to_owned(), cause.last()),
             CriticalError::Undecided { .. } => {
-                let help = "the drag leaves less of V0² than its round-off: --method taylor or energy resolves more"
-                    .to_owned();
+                let help =
+                    "--method taylor or energy, or a tighter --rtol, resolves more of what is left of V0²".to_owned();
                 return Self::Undecided { message, help };
             }
             CriticalError::NoBracket { .. } => (
-                "the drag over the thickness is too large: check the thickness, the density and the mass".to_owned(),
+                "drag takes all speed over the thickness: check the thickness, the density and the mass; with a fixed \
+                 step, shorten --dt"
+                    .to_owned(),
                 None,
             ),
             _ => (String::new(), None),

@@ -58,7 +58,9 @@ pub struct SolveJson {
     pub depth_m: f64,
     pub time_s: f64,
     pub velocity_m_s: f64,
+    /// Least W = V² over V0² at the stage ends and the exit, below zero for a stop: the exit energy unless a stage drives.
     pub exit_margin: Option<f64>,
+    /// Half-width of its error bar.
     pub exit_margin_error: Option<f64>,
     pub events: Vec<EventJson>,
     pub cost: CostJson,

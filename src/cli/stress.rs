@@ -24,7 +24,7 @@ use crate::suite::{Counts, Suite, Verdict};
     Exit codes: 0 all hold, 3 a case failed, 4 undecided.")]
 pub struct StressArgs {
     /// Random scenes to fly besides the cases.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub cases: Option<u64>,
     /// Seed of every random number.
     #[arg(long, default_value_t = 1)]

@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::input::table_text;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{
-    check_format, check_outputs, escape_terminal, is_standard, print_json, print_text, significant, table, table_lines,
-    takes_standard_output, tell, wrapped, write_all,
+    WIDTH, check_format, check_outputs, escape_terminal, is_standard, print_json, print_text, significant, table,
+    table_lines, takes_standard_output, tell, wrapped, write_all,
 };
 use super::{CliError, Exit, read_scene};
 use crate::integrators::Method;
@@ -251,7 +251,8 @@ impl SweepArgs {
             lines.push(escape_terminal(title));
         }
         let paths: Vec<_> = report.axes.iter().map(|axis| axis.path.as_str()).collect();
-        lines.push(format!("  {} points over {}, criterion {}", rows.len(), paths.join(" and "), report.criterion));
+        let over = format!("{} points over {}, criterion {}", rows.len(), paths.join(" and "), report.criterion);
+        lines.push(wrapped("  ", &over));
         if report.static_factor_follows_strength {
             lines.push("  S follows the strength by Eq. 14".to_owned());
         }
@@ -261,7 +262,20 @@ impl SweepArgs {
         let count = rows.len().min(ROWS_SHOWN);
         let shown: Vec<&Row> =
             (0..count).map(|i| &rows[if count < 2 { 0 } else { i * (rows.len() - 1) / (count - 1) }]).collect();
-        lines.extend(table_lines(&points_table(&paths, &shown)));
+        // A number broken in two lines reads as another number: columns that do not fit are left out.
+        let fitting = (1..=TEXT_COLUMNS.len()).rev().map(|count| points_table(&paths, &shown, count));
+        let is_within = |(lines, _): &(Vec<String>, _)| lines.iter().all(|line| line.chars().count() <= WIDTH);
+        let mut tables = fitting.map(|(table, left_out)| (table_lines(&table), left_out));
+        let narrowest = || points_table(&paths, &shown, 1);
+        let (points, left_out) = tables.find(is_within).unwrap_or_else(|| {
+            let (mut table, left_out) = narrowest();
+            table.set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
+            (table_lines(&table), left_out)
+        });
+        lines.extend(points);
+        if !left_out.is_empty() {
+            lines.push(format!("  no room for {}; --out and --json give all", left_out.join(", ")));
+        }
         if count < rows.len() {
             lines.push(format!("  {count} of {} points shown; --out and --json give all", rows.len()));
         }
@@ -316,14 +330,17 @@ const TEXT_COLUMNS: [Column; 7] = [
     ("V", |row| row.flight.map(|f| significant(f.velocity))),
 ];
 
-/// The rows for people: a column that no row fills is left out, and Eq. 15 where two numbers vary.
-fn points_table(paths: &[&str], rows: &[&Row]) -> comfy_table::Table {
+/// The rows for people, with the first `count` columns behind the varied numbers, and the names of the others; a column
+/// that no row fills is no column, nor is Eq. 15 where two numbers vary.
+fn points_table(paths: &[&str], rows: &[&Row], count: usize) -> (comfy_table::Table, Vec<&'static str>) {
     let is_shown =
         |(name, cell): &&Column| rows.iter().any(|row| cell(row).is_some()) && !(*name == "Eq. 15" && paths.len() > 1);
-    let columns: Vec<&Column> = TEXT_COLUMNS.iter().filter(is_shown).collect();
+    let mut columns: Vec<&Column> = TEXT_COLUMNS.iter().filter(is_shown).collect();
+    let left_out = columns.split_off(count.min(columns.len())).iter().map(|(name, _)| *name).collect();
     let mut header: Vec<&str> = paths.iter().map(|path| path.rsplit('.').next().unwrap_or(path)).collect();
     header.extend(columns.iter().map(|(name, _)| *name));
     let mut shown = table(&header);
+    shown.set_content_arrangement(comfy_table::ContentArrangement::Disabled);
     for row in rows {
         let mut cells: Vec<String> = row.values.iter().map(|value| significant(*value)).collect();
         if row.error.is_empty() {
@@ -333,7 +350,7 @@ fn points_table(paths: &[&str], rows: &[&Row]) -> comfy_table::Table {
         }
         shown.add_row(cells);
     }
-    shown
+    (shown, left_out)
 }
 
 /// The curves at the measured points, computed there and not interpolated.
@@ -457,8 +474,13 @@ fn notes(plan: &Plan, rows: &[Row]) -> Vec<(&'static str, String)> {
     let mut notes = Vec::new();
     let bad = rows.iter().filter(|row| !row.error.is_empty()).count();
     if bad > 0 {
-        notes
-            .push(("warning: ", format!("{bad} of {} points have no answer; the column `error` says why", rows.len())));
+        notes.push((
+            "warning: ",
+            format!(
+                "{bad} of {} points have no answer; `error` in --json, and in the table of --out, says why",
+                rows.len()
+            ),
+        ));
     }
     let undecided = |row: &&Row| row.flight.is_some_and(|f| f.outcome == Outcome::Undecided);
     let undecided = rows.iter().filter(undecided).count();

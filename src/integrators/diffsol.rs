@@ -34,7 +34,7 @@ use diffsol::{
 };
 
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Sample};
-use crate::physics::exit_energy::exit_margin;
+use crate::physics::exit_energy::{exit_margin, speed_missing};
 use crate::physics::{Event, EventKind, Outcome, Problem, Stage, State};
 
 type Matrix = NalgebraMat<f64>;
@@ -811,6 +811,12 @@ pub(super) fn fly(
                     course.at = State { depth: reached.depth.min(limit), velocity: 0.0, ..reached };
                     outcome = Some(problem.stop_in(index));
                 }
+                // Whether it gets there is lost in the tolerance: there without speed, the margin is zero within its bar.
+                LegEnd::Approach
+                    if is_near(problem.mass, stage, reached, limit, course.margin_error * units.speed.powi(2)) =>
+                {
+                    course.at = State { depth: limit, velocity: 0.0, ..reached };
+                }
                 LegEnd::Approach => {
                     return Err(IntegrationError::NeverEnds {
                         why: "it only approaches the place where nothing moves it on",
@@ -840,6 +846,12 @@ pub(super) fn fly(
         course.event(EventKind::Rest, index);
     }
     Ok(course.finish(outcome, index))
+}
+
+/// Whether a flight that `stage` brings to nothing at `at` lacks no more of V² at `limit` than `bar` [m²/s²].
+fn is_near(mass: f64, stage: &Stage, at: State, limit: f64, bar: f64) -> bool {
+    let at = State { velocity: at.velocity.max(0.0), ..at };
+    speed_missing(stage, mass, at, limit).is_some_and(|missing| missing * missing <= bar)
 }
 
 /// A flight under way.

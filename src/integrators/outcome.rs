@@ -225,7 +225,7 @@ impl IntegrationError {
             Self::StepBudgetSpent { .. } => "take a longer step or a looser tolerance, or another method",
             Self::NotFinite { .. } => "check the scene for forces beyond the range of 64-bit numbers",
             Self::NeverEnds { .. } => {
-                "give the target a thickness, or a last stage that resists at rest (static_force > 0)"
+                "give each stage a force that resists at rest (static_force > 0), and the last one that or a thickness"
             }
             Self::SolverFailed { .. } => "loosen --rtol, or take another method",
             _ => "",

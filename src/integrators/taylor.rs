@@ -468,8 +468,8 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
     #[inline(always)]
     fn cross_stage(&mut self) -> Result<(), IntegrationError> {
         let law = &self.problem.stages[self.stage];
-        if law.static_force.value() <= 0.0 {
-            self.refuse_endless(law)?;
+        if law.static_force.value() <= 0.0 && self.is_lost_in_approach(law)? {
+            return Ok(());
         }
         match Shape::of(law) {
             Shape::Constant => self.step_through::<4, false, false, false>(),
@@ -619,12 +619,14 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
     }
 
     /// Error where the stage entered without a resisting static force neither stops the projectile nor lets it out.
+    ///
+    /// Where the bar leaves open whether it gets out, it counts as there without speed, and that is returned.
     #[cold]
-    fn refuse_endless(&self, law: &Stage<S>) -> Result<(), IntegrationError> {
+    fn is_lost_in_approach(&mut self, law: &Stage<S>) -> Result<bool, IntegrationError> {
         let never = |why| Err(IntegrationError::NeverEnds { why, last: self.state.values() });
         if law.stiffness.value() > 0.0 {
             // A spring stops everything but a creep, which is judged while it goes on.
-            return Ok(());
+            return Ok(false);
         }
         let way = self.problem.limit_of(self.stage).value() - self.state.depth.value();
         if way == f64::INFINITY {
@@ -636,16 +638,18 @@ impl<'a, S: Scalar, const K: usize, const L: usize> Course<'a, S, K, L> {
                 "resistance vanishes with the velocity and there is no far side"
             });
         }
-        if law.static_force.value() == 0.0 && law.viscosity.value() > 0.0 {
-            // dV/dx = -(r + q V)/M: V vanishes at the depth (M/q) ln(1 + q V/r), which is only approached.
-            let (mass, speed) = (self.problem.mass.value(), self.state.velocity.value());
-            let ratio = law.drag.value() * speed / law.viscosity.value();
-            let log_over = if ratio == 0.0 { 1.0 } else { ratio.ln_1p() / ratio };
-            if mass * speed / law.viscosity.value() * log_over <= way {
-                return never("a resistance that vanishes with the velocity brings it to nothing before the boundary");
-            }
+        let (law, limit, here) = (law.values(), self.problem.limit_of(self.stage), self.state.values());
+        let mass = self.problem.mass.value();
+        // dV/dx = -(r + q V)/M: V vanishes at the depth (M/q) ln(1 + q V/r), which is only approached.
+        let Some(missing) = exit_energy::speed_missing(&law, mass, here, limit.value()) else { return Ok(false) };
+        // The bar of V² is one of 2 V dV; and the place itself is rounded.
+        let v0 = self.problem.impact_speed.value();
+        if 2.0 * here.velocity * missing > self.bar * v0 * v0 + 4.0 * f64::EPSILON * here.velocity * here.velocity {
+            return never("a resistance that vanishes with the velocity brings it to nothing before the boundary");
         }
-        Ok(())
+        let time = S::from_f64(-f64::EPSILON.ln() * mass / law.viscosity);
+        self.state = State { time: self.state.time + time, depth: limit, velocity: S::zero() };
+        Ok(true)
     }
 
     /// Error where an overdamped driven stage has trapped the projectile before its equilibrium `x = -p/s`.
@@ -1206,9 +1210,9 @@ mod tests {
             (law(0.0, 0.0, 2.0, 0.0), f64::INFINITY),
             (law(0.0, 0.0, 0.0, 2.0), f64::INFINITY),
             (law(-1.0, 0.0, 3.0, 1.0), f64::INFINITY),
-            // r alone covers M V0/r = 5 m and no more; with drag ln(1 + q V0/r)/q.
-            (law(0.0, 0.0, 2.0, 0.0), 5.0),
-            (law(0.0, 0.0, 2.0, 1.0), 6.0_f64.ln()),
+            // r alone covers M V0/r = 5 m and no more; with drag ln(1 + q V0/r)/q. Nearer is undecided.
+            (law(0.0, 0.0, 2.0, 0.0), 5.0 + 1e-13),
+            (law(0.0, 0.0, 2.0, 1.0), 6.0_f64.ln() + 1e-13),
             // Overdamped towards x = 10.
             (law(-1000.0, 100.0, 1000.0, 0.0), f64::INFINITY),
             (law(-1000.0, 100.0, 1000.0, 5.0), 10.0),
@@ -1432,7 +1436,7 @@ mod tests {
     #[test]
     fn a_stage_without_static_force_is_refused_for_its_own_reason() {
         let stage = |p, r, q| Stage { viscosity: r, ..Stage::tunnel(p, q) };
-        let refused = |stage: Stage, exit: f64| course_at(&alone(stage, exit), 0.5, 3.0).refuse_endless(&stage);
+        let lost = |stage: Stage, exit: f64| course_at(&alone(stage, exit), 0.5, 3.0).is_lost_in_approach(&stage);
         for (stage, why) in [
             (stage(-1.0, 0.0, 0.0), "drives"),
             (stage(-1.0, 1.5, 0.0), "drives"),
@@ -1440,12 +1444,31 @@ mod tests {
             (stage(0.0, 1.5, 0.0), "vanishes with the velocity"),
             (stage(0.0, 0.0, 1.0), "vanishes with the velocity"),
         ] {
-            let error = refused(stage, f64::INFINITY).unwrap_err().to_string();
+            let error = lost(stage, f64::INFINITY).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
-        assert!(refused(stage(0.0, 1.5, 0.0), 4.5).is_err());
-        assert!(refused(stage(0.0, 1.5, 0.0), 4.5_f64.next_down()).is_ok());
-        assert!(refused(stage(-1.0, 1.5, 0.0), 4.5).is_ok());
+        assert!(lost(stage(0.0, 1.5, 0.0), 4.5 + 1e-14).is_err());
+        assert_eq!(lost(stage(0.0, 1.5, 0.0), 4.5_f64.next_down()), Ok(false));
+        assert_eq!(lost(stage(-1.0, 1.5, 0.0), 4.5), Ok(false));
+    }
+
+    /// As above: at 4.5 m no speed is left, and what the bar holds decides whether more is missing.
+    #[test]
+    fn an_approach_that_the_bar_cannot_tell_from_arrival_is_undecided() {
+        let problem = |exit| alone(Stage { viscosity: 1.5, ..Stage::tunnel(0.0, 0.0) }, exit);
+        let undecided = |exit: f64, bar: f64| {
+            let problem = problem(exit);
+            let mut course = course_at(&problem, 0.5, 3.0);
+            course.bar = bar;
+            course.is_lost_in_approach(&problem.stages[0]).map(|lost| (lost, course.state.depth, course.state.velocity))
+        };
+        assert_eq!(undecided(4.5, 0.0), Ok((true, 4.5, 0.0)));
+        // r dx/M = 0.75e-9 m/s are missing, and 2 V as much of V²: 4.5e-9 m²/s².
+        let v0 = problem(4.5).impact_speed;
+        assert_eq!(undecided(4.5 + 1e-9, 4.6e-9 / v0 / v0), Ok((true, 4.5 + 1e-9, 0.0)));
+        assert!(undecided(4.5 + 1e-9, 4.4e-9 / v0 / v0).is_err());
+        let flight = Taylor::default().fly(&Problem { impact_speed: 3.0, ..problem(4.0) }, Detail::Events).unwrap();
+        assert_eq!((flight.outcome, flight.exit_margin), (Outcome::Undecided, Some(0.0)));
     }
 
     /// Orders as tabled, in evaluations a step; a tolerance at the seam takes the higher.

@@ -28,7 +28,7 @@ use smallvec::SmallVec;
 use thiserror::Error;
 
 use super::event::{Event, EventKind, Outcome, State};
-use super::exit_energy::{carry, exit_margin, expm1_over};
+use super::exit_energy::{carry, exit_margin, expm1_over, speed_missing};
 use super::scene::CraterStiffness;
 use super::stage::{Problem, Stage, Stages, Target};
 
@@ -225,7 +225,17 @@ fn follow(
                     let depth = if entry.depth + way > limit { limit } else { entry.depth + way };
                     (false, State { time: entry.time + time, depth, velocity: 0.0 })
                 }
-                Leg::Endless(why) => return Err(ClosedFormError::NeverEnds { why, last: entry }),
+                Leg::Endless(why) => {
+                    // By less than what the bar of the margin leaves open of the speed: `2 V dV`.
+                    let v0 = problem.impact_speed;
+                    let bar = margin_bar(problem, index, entry.depth, 0.0) * v0 * v0;
+                    let missing = speed_missing(stage, problem.mass, entry, limit);
+                    if missing.is_none_or(|missing| 2.0 * entry.velocity * missing > bar) {
+                        return Err(ClosedFormError::NeverEnds { why, last: entry });
+                    }
+                    let time = entry.time - f64::EPSILON.ln() * problem.mass / stage.viscosity;
+                    (true, State { time, depth: limit, velocity: 0.0 })
+                }
             };
             if !(next.time.is_finite() && next.depth.is_finite() && next.velocity.is_finite()) {
                 return Err(ClosedFormError::OutOfRange { stage: index, last: entry });
@@ -1365,13 +1375,18 @@ mod tests {
         let both = Stage { viscosity: 1.0, ..Stage::tunnel(1.0, 1.0) };
         let error = solve(&problem(&[Stage::crater(1.0, 1.0), both], 1.0, 10.0, 3.0)).unwrap_err();
         assert_eq!(error.to_string(), "stage 1 has no closed form: viscosity and drag act together");
-        // V0 = r x/M: the whole speed is lost at the exit and not before. And a drive that V0 just balances: the
-        // motion is the fast decay alone, x = 1 - e^(-2 t).
+        // V0 = r x/M: the whole speed is lost just before the exit. And a drive that V0 just balances: the motion is the
+        // fast decay alone, x = 1 - e^(-2 t).
         let lost = Stage { viscosity: 1.0, ..Stage::tunnel(0.0, 0.0) };
         let balanced = Stage { stiffness: 1.0, viscosity: 2.5, ..Stage::tunnel(-1.0, 0.0) };
-        for (stage, speed, exit_depth) in [(lost, 10.0, 10.0), (balanced, 2.0, 1.5)] {
+        for (stage, speed, exit_depth) in [(lost, 10.0, 10.0 + 1e-13), (balanced, 2.0, 1.5)] {
             let error = solve(&problem(&[stage], 1.0, speed, exit_depth)).unwrap_err();
             assert!(matches!(error, ClosedFormError::NeverEnds { .. }), "{error}");
+        }
+        // At the exit and not before: there without speed, and the margin within its bar.
+        for exit_depth in [10.0, 10.0 + 4e-15] {
+            let within = solve(&problem(&[lost], 1.0, 10.0, exit_depth)).unwrap();
+            assert_eq!((within.end.depth, within.exit_margin), (exit_depth, Some(0.0)));
         }
         // It stands in the way only of a flight that gets there.
         assert!(solve(&problem(&[Stage::crater(1e3, 1.0), both], 1.0, 10.0, 3.0)).is_ok());

@@ -84,9 +84,49 @@ pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State
 
 /// Least W [m²/s²] over the stage ends ahead and the exit, carried on from rest at `depth` in stage `stage`.
 pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64) -> f64 {
-    let mut w = 0.0;
-    let mut from = depth;
-    let mut least = f64::INFINITY;
+    carried_on(problem, stage, depth, 0.0, f64::INFINITY)
+}
+
+/// Least W [m²/s²] of a flight that never ends, as [`energy_beyond_stop`] for one that does; `at` is any state of it in
+/// the stage that holds it, before the approach or in it.
+///
+/// - Where nothing but viscosity and drag acts, V falls by r/M for each metre in the end and vanishes at
+///   `X = x + (M/q) ln(1 + q V/r)`: W at the end of the stage counts as `-(r (end - X)/M)²`, so that it goes through
+///   zero with the speed itself.
+/// - Where a spring balances the drive at `X = -p/s`, it is minus twice the static work from there per mass.
+///
+/// `None` without an exit, or in a stage of another kind.
+pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
+    let index = (0..problem.stages.len()).find(|&index| problem.limit_of(index) > at.depth)?;
+    let (law, limit) = (&problem.stages[index], problem.limit_of(index));
+    let w = if let Some(missing) = speed_missing(law, problem.mass, at, limit) {
+        -missing * missing
+    } else if law.static_force < 0.0 && law.stiffness > 0.0 {
+        let missing = (limit + law.static_force / law.stiffness).max(0.0);
+        -law.stiffness * missing * missing / problem.mass
+    } else {
+        return None;
+    };
+    let beyond = if law.end < problem.exit_depth { carried_on(problem, index + 1, limit, w, w) } else { w };
+    (problem.has_exit() && beyond.is_finite()).then_some(beyond)
+}
+
+/// The speed [m/s] that a projectile at `at` would need beyond its own to reach `limit` through a stage in which nothing
+/// but viscosity and drag resists; `None` where it reaches it, or in a stage of another kind.
+pub(crate) fn speed_missing(law: &Stage, mass: f64, at: State, limit: f64) -> Option<f64> {
+    let Stage { static_force, stiffness, viscosity, drag, .. } = *law;
+    if static_force != 0.0 || stiffness != 0.0 || viscosity <= 0.0 {
+        return None;
+    }
+    let ratio = drag * at.velocity / viscosity;
+    let log_over = if ratio == 0.0 { 1.0 } else { ratio.ln_1p() / ratio };
+    let missing = viscosity * (limit - at.depth) / mass - at.velocity * log_over;
+    (missing >= 0.0).then_some(missing)
+}
+
+/// Least of `least` and of W [m²/s²] at the stage ends from stage `stage` on and at the exit, carried from `w` at `depth`.
+fn carried_on<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, least: f64) -> f64 {
+    let (mut w, mut from, mut least) = (w, depth, least);
     for index in stage..problem.stages.len() {
         let law = &problem.stages[index].values();
         let mass = problem.mass.value();
@@ -106,12 +146,48 @@ pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: 
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use approx::assert_relative_eq;
     use smallvec::smallvec;
 
     use super::*;
     use crate::physics::Target;
+
+    /// M = 2 kg: at 1 m/s, 0.5 m deep, r = 4 kg/s takes 2 m/s for each metre, so that x = 1 m is approached.
+    #[test]
+    fn a_flight_that_never_ends_lacks_the_speed_to_its_boundary_and_the_static_work_beyond() {
+        let still = Stage { static_force: 0.0, stiffness: 0.0, viscosity: 0.0, drag: 0.0, end: f64::INFINITY };
+        let at = State { time: 0.0, depth: 0.5, velocity: 1.0 };
+        let of = |first: Stage, exit_depth| Problem {
+            mass: 2.0,
+            impact_speed: 3.0,
+            exit_depth,
+            stages: smallvec![first, Stage { static_force: 5.0, ..still }],
+            crater: None,
+            target: Target::Stages,
+        };
+        let slowing = Stage { viscosity: 4.0, end: 2.0, ..still };
+        // 2 m/s are missing at 2 m; to the exit at 3 m, 2 5 N 1 m/2 kg more.
+        assert_relative_eq!(energy_beyond_approach(&of(slowing, 2.0), at).unwrap(), -4.0, max_relative = 1e-15);
+        assert_relative_eq!(energy_beyond_approach(&of(slowing, 3.0), at).unwrap(), -9.0, max_relative = 1e-15);
+        assert_relative_eq!(energy_beyond_approach(&of(slowing, 1.0), at).unwrap(), 0.0);
+        // Within reach it is no approach, nor without an exit.
+        assert_eq!(energy_beyond_approach(&of(slowing, 0.9), at), None);
+        assert_eq!(energy_beyond_approach(&of(slowing, f64::INFINITY), at), None);
+        // Drag shortens the way to (M/q) ln(1 + q V/r): with q = 4 kg/m to ln(2)/2 m.
+        let dragged = Stage { drag: 4.0, ..slowing };
+        let missing = 2.0 * (1.5 - 0.5 * std::f64::consts::LN_2);
+        assert_relative_eq!(
+            energy_beyond_approach(&of(dragged, 2.0), at).unwrap(),
+            -missing * missing,
+            max_relative = 1e-15
+        );
+        // A drive spent at 6 N/8 N/m = 0.75 m: 8 (2 - 0.75)²/2 to the end.
+        let driven = Stage { static_force: -6.0, stiffness: 8.0, ..slowing };
+        assert_relative_eq!(energy_beyond_approach(&of(driven, 2.0), at).unwrap(), -6.25, max_relative = 1e-15);
+        assert_eq!(energy_beyond_approach(&of(Stage { static_force: 1.0, ..slowing }, 2.0), at), None);
+    }
 
     #[test]
     fn a_stop_is_carried_on_by_the_static_work_through_viscous_stages_and_by_the_drag_through_others() {

@@ -18,8 +18,8 @@ use argmin::solver::brent::BrentRoot;
 use smallvec::SmallVec;
 use thiserror::Error;
 
-use crate::integrators::{Cost, IntegrationError, Integrator, Taylor, keeping};
-use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, Shown, Stage, closed_form};
+use crate::integrators::{Cost, IntegrationError, Integrator, Margin, Taylor, keeping};
+use crate::physics::{CraterStiffness, Problem, ResolveError, Scene, Shown, Stage, closed_form, exit_energy};
 
 /// Speed [m/s] at which the target is first asked for, to learn its exit depth and static work.
 const PROBE_SPEED: f64 = 1.0;
@@ -159,7 +159,7 @@ pub enum CriticalError<E: Display> {
     },
     /// The error bar leaves no digit of `V_c`: exit code 4.
     #[error(
-        "V_c is undecided: {} m/s with an error bar of {} m/s, the exit energy lost in its round-off",
+        "V_c is undecided: {} m/s with an error bar of {} m/s, the exit energy lost in the error bar of the method",
         Shown(*.velocity), Shown(*.error_bar)
     )]
     Undecided {
@@ -466,8 +466,18 @@ where
             });
         }
         let problem = (self.resolve)(velocity).map_err(|cause| CriticalError::Scene { velocity, cause })?;
-        let margin =
-            self.integrator.exit_margin(&problem).map_err(|cause| CriticalError::Flight { velocity, cause })?;
+        let margin = match self.integrator.exit_margin(&problem) {
+            // A flight that never ends leaves no target: what it lacks follows from where it is held.
+            Err(IntegrationError::NeverEnds { why, last }) => {
+                let w = exit_energy::energy_beyond_approach(&problem, last).ok_or_else(|| {
+                    let cause = IntegrationError::NeverEnds { why, last };
+                    CriticalError::Flight { velocity, cause }
+                })?;
+                let bar = 8.0 * f64::EPSILON * (u + w.abs());
+                Some(Margin { value: w / u, error: Some(bar / u), cost: Cost::default() })
+            }
+            other => other.map_err(|cause| CriticalError::Flight { velocity, cause })?,
+        };
         tally.flights += 1;
         let Some(margin) = margin else {
             return Err(CriticalError::NotFinite { velocity, exit_energy: f64::NAN });
@@ -840,6 +850,29 @@ mod tests {
         let refusal = search(slab, &coarse).unwrap_err();
         let CriticalError::Undecided { velocity, error_bar } = refusal else { panic!("{refusal}") };
         assert!(2.0 * error_bar >= velocity, "{velocity} {error_bar}");
+    }
+
+    /// Layers of F = r V in front of a static one, behind one, and alone: by hand from dV/dx = -r/M.
+    #[test]
+    fn layers_that_only_slow_have_a_critical_velocity_though_slower_flights_never_end() {
+        let slowing = |end| Stage { viscosity: 1.0, end, ..Stage::tunnel(0.0, 0.0) };
+        let resisting = |force, end| Stage { end, ..Stage::tunnel(force, 0.0) };
+        for (stages, exact) in [
+            (vec![slowing(0.5), resisting(0.1, f64::INFINITY)], 0.5 + 0.1_f64.sqrt()),
+            (vec![resisting(1.0, 0.5), slowing(f64::INFINITY)], 1.25_f64.sqrt()),
+            (vec![slowing(f64::INFINITY)], 1.0),
+        ] {
+            let at = |impact_speed| {
+                let stages = Stages::from_slice(&stages);
+                let target = Target::Stages;
+                Ok::<_, Infallible>(Problem { mass: 1.0, impact_speed, exit_depth: 1.0, stages, crater: None, target })
+            };
+            for integrator in [&Taylor::default() as &dyn Integrator, &crate::integrators::ClosedForm] {
+                let found = critical_velocity(at, integrator, Options::default()).unwrap();
+                let (error, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap());
+                assert!(error <= bar && error < 1e-14, "{} {stages:?}: {found:?} and not {exact}", integrator.name());
+            }
+        }
     }
 
     #[test]

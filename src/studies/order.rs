@@ -409,7 +409,7 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     if low <= 0.0 && height <= ROUND_OFF_ALLOWANCE {
         return (
             Class::AtFloor,
-            format!("the errors do not fall with the step and are {height:.1} times the round-off"),
+            format!("the errors do not fall with the step and are {height:.1e} times the round-off"),
         );
     }
     if negative.len() >= STEPS_MIN && alternates(negative) {
@@ -421,7 +421,7 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     } else if high < 0.0 {
         (Class::Diverging, format!("the error grows as h^{slope:.2} while the step shrinks"))
     } else {
-        (Class::Undecided, format!("slope {slope:.2} is not told from zero, [{low:.2}, {high:.2}]"))
+        (Class::Undecided, format!("slope {slope:.2} is not told from zero: 99.9 % within {low:.2} to {high:.2}"))
     }
 }
 

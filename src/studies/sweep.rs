@@ -146,10 +146,13 @@ impl Axis {
             return self.to;
         }
         let share = index as f64 / (self.count - 1) as f64;
-        if self.logarithmic {
-            self.from * (self.to / self.from).powf(share)
-        } else {
-            self.from + (self.to - self.from) * share
+        let (ratio, difference) = (self.to / self.from, self.to - self.from);
+        match self.logarithmic {
+            true if ratio.is_normal() => self.from * ratio.powf(share),
+            false if difference.is_finite() => self.from + difference * share,
+            // Ends farther apart than a number can say.
+            true => (self.from.ln() * (1.0 - share) + self.to.ln() * share).exp(),
+            false => self.from * (1.0 - share) + self.to * share,
         }
     }
 }
@@ -499,6 +502,10 @@ mod tests {
         let log: Axis = "target.strength=20MPa:60MPa:3:log".parse().unwrap();
         assert_eq!((log.value(0), log.value(2)), (20e6, 60e6));
         assert!((log.value(1) / (20e6 * 3.0_f64.sqrt()) - 1.0).abs() < 1e-15);
+        let wide: Axis = "N=1e-200:1e200:3:log".parse().unwrap();
+        assert!((wide.value(1) - 1.0).abs() < 1e-12, "{}", wide.value(1));
+        let wide: Axis = "stage.0.static_force=-1.7e308:1.7e308:5".parse().unwrap();
+        assert!((wide.value(1) / -0.85e308 - 1.0).abs() < 1e-15 && wide.value(2) == 0.0);
         let falling: Axis = "N=30:10:2".parse().unwrap();
         assert_eq!((falling.value(0), falling.value(1)), (30.0, 10.0));
     }

@@ -11,6 +11,7 @@ use crate::integrators::{
 };
 use crate::physics::scene_file::SHIPPED;
 use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
+use crate::studies::critical_velocity::{Options, critical_velocity};
 use crate::studies::relations::way_back;
 use crate::suite::claim::{Measurement, NotMeasured};
 
@@ -182,6 +183,27 @@ pub(super) const CASES: &[Case] = &[
         methods: ALL_EXACT,
         measure: across_the_crater_end,
     },
+    Case {
+        id: "E19",
+        statement: "a layer that only slows (F = r V) is left, approached for ever or undecided as V0 = V_c (1 ± 10^-j) says, \
+                    j = 1 to 14, and its V_c is found within its bar",
+        reason: "zero: an end that is told wrongly, and one that is not told within a hundredth of V_c",
+        limit: 0.0,
+        unit: "violations",
+        methods: LINEAR,
+        measure: approached_for_ever,
+    },
+];
+
+/// Methods for viscosity.
+const LINEAR: &[MethodName] = &[
+    MethodName::Taylor,
+    MethodName::Tsit45,
+    MethodName::Bdf,
+    MethodName::Esdirk34,
+    MethodName::TrBdf2,
+    MethodName::Adaptive,
+    MethodName::ClosedForm,
 ];
 
 /// Widest |margin| at which a method may still be undecided.
@@ -428,6 +450,34 @@ fn scaled_forces(subject: Subject) -> Result<Measurement, NotMeasured> {
         return Err(NotMeasured::broken("subnormal mass and force are taken"));
     }
     Ok(Measurement::new(worst / subject.promise()))
+}
+
+/// A spring of 1 kN/m over half a metre, then 1 kg/s over another, 1 kg: V_c² = s (1/2)² + (r/2)².
+fn approached_for_ever(subject: Subject) -> Result<Measurement, NotMeasured> {
+    let mut seen = Violations::default();
+    let spring = Stage { stiffness: 1e3, end: 0.5, ..Stage::tunnel(0.0, 0.0) };
+    let slowing = Stage { viscosity: 1.0, ..Stage::tunnel(0.0, 0.0) };
+    let at = |speed| staged(1.0, speed, 1.0, &[spring, slowing]);
+    let critical = 250.25_f64.sqrt();
+    let method = subject.build(None)?;
+    for power in 1..=14 {
+        for sign in [1.0, -1.0] {
+            let said = method.integrator().fly(&at(critical * (1.0 + sign * 10f64.powi(-power))), Detail::Events);
+            let told = match &said {
+                Ok(flight) if flight.outcome == Outcome::Undecided => power > 2,
+                // From a thousandth below V_c down the spring stops it.
+                Ok(flight) => (flight.outcome == Outcome::Perforated) == (sign > 0.0),
+                Err(error) => matches!(error, IntegrationError::NeverEnds { .. }) && sign < 0.0,
+            };
+            seen.expect(told, || format!("{sign}e-{power}: {:?}", said.map(|flight| flight.outcome)));
+        }
+    }
+    let resolve = |speed| Ok::<_, std::convert::Infallible>(at(speed));
+    let found = critical_velocity(resolve, method.integrator(), Options::default()).map_err(NotMeasured::broken)?;
+    seen.expect((found.velocity - critical).abs() <= found.error_bar.unwrap_or(0.0), || {
+        format!("V_c {} +- {:?}", found.velocity, found.error_bar)
+    });
+    Ok(seen.measurement())
 }
 
 fn plateau(subject: Subject) -> Result<Measurement, NotMeasured> {
