@@ -1671,6 +1671,9 @@ mod tests {
         ] {
             assert_eq!(unit(INF, &[law]), length, "{law:?}");
         }
+        // M/q = 1e-330 m is less than any number.
+        let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
+        assert!((Units::of(&light).length - 1.0).abs() < 1e-15);
         let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
         let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, xi: 5.0, u: 6.0 });
         assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
@@ -1752,19 +1755,73 @@ mod tests {
         let mut random = Random(23);
         let mut stops = 0;
         for _ in 0..100 {
-            // What is left after 0.1 N over a tenth of a metre, taken within about a nanometre: 4e7 spacings of depth.
+            // What is left after 0.1 MN over a tenth of a metre, taken within about a nanometre: 4e7 spacings of depth.
             let exit_depth: f64 = 0.1 + 1e-9;
-            let force = 0.98 / (2.0 * (exit_depth - 0.1)) * random.between(0.9, 1.5);
-            let stages = [stage(0.1, 0.0, 0.0, 0.0, 0.1), stage(force, 0.0, 0.0, 0.0, INF)];
-            let problem = of_stages(1.0, 1.0, exit_depth, &stages);
+            let force = 0.98e6 / (2.0 * (exit_depth - 0.1)) * random.between(0.9, 1.5);
+            let stages = [stage(0.1e6, 0.0, 0.0, 0.0, 0.1), stage(force, 0.0, 0.0, 0.0, INF)];
+            let problem = of_stages(1.0, 1e3, exit_depth, &stages);
             let margin = exact_margin(&problem);
             for scheme in Scheme::ALL {
                 let flight = Diffsol::new(scheme, 1e-12).fly(&problem, Detail::End).unwrap();
                 let (found, bar) = (flight.exit_margin.unwrap(), flight.exit_margin_error.unwrap());
                 assert!((found - margin).abs() <= bar, "{scheme:?}: {found} +- {bar}, not {margin}");
+                assert!(bar < 1e-6, "{scheme:?}: {bar}");
                 stops += u32::from(flight.outcome == Outcome::Stopped);
             }
         }
         assert!(stops > 200, "{stops} stops");
+    }
+
+    #[test]
+    fn a_leg_adds_to_the_bar_by_the_energy_that_is_left_at_its_start() {
+        // W falls from 1 to 0.01 in the first metre: 50 N/kg of 99 percent of half V0².
+        let stages = [stage(0.495, 0.0, 0.0, 0.0, 1.0), stage(1e-3, 0.0, 0.0, 0.0, INF)];
+        for speed in [1.0, 1e3] {
+            let stages = stages.map(|law| Stage { static_force: law.static_force * speed * speed, ..law });
+            let problem = of_stages(1.0, speed, 2.0, &stages);
+            for scheme in Scheme::ALL {
+                let flight = Diffsol::new(scheme, 1e-6).fly(&problem, Detail::End).unwrap();
+                let parts = flight.exit_margin_error.unwrap() / scheme.margin_error(1e-6);
+                assert!((parts - 1.01).abs() < 1e-3, "{scheme:?}: {parts}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_explicit_flight_evaluates_the_force_once_a_leg_and_six_times_a_step_taken_or_not() {
+        let mut random = Random(31);
+        let mut rejected = 0;
+        for _ in 0..100 {
+            let problem = random_concrete(&mut random);
+            for rtol in [1e-2, 1e-5, 1e-9] {
+                let flight = Diffsol::new(Scheme::Tsit45, rtol).fly(&problem, Detail::Trajectory).unwrap();
+                let Cost { steps, rejected_steps, force_evaluations } = flight.cost;
+                let legs = 1 + flight.stage as u64;
+                // One at the start of each leg, and one in which the library makes the first solver.
+                assert_eq!(force_evaluations, 1 + legs + 6 * (steps + rejected_steps), "{:?}", flight.cost);
+                // Impact, every step but the last of each leg, which ends in its event, and the events.
+                let samples = 1 + steps - legs + flight.events.len() as u64;
+                assert_eq!(flight.trajectory.len() as u64, samples, "{:?}", flight.events);
+                rejected += rejected_steps;
+            }
+        }
+        assert!(rejected > 0, "no step was rejected");
+        // Speed that is lost in the tolerance ends a leg in a step that counts too.
+        let problem = of_stages(1.0, 1.0, 1.0, &[stage(5.9e-7, 0.0, 1360.0, 0.0, INF)]);
+        let flight = Diffsol::new(Scheme::Tsit45, 0.1).fly(&problem, Detail::Trajectory).unwrap();
+        assert_eq!(flight.trajectory.len() as u64, flight.cost.steps + 1, "{:?}", flight.cost);
+    }
+
+    #[test]
+    fn a_step_that_is_tried_again_is_counted_and_time_goes_on_from_where_it_began() {
+        // A drag of 3e26/m beside a spring of 7e28/m²: the Newton iterations leave more of x open than a step moves.
+        let problem =
+            of_stages(1.0, 1.0, 1.0, &[stage(0.0, 6.859_735_044_546_989e28, 1.65, 2.987_378_155_631_558e26, INF)]);
+        for scheme in [Scheme::Bdf, Scheme::Esdirk34] {
+            let Ok(flight) = Diffsol::new(scheme, 1e-2).fly(&problem, Detail::Trajectory) else { panic!("{scheme:?}") };
+            let rises = flight.trajectory.windows(2).all(|pair| pair[0].state.time <= pair[1].state.time);
+            assert!(rises, "{scheme:?}");
+            assert!(flight.cost.rejected_steps > 0, "{scheme:?}: {:?}", flight.cost);
+        }
     }
 }
