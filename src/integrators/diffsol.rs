@@ -1824,4 +1824,32 @@ mod tests {
             assert!(flight.cost.rejected_steps > 0, "{scheme:?}: {:?}", flight.cost);
         }
     }
+
+    #[test]
+    fn an_approach_that_the_bar_cannot_tell_from_arrival_is_undecided() {
+        // 1 kg/s takes 1 m/s for each metre: from 0.5 m at 0.4 m/s to 1 m, 0.1 m/s are missing, 0.01 of V².
+        let slowing = stage(0.0, 0.0, 1.0, 0.0, INF);
+        let near = |velocity, bar| is_near(1.0, &slowing, State { time: 0.0, depth: 0.5, velocity }, 1.0, bar);
+        assert!(near(0.4, 0.011) && !near(0.4, 0.009));
+        // Speed below zero is the tolerance's, and none.
+        assert!(near(-0.1, 0.26) && !near(-0.1, 0.24));
+
+        // Behind a spring of 1 kN/m: V_c² = 1000/4 + 1/4.
+        let stages = [stage(0.0, 1e3, 0.0, 0.0, 0.5), slowing];
+        for scheme in Scheme::ALL {
+            let mut undecided = 0;
+            for power in 4..=14 {
+                for sign in [1.0, -1.0] {
+                    let speed = 250.25_f64.sqrt() * (1.0 + sign * 10f64.powi(-power));
+                    match Diffsol::new(scheme, 1e-8).fly(&of_stages(1.0, speed, 1.0, &stages), Detail::End) {
+                        Ok(Flight { outcome: Outcome::Undecided, .. }) => undecided += 1,
+                        Ok(flight) => assert!(flight.outcome == Outcome::Perforated && sign > 0.0, "{scheme:?}"),
+                        Err(IntegrationError::NeverEnds { .. }) => assert!(sign < 0.0, "{scheme:?}, 1e-{power}"),
+                        Err(error) => panic!("{scheme:?}: {error}"),
+                    }
+                }
+            }
+            assert!(undecided >= 4, "{scheme:?}: {undecided}");
+        }
+    }
 }
