@@ -1463,12 +1463,16 @@ mod tests {
             course.is_lost_in_approach(&problem.stages[0]).map(|lost| (lost, course.state.depth, course.state.velocity))
         };
         assert_eq!(undecided(4.5, 0.0), Ok((true, 4.5, 0.0)));
+        // Nor what the rounding of the place does: a spacing is 4e-15 of V², and 4 eps V² are 8e-15.
+        assert_eq!(undecided(4.5_f64.next_up(), 0.0), Ok((true, 4.5_f64.next_up(), 0.0)));
         // r dx/M = 0.75e-9 m/s are missing, and 2 V as much of V²: 4.5e-9 m²/s².
         let v0 = problem(4.5).impact_speed;
         assert_eq!(undecided(4.5 + 1e-9, 4.6e-9 / v0 / v0), Ok((true, 4.5 + 1e-9, 0.0)));
         assert!(undecided(4.5 + 1e-9, 4.4e-9 / v0 / v0).is_err());
         let flight = Taylor::default().fly(&Problem { impact_speed: 3.0, ..problem(4.0) }, Detail::Events).unwrap();
         assert_eq!((flight.outcome, flight.exit_margin), (Outcome::Undecided, Some(0.0)));
+        // Until the speed is an epsilon of what it was: M/r ln(1/eps).
+        assert!((flight.end.time / (2.0 / 1.5 * 36.043_653_389_117_15) - 1.0).abs() < 1e-14, "{}", flight.end);
     }
 
     /// Orders as tabled, in evaluations a step; a tolerance at the seam takes the higher.
