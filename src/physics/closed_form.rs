@@ -1379,7 +1379,7 @@ mod tests {
         // fast decay alone, x = 1 - e^(-2 t).
         let lost = Stage { viscosity: 1.0, ..Stage::tunnel(0.0, 0.0) };
         let balanced = Stage { stiffness: 1.0, viscosity: 2.5, ..Stage::tunnel(-1.0, 0.0) };
-        for (stage, speed, exit_depth) in [(lost, 10.0, 10.0 + 1e-13), (balanced, 2.0, 1.5)] {
+        for (stage, speed, exit_depth) in [(lost, 10.0, 10.0 + 1.1e-14), (balanced, 2.0, 1.5)] {
             let error = solve(&problem(&[stage], 1.0, speed, exit_depth)).unwrap_err();
             assert!(matches!(error, ClosedFormError::NeverEnds { .. }), "{error}");
         }
@@ -1388,6 +1388,10 @@ mod tests {
             let within = solve(&problem(&[lost], 1.0, 10.0, exit_depth)).unwrap();
             assert_eq!((within.end.depth, within.exit_margin), (exit_depth, Some(0.0)));
         }
+        // Until the speed is an epsilon of what it was, M/r ln(1/eps), here behind a gap that takes 0.1 s.
+        let (gap, slowing) = (Stage { end: 1.0, ..Stage::tunnel(0.0, 0.0) }, Stage { viscosity: 4.0, ..lost });
+        let within = solve(&problem(&[gap, slowing], 2.0, 10.0, 6.0)).unwrap().end;
+        assert!((within.time / (0.1 + 0.5 * 36.043_653_389_117_15) - 1.0).abs() < 1e-15, "{within}");
         // It stands in the way only of a flight that gets there.
         assert!(solve(&problem(&[Stage::crater(1e3, 1.0), both], 1.0, 10.0, 3.0)).is_ok());
     }
