@@ -67,6 +67,20 @@ fn a_table_to_audit_may_come_from_standard_input_and_the_scene_not_as_well() {
 }
 
 #[test]
+fn a_flight_without_time_and_a_run_without_scenes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = changed_slab(folder.path(), "\"400 m/s\"", "0.0");
+    let output = run(&["converge", &path]);
+    assert_eq!((code(&output), output.stdout.len()), (2, 0));
+    let text = said(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("the flight takes no time") && !text.contains("--dt"), "{text}");
+    for arguments in [&["stress", "--cases", "0"][..], &["batch", "random:0", "--out", "-"]] {
+        let output = run(arguments);
+        assert_eq!((code(&output), output.stdout.len()), (2, 0), "{arguments:?}: {}", said(&output));
+    }
+}
+
+#[test]
 fn a_grazing_perforation_is_never_called_a_stop() {
     for method in adaptive_methods() {
         let answer = json(&["solve", &scene("graze"), "--method", method, "--json"]);

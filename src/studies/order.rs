@@ -421,7 +421,8 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     } else if high < 0.0 {
         (Class::Diverging, format!("the error grows as h^{slope:.2} while the step shrinks"))
     } else {
-        (Class::Undecided, format!("slope {slope:.2} is not told from zero: 99.9 % within {low:.2} to {high:.2}"))
+        let sure = 100.0 * (1.0 - CLASS_LEVEL);
+        (Class::Undecided, format!("slope {slope:.2} is not told from zero: {sure} % within {low:.2} to {high:.2}"))
     }
 }
 

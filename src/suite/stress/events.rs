@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::{
-    ALL_EXACT, Case, Subject, Violations, concrete, critical_of, exact, exact_margin, is_right, resolve, slab, staged,
-    worse,
+    ALL_EXACT, Case, Subject, VISCOUS_AND_EXACT, Violations, concrete, critical_of, exact, exact_margin, is_right,
+    resolve, slab, staged, worse,
 };
 use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
@@ -190,20 +190,9 @@ pub(super) const CASES: &[Case] = &[
         reason: "zero: an end that is told wrongly, and one that is not told within a hundredth of V_c",
         limit: 0.0,
         unit: "violations",
-        methods: LINEAR,
+        methods: VISCOUS_AND_EXACT,
         measure: approached_for_ever,
     },
-];
-
-/// Methods for viscosity.
-const LINEAR: &[MethodName] = &[
-    MethodName::Taylor,
-    MethodName::Tsit45,
-    MethodName::Bdf,
-    MethodName::Esdirk34,
-    MethodName::TrBdf2,
-    MethodName::Adaptive,
-    MethodName::ClosedForm,
 ];
 
 /// Widest |margin| at which a method may still be undecided.

@@ -44,6 +44,20 @@ const ALL_ADAPTIVE: &[MethodName] = &[
     MethodName::Adaptive,
 ];
 
+/// Those for a stage with viscosity.
+const VISCOUS_AND_EXACT: &[MethodName] = &[
+    MethodName::Taylor,
+    MethodName::Tsit45,
+    MethodName::Bdf,
+    MethodName::Esdirk34,
+    MethodName::TrBdf2,
+    MethodName::Adaptive,
+    MethodName::ClosedForm,
+];
+
+/// Those of them that integrate.
+const VISCOUS: &[MethodName] = VISCOUS_AND_EXACT.split_at(6).0;
+
 /// A case before it is run.
 pub struct Case {
     /// Name: letter and number.

@@ -1,6 +1,6 @@
 //! Step sizes, number range, rounding and stiffness.
 
-use super::{ALL_ADAPTIVE, Case, Subject, Violations, concrete, exact, resolve, slab, staged, worse};
+use super::{ALL_ADAPTIVE, Case, Subject, VISCOUS, Violations, concrete, exact, resolve, slab, staged, worse};
 use crate::integrators::central_difference::stability_limit;
 use crate::integrators::{
     Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, Taylor, VelocityAt,
@@ -17,16 +17,6 @@ use crate::suite::claim::{Evidence, Measurement, NotMeasured};
 
 const NONE: &[MethodName] = &[];
 const RULES: [VelocityAt; 3] = [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
-
-/// Methods for a stage with viscosity that drives.
-const VISCOUS: &[MethodName] = &[
-    MethodName::Taylor,
-    MethodName::Tsit45,
-    MethodName::Bdf,
-    MethodName::Esdirk34,
-    MethodName::TrBdf2,
-    MethodName::Adaptive,
-];
 
 /// Without tr-bdf2: of second order, it takes tens of thousands of steps at this tolerance whatever the stage.
 const RESISTING: &[MethodName] =
