@@ -11,10 +11,10 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use penetrode::integrators::batch::Batch;
-use penetrode::integrators::{Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor, keeping};
+use penetrode::exchange::scene_file::SHIPPED;
+use penetrode::integrators::lanes::Batch;
+use penetrode::integrators::{Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor};
 use penetrode::physics::reference::Source;
-use penetrode::physics::scene_file::SHIPPED;
 use penetrode::physics::{Outcome, Problem, Scene};
 use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::critical_velocity;
@@ -37,7 +37,7 @@ fn problem(name: &str) -> Problem {
 /// Nobody times a wrong answer: every free quantity within `limit` of the exact one.
 fn assert_right(method: &dyn Integrator, problem: &Problem, limit: f64) {
     let exact = Yardstick::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
-    let flight = method.fly(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+    let flight = method.solve(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
     for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
         if is_fixed(quantity, &exact) {
             continue;
@@ -48,7 +48,7 @@ fn assert_right(method: &dyn Integrator, problem: &Problem, limit: f64) {
 }
 
 fn flights(criterion: &mut Criterion) {
-    for name in MethodName::ALL.into_iter().filter(|m| m.is_built()) {
+    for name in MethodName::ALL.iter().copied().filter(|m| m.is_built()) {
         let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         for scene in SCENES {
             // The paper's scheme takes the millionth left to the far side for a stop, and that is its answer.
@@ -64,7 +64,7 @@ fn flights(criterion: &mut Criterion) {
             };
             assert_right(method.integrator(), &problem, limit);
             criterion.bench_function(&format!("{name}/{scene}"), |bencher| {
-                bencher.iter(|| method.integrator().fly(black_box(&problem), Detail::Events));
+                bencher.iter(|| method.integrator().solve(black_box(&problem), Detail::Events));
             });
         }
     }
@@ -104,19 +104,18 @@ fn varied(criterion: &mut Criterion) {
     assert_eq!(problems.len(), 1000);
     let mut group = criterion.benchmark_group("varied-1000");
     group.throughput(Throughput::Elements(1000));
-    for name in MethodName::ALL.into_iter().filter(|m| m.is_built() && *m != MethodName::CentralDifference) {
+    for name in MethodName::ALL.iter().copied().filter(|m| m.is_built() && *m != MethodName::CentralDifference) {
         let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let limit = match name {
             MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm => 1e-12,
             _ => 1e-6,
         };
-        keeping(method.integrator(), |integrator| {
-            let fly = |p| integrator.fly(p, Detail::Events).unwrap_or_else(|e| panic!("{name}: {e}"));
-            assert_varied(name.name(), &scenes, problems.iter().map(fly), limit);
-            group.bench_function(name.name(), |bencher| {
-                bencher
-                    .iter(|| problems.iter().filter(|p| black_box(integrator.fly(p, Detail::Events)).is_ok()).count());
-            });
+        let reused = method.integrator().reusing();
+        let integrator = reused.as_deref().unwrap_or(method.integrator());
+        let solve = |p| integrator.solve(p, Detail::Events).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_varied(name.name(), &scenes, problems.iter().map(solve), limit);
+        group.bench_function(name.name(), |bencher| {
+            bencher.iter(|| problems.iter().filter(|p| black_box(integrator.solve(p, Detail::Events)).is_ok()).count());
         });
     }
     group.finish();
@@ -125,22 +124,22 @@ fn varied(criterion: &mut Criterion) {
 fn batch(criterion: &mut Criterion) {
     let scenes = varied_scenes();
     let varied: Vec<Problem> = scenes.iter().filter_map(|scene| scene.problem().ok()).collect();
-    let fly = |problems: &[Problem]| Batch::new().fly(problems);
-    let flights = fly(&varied).into_iter().map(|flight| flight.unwrap_or_else(|e| panic!("{e}")).flight());
+    let solve = |problems: &[Problem]| Batch::new().solve(problems);
+    let flights = solve(&varied).into_iter().map(|flight| flight.unwrap_or_else(|e| panic!("{e}")).flight());
     assert_varied("batch", &scenes, flights, 1e-12);
     let mut group = criterion.benchmark_group("batch");
     group.throughput(Throughput::Elements(1000));
     for name in SCENES {
         let problems = vec![problem(name); 1000];
-        let scalar = Taylor::default().fly(&problems[0], Detail::Events).unwrap_or_else(|e| panic!("{e}"));
-        for lane in fly(&problems) {
+        let scalar = Taylor::default().solve(&problems[0], Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+        for lane in solve(&problems) {
             let lane = lane.unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(lane.outcome, scalar.outcome);
             assert!((lane.end.depth / scalar.end.depth - 1.0).abs() < 1e-14, "{name}: {lane:?}");
         }
-        group.bench_function(name, |bencher| bencher.iter(|| fly(black_box(&problems))));
+        group.bench_function(name, |bencher| bencher.iter(|| solve(black_box(&problems))));
     }
-    group.bench_function("varied-1000", |bencher| bencher.iter(|| fly(black_box(&varied))));
+    group.bench_function("varied-1000", |bencher| bencher.iter(|| solve(black_box(&varied))));
     group.finish();
 }
 

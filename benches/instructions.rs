@@ -11,9 +11,9 @@
 use std::hint::black_box;
 use std::process::Command;
 
-use penetrode::integrators::batch::Batch;
-use penetrode::integrators::{Detail, Method, MethodName, MethodOptions, keeping};
-use penetrode::physics::scene_file::SHIPPED;
+use penetrode::exchange::scene_file::SHIPPED;
+use penetrode::integrators::lanes::Batch;
+use penetrode::integrators::{Detail, Method, MethodName, MethodOptions};
 use penetrode::physics::{Problem, Scene, Stage, Target};
 use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::critical_velocity;
@@ -59,7 +59,7 @@ fn method(name: MethodName) -> Method {
 fn right(name: MethodName, problem: &Problem, limit: f64) -> Method {
     let method = method(name);
     let exact = Yardstick::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
-    let flight = method.integrator().fly(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+    let flight = method.integrator().solve(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
     for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
         if !is_fixed(quantity, &exact) {
             let error = flight_error(quantity, &flight, &exact, problem.impact_speed).map_or(f64::INFINITY, f64::abs);
@@ -74,7 +74,7 @@ fn flights(name: MethodName, problems: Vec<Problem>, detail: Detail, limit: f64)
     Box::new(move || {
         let methods: Vec<Method> = problems.iter().map(|problem| right(name, problem, limit)).collect();
         let method = methods.last().unwrap_or_else(|| panic!("no problem"));
-        counted(|| problems.iter().filter(|p| black_box(method.integrator().fly(p, detail)).is_ok()).count());
+        counted(|| problems.iter().filter(|p| black_box(method.integrator().solve(p, detail)).is_ok()).count());
     })
 }
 
@@ -100,13 +100,13 @@ fn batch(problems: fn() -> Vec<Problem>) -> Case {
     Box::new(move || {
         let problems = problems();
         let scalar = method(MethodName::Taylor);
-        for (lane, problem) in Batch::new().fly(&problems).into_iter().zip(&problems) {
+        for (lane, problem) in Batch::new().solve(&problems).into_iter().zip(&problems) {
             let lane = lane.unwrap_or_else(|e| panic!("{e}"));
-            let scalar = scalar.integrator().fly(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
+            let scalar = scalar.integrator().solve(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(lane.outcome, scalar.outcome);
             assert!((lane.end.depth / scalar.end.depth - 1.0).abs() < 1e-13, "{lane:?}");
         }
-        counted(|| Batch::new().fly(black_box(&problems)));
+        counted(|| Batch::new().solve(black_box(&problems)));
     })
 }
 
@@ -114,13 +114,13 @@ fn batch(problems: fn() -> Vec<Problem>) -> Case {
 fn kept(name: MethodName) -> Case {
     Box::new(move || {
         let (method, problems) = (method(name), varied());
-        let fly_all = || {
-            keeping(method.integrator(), |kept| {
-                problems.iter().filter(|p| black_box(kept.fly(p, Detail::Events)).is_ok()).count()
-            })
+        let solve_all = || {
+            let reused = method.integrator().reusing();
+            let integrator = reused.as_deref().unwrap_or(method.integrator());
+            problems.iter().filter(|p| black_box(integrator.solve(p, Detail::Events)).is_ok()).count()
         };
-        assert_eq!(fly_all(), problems.len());
-        counted(fly_all);
+        assert_eq!(solve_all(), problems.len());
+        counted(solve_all);
     })
 }
 
@@ -131,7 +131,7 @@ fn with_sensitivities(name: &'static str) -> Case {
         let find = || sensitivity::by_taylor(&scene).unwrap_or_else(|e| panic!("{e}"));
         assert!(find().disagreement(&exact).is_some_and(|worst| worst < 1e-12));
         let method = right(MethodName::Taylor, &problem, 1e-12);
-        let (_, flight) = counted(|| (find(), method.integrator().fly(&problem, Detail::Events)));
+        let (_, flight) = counted(|| (find(), method.integrator().solve(&problem, Detail::Events)));
         assert!(flight.is_ok());
     })
 }
@@ -139,7 +139,7 @@ fn with_sensitivities(name: &'static str) -> Case {
 /// Name and case of everything that is counted for itself.
 fn cases() -> Vec<(String, Case)> {
     let mut cases = Vec::new();
-    for name in MethodName::ALL {
+    for &name in MethodName::ALL {
         for scene in ["crater", "tunnel", "perforate", "graze"] {
             // The paper's scheme takes the millionth left to the far side of `graze` for a stop.
             let limit = match (name, scene) {
@@ -273,9 +273,9 @@ const NO_SAVING: [&str; 2] = ["error bar of the exit margin not given", "stiffne
 fn assert_complete(savings: &[Saving]) {
     let named: Vec<&str> = savings.iter().filter_map(|saving| saving.sentence).collect();
     let mut unheard = named.clone();
-    for method in MethodName::ALL.map(method) {
+    for method in MethodName::ALL.iter().copied().map(method) {
         for problem in SHIPPED.iter().filter_map(|(name, _)| scene(name).problem().ok()) {
-            let Ok(flight) = method.integrator().fly(&problem, Detail::Events) else { continue };
+            let Ok(flight) = method.integrator().solve(&problem, Detail::Events) else { continue };
             for sentence in method.explain(&problem, &flight, Detail::Events) {
                 let mut known = named.iter().chain(&NO_SAVING);
                 assert!(known.any(|part| sentence.contains(part)), "no pair with and without: {sentence}");

@@ -2,10 +2,11 @@
 
 use dashu_int::ops::Gcd;
 use dashu_int::{IBig, Sign};
+use penetrode::exchange::tables::{CsvTable, Rows};
 use penetrode::integrators::locate::{COEFFICIENTS_MAX, first_root};
-use penetrode::physics::Scene;
+use penetrode::physics::{Advice, Scene};
 use penetrode::studies::audit::{Expectation, Table, Verdict, audit as judge};
-use penetrode::studies::batch::csv::CsvScenes;
+use penetrode::studies::batch::{SCENES, Scenes};
 use penetrode::studies::order::{Class, OrderVerdict, StepError, fit};
 
 /// What is run on any bytes, and panics where a promise is broken.
@@ -47,15 +48,14 @@ pub fn scene(data: &[u8]) {
 /// A table of scenes is refused, or each of its rows is a scene or a message of one line; chunks do not matter.
 pub fn batch(data: &[u8]) {
     let rows = |chunk: usize| {
-        let mut table = CsvScenes::new("fuzz.csv", data).map_err(|error| error.to_string())?;
-        let (mut all, mut used) = (Vec::new(), None);
+        let mut table = CsvTable::new("fuzz.csv", data, &SCENES).map_err(|error| error.to_string())?;
+        let mut all = Vec::new();
         loop {
-            let records = table.next_rows(chunk, used.take()).map_err(|error| error.to_string())?;
-            if records.is_empty() {
+            let scenes = Scenes::Table(Rows::Csv(table.next_rows(chunk, None).map_err(|error| error.to_string())?));
+            if scenes.is_empty() {
                 return Ok::<_, String>(all);
             }
-            all.extend((0..records.len()).map(|index| records.scene(index)));
-            used = Some(records);
+            all.extend(scenes.scenes(0..scenes.len()));
         }
     };
     let whole = rows(1024);
@@ -68,7 +68,8 @@ pub fn batch(data: &[u8]) {
             for row in rows {
                 match row {
                     Ok(scene) => assert!(scene.mass.is_finite()),
-                    Err(message) => {
+                    Err(error) => {
+                        let message = error.to_string();
                         assert!(!message.is_empty() && message.len() < 500 && !message.contains(char::is_control));
                     }
                 }

@@ -12,9 +12,9 @@ use std::cell::Cell;
 
 use argmin::core::{CostFunction, Executor, IterState};
 use argmin::solver::brent::BrentRoot;
-use penetrode::integrators::batch::Batch;
+use penetrode::exchange::scene_file::SHIPPED;
+use penetrode::integrators::lanes::Batch;
 use penetrode::integrators::{ClosedForm, Detail, Energy, Integrator, Taylor};
-use penetrode::physics::scene_file::SHIPPED;
 use penetrode::physics::{Problem, Scene};
 use penetrode::studies::critical_velocity;
 use penetrode::studies::random_scenes::Generator;
@@ -94,7 +94,7 @@ fn a_flight_with_all_its_events_allocates_nothing() {
     for method in [&Taylor::default() as &dyn Integrator, &Energy::default(), &ClosedForm] {
         for (index, problem) in problems.iter().enumerate() {
             for detail in [Detail::End, Detail::Events] {
-                let (count, flight) = allocations(|| method.fly(problem, detail));
+                let (count, flight) = allocations(|| method.solve(problem, detail));
                 assert_eq!(count, 0, "{} on problem {index} with {detail:?}: {flight:?}", method.name());
                 assert!(flight.unwrap().end.time > 0.0);
             }
@@ -146,10 +146,10 @@ fn a_critical_velocity_allocates_what_the_root_finder_of_argmin_does_and_nothing
 fn lanes_allocate_their_answers_and_one_block_however_many_scenes_fly() {
     let problems = problems();
     let batch = Batch::new();
-    let few = allocations(|| batch.fly(&problems[..10]));
+    let few = allocations(|| batch.solve(&problems[..10]));
     // Three blocks of lanes, one after the other in the same memory.
     let many: Vec<Problem> = problems.iter().cycle().take(3000).cloned().collect();
-    let many = allocations(|| batch.fly(&many));
+    let many = allocations(|| batch.solve(&many));
     assert_eq!((few.0, few.1.len(), many.1.len()), (many.0, 10, 3000));
     assert!(many.0 <= 2, "{}", many.0);
 }

@@ -9,11 +9,11 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use penetrode::exchange::peers::{
+    BundledPeer, Environment, Peer, PeerRequest, PeerSetupError, RecordedFlight, Recording, recordings,
+};
 use penetrode::integrators::{ClosedForm, Detail, Integrator, Taylor};
 use penetrode::physics::{Outcome, Problem, Stage, Target};
-use penetrode::studies::peers::{
-    BundledPeer, Environment, Peer, PeerAnswer, PeerRequest, PeerSetupError, RecordedFlight, Recording, recordings,
-};
 use serde_json::{Value, json};
 
 /// What makes a test fail; every error of ours chains into it.
@@ -84,7 +84,7 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
     for flight in &recording.flights {
         let answer = live.ask(&flight.request)?;
         let differences = answer
-            .differences_from(&flight.answer, &flight.problem())
+            .differences_from(&flight.answer.flight(&flight.problem()), &flight.problem())
             .ok_or_else(|| format!("{}: {} was {}", flight.scene, answer.outcome, flight.answer.outcome))?;
         if answer.events.len() != flight.answer.events.len() {
             return Err(format!("{}: {:?} were {:?}", flight.scene, answer.events, flight.answer.events).into());
@@ -95,7 +95,7 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
             }
         }
         // And ours: two unlike methods agree within what the program is trusted to.
-        let ours = PeerAnswer::from_flight(&Taylor::default().fly(&flight.problem(), Detail::Events)?);
+        let ours = Taylor::default().solve(&flight.problem(), Detail::Events)?;
         let differences = answer
             .differences_from(&ours, &flight.problem())
             .ok_or_else(|| format!("{}: {} is {} by the Taylor series", flight.scene, answer.outcome, ours.outcome))?;
@@ -162,7 +162,7 @@ fn misses_a_perforation(peer: BundledPeer, environment: &Environment) -> Check {
         crater: Some(0),
         target: Target::CraterAndTunnel,
     };
-    let exact = ClosedForm.fly(&problem, Detail::Events)?;
+    let exact = ClosedForm.solve(&problem, Detail::Events)?;
     let mut live = Peer::start(&environment.command(peer))?;
     let missed = live.ask(&PeerRequest::from_problem(&problem, 1e-12))?;
     if missed.outcome.is_stop() && missed.depth_m > 1.1 * exact.end.depth && exact.outcome == Outcome::Perforated {
@@ -237,11 +237,7 @@ fn says_that_the_network_is_missing() -> Check {
             Ok(())
         }
         // Without Python there is nothing to install from; the other tests say so.
-        Err(
-            PeerSetupError::NoPython { .. }
-            | PeerSetupError::PythonTooOld { .. }
-            | PeerSetupError::NoVirtualEnvironment { .. },
-        ) => Ok(()),
+        Err(PeerSetupError::NoPython { .. } | PeerSetupError::NoVirtualEnvironment { .. }) => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }

@@ -16,11 +16,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use penetrode::report::stress::{StressRun, files};
+use penetrode::report::stress::files;
 use penetrode::report::{Environment, Run, folder};
 use penetrode::studies::extreme_scenes;
+use penetrode::suite::Suite;
 use penetrode::suite::checks::PeerAnswers;
-use penetrode::suite::{Suite, stress};
 use serde_json::Value;
 
 /// What makes a test fail; every error of ours chains into it.
@@ -132,13 +132,14 @@ impl Stage {
         let judged = suite.run(1, &PeerAnswers::recorded()?, &|_| ());
         let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
         let folder = tempfile::tempdir()?;
-        let run = Run { suite: &suite, judged: &judged, environment, points: &[(5.0, 30.0)] };
-        folder::write(&run, &folder.path().join(PAGES[0]))?;
-        let cases = stress::run(1, &|_| ());
+        let run = Run { suite: &suite, judged: &judged, environment, points: &[(5.0, 30.0)], random: None };
+        folder::write(folder::files(&run), &folder.path().join(PAGES[0]))?;
+        let suite = Suite::edges()?;
+        let judged = suite.run(1, &PeerAnswers::default(), &|_| ());
         let summary = extreme_scenes::run(200, 1, &|| ());
         let environment = Environment::here(1, "penetrode stress --seed 1".to_owned(), &suite, Vec::new());
-        let run = StressRun { judged: &cases, random: Some((&summary, 1.0)), environment };
-        folder::write_files(files(&run)?, &folder.path().join(PAGES[1]))?;
+        let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: Some((&summary, 1.0)) };
+        folder::write(files(&run), &folder.path().join(PAGES[1]))?;
         Ok(Self { browser, folder })
     }
 
@@ -226,13 +227,13 @@ impl Stage {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let proxy = format!("--proxy-server=http://{}", listener.local_addr()?);
         let done = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&done);
+        let seen = Arc::clone(&done);
         listener.set_nonblocking(true)?;
         let listening = thread::spawn(move || {
             let mut asked = Vec::new();
             loop {
                 // Read before the queue is emptied once more: what came before the end is heard.
-                let last = told.load(Ordering::SeqCst);
+                let last = seen.load(Ordering::SeqCst);
                 while let Ok((stream, _)) = listener.accept() {
                     asked.extend(refuse(stream));
                 }

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::input::{input_name, table_bytes};
 use super::output::{escape_terminal, is_standard, print_json, print_text, significant, table, table_lines, wrapped};
 use super::{CliError, Exit, problem_of, read_scene};
+use crate::exchange::tables::{name_of, read_bytes};
 use crate::physics::Problem;
-use crate::studies::audit::{Audit, AuditError, ExactValues, Expectation, Table, Verdict, audit};
+use crate::studies::audit::{Audit, ExactValues, Expectation, RESULTS, Table, Verdict, audit};
 use crate::studies::convergence::Yardstick;
 use crate::studies::critical_velocity;
 use crate::studies::error::{is_fixed, value_of};
@@ -43,12 +43,11 @@ impl AuditArgs {
                 "name a file for one",
             ));
         }
-        let file = input_name(&self.results);
-        let bytes = table_bytes(&self.results, "name a CSV file with a column dt_s")?;
-        let refuse = |error: AuditError| CliError::usage(error.to_string(), error.help());
-        let results = Table::read(&file, &bytes).map_err(refuse)?;
+        let file = name_of(&self.results);
+        let bytes = read_bytes(&self.results, &RESULTS)?;
+        let results = Table::read(&file, &bytes)?;
         let exact = self.scene.as_deref().map(exact_values).transpose()?;
-        let judged = audit(&results, &Expectation { order: self.order, exact }).map_err(refuse)?;
+        let judged = audit(&results, &Expectation { order: self.order, exact })?;
         if self.json { print_json(&judged) } else { print_text(&text(&file, &judged)) }.map_err(CliError::stdout)?;
         Ok(match judged.verdict {
             Verdict::Passed => Exit::Success,
@@ -63,16 +62,12 @@ fn exact_values(path: &str) -> Result<ExactValues, CliError> {
     let scene = read_scene(path)?;
     let problem: Problem = problem_of(&scene, path)?;
     let exact = Yardstick::of(&problem)?.flight;
-    let value = |quantity| if is_fixed(quantity, &exact) { None } else { value_of(quantity, &exact) };
-    Ok(ExactValues {
-        impact_velocity: problem.impact_speed,
-        depth: value(Quantity::Depth),
-        time: value(Quantity::Time),
-        velocity: value(Quantity::Velocity),
-        crater_end_time: value(Quantity::CraterEndTime),
-        crater_end_velocity: value(Quantity::CraterEndVelocity),
-        critical_velocity: critical_velocity::exact_or_refined(&scene).ok(),
-    })
+    let values = Quantity::ALL.map(|quantity| match quantity {
+        Quantity::CriticalVelocity => critical_velocity::exact_or_refined(&scene).ok(),
+        fixed if is_fixed(fixed, &exact) => None,
+        free => value_of(free, &exact),
+    });
+    Ok(ExactValues { impact_velocity: problem.impact_speed, values })
 }
 
 fn text(file: &str, judged: &Audit) -> String {

@@ -1,6 +1,5 @@
 //! `penetrode batch`: many scenes from a table, one line of results each, in bounded memory.
 
-use std::fs::{self, File};
 use std::io::ErrorKind::BrokenPipe;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
@@ -15,27 +14,24 @@ use super::method_args::MethodArgs;
 use super::output::is_parquet;
 use super::output::{check_format, check_outputs, is_standard, persist, tell, temporary_beside, unless_closed};
 use super::{CliError, Exit};
-use crate::integrators::Method;
-use crate::studies::batch::csv::{CsvScenes, Records};
-use crate::studies::batch::{PART, Rows, TableError, Tally, result_header, result_lines};
-use crate::studies::table_text::counted;
 #[cfg(feature = "parquet")]
-use crate::studies::{
-    batch::{RESULT_COLUMNS, result_columns},
-    columns::Cells,
-    parquet::{ParquetScenes, ParquetTable},
-};
+use crate::exchange::tables::parquet::{ParquetReader, ParquetWriter};
+use crate::exchange::tables::{self, Cells, CsvTable, Rows};
+use crate::integrators::Method;
+use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, answers};
+use crate::text::count;
 
 /// Progress over a known number of rows.
 const ROWS_BAR: &str = "{bar:30} {human_pos}/{human_len} rows, {eta} left";
 
-/// Rows read, flown and written at a time: three such chunks are the bound of the memory.
+/// Rows read, solved and written at a time: three such chunks bound the memory.
 const CHUNK: usize = 128 * PART;
 
 /// Arguments of `batch`.
 #[derive(Args, Debug)]
 pub struct BatchArgs {
-    /// Scenes: a .csv or .parquet table, - for standard input (CSV), or random:N[:SEED] for N random scenes.
+    /// Scenes: a .csv or .parquet table, - for standard input (CSV), or random:N or random:N:SEED for N random
+    /// scenes.
     pub scenes: PathBuf,
     /// Results: a .csv or .parquet table, written whole or not at all; - for standard output (CSV).
     #[arg(long, value_name = "RESULTS.csv")]
@@ -52,7 +48,7 @@ pub struct BatchArgs {
 }
 
 impl BatchArgs {
-    /// Flies every row and writes the results in the same order.
+    /// Solves every row and writes the results in the same order.
     ///
     /// # Errors
     /// A table or options that cannot be used (exit 2), results that cannot be written (exit 1).
@@ -64,13 +60,13 @@ impl BatchArgs {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
             .build()
-            .map_err(|error| CliError::Run { message: error.to_string(), help: String::new(), last: None })?;
+            .map_err(|error| CliError::failed(error.to_string(), ""))?;
         let progress = ProgressBar::no_length();
         let mut source = Source::open(&self.scenes, &progress)?;
         // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
-        let rows = source.next_rows(None)?;
+        let first = source.next_scenes(None)?;
         let mut sink = Sink::create(&self.out).map_err(|cause| self.unwritable(cause))?;
-        let tally = match pool.install(|| self.fly_all(rows, &mut source, &mut sink, &method)) {
+        let tally = match pool.install(|| self.solve_all(first, &mut source, &mut sink, &method)) {
             // Whoever reads the results (`| head`) has enough.
             Err(CliError::Write { cause, .. }) if is_standard(&self.out) && cause.kind() == BrokenPipe => {
                 return Ok(Exit::Success);
@@ -83,35 +79,32 @@ impl BatchArgs {
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
 
-    /// Flies one chunk, `rows` to begin with, while the one before is written and the next is read.
-    fn fly_all(
+    /// Solves one chunk, `scenes` to begin with, while the one before is written and the next is read.
+    fn solve_all(
         &self,
-        mut rows: Rows,
+        mut scenes: Option<Scenes>,
         source: &mut Source,
         sink: &mut Sink,
         method: &Method,
     ) -> Result<Tally, CliError> {
         keep_freed_memory();
+        let as_lines = sink.takes_lines();
         let mut tally = Tally::default();
-        let format = sink.format();
-        let mut flown = Flown::default();
-        let mut used = None;
-        // Ends with the table: each turn reads rows, or is the last but one.
-        while !rows.is_empty() || !flown.results.is_empty() {
-            let first = tally.rows + flown.tally.rows + 1;
-            let results = std::mem::take(&mut flown.results);
-            let (next_flown, moved) = rayon::join(
-                || Flown::new(&rows, first, method, self.critical, format),
+        let (mut results, mut used) = (Vec::new(), None);
+        // Ends with the table: each turn but the last has scenes.
+        while scenes.is_some() || !results.is_empty() {
+            let (solved, moved) = rayon::join(
+                || scenes.as_ref().map(|scenes| solve(scenes, tally.rows + 1, method, self.critical, as_lines)),
                 || -> Result<_, CliError> {
                     sink.write(results).map_err(|cause| self.unwritable(cause))?;
                     // After the last row nothing is left to read.
-                    if rows.is_empty() { Ok(None) } else { source.next_rows(used.take()).map(Some) }
+                    if scenes.is_some() { source.next_scenes(used.take()) } else { Ok(None) }
                 },
             );
-            tally += flown.tally;
-            flown = next_flown;
-            let read = moved?.unwrap_or(Rows::Random { seed: 0, rows: 0..0 });
-            used = Some(std::mem::replace(&mut rows, read));
+            let (counted, written_next) = solved.unwrap_or_default();
+            tally += counted;
+            results = written_next;
+            used = std::mem::replace(&mut scenes, moved?);
         }
         Ok(tally)
     }
@@ -121,8 +114,8 @@ impl BatchArgs {
     }
 }
 
-/// Lets the allocator of glibc keep what is freed: it gives memory back above a bound that follows the largest block
-/// freed so far, and buffers of a chunk, handed back and fetched anew, cost two threads a tenth of their time.
+/// Makes the allocator of glibc hold freed memory. It returns memory to the system above a bound that follows the
+/// largest block freed so far, and fetching the buffers of each chunk anew costs two threads a tenth of their time.
 fn keep_freed_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
 }
@@ -131,70 +124,53 @@ fn summary(tally: &Tally) -> String {
     if tally.rows == 0 {
         return "0 rows: the table has a first line with names and no scene below it".to_owned();
     }
-    let mut text = format!("{}: {} bad, {} undecided", counted(tally.rows, "row"), tally.bad, tally.undecided);
+    let mut text = format!("{}: {} bad, {} undecided", count(tally.rows, "row"), tally.bad, tally.undecided);
     if tally.unstable > 0 {
         text.push_str(&format!(", {} with a step beyond the stability limit", tally.unstable));
     }
     text
 }
 
-/// How results are written.
-#[derive(Clone, Copy)]
-enum Format {
-    Csv,
-    #[cfg(feature = "parquet")]
-    Parquet,
-}
-
 /// Results of some rows.
 enum Results {
     Lines(String),
-    #[cfg(feature = "parquet")]
+    #[cfg_attr(not(feature = "parquet"), expect(dead_code, reason = "only a Parquet table takes columns"))]
     Columns(Vec<Cells>),
 }
 
-/// Results of a chunk, part by part.
-#[derive(Default)]
-struct Flown {
-    tally: Tally,
-    results: Vec<Results>,
-}
-
-impl Flown {
-    fn new(rows: &Rows, first: u64, method: &Method, critical: bool, format: Format) -> Self {
-        let count = rows.len();
-        let parts: Vec<(Tally, Results)> = (0..count.div_ceil(PART))
-            .into_par_iter()
-            // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
-            .with_max_len(1)
-            .map(|index| {
-                let from = index * PART;
-                let answers = rows.answers(from..count.min(from + PART), method, critical);
-                let mut tally = Tally::default();
-                tally.count(&answers);
-                let first = first + from as u64;
-                let results = match format {
-                    Format::Csv => Results::Lines(result_lines(first, &answers)),
-                    #[cfg(feature = "parquet")]
-                    Format::Parquet => Results::Columns(result_columns(first, &answers)),
-                };
-                (tally, results)
-            })
-            .collect();
-        let mut flown = Self::default();
-        for (tally, results) in parts {
-            flown.tally += tally;
-            flown.results.push(results);
-        }
-        flown
+/// Results of a chunk, part by part; `first` is the number of its first row.
+fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, as_lines: bool) -> (Tally, Vec<Results>) {
+    let total = scenes.len();
+    let parts: Vec<(Tally, Results)> = (0..total.div_ceil(PART))
+        .into_par_iter()
+        // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
+        .with_max_len(1)
+        .map(|index| {
+            let from = index * PART;
+            let answers = answers(scenes.scenes(from..total.min(from + PART)), method, critical);
+            let first = first + from as u64;
+            let results = if as_lines {
+                Results::Lines(scenes.result_lines(from, first, &answers))
+            } else {
+                Results::Columns(scenes.result_columns(from, first, &answers))
+            };
+            (Tally::of(&answers), results)
+        })
+        .collect();
+    let mut tally = Tally::default();
+    let mut all = Vec::with_capacity(parts.len());
+    for (counted, results) in parts {
+        tally += counted;
+        all.push(results);
     }
+    (tally, all)
 }
 
 /// Where the scenes come from.
 enum Source {
-    Csv(CsvScenes<Box<dyn Read + Send>>),
+    Csv(CsvTable<Box<dyn Read + Send>>),
     #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetScenes>, ProgressBar),
+    Parquet(Box<ParquetReader>, ProgressBar),
     Random {
         seed: u64,
         next: u64,
@@ -205,58 +181,54 @@ enum Source {
 
 impl Source {
     fn open(path: &Path, progress: &ProgressBar) -> Result<Self, CliError> {
-        let name = path.display().to_string();
-        let unreadable = |cause: String| refused(&TableError::Unreadable { file: name.clone(), cause });
         if let Some((count, seed)) = random_table(path)? {
             bar(progress, count, ROWS_BAR);
             return Ok(Self::Random { seed, next: 0, end: count, progress: progress.clone() });
         }
-        if is_standard(path) {
-            let input: Box<dyn Read + Send> = Box::new(progress.wrap_read(io::stdin()));
-            return CsvScenes::new("standard input", input).map(Self::Csv).map_err(|error| refused(&error));
-        }
-        let metadata = fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
-        if metadata.is_dir() {
-            return Err(unreadable("is a folder".to_owned()));
-        }
-        let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        #[cfg(feature = "parquet")]
-        if is_parquet(path) {
-            let scenes = ParquetScenes::new(&name, file).map_err(|error| refused(&error))?;
-            bar(progress, scenes.rows(), ROWS_BAR);
-            return Ok(Self::Parquet(Box::new(scenes), progress.clone()));
-        }
-        // A pipe or a device has no length.
-        if metadata.len() > 0 {
-            bar(progress, metadata.len(), "{bar:30} {bytes}/{total_bytes}, {eta} left");
-        }
-        let input: Box<dyn Read + Send> = Box::new(progress.wrap_read(file));
-        CsvScenes::new(&name, input).map(Self::Csv).map_err(|error| refused(&error))
+        let name = tables::name_of(path);
+        let input: Box<dyn Read + Send> = match tables::open(path, &SCENES)? {
+            None => Box::new(progress.wrap_read(io::stdin())),
+            #[cfg(feature = "parquet")]
+            Some(file) if is_parquet(path) => {
+                let table = ParquetReader::new(&name, file, &SCENES)?;
+                bar(progress, table.rows(), ROWS_BAR);
+                return Ok(Self::Parquet(Box::new(table), progress.clone()));
+            }
+            Some(file) => {
+                // A pipe or a device has no length.
+                if let Some(length) = file.metadata().ok().map(|metadata| metadata.len()).filter(|length| *length > 0) {
+                    bar(progress, length, "{bar:30} {bytes}/{total_bytes}, {eta} left");
+                }
+                Box::new(progress.wrap_read(file))
+            }
+        };
+        Ok(Self::Csv(CsvTable::new(&name, input, &SCENES)?))
     }
 
-    /// The next chunk, empty at the end; the memory of `used` serves again.
-    fn next_rows(&mut self, used: Option<Rows>) -> Result<Rows, CliError> {
-        match self {
-            Self::Csv(scenes) => {
-                let used: Option<Records> = match used {
-                    Some(Rows::Csv(records)) => Some(records),
+    /// The next chunk, `None` at the end; the memory of `used` is reused.
+    fn next_scenes(&mut self, used: Option<Scenes>) -> Result<Option<Scenes>, CliError> {
+        let scenes = match self {
+            Self::Csv(table) => {
+                let used = match used {
+                    Some(Scenes::Table(Rows::Csv(records))) => Some(records),
                     _ => None,
                 };
-                scenes.next_rows(CHUNK, used).map(Rows::Csv).map_err(|error| refused(&error))
+                Scenes::Table(Rows::Csv(table.next_rows(CHUNK, used)?))
             }
             #[cfg(feature = "parquet")]
-            Self::Parquet(scenes, progress) => {
-                let columns = scenes.next_rows(CHUNK).map_err(|error| refused(&error))?;
+            Self::Parquet(table, progress) => {
+                let columns = table.next_rows(CHUNK)?;
                 progress.inc(columns.len() as u64);
-                Ok(Rows::Parquet(Box::new(columns)))
+                Scenes::Table(Rows::Parquet(columns))
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;
                 *next = (*end).min(from.saturating_add(CHUNK as u64));
                 progress.set_position(from);
-                Ok(Rows::Random { seed: *seed, rows: from..*next })
+                Scenes::Random { seed: *seed, rows: from..*next }
             }
-        }
+        };
+        Ok(Some(scenes).filter(|scenes| !scenes.is_empty()))
     }
 }
 
@@ -278,32 +250,28 @@ enum Sink {
     File(BufWriter<NamedTempFile>),
     Standard(BufWriter<io::Stdout>),
     #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetTable<NamedTempFile>>),
+    Parquet(Box<ParquetWriter<NamedTempFile>>),
 }
 
 impl Sink {
     fn create(path: &Path) -> io::Result<Self> {
         #[cfg(feature = "parquet")]
         if is_parquet(path) {
-            let table = ParquetTable::new(temporary_beside(path)?, &RESULT_COLUMNS)?;
+            let table = ParquetWriter::new(temporary_beside(path)?, &RESULT_COLUMNS)?;
             return Ok(Self::Parquet(Box::new(table)));
         }
         let mut sink = if is_standard(path) {
             Self::Standard(BufWriter::with_capacity(1 << 20, io::stdout()))
         } else {
-            let file = temporary_beside(path)?;
-            Self::File(BufWriter::with_capacity(1 << 20, file))
+            Self::File(BufWriter::with_capacity(1 << 20, temporary_beside(path)?))
         };
-        sink.write(vec![Results::Lines(result_header())])?;
+        sink.write(vec![Results::Lines(RESULT_COLUMNS.map(|(name, _)| name).join(",") + "\n")])?;
         Ok(sink)
     }
 
-    fn format(&self) -> Format {
-        match self {
-            Self::File(_) | Self::Standard(_) => Format::Csv,
-            #[cfg(feature = "parquet")]
-            Self::Parquet(_) => Format::Parquet,
-        }
+    /// True if it takes lines of CSV.
+    fn takes_lines(&self) -> bool {
+        matches!(self, Self::File(_) | Self::Standard(_))
     }
 
     fn write(&mut self, results: Vec<Results>) -> io::Result<()> {
@@ -312,8 +280,7 @@ impl Sink {
             (Self::Standard(writer), Results::Lines(lines)) => writer.write_all(lines.as_bytes()),
             #[cfg(feature = "parquet")]
             (Self::Parquet(table), Results::Columns(columns)) => table.push(columns),
-            #[cfg(feature = "parquet")]
-            _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "results of another format")),
+            _ => unreachable!("`takes_lines` chose the form of the results"),
         })
     }
 
@@ -325,11 +292,6 @@ impl Sink {
             Self::Parquet(table) => persist(table.finish()?, path),
         }
     }
-}
-
-/// A table that cannot be used, as exit code 2.
-fn refused(error: &TableError) -> CliError {
-    CliError::usage(error.to_string(), error.help())
 }
 
 /// Gives `progress` a length and a look; it shows on a terminal only.

@@ -7,18 +7,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::escape_terminal;
 use super::output::{print_json, print_text, table, table_lines, tell_line};
-use super::verify::folder_error;
+use super::verify::{not_started, quoted};
 use super::{CliError, Exit, read_scene};
+use crate::exchange::peers::{Environment as PeerEnvironment, Peer, PeerStartError};
+use crate::exchange::scene_file::SHIPPED;
 use crate::physics::Scene;
-use crate::physics::scene_file::SHIPPED;
 use crate::report::bench::{BenchJson, CaseJson, files};
-use crate::report::text::{number, wrapped};
+use crate::report::text::{number, prefixed, wrapped};
 use crate::report::{Environment, folder};
 use crate::studies::bench::growth::{self, Growth};
 use crate::studies::bench::step_size::{self, Held, LEVELS as STEP_LEVELS, StepStudy};
-use crate::studies::bench::work_precision::{self, Case, CaseError, Contender, LEVELS, Run, RunState, fastest};
+use crate::studies::bench::work_precision::{self, Case, Contender, LEVELS, Run, RunState, fastest};
 use crate::studies::bench::{Effort, peers};
-use crate::studies::peers::{Environment as PeerEnvironment, Peer, PeerStartError};
 
 /// Scenes that are measured where none is given: those of the comparison with other solvers, and the stiff one.
 const DEFAULT_SCENES: [&str; 5] = ["crater", "tunnel", "perforate", "graze", "stiff"];
@@ -92,14 +92,13 @@ impl BenchArgs {
     /// (exit 1), a peer that cannot be started (exit 5).
     pub fn run(&self) -> Result<Exit, CliError> {
         if let Some(folder) = &self.out {
-            folder::check(folder).map_err(folder_error)?;
+            folder::check(folder)?;
         }
         let scenes = self.scenes()?;
         let mut peers = self.start_peers()?;
         let report = self.measure(&scenes, &mut peers)?;
         if let Some(folder) = &self.out {
-            let failed = |cause| CliError::Write { path: folder.display().to_string(), cause };
-            folder::write_files(files(&report).map_err(failed)?, folder).map_err(folder_error)?;
+            folder::write(files(&report), folder)?;
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;
         Ok(Exit::Success)
@@ -149,7 +148,7 @@ impl BenchArgs {
         if self.peers {
             for (name, bundled, options) in peers::BUNDLED {
                 let environment = PeerEnvironment::ensure(bundled, &mut |line| tell_line(line))
-                    .map_err(|error| CliError::PeerMissing(error.to_string()))?;
+                    .map_err(|error| CliError::peer_missing(error.to_string()))?;
                 let command = format!("{} {options}", environment.command(bundled));
                 peers.push((name.to_owned(), start(&command)?));
             }
@@ -176,10 +175,10 @@ impl BenchArgs {
         if self.has(Part::WorkPrecision) {
             progress.set_message("exact answers");
             for (name, scene) in scenes {
-                cases.push(Case::of_scene(name, scene).map_err(case_error)?);
+                cases.push(Case::of_scene(name, scene)?);
             }
             if self.varied() > 0 {
-                cases.push(Case::varied(self.varied(), self.seed).map_err(case_error)?);
+                cases.push(Case::varied(self.varied(), self.seed)?);
             }
         }
         progress.inc_length((cases.len() * (Contender::all().len() + peers.len())) as u64);
@@ -201,13 +200,13 @@ impl BenchArgs {
             progress.inc_length(scenes.len() as u64);
             for (name, scene) in scenes {
                 progress.set_message(format!("{name}, steps"));
-                studies.extend(step_size::of_scene(name, scene, effort, self.seed).map_err(case_error)?);
+                studies.extend(step_size::of_scene(name, scene, effort, self.seed)?);
                 progress.inc(1);
             }
         }
         let growths = if self.has(Part::Scaling) { self.growth(&progress)? } else { Vec::new() };
         progress.finish_and_clear();
-        let told = peers.iter().map(|(name, peer)| (name.clone(), peer.identity().to_string())).collect();
+        let peers = peers.iter().map(|(name, peer)| (name.clone(), peer.identity().to_string())).collect();
         let understood = format!("{scenes:?}, {} varied", self.varied());
         Ok(BenchJson {
             schema: "penetrode/bench/1",
@@ -216,13 +215,13 @@ impl BenchArgs {
             runs,
             step_size: studies,
             growth: growths,
-            environment: Environment::of_scenes(self.seed, self.command(), &understood, told),
+            environment: Environment::of_scenes(self.seed, self.command(), &understood, peers),
         })
     }
 
     fn growth(&self, progress: &ProgressBar) -> Result<Vec<Growth>, CliError> {
         const THREADS: [u16; 2] = [1, 2];
-        let failed = |message: String| CliError::Run { message, help: String::new(), last: None };
+        let failed = |message: String| CliError::failed(message, "");
         let program = std::env::current_exe().map_err(|error| failed(format!("where is this program? {error}")))?;
         let counts = growth::counts(self.most);
         progress.inc_length((counts.len() * THREADS.len()) as u64);
@@ -233,15 +232,14 @@ impl BenchArgs {
 
     /// The command that remakes this run.
     fn command(&self) -> String {
-        let quote = |text: &str| shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned);
         let mut words = vec!["penetrode bench".to_owned()];
-        words.extend(self.scenes.iter().map(|path| quote(path)));
+        words.extend(self.scenes.iter().map(|path| quoted(path)));
         let parts = self.parts.iter().filter_map(ValueEnum::to_possible_value);
         words.push(format!("--parts {}", parts.map(|part| part.get_name().to_owned()).collect::<Vec<_>>().join(",")));
         if self.peers {
             words.push("--peers".to_owned());
         }
-        words.extend(self.peer.iter().map(|command| format!("--peer {}", quote(command))));
+        words.extend(self.peer.iter().map(|command| format!("--peer {}", quoted(command))));
         words.extend(self.varied.map(|count| format!("--varied {count}")));
         words.push(format!("--seed {} --repeats {}", self.seed, self.repeats));
         if self.has(Part::Scaling) {
@@ -280,23 +278,11 @@ impl BenchArgs {
 /// A running peer, or the exit code that its absence has.
 fn start(command: &str) -> Result<Peer, CliError> {
     Peer::start(command).map_err(|error| match error {
-        PeerStartError::Greeting(failure) => CliError::Run {
-            message: failure.to_string(),
-            help: "see the peer protocol: verification/peers/README.md".to_owned(),
-            last: None,
-        },
-        error if error.is_usage() => {
-            CliError::usage(error.to_string(), "give a program and its arguments, quoted as for a shell")
+        PeerStartError::Greeting(failure) => {
+            CliError::failed(failure.to_string(), "see the peer protocol: verification/peers/README.md")
         }
-        error => CliError::PeerMissing(error.to_string()),
+        error => not_started(&error),
     })
-}
-
-fn case_error(error: CaseError) -> CliError {
-    match error {
-        CaseError::Resolve(error) => error.into(),
-        CaseError::Integration(error) => error.into(),
-    }
 }
 
 fn case_lines(report: &BenchJson, case: &CaseJson) -> Vec<String> {
@@ -419,22 +405,8 @@ fn micro(ns: f64) -> String {
 
 /// Two digits and the prefix of the unit: `1.2µ`, `83k`.
 fn compact(value: f64) -> String {
-    const PREFIXES: [(i32, &str); 8] =
-        [(-12, "p"), (-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
-    // Rounded first, so that 999.6 becomes 1.0k.
-    let rounded: f64 = format!("{value:.1e}").parse().unwrap_or(value);
-    if rounded == 0.0 || !rounded.is_finite() {
-        return rounded.to_string();
-    }
-    let exponent = rounded.abs().log10().floor() as i32;
-    let power = exponent.div_euclid(3) * 3;
-    match PREFIXES.iter().find(|(known, _)| *known == power) {
-        Some((_, prefix)) => {
-            let decimals = usize::from(exponent == power && (power != 0 || rounded.fract() != 0.0));
-            format!("{:.decimals$}{prefix}", rounded / 10f64.powi(power))
-        }
-        None => format!("{rounded:.1e}"),
-    }
+    let (digits, prefix) = prefixed(value, 2);
+    if prefix.is_empty() { digits.trim_end_matches(".0").to_owned() } else { digits + prefix }
 }
 
 /// `text` in at most `most` characters, harmless on a terminal.

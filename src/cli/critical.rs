@@ -5,19 +5,17 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{
-    engineering, error_text, escape_terminal, print_json, print_text, significant, table, table_lines, tell, wrapped,
-};
+use super::output::{engineering, error_text, escape_terminal, significant, table, table_lines, tell, wrapped};
 use super::scene_json::SceneJson;
-use super::{CliError, Exit, read_scene};
+use super::{Answer, Ask, CliError, Exit, read_scene};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
-use crate::physics::{Criterion, Problem, Scene, Shown, groups};
-use crate::studies::critical_velocity::{self, CriticalVelocity};
-use crate::studies::sensitivity::{self, SensitivityError, Spread};
-use crate::studies::{applicability, parameter::ParameterError};
+use crate::physics::{Criterion, Scene, Shown, groups};
+use crate::studies::sensitivity::{self, Spread};
+use crate::studies::{applicability, critical_velocity};
 
 /// Arguments of `critical`.
 #[derive(Args, Debug)]
+#[command(after_help = "Example: penetrode critical slab.toml --spread target.strength=5% --spread projectile.mass=1%")]
 pub struct CriticalArgs {
     /// Scene file (TOML), or - for standard input.
     pub scene: String,
@@ -33,14 +31,11 @@ pub struct CriticalArgs {
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 1, requires = "spread")]
     pub seed: u64,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// What `critical --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "the contract names every field with its unit")]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct CriticalJson {
     pub schema: &'static str,
     pub scene: SceneJson,
@@ -90,7 +85,7 @@ pub struct SpreadJson {
 
 /// The exact critical velocity.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "the contract names every field with its unit")]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct ClosedCriticalJson {
     pub critical_velocity_m_s: f64,
     pub critical_energy_j: f64,
@@ -127,34 +122,10 @@ impl Eq15Json {
     }
 }
 
-impl From<ParameterError> for CliError {
-    fn from(error: ParameterError) -> Self {
-        Self::Usage { message: error.to_string(), help: error.help() }
-    }
-}
+impl Ask for CriticalArgs {
+    type Answer = CriticalJson;
 
-impl From<SensitivityError> for CliError {
-    fn from(error: SensitivityError) -> Self {
-        match error {
-            SensitivityError::Resolve(error) => error.into(),
-            SensitivityError::Flight(error) => error.into(),
-            SensitivityError::Parameter(error) => error.into(),
-            SensitivityError::NoInput => {
-                Self::usage(error.to_string(), "leave its spread out: V_c is sought whatever the impact velocity")
-            }
-            SensitivityError::NoCritical(_) => {
-                Self::Run { message: error.to_string(), help: String::new(), last: None }
-            }
-        }
-    }
-}
-
-impl CriticalArgs {
-    /// Finds the critical velocity and prints it.
-    ///
-    /// # Errors
-    /// A scene without a thickness or options that cannot be used (exit 2), no finite V_c (exit 1).
-    pub fn run(&self) -> Result<Exit, CliError> {
+    fn ask(&self) -> Result<Answer<CriticalJson>, CliError> {
         let scene = read_scene(&self.scene)?;
         if scene.thickness.is_none() {
             return Err(CliError::usage(
@@ -167,73 +138,58 @@ impl CriticalArgs {
         let spreads = sensitivity::spreads(&self.spread)?;
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let exact = critical_velocity::exact(&scene).ok();
-        if let Some(warning) = scene.exit_depth_warning() {
-            tell("warning: ", &warning);
-        }
         let problem = scene.resolve(found.velocity)?;
-        for warning in applicability::warnings(&scene, found.velocity) {
+        let exit_depth_warning = scene.exit_depth_warning();
+        for warning in exit_depth_warning.into_iter().chain(applicability::warnings(&scene, found.velocity)) {
             tell("warning: ", &warning);
         }
-        let mut report = self.report(&scene, &problem, &found, exact)?;
-        if !spreads.is_empty() {
-            if exact == Some(0.0) || found.velocity == 0.0 {
-                report
-                    .skipped
-                    .push("the uncertainty does not apply: V_c is 0, and no spread is relative to it".to_owned());
-            } else {
-                report.uncertainty = Some(self.uncertainty(&scene, &spreads)?);
-            }
-        }
-        if self.json { print_json(&report) } else { print_text(&text(&scene, &report)) }.map_err(CliError::stdout)?;
-        Ok(Exit::Success)
-    }
-
-    fn report(
-        &self,
-        scene: &Scene,
-        problem: &Problem,
-        found: &CriticalVelocity,
-        exact: Option<f64>,
-    ) -> Result<CriticalJson, CliError> {
-        let dimensionless = |energy: f64| {
-            scene.concrete().filter(|c| c.layers.is_empty()).map(|c| groups::dimensionless_energy(energy, c))
+        let is_zero = exact == Some(0.0) || found.velocity == 0.0;
+        let uncertainty = match spreads.as_slice() {
+            [_, ..] if !is_zero => Some(self.uncertainty(&scene, &spreads)?),
+            _ => None,
         };
-        let energy = |velocity: f64| 0.5 * scene.mass * velocity * velocity;
-        Ok(CriticalJson {
+        let no_spread = (is_zero && !spreads.is_empty())
+            .then(|| "the uncertainty does not apply: V_c is 0, and no spread is relative to it".to_owned());
+        let concrete = scene.concrete().filter(|concrete| concrete.layers.is_empty());
+        let dimensionless = |energy: f64| concrete.map(|concrete| groups::dimensionless_energy(energy, concrete));
+        let data = CriticalJson {
             schema: "penetrode/critical/1",
-            scene: SceneJson::new(scene, problem),
-            method: MethodJson::new(self.method.method, &self.method.options()?, Some(problem), None),
+            scene: SceneJson::new(&scene, &problem),
+            method: MethodJson::new(self.method.method, &self.method.options()?, Some(&problem), None),
             critical_velocity_m_s: found.velocity,
             error_bar_m_s: found.error_bar,
             critical_energy_j: found.energy,
             dimensionless_energy: dimensionless(found.energy),
             evaluations: found.evaluations,
             note: found.note,
-            closed_form: exact.map(|velocity| ClosedCriticalJson {
-                critical_velocity_m_s: velocity,
-                critical_energy_j: energy(velocity),
-                dimensionless_energy: dimensionless(energy(velocity)),
+            closed_form: exact.map(|velocity| {
+                let energy = 0.5 * scene.mass * velocity * velocity;
+                ClosedCriticalJson {
+                    critical_velocity_m_s: velocity,
+                    critical_energy_j: energy,
+                    dimensionless_energy: dimensionless(energy),
+                }
             }),
             relative_error: exact
                 .map(|exact| if found.velocity == exact { 0.0 } else { ((found.velocity - exact) / exact).abs() }),
-            eq15: Eq15Json::new(scene),
-            uncertainty: None,
-            skipped: Vec::new(),
-        })
+            eq15: Eq15Json::new(&scene),
+            uncertainty,
+            skipped: no_spread.into_iter().collect(),
+        };
+        Ok(Answer { text: data.text(scene.criterion), data, exit: Exit::Success })
     }
+}
 
+impl CriticalArgs {
     fn uncertainty(&self, scene: &Scene, spreads: &[Spread]) -> Result<UncertaintyJson, CliError> {
         let found = sensitivity::uncertainty(scene, spreads, self.samples as usize, self.seed)?;
+        let spread = |(spread, &share): (&Spread, &f64)| SpreadJson {
+            path: spread.parameter.to_string(),
+            relative: spread.relative,
+            share,
+        };
         Ok(UncertaintyJson {
-            spreads: spreads
-                .iter()
-                .zip(&found.shares)
-                .map(|(spread, &share)| SpreadJson {
-                    path: spread.parameter.to_string(),
-                    relative: spread.relative,
-                    share,
-                })
-                .collect(),
+            spreads: spreads.iter().zip(&found.shares).map(spread).collect(),
             first_order_m_s: found.first_order,
             samples: found.samples,
             inadmissible: found.inadmissible,
@@ -245,65 +201,72 @@ impl CriticalArgs {
     }
 }
 
-fn text(scene: &Scene, report: &CriticalJson) -> String {
-    let mut lines = Vec::new();
-    if let Some(title) = &scene.title {
-        lines.push(escape_terminal(title));
-    }
-    let criterion = match scene.criterion {
-        Criterion::FullDepth => "x = H",
-        Criterion::Ndrc => "x = x_p(H), the NDRC relation",
-    };
-    lines.push(format!("  method     {}, perforation at {criterion}", report.method.name));
-    let bar = report.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {}", error_text(Some(bar))));
-    lines.push(format!(
-        "  V_c        {}{bar} m/s, {} flights",
-        Shown(report.critical_velocity_m_s),
-        report.evaluations
-    ));
-    lines.push(format!("  E_c        {}", engineering(report.critical_energy_j, "J")));
-    if !report.note.is_empty() {
-        lines.push(wrapped("  note       ", report.note));
-    }
-    if let Some(exact) = &report.closed_form {
-        let error = error_text(report.relative_error);
-        lines.push(format!("  exact      {} m/s, relative error {error}", Shown(exact.critical_velocity_m_s)));
-    }
-    lines.extend(report.skipped.iter().map(|note| wrapped("  note       ", note)));
-    if let Some(u) = &report.uncertainty {
-        lines.push(format!("  spread     +- {:.4} m/s to first order", u.first_order_m_s));
-        for part in &u.spreads {
-            let (path, share) = (&part.path, 100.0 * part.share);
-            lines.push(format!("             {path} {} %: {share:.1} % of the variance", 100.0 * part.relative));
+impl CriticalJson {
+    fn text(&self, criterion: Criterion) -> String {
+        let criterion = match criterion {
+            Criterion::FullDepth => "x = H",
+            Criterion::Ndrc => "x = x_p(H), the NDRC relation",
+        };
+        let mut lines: Vec<_> = self.scene.title.iter().map(|title| escape_terminal(title)).collect();
+        lines.push(format!("  method     {}, perforation at {criterion}", self.method.name));
+        let bar = self.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {}", error_text(Some(bar))));
+        let velocity = Shown(self.critical_velocity_m_s);
+        lines.push(format!("  V_c        {velocity}{bar} m/s, {} flights", self.evaluations));
+        lines.push(format!("  E_c        {}", engineering(self.critical_energy_j, "J")));
+        if !self.note.is_empty() {
+            lines.push(wrapped("  note       ", self.note));
         }
-        let [low, median, high] = u.quantiles_m_s;
-        lines.push(format!("  sampled    mean {:.4}, deviation {:.4} m/s", u.mean_m_s, u.deviation_m_s));
-        lines.push(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
-        let left_out =
-            if u.inadmissible > 0 { format!(", {} inadmissible left out", u.inadmissible) } else { String::new() };
-        lines.push(format!("             {} random scenes, seed {}{left_out}", u.samples, u.seed));
+        if let Some(exact) = &self.closed_form {
+            let error = error_text(self.relative_error);
+            lines.push(format!("  exact      {} m/s, relative error {error}", Shown(exact.critical_velocity_m_s)));
+        }
+        lines.extend(self.skipped.iter().map(|note| wrapped("  note       ", note)));
+        lines.extend(self.uncertainty.iter().flat_map(UncertaintyJson::text));
+        if let Some((ours, eq15)) = self.dimensionless_energy.zip(self.eq15.as_ref()) {
+            lines.extend(eq15.text(ours));
+        }
+        lines.push(String::new());
+        lines.join("\n")
     }
-    if let (Some(ours), Some(eq15)) = (report.dimensionless_energy, &report.eq15) {
+}
+
+impl UncertaintyJson {
+    fn text(&self) -> Vec<String> {
+        let mut lines = vec![format!("  spread     +- {:.4} m/s to first order", self.first_order_m_s)];
+        for SpreadJson { path, relative, share } in &self.spreads {
+            lines.push(format!("             {path} {} %: {:.1} % of the variance", 100.0 * relative, 100.0 * share));
+        }
+        let [low, median, high] = self.quantiles_m_s;
+        lines.push(format!("  sampled    mean {:.4}, deviation {:.4} m/s", self.mean_m_s, self.deviation_m_s));
+        lines.push(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
+        let left_out = match self.inadmissible {
+            0 => String::new(),
+            count => format!(", {count} inadmissible left out"),
+        };
+        lines.push(format!("             {} random scenes, seed {}{left_out}", self.samples, self.seed));
+        lines
+    }
+}
+
+impl Eq15Json {
+    /// The formula beside `ours`, the simulated E_c/(d³ fc).
+    fn text(&self, ours: f64) -> Vec<String> {
         let mut rows = table(&["E_c/(d³ fc)", "value", "simulation over it"]);
         rows.add_row(["simulation".to_owned(), significant(ours), String::new()]);
-        let mut row = |name: &str, value: f64| {
+        for (name, value) in [("Eq. 15, printed", self.printed), ("Eq. 15, unrounded", self.unrounded)] {
             // A target without thickness needs no energy by either.
-            let over = ours / value - 1.0;
-            let over = match 100.0 * over {
+            let over = match 100.0 * (ours / value - 1.0) {
                 percent if !percent.is_finite() => "-".to_owned(),
                 percent if percent.abs() < 1e6 => format!("{percent:+.1} %"),
                 percent => format!("{percent:+.1e} %"),
             };
             rows.add_row([name.to_owned(), significant(value), over]);
-        };
-        row("Eq. 15, printed", eq15.printed);
-        row("Eq. 15, unrounded", eq15.unrounded);
-        lines.push(String::new());
-        lines.extend(table_lines(&rows));
-        if !eq15.valid {
-            lines.push(wrapped("  ", &format!("Eq. 15 does not apply: {}", eq15.note)));
         }
+        let mut lines = vec![String::new()];
+        lines.extend(table_lines(&rows));
+        if !self.valid {
+            lines.push(wrapped("  ", &format!("Eq. 15 does not apply: {}", self.note)));
+        }
+        lines
     }
-    lines.push(String::new());
-    lines.join("\n")
 }

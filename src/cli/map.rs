@@ -44,53 +44,9 @@ pub struct MapJson {
     /// Crater depth in diameters.
     pub k: f64,
     /// Lines of equal error.
-    pub lines: Vec<LineJson>,
+    pub lines: Vec<Line>,
     /// Scenes of the measured data, each with its own k.
-    pub scenes: Vec<MarkedSceneJson>,
-}
-
-/// A stretch of a line of equal error.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct LineJson {
-    /// Size of the relative error.
-    pub level: f64,
-    /// (I, N), ascending in I.
-    pub points: Vec<(f64, f64)>,
-}
-
-/// A scene of the measured data.
-#[derive(Debug, Serialize, JsonSchema)]
-#[expect(non_snake_case, reason = "the groups are named as in the paper")]
-pub struct MarkedSceneJson {
-    /// Set of data.
-    pub set: String,
-    /// Impact function.
-    pub I: f64,
-    /// Geometry function.
-    pub N: f64,
-    /// Crater depth in diameters.
-    pub k: f64,
-    /// Error of Eq. 11-12 there.
-    pub error: f64,
-}
-
-impl MapJson {
-    fn new(k: f64, lines: &[Line], scenes: &[MarkedScene]) -> Self {
-        let line = |line: &Line| LineJson { level: line.level, points: line.points.clone() };
-        let scene = |scene: &MarkedScene| MarkedSceneJson {
-            set: scene.set.clone(),
-            I: scene.impact,
-            N: scene.geometry,
-            k: scene.crater_ratio,
-            error: scene.error,
-        };
-        Self {
-            schema: "penetrode/map/1",
-            k,
-            lines: lines.iter().map(line).collect(),
-            scenes: scenes.iter().map(scene).collect(),
-        }
-    }
+    pub scenes: Vec<MarkedScene>,
 }
 
 impl MapArgs {
@@ -106,23 +62,18 @@ impl MapArgs {
         if let Some(path) = &self.out {
             check_outputs(&[], &[("the table", path), ("the figure", &path.with_extension("svg"))])?;
         }
-        let shots = experiments::shipped().map_err(|error| CliError::usage(error.to_string(), ""))?;
-        let (lines, scenes) = (applicability::lines(self.k), experiments::marked(&shots));
-        let report = MapJson::new(self.k, &lines, &scenes);
+        let scenes = experiments::marked(&experiments::shipped()?);
+        let report = MapJson { schema: "penetrode/map/1", k: self.k, lines: applicability::lines(self.k), scenes };
         if let Some(path) = &self.out {
-            let failed = |cause| CliError::write(path, cause);
-            let figure = sweep_figures::applicability(self.k, &lines, &scenes)
-                .draw()
-                .map_err(|error| failed(std::io::Error::other(error)))?
-                .file();
+            let figure = sweep_figures::applicability(self.k, &report.lines, &report.scenes);
             let mut csv = vec!["level,I,N".to_owned()];
             for line in &report.lines {
                 csv.extend(line.points.iter().map(|(i, n)| format!("{},{i},{n}", line.level)));
             }
             csv.push(String::new());
             let mut files = vec![(path.clone(), csv.join("\n").into_bytes())];
-            if !is_standard(path) {
-                files.push((path.with_extension("svg"), figure.into_bytes()));
+            if let Some(figure) = figure.filter(|_| !is_standard(path)) {
+                files.push((path.with_extension("svg"), figure.file().into_bytes()));
             }
             write_all(&files)?;
         }
@@ -150,15 +101,15 @@ impl MapArgs {
         }
         lines.extend(table_lines(&rows));
         lines.push(String::new());
-        let mut sets = table(&["measured set", "shots", "I", "N", "error, %", "in 5 %"]);
+        let mut sets = table(&["measured set", "tests", "I", "N", "error, %", "in 5 %"]);
         let mut names: Vec<&str> = report.scenes.iter().map(|scene| scene.set.as_str()).collect();
         names.dedup();
         for name in names {
             let of_set: Vec<_> = report.scenes.iter().filter(|scene| scene.set == name).collect();
-            let range = |get: fn(&MarkedSceneJson) -> f64| {
+            let range = |get: fn(&MarkedScene) -> f64| {
                 of_set.iter().map(|s| get(s)).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
             };
-            let (impact, geometry, error) = (range(|s| s.I), range(|s| s.N), range(|s| s.error));
+            let (impact, geometry, error) = (range(|s| s.impact), range(|s| s.geometry), range(|s| s.error));
             let within = of_set.iter().filter(|s| s.error.abs() <= applicability::ERROR_ALLOWED).count();
             sets.add_row([
                 (*name).to_owned(),

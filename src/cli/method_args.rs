@@ -1,4 +1,4 @@
-//! The options that choose and tune a method, shared by every command that flies.
+//! The options that choose and tune a method, shared by every command that integrates.
 
 use clap::Args;
 use schemars::JsonSchema;
@@ -10,6 +10,7 @@ use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT
 use crate::integrators::{Flight, IntegrationError, StepLimit};
 use crate::physics::Problem;
 use crate::physics::units::{Dimension, QuantityError, quantity};
+use crate::text::engineering;
 
 /// Method and options.
 #[derive(Args, Clone, Debug, Default)]
@@ -40,35 +41,32 @@ impl MethodArgs {
         let dt = self
             .dt
             .as_deref()
-            .map(|text| {
-                parse_time(text).map_err(|cause| {
-                    CliError::usage(format!("--dt {text}: {cause}"), "write a time such as \"1 us\", or seconds")
-                })
-            })
+            .map(|text| time_option(text, "write a time such as \"1 us\", or seconds"))
             .transpose()?;
         Ok(MethodOptions { rtol: self.rtol, dt, velocity: self.velocity, events: self.events })
     }
 
-    /// The method, ready to fly.
+    /// The method, ready to solve.
     ///
     /// # Errors
     /// Options that the method does not use or that are out of range.
     pub fn build(&self) -> Result<Method, CliError> {
-        let build = |options| Method::new(self.method, &options).map_err(|error| self.as_typed(error));
-        Ok(build(self.options()?)?)
+        Method::new(self.method, &self.options()?).map_err(|error| match (error, &self.dt) {
+            // The step as it was typed, `1 us` and not 1e-6.
+            (IntegrationError::BadOption { option: "--dt", allowed, .. }, Some(typed)) => {
+                IntegrationError::BadOption { option: "--dt", value: typed.clone(), allowed }.into()
+            }
+            (error, _) => error.into(),
+        })
     }
 }
 
-impl MethodArgs {
-    /// `error` with the step as it was typed, `1 us` and not 1e-6.
-    fn as_typed(&self, error: IntegrationError) -> IntegrationError {
-        match (error, &self.dt) {
-            (IntegrationError::BadOption { option: "--dt", allowed, .. }, Some(typed)) => {
-                IntegrationError::BadOption { option: "--dt", value: typed.clone(), allowed }
-            }
-            (other, _) => other,
-        }
-    }
+/// The time (s) that was given to `--dt`.
+///
+/// # Errors
+/// A text that is no time (exit 2), with `help`.
+pub fn time_option(text: &str, help: &str) -> Result<f64, CliError> {
+    parse_time(text).map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help))
 }
 
 /// `method` in the JSON of a command.
@@ -79,26 +77,26 @@ pub struct MethodJson {
     /// Relative tolerance; absent for fixed steps and closed forms, `null` for round-off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rtol: Option<Option<f64>>,
-    /// Time step [s] of a fixed-step scheme.
+    /// Time step (s) of a fixed-step scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dt_s: Option<f64>,
     /// Velocity in the drag of a fixed-step scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub velocity: Option<String>,
+    pub velocity: Option<&'static str>,
     /// Boundary rule of a fixed-step scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub events: Option<String>,
+    pub events: Option<&'static str>,
     /// Step limit of a fixed-step scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stability: Option<StabilityJson>,
 }
 
-/// Step limit of a fixed-step scheme (theory section 5).
+/// Step limit of a fixed-step scheme (`docs/theory.md`, section 5).
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct StabilityJson {
-    /// Largest stable step [s]; `null` without a limit.
+    /// Largest stable step (s); `null` without a limit.
     pub limit_s: Option<f64>,
-    /// Whether every step kept it.
+    /// Whether no step exceeds it.
     pub stable: bool,
 }
 
@@ -118,8 +116,8 @@ impl MethodJson {
                 let velocity = options.velocity.unwrap_or_default();
                 let events = options.events.unwrap_or_default();
                 json.dt_s = problem.map(|p| options.central_difference().time_step(p)).or(options.dt);
-                json.velocity = Some(velocity.to_string());
-                json.events = Some(events.to_string());
+                json.velocity = Some(velocity.name());
+                json.events = Some(events.name());
                 json.stability = flight.and_then(|f| f.step_limit).map(StabilityJson::from);
             }
             MethodName::Taylor | MethodName::Energy => json.rtol = Some(options.rtol),
@@ -128,15 +126,26 @@ impl MethodJson {
         }
         json
     }
+
+    /// The rules of a fixed-step scheme, for people.
+    pub fn rules(&self) -> String {
+        let rules = self.velocity.zip(self.events);
+        rules.map_or_else(String::new, |(velocity, events)| format!(", {velocity} drag, {events} boundaries"))
+    }
+
+    /// Name and options for people.
+    pub fn text(&self) -> String {
+        let tuning = match (self.rtol, self.dt_s) {
+            (Some(Some(rtol)), _) => format!(", rtol {rtol:e}"),
+            (Some(None), _) => ", to round-off".to_owned(),
+            (None, Some(dt)) => format!(", dt {}", engineering(dt, "s")),
+            (None, None) => String::new(),
+        };
+        format!("{}{tuning}{}", self.name, self.rules())
+    }
 }
 
-/// A time [s] from "1 us" or a bare number of seconds.
-///
-/// # Errors
-/// What is wrong with the text.
-pub fn parse_time(text: &str) -> Result<f64, QuantityError> {
-    match text.trim().parse() {
-        Ok(seconds) => Ok(seconds),
-        Err(_) => quantity(text, Dimension::Time),
-    }
+/// A time (s) from "1 us" or a bare number of seconds.
+fn parse_time(text: &str) -> Result<f64, QuantityError> {
+    text.trim().parse().or_else(|_| quantity(text, Dimension::Time))
 }

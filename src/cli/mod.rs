@@ -1,4 +1,4 @@
-//! The command line: one file per subcommand, exit codes in one place.
+//! The command line: one file per command, one table of commands, one path of errors to their exit codes.
 
 pub mod audit;
 pub mod batch;
@@ -7,7 +7,6 @@ pub mod completions;
 pub mod converge;
 pub mod critical;
 pub mod experiments;
-pub mod input;
 pub mod map;
 pub mod method_args;
 pub mod output;
@@ -19,20 +18,21 @@ pub mod stress;
 pub mod sweep;
 pub mod verify;
 
-use std::io;
+use std::io::{self, IsTerminal};
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
+use schemars::{JsonSchema, Schema, schema_for};
 use serde::Serialize;
+use serde_json::json;
 
-use crate::integrators::IntegrationError;
-use crate::physics::State;
-use crate::physics::{Problem, ResolveError, Scene, SceneError};
-use crate::report::folder::without_temporary_name;
-use crate::studies::convergence::ConvergenceError;
-use crate::studies::critical_velocity::CriticalError;
+use crate::exchange::SceneError;
+use crate::physics::{Advice, Problem, Scene, State};
+use crate::report::folder::{FolderError, without_temporary_name};
+use crate::suite::Verdict;
 
-/// How the program ended (contract, "Exit codes").
+/// How the program ended (`docs/reference.md`, "Exit codes").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
     /// All is well.
@@ -55,38 +55,22 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// What a subcommand can fail with, each with its exit code.
+impl From<Verdict> for Exit {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Passed | Verdict::Skipped => Self::Success,
+            Verdict::Failed => Self::Criterion,
+            Verdict::Undecided => Self::Undecided,
+        }
+    }
+}
+
+/// Why a command has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// A scene that cannot be used: exit 2.
+    /// A scene that cannot be used, shown with the text underlined: exit 2.
     #[error(transparent)]
     Scene(#[from] Box<SceneError>),
-    /// A request that cannot be served: exit 2.
-    #[error("{message}")]
-    Usage {
-        /// What is wrong.
-        message: String,
-        /// What to do.
-        help: String,
-    },
-    /// A computation without an answer: exit 1.
-    #[error("{message}")]
-    Run {
-        /// What happened.
-        message: String,
-        /// What to try.
-        help: String,
-        /// State reached, where there is one.
-        last: Option<State>,
-    },
-    /// An answer inside its own error bar: exit 4.
-    #[error("{message}")]
-    Undecided {
-        /// What cannot be told.
-        message: String,
-        /// What to try.
-        help: String,
-    },
     /// A result that could not be written: exit 1.
     #[error("cannot write {path}: {cause}")]
     Write {
@@ -95,65 +79,64 @@ pub enum CliError {
         /// What the system said.
         cause: io::Error,
     },
-    /// A peer that could not be started: exit 5.
-    #[error("{0}")]
-    PeerMissing(String),
+    /// Everything else.
+    #[error("{message}")]
+    Stated {
+        /// Exit code.
+        exit: Exit,
+        /// What is wrong.
+        message: String,
+        /// What to do.
+        help: String,
+        /// State reached, where there is one.
+        last: Option<State>,
+    },
 }
 
-impl From<IntegrationError> for CliError {
-    fn from(error: IntegrationError) -> Self {
-        let (message, help) = (error.to_string(), error.help().to_owned());
-        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last: error.last() } }
-    }
-}
-
-impl From<ResolveError> for CliError {
-    fn from(error: ResolveError) -> Self {
-        let (message, help) = (error.to_string(), error.help().to_owned());
-        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last: None } }
-    }
-}
-
-impl<E: std::fmt::Display> From<CriticalError<E>> for CliError {
-    fn from(error: CriticalError<E>) -> Self {
-        let message = error.to_string();
-        let (help, last) = match &error {
-            CriticalError::Flight { cause, .. } => (cause.help().to_owned(), cause.last()),
-            CriticalError::Undecided { .. } => {
-                let help =
-                    "--method taylor or energy, or a tighter --rtol, resolves more of what is left of V0²".to_owned();
-                return Self::Undecided { message, help };
-            }
-            CriticalError::NoBracket { .. } => (
-                "drag takes all speed over the thickness: check the thickness, the density and the mass; with a fixed \
-                 step, shorten --dt"
-                    .to_owned(),
-                None,
-            ),
-            _ => (String::new(), None),
+impl<E: Advice> From<E> for CliError {
+    fn from(error: E) -> Self {
+        let exit = match () {
+            () if error.is_undecided() => Exit::Undecided,
+            () if error.is_usage() => Exit::Usage,
+            () => Exit::Failed,
         };
-        if error.is_usage() { Self::Usage { message, help } } else { Self::Run { message, help, last } }
+        Self::Stated { exit, message: error.to_string(), help: error.help(), last: error.last() }
     }
 }
 
-impl From<ConvergenceError> for CliError {
-    fn from(error: ConvergenceError) -> Self {
+impl From<FolderError> for CliError {
+    fn from(error: FolderError) -> Self {
         match error {
-            ConvergenceError::Resolve(error) => error.into(),
-            ConvergenceError::Integration(error) => error.into(),
-            ConvergenceError::Critical(error) => error.into(),
+            FolderError::NotOurs { .. } => {
+                Self::usage(error.to_string(), "name another folder with --out, or move away what is there")
+            }
+            FolderError::Write { path, cause } => Self::Write { path, cause },
         }
     }
 }
 
 impl CliError {
-    /// A mistake in the request.
+    fn stated(exit: Exit, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Stated { exit, message: message.into(), help: help.into(), last: None }
+    }
+
+    /// A mistake in the request: exit 2.
     pub fn usage(message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self::Usage { message: message.into(), help: help.into() }
+        Self::stated(Exit::Usage, message, help)
+    }
+
+    /// A computation without an answer: exit 1.
+    pub fn failed(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::stated(Exit::Failed, message, help)
+    }
+
+    /// A peer that could not be started: exit 5.
+    pub fn peer_missing(message: impl Into<String>) -> Self {
+        Self::stated(Exit::PeerMissing, message, "")
     }
 
     /// A file that could not be written.
-    pub fn write(path: &std::path::Path, cause: io::Error) -> Self {
+    pub fn write(path: &Path, cause: io::Error) -> Self {
         Self::Write { path: path.display().to_string(), cause: without_temporary_name(cause) }
     }
 
@@ -164,66 +147,219 @@ impl CliError {
 
     /// The same about the file at `path`, where it is about what the file holds.
     #[must_use]
-    pub fn in_file(self, path: &str) -> Self {
-        let named = |message: String| match path {
-            "-" => format!("standard input: {message}"),
-            path => format!("{path}: {message}"),
-        };
-        match self {
-            Self::Usage { message, help } => Self::Usage { message: named(message), help },
-            Self::Run { message, help, last } => Self::Run { message: named(message), help, last },
-            Self::Undecided { message, help } => Self::Undecided { message: named(message), help },
-            other => other,
+    pub fn in_file(mut self, path: &str) -> Self {
+        if let Self::Stated { message, .. } = &mut self {
+            *message = format!("{}: {message}", if path == "-" { "standard input" } else { path });
         }
+        self
     }
 
     /// The exit code.
     pub fn exit(&self) -> Exit {
         match self {
-            Self::Scene(_) | Self::Usage { .. } => Exit::Usage,
-            Self::Run { .. } | Self::Write { .. } => Exit::Failed,
-            Self::Undecided { .. } => Exit::Undecided,
-            Self::PeerMissing(_) => Exit::PeerMissing,
+            Self::Scene(_) => Exit::Usage,
+            Self::Write { .. } => Exit::Failed,
+            Self::Stated { exit, .. } => *exit,
         }
     }
 
     /// The message for a person, on standard error.
-    pub fn render(&self, color: bool) -> String {
-        match self {
-            Self::Scene(error) => error.render(color),
-            Self::Usage { message, help } | Self::Run { message, help, .. } | Self::Undecided { message, help } => {
-                told(message, help)
-            }
-            Self::Write { cause, .. } => told(&self.to_string(), output::write_help(cause.kind())),
-            Self::PeerMissing(message) => told(message, ""),
+    fn render(&self, color: bool) -> String {
+        let help = match self {
+            Self::Scene(error) => return error.render(color),
+            Self::Write { cause, .. } => output::write_help(cause.kind()),
+            Self::Stated { help, .. } => help,
+        };
+        let line = |head, text: &str| output::wrapped(head, &output::escape_terminal(text)) + "\n";
+        let help = if help.is_empty() { String::new() } else { line(" help: ", help) };
+        line("error: ", &self.to_string()) + &help
+    }
+
+    /// The JSON of a command that failed or could not decide.
+    fn json(&self, command: &str) -> serde_json::Value {
+        let last = if let Self::Stated { last, .. } = self { *last } else { None };
+        json!({
+            "schema": format!("penetrode/{command}/1"),
+            "error": {
+                "message": self.to_string(),
+                "time_s": last.map(|s| s.time),
+                "depth_m": last.map(|s| s.depth),
+                "velocity_m_s": last.map(|s| s.velocity),
+            },
+        })
+    }
+}
+
+/// A command, with its arguments.
+pub trait Run {
+    /// Does what the command is for.
+    ///
+    /// # Errors
+    /// [`CliError`], with the exit code.
+    fn run(&self) -> Result<Exit, CliError>;
+
+    /// Whether JSON is asked for.
+    fn wants_json(&self) -> bool {
+        false
+    }
+
+    /// Schema of that JSON, where the command has one.
+    fn schema() -> Option<Schema>
+    where
+        Self: Sized,
+    {
+        None
+    }
+}
+
+/// A command with one answer, for people and as JSON.
+pub trait Ask: Args {
+    /// What `--json` prints.
+    type Answer: Serialize + JsonSchema;
+
+    /// The answer to these arguments; files are written.
+    ///
+    /// # Errors
+    /// [`CliError`], with the exit code.
+    fn ask(&self) -> Result<Answer<Self::Answer>, CliError>;
+
+    /// The table that the command writes: on standard output (`-`) it takes the place of the answer.
+    fn table(&self) -> Option<&Path> {
+        None
+    }
+}
+
+/// What a command found.
+#[derive(Debug)]
+pub struct Answer<T> {
+    /// For programs.
+    pub data: T,
+    /// For people.
+    pub text: String,
+    /// Exit code.
+    pub exit: Exit,
+}
+
+/// A command that prints its answer, as JSON if asked.
+#[derive(Args, Debug)]
+pub struct Printing<A: Args> {
+    /// Its own arguments.
+    #[command(flatten)]
+    pub args: A,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl<A: Ask> Run for Printing<A> {
+    fn run(&self) -> Result<Exit, CliError> {
+        let is_table_printed = output::takes_standard_output(self.args.table(), self.json)?;
+        let answer = self.args.ask()?;
+        if !is_table_printed {
+            if self.json { output::print_json(&answer.data) } else { output::print_text(&answer.text) }
+                .map_err(CliError::stdout)?;
         }
+        Ok(answer.exit)
+    }
+
+    fn wants_json(&self) -> bool {
+        self.json
+    }
+
+    fn schema() -> Option<Schema> {
+        Some(schema_for!(A::Answer))
     }
 }
 
-/// A message and what to do, for a terminal.
-fn told(message: &str, help: &str) -> String {
-    let mut text = output::wrapped("error: ", &output::escape_terminal(message));
-    text.push('\n');
-    if !help.is_empty() {
-        text.push_str(&output::wrapped(" help: ", &output::escape_terminal(help)));
-        text.push('\n');
+/// Commands that print for themselves.
+macro_rules! printing_for_themselves {
+    ($($arguments:ty => $json:ty,)+) => {
+        $(impl Run for $arguments {
+            fn run(&self) -> Result<Exit, CliError> {
+                <$arguments>::run(self)
+            }
+
+            fn wants_json(&self) -> bool {
+                self.json
+            }
+
+            fn schema() -> Option<Schema> {
+                Some(schema_for!($json))
+            }
+        })+
+    };
+}
+
+printing_for_themselves! {
+    audit::AuditArgs => crate::studies::audit::Audit,
+    bench::BenchArgs => crate::report::bench::BenchJson,
+    experiments::ExperimentsArgs => experiments::ExperimentsJson<'static>,
+    map::MapArgs => map::MapJson,
+    stress::StressArgs => crate::report::StressJson<'static>,
+    sweep::SweepArgs => sweep::SweepJson<'static>,
+    verify::VerifyArgs => crate::report::VerifyJson<'static>,
+}
+
+impl Run for batch::BatchArgs {
+    fn run(&self) -> Result<Exit, CliError> {
+        Self::run(self)
     }
-    text
 }
 
-/// The JSON verdict of a run that failed (exit 1) or could not decide (exit 4).
-#[derive(Serialize)]
-struct FailureJson {
-    schema: String,
-    error: ErrorJson,
+/// The table of commands: description, variant, name, arguments.
+macro_rules! commands {
+    ($($(#[doc = $doc:literal])+ $variant:ident = $name:literal: $arguments:ty,)+) => {
+        /// The commands.
+        #[derive(Subcommand, Debug)]
+        pub enum Command {
+            $($(#[doc = $doc])+ #[command(name = $name)] $variant($arguments),)+
+        }
+
+        impl Command {
+            /// Name, and what runs.
+            fn entry(&self) -> (&'static str, &dyn Run) {
+                match self {
+                    $(Self::$variant(arguments) => ($name, arguments),)+
+                }
+            }
+
+            /// Name and schema of each command that prints JSON.
+            fn schemas() -> impl Iterator<Item = (&'static str, Schema)> {
+                [$(($name, <$arguments>::schema as fn() -> Option<Schema>),)+]
+                    .into_iter()
+                    .filter_map(|(name, schema)| Some((name, schema()?)))
+            }
+        }
+    };
 }
 
-#[derive(Serialize)]
-struct ErrorJson {
-    message: String,
-    time_s: Option<f64>,
-    depth_m: Option<f64>,
-    velocity_m_s: Option<f64>,
+commands! {
+    /// One scene solved: depth, times and velocities, beside the exact answer.
+    Solve = "solve": Printing<solve::SolveArgs>,
+    /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
+    Critical = "critical": Printing<critical::CriticalArgs>,
+    /// Many scenes from a table, one line of results each.
+    Batch = "batch": batch::BatchArgs,
+    /// Order of convergence of every quantity, fitted and classified.
+    Converge = "converge": Printing<converge::ConvergeArgs>,
+    /// V_c, E_c/(d³ fc), depth and Eq. 15 along one number of a scene, or over two.
+    Sweep = "sweep": sweep::SweepArgs,
+    /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
+    Map = "map": map::MapArgs,
+    /// What an accuracy costs: time and work against error, and the largest steps.
+    Bench = "bench": bench::BenchArgs,
+    /// Measured penetration depths beside predicted ones: shipped data or your own.
+    Experiments = "experiments": experiments::ExperimentsArgs,
+    /// Order, error band and verdict for step-size results of another code.
+    Audit = "audit": audit::AuditArgs,
+    /// The verification suite and its report.
+    Verify = "verify": verify::VerifyArgs,
+    /// Numerical stability and event stress cases, and random scenes by the million.
+    Stress = "stress": stress::StressArgs,
+    /// JSON schema of what a command prints.
+    Schema = "schema": schema::SchemaArgs,
+    /// Shell completion.
+    Completions = "completions": completions::CompletionsArgs,
 }
 
 /// penetrode: verify integrators of the equation of motion of a rigid projectile in concrete.
@@ -231,143 +367,38 @@ struct ErrorJson {
 /// M dV/dt = -F(x, V); F = c x in the crater, P + Q V² in the tunnel, until rest or the far side. Every method's
 /// answer stands beside the exact one.
 #[derive(Parser, Debug)]
-#[command(name = "penetrode", version, max_term_width = 80, arg_required_else_help = true, after_help = EXIT_HELP)]
+#[command(name = "penetrode", version, max_term_width = 80, arg_required_else_help = true, after_help = AFTER_HELP)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
 }
 
-const EXIT_HELP: &str = "Exit codes: 0 all is well, 1 the run failed, 2 usage or input, 3 a criterion failed, \
-                         4 undecided, 5 a required peer program is missing.";
-
-/// The subcommands.
-#[derive(Subcommand, Debug)]
-pub enum Command {
-    /// One flight: depth, times and velocities, beside the exact answer.
-    Solve(solve::SolveArgs),
-    /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
-    Critical(critical::CriticalArgs),
-    /// Many scenes from a table, one line of results each.
-    Batch(batch::BatchArgs),
-    /// Order of convergence of every quantity, fitted and classified.
-    Converge(converge::ConvergeArgs),
-    /// V_c, E_c/(d³ fc), depth and Eq. 15 along one number of a scene, or over two.
-    Sweep(sweep::SweepArgs),
-    /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
-    Map(map::MapArgs),
-    /// What an accuracy costs: time and work against error, and the largest steps.
-    Bench(bench::BenchArgs),
-    /// Measured penetration depths beside predicted ones: shipped data or your own.
-    Experiments(experiments::ExperimentsArgs),
-    /// Order, error band and verdict for step-size results of another code.
-    Audit(audit::AuditArgs),
-    /// The verification suite and its report.
-    Verify(verify::VerifyArgs),
-    /// Numerical stability and event stress cases, and random scenes by the million.
-    Stress(stress::StressArgs),
-    /// JSON schema of what a command prints.
-    Schema(schema::SchemaArgs),
-    /// Shell completion.
-    Completions(completions::CompletionsArgs),
-}
-
-impl Command {
-    fn name(&self) -> &'static str {
-        match self {
-            Self::Solve(_) => "solve",
-            Self::Critical(_) => "critical",
-            Self::Batch(_) => "batch",
-            Self::Converge(_) => "converge",
-            Self::Sweep(_) => "sweep",
-            Self::Map(_) => "map",
-            Self::Bench(_) => "bench",
-            Self::Experiments(_) => "experiments",
-            Self::Audit(_) => "audit",
-            Self::Verify(_) => "verify",
-            Self::Stress(_) => "stress",
-            Self::Schema(_) => "schema",
-            Self::Completions(_) => "completions",
-        }
-    }
-
-    fn wants_json(&self) -> bool {
-        match self {
-            Self::Solve(args) => args.json,
-            Self::Critical(args) => args.json,
-            Self::Converge(args) => args.json,
-            Self::Sweep(args) => args.json,
-            Self::Map(args) => args.json,
-            Self::Bench(args) => args.json,
-            Self::Experiments(args) => args.json,
-            Self::Audit(args) => args.json,
-            Self::Verify(args) => args.json,
-            Self::Stress(args) => args.json,
-            _ => false,
-        }
-    }
-
-    fn run(&self) -> Result<Exit, CliError> {
-        match self {
-            Self::Solve(args) => args.run(),
-            Self::Critical(args) => args.run(),
-            Self::Batch(args) => args.run(),
-            Self::Converge(args) => args.run(),
-            Self::Sweep(args) => args.run(),
-            Self::Map(args) => args.run(),
-            Self::Bench(args) => args.run(),
-            Self::Experiments(args) => args.run(),
-            Self::Audit(args) => args.run(),
-            Self::Verify(args) => args.run(),
-            Self::Stress(args) => args.run(),
-            Self::Schema(args) => args.run(),
-            Self::Completions(args) => args.run(),
-        }
-    }
-}
+const AFTER_HELP: &str = "Example: penetrode solve scene.toml\n\nExit codes: 0 all is well, 1 the run failed, 2 usage or \
+                          input, 3 a criterion failed, 4 undecided, 5 a required peer program is missing.";
 
 impl Cli {
     /// Runs the command, reports an error on standard error, and says how it ended.
     pub fn run(&self) -> Exit {
-        match self.command.run() {
-            Ok(exit) => exit,
-            Err(error) => {
-                if matches!(error.exit(), Exit::Failed | Exit::Undecided) && self.command.wants_json() {
-                    let last = match &error {
-                        CliError::Run { last, .. } => *last,
-                        _ => None,
-                    };
-                    let failure = FailureJson {
-                        schema: format!("penetrode/{}/1", self.command.name()),
-                        error: ErrorJson {
-                            message: error.to_string(),
-                            time_s: last.map(|s| s.time),
-                            depth_m: last.map(|s| s.depth),
-                            velocity_m_s: last.map(|s| s.velocity),
-                        },
-                    };
-                    // The message below still reaches the person if standard output is gone.
-                    let _ = output::print_json(&failure);
-                }
-                output::tell_line(error.render(is_terminal_stderr()).trim_end_matches('\n'));
-                error.exit()
+        let (name, command) = self.command.entry();
+        command.run().unwrap_or_else(|error| {
+            if matches!(error.exit(), Exit::Failed | Exit::Undecided) && command.wants_json() {
+                // The message below still reaches the person if standard output is gone.
+                let _ = output::print_json(&error.json(name));
             }
-        }
+            let color = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+            output::tell_line(error.render(color).trim_end_matches('\n'));
+            error.exit()
+        })
     }
 }
 
 /// The scene in the file at `path`; `-` is standard input.
 fn read_scene(path: &str) -> Result<Scene, Box<SceneError>> {
-    Scene::read(std::path::Path::new(path))
+    Scene::read(Path::new(path))
 }
 
 /// The problem of `scene`, read from `path`; what is wrong with it names the file.
 fn problem_of(scene: &Scene, path: &str) -> Result<Problem, CliError> {
     scene.problem().map_err(|error| CliError::from(error).in_file(path))
-}
-
-/// Whether standard error is a terminal that wants colour.
-fn is_terminal_stderr() -> bool {
-    use std::io::IsTerminal;
-    io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }

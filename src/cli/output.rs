@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::CliError;
 use crate::report::folder::TEMPORARY;
-use crate::studies::table_text::steers;
+pub use crate::text::{engineering, error_text, harmless as escape_terminal, significant};
 
 /// Prints `value` as pretty JSON on standard output.
 ///
@@ -44,29 +44,16 @@ pub fn unless_closed(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Width of what is printed for people [characters].
+/// Width of what is printed for people (characters).
 pub const WIDTH: usize = 80;
 
 /// `text` in lines of [`WIDTH`] at most, behind `head`; further lines are indented by as much as `head` is long.
 ///
 /// A word that is longer than a line stays whole: a path is copied, not read.
 pub fn wrapped(head: &str, text: &str) -> String {
-    let indent = " ".repeat(head.chars().count());
-    let mut lines = vec![head.to_owned()];
-    let mut is_first = true;
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if is_first || line.chars().count() + 1 + word.chars().count() <= WIDTH => {
-                if !is_first {
-                    line.push(' ');
-                }
-                line.push_str(word);
-            }
-            _ => lines.push(format!("{indent}{word}")),
-        }
-        is_first = false;
-    }
-    lines.join("\n")
+    let indent = head.chars().count();
+    let lines = crate::text::wrapped(text, WIDTH.saturating_sub(indent));
+    format!("{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
 }
 
 /// Tells a person on standard error, `head` (`warning: `) in front.
@@ -244,61 +231,6 @@ pub fn check_format(path: &Path) -> Result<(), CliError> {
     ))
 }
 
-/// Characters of a text from a file that steer a terminal, made visible: a title must not drive it, nor turn its lines.
-pub fn escape_terminal(text: &str) -> String {
-    text.chars().map(|c| if steers(c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
-}
-
-/// `value` with an SI prefix and six significant digits: `144.826 mm`, `8.48230 MN`.
-pub fn engineering(value: f64, unit: &str) -> String {
-    const PREFIXES: [(i32, &str); 9] =
-        [(-12, "p"), (-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G"), (12, "T")];
-    if value == 0.0 {
-        return format!("0 {unit}");
-    }
-    if !value.is_finite() {
-        return format!("{value} {unit}");
-    }
-    // Rounding to six digits first, so that 999.9999 becomes 1.00000 k.
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    let exponent = rounded.abs().log10().floor() as i32;
-    let thousands = exponent.div_euclid(3) * 3;
-    match PREFIXES.iter().find(|(power, _)| *power == thousands) {
-        Some((power, prefix)) => {
-            let scaled = rounded / 10f64.powi(*power);
-            let decimals = (5 - (exponent - thousands)).clamp(0, 5) as usize;
-            format!("{scaled:.decimals$} {prefix}{unit}")
-        }
-        None => format!("{rounded:.5e} {unit}"),
-    }
-}
-
-/// `value` to six significant digits without a prefix: plain between 1e-4 and 1e7, scientific beyond.
-pub fn significant(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !value.is_finite() {
-        return value.to_string();
-    }
-    let magnitude = value.abs();
-    if (1e-4..1e7).contains(&magnitude) {
-        let decimals = (5 - magnitude.log10().floor() as i32).clamp(0, 9) as usize;
-        format!("{value:.decimals$}")
-    } else {
-        format!("{value:.5e}")
-    }
-}
-
-/// A relative error for people: two digits, `0` when there is none, a dash where it is not known.
-pub fn error_text(value: Option<f64>) -> String {
-    match value {
-        None => "-".to_owned(),
-        Some(0.0) => "0".to_owned(),
-        Some(e) => format!("{e:.1e}"),
-    }
-}
-
 /// An empty table in the house style: no frame, so that it copies well.
 pub fn table(header: &[&str]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
@@ -314,25 +246,4 @@ pub fn table(header: &[&str]) -> comfy_table::Table {
 pub fn table_lines(table: &comfy_table::Table) -> Vec<String> {
     // The style pads each cell by one blank.
     table.to_string().lines().map(|line| format!(" {line}").trim_end().to_owned()).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn engineering_prefixes_turn_at_a_thousand_after_rounding() {
-        assert_eq!(engineering(0.144_826_2, "m"), "144.826 mm");
-        assert_eq!(engineering(999.999_9, "s"), "1.00000 ks");
-        assert_eq!(engineering(-8.482_3e6, "N"), "-8.48230 MN");
-        assert_eq!(engineering(0.0, "m"), "0 m");
-        assert_eq!(engineering(1e-30, "m"), "1.00000e-30 m");
-    }
-
-    #[test]
-    fn significant_digits_are_six_everywhere() {
-        assert_eq!(significant(6.215_430_1), "6.21543");
-        assert_eq!(significant(1e-9), "1.00000e-9");
-        assert_eq!(significant(123_456.7), "123457");
-    }
 }

@@ -3,12 +3,12 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::physics::{Concrete, CraterStiffness, Problem, Resistance, Scene};
-use crate::studies::peers::StageJson;
+use crate::exchange::peers::StageJson;
+use crate::physics::{Concrete, CraterStiffness, Problem, Scene};
 
 /// The scene in SI units; what a scene of stages does not have is `null`.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "the contract names every field with its unit")]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct SceneJson {
     pub title: Option<String>,
     pub mass_kg: f64,
@@ -34,32 +34,28 @@ pub struct SceneJson {
 impl SceneJson {
     /// `scene` as it resolved into `problem`.
     pub fn new(scene: &Scene, problem: &Problem) -> Self {
-        let concrete = match &scene.resistance {
-            Resistance::Concrete(concrete) => Some(concrete),
-            Resistance::Stages(_) => None,
-        };
+        let concrete = scene.concrete();
+        let of = |get: fn(&Concrete) -> f64| concrete.map(get);
         // A layered target has no strength of its own: its layers are in the stages.
         let homogeneous = concrete.filter(|c| c.layers.is_empty());
-        let of = |get: fn(&Concrete) -> f64| concrete.map(get);
-        let crater_stiffness_n_m = problem.crater.map(|i| problem.stages[i].stiffness).or_else(|| {
-            concrete.and_then(|c| match c.crater_stiffness {
-                CraterStiffness::Given(value) => Some(value),
-                CraterStiffness::Continuous => None,
-            })
+        let of_one = |get: fn(&Concrete) -> f64| homogeneous.map(get);
+        let given_stiffness = concrete.and_then(|c| match c.crater_stiffness {
+            CraterStiffness::Given(value) => Some(value),
+            CraterStiffness::Continuous => None,
         });
         Self {
             title: scene.title.clone(),
             mass_kg: scene.mass,
             diameter_m: of(|c| c.diameter),
             nose_factor: of(|c| c.nose_factor),
-            strength_pa: homogeneous.map(|c| c.strength),
-            density_kg_m3: homogeneous.map(|c| c.density),
+            strength_pa: of_one(|c| c.strength),
+            density_kg_m3: of_one(|c| c.density),
             thickness_m: scene.thickness,
-            static_factor: homogeneous.map(|c| c.static_factor),
+            static_factor: of_one(|c| c.static_factor),
             inertia_factor: of(|c| c.inertia_factor),
             crater_ratio: of(|c| c.crater_ratio),
             velocity_m_s: problem.impact_speed,
-            crater_stiffness_n_m,
+            crater_stiffness_n_m: problem.crater.map(|i| problem.stages[i].stiffness).or(given_stiffness),
             static_force_n: homogeneous.and(scene.static_force()),
             drag_kg_m: homogeneous.and(scene.drag()),
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),

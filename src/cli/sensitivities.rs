@@ -45,11 +45,11 @@ impl SensitivitiesJson {
     /// Sensitivities of `scene` at its impact velocity.
     ///
     /// # Errors
-    /// As the flight of the scene.
+    /// [`SensitivityError`](crate::studies::sensitivity::SensitivityError): the scene does not resolve, or has no solution.
     pub fn new(scene: &Scene) -> Result<Self, CliError> {
-        let flown = by_taylor(scene)?;
+        let integrated = by_taylor(scene)?;
         let exact = by_closed_form(scene)?;
-        let q = flown.quantities;
+        let q = integrated.quantities;
         let entry = |s: &Sensitivity| {
             let of = |derivative: Option<f64>, quantity: Option<f64>| {
                 derivative.map(|d| DerivativeJson { derivative: d, elasticity: elasticity(Some(d), quantity, s.value) })
@@ -64,9 +64,9 @@ impl SensitivitiesJson {
         };
         Ok(Self {
             method: "taylor",
-            disagreement: exact.disagreement(&flown),
-            parameters: flown.entries.iter().map(entry).collect(),
-            notes: flown.notes,
+            disagreement: exact.disagreement(&integrated),
+            parameters: integrated.entries.iter().map(entry).collect(),
+            notes: integrated.notes,
         })
     }
 

@@ -6,19 +6,19 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::input::table_text;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{
     WIDTH, check_format, check_outputs, escape_terminal, is_standard, print_json, print_text, significant, table,
     table_lines, takes_standard_output, tell, wrapped, write_all,
 };
 use super::{CliError, Exit, read_scene};
+#[cfg(feature = "parquet")]
+use crate::exchange::tables::{Cells, Kind, parquet::ParquetWriter};
+use crate::exchange::tables::{name_of, push_line, read_bytes};
 use crate::integrators::Method;
-use crate::physics::{Criterion, Outcome};
-use crate::report::figure::Figure;
+use crate::physics::{Criterion, Outcome, Parameter};
 use crate::report::sweep_figures;
-use crate::studies::columns::Cells;
-use crate::studies::sweep::{Axis, Plan, Row, SweepError, explanation, read_points};
+use crate::studies::sweep::{Axis, COLUMNS, POINTS, Plan, Row, explanation, read_points};
 
 /// Rows of the table for people; all rows are in the CSV and the JSON.
 const ROWS_SHOWN: usize = 24;
@@ -29,7 +29,7 @@ const ROWS_SHOWN: usize = 24;
     target.density, target.thickness, resistance.S, resistance.B, resistance.k, resistance.crater_stiffness, \
     impact.velocity, target.layer.0.strength and its like, stage.0.drag and its like; or a group: H/d moves the \
     thickness, I the velocity, N the density. A and B may have units: target.strength=20MPa:60MPa:5.\n\n\
-    Where S follows Eq. 14 it is computed anew for each strength. Without impact velocity no flight is flown.\n\n\
+    Where S follows Eq. 14 it is computed anew for each strength. Without impact velocity only V_c is computed.\n\n\
     Files: --out F.csv writes the table and, beside it, F.svg (along H/d: Figure 4) and F-difference.svg (Figure 5).")]
 pub struct SweepArgs {
     /// Scene file (TOML), or - for standard input.
@@ -53,111 +53,39 @@ pub struct SweepArgs {
 
 /// What `sweep --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct SweepJson {
+pub struct SweepJson<'a> {
     /// `penetrode/sweep/1`.
     pub schema: &'static str,
     /// Title of the scene.
-    pub title: Option<String>,
-    /// Method of the flights.
+    pub title: Option<&'a str>,
+    /// Method of solution.
     pub method: MethodJson,
     /// Criterion of `critical_velocity_m_s` and `dimensionless_energy`: `full-depth` or `ndrc`.
     pub criterion: &'static str,
     /// What was varied, in the order of `values`.
-    pub axes: Vec<AxisJson>,
+    pub axes: &'a [Axis],
     /// Whether S was computed anew from each strength (Eq. 14).
     pub static_factor_follows_strength: bool,
     /// The points; the last axis runs fastest.
-    pub rows: Vec<RowJson>,
+    pub rows: &'a [Row],
     /// Measured points beside the curves at the same H/d.
-    pub data: Vec<DataJson>,
+    pub data: Vec<MeasuredPoint>,
     /// Why the curves along H/d differ; empty along anything else.
     pub explanation: String,
     /// Rows without an answer.
     pub bad_rows: usize,
 }
 
-/// One axis.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct AxisJson {
-    /// Path of the number.
-    pub path: String,
-    /// First value, SI.
-    pub from: f64,
-    /// Last value, SI.
-    pub to: f64,
-    /// How many values.
-    pub count: usize,
-    /// Spaced by ratio.
-    pub logarithmic: bool,
-}
-
-/// One point; `null` where there is no such value.
-#[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "the contract names every field with its unit")]
-pub struct RowJson {
-    pub values: Vec<f64>,
-    pub outcome: Option<&'static str>,
-    pub depth_m: Option<f64>,
-    pub velocity_m_s: Option<f64>,
-    pub critical_velocity_m_s: Option<f64>,
-    pub critical_energy_j: Option<f64>,
-    pub dimensionless_energy: Option<f64>,
-    pub eq15_printed: Option<f64>,
-    pub eq15_unrounded: Option<f64>,
-    /// `dimensionless_energy` over `eq15_printed`, less one.
-    pub difference_printed: Option<f64>,
-    /// `dimensionless_energy` over `eq15_unrounded`, less one.
-    pub difference_unrounded: Option<f64>,
-    /// `E_c/(d³ fc)` with x = H, along H/d.
-    pub energy_full_depth: Option<f64>,
-    /// `E_c/(d³ fc)` with x = x_p(H), along H/d.
-    pub energy_ndrc: Option<f64>,
-    #[serde(rename = "H_over_d")]
-    pub thickness_ratio: Option<f64>,
-    #[serde(rename = "N")]
-    pub geometry: Option<f64>,
-    pub error: String,
-}
-
 /// A measured point and the curves there, all as `E_c/(d³ fc)`.
 #[derive(Debug, Serialize, JsonSchema)]
 #[expect(missing_docs, reason = "named as the columns and curves")]
-pub struct DataJson {
+pub struct MeasuredPoint {
     #[serde(rename = "H_over_d")]
     pub thickness_ratio: f64,
     pub measured: f64,
     pub energy_full_depth: Option<f64>,
     pub energy_ndrc: Option<f64>,
     pub eq15_printed: Option<f64>,
-}
-
-impl From<&Row> for RowJson {
-    fn from(row: &Row) -> Self {
-        Self {
-            values: row.values.to_vec(),
-            outcome: row.flight.map(|f| f.outcome.name()),
-            depth_m: row.flight.map(|f| f.depth),
-            velocity_m_s: row.flight.map(|f| f.velocity),
-            critical_velocity_m_s: row.critical_velocity,
-            critical_energy_j: row.critical_energy,
-            dimensionless_energy: row.dimensionless_energy,
-            eq15_printed: row.eq15_printed,
-            eq15_unrounded: row.eq15_unrounded,
-            difference_printed: row.difference_printed(),
-            difference_unrounded: row.difference_unrounded(),
-            energy_full_depth: row.energy_full_depth,
-            energy_ndrc: row.energy_ndrc,
-            thickness_ratio: row.thickness_ratio,
-            geometry: row.geometry,
-            error: row.error.clone(),
-        }
-    }
-}
-
-impl From<SweepError> for CliError {
-    fn from(error: SweepError) -> Self {
-        Self::Usage { message: error.to_string(), help: error.help() }
-    }
 }
 
 impl SweepArgs {
@@ -217,40 +145,30 @@ impl SweepArgs {
         read_data(path)
     }
 
-    fn report(&self, plan: &Plan, rows: &[Row], data: Vec<DataJson>) -> Result<SweepJson, CliError> {
+    fn report<'a>(&self, plan: &'a Plan, rows: &'a [Row], data: Vec<MeasuredPoint>) -> Result<SweepJson<'a>, CliError> {
         Ok(SweepJson {
             schema: "penetrode/sweep/1",
-            title: plan.scene().title.clone(),
+            title: plan.scene().title.as_deref(),
             method: MethodJson::new(self.method.method, &self.method.options()?, None, None),
             criterion: match plan.scene().criterion {
                 Criterion::FullDepth => "full-depth",
                 Criterion::Ndrc => "ndrc",
             },
-            axes: plan
-                .axes()
-                .iter()
-                .map(|axis| AxisJson {
-                    path: axis.parameter.to_string(),
-                    from: axis.from,
-                    to: axis.to,
-                    count: axis.count,
-                    logarithmic: axis.logarithmic,
-                })
-                .collect(),
+            axes: plan.axes(),
             static_factor_follows_strength: plan.moves_static_factor(),
-            rows: rows.iter().map(RowJson::from).collect(),
+            rows,
             data,
             explanation: explanation(plan, rows),
             bad_rows: rows.iter().filter(|row| !row.error.is_empty()).count(),
         })
     }
 
-    fn text(&self, plan: &Plan, rows: &[Row], report: &SweepJson) -> String {
+    fn text(&self, plan: &Plan, rows: &[Row], report: &SweepJson<'_>) -> String {
         let mut lines = Vec::new();
         if let Some(title) = &report.title {
             lines.push(escape_terminal(title));
         }
-        let paths: Vec<_> = report.axes.iter().map(|axis| axis.path.as_str()).collect();
+        let paths: Vec<_> = report.axes.iter().map(|axis| axis.parameter.to_string()).collect();
         let over = format!("{} points over {}, criterion {}", rows.len(), paths.join(" and "), report.criterion);
         lines.push(wrapped("  ", &over));
         if report.static_factor_follows_strength {
@@ -311,9 +229,7 @@ impl SweepArgs {
 
 /// Measured points of the file at `path`.
 pub(super) fn read_data(path: &Path) -> Result<Vec<(f64, f64)>, CliError> {
-    let help = "give a CSV with the columns `H/d` and `E_c/(d3 fc)`, separated by commas, one number each a line";
-    let text = table_text(path, help)?;
-    read_points(&text).map_err(|error| CliError::usage(format!("{}: {error}", path.display()), help))
+    Ok(read_points(&name_of(path), &read_bytes(path, &POINTS)?)?)
 }
 
 /// What a column of the table for people shows of a row; `None` where the row has no such value.
@@ -324,15 +240,15 @@ const TEXT_COLUMNS: [Column; 7] = [
     ("V_c", |row| row.critical_velocity.map(significant)),
     ("E_c", |row| row.dimensionless_energy.map(significant)),
     ("Eq. 15", |row| row.eq15_printed.map(significant)),
-    ("over it", |row| row.difference_printed().map(|d| format!("{:+.1} %", 100.0 * d))),
-    ("ends", |row| row.flight.map(|f| f.outcome.name().replace("stopped-in-", "in "))),
-    ("X", |row| row.flight.map(|f| significant(f.depth))),
-    ("V", |row| row.flight.map(|f| significant(f.velocity))),
+    ("over it", |row| row.difference_printed.map(|d| format!("{:+.1} %", 100.0 * d))),
+    ("ends", |row| row.outcome.map(|outcome| outcome.name().replace("stopped-in-", "in "))),
+    ("X", |row| row.depth.map(significant)),
+    ("V", |row| row.velocity.map(significant)),
 ];
 
 /// The rows for people, with the first `count` columns behind the varied numbers, and the names of the others; a column
 /// that no row fills is no column, nor is Eq. 15 where two numbers vary.
-fn points_table(paths: &[&str], rows: &[&Row], count: usize) -> (comfy_table::Table, Vec<&'static str>) {
+fn points_table(paths: &[String], rows: &[&Row], count: usize) -> (comfy_table::Table, Vec<&'static str>) {
     let is_shown =
         |(name, cell): &&Column| rows.iter().any(|row| cell(row).is_some()) && !(*name == "Eq. 15" && paths.len() > 1);
     let mut columns: Vec<&Column> = TEXT_COLUMNS.iter().filter(is_shown).collect();
@@ -354,26 +270,19 @@ fn points_table(paths: &[&str], rows: &[&Row], count: usize) -> (comfy_table::Ta
 }
 
 /// The curves at the measured points, computed there and not interpolated.
-fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<DataJson>, CliError> {
+fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<MeasuredPoint>, CliError> {
     let mut data = Vec::with_capacity(points.len());
     for &(ratio, measured) in points {
-        let axis = Axis {
-            parameter: crate::studies::parameter::Parameter::ThicknessRatio,
-            from: ratio,
-            to: ratio,
-            count: 1,
-            logarithmic: false,
-        };
+        let parameter = Parameter::ThicknessRatio;
+        let axis = Axis { parameter, from: ratio, to: ratio, count: 1, logarithmic: false };
         let there = Plan::new(plan.scene().clone(), &[axis])?.run(method.integrator());
-        for row in there {
-            data.push(DataJson {
-                thickness_ratio: ratio,
-                measured,
-                energy_full_depth: row.energy_full_depth,
-                energy_ndrc: row.energy_ndrc,
-                eq15_printed: row.eq15_printed,
-            });
-        }
+        data.extend(there.into_iter().map(|row| MeasuredPoint {
+            thickness_ratio: ratio,
+            measured,
+            energy_full_depth: row.energy_full_depth,
+            energy_ndrc: row.energy_ndrc,
+            eq15_printed: row.eq15_printed,
+        }));
     }
     Ok(data)
 }
@@ -403,15 +312,13 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
     } else {
         vec![sweep_figures::critical_velocity(plan, rows)]
     };
-    let columns = columns_of(plan, rows);
     #[cfg(feature = "parquet")]
-    let bytes = if super::output::is_parquet(path) { parquet_of(columns) } else { csv_of(&columns) };
+    let bytes = if super::output::is_parquet(path) { parquet_of(plan, rows) } else { Ok(csv_of(plan, rows)) };
     #[cfg(not(feature = "parquet"))]
-    let bytes = csv_of(&columns);
+    let bytes = Ok(csv_of(plan, rows));
     let mut files = vec![(path.to_owned(), bytes.map_err(|cause| CliError::write(path, cause))?)];
     for (figure_path, figure) in figure_paths(path, plan).into_iter().zip(figures) {
-        let drawn = figure.map(Figure::draw).transpose();
-        match drawn.map_err(|error| CliError::write(&figure_path, std::io::Error::other(error)))? {
+        match figure {
             Some(figure) => files.push((figure_path, figure.file().into_bytes())),
             // A sweep of bad rows has a table, and nothing to draw.
             None => tell("warning: ", &format!("{} not written: no point in its range", figure_path.display())),
@@ -420,52 +327,27 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
     write_all(&files)
 }
 
-/// The table: the columns of the contract, then those that it allows to add.
-fn columns_of(plan: &Plan, rows: &[Row]) -> Vec<(String, Cells)> {
-    type Number = fn(&Row) -> Option<f64>;
-    let numbers = |number: Number| Cells::Numbers(rows.iter().map(number).collect());
-    let mut columns: Vec<(String, Cells)> = Vec::new();
-    for (index, axis) in plan.axes().iter().enumerate() {
-        let values = rows.iter().map(|row| row.values.get(index).copied()).collect();
-        columns.push((axis.parameter.to_string(), Cells::Numbers(values)));
+fn csv_of(plan: &Plan, rows: &[Row]) -> Vec<u8> {
+    let axes = plan.axes().iter().map(|axis| axis.parameter.to_string());
+    let names: Vec<_> = axes.chain(COLUMNS.map(|(name, ..)| name.to_owned())).collect();
+    let mut csv = names.join(",") + "\n";
+    for row in rows {
+        push_line(&mut csv, &row.cells());
     }
-    let outcomes = rows.iter().map(|row| row.flight.map(|f| f.outcome.name().into())).collect();
-    let errors = rows.iter().map(|row| (!row.error.is_empty()).then(|| row.error.clone().into())).collect();
-    columns.extend(
-        [
-            ("outcome", Cells::Texts(outcomes)),
-            ("depth_m", numbers(|row| row.flight.map(|f| f.depth))),
-            ("velocity_m_s", numbers(|row| row.flight.map(|f| f.velocity))),
-            ("critical_velocity_m_s", numbers(|row| row.critical_velocity)),
-            ("critical_energy_j", numbers(|row| row.critical_energy)),
-            ("dimensionless_energy", numbers(|row| row.dimensionless_energy)),
-            ("eq15_printed", numbers(|row| row.eq15_printed)),
-            ("eq15_unrounded", numbers(|row| row.eq15_unrounded)),
-            ("error", Cells::Texts(errors)),
-            ("difference_printed", numbers(Row::difference_printed)),
-            ("difference_unrounded", numbers(Row::difference_unrounded)),
-            ("energy_full_depth", numbers(|row| row.energy_full_depth)),
-            ("energy_ndrc", numbers(|row| row.energy_ndrc)),
-        ]
-        .map(|(name, cells)| (name.to_owned(), cells)),
-    );
-    columns
-}
-
-fn csv_of(columns: &[(String, Cells)]) -> std::io::Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns.iter().map(|(name, _)| name))?;
-    for row in 0..columns.first().map_or(0, |(_, cells)| cells.len()) {
-        writer.write_record(columns.iter().map(|(_, cells)| cells.text(row).into_owned()))?;
-    }
-    writer.into_inner().map_err(csv::IntoInnerError::into_error)
+    csv.into_bytes()
 }
 
 #[cfg(feature = "parquet")]
-fn parquet_of(columns: Vec<(String, Cells)>) -> std::io::Result<Vec<u8>> {
-    let kinds: Vec<_> = columns.iter().map(|(name, cells)| (name.as_str(), cells.kind())).collect();
-    let mut table = crate::studies::parquet::ParquetTable::new(Vec::new(), &kinds)?;
-    table.push(columns.into_iter().map(|(_, cells)| cells).collect())?;
+fn parquet_of(plan: &Plan, rows: &[Row]) -> std::io::Result<Vec<u8>> {
+    let paths: Vec<_> = plan.axes().iter().map(|axis| axis.parameter.to_string()).collect();
+    let axes = paths.iter().map(|path| (path.as_str(), Kind::Number));
+    let columns: Vec<_> = axes.chain(COLUMNS.map(|(name, kind, _)| (name, kind))).collect();
+    let mut cells: Vec<_> = columns.iter().map(|(_, kind)| Cells::empty(*kind)).collect();
+    for row in rows {
+        cells.iter_mut().zip(row.cells()).for_each(|(column, cell)| column.push(cell));
+    }
+    let mut table = ParquetWriter::new(Vec::new(), &columns)?;
+    table.push(cells)?;
     table.finish()
 }
 
@@ -482,10 +364,9 @@ fn notes(plan: &Plan, rows: &[Row]) -> Vec<(&'static str, String)> {
             ),
         ));
     }
-    let undecided = |row: &&Row| row.flight.is_some_and(|f| f.outcome == Outcome::Undecided);
-    let undecided = rows.iter().filter(undecided).count();
+    let undecided = rows.iter().filter(|row| row.outcome == Some(Outcome::Undecided)).count();
     if undecided > 0 {
-        notes.push(("note: ", format!("{undecided} of {} flights are undecided", rows.len())));
+        notes.push(("note: ", format!("{undecided} of {} outcomes are undecided", rows.len())));
     }
     let end = crate::physics::semi_empirical::NDRC_END;
     let beyond = rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > end)).count();

@@ -1,7 +1,7 @@
 //! `penetrode verify`: the verification suite and its report.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,10 +9,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::output::{escape_terminal, print_json, print_text, tell, tell_line, wrapped};
 use super::sweep::read_data;
 use super::{CliError, Exit};
+use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
-use crate::studies::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
-use crate::suite::checks::PeerAnswers;
-use crate::suite::{Check, Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness, summary};
+use crate::suite::checks::{PeerAnswers, USER};
+use crate::suite::{Check, Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness};
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
@@ -45,9 +45,6 @@ pub struct VerifyArgs {
     pub json: bool,
 }
 
-/// Name of a user's peer in the suite.
-const USER_PEER: &str = "user";
-
 impl VerifyArgs {
     /// Runs the suite, writes the report and prints the summary.
     ///
@@ -55,7 +52,7 @@ impl VerifyArgs {
     /// A suite, a scene or a folder that cannot be used (exit 2); a report that cannot be written (exit 1); a peer
     /// that cannot be started (exit 5).
     pub fn run(&self) -> Result<Exit, CliError> {
-        folder::check(&self.out).map_err(folder_error)?;
+        folder::check(&self.out)?;
         let mut suite = match &self.suite {
             Some(path) => Suite::read(path)?,
             None => Suite::embedded()?,
@@ -70,24 +67,22 @@ impl VerifyArgs {
             }
         }
         let points = self.data.as_deref().map(read_data).transpose()?.unwrap_or_default();
-        if !points.is_empty() && !suite.claims.iter().any(|claim| matches!(claim.check, Check::Sweep { .. })) {
+        if !points.is_empty() && !suite.claims.iter().any(|claim| matches!(claim.check, Check::Sweep(_))) {
             return Err(CliError::usage(
                 "no claim of the suite sweeps H/d, so --data would not be shown",
                 "leave out --data, or --only",
             ));
         }
         let peers = self.peers()?;
-        let progress = progress_bar(suite.claims.len() as u64);
-        let running = Mutex::new(Counts::default());
-        let judged = suite.run(self.seed, &peers, &|judged| advance(&progress, &running, judged));
-        progress.finish_and_clear();
+        let judged = judge_all(&suite, self.seed, &peers, "claims");
         let run = Run {
             suite: &suite,
             judged: &judged,
             environment: Environment::here(self.seed, self.command(), &suite, peers.describe()),
             points: &points,
+            random: None,
         };
-        folder::write(&run, &self.out).map_err(folder_error)?;
+        folder::write(folder::files(&run), &self.out)?;
         let report = VerifyJson::new(&run);
         if !suite.is_embedded {
             for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX)
@@ -97,31 +92,21 @@ impl VerifyArgs {
             }
         }
         if self.json { print_json(&report) } else { print_text(&self.text(&judged)) }.map_err(CliError::stdout)?;
-        Ok(match report.verdict {
-            Verdict::Passed | Verdict::Skipped => Exit::Success,
-            Verdict::Failed => Exit::Criterion,
-            Verdict::Undecided => Exit::Undecided,
-        })
+        Ok(report.verdict.into())
     }
 
     fn peers(&self) -> Result<PeerAnswers, CliError> {
-        let mut peers = PeerAnswers::recorded().map_err(|error| CliError::Run {
-            message: format!("a recorded answer cannot be read: {error}"),
-            help: "remake it with `python3 verification/references/record.py`".to_owned(),
-            last: None,
+        let mut peers = PeerAnswers::recorded().map_err(|error| {
+            let help = "remake it with `python3 verification/references/record.py`";
+            CliError::failed(format!("a recorded answer cannot be read: {error}"), help)
         })?;
         let start = |peers: &mut PeerAnswers, name: &str, command: &str| match peers.start(name, command) {
-            Err(error) if error.is_usage() => {
-                Err(CliError::usage(error.to_string(), "give a program and its arguments, quoted as for a shell"))
-            }
-            Err(error) if error.is_missing() => Err(CliError::PeerMissing(error.to_string())),
-            // It started and then failed: its claims fail, and the others go on.
+            // It started and then failed: its claims fail, and the others are judged all the same.
             Err(PeerStartError::Greeting(failure)) => {
                 peers.fail(name, failure.to_string());
                 Ok(())
             }
-            Err(error) => Err(CliError::PeerMissing(error.to_string())),
-            Ok(()) => Ok(()),
+            started => started.map_err(|error| not_started(&error)),
         };
         if self.live_peers {
             for (name, peer) in [
@@ -131,83 +116,96 @@ impl VerifyArgs {
                 ("heyoka-taylor", BundledPeer::Heyoka),
             ] {
                 let environment = PeerEnvironment::ensure(peer, &mut |line| tell_line(line))
-                    .map_err(|error| CliError::PeerMissing(error.to_string()))?;
+                    .map_err(|error| CliError::peer_missing(error.to_string()))?;
                 start(&mut peers, name, &environment.command(peer))?;
             }
         }
         if let Some(command) = &self.peer {
-            start(&mut peers, USER_PEER, command)?;
+            start(&mut peers, USER, command)?;
         }
         Ok(peers)
     }
 
     /// The command that remakes this run.
     fn command(&self) -> String {
-        let quote = |text: &str| shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned);
         let mut words = vec!["penetrode verify".to_owned()];
-        words.extend(self.suite.as_deref().map(quote));
-        words.extend(self.only.as_deref().map(|pattern| format!("--only {}", quote(pattern))));
+        words.extend(self.suite.as_deref().map(quoted));
+        words.extend(self.only.as_deref().map(|pattern| format!("--only {}", quoted(pattern))));
         words.push(format!("--seed {}", self.seed));
         if self.live_peers {
             words.push("--live-peers".to_owned());
         }
-        words.extend(self.data.as_deref().map(|path| format!("--data {}", quote(&path.to_string_lossy()))));
-        words.extend(self.peer.as_deref().map(|command| format!("--peer {}", quote(command))));
+        words.extend(self.data.as_deref().map(|path| format!("--data {}", quoted(&path.to_string_lossy()))));
+        words.extend(self.peer.as_deref().map(|command| format!("--peer {}", quoted(command))));
         words.join(" ")
     }
 
     fn text(&self, judged: &[Judged]) -> String {
-        let (verdict, counts) = summary(judged);
-        let mut text = String::new();
-        for judged in judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)) {
-            let measured = judged.measured.map_or("nothing measured".to_owned(), |m| {
-                format!("{m:.3e}, limit {:.1e} {}", judged.claim.limit, judged.claim.check.unit())
-            });
-            text.push_str(&format!(
-                "{:<9} {}\n{}\n{}\n",
-                judged.verdict.name(),
-                escape_terminal(&judged.claim.id),
-                wrapped("          ", &escape_terminal(&judged.claim.statement)),
-                wrapped("          ", &format!("{measured}; {}", escape_terminal(&judged.remark)))
-            ));
-        }
+        let report = self.out.join("report.html");
+        format!("{}{}report: {}\n", not_passed_text(judged), counts_text(judged), report.display())
+    }
+}
+
+/// Every failed or undecided claim, with its statement and what was seen.
+pub(super) fn not_passed_text(judged: &[Judged]) -> String {
+    let mut text = String::new();
+    for judged in judged.iter().filter(|j| j.is_open()) {
+        let Judged { claim, verdict, measured, remark, .. } = judged;
+        let measured = measured
+            .map_or("nothing measured".to_owned(), |m| format!("{m:.3e}, limit {:.1e} {}", claim.limit, claim.unit));
         text.push_str(&format!(
-            "{}: {} passed, {} failed, {} undecided, {} skipped\nreport: {}\n",
+            "{:<9} {}\n{}\n{}\n",
             verdict.name(),
-            counts.passed,
-            counts.failed,
-            counts.undecided,
-            counts.skipped,
-            self.out.join("report.html").display()
+            escape_terminal(&claim.id),
+            wrapped("          ", &escape_terminal(&claim.statement)),
+            wrapped("          ", &format!("{measured}; {}", escape_terminal(remark)))
         ));
-        text
     }
+    text
 }
 
-pub(super) fn folder_error(error: folder::FolderError) -> CliError {
-    match error {
-        folder::FolderError::NotOurs { .. } => {
-            CliError::usage(error.to_string(), "name another folder with --out, or move away what is there")
+/// The verdict and how many claims came to it, as one line.
+pub(super) fn counts_text(judged: &[Judged]) -> String {
+    let counts = Counts::of_claims(judged);
+    let Counts { passed, failed, undecided, skipped } = counts;
+    let verdict = counts.verdict().name();
+    format!("{verdict}: {passed} passed, {failed} failed, {undecided} undecided, {skipped} skipped\n")
+}
+
+/// Judges every claim of `suite` behind a progress bar that counts `what`.
+pub(super) fn judge_all(suite: &Suite, seed: u64, peers: &PeerAnswers, what: &str) -> Vec<Judged> {
+    let bar = progress_bar(suite.claims.len() as u64, what);
+    let failed = AtomicUsize::new(0);
+    let judged = suite.run(seed, peers, &|judged| {
+        bar.inc(1);
+        if judged.verdict == Verdict::Failed {
+            bar.set_message(format!("({} failed)", failed.fetch_add(1, Ordering::Relaxed) + 1));
         }
-        folder::FolderError::Write { path, cause } => CliError::Write { path, cause },
+    });
+    bar.finish_and_clear();
+    judged
+}
+
+/// `text` as a word of a command.
+pub(super) fn quoted(text: &str) -> String {
+    shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned)
+}
+
+/// Why a program given as a peer cannot be asked.
+pub(super) fn not_started(error: &PeerStartError) -> CliError {
+    if error.is_usage() {
+        CliError::usage(error.to_string(), "give a program and its arguments, quoted as for a shell")
+    } else {
+        CliError::peer_missing(error.to_string())
     }
 }
 
-/// A bar with time left, on a terminal only.
-fn progress_bar(length: u64) -> ProgressBar {
+/// A bar with the time left, on a terminal only.
+pub(super) fn progress_bar(length: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} claims, {eta} left {msg}") {
+    let template = format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left {{msg}}");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
         bar.set_style(style);
     }
     bar
-}
-
-fn advance(progress: &ProgressBar, running: &Mutex<Counts>, judged: &Judged) {
-    progress.inc(1);
-    if judged.verdict == Verdict::Failed
-        && let Ok(mut counts) = running.lock()
-    {
-        counts.failed += 1;
-        progress.set_message(format!("({} failed)", counts.failed));
-    }
 }

@@ -10,17 +10,18 @@
 //! ```text
 //! terminal velocity  V_t = 2 f/(r + sqrt(r² + 4 q f)),  f = -(p + s x0)
 //! fast rate          l = (r + 2 q V_t)/M
-//! stiffness          Z = (l D - V)/V_t,  D the way to the stage's end, the exit or the place where the drive is spent
+//! stiffness          Z = (l D - V)/V_t,  D the distance to the stage's end, the exit or the place where the drive is spent
 //! ```
 //!
 //! Z counts the relaxation times left in the stage once the transient is over, at the least: the drive fades and the
 //! projectile slows. An explicit method of order 5 takes one step of six evaluations for every three of them.
 
-use super::diffsol::{FlyOne, Kept, MAX_STEPS, Scheme, check_rtol, fly, with_legs};
+use super::diffsol::{MAX_STEPS, Reusing, Scheme, Solver, check_rtol};
+use super::flight::Course;
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
-use crate::physics::{Problem, Stage};
+use crate::physics::{Problem, Stage, State};
 
-/// Stiffness Z above which a stage is flown by the implicit method.
+/// Stiffness Z above which a stage is solved by the implicit method.
 ///
 /// `tsit45` takes about 2.4 Z force evaluations, `bdf` takes 70 to 400 whatever Z, each three times as dear for its
 /// linear algebra and at the same rtol with a larger error. Both take the same time at Z = 60 (rtol 1e-6), 250 (1e-10)
@@ -57,8 +58,8 @@ impl Choice {
     /// From the coefficients alone: no force is evaluated.
     pub fn of(problem: &Problem, stage: usize, depth: f64, velocity: f64) -> Self {
         let law = &problem.stages[stage];
-        let way = problem.limit_of(stage) - depth;
-        match stiffness(law, problem.mass, depth, velocity, way) {
+        let distance = problem.limit_of(stage) - depth;
+        match stiffness(law, problem.mass, depth, velocity, distance) {
             Some(z) if z > STIFFNESS_LIMIT => Self { scheme: IMPLICIT, stiffness: Some(z) },
             z => Self { scheme: EXPLICIT, stiffness: z },
         }
@@ -82,18 +83,18 @@ impl Choice {
 }
 
 /// Stiffness Z; `None` where the static force resists.
-fn stiffness(law: &Stage, mass: f64, depth: f64, velocity: f64, way: f64) -> Option<f64> {
+fn stiffness(law: &Stage, mass: f64, depth: f64, velocity: f64, distance: f64) -> Option<f64> {
     let drive = -(law.static_force + law.stiffness * depth);
     if drive <= 0.0 {
         return None;
     }
-    let way = if law.stiffness > 0.0 { way.min(drive / law.stiffness) } else { way };
+    let distance = if law.stiffness > 0.0 { distance.min(drive / law.stiffness) } else { distance };
     let terminal = 2.0 * drive / (law.viscosity + (law.viscosity * law.viscosity + 4.0 * law.drag * drive).sqrt());
     if terminal.is_infinite() {
         return Some(0.0);
     }
     let rate = (law.viscosity + 2.0 * law.drag * terminal) / mass;
-    Some(((rate * way - velocity) / terminal).max(0.0))
+    Some(((rate * distance - velocity) / terminal).max(0.0))
 }
 
 impl Adaptive {
@@ -102,26 +103,17 @@ impl Adaptive {
         Self { rtol, max_steps: MAX_STEPS }
     }
 
-    /// Flies many problems with the library problems kept, as [`super::Diffsol::study`].
-    ///
-    /// # Errors
-    /// As there.
-    pub fn study<R>(&self, work: impl FnOnce(&mut FlyOne<'_>) -> R) -> Result<R, IntegrationError> {
+    fn solver(&self) -> Result<Reusing<impl Fn(&mut Course<'_>) -> usize + use<>>, IntegrationError> {
         check_rtol(IMPLICIT, self.rtol)?;
-        with_legs(EXPLICIT, self.rtol, |explicit| {
-            with_legs(IMPLICIT, self.rtol, |implicit| {
-                work(&mut |problem, detail| {
-                    fly(problem, detail, self.name(), self.max_steps, &mut |leg, watch| {
-                        let choice = Choice::of(problem, leg.stage, leg.start.depth, leg.start.velocity);
-                        let flown =
-                            if choice.scheme.is_implicit() { implicit(leg, watch) } else { explicit(leg, watch) };
-                        let mut report = flown?;
-                        report.note = leg.explain.then(|| choice.explain(leg.stage));
-                        Ok(report)
-                    })
-                })
-            })
-        })?
+        let solvers = vec![Solver::of(EXPLICIT, self.rtol)?, Solver::of(IMPLICIT, self.rtol)?];
+        Ok(Reusing::new(self, self.max_steps, solvers, |course: &mut Course<'_>| {
+            let State { depth, velocity, .. } = course.state;
+            let choice = Choice::of(course.problem, course.stage, depth, velocity);
+            if course.detail >= Detail::Events {
+                course.notes.push(choice.explain(course.stage));
+            }
+            usize::from(choice.scheme.is_implicit())
+        }))
     }
 }
 
@@ -130,13 +122,12 @@ impl Integrator for Adaptive {
         "adaptive"
     }
 
-    fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
-        self.study(|fly_one| fly_one(problem, detail))?
+    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+        self.solver()?.solve(problem, detail)
     }
 
-    fn keep(&self, work: &mut dyn FnMut(&dyn Integrator)) {
-        // A method that cannot start says why in each of its flights.
-        let _ = self.study(|fly_one| work(&Kept::new(self, fly_one)));
+    fn reusing(&self) -> Option<Box<dyn Integrator>> {
+        self.solver().ok().map(|solver| Box::new(solver) as Box<dyn Integrator>)
     }
 }
 
@@ -145,15 +136,11 @@ impl Integrator for Adaptive {
 mod tests {
     use super::*;
     use crate::integrators::Diffsol;
-    use crate::physics::{Outcome, Stages, Target};
+    use crate::physics::Outcome;
+    use crate::testing::stage;
 
     fn of_stages(impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
-        let stages = Stages::from_slice(stages);
-        Problem { mass: 1.0, impact_speed, exit_depth, stages, crater: None, target: Target::Stages }
-    }
-
-    fn stage(static_force: f64, stiffness: f64, viscosity: f64, drag: f64, end: f64) -> Stage {
-        Stage { static_force, stiffness, viscosity, drag, end }
+        Problem::of_stages(1.0, impact_speed, stages.iter().copied()).with_exit(exit_depth)
     }
 
     /// Weight through a viscous layer: the drive fades over x, and it leaves at a tenth of its speed.
@@ -172,7 +159,7 @@ mod tests {
         for (name, problem) in [("stiff", stiff_scene()), ("viscous", viscous_scene())] {
             for rtol in [1e-6, 1e-10] {
                 for scheme in Scheme::ALL {
-                    let flight = Diffsol::new(scheme, rtol).fly(&problem, Detail::Events).unwrap();
+                    let flight = Diffsol::new(scheme, rtol).solve(&problem, Detail::Events).unwrap();
                     println!(
                         "{name} {rtol:e} {:9} {:?} {} {:?}",
                         scheme.name(),
@@ -181,7 +168,7 @@ mod tests {
                         flight.end
                     );
                 }
-                let flight = Adaptive::new(rtol).fly(&problem, Detail::Events).unwrap();
+                let flight = Adaptive::new(rtol).solve(&problem, Detail::Events).unwrap();
                 println!(
                     "{name} {rtol:e} adaptive  {:?} {} {:?} {:?}",
                     flight.cost, flight.outcome, flight.end, flight.notes
@@ -194,7 +181,7 @@ mod tests {
                     of_stages(1.0, 4.0, &[stage(-viscosity, viscosity / 10.0, viscosity, 0.0, f64::INFINITY)]);
                 print!("{rtol:e} Z = {:7.1?}: ", Choice::of(&problem, 0, 0.0, 1.0).stiffness);
                 for scheme in Scheme::ALL {
-                    let flight = Diffsol::new(scheme, rtol).fly(&problem, Detail::End).unwrap();
+                    let flight = Diffsol::new(scheme, rtol).solve(&problem, Detail::End).unwrap();
                     print!(" {} {}", scheme.name(), flight.cost.force_evaluations);
                 }
                 println!();
@@ -204,8 +191,8 @@ mod tests {
 
     #[test]
     fn a_stiff_stage_costs_a_tenth_of_the_explicit_evaluations_at_most() {
-        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).fly(&stiff_scene(), Detail::Events).unwrap();
-        let adaptive = Adaptive::new(1e-6).fly(&stiff_scene(), Detail::Events).unwrap();
+        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
+        let adaptive = Adaptive::new(1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
         assert!(
             10 * adaptive.cost.force_evaluations <= explicit.cost.force_evaluations,
             "{:?} against {:?}",
@@ -225,8 +212,8 @@ mod tests {
 
     #[test]
     fn a_stage_that_only_resists_stays_explicit_however_viscous() {
-        let flight = Adaptive::new(1e-6).fly(&viscous_scene(), Detail::Events).unwrap();
-        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).fly(&viscous_scene(), Detail::Events).unwrap();
+        let flight = Adaptive::new(1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
+        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
         assert_eq!(flight.cost, explicit.cost);
         assert_eq!(flight.end, explicit.end);
         assert!(flight.notes.iter().any(|note| note.contains("never stiff")), "{:?}", flight.notes);
@@ -246,10 +233,10 @@ mod tests {
                 stage(1e-4, 0.0, 0.0, 0.0, f64::INFINITY),
             ],
         );
-        let flight = Adaptive::new(1e-8).fly(&problem, Detail::Events).unwrap();
+        let flight = Adaptive::new(1e-8).solve(&problem, Detail::Events).unwrap();
         let named: Vec<_> = flight.notes.iter().filter_map(|note| note.split(' ').nth(3)).collect();
         assert_eq!(named, ["tsit45:", "bdf:", "tsit45:"]);
-        let all_explicit = Diffsol::new(Scheme::Tsit45, 1e-8).fly(&problem, Detail::Events).unwrap();
+        let all_explicit = Diffsol::new(Scheme::Tsit45, 1e-8).solve(&problem, Detail::Events).unwrap();
         assert!(
             (flight.exit_margin.unwrap() - all_explicit.exit_margin.unwrap()).abs() < flight.exit_margin_error.unwrap()
         );
@@ -265,8 +252,8 @@ mod tests {
 
     #[test]
     fn stiffness_is_the_relaxation_times_left_after_the_transient() {
-        // By hand: terminal speed Vt, rate (r + 2 q Vt)/M, Z = (rate way - V)/Vt.
-        for (law, mass, depth, velocity, way, stiffness) in [
+        // By hand: terminal speed Vt, rate (r + 2 q Vt)/M, Z = (rate distance - V)/Vt.
+        for (law, mass, depth, velocity, distance, stiffness) in [
             (stage(-1000.0, 100.0, 1000.0, 0.0, f64::INFINITY), 1.0, 0.0, 1.0, 9.0, Some(8999.0)),
             (stage(-100.0, 0.0, 0.0, 4.0, f64::INFINITY), 2.0, 0.0, 4.0, 3.0, Some(11.2)),
             (stage(-10.0, 0.0, 3.0, 1.0, f64::INFINITY), 0.5, 0.0, 1.0, 1.5, Some(10.0)),
@@ -276,13 +263,13 @@ mod tests {
             (stage(-1.0, 0.0, 0.0, 0.0, f64::INFINITY), 1.0, 0.0, 5.0, 1.0, Some(0.0)),
             (stage(1.0, 0.0, 1e9, 0.0, f64::INFINITY), 1.0, 0.0, 5.0, 1.0, None),
         ] {
-            assert_eq!(super::stiffness(&law, mass, depth, velocity, way), stiffness, "{law:?}");
+            assert_eq!(super::stiffness(&law, mass, depth, velocity, distance), stiffness, "{law:?}");
         }
     }
 
     #[test]
-    fn the_way_counts_from_where_the_stage_is_entered_and_the_limit_itself_is_explicit() {
-        // Terminal velocity 1 m/s, rate 128/s: Z = 128 way - 1, which is 200 for a way of 201/128 m behind 1 m.
+    fn the_distance_counts_from_where_the_stage_is_entered_and_the_limit_itself_is_explicit() {
+        // Terminal velocity 1 m/s, rate 128/s: Z = 128 D - 1, which is 200 for a distance of 201/128 m behind 1 m.
         let exit_depth: f64 = 1.0 + 201.0 / 128.0;
         for (exit_depth, scheme, words) in [
             (exit_depth, EXPLICIT, "tsit45: it drives but is not stiff"),
@@ -292,21 +279,8 @@ mod tests {
             let choice = Choice::of(&problem, 0, 1.0, 1.0);
             assert_eq!(choice.scheme, scheme);
             assert!((choice.stiffness.unwrap() - STIFFNESS_LIMIT).abs() < 1e-12, "{choice:?}");
-            let told = choice.explain(3);
-            assert!(told.starts_with(&format!("stage 3 by {words}, with 2.000e2 relaxation times")), "{told}");
+            let shown = choice.explain(3);
+            assert!(shown.starts_with(&format!("stage 3 by {words}, with 2.000e2 relaxation times")), "{shown}");
         }
-    }
-
-    #[test]
-    fn kept_it_flies_as_it_does_alone() {
-        let method = Adaptive::new(1e-6);
-        let mut kept_once = 0;
-        method.keep(&mut |kept| {
-            kept_once += 1;
-            assert_eq!((kept.name(), kept.order()), ("adaptive", None));
-            let flights = [&method, kept].map(|by| by.fly(&stiff_scene(), Detail::End).unwrap().end);
-            assert_eq!(flights[0], flights[1]);
-        });
-        assert_eq!(kept_once, 1);
     }
 }

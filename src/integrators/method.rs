@@ -1,7 +1,8 @@
 //! The methods by name, the options each takes, and one place that builds them.
 
 use std::fmt;
-use std::str::FromStr;
+
+use strum::VariantArray;
 
 use super::central_difference::{Boundaries, CentralDifference, Steps, VelocityAt};
 use super::closed_form::ClosedForm;
@@ -10,9 +11,26 @@ use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
 use crate::physics::{Problem, Shown};
 
-/// Names of the methods in the contract.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum, serde::Deserialize)]
+/// Names of the methods.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    serde::Deserialize,
+    strum::Display,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum MethodName {
     /// Adaptive high-order Taylor series, events by root isolation: the default.
     #[default]
@@ -36,32 +54,12 @@ pub enum MethodName {
 }
 
 impl MethodName {
-    /// Every method, in the order of the contract.
-    pub const ALL: [Self; 9] = [
-        Self::Taylor,
-        Self::Tsit45,
-        Self::Bdf,
-        Self::Esdirk34,
-        Self::TrBdf2,
-        Self::Adaptive,
-        Self::Energy,
-        Self::CentralDifference,
-        Self::ClosedForm,
-    ];
+    /// Every method, in the order of the help texts.
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
-    /// Name in the contract.
+    /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Taylor => "taylor",
-            Self::Tsit45 => "tsit45",
-            Self::Bdf => "bdf",
-            Self::Esdirk34 => "esdirk34",
-            Self::TrBdf2 => "tr-bdf2",
-            Self::Adaptive => "adaptive",
-            Self::Energy => "energy",
-            Self::CentralDifference => "central-difference",
-            Self::ClosedForm => "closed-form",
-        }
+        self.into()
     }
 
     /// Whether the method comes from the diffsol library.
@@ -72,23 +70,6 @@ impl MethodName {
     /// Whether this build has the method.
     pub fn is_built(self) -> bool {
         cfg!(feature = "diffsol") || !self.needs_diffsol()
-    }
-}
-
-impl fmt::Display for MethodName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for MethodName {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|m| m.name()).collect();
-            format!("unknown method '{text}': choose from {}", names.join(", "))
-        })
     }
 }
 
@@ -123,7 +104,7 @@ pub const RTOL_DEFAULT: f64 = 1e-10;
 /// Tolerances that any method is asked for.
 const RTOL_ALLOWED: std::ops::RangeInclusive<f64> = 1e-15..=0.1;
 
-/// A method with its options, ready to fly.
+/// A method with its options, ready to solve.
 #[derive(Clone, Debug)]
 pub enum Method {
     /// See [`Taylor`].
@@ -272,28 +253,27 @@ fn refuse_unless<T: fmt::Display>(
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
     use super::*;
-    use crate::physics::{Stage, Stages, Target};
+    use crate::physics::Stage;
 
     const NAMES: &str = "taylor, tsit45, bdf, esdirk34, tr-bdf2, adaptive, energy, central-difference, closed-form";
 
     fn slab(exit_depth: f64, speed: f64) -> Problem {
-        let stages = Stages::from_slice(&[Stage::crater(8e6, 0.1), Stage::tunnel(1e5, 1.0)]);
-        Problem { mass: 2.0, impact_speed: speed, exit_depth, stages, crater: Some(0), target: Target::CraterAndTunnel }
+        let crater = Stage::crater(8e6, 0.1);
+        Problem::crater_and_tunnel(2.0, speed, Some(crater), Stage::tunnel(1e5, 1.0)).with_exit(exit_depth)
     }
 
     #[test]
     fn names_are_those_of_the_contract_and_read_back() {
-        let names = MethodName::ALL.map(|name| name.to_string());
+        let names: Vec<_> = MethodName::ALL.iter().map(ToString::to_string).collect();
         assert_eq!(names.join(", "), NAMES);
-        for name in MethodName::ALL {
+        for &name in MethodName::ALL {
             assert_eq!(name.name().parse(), Ok(name));
             let from_diffsol = ["tsit45", "bdf", "esdirk34", "tr-bdf2", "adaptive"].contains(&name.name());
             assert_eq!(name.needs_diffsol(), from_diffsol);
             assert_eq!(name.is_built(), cfg!(feature = "diffsol") || !from_diffsol);
             assert_eq!(Method::new(name, &MethodOptions::default()).is_ok(), name.is_built());
         }
-        let unknown = "euler".parse::<MethodName>().unwrap_err();
-        assert_eq!(unknown, format!("unknown method 'euler': choose from {NAMES}"));
+        assert!("euler".parse::<MethodName>().is_err());
     }
 
     #[test]
@@ -337,7 +317,7 @@ mod tests {
     fn it_is_said_what_was_skipped_and_why() {
         let explain = |name: MethodName, problem: &Problem, detail: Detail| {
             let method = Method::new(name, &MethodOptions::default()).unwrap();
-            let flight = method.integrator().fly(problem, detail).unwrap();
+            let flight = method.integrator().solve(problem, detail).unwrap();
             method.explain(problem, &flight, detail)
         };
         let closed_form = "no integration: the closed form";

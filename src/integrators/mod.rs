@@ -4,7 +4,6 @@
 
 #[cfg(feature = "diffsol")]
 pub mod adaptive;
-pub mod batch;
 pub mod central_difference;
 pub mod closed_form;
 #[cfg(feature = "diffsol")]
@@ -12,6 +11,12 @@ pub mod diffsol;
 #[cfg(feature = "diffsol")]
 pub mod diffsol_sensitivity;
 pub mod energy;
+#[cfg(test)]
+#[path = "tests/every_method.rs"]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]
+mod every_method;
+mod flight;
+pub mod lanes;
 pub mod locate;
 pub mod method;
 pub mod outcome;
@@ -25,5 +30,5 @@ pub use closed_form::ClosedForm;
 pub use diffsol::{Diffsol, Scheme};
 pub use energy::Energy;
 pub use method::{Method, MethodName, MethodOptions};
-pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit, keeping};
+pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};
 pub use taylor::Taylor;

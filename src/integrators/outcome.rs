@@ -1,9 +1,10 @@
-//! What every integrator returns: outcome, ordered events, end state, margin with its error bar, cost.
+//! What every integrator returns: outcome, ordered events, end state, margin with its error bound, cost.
 
+use serde::Serialize;
 use smallvec::SmallVec;
 use thiserror::Error;
 
-use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, State};
+use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, State};
 
 /// How much of a flight to compute. What is not asked for is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,7 +19,8 @@ pub enum Detail {
 }
 
 /// Work done for a flight.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Cost {
     /// Accepted steps.
     pub steps: u64,
@@ -26,6 +28,15 @@ pub struct Cost {
     pub rejected_steps: u64,
     /// Evaluations of a stage's force. A Taylor step of order K counts K: one for each coefficient of the force.
     pub force_evaluations: u64,
+}
+
+impl std::ops::Add for Cost {
+    type Output = Self;
+
+    fn add(mut self, other: Self) -> Self {
+        self += other;
+        self
+    }
 }
 
 impl std::ops::AddAssign for Cost {
@@ -47,7 +58,7 @@ pub struct Sample {
     pub stage: usize,
 }
 
-/// The step limit of a fixed-step scheme, and whether the step kept it (theory section 5).
+/// The step limit of a fixed-step scheme, and whether the step respected it (`docs/theory.md`, section 5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLimit {
     /// Largest stable step [s]; infinite where there is no limit.
@@ -74,7 +85,7 @@ pub struct Flight<S = f64> {
     ///
     /// `None` without an exit depth, or at no impact speed.
     pub exit_margin: Option<f64>,
-    /// Half-width of the error bar of the margin; the outcome is `Undecided` exactly when it is not exceeded.
+    /// Error bound of the margin; the outcome is `Undecided` exactly when it is not exceeded.
     pub exit_margin_error: Option<f64>,
     /// Work done.
     pub cost: Cost,
@@ -82,8 +93,7 @@ pub struct Flight<S = f64> {
     pub trajectory: Vec<Sample>,
     /// Step limit, for schemes that have one.
     pub step_limit: Option<StepLimit>,
-    /// What the method has to say of this flight: choices it made, with their reasons. What a scene lets every method
-    /// skip is told by [`super::Method::explain`].
+    /// Choices of the method, with their reasons. [`super::Method::explain`] adds what the scene lets every method skip.
     pub notes: Vec<String>,
 }
 
@@ -178,7 +188,7 @@ pub enum IntegrationError {
     /// The flight has no end: nothing stops the projectile and there is no far side, or both are only approached.
     #[error("the flight never ends: {why}; reached {last}")]
     NeverEnds {
-        /// What keeps it going.
+        /// What prevents an end.
         why: &'static str,
         /// State reached.
         last: State,
@@ -186,7 +196,7 @@ pub enum IntegrationError {
     /// The method cannot treat this problem: a mistake of the caller, exit code 2.
     #[error("{method} cannot treat this scene: {why}")]
     Refused {
-        /// Method name of the contract.
+        /// Name of the method.
         method: &'static str,
         /// Reason and remedy.
         why: String,
@@ -204,7 +214,7 @@ pub enum IntegrationError {
     /// The library behind the method gave up.
     #[error("{method} gave up after {last}: {cause}")]
     SolverFailed {
-        /// Method name of the contract.
+        /// Name of the method.
         method: &'static str,
         /// What the library said.
         cause: String,
@@ -213,14 +223,12 @@ pub enum IntegrationError {
     },
 }
 
-impl IntegrationError {
-    /// Whether the request was at fault (exit code 2) and not the computation (exit code 1).
-    pub fn is_usage(&self) -> bool {
+impl Advice for IntegrationError {
+    fn is_usage(&self) -> bool {
         matches!(self, Self::Refused { .. } | Self::BadOption { .. })
     }
 
-    /// Help for a person: what to change. Empty when the message says it all.
-    pub fn help(&self) -> &'static str {
+    fn help(&self) -> String {
         match self {
             Self::StepBudgetSpent { .. } => "take a longer step or a looser tolerance, or another method",
             Self::NotFinite { .. } => "check the scene for forces beyond the range of 64-bit numbers",
@@ -230,10 +238,10 @@ impl IntegrationError {
             Self::SolverFailed { .. } => "loosen --rtol, or take another method",
             _ => "",
         }
+        .to_owned()
     }
 
-    /// State reached, where the error knows one.
-    pub fn last(&self) -> Option<State> {
+    fn last(&self) -> Option<State> {
         match self {
             Self::StepBudgetSpent { last, .. }
             | Self::NotFinite { last, .. }
@@ -249,15 +257,15 @@ impl IntegrationError {
 pub struct Margin {
     /// Exit margin W(exit)/V0², as [`Flight::exit_margin`].
     pub value: f64,
-    /// Half-width of its error bar, as [`Flight::exit_margin_error`].
+    /// Its error bound, as [`Flight::exit_margin_error`].
     pub error: Option<f64>,
     /// Work done.
     pub cost: Cost,
 }
 
-/// A way to fly a problem.
+/// A method that solves a [`Problem`].
 pub trait Integrator {
-    /// Name of the method in the contract.
+    /// Name of the method.
     fn name(&self) -> &'static str;
 
     /// Formal order of the method; `None` where it varies or where the answer is exact.
@@ -269,30 +277,26 @@ pub trait Integrator {
     ///
     /// # Errors
     /// [`IntegrationError`]: the method refuses the problem, or no end can be computed.
-    fn fly(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError>;
+    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError>;
 
     /// The exit margin of `problem`; `None` without an exit depth, or at no impact speed.
     ///
-    /// The whole flight unless a method knows a shorter way: the search for the critical velocity asks for nothing else.
+    /// Solves the whole flight unless a method has something shorter. The search for the critical velocity asks for
+    /// nothing else.
     ///
     /// # Errors
-    /// As [`Integrator::fly`].
+    /// As [`Integrator::solve`].
     fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
-        let flight = self.fly(problem, Detail::End)?;
+        let flight = self.solve(problem, Detail::End)?;
         Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }))
     }
 
-    /// Calls `work` once with an integrator that flies as this one does and keeps what a library builds for a flight;
-    /// does nothing where there is nothing to keep. See [`keeping`].
-    fn keep(&self, _work: &mut dyn FnMut(&dyn Integrator)) {}
-}
-
-/// What `work` makes of `integrator` when it flies many problems: the same answers, with a library's problem and solver
-/// kept from flight to flight.
-pub fn keeping<R>(integrator: &dyn Integrator, mut work: impl FnMut(&dyn Integrator) -> R) -> R {
-    let mut result = None;
-    integrator.keep(&mut |kept| result = Some(work(kept)));
-    result.unwrap_or_else(|| work(integrator))
+    /// The same method, reusing its solver between calls, for many problems; `None` where a method has no such state.
+    ///
+    /// The answers are the same. Also `None` for a method that cannot start: each of its solutions says why.
+    fn reusing(&self) -> Option<Box<dyn Integrator>> {
+        None
+    }
 }
 
 #[cfg(test)]

@@ -2,20 +2,23 @@
 //!
 //! With `W = V²` the equation of motion reads `dW/dx = -2 F/M`. For `r = 0` it is linear in W and goes on smoothly
 //! through `W < 0`, so `W(exit)` is one affine function of `V0²` for stops and perforations alike; its root is the
-//! critical velocity, and its sign decides the outcome (theory section 6). Across a stage with `r > 0` a stop is
+//! critical velocity, and its sign decides the outcome (docs/theory.md, section 6). Across a stage with `r > 0` a stop is
 //! continued by minus twice the static work per mass.
 //!
-//! A target may hold a barrier and drive the projectile beyond it. Then the least W over the path decides, and it
-//! stands at a stage end: inside a stage with `s >= 0` the velocity has a maximum but no minimum. The margin is
-//! therefore the least W over the stage ends ahead and the exit; for a target that only resists that is W(exit).
+//! A target may hold a barrier and drive the projectile beyond it. Then the least W over the path decides. It occurs
+//! at a stage end, because inside a stage with `s >= 0` the velocity may have a maximum but no minimum. The margin is
+//! therefore the least W over the stage ends ahead and the exit; for a target that only resists, that is W(exit).
 
-use super::event::{Event, EventKind, Outcome, State};
-use super::scalar::Scalar;
-use super::stage::{Problem, Stage};
+use super::problem::{Event, EventKind, Outcome, Problem, Stage, State};
+use super::scalar::{Differentiable, Scalar};
 
-/// `expm1(z)/z`, 1 at zero.
-pub(crate) fn expm1_over(z: f64) -> f64 {
-    if z == 0.0 { 1.0 } else { z.exp_m1() / z }
+/// `E(z) = expm1(z)/z`, 1 at zero.
+#[inline]
+pub(crate) fn expm1_over<S: Differentiable>(z: S) -> S {
+    let x = z.value();
+    let mean = if x == 0.0 { 1.0 } else { x.exp_m1() / x };
+    // E'(z) = (e^z - E)/z = e^z G(z), the second form without the cancellation at zero.
+    z.apply(mean, || if x.abs() < 0.3 { x.exp() * second_exponential_integral(x) } else { (x.exp() - mean) / x })
 }
 
 /// `(1 + z/8)^8`, which is below `e^z` for z > 0, by 6 % at z = 1; a bound in four multiplications.
@@ -26,50 +29,44 @@ pub(crate) fn exp_from_below(z: f64) -> f64 {
     fourth * fourth
 }
 
-/// `(y + expm1(-y))/y²`, 1/2 at zero.
+/// `G(y) = (y + expm1(-y))/y²`, 1/2 at zero.
 ///
 /// Below |y| = 0.3 by its Taylor series, whose first neglected term is under 1e-18; above, the subtraction costs at
 /// most four bits.
-pub(crate) fn second_exponential_integral(y: f64) -> f64 {
-    if y.abs() < 0.3 {
-        // sum over n >= 0 of (-y)^n / (n + 2)!
-        let mut sum = 0.0;
-        for n in (0..14_u32).rev() {
-            sum = (1.0 - y * sum) / f64::from(fault!("exit-energy-series", n + 2, n + 3));
-        }
-        // The loop nests 1/(2)(1 - y/3 (1 - y/4 (...))).
-        sum
+pub(crate) fn second_exponential_integral<S: Differentiable>(y: S) -> S {
+    if y.value().abs() < 0.3 {
+        // sum over n >= 0 of (-y)^n/(n + 2)!, nested: 1/2 (1 - y/3 (1 - y/4 (...)))
+        (2..16_u32).rev().fold(S::zero(), |sum, n| (S::one() - y * sum) / S::from_f64(f64::from(n)))
     } else {
         (y + (-y).exp_m1()) / (y * y)
     }
 }
 
-/// W = V² at depth `to` [m²/s²], carried from `w` at depth `from` through one stage by the law without viscosity:
+/// W = V² at depth `to` [m²/s²], from `w` at depth `from`, through one stage without viscosity:
 ///
 /// ```text
 /// W(to) = W e^{-y} - (2 xi/M) ((p + s from) E(-y) + s xi (y + expm1(-y))/y²),  y = 2 q xi/M,  xi = to - from
 /// ```
 ///
-/// with `E(z) = expm1(z)/z`. Exact for r = 0, of either sign of W.
-pub fn carry(stage: &Stage, mass: f64, w: f64, from: f64, to: f64) -> f64 {
+/// with `E(z) = expm1(z)/z`. Exact for r = 0 and for W of either sign.
+pub fn propagate<S: Differentiable>(stage: &Stage<S>, mass: S, w: S, from: S, to: S) -> S {
+    let two = S::from_f64(2.0);
     let xi = to - from;
-    let y = 2.0 * stage.drag * xi / mass;
+    let y = two * stage.drag * xi / mass;
     let static_at_start = stage.static_force + stage.stiffness * from;
-    w * fault!("exit-energy-sign", -y, y).exp()
-        - fault!("exit-energy-factor", 2.0, 1.0) * xi / mass
-            * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
+    w * (-y).exp()
+        - two * xi / mass * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
 }
 
 /// The margin `min W / V0²` over the stage ends ahead and the exit; `None` without an exit or an impact speed.
 ///
 /// - perforated: from the velocities at `events` (stage ends) and at the exit;
-/// - stopped at `end` in stage `stage`: W = 0 there, carried on to the exit.
+/// - stopped at `end` in stage `stage`: W = 0 there, continued to the exit.
 pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State, events: &[Event]) -> Option<f64> {
     if !problem.has_exit() || problem.impact_speed <= 0.0 {
         return None;
     }
     let scale = problem.impact_speed;
-    let relative = |w: f64| w / scale / scale;
     if outcome == Outcome::Perforated {
         let mut least = end.velocity / scale;
         for event in events {
@@ -77,23 +74,23 @@ pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State
                 least = least.min(event.state.velocity / scale);
             }
         }
-        return Some(fault!("exit-margin-speed", least * least, least));
+        return Some(least * least);
     }
-    Some(relative(energy_beyond_stop(problem, stage, end.depth)))
+    Some(energy_beyond_stop(problem, stage, end.depth) / scale / scale)
 }
 
-/// Least W [m²/s²] over the stage ends ahead and the exit, carried on from rest at `depth` in stage `stage`.
+/// Least W [m²/s²] over the stage ends ahead and the exit, continued from rest at `depth` in stage `stage`.
 pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64) -> f64 {
-    carried_on(problem, stage, depth, 0.0, f64::INFINITY)
+    continued(problem, stage, depth, 0.0, f64::INFINITY)
 }
 
-/// Least W [m²/s²] of a flight that never ends, as [`energy_beyond_stop`] for one that does; `at` is any state of it in
-/// the stage that holds it, before the approach or in it.
+/// Least W [m²/s²] of a flight that never ends, the counterpart of [`energy_beyond_stop`].
 ///
-/// - Where nothing but viscosity and drag acts, V falls by r/M for each metre in the end and vanishes at
-///   `X = x + (M/q) ln(1 + q V/r)`: W at the end of the stage counts as `-(r (end - X)/M)²`, so that it goes through
-///   zero with the speed itself.
-/// - Where a spring balances the drive at `X = -p/s`, it is minus twice the static work from there per mass.
+/// `at` is any of its states in the stage in which it approaches a depth X for ever.
+///
+/// - Viscosity and drag alone: V vanishes at `X = x + (M/q) ln(1 + q V/r)`. W at the end of the stage is taken as
+///   `-(r (end - X)/M)²`, which has the sign of the missing speed.
+/// - A spring that balances a drive at `X = -p/s`: minus twice the static work per mass from X to the end.
 ///
 /// `None` without an exit, or in a stage of another kind.
 pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
@@ -107,12 +104,13 @@ pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
     } else {
         return None;
     };
-    let beyond = if law.end < problem.exit_depth { carried_on(problem, index + 1, limit, w, w) } else { w };
+    let beyond = if law.end < problem.exit_depth { continued(problem, index + 1, limit, w, w) } else { w };
     (problem.has_exit() && beyond.is_finite()).then_some(beyond)
 }
 
-/// The speed [m/s] that a projectile at `at` would need beyond its own to reach `limit` through a stage in which nothing
-/// but viscosity and drag resists; `None` where it reaches it, or in a stage of another kind.
+/// The speed [m/s] that a projectile at `at` lacks to reach `limit` through a stage of viscosity and drag alone.
+///
+/// `None` if it gets there, and for a stage of another kind.
 pub(crate) fn speed_missing(law: &Stage, mass: f64, at: State, limit: f64) -> Option<f64> {
     let Stage { static_force, stiffness, viscosity, drag, .. } = *law;
     if static_force != 0.0 || stiffness != 0.0 || viscosity <= 0.0 {
@@ -124,8 +122,8 @@ pub(crate) fn speed_missing(law: &Stage, mass: f64, at: State, limit: f64) -> Op
     (missing >= 0.0).then_some(missing)
 }
 
-/// Least of `least` and of W [m²/s²] at the stage ends from stage `stage` on and at the exit, carried from `w` at `depth`.
-fn carried_on<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, least: f64) -> f64 {
+/// Least of `least` and of W [m²/s²] at the stage ends from stage `stage` on and at the exit, from `w` at `depth`.
+fn continued<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, least: f64) -> f64 {
     let (mut w, mut from, mut least) = (w, depth, least);
     for index in stage..problem.stages.len() {
         let law = &problem.stages[index].values();
@@ -134,7 +132,7 @@ fn carried_on<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64,
         w = if law.viscosity > 0.0 {
             w - 2.0 * law.static_work(from, to) / mass
         } else {
-            carry(law, mass, w, from, to)
+            propagate(law, mass, w, from, to)
         };
         least = least.min(w);
         from = to;
@@ -149,23 +147,16 @@ fn carried_on<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64,
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use approx::assert_relative_eq;
-    use smallvec::smallvec;
 
     use super::*;
-    use crate::physics::Target;
 
     /// M = 2 kg: at 1 m/s, 0.5 m deep, r = 4 kg/s takes 2 m/s for each metre, so that x = 1 m is approached.
     #[test]
     fn a_flight_that_never_ends_lacks_the_speed_to_its_boundary_and_the_static_work_beyond() {
-        let still = Stage { static_force: 0.0, stiffness: 0.0, viscosity: 0.0, drag: 0.0, end: f64::INFINITY };
+        let still = Stage::free();
         let at = State { time: 0.0, depth: 0.5, velocity: 1.0 };
-        let of = |first: Stage, exit_depth| Problem {
-            mass: 2.0,
-            impact_speed: 3.0,
-            exit_depth,
-            stages: smallvec![first, Stage { static_force: 5.0, ..still }],
-            crater: None,
-            target: Target::Stages,
+        let of = |first: Stage, exit_depth| {
+            Problem::of_stages(2.0, 3.0, [first, Stage { static_force: 5.0, ..still }]).with_exit(exit_depth)
         };
         let slowing = Stage { viscosity: 4.0, end: 2.0, ..still };
         // 2 m/s are missing at 2 m; to the exit at 3 m, 2 5 N 1 m/2 kg more.
@@ -175,7 +166,7 @@ mod tests {
         // Within reach it is no approach, nor without an exit.
         assert_eq!(energy_beyond_approach(&of(slowing, 0.9), at), None);
         assert_eq!(energy_beyond_approach(&of(slowing, f64::INFINITY), at), None);
-        // Drag shortens the way to (M/q) ln(1 + q V/r): with q = 4 kg/m to ln(2)/2 m.
+        // Drag shortens the distance to (M/q) ln(1 + q V/r): with q = 4 kg/m to ln(2)/2 m.
         let dragged = Stage { drag: 4.0, ..slowing };
         let missing = 2.0 * (1.5 - 0.5 * std::f64::consts::LN_2);
         assert_relative_eq!(
@@ -192,24 +183,17 @@ mod tests {
             assert_eq!(energy_beyond_approach(&of(other, 2.0), at), None, "{other:?}");
         }
         // At the end of a stage it is the next that holds the projectile.
-        let behind = Problem { stages: smallvec![Stage { end: 0.5, ..still }, slowing], ..of(slowing, 2.0) };
+        let behind = Problem::of_stages(2.0, 3.0, [still.until(0.5), slowing, still]).with_exit(2.0);
         assert_relative_eq!(energy_beyond_approach(&behind, at).unwrap(), -4.0, max_relative = 1e-15);
     }
 
     #[test]
-    fn a_stop_is_carried_on_by_the_static_work_through_viscous_stages_and_by_the_drag_through_others() {
+    fn a_stop_is_continued_by_the_static_work_through_viscous_stages_and_by_the_drag_through_others() {
         // At rest 0.5 m deep in a first stage to 1 m, then to the exit at 3 m; M = 2 kg, p = 5 N, s = 4 N/m, q = 3 kg/m.
         let law = Stage { static_force: 5.0, stiffness: 4.0, viscosity: 0.0, drag: 3.0, end: f64::INFINITY };
         let beyond = |viscosity: [f64; 2]| {
             let [first, second] = viscosity.map(|viscosity| Stage { viscosity, ..law });
-            let problem = Problem {
-                mass: 2.0,
-                impact_speed: 1.0,
-                exit_depth: 3.0,
-                stages: smallvec![Stage { end: 1.0, ..first }, second],
-                crater: None,
-                target: Target::Stages,
-            };
+            let problem = Problem::of_stages(2.0, 1.0, [first.until(1.0), second]).with_exit(3.0);
             energy_beyond_stop(&problem, 0, 0.5)
         };
         // Work of p + s x: 4 J from 0.5 m to 1 m, 26 J from there to 3 m.

@@ -22,7 +22,7 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// The groups of `scene` at `impact_speed` [m/s].
+    /// The groups of `scene` at `impact_speed` (m/s).
     ///
     /// `None` for a scene of stages, which has no diameter, and of layers, which has no one strength.
     pub fn of(scene: &Scene, impact_speed: f64) -> Option<Self> {
@@ -44,29 +44,23 @@ impl Groups {
     }
 }
 
-/// Impact speed [m/s] at which a projectile of `mass` [kg] has the impact function `impact`: `d sqrt(I S fc d/M)`.
+/// Impact speed (m/s) at which a projectile of `mass` (kg) has the impact function `impact`: `d sqrt(I S fc d/M)`.
 pub fn impact_speed_for(impact: f64, mass: f64, concrete: &Concrete) -> f64 {
     let d = concrete.diameter;
-    d * (impact * (fault!("group-impact", concrete.static_factor, 1.0) * concrete.strength) * (d / mass)).sqrt()
+    d * (impact * (concrete.static_factor * concrete.strength) * (d / mass)).sqrt()
 }
 
-/// Target density [kg/m³] at which a projectile of `mass` [kg] has the geometry function `geometry`:
+/// Target density (kg/m³) at which a projectile of `mass` (kg) has the geometry function `geometry`:
 /// `M/(N N* B d³)`. Not finite without a nose factor or an inertia factor.
 pub fn density_for(geometry: f64, mass: f64, concrete: &Concrete) -> f64 {
     let d = concrete.diameter;
-    (mass / d)
-        / (fault!("group-geometry", 1.0, std::f64::consts::FRAC_PI_4)
-            * geometry
-            * concrete.nose_factor
-            * concrete.inertia_factor
-            * d
-            * d)
+    (mass / d) / (geometry * concrete.nose_factor * concrete.inertia_factor * d * d)
 }
 
-/// `E/(d³ fc)` of an energy [J]: the ordinate of the paper's Figure 4.
+/// `E/(d³ fc)` of an energy (J): the ordinate of the paper's Figure 4.
 pub fn dimensionless_energy(energy: f64, concrete: &Concrete) -> f64 {
     let d = concrete.diameter;
-    energy / fault!("group-energy", d, 1.0) / (concrete.strength * d * d)
+    energy / d / (concrete.strength * d * d)
 }
 
 #[cfg(test)]
@@ -76,7 +70,7 @@ mod tests {
 
     use super::*;
     use crate::physics::Layer;
-    use crate::physics::scene::tests::{concrete, scene};
+    use crate::testing::{concrete, scene};
 
     #[test]
     fn groups_of_shot_14_are_those_published() {

@@ -1,22 +1,21 @@
 //! The equation of motion, what a scene says about it, and what is known of it exactly.
 
+pub mod advice;
 pub mod closed_form;
-pub mod event;
 pub mod exit_energy;
 pub mod groups;
 pub mod nose;
-pub mod number;
+pub mod parameter;
+pub mod problem;
 pub mod reference;
 pub mod scalar;
 pub mod scene;
-pub mod scene_file;
 pub mod semi_empirical;
-pub mod stage;
 pub mod units;
 
-pub use event::{Event, EventKind, Outcome, State};
-pub use number::Shown;
+pub use crate::text::Shown;
+pub use advice::Advice;
+pub use parameter::Parameter;
+pub use problem::{Event, EventKind, Outcome, Problem, Stage, Stages, State, Target};
 pub use scalar::Scalar;
 pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, ResolveError, Scene};
-pub use scene_file::SceneError;
-pub use stage::{Problem, Stage, Stages, Target};

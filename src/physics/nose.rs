@@ -40,11 +40,9 @@ impl NoseShape {
     pub fn factor(self) -> f64 {
         match self {
             Self::Flat => 1.0,
-            Self::Ogive { caliber_radius_head: psi } => {
-                fault!("nose-ogive", 8.0 - 1.0 / psi, 8.0 + 1.0 / psi) / (24.0 * psi)
-            }
-            Self::Cone { length_ratio: psi } => 1.0 / (1.0 + fault!("nose-cone", 4.0, 1.0) * psi * psi),
-            Self::Spherical { radius_ratio: psi } => 1.0 - fault!("nose-cap", 0.125, 0.25) / psi / psi,
+            Self::Ogive { caliber_radius_head: psi } => (8.0 - 1.0 / psi) / (24.0 * psi),
+            Self::Cone { length_ratio: psi } => 1.0 / (1.0 + 4.0 * psi * psi),
+            Self::Spherical { radius_ratio: psi } => 1.0 - 0.125 / psi / psi,
         }
     }
 
@@ -58,13 +56,9 @@ impl NoseShape {
     pub fn height_ratio(self) -> f64 {
         match self {
             Self::Flat => 0.0,
-            Self::Ogive { caliber_radius_head: psi } => (psi - fault!("nose-height-ogive", 0.25, 0.5)).sqrt(),
+            Self::Ogive { caliber_radius_head: psi } => (psi - 0.25).sqrt(),
             Self::Cone { length_ratio: psi } => psi,
-            Self::Spherical { radius_ratio: psi } => fault!(
-                "nose-height-cap",
-                0.25 / (psi + (psi - 0.5).sqrt() * (psi + 0.5).sqrt()),
-                psi + (psi - 0.5).sqrt() * (psi + 0.5).sqrt()
-            ),
+            Self::Spherical { radius_ratio: psi } => 0.25 / (psi + (psi - 0.5).sqrt() * (psi + 0.5).sqrt()),
         }
     }
 

@@ -52,6 +52,42 @@ pub trait Scalar:
     }
 }
 
+/// A number to which smooth functions apply by value and slope: `f64`, and the dual numbers over it.
+pub trait Differentiable: Scalar {
+    /// `f(self)`, from `value` = f at the value of `self`, and `slope` = f' there.
+    #[must_use]
+    fn apply(self, value: f64, slope: impl FnOnce() -> f64) -> Self;
+
+    /// `e^z`.
+    #[must_use]
+    #[inline]
+    fn exp(self) -> Self {
+        let value = self.value().exp();
+        self.apply(value, || value)
+    }
+
+    /// `e^z - 1`, without cancellation at zero.
+    #[must_use]
+    #[inline]
+    fn exp_m1(self) -> Self {
+        let value = self.value().exp_m1();
+        self.apply(value, || value + 1.0)
+    }
+}
+
+impl Differentiable for f64 {
+    #[inline(always)]
+    fn apply(self, value: f64, _slope: impl FnOnce() -> f64) -> Self {
+        value
+    }
+}
+
+impl Differentiable for num_dual::Dual64 {
+    fn apply(self, value: f64, slope: impl FnOnce() -> f64) -> Self {
+        Self::new(value, slope() * self.eps)
+    }
+}
+
 impl Scalar for f64 {
     const EPSILON: f64 = Self::EPSILON;
 

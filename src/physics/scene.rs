@@ -1,22 +1,26 @@
 //! A scene: projectile, target, resistance and criterion in SI units, and the stages it resolves into.
 //!
-//! Reading a scene from a file is [`super::scene_file`]; here a scene may come from anywhere, a table or a sweep, so
-//! [`Scene::resolve`] checks every number again before a [`Problem`] leaves it.
+//! A scene may come from a file ([`crate::exchange::scene_file`]), a table or a sweep. [`Scene::resolve`] therefore checks
+//! every number before it returns a [`Problem`].
 
 use std::f64::consts::FRAC_PI_4;
 
+use serde::Deserialize;
 use thiserror::Error;
 
-use super::number::Shown;
+use super::advice::Advice;
+use super::parameter::{LayerNumber, Parameter, StageNumber};
+use super::problem::{Problem, Stage, Stages, Target};
+use super::scalar::Scalar;
 use super::semi_empirical;
-use super::stage::{Problem, Stage, Stages, Target};
+use crate::text::Shown;
 
 /// What the projectile meets.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Resistance {
     /// Eq. 4-5: a crater `F = c x` to k d, then a tunnel `F = P + Q V²`.
     Concrete(Concrete),
-    /// Stages given outright.
+    /// Stages given directly.
     Stages(Vec<Stage>),
 }
 
@@ -43,7 +47,7 @@ pub struct Concrete {
     pub layers: Vec<Layer>,
 }
 
-/// The crater constant c (theory section 1).
+/// The crater constant c (docs/theory.md, section 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CraterStiffness {
     /// The force is continuous at x = k d: `c = M (P + Q V0²)/(k d (M + k d Q))`.
@@ -68,12 +72,13 @@ pub struct Layer {
 }
 
 /// When the target counts as perforated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Criterion {
     /// x = H, the paper's.
     #[default]
     FullDepth,
-    /// x = `x_p(H)`, the penetration that perforates by the ACE/NDRC relation (theory section 4).
+    /// x = `x_p(H)`, the penetration that perforates by the ACE/NDRC relation (docs/theory.md, section 4).
     Ndrc,
 }
 
@@ -132,9 +137,7 @@ impl Range {
             Self::AtLeastHalf => "a number >= 0.5",
         }
     }
-}
 
-impl Range {
     /// A number in the range, as a person might write it.
     pub fn example(self) -> &'static str {
         match self {
@@ -149,14 +152,12 @@ impl Range {
 #[non_exhaustive]
 pub enum ResolveError {
     /// A number outside its range.
-    #[error("{quantity} = {value} is not admissible: it must be {allowed}", value = Shown(*.value), allowed = .range.description())]
+    #[error("{} = {} is not admissible: it must be {}", .parameter.label(), Shown(*.value), .parameter.entry().range.description())]
     Inadmissible {
-        /// Which quantity, with its unit.
-        quantity: &'static str,
+        /// Which number.
+        parameter: Parameter,
         /// Value given.
         value: f64,
-        /// What is allowed.
-        range: Range,
     },
     /// The scene gives no impact velocity, and none was asked for.
     #[error("the scene gives no impact velocity")]
@@ -201,14 +202,12 @@ pub enum ResolveError {
     },
 }
 
-impl ResolveError {
-    /// Whether the input was at fault (exit code 2) and not the computation (exit code 1).
-    pub fn is_usage(&self) -> bool {
+impl Advice for ResolveError {
+    fn is_usage(&self) -> bool {
         !matches!(self, Self::OutOfRange { .. })
     }
 
-    /// Help for a person: what to change.
-    pub fn help(&self) -> &'static str {
+    fn help(&self) -> String {
         match self {
             Self::Inadmissible { .. } => "give a value in the range",
             Self::NoImpactSpeed => "add [impact] with velocity = \"300 m/s\"",
@@ -219,40 +218,55 @@ impl ResolveError {
             Self::LayersDoNotSumUp { .. } => "leave out the thickness; it follows from the layers",
             Self::OutOfRange { .. } => "check the units of the scene; its numbers lie too far apart",
         }
+        .to_owned()
     }
 }
 
-fn admit(quantity: &'static str, value: f64, range: Range) -> Result<(), ResolveError> {
-    if range.contains(value) { Ok(()) } else { Err(ResolveError::Inadmissible { quantity, value, range }) }
-}
-
-/// `value`, unless it overflowed or, not being zero by its factors, fell below the normal numbers.
-fn representable(quantity: &'static str, value: f64, zero: bool) -> Result<f64, ResolveError> {
+/// `number`, unless its value overflowed or is subnormal; zero is accepted where a factor is `zero`.
+fn representable<S: Scalar>(quantity: &'static str, number: S, zero: bool) -> Result<S, ResolveError> {
+    let value = number.value();
     if value.is_normal() || (zero && value == 0.0) {
-        Ok(value)
+        Ok(number)
     } else {
         Err(ResolveError::OutOfRange { quantity, value })
     }
 }
 
-/// Crater constant c [N/m] with which the force is continuous at `depth` = k d.
-///
-/// ```text
-/// c = M (P + Q V0²)/(k d (M + k d Q)),  divided through by M
-/// ```
-fn continuous_stiffness(depth: f64, beyond: &Stage, mass: f64, impact_speed: f64) -> Result<f64, ResolveError> {
-    let force = beyond.static_force + fault!("c-not-continuous", beyond.drag, 0.0) * impact_speed * impact_speed;
-    let stiffness = force / (1.0 + fault!("c-at-impact", depth * (beyond.drag / mass), 0.0)) / depth;
+/// [`Stage::continuous_crater`], unless its constant leaves the range of numbers.
+fn continuous_crater<S: Scalar>(
+    depth: S,
+    beyond: &Stage<S>,
+    mass: S,
+    impact_speed: S,
+) -> Result<Stage<S>, ResolveError> {
+    let crater = Stage::continuous_crater(depth, beyond, mass, impact_speed);
     // No force at k d (an air gap there) leaves no force in the crater.
-    representable("the crater stiffness c [N/m]", stiffness, force == 0.0)
+    let force = beyond.static_force + beyond.drag * impact_speed * impact_speed;
+    representable("the crater stiffness c [N/m]", crater.stiffness, force.value() == 0.0)?;
+    Ok(crater)
+}
+
+/// The value of a number as it is.
+fn plain(_: Parameter, value: f64) -> f64 {
+    value
+}
+
+/// The number `which` of a target of one medium; the others are in no scene.
+fn of_one_medium(which: LayerNumber) -> Parameter {
+    match which {
+        LayerNumber::Strength => Parameter::Strength,
+        LayerNumber::Density => Parameter::Density,
+        LayerNumber::StaticFactor => Parameter::StaticFactor,
+        LayerNumber::Thickness | LayerNumber::Viscosity => Parameter::Layer(0, which),
+    }
 }
 
 /// Index of the layer that holds `depth` [m] just beyond it, of the last where all end before; `None` without layers.
-pub(super) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
+pub(crate) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
     let mut end = 0.0;
     let holds = |layer: &Layer| {
         end += layer.thickness;
-        fault!("layer-at-crater-end", end > depth, end >= depth)
+        end > depth
     };
     layers.iter().position(holds).or(layers.len().checked_sub(1))
 }
@@ -263,16 +277,16 @@ impl Concrete {
     /// # Errors
     /// [`ResolveError::Inadmissible`] for a strength that is not positive.
     pub fn usual_static_factor(strength: f64) -> Result<f64, ResolveError> {
-        admit("the strength fc [Pa]", strength, Range::Positive)?;
+        Parameter::Strength.admit(strength)?;
         Ok(semi_empirical::static_factor(strength))
     }
 
     /// Crater depth k d [m].
     pub fn crater_depth(&self) -> f64 {
-        self.crater_ratio * fault!("crater-radii", self.diameter, 0.5 * self.diameter)
+        self.crater_ratio * self.diameter
     }
 
-    /// Whether S is the one of Eq. 14, so that it ought to follow when the strength is varied.
+    /// True if S is that of Eq. 14, so that it follows the strength.
     pub fn follows_eq14(&self) -> bool {
         self.static_factor == semi_empirical::static_factor(self.strength)
     }
@@ -280,18 +294,25 @@ impl Concrete {
     /// Tunnel stage of one medium (Eq. 5): `P = (pi d²/4) S fc`, `Q = (pi d²/4) N* B rho`.
     ///
     /// The factors are paired so that no product overflows before the result does.
-    fn tunnel(&self, medium: &Layer, end: f64) -> Result<Stage, ResolveError> {
-        let d = self.diameter;
-        let static_force =
-            fault!("area", FRAC_PI_4, 2.0 * FRAC_PI_4) * (medium.static_factor * d) * (medium.strength * d);
+    fn tunnel<S: Scalar>(
+        &self,
+        medium: &Layer,
+        name: impl Fn(LayerNumber) -> Parameter,
+        end: S,
+        number: &impl Fn(Parameter, f64) -> S,
+    ) -> Result<Stage<S>, ResolveError> {
+        let of_medium = |which: LayerNumber| number(name(which), which.of(*medium));
+        let (d, area) = (number(Parameter::Diameter, self.diameter), S::from_f64(FRAC_PI_4));
+        let static_force = area * (of_medium(LayerNumber::StaticFactor) * d) * (of_medium(LayerNumber::Strength) * d);
         let no_force = medium.static_factor == 0.0 || medium.strength == 0.0;
-        let nose = fault!("nose-left-out", self.nose_factor, 1.0) * self.inertia_factor;
-        let drag = FRAC_PI_4 * (nose * d) * (medium.density * d);
+        let nose =
+            number(Parameter::NoseFactor, self.nose_factor) * number(Parameter::InertiaFactor, self.inertia_factor);
+        let drag = area * (nose * d) * (of_medium(LayerNumber::Density) * d);
         let no_drag = self.nose_factor == 0.0 || self.inertia_factor == 0.0 || medium.density == 0.0;
         Ok(Stage {
             static_force: representable("the static force P [N]", static_force, no_force)?,
-            stiffness: 0.0,
-            viscosity: medium.viscosity,
+            stiffness: S::zero(),
+            viscosity: of_medium(LayerNumber::Viscosity),
             drag: representable("the drag Q [kg/m]", drag, no_drag)?,
             end,
         })
@@ -301,8 +322,8 @@ impl Concrete {
     ///
     /// Layer ends before k d are no boundaries of the force. A target no thicker than k d is continued by its last
     /// layer, as a homogeneous one is by itself.
-    fn beyond_crater(&self) -> Result<Stages, ResolveError> {
-        let mut stages = Stages::new();
+    fn beyond_crater<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Result<Stages<S>, ResolveError> {
+        let (mut stages, infinite) = (Stages::new(), S::from_f64(f64::INFINITY));
         let Some(first) = layer_beyond(&self.layers, self.crater_depth()) else {
             let medium = Layer {
                 thickness: f64::INFINITY,
@@ -311,58 +332,62 @@ impl Concrete {
                 static_factor: self.static_factor,
                 viscosity: 0.0,
             };
-            stages.push(self.tunnel(&medium, f64::INFINITY)?);
+            stages.push(self.tunnel(&medium, of_one_medium, infinite, number)?);
             return Ok(stages);
         };
         let last = self.layers.len() - 1;
-        let mut end = 0.0;
+        let mut end = S::zero();
         for (index, layer) in self.layers.iter().enumerate() {
-            end += layer.thickness;
+            let name = |which| Parameter::Layer(index, which);
+            end += number(name(LayerNumber::Thickness), layer.thickness);
             if index >= first {
-                stages.push(self.tunnel(layer, if index == last { f64::INFINITY } else { end })?);
+                stages.push(self.tunnel(layer, name, if index == last { infinite } else { end }, number)?);
             }
         }
         Ok(stages)
     }
 
     /// The stages at `impact_speed` [m/s], and the index of the crater's.
-    fn stages(&self, mass: f64, impact_speed: f64) -> Result<(Stages, Option<usize>), ResolveError> {
-        let mut stages = self.beyond_crater()?;
+    fn stages<S: Scalar>(
+        &self,
+        mass: S,
+        impact_speed: S,
+        number: &impl Fn(Parameter, f64) -> S,
+    ) -> Result<(Stages<S>, Option<usize>), ResolveError> {
+        let mut stages = self.beyond_crater(number)?;
         if self.crater_ratio == 0.0 {
             return Ok((stages, None));
         }
-        let depth = representable("the crater depth k d [m]", self.crater_depth(), false)?;
-        let stiffness = match self.crater_stiffness {
-            CraterStiffness::Given(stiffness) => stiffness,
-            CraterStiffness::Continuous => continuous_stiffness(depth, &stages[0], mass, impact_speed)?,
+        let depth = number(Parameter::CraterRatio, self.crater_ratio) * number(Parameter::Diameter, self.diameter);
+        let depth = representable("the crater depth k d [m]", depth, false)?;
+        let crater = match self.crater_stiffness {
+            CraterStiffness::Given(stiffness) => Stage::crater(number(Parameter::CraterStiffness, stiffness), depth),
+            CraterStiffness::Continuous => continuous_crater(depth, &stages[0], mass, impact_speed)?,
         };
-        stages.insert(0, Stage::crater(stiffness, depth));
+        stages.insert(0, crater);
         Ok((stages, Some(0)))
     }
 
     fn check(&self, thickness: Option<f64>) -> Result<(), ResolveError> {
-        admit("the diameter d [m]", self.diameter, Range::Positive)?;
-        admit("the nose factor N*", self.nose_factor, Range::UnitInterval)?;
-        admit("the inertia factor B", self.inertia_factor, Range::NotNegative)?;
-        admit("the crater ratio k", self.crater_ratio, Range::NotNegative)?;
+        Parameter::Diameter.admit(self.diameter)?;
+        Parameter::NoseFactor.admit(self.nose_factor)?;
+        Parameter::InertiaFactor.admit(self.inertia_factor)?;
+        Parameter::CraterRatio.admit(self.crater_ratio)?;
         if let CraterStiffness::Given(stiffness) = self.crater_stiffness {
-            admit("the crater stiffness c [N/m]", stiffness, Range::Positive)?;
+            Parameter::CraterStiffness.admit(stiffness)?;
         }
         let Some((last, inner)) = self.layers.split_last() else {
-            admit("the strength fc [Pa]", self.strength, Range::Positive)?;
-            admit("the density rho [kg/m³]", self.density, Range::NotNegative)?;
-            return admit("the static factor S", self.static_factor, Range::Positive);
+            Parameter::Strength.admit(self.strength)?;
+            Parameter::Density.admit(self.density)?;
+            return Parameter::StaticFactor.admit(self.static_factor);
         };
         let mut sum = 0.0;
-        for layer in inner {
-            admit("a layer's thickness [m]", layer.thickness, Range::NotNegative)?;
-            layer.check()?;
+        for (index, layer) in inner.iter().enumerate() {
+            layer.check(index, layer.thickness)?;
             sum += layer.thickness;
         }
-        if last.thickness != f64::INFINITY {
-            admit("a layer's thickness [m]", last.thickness, Range::NotNegative)?;
-        }
-        last.check()?;
+        // Only the last layer may be infinite.
+        last.check(inner.len(), if last.thickness == f64::INFINITY { 0.0 } else { last.thickness })?;
         sum += last.thickness;
         let thickness = thickness.unwrap_or(f64::INFINITY);
         if sum == thickness { Ok(()) } else { Err(ResolveError::LayersDoNotSumUp { sum, thickness }) }
@@ -370,45 +395,51 @@ impl Concrete {
 }
 
 impl Layer {
-    fn check(&self) -> Result<(), ResolveError> {
-        admit("a layer's strength fc [Pa]", self.strength, Range::NotNegative)?;
-        admit("a layer's density rho [kg/m³]", self.density, Range::NotNegative)?;
-        admit("a layer's static factor S", self.static_factor, Range::NotNegative)?;
-        admit("a layer's viscosity r [kg/s]", self.viscosity, Range::NotNegative)
+    /// Checks the layer `index`, its thickness as `thickness`.
+    fn check(&self, index: usize, thickness: f64) -> Result<(), ResolveError> {
+        let layer = Self { thickness, ..*self };
+        LayerNumber::ALL.into_iter().try_for_each(|which| Parameter::Layer(index, which).admit(which.of(layer)))
     }
 }
 
-/// Stages given outright, the last without an end.
-fn outright(stages: &[Stage], exit_depth: f64) -> Result<Stages, ResolveError> {
+/// Stages given directly, the last without an end.
+fn given<S: Scalar>(
+    stages: &[Stage],
+    exit_depth: f64,
+    number: &impl Fn(Parameter, f64) -> S,
+) -> Result<Stages<S>, ResolveError> {
     let mut previous = 0.0;
     for (index, stage) in stages.iter().enumerate() {
-        admit("a stage's static force p [N]", stage.static_force, Range::Finite)?;
-        admit("a stage's stiffness s [N/m]", stage.stiffness, Range::NotNegative)?;
-        admit("a stage's viscosity r [kg/s]", stage.viscosity, Range::NotNegative)?;
-        admit("a stage's drag q [kg/m]", stage.drag, Range::NotNegative)?;
-        // A subnormal number has lost digits already, and any product with it loses more.
-        for (quantity, value) in [
-            ("a stage's static force p [N]", stage.static_force),
-            ("a stage's stiffness s [N/m]", stage.stiffness),
-            ("a stage's viscosity r [kg/s]", stage.viscosity),
-            ("a stage's drag q [kg/m]", stage.drag),
-        ] {
-            representable(quantity, value, true)?;
+        for which in [StageNumber::StaticForce, StageNumber::Stiffness, StageNumber::Viscosity, StageNumber::Drag] {
+            let (parameter, value) = (Parameter::Stage(index, which), which.of(*stage));
+            parameter.admit(value)?;
+            // A subnormal number has lost digits already, and any product with it loses more.
+            representable(parameter.entry().name, value, true)?;
         }
-        // Written so that a NaN is caught, and so is any stage behind one without an end.
+        // In this form it also refuses NaN, and a stage behind one without an end.
         if !(stage.end >= previous && previous.is_finite()) {
             return Err(ResolveError::StageEndsFall { stage: index, end: stage.end, previous });
         }
         previous = stage.end;
     }
-    let mut stages: Stages = stages.iter().copied().collect();
-    let last = stages.last_mut().ok_or(ResolveError::NoStage)?;
-    if last.end < exit_depth {
-        return Err(ResolveError::TargetGoesOn { end: last.end });
+    if stages.is_empty() {
+        return Err(ResolveError::NoStage);
     }
-    // An end at or behind the exit is never crossed.
-    last.end = f64::INFINITY;
-    Ok(stages)
+    if previous < exit_depth {
+        return Err(ResolveError::TargetGoesOn { end: previous });
+    }
+    let lifted = |(index, stage): (usize, &Stage)| {
+        let of = |which: StageNumber| number(Parameter::Stage(index, which), which.of(*stage));
+        Stage {
+            static_force: of(StageNumber::StaticForce),
+            stiffness: of(StageNumber::Stiffness),
+            viscosity: of(StageNumber::Viscosity),
+            drag: of(StageNumber::Drag),
+            // The last end, at or behind the exit, is never crossed.
+            end: if index + 1 == stages.len() { S::from_f64(f64::INFINITY) } else { of(StageNumber::End) },
+        }
+    };
+    Ok(stages.iter().enumerate().map(lifted).collect())
 }
 
 impl Scene {
@@ -425,7 +456,7 @@ impl Scene {
         }
     }
 
-    /// The equation of motion at `impact_speed` [m/s]: stages and exit depth (theory section 1).
+    /// The equation of motion at `impact_speed` [m/s]: stages and exit depth (docs/theory.md, section 1).
     ///
     /// ```text
     /// crater  s = c until k d,   c = M (P + Q V0²)/(k d (M + k d Q)) or given
@@ -440,34 +471,48 @@ impl Scene {
     /// [`ResolveError`]: a number of the scene or the speed is not admissible, or a coefficient leaves the range of
     /// normal `f64` numbers. A problem never holds NaN, nor an infinity other than an absent end.
     pub fn resolve(&self, impact_speed: f64) -> Result<Problem, ResolveError> {
-        admit("the impact speed V0 [m/s]", impact_speed, Range::NotNegative)?;
-        admit("the mass M [kg]", self.mass, Range::Positive)?;
-        representable("the mass M [kg]", self.mass, false)?;
-        let exit_depth = self.exit_depth()?;
+        self.resolve_in(impact_speed, plain)
+    }
+
+    /// As [`Scene::resolve`], in the number type into which `number` lifts each number of the scene.
+    ///
+    /// With dual numbers, `number` says which of them carries a derivative.
+    ///
+    /// # Errors
+    /// As [`Scene::resolve`].
+    pub fn resolve_in<S: Scalar>(
+        &self,
+        impact_speed: f64,
+        number: impl Fn(Parameter, f64) -> S,
+    ) -> Result<Problem<S>, ResolveError> {
+        Parameter::Velocity.admit(impact_speed)?;
+        Parameter::Mass.admit(self.mass)?;
+        let mass = representable("the mass M [kg]", number(Parameter::Mass, self.mass), false)?;
+        let impact_speed = number(Parameter::Velocity, impact_speed);
+        let exit_depth = self.exit_depth_in(&number)?;
         let (stages, crater, target) = match &self.resistance {
-            Resistance::Stages(stages) => (outright(stages, exit_depth)?, None, Target::Stages),
+            Resistance::Stages(stages) => (given(stages, exit_depth.value(), &number)?, None, Target::Stages),
             Resistance::Concrete(concrete) => {
                 concrete.check(self.thickness)?;
-                let (stages, crater) = concrete.stages(self.mass, impact_speed)?;
+                let (stages, crater) = concrete.stages(mass, impact_speed, &number)?;
                 let target = if concrete.layers.is_empty() { Target::CraterAndTunnel } else { Target::Stages };
                 (stages, crater, target)
             }
         };
-        Ok(Problem { mass: self.mass, impact_speed, exit_depth, stages, crater, target })
+        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target })
     }
 
-    /// As [`Scene::resolve`] at `impact_speed`, from this scene's `problem` at any other: of the target only a continuous
-    /// crater constant depends on the speed.
+    /// As [`Scene::resolve`], from the `problem` of this scene at another speed: only a continuous crater constant depends
+    /// on the speed.
     ///
     /// # Errors
     /// As [`Scene::resolve`].
     pub(crate) fn resolve_from(&self, problem: &Problem, impact_speed: f64) -> Result<Problem, ResolveError> {
-        admit("the impact speed V0 [m/s]", impact_speed, Range::NotNegative)?;
+        Parameter::Velocity.admit(impact_speed)?;
         let mut stages = Stages::from_slice(&problem.stages);
         let continuous = self.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous);
         if let (Some(crater), true) = (problem.crater, continuous) {
-            let depth = stages[crater].end;
-            stages[crater].stiffness = continuous_stiffness(depth, &stages[crater + 1], self.mass, impact_speed)?;
+            stages[crater] = continuous_crater(stages[crater].end, &stages[crater + 1], self.mass, impact_speed)?;
         }
         Ok(Problem { impact_speed, stages, ..*problem })
     }
@@ -502,12 +547,12 @@ impl Scene {
 
     /// Static force P [N] just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
     pub fn static_force(&self) -> Option<f64> {
-        Some(self.concrete()?.beyond_crater().ok()?[0].static_force)
+        Some(self.concrete()?.beyond_crater(&plain).ok()?[0].static_force)
     }
 
     /// Drag Q [kg/m] just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
     pub fn drag(&self) -> Option<f64> {
-        Some(self.concrete()?.beyond_crater().ok()?[0].drag)
+        Some(self.concrete()?.beyond_crater(&plain).ok()?[0].drag)
     }
 
     /// Depth that perforates [m]: H, or `x_p(H)` by the ACE/NDRC relation; infinite for a semi-infinite target.
@@ -516,21 +561,26 @@ impl Scene {
     /// [`ResolveError`]: the thickness or the diameter is not admissible, the criterion `ndrc` has no diameter to go
     /// by, or the depth leaves the range of `f64`.
     pub fn exit_depth(&self) -> Result<f64, ResolveError> {
+        self.exit_depth_in(&plain)
+    }
+
+    fn exit_depth_in<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Result<S, ResolveError> {
         let diameter = match (self.criterion, &self.resistance) {
             (Criterion::FullDepth, _) => None,
             (Criterion::Ndrc, Resistance::Concrete(concrete)) => Some(concrete.diameter),
             (Criterion::Ndrc, Resistance::Stages(_)) => return Err(ResolveError::NoDiameter),
         };
-        let Some(thickness) = self.thickness else { return Ok(f64::INFINITY) };
-        admit("the target's thickness H [m]", thickness, Range::NotNegative)?;
+        let Some(given) = self.thickness else { return Ok(S::from_f64(f64::INFINITY)) };
+        Parameter::Thickness.admit(given)?;
+        let thickness = number(Parameter::Thickness, given);
         let Some(diameter) = diameter else { return Ok(thickness) };
-        admit("the diameter d [m]", diameter, Range::Positive)?;
-        let depth =
-            fault!("ndrc-ignored", diameter * semi_empirical::perforating_depth_ratio(thickness / diameter), thickness);
-        representable("the exit depth x_p [m]", depth, thickness == 0.0)
+        Parameter::Diameter.admit(diameter)?;
+        let diameter = number(Parameter::Diameter, diameter);
+        let depth = diameter * semi_empirical::perforating_depth_ratio(thickness / diameter);
+        representable("the exit depth x_p [m]", depth, given == 0.0)
     }
 
-    /// Why the exit depth is not to be trusted: the criterion `ndrc` beyond the range of its relation, H/d = 18.06.
+    /// A warning if the criterion `ndrc` is used beyond the range of its relation, H/d = 18.06.
     pub fn exit_depth_warning(&self) -> Option<String> {
         if self.criterion != Criterion::Ndrc {
             return None;
@@ -542,41 +592,14 @@ impl Scene {
 
 #[cfg(test)]
 #[expect(clippy::unwrap_used, clippy::panic, reason = "a missing value is a failed test")]
-pub(crate) mod tests {
+mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
-    use crate::physics::nose::NoseShape;
-
-    /// Forrestal 1994, shot 14 (Li & Chen 2003, table 2).
-    pub(crate) fn concrete() -> Concrete {
-        Concrete {
-            diameter: 0.0269,
-            nose_factor: NoseShape::Ogive { caliber_radius_head: 2.0 }.factor(),
-            strength: 35.2e6,
-            density: 2370.0,
-            static_factor: 12.0,
-            inertia_factor: 1.0,
-            crater_ratio: 2.0,
-            crater_stiffness: CraterStiffness::Continuous,
-            layers: Vec::new(),
-        }
-    }
-
-    /// Forrestal 1994, shot 14, into a semi-infinite target.
-    pub(crate) fn scene() -> Scene {
-        scene_of(concrete())
-    }
+    use crate::testing::{concrete, scene, stage};
 
     fn scene_of(concrete: Concrete) -> Scene {
-        Scene {
-            title: None,
-            mass: 0.906,
-            resistance: Resistance::Concrete(concrete),
-            thickness: None,
-            criterion: Criterion::FullDepth,
-            velocity: Some(277.0),
-        }
+        Scene::of_concrete(0.906, concrete).with_velocity(277.0)
     }
 
     fn stages_scene(stages: Vec<Stage>) -> Scene {
@@ -713,26 +736,6 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn inadmissible_layers_are_refused() {
-        let faults: [fn(&mut Layer); 5] = [
-            |layer| layer.thickness = -0.1,
-            |layer| layer.strength = -1.0,
-            |layer| layer.density = f64::NAN,
-            |layer| layer.static_factor = -1.0,
-            |layer| layer.viscosity = f64::INFINITY,
-        ];
-        for fault in faults {
-            for index in 0..2 {
-                let mut scene = layered(&[0.2, 0.1]);
-                let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
-                fault(&mut concrete.layers[index]);
-                let refused = scene.problem();
-                assert!(matches!(refused, Err(ResolveError::Inadmissible { .. })), "{refused:?}");
-            }
-        }
-    }
-
-    #[test]
     fn a_nose_factor_inertia_factor_or_density_of_0_gives_no_drag() {
         for frictionless in [
             Concrete { nose_factor: 0.0, ..concrete() },
@@ -749,12 +752,12 @@ pub(crate) mod tests {
         assert!(matches!(scene.problem(), Err(ResolveError::LayersDoNotSumUp { thickness: 1.0, .. })));
         assert!(matches!(
             layered(&[0.1, f64::INFINITY, 0.2]).problem(),
-            Err(ResolveError::Inadmissible { quantity: "a layer's thickness [m]", .. })
+            Err(ResolveError::Inadmissible { parameter: Parameter::Layer(1, LayerNumber::Thickness), .. })
         ));
     }
 
     #[test]
-    fn stages_given_outright_stay_as_they_are() {
+    fn stages_given_directly_stay_as_they_are() {
         let stages = vec![Stage { end: 0.1, ..Stage::tunnel(-10.0, 0.5) }, Stage::tunnel(5.0, 0.0)];
         let problem = stages_scene(stages.clone()).problem().unwrap();
         assert_eq!(problem.stages.to_vec(), stages);
@@ -822,48 +825,31 @@ pub(crate) mod tests {
 
     #[test]
     fn inadmissible_numbers_never_reach_a_problem() {
-        for speed in [-1.0, f64::NAN, f64::INFINITY] {
-            assert!(matches!(scene().resolve(speed), Err(ResolveError::Inadmissible { .. })), "{speed}");
+        let given = Concrete { crater_stiffness: CraterStiffness::Given(8e6), ..concrete() };
+        let stages = stages_scene(vec![stage(1.0, 1.0, 1.0, 1.0, 0.5), Stage::tunnel(5.0, 0.0)]);
+        for scene in [Scene { thickness: Some(1.0), ..scene_of(given) }, layered(&[0.2, 0.1]), stages] {
+            assert!(scene.problem().is_ok());
+            for parameter in Parameter::all_of(&scene) {
+                // Ends of stages, and a last layer without an end, have rules of their own.
+                let is_length = matches!(
+                    parameter,
+                    Parameter::Stage(_, StageNumber::End) | Parameter::Layer(_, LayerNumber::Thickness)
+                );
+                let values: &[f64] =
+                    if is_length { &[f64::NAN, -1.0] } else { &[f64::NAN, f64::INFINITY, -1.0, 0.0, 1.5] };
+                for value in values.iter().filter(|value| !parameter.entry().range.contains(**value)) {
+                    let mut faulty = scene.clone();
+                    parameter.set(&mut faulty, *value).unwrap();
+                    let refused = faulty.problem();
+                    let ends_fall = matches!(refused, Err(ResolveError::StageEndsFall { .. }));
+                    let refuses = matches!(refused, Err(ResolveError::Inadmissible { .. })) || (is_length && ends_fall);
+                    assert!(refuses, "{parameter} = {value}: {refused:?}");
+                }
+            }
         }
         let no_speed = Scene { velocity: None, ..scene() };
         assert_eq!(no_speed.problem(), Err(ResolveError::NoImpactSpeed));
         assert_eq!(no_speed.with_velocity(3.0).problem().unwrap().impact_speed, 3.0);
-        for mass in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(matches!(Scene { mass, ..scene() }.problem(), Err(ResolveError::Inadmissible { .. })));
-        }
-        let faults: [fn(&mut Concrete); 9] = [
-            |c| c.diameter = 0.0,
-            |c| c.nose_factor = 1.5,
-            |c| c.strength = 0.0,
-            |c| c.density = -1.0,
-            |c| c.static_factor = f64::NAN,
-            |c| c.inertia_factor = -1.0,
-            |c| c.crater_ratio = f64::INFINITY,
-            |c| c.crater_stiffness = CraterStiffness::Given(0.0),
-            |c| c.crater_stiffness = CraterStiffness::Given(f64::NAN),
-        ];
-        for fault in faults {
-            let mut faulty = concrete();
-            fault(&mut faulty);
-            let refused = scene_of(faulty).problem();
-            assert!(matches!(refused, Err(ResolveError::Inadmissible { .. })), "{refused:?}");
-        }
-        let stage = |p: f64, s: f64, r: f64, q: f64| Stage {
-            static_force: p,
-            stiffness: s,
-            viscosity: r,
-            drag: q,
-            end: f64::INFINITY,
-        };
-        for faulty in [
-            stage(f64::NAN, 0.0, 0.0, 0.0),
-            stage(0.0, -1.0, 0.0, 0.0),
-            stage(0.0, 0.0, -1.0, 0.0),
-            stage(0.0, 0.0, 0.0, f64::INFINITY),
-        ] {
-            let refused = stages_scene(vec![faulty]).problem();
-            assert!(matches!(refused, Err(ResolveError::Inadmissible { .. })), "{refused:?}");
-        }
     }
 
     #[test]
@@ -899,7 +885,7 @@ pub(crate) mod tests {
     fn errors_name_the_numbers_and_the_remedy_and_only_overflow_is_no_usage() {
         let usage = [
             (
-                ResolveError::Inadmissible { quantity: "the mass M [kg]", value: -1.0, range: Range::Positive },
+                ResolveError::Inadmissible { parameter: Parameter::Mass, value: -1.0 },
                 "the mass M [kg] = -1 is not admissible: it must be a number > 0",
                 "give a value in the range",
             ),
@@ -931,7 +917,7 @@ pub(crate) mod tests {
             ),
         ];
         for (error, message, help) in usage {
-            assert_eq!((error.to_string().as_str(), error.help(), error.is_usage()), (message, help, true));
+            assert_eq!((error.to_string().as_str(), error.help().as_str(), error.is_usage()), (message, help, true));
         }
         let error = ResolveError::OutOfRange { quantity: "the drag Q [kg/m]", value: 1e-310 };
         assert_eq!(error.to_string(), "the drag Q [kg/m] comes to 1e-310, beyond the range of 64-bit numbers");
@@ -940,7 +926,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_scene_tells_whether_its_static_factor_is_the_one_of_eq_14() {
+    fn a_static_factor_follows_the_strength_if_it_is_that_of_eq_14() {
         assert!(!concrete().follows_eq14());
         assert!(Concrete { strength: 36e6, ..concrete() }.follows_eq14());
     }

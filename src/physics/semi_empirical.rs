@@ -16,6 +16,8 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
+use super::scalar::Scalar;
+
 /// Whether a formula is used inside the range it was made for, and what there is to say about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Validity {
@@ -42,6 +44,12 @@ pub const NDRC_FIRST_BRANCH_DEPTH: f64 = 1.35;
 /// The second branch begins lower, at 2.994: in between two depths fit, and the smaller one is taken.
 pub const NDRC_FIRST_BRANCH_END: f64 = 2.997_945;
 
+/// First branch of the ACE/NDRC relation, `H/d = a y - b y²`: a and b.
+const NDRC_PARABOLA: [f64; 2] = [3.19, 0.718];
+
+/// Second branch, `H/d = a + b y`: a and b.
+const NDRC_LINE: [f64; 2] = [1.32, 1.24];
+
 /// H/d where the relation ends, `1.32 + 1.24 · 13.5`.
 pub const NDRC_END: f64 = 18.06;
 
@@ -55,7 +63,7 @@ const THIRD_BRANCH: f64 = 3.8;
 ///
 /// `S = 72 (fc/MPa)^(-1/2)`, Not finite for fc = 0.
 pub fn static_factor(strength: f64) -> f64 {
-    fault!("eq14-72", 72.0, 82.6) / (strength / 1e6).sqrt()
+    72.0 / (strength / 1e6).sqrt()
 }
 
 /// Range of the shots to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
@@ -69,17 +77,13 @@ pub fn static_factor_validity(strength: f64) -> Validity {
 /// Depth X/d of Eq. 11-12 at impact function `impact`, for crater depth `crater_ratio` = k > 0.
 pub fn depth_ratio(impact: f64, crater_ratio: f64) -> f64 {
     let k = crater_ratio;
-    if impact <= k * FRAC_PI_4 {
-        fault!("eq11-as-printed", (k * impact / FRAC_PI_4).sqrt(), (k / FRAC_PI_4).sqrt() * impact)
-    } else {
-        fault!("eq12-offset", 0.5, 1.0) * k + impact / FRAC_PI_2
-    }
+    if impact <= k * FRAC_PI_4 { (k * impact / FRAC_PI_4).sqrt() } else { 0.5 * k + impact / FRAC_PI_2 }
 }
 
 /// Impact function I that reaches the depth X/d = `depth_ratio` by Eq. 11-12: the inverse of [`depth_ratio`].
 pub fn impact_function(depth_ratio: f64, crater_ratio: f64) -> f64 {
     let (y, k) = (depth_ratio, crater_ratio);
-    if y <= k { FRAC_PI_4 * y * (y / k) } else { FRAC_PI_2 * (y - fault!("eq12-inverse", 0.5, 1.0) * k) }
+    if y <= k { FRAC_PI_4 * y * (y / k) } else { FRAC_PI_2 * (y - 0.5 * k) }
 }
 
 /// How far Eq. 11-12 is from the equation of motion at finite N, by the first term in 1/N, relative to X/d.
@@ -92,11 +96,9 @@ pub fn impact_function(depth_ratio: f64, crater_ratio: f64) -> f64 {
 pub fn model_difference(impact: f64, geometry: f64, crater_ratio: f64) -> f64 {
     let at_crater_end = crater_ratio * FRAC_PI_4;
     if impact <= at_crater_end {
-        fault!("approach-half", 0.5, 1.0) * (at_crater_end - impact) / geometry
+        0.5 * (at_crater_end - impact) / geometry
     } else {
-        (at_crater_end - impact) * (at_crater_end + impact)
-            / (fault!("approach-pi", PI, 1.0) * geometry)
-            / depth_ratio(impact, crater_ratio)
+        (at_crater_end - impact) * (at_crater_end + impact) / (PI * geometry) / depth_ratio(impact, crater_ratio)
     }
 }
 
@@ -122,8 +124,8 @@ pub fn depth_validity(impact: f64, geometry: Option<f64>, crater_ratio: f64) -> 
 ///
 /// Drops from 2.997945 to 2.994 at y = 1.35, as the relation does.
 pub fn perforated_thickness_ratio(depth_ratio: f64) -> f64 {
-    let y = depth_ratio;
-    if y <= NDRC_FIRST_BRANCH_DEPTH { y * (3.19 - 0.718 * y) } else { 1.32 + 1.24 * y }
+    let (y, [a, b], [c, d]) = (depth_ratio, NDRC_PARABOLA, NDRC_LINE);
+    if y <= NDRC_FIRST_BRANCH_DEPTH { y * (a - b * y) } else { c + d * y }
 }
 
 /// Penetration y = `x_p/d` at which a target of thickness H/d counts as perforated: the inverse of
@@ -135,15 +137,15 @@ pub fn perforated_thickness_ratio(depth_ratio: f64) -> f64 {
 ///
 /// The quotient is the smaller root of the quadratic without its cancellation as H/d -> 0, where y -> (H/d)/3.19.
 /// Where two depths fit, from 2.994 to 2.997945, the smaller one (first branch) is taken. Beyond 18.06 the second
-/// branch is continued ([`perforation_validity`] tells).
-pub fn perforating_depth_ratio(thickness_ratio: f64) -> f64 {
-    let h = thickness_ratio;
-    if h <= NDRC_FIRST_BRANCH_END {
-        let a = fault!("ndrc-3.19", 3.19, 3.91) / (2.0 * 0.718);
-        let scaled = h / fault!("ndrc-0.718", 0.718, 0.781);
-        scaled / fault!("ndrc-wrong-root", a + (a * a - scaled).sqrt(), a - (a * a - scaled).sqrt())
+/// branch is continued (see [`perforation_validity`]).
+pub fn perforating_depth_ratio<S: Scalar>(thickness_ratio: S) -> S {
+    let (h, [a, b], [c, d]) = (thickness_ratio, NDRC_PARABOLA, NDRC_LINE);
+    if h.value() <= NDRC_FIRST_BRANCH_END {
+        let a = S::from_f64(a / (2.0 * b));
+        let scaled = h / S::from_f64(b);
+        scaled / (a + (a * a - scaled).sqrt())
     } else {
-        (h - fault!("ndrc-1.32", 1.32, 1.23)) / fault!("ndrc-1.24", 1.24, 1.42)
+        (h - S::from_f64(c)) / S::from_f64(d)
     }
 }
 
@@ -178,16 +180,16 @@ fn range_validity(thickness_ratio: f64, below_end: bool, end: &str) -> Validity 
 /// 5.2e-8 in place of 0, since its difference cancels: that is what is printed. Beyond 18 the last branch continues.
 pub fn eq15_printed(thickness_ratio: f64) -> f64 {
     let h = thickness_ratio;
-    if h <= fault!("eq15-joint", 3.0, 3.2) { printed_first(h) } else { printed_beyond_first(h) }
+    if h <= 3.0 { printed_first(h) } else { printed_beyond_first(h) }
 }
 
 fn printed_first(h: f64) -> f64 {
-    let root = fault!("eq15-2.222", 2.222, 2.221) - (4.935 - 1.393 * h).sqrt();
+    let root = 2.222 - (4.935 - 1.393 * h).sqrt();
     0.196 * root * root
 }
 
 fn printed_beyond_first(h: f64) -> f64 {
-    if h <= THIRD_BRANCH { fault!("eq15-0.128", 0.128, 0.182) * (h - 1.320) * (h - 1.320) } else { 0.633 * (h - 2.560) }
+    if h <= THIRD_BRANCH { 0.128 * (h - 1.320) * (h - 1.320) } else { 0.633 * (h - 2.560) }
 }
 
 /// Critical energy `E_c/(S d³ fc)` of Eq. 15 with unrounded coefficients: Eq. 11-12 at k = 2 with the ACE/NDRC

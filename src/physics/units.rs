@@ -15,27 +15,27 @@ use uom::si::f64 as si;
 /// What a quantity of a scene is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Dimension {
-    /// Mass [kg].
+    /// Mass (kg).
     Mass,
-    /// Length [m].
+    /// Length (m).
     Length,
-    /// Pressure or strength [Pa].
+    /// Pressure or strength (Pa).
     Pressure,
-    /// Mass density [kg/m³].
+    /// Mass density (kg/m³).
     Density,
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     Velocity,
-    /// Force [N].
+    /// Force (N).
     Force,
-    /// Stiffness, force per length [N/m].
+    /// Stiffness, force per length (N/m).
     Stiffness,
-    /// Viscosity, force per velocity [kg/s].
+    /// Viscosity, force per velocity (kg/s).
     Viscosity,
-    /// Drag, force per velocity squared [kg/m].
+    /// Drag, force per velocity squared (kg/m).
     Drag,
-    /// Time [s].
+    /// Time (s).
     Time,
-    /// Energy [J]; no scene has one, and a unit of it is told apart from an unknown unit.
+    /// Energy (J); no scene has one, but its units are known ones.
     Energy,
 }
 
@@ -86,38 +86,36 @@ impl Dimension {
         Self::Energy,
     ];
 
+    /// Name for messages, and common units, the SI unit first.
+    fn about(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Mass => ("mass", &["kg", "g", "t", "mg", "lb", "oz"]),
+            Self::Length => ("length", &["m", "mm", "cm", "µm", "km", "in", "ft"]),
+            Self::Pressure => ("pressure", &["Pa", "kPa", "MPa", "GPa", "bar", "psi", "ksi"]),
+            Self::Density => ("mass density", &["kg/m^3", "g/cm^3", "t/m^3", "lb/ft^3", "lb/in^3"]),
+            Self::Velocity => ("velocity", &["m/s", "mm/s", "km/s", "km/h", "ft/s"]),
+            Self::Force => ("force", &["N", "kN", "MN", "lbf", "kgf"]),
+            Self::Stiffness => ("stiffness (force per length)", &["N/m", "kN/m", "MN/m", "N/mm", "lbf/in"]),
+            Self::Viscosity => ("viscosity (force per velocity)", &["kg/s", "N s/m", "g/s", "lb/s"]),
+            Self::Drag => ("drag (force per velocity squared)", &["kg/m", "g/cm", "g/m", "lb/ft"]),
+            Self::Time => ("time", &["s", "ms", "µs", "min"]),
+            Self::Energy => ("energy", &["J", "kJ", "MJ"]),
+        }
+    }
+
     /// Name for messages: `mass`.
     pub fn noun(self) -> &'static str {
-        match self {
-            Self::Mass => "mass",
-            Self::Length => "length",
-            Self::Pressure => "pressure",
-            Self::Density => "mass density",
-            Self::Velocity => "velocity",
-            Self::Force => "force",
-            Self::Stiffness => "stiffness (force per length)",
-            Self::Viscosity => "viscosity (force per velocity)",
-            Self::Drag => "drag (force per velocity squared)",
-            Self::Time => "time",
-            Self::Energy => "energy",
-        }
+        self.about().0
     }
 
     /// Common units, the SI unit first.
     pub fn units(self) -> &'static [&'static str] {
-        match self {
-            Self::Mass => &["kg", "g", "t", "mg", "lb", "oz"],
-            Self::Length => &["m", "mm", "cm", "µm", "km", "in", "ft"],
-            Self::Pressure => &["Pa", "kPa", "MPa", "GPa", "bar", "psi", "ksi"],
-            Self::Density => &["kg/m^3", "g/cm^3", "t/m^3", "lb/ft^3", "lb/in^3"],
-            Self::Velocity => &["m/s", "mm/s", "km/s", "km/h", "ft/s"],
-            Self::Force => &["N", "kN", "MN", "lbf", "kgf"],
-            Self::Stiffness => &["N/m", "kN/m", "MN/m", "N/mm", "lbf/in"],
-            Self::Viscosity => &["kg/s", "N s/m", "g/s", "lb/s"],
-            Self::Drag => &["kg/m", "g/cm", "g/m", "lb/ft"],
-            Self::Time => &["s", "ms", "µs", "min"],
-            Self::Energy => &["J", "kJ", "MJ"],
-        }
+        self.about().1
+    }
+
+    /// SI unit in print: `kg/m³`.
+    pub fn symbol(self) -> String {
+        canonical(self.units()[0])
     }
 
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
@@ -256,6 +254,53 @@ pub fn number(number: &str) -> Result<f64, QuantityError> {
     }
 }
 
+/// A number beside the decimal that it was read from, in SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    /// The `f64` nearest the decimal.
+    pub value: f64,
+    /// The decimal as written, times that of the unit: `269e-4` for `26.9 mm`. It is the exact value where that of the
+    /// unit is a decimal of at most 17 digits, as for metric units; see [`quantity`] for others.
+    pub decimal: String,
+}
+
+impl Quantity {
+    /// A bare number.
+    ///
+    /// # Errors
+    /// As [`number`].
+    pub fn bare(decimal: &str) -> Result<Self, QuantityError> {
+        Ok(Self { value: number(decimal)?, decimal: decimal.to_owned() })
+    }
+
+    /// A number with a unit of `dimension`.
+    ///
+    /// # Errors
+    /// As [`quantity`].
+    pub fn with_unit(text: &str, dimension: Dimension) -> Result<Self, QuantityError> {
+        let text = text.trim();
+        let (digits, unit) = split(text);
+        if digits.is_empty() {
+            let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+            let word = word.split_whitespace().next().unwrap_or_default();
+            return Err(match word {
+                "nan" | "inf" | "infinity" => QuantityError::NotFinite,
+                _ => QuantityError::NoNumber,
+            });
+        }
+        number(digits)?;
+        let unit = unit.trim();
+        if unit.is_empty() {
+            return Err(QuantityError::NoUnit);
+        }
+        let coefficient = dimension.coefficient(unit).ok_or_else(|| match Dimension::of(unit) {
+            Some(has) => QuantityError::WrongDimension { unit: unit.to_owned(), has },
+            None => QuantityError::UnknownUnit { unit: unit.to_owned() },
+        })?;
+        Self::bare(&product(digits, coefficient))
+    }
+}
+
 /// SI value of a text `number unit`, of `dimension`. White space around and between is free, and may be absent.
 ///
 /// # Errors
@@ -272,26 +317,7 @@ pub fn number(number: &str) -> Result<f64, QuantityError> {
 /// assert_eq!(quantity("36MPa", Dimension::Pressure), Ok(36e6));
 /// ```
 pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
-    let text = text.trim();
-    let (digits, unit) = split(text);
-    if digits.is_empty() {
-        let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
-        let word = word.split_whitespace().next().unwrap_or_default();
-        return Err(match word {
-            "nan" | "inf" | "infinity" => QuantityError::NotFinite,
-            _ => QuantityError::NoNumber,
-        });
-    }
-    number(digits)?;
-    let unit = unit.trim();
-    if unit.is_empty() {
-        return Err(QuantityError::NoUnit);
-    }
-    let coefficient = dimension.coefficient(unit).ok_or_else(|| match Dimension::of(unit) {
-        Some(has) => QuantityError::WrongDimension { unit: unit.to_owned(), has },
-        None => QuantityError::UnknownUnit { unit: unit.to_owned() },
-    })?;
-    number(&product(digits, coefficient))
+    Quantity::with_unit(text, dimension).map(|quantity| quantity.value)
 }
 
 /// Decimal text of `number · coefficient`, exact where 38 digits hold it.

@@ -1,6 +1,6 @@
 //! The report of `bench`: its JSON, and a folder with a page of its own.
 //!
-//! It stands apart from the report of `verify`, whose numbers are the same in every run: times belong to one machine
+//! It is separate from the report of `verify`, whose numbers are the same in every run: times belong to one machine
 //! and one hour, and decide no claim.
 
 mod figures;
@@ -12,8 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::environment::Environment;
-use super::figure::Figure;
-use super::folder::figure_files;
+use super::folder::{Files, files_of};
 use crate::studies::bench::growth::Growth;
 use crate::studies::bench::step_size::StepStudy;
 use crate::studies::bench::work_precision::{Case, Fastest, Known, Run};
@@ -61,19 +60,11 @@ impl From<&Case> for CaseJson {
     }
 }
 
-/// Every file of the report: its path in the folder, and its bytes.
+/// Every file of the report.
 ///
 /// # Errors
-/// Only what makes memory run out, or a figure that cannot be drawn.
-pub fn files(report: &BenchJson) -> io::Result<Vec<(String, Vec<u8>)>> {
-    let figures =
-        figures::all(report).into_iter().map(Figure::draw).collect::<Result<Vec<_>, _>>().map_err(io::Error::other)?;
-    let mut json = serde_json::to_vec_pretty(report)?;
-    json.push(b'\n');
-    let mut files = vec![
-        ("report.json".to_owned(), json),
-        ("report.html".to_owned(), page::to_html(report, &figures).into_bytes()),
-    ];
-    files.extend(figure_files(&figures)?);
-    Ok(files)
+/// Only what makes memory run out.
+pub fn files(report: &BenchJson) -> io::Result<Files> {
+    let figures = figures::all(report);
+    files_of(report, page::to_html(report, &figures), &figures)
 }

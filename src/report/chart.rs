@@ -1,46 +1,39 @@
-//! How a figure is drawn: panels of one size, drawn by plotters, in colours that follow the page.
+//! A diagram: axes and series in; ranges, ticks, legend, places of names, and a description out.
 //!
-//! plotters places everything on whole units, so a panel is drawn [`FINE`] times larger than it is shown and scaled by
-//! its view box. Colours stand in the drawing as plain ones, for programs that know no style sheets, and once more as
-//! classes ([`Ink`]) that the page sets for light, dark and print.
+//! A panel is written as SVG elements that name their colours by class, so that a page or a file sets them for light,
+//! dark and print. The same colours stand beside the classes for programs without style sheets. Series differ by shape
+//! or dashes as well as by colour. Lengths are pixels of a panel [`WIDTH`] wide: printed 80 mm wide, its text has 7 pt.
 
 use std::fmt::Write as _;
 
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use thiserror::Error;
+use maud::{Markup, PreEscaped, html};
 
 use super::text::{number, one_line, power_of_ten};
 
-/// Units of the drawing per unit shown.
-const FINE: i32 = 4;
-/// Width of a panel [px at full size]; it fits a phone of 375 px.
-pub const WIDTH: i32 = 344;
-/// Radius of a point, unless it says otherwise [px].
-pub const RADIUS: f64 = 2.75;
-/// Height of a panel, unless it says otherwise [px].
-pub const HEIGHT: i32 = 270;
+/// Width of a panel: it fits a phone of 375 px.
+pub const WIDTH: f64 = 344.0;
+/// Height of a diagram without title, legend and axis labels.
+pub const HEIGHT: f64 = 188.0;
 
-const LEFT: i32 = 44;
-const RIGHT: i32 = 10;
-const TOP: i32 = 44;
-const BOTTOM: i32 = 38;
-/// What a panel is higher than its diagram [px].
-pub const MARGINS: i32 = TOP + BOTTOM;
-/// Widths of lines [units of the drawing]. They tell dashed lines from the others, which plotters' drawing does not.
-const SOLID: u32 = 7;
-const DASHED: u32 = 5;
-const OUTLINE: u32 = 6;
-const TEXT: f64 = 11.0;
-const TITLE: f64 = 13.0;
+const LEFT: f64 = 46.0;
+const RIGHT: f64 = 10.0;
+const TITLE: f64 = 22.0;
+/// Height of a line of text.
+const LINE: f64 = 16.0;
+const BOTTOM: f64 = 38.0;
+const SYMBOL: f64 = 22.0;
+
+/// A point in the units of the axes.
+pub type Point = (f64, f64);
 
 /// A colour by its role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Ink {
-    /// Text and axes.
+    /// What everything stands on.
+    Paper,
+    /// Text.
     Text,
-    /// Second text, reference lines.
+    /// Axes, second text, reference lines.
     Muted,
     /// Grid.
     Grid,
@@ -59,154 +52,219 @@ pub enum Ink {
 }
 
 impl Ink {
-    /// Every colour with its class, its light and its dark value. Text is readable at 4.5 : 1, lines at 3 : 1.
-    pub const ALL: [(Self, &'static str, [u8; 3], [u8; 3]); 9] = [
-        (Self::Text, "text", [0x1c, 0x22, 0x2a], [0xe6, 0xea, 0xef]),
-        (Self::Muted, "muted", [0x5a, 0x64, 0x70], [0xa3, 0xad, 0xb8]),
-        (Self::Grid, "grid", [0xdf, 0xe3, 0xe8], [0x33, 0x3a, 0x44]),
-        (Self::Shade, "shade", [0xec, 0xee, 0xf2], [0x29, 0x2f, 0x38]),
-        (Self::Blue, "blue", [0x1b, 0x5f, 0xb4], [0x6f, 0xb1, 0xff]),
-        (Self::Orange, "orange", [0xb0, 0x50, 0x05], [0xf2, 0xa1, 0x5b]),
-        (Self::Teal, "teal", [0x0b, 0x74, 0x66], [0x4f, 0xcf, 0xba]),
-        (Self::Purple, "purple", [0x7d, 0x3c, 0xa6], [0xcb, 0xa2, 0xf2]),
-        (Self::Red, "red", [0xb4, 0x1e, 0x2b], [0xff, 0x8f, 0x8f]),
+    /// Name, light and dark value in the order of the variants. Contrast: text at least 4.5 : 1, lines 3 : 1.
+    const ALL: [[&'static str; 3]; 10] = [
+        ["paper", "#ffffff", "#161a20"],
+        ["text", "#1c222a", "#e6eaef"],
+        ["muted", "#5a6470", "#a3adb8"],
+        ["grid", "#dfe3e8", "#333a44"],
+        ["shade", "#e6e9ee", "#29303a"],
+        ["blue", "#1b5fb4", "#6fb1ff"],
+        ["orange", "#b05005", "#f2a15b"],
+        ["teal", "#0b7466", "#4fcfba"],
+        ["purple", "#7d3ca6", "#cba2f2"],
+        ["red", "#b41e2b", "#ff8f8f"],
     ];
 
-    /// The colour of series `index`.
-    pub fn series(index: usize) -> Self {
-        [Self::Blue, Self::Orange, Self::Teal, Self::Purple][index % 4]
+    fn name(self) -> &'static str {
+        Self::ALL[self as usize][0]
     }
 
-    fn rgb(self) -> RGBColor {
-        let [r, g, b] = Self::ALL.iter().find(|(ink, ..)| *ink == self).map_or([0; 3], |(_, _, light, _)| *light);
-        RGBColor(r, g, b)
+    fn light(self) -> &'static str {
+        Self::ALL[self as usize][1]
     }
 
-    /// The style sheet of a drawing, `selector` before every rule: classes `s-…` for lines, `f-…` for areas and text.
+    /// The style sheet of every drawing: variables by the names of the colours, and classes `f-…` to fill with them and
+    /// `s-…` for lines. Text inside an element of class `plot` has an outline in the colour of the paper.
     pub fn style_sheet() -> String {
-        let mut css = String::from(":root{");
-        let mut dark = String::new();
-        let mut rules = String::new();
-        for (_, name, [r, g, b], [dr, dg, db]) in Self::ALL {
-            let _ = write!(css, "--{name}:#{r:02x}{g:02x}{b:02x};");
-            let _ = write!(dark, "--{name}:#{dr:02x}{dg:02x}{db:02x};");
-            let _ = write!(rules, ".f-{name}{{fill:var(--{name})}}.s-{name}{{stroke:var(--{name})}}");
+        let [mut light, mut dark, mut classes] = [const { String::new() }; 3];
+        for [name, value, value_in_dark] in Self::ALL {
+            let _ = write!(light, "--{name}:{value};");
+            let _ = write!(dark, "--{name}:{value_in_dark};");
+            let _ = write!(classes, ".f-{name}{{fill:var(--{name})}}.s-{name}{{stroke:var(--{name})}}");
         }
-        format!("{css}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}{rules}")
+        format!(
+            ":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}{classes}\
+             .plot text{{paint-order:stroke;stroke:var(--paper);stroke-width:3px;stroke-linejoin:round}}"
+        )
     }
 }
 
-/// How a point looks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
-    /// Round.
-    Circle,
-    /// Square.
-    Square,
-    /// Triangle, point up.
-    Triangle,
+/// Corners of marks in units of the radius: circle, triangle, square, diamond, and triangle point down.
+const SHAPES: [&[Point]; 5] = [
+    &[],
+    &[(0.0, -1.3), (1.25, 0.9), (-1.25, 0.9)],
+    &[(-0.95, -0.95), (0.95, -0.95), (0.95, 0.95), (-0.95, 0.95)],
+    &[(0.0, -1.4), (1.4, 0.0), (0.0, 1.4), (-1.4, 0.0)],
+    &[(0.0, 1.3), (1.25, -0.9), (-1.25, -0.9)],
+];
+
+/// Dashes of lines: solid, long, dotted, dash and dot.
+const DASHES: [&str; 4] = ["none", "6 3", "2 2", "8 3 2 3"];
+
+/// How a series is drawn: as a line, as marks, as both, or as an area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
+pub struct Style {
+    ink: Ink,
+    is_area: bool,
+    dash: Option<&'static str>,
+    shape: Option<&'static [Point]>,
+    is_hollow: bool,
+    radius: f64,
 }
 
-impl Shape {
-    /// The shape of series `index`.
-    pub fn series(index: usize) -> Self {
-        [Self::Circle, Self::Triangle, Self::Square][index % 3]
+impl Style {
+    /// An area within the points.
+    pub const fn area(ink: Ink) -> Self {
+        Self { ink, is_area: true, dash: None, shape: None, is_hollow: false, radius: 2.75 }
+    }
+
+    /// A dashed line for what was not measured.
+    pub const REFERENCE: Self = Self { is_area: false, dash: Some("4 3"), ..Self::area(Ink::Muted) };
+
+    /// A line; each of the first four indices has a colour and dashes of its own.
+    pub fn line(index: usize) -> Self {
+        let ink = [Ink::Blue, Ink::Orange, Ink::Teal, Ink::Purple][index % 4];
+        Self { ink, dash: Some(DASHES[(index + index / 4) % 4]), ..Self::REFERENCE }
+    }
+
+    /// Marks; each of the first twenty indices has its own pair of colour and shape.
+    pub fn marks(index: usize) -> Self {
+        Self { dash: None, shape: Some(SHAPES[index % 5]), ..Self::line(index) }
+    }
+
+    /// Marks on a solid line.
+    pub fn marked_line(index: usize) -> Self {
+        Self { dash: Some(DASHES[0]), ..Self::marks(index) }
+    }
+
+    /// A solid line of the same colour, without marks.
+    pub fn as_line(self) -> Self {
+        Self { dash: Some(DASHES[0]), shape: None, ..self }
+    }
+
+    /// In this colour.
+    pub fn ink(self, ink: Ink) -> Self {
+        Self { ink, ..self }
+    }
+
+    /// Only the outline of the marks.
+    pub fn hollow(self) -> Self {
+        Self { is_hollow: true, ..self }
+    }
+
+    /// With marks of this radius.
+    pub fn radius(self, radius: f64) -> Self {
+        Self { radius, ..self }
     }
 }
 
-/// Whether an axis counts equal distances or equal ratios.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Equal distances.
-    Linear,
-    /// Equal ratios.
-    Log,
-}
-
-/// An axis.
-#[derive(Clone, Debug, PartialEq)]
+/// An axis: linear or logarithmic. Its range follows from the series unless it is set.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[must_use]
 pub struct Axis {
-    /// What it shows, with its unit.
-    pub label: String,
-    /// Its scale.
-    pub scale: Scale,
-    /// Its ends, ascending; both positive on a logarithmic one.
-    pub range: [f64; 2],
-    /// Whether values stand beside it.
-    pub numbered: bool,
+    label: String,
+    is_log: bool,
+    included: Vec<f64>,
+    range: Option<[f64; 2]>,
 }
 
 impl Axis {
-    /// A linear axis over `values`, with a margin.
-    pub fn linear(label: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let (low, high) = ends(values).unwrap_or((0.0, 1.0));
-        let pad = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
-        let low = if low >= 0.0 && low < 0.2 * high { 0.0 } else { low - pad };
-        Self { label: label.into(), scale: Scale::Linear, range: [low, high + pad], numbered: true }
+    /// A linear axis; `unit` is empty for a number without one.
+    pub fn linear(title: &str, unit: &str) -> Self {
+        let label = if unit.is_empty() { title.to_owned() } else { format!("{title} [{unit}]") };
+        Self { label, ..Self::default() }
     }
 
-    /// A logarithmic axis over the positive ones of `values`, with a margin.
-    pub fn log(label: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let (low, high) = ends(values.into_iter().filter(|v| *v > 0.0)).unwrap_or((0.1, 1.0));
-        Self { label: label.into(), scale: Scale::Log, range: [low / 1.5, high * 1.5], numbered: true }
+    /// A logarithmic axis. Values that are not positive are not drawn.
+    pub fn log(title: &str, unit: &str) -> Self {
+        Self { is_log: true, ..Self::linear(title, unit) }
     }
 
-    /// Place on the axis: the value, or its decimal logarithm.
-    pub fn place(&self, value: f64) -> f64 {
-        match self.scale {
-            Scale::Linear => value,
-            Scale::Log => value.max(f64::MIN_POSITIVE).log10(),
-        }
+    /// Extends the range to `values`.
+    pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
+        self.included.extend(values);
+        self
     }
 
-    /// `value` as a share of the axis, 0 to 1 on it.
-    pub fn share(&self, value: f64) -> f64 {
-        let [low, high] = self.places();
-        (self.place(value) - low) / (high - low)
+    /// Sets the range; what lies beyond is drawn at the edge.
+    pub fn over(self, range: [f64; 2]) -> Self {
+        Self { range: Some(range), ..self }
     }
 
-    fn places(&self) -> [f64; 2] {
-        self.range.map(|end| self.place(end))
+    fn has(&self, value: f64) -> bool {
+        value.is_finite() && (value > 0.0 || !self.is_log)
     }
 
-    /// Whether `value` lies on the axis.
-    pub fn holds(&self, value: f64) -> bool {
-        self.range[0] <= value && value <= self.range[1]
-    }
-
-    /// Places of the grid lines, `most` at most.
-    fn ticks(&self, most: f64) -> Vec<f64> {
-        let [low, high] = self.places();
-        let span = high - low;
-        let step = match self.scale {
-            Scale::Log => {
-                [1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0].into_iter().find(|s| span / s <= most).unwrap_or(100.0)
-            }
-            Scale::Linear => {
-                let decade = 10.0_f64.powf((span / most).log10().floor());
-                [1.0, 2.0, 2.5, 5.0, 10.0].map(|s| s * decade).into_iter().find(|s| span / s <= most).unwrap_or(span)
+    /// The axis over `values`, with a margin, and `headroom` as a share of its length above them.
+    fn fitted(&self, values: impl Iterator<Item = f64>, headroom: f64) -> Span {
+        let all = values.chain(self.included.iter().copied()).filter(|v| self.has(*v));
+        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let [low, high] = match self.range {
+            Some(range) => range,
+            None if low > high => [0.1, 1.0],
+            None if self.is_log => [low / 1.5, high * 1.5],
+            None => {
+                let pad = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+                [if low >= 0.0 && low < 0.2 * high { 0.0 } else { low - pad }, high + pad]
             }
         };
-        let first = (low / step).ceil() as i64;
-        (0..=most.ceil() as i64 + 1)
-            .map(|i| (first + i) as f64 * step)
-            .take_while(|place| *place <= high + 1e-9 * span)
-            .collect()
-    }
-
-    fn tick_label(&self, place: f64) -> String {
-        match self.scale {
-            Scale::Log => power_of_ten(place.round() as i32),
-            Scale::Linear => number(if place.abs() < 1e-12 * self.range[1].abs() { 0.0 } else { place }, 3),
-        }
+        let mut span = Span { is_log: self.is_log, low: 0.0, high: 1.0 };
+        (span.low, span.high) = (span.place(low), span.place(high));
+        span.high += headroom * span.length();
+        span
     }
 }
 
-fn ends(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
-    values.into_iter().filter(|v| v.is_finite()).fold(None, |ends, v| match ends {
-        None => Some((v, v)),
-        Some((low, high)) => Some((v.min(low), v.max(high))),
-    })
+/// An axis with its range, in values or their decimal logarithms.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    is_log: bool,
+    low: f64,
+    high: f64,
+}
+
+impl Span {
+    fn place(&self, value: f64) -> f64 {
+        if self.is_log { value.max(f64::MIN_POSITIVE).log10() } else { value }
+    }
+
+    fn value(&self, place: f64) -> f64 {
+        if self.is_log { 10.0_f64.powf(place) } else { place }
+    }
+
+    fn length(&self) -> f64 {
+        self.high - self.low
+    }
+
+    /// `value` as a share of the axis: 0 to 1 on it.
+    fn share(&self, value: f64) -> f64 {
+        (self.place(value) - self.low) / self.length()
+    }
+
+    /// Grid lines, `most` at most where the axis is longer than two decades: share of the axis and label.
+    fn ticks(&self, most: f64) -> Vec<(f64, String)> {
+        let length = self.length();
+        let places: Vec<f64> = if self.is_log && length < 2.0 {
+            let mantissas: &[f64] = if length < 0.5 { &[1., 2., 3., 4., 5., 6., 7., 8., 9.] } else { &[1., 2., 5.] };
+            let decades = self.low.floor() as i32..=self.high.floor() as i32;
+            decades.flat_map(|decade| mantissas.iter().map(move |m| m.log10() + f64::from(decade))).collect()
+        } else {
+            let decade = if self.is_log { 1.0 } else { 10.0_f64.powf((length / most).log10().floor()) };
+            let steps = if self.is_log { [1., 2., 3., 5., 10., 20., 50.] } else { [1., 2., 2.5, 5., 10., 20., 50.] };
+            let step = steps.map(|s| s * decade).into_iter().find(|s| length / s <= most).unwrap_or(length);
+            let first = (self.low / step).ceil();
+            (0..=most.ceil() as u32 + 1).map(|i| (first + f64::from(i)) * step).collect()
+        };
+        let is_inside = |place: &f64| *place >= self.low - 1e-9 * length && *place <= self.high + 1e-9 * length;
+        let label = |place: f64| match self.is_log {
+            true if length >= 2.0 => power_of_ten(place.round() as i32),
+            true => number(self.value(place), 2).replace("\u{a0}×\u{a0}", "·"),
+            false => number(if place.abs() < 1e-9 * length { 0.0 } else { place }, 3),
+        };
+        places.into_iter().filter(is_inside).map(|place| ((place - self.low) / length, label(place))).collect()
+    }
 }
 
 /// Where a text stands against its place.
@@ -216,329 +274,480 @@ pub enum Anchor {
     Start,
     /// To the left of it.
     End,
-    /// Over it.
+    /// Across it.
     Middle,
 }
 
-/// Something in a panel, in its coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Mark {
-    /// A line through points.
-    Line {
-        /// The points.
-        points: Vec<(f64, f64)>,
-        /// Colour.
-        ink: Ink,
-        /// Whether it is broken into dashes.
-        dashed: bool,
-    },
-    /// Points.
-    Points {
-        /// The points.
-        points: Vec<(f64, f64)>,
-        /// Colour.
-        ink: Ink,
-        /// Shape.
-        shape: Shape,
-        /// Whether only the outline is drawn.
-        hollow: bool,
-        /// Radius [px].
-        radius: f64,
-    },
-    /// A shaded polygon, behind the grid.
-    Area {
-        /// Its corners.
-        points: Vec<(f64, f64)>,
-        /// Colour.
-        ink: Ink,
-    },
-    /// A text.
-    Text {
-        /// Its place.
-        at: (f64, f64),
-        /// The text.
-        text: String,
-        /// Colour.
-        ink: Ink,
-        /// On which side of the place.
-        anchor: Anchor,
-    },
+struct Series {
+    name: String,
+    style: Style,
+    points: Vec<Point>,
 }
 
-/// Where the legend of a panel stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum KeyPlace {
-    /// In the lower right corner, one below the other.
-    Corner,
-    /// In the upper left corner.
-    TopLeft,
-    /// In the upper right corner.
-    TopRight,
-    /// Above the diagram, side by side.
-    Head,
-}
-
-/// An entry of the legend.
+/// A line of known slope.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Key {
-    /// Text.
-    pub text: String,
-    /// Colour.
-    pub ink: Ink,
-    /// Shape; `None` for a line.
-    pub shape: Option<Shape>,
-    /// Whether only the outline is drawn; of a line, whether it is dashed.
-    pub hollow: bool,
-}
-
-impl Key {
-    /// The entry of points.
-    pub fn points(text: impl Into<String>, ink: Ink, shape: Shape) -> Self {
-        Self { text: text.into(), ink, shape: Some(shape), hollow: false }
-    }
-
-    /// The entry of a line.
-    pub fn line(text: impl Into<String>, ink: Ink, dashed: bool) -> Self {
-        Self { text: text.into(), ink, shape: None, hollow: dashed }
-    }
+struct Reference {
+    name: String,
+    slope: f64,
+    through: Point,
+    is_shaded: bool,
 }
 
 /// One diagram of a figure.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[must_use]
 pub struct Panel {
     /// What sets it apart from its neighbours.
     pub title: String,
-    /// What is seen in it, for those who cannot see it.
-    pub description: String,
-    /// Abscissa.
-    pub x: Axis,
-    /// Ordinate.
-    pub y: Axis,
-    /// What is in it, back to front.
-    pub marks: Vec<Mark>,
-    /// Legend.
-    pub keys: Vec<Key>,
-    /// Where the legend stands.
-    pub key_place: KeyPlace,
-    /// Height [px at full size].
-    pub height: i32,
+    sentence: String,
+    x: Axis,
+    y: Axis,
+    series: Vec<Series>,
+    references: Vec<Reference>,
+    uprights: Vec<(String, f64)>,
+    labels: Vec<(Point, String, Anchor)>,
+    height: f64,
 }
-
-/// plotters could not draw.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("cannot draw `{panel}`: {cause}")]
-pub struct DrawError {
-    /// Title of the panel.
-    pub panel: String,
-    /// What plotters said.
-    pub cause: String,
-}
-
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type Area<'b> = DrawingArea<SVGBackend<'b>, plotters::coord::Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 impl Panel {
-    /// The elements of the drawing, to stand inside an `svg` of view box [`Panel::view_box`].
-    ///
-    /// # Errors
-    /// [`DrawError`], if plotters refuses the coordinates.
-    pub fn draw(&self) -> Result<String, DrawError> {
-        let mut drawing = String::new();
-        self.draw_on(&mut drawing)
-            .map_err(|cause| DrawError { panel: self.title.clone(), cause: cause.to_string() })?;
-        Ok(with_classes(&drawing))
+    /// A panel without data. A `y` without a title is not drawn.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
+        Self { title: title.into(), x, y, height: HEIGHT, ..Self::default() }
     }
 
-    /// View box of the drawing.
-    pub fn view_box(&self) -> String {
-        format!("0 0 {} {}", WIDTH * FINE, self.height * FINE)
+    /// Says what is seen, for those who cannot see it. Axes, ranges and names of series are added to it.
+    pub fn described(self, sentence: impl Into<String>) -> Self {
+        Self { sentence: sentence.into(), ..self }
     }
 
-    fn draw_on(&self, drawing: &mut String) -> Drawn {
-        let size = ((WIDTH * FINE).unsigned_abs(), (self.height * FINE).unsigned_abs());
-        let root = SVGBackend::with_string(drawing, size).into_drawing_area();
-        let [x0, x1] = self.x.places();
-        let [y0, y1] = self.y.places();
-        let left = if self.y.numbered { LEFT } else { RIGHT };
-        let x_ticks = self.x.ticks(6.0);
-        let y_ticks = if self.y.numbered { self.y.ticks(7.0) } else { Vec::new() };
-        let mut chart = ChartBuilder::on(&root)
-            .margin_top(TOP * FINE)
-            .margin_right(RIGHT * FINE)
-            .margin_left(left * FINE)
-            .margin_bottom(BOTTOM * FINE)
-            .build_cartesian_2d(x0..x1, y0..y1)?;
-        for mark in &self.marks {
-            if let Mark::Area { points, ink } = mark {
-                let corners: Vec<_> = points.iter().map(|p| self.place(*p)).collect();
-                chart.draw_series([Polygon::new(corners, ink.rgb())])?;
-            }
+    /// Sets the height of the diagram.
+    pub fn tall(self, height: f64) -> Self {
+        Self { height, ..self }
+    }
+
+    /// Adds a series. One with a name stands in the legend, series of the same name once.
+    pub fn series(mut self, name: impl Into<String>, style: Style, points: impl IntoIterator<Item = Point>) -> Self {
+        let points = points.into_iter().filter(|(x, y)| self.x.has(*x) && self.y.has(*y)).collect();
+        self.series.push(Series { name: name.into(), style, points });
+        self
+    }
+
+    /// Adds a rectangle: a bar, a cell of a matrix, a limit.
+    pub fn rectangle(self, name: impl Into<String>, ink: Ink, x: [f64; 2], y: [f64; 2]) -> Self {
+        self.series(name, Style::area(ink), [(x[0], y[0]), (x[0], y[1]), (x[1], y[1]), (x[1], y[0])])
+    }
+
+    /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands where there is room.
+    pub fn slope(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
+        self.references.push(Reference { name: name.into(), slope, through, is_shaded: false });
+        self
+    }
+
+    /// Shades what lies below a line of this slope.
+    pub fn floor(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
+        self.references.push(Reference { name: name.into(), slope, through, is_shaded: true });
+        self
+    }
+
+    /// Adds a dashed upright line at `x`, with its name at the top.
+    pub fn upright(mut self, name: impl Into<String>, x: f64) -> Self {
+        self.uprights.push((name.into(), x));
+        self
+    }
+
+    /// Adds a text.
+    pub fn label(mut self, at: Point, text: impl Into<String>, anchor: Anchor) -> Self {
+        self.labels.push((at, text.into(), anchor));
+        self
+    }
+
+    /// Whether there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        self.series.iter().all(|series| series.points.is_empty())
+    }
+
+    /// Gives all `panels` the same ranges.
+    pub fn share_axes(panels: &mut [Self]) {
+        let points: Vec<Point> = panels.iter().flat_map(Self::points).collect();
+        for panel in panels {
+            panel.x.included.extend(points.iter().map(|p| p.0));
+            panel.y.included.extend(points.iter().map(|p| p.1));
         }
-        let grid = Ink::Grid.rgb().stroke_width(FINE.unsigned_abs());
-        let lines = |at: &[f64], upright: bool| -> Vec<_> {
-            at.iter()
-                .map(|&t| PathElement::new(if upright { [(t, y0), (t, y1)] } else { [(x0, t), (x1, t)] }, grid))
-                .collect()
+    }
+
+    /// What determines the ranges.
+    fn points(&self) -> impl Iterator<Item = Point> {
+        self.series.iter().flat_map(|series| series.points.iter().copied())
+    }
+
+    /// Rows in which the names of upright lines stand.
+    fn upright_rows(&self) -> usize {
+        if self.uprights.len() > 2 { 3 } else { self.uprights.len().min(1) }
+    }
+
+    /// Entries of the legend in rows.
+    pub(super) fn legend_rows(&self) -> usize {
+        self.legend().last().map_or(0, |(_, row, _)| row + 1)
+    }
+
+    /// Entries of the legend: left edge, row, and series.
+    fn legend(&self) -> Vec<(f64, usize, &Series)> {
+        let mut entries: Vec<(f64, usize, &Series)> = Vec::new();
+        let (mut x, mut row) = (2.0, 0);
+        for series in self.series.iter().filter(|series| !series.name.is_empty()) {
+            if entries.iter().any(|(.., known)| known.name == series.name) {
+                continue;
+            }
+            let width = SYMBOL + width_of(&series.name);
+            if x > 2.0 && x + width > WIDTH {
+                (x, row) = (2.0, row + 1);
+            }
+            entries.push((x, row, series));
+            x += width + 10.0;
+        }
+        entries
+    }
+
+    fn frame(&self, legend_rows: usize) -> Frame {
+        let left = if self.y.label.is_empty() { RIGHT } else { LEFT };
+        let label = if self.y.label.is_empty() { 0.5 } else { 1.5 };
+        Frame {
+            x: self.x.fitted(self.points().map(|p| p.0), 0.0),
+            y: self.y.fitted(self.points().map(|p| p.1), 0.08 * self.upright_rows() as f64),
+            left,
+            top: TITLE + LINE * (legend_rows as f64 + label),
+            width: WIDTH - left - RIGHT,
+            height: self.height,
+        }
+    }
+
+    /// Height of the panel with its title, a legend of so many rows, and its axes.
+    pub(super) fn full_height(&self, legend_rows: usize) -> f64 {
+        self.frame(legend_rows).top + self.height + BOTTOM
+    }
+
+    /// What is seen, in words.
+    pub fn description(&self) -> String {
+        let frame = self.frame(0);
+        let ends = |axis: &Axis, span: Span| {
+            let [low, high] = [span.low, span.high].map(|place| number(span.value(place), 2));
+            let scale = if axis.is_log { ", logarithmic" } else { "" };
+            format!("{} from {low} to {high}{scale}", axis.label)
         };
-        chart.draw_series(lines(&x_ticks, true))?;
-        chart.draw_series(lines(&y_ticks, false))?;
-        let height = self.height;
-        let pixel = |chart: &Chart<'_, '_>, at: (f64, f64)| chart.backend_coord(&at);
-        for &tick in &x_ticks {
-            let (x, _) = pixel(&chart, (tick, y0));
-            let y = (height - BOTTOM + 5) * FINE;
-            write_text(&root, (x, y), &self.x.tick_label(tick), TEXT, Ink::Muted, (HPos::Center, VPos::Top))?;
-        }
-        for &tick in &y_ticks {
-            let (_, y) = pixel(&chart, (x0, tick));
-            let at = ((LEFT - 6) * FINE, y);
-            write_text(&root, at, &self.y.tick_label(tick), TEXT, Ink::Muted, (HPos::Right, VPos::Center))?;
-        }
-        let axis = Ink::Muted.rgb().stroke_width(FINE.unsigned_abs());
-        chart.draw_series([PathElement::new(vec![(x0, y0), (x1, y0)], axis)])?;
-        // Texts last: nothing is drawn over them.
-        let (texts, others): (Vec<_>, Vec<_>) = self.marks.iter().partition(|mark| matches!(mark, Mark::Text { .. }));
-        for mark in others.into_iter().chain(texts) {
-            self.draw_mark(&mut chart, &root, mark)?;
-        }
-        self.draw_keys(&root)?;
-        let start = (HPos::Left, VPos::Top);
-        write_text(&root, (2 * FINE, 2 * FINE), &self.title, TITLE, Ink::Text, start)?;
-        write_text(&root, (2 * FINE, 22 * FINE), &self.y.label, TEXT, Ink::Muted, start)?;
-        let end = ((WIDTH - RIGHT) * FINE, (height - 15) * FINE);
-        write_text(&root, end, &self.x.label, TEXT, Ink::Muted, (HPos::Right, VPos::Top))?;
-        root.present()
+        let x = ends(&self.x, frame.x);
+        let axes = if self.y.label.is_empty() { x } else { format!("{} over {x}", ends(&self.y, frame.y)) };
+        let names: Vec<_> = self.legend().into_iter().map(|(.., series)| series.name.as_str()).collect();
+        let names = if names.is_empty() { String::new() } else { format!(" Series: {}.", names.join("; ")) };
+        format!("{} {axes}.{names}", self.sentence).trim_start().to_owned()
     }
 
-    fn place(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        let [low, high] = self.y.places();
-        // Nothing leaves the panel at its sides; above and below it is cut off.
-        (self.x.place(x), self.y.place(y).clamp(low, high))
-    }
-
-    fn draw_mark(&self, chart: &mut Chart<'_, '_>, root: &Area<'_>, mark: &Mark) -> Drawn {
-        match mark {
-            Mark::Area { .. } => {}
-            Mark::Line { points, ink, dashed } => {
-                let style = ink.rgb().stroke_width(if *dashed { DASHED } else { SOLID });
-                let path: Vec<_> = points.iter().map(|p| self.place(*p)).collect();
-                chart.draw_series([PathElement::new(path, style)])?;
-            }
-            Mark::Points { points, ink, shape, hollow, radius } => {
-                for point in points {
-                    let at = chart.backend_coord(&self.place(*point));
-                    draw_point(root, at, *ink, *shape, *hollow, *radius)?;
+    /// The panel as SVG elements, the legend in `legend_rows` rows.
+    pub(super) fn draw(&self, legend_rows: usize) -> Markup {
+        let frame = self.frame(legend_rows);
+        // Shades stand behind the grid.
+        let (shades, others): (Vec<_>, Vec<_>) = self.series.iter().partition(|s| s.style.ink == Ink::Shade);
+        let (shaded, lines): (Vec<_>, Vec<_>) = self.references.iter().partition(|line| line.is_shaded);
+        let draw =
+            |series: &Series| symbol(&series.style, &series.points.iter().map(|p| frame.at(*p)).collect::<Vec<_>>());
+        html! {
+            g.plot font-size="11" {
+                @for series in shades { (draw(series)) }
+                @for floor in shaded { (frame.floor(floor)) }
+                (self.grid(&frame))
+                @for (_, x) in &self.uprights {
+                    (symbol(&Style::REFERENCE, &[0.0, 1.0].map(|v| frame.inside((frame.x.share(*x), v)))))
                 }
-            }
-            Mark::Text { at, text, ink, anchor } => {
-                let at = chart.backend_coord(&self.place(*at));
-                let horizontal = match anchor {
-                    Anchor::Start => HPos::Left,
-                    Anchor::End => HPos::Right,
-                    Anchor::Middle => HPos::Center,
-                };
-                write_text(root, at, text, TEXT, *ink, (horizontal, VPos::Center))?;
+                @for line in &lines {
+                    @if let Some(ends) = line.ends(&frame) { (symbol(&Style::REFERENCE, &ends.map(|p| frame.inside(p)))) }
+                }
+                @for series in others { (draw(series)) }
+                @for (index, (name, x)) in self.uprights.iter().enumerate() {
+                    (frame.upright_name(name, *x, index % self.upright_rows()))
+                }
+                (self.names_of(&lines, &frame))
+                @for (at, label, anchor) in &self.labels {
+                    @let (x, y) = frame.at(*at);
+                    (text((x, y + 4.0), label, Ink::Text, *anchor))
+                }
+                @for (x, row, series) in self.legend() {
+                    @let y = TITLE + LINE * (row as f64 + 0.5);
+                    @let key = [(x, y), (x + 8.0, y), (x + 16.0, y)];
+                    @if series.style.is_area {
+                        (symbol(&series.style, &[(x, y - 4.0), (x + 16.0, y - 4.0), (x + 16.0, y + 4.0), (x, y + 4.0)]))
+                    } @else {
+                        (symbol(&Style { shape: None, ..series.style }, &key))
+                        (symbol(&Style { dash: None, ..series.style }, &key[1..2]))
+                    }
+                    (text((x + SYMBOL, y + 4.0), &series.name, Ink::Text, Anchor::Start))
+                }
+                g font-size="13" font-weight="bold" { (text((2.0, 14.0), &self.title, Ink::Text, Anchor::Start)) }
+                (text((2.0, frame.top - 10.0), &self.y.label, Ink::Muted, Anchor::Start))
+                (text((WIDTH - RIGHT, frame.top + self.height + 32.0), &self.x.label, Ink::Muted, Anchor::End))
             }
         }
-        Ok(())
     }
 
-    fn draw_keys(&self, root: &Area<'_>) -> Drawn {
-        const LINE: i32 = 16;
-        let left = if self.y.numbered { LEFT } else { RIGHT };
-        let mut right = WIDTH - RIGHT - if self.key_place == KeyPlace::Head { 4 } else { 8 };
-        for (index, key) in self.keys.iter().enumerate().rev() {
-            let from_top = TOP + 12 + LINE * whole(index);
-            let y = match self.key_place {
-                KeyPlace::Corner => self.height - BOTTOM - 12 - LINE * whole(self.keys.len() - 1 - index),
-                KeyPlace::TopLeft | KeyPlace::TopRight => from_top,
-                KeyPlace::Head => 28,
-            } * FINE;
-            // The symbol stands at the edge, the text beside it.
-            let (symbol, text, side) = match self.key_place {
-                KeyPlace::TopLeft => (left + 12, left + 24, HPos::Left),
-                _ => (right, right - 12, HPos::Right),
+    /// Grid, numbers, and the lower edge.
+    fn grid(&self, frame: &Frame) -> Markup {
+        let columns = frame.x.ticks(6.0);
+        let rows = if self.y.label.is_empty() { Vec::new() } else { frame.y.ticks(7.0) };
+        let across = |v: f64| polyline(&[0.0, 1.0].map(|u| frame.inside((u, v))));
+        let along = |u: f64| polyline(&[0.0, 1.0].map(|v| frame.inside((u, v))));
+        let lines = columns.iter().map(|(u, _)| along(*u)).chain(rows.iter().map(|(v, _)| across(*v)));
+        html! {
+            (path(&lines.collect::<String>(), Ink::Grid, false, "none", 1.0))
+            (path(&across(0.0), Ink::Muted, false, "none", 1.0))
+            @for (u, label) in &columns {
+                @let (x, y) = frame.inside((*u, 0.0));
+                (text((x, y + 15.0), label, Ink::Muted, Anchor::Middle))
+            }
+            @for (v, label) in &rows {
+                @let (x, y) = frame.inside((0.0, *v));
+                (text((x - 6.0, y + 4.0), label, Ink::Muted, Anchor::End))
+            }
+        }
+    }
+
+    /// The names of `lines`, each beside its line where no point and no other line is.
+    fn names_of(&self, lines: &[&Reference], frame: &Frame) -> Markup {
+        let along =
+            |[from, to]: [Point; 2], share: f64| (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share);
+        let points: Vec<Point> = self.points().map(|p| frame.shares(p)).collect();
+        let mut names = Vec::new();
+        for (index, line) in lines.iter().enumerate() {
+            let Some(ends) = line.ends(frame) else { continue };
+            let others = lines.iter().enumerate().filter(|(other, _)| *other != index);
+            let others = others.filter_map(|(_, other)| other.ends(frame));
+            let mut obstacles: Vec<Point> =
+                others.flat_map(|ends| (0..100).map(move |i| along(ends, f64::from(i) / 99.0))).collect();
+            obstacles.extend(&points);
+            let [width, height] = [width_of(&line.name) / frame.width, LINE / frame.height];
+            let rises = ends[1].1 >= ends[0].1;
+            // Lower left corner of the name: above the line on the side where it is lower, or below on the other.
+            let corner = |share: f64, is_above: bool| {
+                let (u, v) = along(ends, share);
+                (if is_above == rises { u - width } else { u }, if is_above { v } else { v - height })
             };
-            write_text(root, (text * FINE, y), &key.text, TEXT, Ink::Text, (side, VPos::Center))?;
-            match key.shape {
-                Some(shape) => draw_point(root, (symbol * FINE, y), key.ink, shape, key.hollow, RADIUS)?,
-                None => root.draw(&PathElement::new(
-                    vec![((symbol - 8) * FINE, y), ((symbol + 4) * FINE, y)],
-                    key.ink.rgb().stroke_width(if key.hollow { DASHED } else { SOLID }),
-                ))?,
-            }
-            if self.key_place == KeyPlace::Head {
-                // Letters of this size are six units wide on average.
-                right -= 30 + 6 * whole(key.text.chars().count());
+            let crowd = |(u, v): &Point| {
+                let hit = |(x, y): &&Point| u - 0.02 < *x && *x < u + width + 0.02 && v - 0.02 < *y && *y < v + height;
+                let is_inside = *u >= 0.0 && u + width <= 1.0 && *v >= 0.0 && v + height <= 1.0;
+                if is_inside { obstacles.iter().filter(hit).count() } else { usize::MAX }
+            };
+            let places = (1..20).flat_map(|i| [true, false].map(|above| corner(0.05 * f64::from(i), above)));
+            names.extend(places.min_by_key(crowd).map(|place| (place, &line.name)));
+        }
+        html! {
+            @for (place, name) in names {
+                @let (x, y) = frame.inside(place);
+                (text((x, y - 5.0), name, Ink::Muted, Anchor::Start))
             }
         }
-        Ok(())
     }
 }
 
-/// A count as a number of pixels.
-fn whole(count: usize) -> i32 {
-    i32::try_from(count).unwrap_or(i32::MAX)
+impl Reference {
+    /// Where the line enters and leaves the panel, in shares of it.
+    fn ends(&self, frame: &Frame) -> Option<[Point; 2]> {
+        let (a, b) = (frame.x.share(self.through.0), frame.y.share(self.through.1));
+        let slope = self.slope * frame.x.length() / frame.y.length();
+        let (mut low, mut high) = (0.0_f64, 1.0_f64);
+        if slope == 0.0 {
+            high = if (0.0..=1.0).contains(&b) { high } else { low };
+        } else {
+            let [bottom, top] = [0.0, 1.0].map(|v| a + (v - b) / slope);
+            (low, high) = (low.max(bottom.min(top)), high.min(bottom.max(top)));
+        }
+        (low < high).then(|| [low, high].map(|u| (u, b + slope * (u - a))))
+    }
 }
 
-fn draw_point(root: &Area<'_>, (x, y): (i32, i32), ink: Ink, shape: Shape, hollow: bool, radius: f64) -> Drawn {
-    let r = (radius * f64::from(FINE)).round() as i32;
-    let outline = ink.rgb().stroke_width(OUTLINE);
-    let corners = match shape {
-        Shape::Circle if hollow => return root.draw(&Circle::new((x, y), r, outline)),
-        Shape::Circle => return root.draw(&Circle::new((x, y), r, ink.rgb().filled())),
-        Shape::Square => vec![(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)],
-        Shape::Triangle => vec![(x, y - r - 3), (x + r + 2, y + r - 2), (x - r - 2, y + r - 2)],
+/// The diagram within its panel.
+struct Frame {
+    x: Span,
+    y: Span,
+    left: f64,
+    top: f64,
+    width: f64,
+    height: f64,
+}
+
+impl Frame {
+    /// A point as shares of the axes; what lies beyond an axis stands at its end.
+    fn shares(&self, (x, y): Point) -> Point {
+        (self.x.share(x).clamp(0.0, 1.0), self.y.share(y).clamp(0.0, 1.0))
+    }
+
+    /// Shares of the axes in pixels.
+    fn inside(&self, (u, v): Point) -> Point {
+        (self.left + u * self.width, self.top + (1.0 - v) * self.height)
+    }
+
+    fn at(&self, point: Point) -> Point {
+        self.inside(self.shares(point))
+    }
+
+    fn floor(&self, floor: &Reference) -> Markup {
+        let Some([from, to]) = floor.ends(self) else { return Markup::default() };
+        let corners = [(from.0, 0.0), from, to, (to.0, 0.0)].map(|p| self.inside(p));
+        let (x, y) = self.inside((from.0, 0.0));
+        html! {
+            (symbol(&Style::area(Ink::Shade), &corners))
+            (text((x + 5.0, y - 5.0), &floor.name, Ink::Muted, Anchor::Start))
+        }
+    }
+
+    /// The name of an upright line, on the side where there is more room.
+    fn upright_name(&self, name: &str, x: f64, row: usize) -> Markup {
+        let (x, y) = self.inside((self.x.share(x), 1.0));
+        let y = y + 11.0 + 12.0 * row as f64;
+        if x > self.left + 0.5 * self.width {
+            text((x - 5.0, y), name, Ink::Muted, Anchor::End)
+        } else {
+            text((x + 5.0, y), name, Ink::Muted, Anchor::Start)
+        }
+    }
+}
+
+/// Width of `text` in a wide sans-serif font.
+fn width_of(text: &str) -> f64 {
+    let width = |c| match c {
+        'f' | 'i' | 'j' | 'l' | 't' | ' ' | '.' | ',' | ':' | ';' | '-' | '(' | ')' | '|' => 4.0,
+        'm' | 'w' | 'M' | 'W' | '%' => 10.0,
+        c if c.is_uppercase() || c.is_ascii_digit() => 7.3,
+        _ => 6.5,
     };
-    if hollow {
-        let closed: Vec<_> = corners.iter().chain(corners.first()).copied().collect();
-        root.draw(&PathElement::new(closed, outline))
-    } else {
-        root.draw(&Polygon::new(corners, ink.rgb()))
+    text.chars().map(width).sum()
+}
+
+fn text((x, y): Point, text: &str, ink: Ink, anchor: Anchor) -> Markup {
+    let anchor = match anchor {
+        Anchor::Start => "start",
+        Anchor::End => "end",
+        Anchor::Middle => "middle",
+    };
+    let [x, y] = [x, y].map(|length| format!("{length:.1}"));
+    html! {
+        text x=(x) y=(y) text-anchor=(anchor) fill=(ink.light()) class={ "f-" (ink.name()) } { (one_line(text)) }
+        (PreEscaped("\n"))
     }
 }
 
-fn write_text(
-    root: &Area<'_>,
-    at: (i32, i32),
-    text: &str,
-    size: f64,
-    ink: Ink,
-    (horizontal, vertical): (HPos, VPos),
-) -> Drawn {
-    // plotters divides the size of a font by this before it writes it.
-    let size = size * f64::from(FINE) * 1.24;
-    let weight = if size > TEXT * f64::from(FINE) * 1.24 { FontStyle::Bold } else { FontStyle::Normal };
-    let colour = ink.rgb();
-    let style = TextStyle::from(FontDesc::new(FontFamily::SansSerif, size, weight))
-        .color(&colour)
-        .pos(Pos::new(horizontal, vertical));
-    root.draw(&Text::new(one_line(text), at, style))
-}
-
-/// The elements inside plotters' `svg`, colours named by class as well, without what says nothing.
-fn with_classes(drawing: &str) -> String {
-    let inner = drawing.split_once(">\n").map_or("", |(_, rest)| rest);
-    let mut inner = inner.trim_end().trim_end_matches("</svg>").to_owned();
-    for (from, to) in [
-        (" opacity=\"1\"", ""),
-        (" stroke=\"none\"", ""),
-        (" stroke-width=\"1\"", ""),
-        (" font-family=\"sans-serif\"", ""),
-        ("\n</text>", "</text>"),
-        (" \"/>", "\"/>"),
-    ] {
-        inner = inner.replace(from, to);
-    }
-    let width = format!(" stroke-width=\"{DASHED}\"");
-    inner = inner.replace(&width, &format!("{width} stroke-dasharray=\"{} {}\"", 4 * FINE, 3 * FINE));
-    for (_, name, [r, g, b], _) in Ink::ALL {
-        let hex = format!("#{r:02X}{g:02X}{b:02X}");
-        for (attribute, class) in [("fill", "f"), ("stroke", "s")] {
-            inner = inner
-                .replace(&format!("{attribute}=\"{hex}\""), &format!("{attribute}=\"{hex}\" class=\"{class}-{name}\""));
+/// `points` (px) drawn as `style` has it.
+fn symbol(style: &Style, points: &[Point]) -> Markup {
+    let marks = |shape| points.iter().map(|point| mark(shape, *point, style.radius)).collect::<String>();
+    html! {
+        @if points.is_empty() {
+        } @else if style.is_area {
+            (path(&format!("{}Z", polyline(points)), style.ink, true, "none", 0.0))
+        } @else {
+            @if let Some(dash) = style.dash { (path(&polyline(points), style.ink, false, dash, if *style == Style::REFERENCE { 1.25 } else { 1.75 })) }
+            @if let Some(shape) = style.shape { (path(&marks(shape), style.ink, !style.is_hollow, "none", 1.4)) }
         }
     }
-    inner
+}
+
+fn path(data: &str, ink: Ink, is_filled: bool, dash: &str, width: f64) -> Markup {
+    html! {
+        @if is_filled {
+            path d=(data) fill=(ink.light()) class={ "f-" (ink.name()) } {}
+        } @else {
+            path d=(data) fill="none" stroke=(ink.light()) class={ "s-" (ink.name()) } stroke-width=(width)
+                stroke-dasharray=(dash) stroke-linejoin="round" {}
+        }
+        (PreEscaped("\n"))
+    }
+}
+
+fn polyline(points: &[Point]) -> String {
+    let mut data = String::new();
+    for (index, (x, y)) in points.iter().enumerate() {
+        let _ = write!(data, "{}{x:.2} {y:.2}", if index == 0 { 'M' } else { 'L' });
+    }
+    data
+}
+
+fn mark(shape: &[Point], (x, y): Point, radius: f64) -> String {
+    if shape.is_empty() {
+        let (left, across) = (x - radius, 2.0 * radius);
+        return format!("M{left:.2} {y:.2}a{radius} {radius} 0 1 0 {across} 0a{radius} {radius} 0 1 0 -{across} 0Z");
+    }
+    let corners: Vec<_> = shape.iter().map(|(u, v)| (x + u * radius, y + v * radius)).collect();
+    polyline(&corners) + "Z"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis, values: [f64; 2]) -> Vec<String> {
+        axis.fitted(values.into_iter(), 0.0).ticks(6.0).into_iter().map(|(_, label)| label).collect()
+    }
+
+    #[test]
+    fn ticks_are_decades_where_there_are_many_and_round_numbers_elsewhere() {
+        let log = Axis::log("error", "");
+        assert_eq!(labels(&log, [1e-9, 1e-6]), ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]);
+        assert_eq!(labels(&log, [1e-15, 1e-2]), ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³"]);
+        assert_eq!(labels(&log, [2.0, 40.0]), ["2", "5", "10", "20", "50"]);
+        assert_eq!(labels(&Axis::linear("depth", "mm"), [0.0, 100.0]), ["0", "20", "40", "60", "80", "100"]);
+        assert_eq!(
+            labels(&Axis::linear("depth", "mm").over([-0.1, 0.1]), [0.0; 2]),
+            ["−0.1", "−0.05", "0", "0.05", "0.1"]
+        );
+    }
+
+    #[test]
+    fn without_data_or_with_a_single_point_there_are_ticks() {
+        for axis in [Axis::linear("x", ""), Axis::log("x", "")] {
+            assert!(!labels(&axis, [f64::NAN; 2]).is_empty());
+            assert!(!labels(&axis, [3.0; 2]).is_empty());
+        }
+    }
+
+    /// Whatever the range, a line of known slope begins and ends on the edge of the diagram and has its slope.
+    #[test]
+    fn a_reference_line_ends_at_the_edges() {
+        let panel =
+            Panel::new("", Axis::log("step", "s").over([1e-8, 1e-5]), Axis::log("error", "").over([1e-12, 1e-3]));
+        let frame = panel.slope("slope 2", 2.0, (1e-6, 1e-8)).frame(0);
+        let line = |slope| Reference { name: String::new(), slope, through: (1e-6, 1e-8), is_shaded: false };
+        for slope in [-2.0, -1.0, 0.0, 1.0, 2.0, 30.0] {
+            let [from, to] = line(slope).ends(&frame).unwrap_or_default();
+            for (u, v) in [from, to] {
+                assert!([u, 1.0 - u, v, 1.0 - v].iter().any(|edge| edge.abs() < 1e-12), "slope {slope}: {u}, {v}");
+            }
+            let decades = 9.0 * (to.1 - from.1) / (3.0 * (to.0 - from.0));
+            assert!((decades - slope).abs() < 1e-12 * slope.abs().max(1.0), "slope {slope}: {decades}");
+        }
+        let outside = Reference { through: (1e-6, 1.0), ..line(0.0) };
+        assert_eq!(outside.ends(&frame), None);
+    }
+
+    #[test]
+    fn nothing_is_drawn_outside_its_diagram_and_no_name_stands_twice() {
+        let y = Axis::linear("y", "m").over([0.0, 1.0]);
+        let panel = Panel::new("t", Axis::linear("x", "s"), y)
+            .series("name", Style::marked_line(0), [(0.0, -5.0), (1.0, 7.0), (f64::NAN, 0.5)])
+            .series("name", Style::marks(0), [(0.5, 0.5)]);
+        let frame = panel.frame(1);
+        assert_eq!(frame.at((0.0, -5.0)), frame.at((0.0, 0.0)));
+        assert_eq!((panel.legend_rows(), panel.series[0].points.len()), (1, 2));
+        let drawing = panel.draw(1).into_string();
+        assert_eq!(drawing.matches(">name<").count(), 1);
+        assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");
+        assert_eq!(panel.description(), "y [m] from 0 to 1 over x [s] from 0 to 1.1. Series: name.");
+    }
+
+    #[test]
+    fn twenty_series_differ_without_their_colour() {
+        for index in 0..20 {
+            let same_colour = (0..index).filter(|other| Style::marks(*other).ink == Style::marks(index).ink);
+            for other in same_colour {
+                assert_ne!(Style::marks(other), Style::marks(index));
+            }
+        }
+        let dashes: Vec<_> = (0..4).map(|index| Style::line(index).dash).collect();
+        assert!((0..4).all(|i| (0..i).all(|j| dashes[i] != dashes[j])));
+    }
 }

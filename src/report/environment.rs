@@ -86,7 +86,7 @@ pub fn hash(text: &str) -> String {
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
-/// Name of the processor, where the system tells it.
+/// Name of the processor, where the system states it.
 fn cpu() -> String {
     fs::read_to_string("/proc/cpuinfo")
         .ok()

@@ -1,52 +1,27 @@
 //! A figure: one message, its panels, its numbers, and where they come from.
 
-use std::fmt::Write as _;
+use maud::{PreEscaped, html};
 
-use super::chart::{DrawError, Ink, Panel, WIDTH};
+use super::chart::{Ink, Panel, WIDTH};
 use super::table::Table;
 use super::text::{one_line, wrapped};
+use crate::suite::Section;
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
-/// Space around panels in a file [px].
-const GAP: i32 = 16;
-/// Height of a line of the message in a file [px].
-const LINE: i32 = 22;
-
-/// The part of the report that shows a figure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Part {
-    /// What is solved.
-    Model,
-    /// Orders and constants beside the exact answer.
-    CodeVerification,
-    /// Other programs.
-    CrossCode,
-    /// Events.
-    Events,
-    /// Energy.
-    Energy,
-    /// What accuracy costs.
-    Cost,
-    /// The paper's curve over the thickness.
-    Slab,
-    /// Where Eq. 11-12 holds.
-    Applicability,
-    /// Measured depths.
-    Measured,
-    /// Targets of layers.
-    Layers,
-    /// Stability and rounding.
-    Stability,
-}
+/// Space around panels in a file (px).
+const GAP: f64 = 16.0;
+/// Height of a line of the message in a file (px).
+const LINE: f64 = 22.0;
 
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
+#[must_use]
 pub struct Figure {
     /// Name of its files, in letters, digits and hyphens.
     pub name: String,
     /// Where it stands.
-    pub part: Part,
+    pub section: Section,
     /// What it shows: one sentence.
     pub message: String,
     /// How to read it.
@@ -59,110 +34,103 @@ pub struct Figure {
     pub table: Table,
 }
 
-/// The panels of a figure, drawn.
-#[derive(Clone, Debug)]
-pub struct Drawn {
-    /// The figure.
-    pub figure: Figure,
-    /// Elements of each panel.
-    pub panels: Vec<String>,
-}
-
 impl Figure {
-    /// Draws the panels.
-    ///
-    /// # Errors
-    /// [`DrawError`].
-    pub fn draw(self) -> Result<Drawn, DrawError> {
-        let panels = self.panels.iter().map(Panel::draw).collect::<Result<_, _>>()?;
-        Ok(Drawn { figure: self, panels })
+    /// A figure that no claim judges; `None` if its panels show nothing.
+    pub fn new(
+        name: impl Into<String>,
+        section: Section,
+        message: impl Into<String>,
+        reading: impl Into<String>,
+        panels: Vec<Panel>,
+        table: Table,
+    ) -> Option<Self> {
+        let (name, message, reading) = (name.into(), message.into(), reading.into());
+        let is_empty = panels.iter().all(Panel::is_empty);
+        (!is_empty).then_some(Self { name, section, message, reading, claims: Vec::new(), panels, table })
     }
-}
 
-impl Drawn {
-    /// A panel as an element of a page: scales with its container, named and described for screen readers.
+    /// The same with the claims that judge it.
+    pub fn judged_by(self, claims: Vec<String>) -> Self {
+        Self { claims, ..self }
+    }
+
+    /// The same with equal ranges in all panels.
+    pub fn sharing_axes(mut self) -> Self {
+        Panel::share_axes(&mut self.panels);
+        self
+    }
+
+    /// Rows of the longest legend: all panels leave the same room, so that their diagrams stand side by side.
+    fn legend_rows(&self) -> usize {
+        self.panels.iter().map(Panel::legend_rows).max().unwrap_or(0)
+    }
+
+    /// A panel as an element of a page: scales with its container, named and described for screen readers. The page
+    /// needs [`Ink::style_sheet`].
     pub fn inline(&self, index: usize) -> String {
-        let panel = &self.figure.panels[index];
-        let id = format!("{}-{index}", self.figure.name);
-        format!(
-            "<svg viewBox=\"{}\" role=\"img\" aria-labelledby=\"{id}-t {id}-d\"><title id=\"{id}-t\">{}</title>\
-             <desc id=\"{id}-d\">{}</desc>\n{}</svg>",
-            panel.view_box(),
-            escape(&format!("{}: {}", self.figure.message, panel.title)),
-            escape(&panel.description),
-            self.panels[index],
-        )
+        let (panel, rows) = (&self.panels[index], self.legend_rows());
+        let [title, description] = ["t", "d"].map(|kind| format!("{}-{index}-{kind}", self.name));
+        html! {
+            svg viewBox={ "0 0 " (WIDTH) " " (panel.full_height(rows)) } role="img"
+                aria-labelledby={ (title) " " (description) } {
+                title id=(title) { (one_line(&self.message)) ": " (one_line(&panel.title)) }
+                desc id=(description) { (one_line(&panel.description())) }
+                (panel.draw(rows))
+            }
+        }
+        .into_string()
     }
 
-    /// The figure as a file of its own, light or dark as the viewer asks.
+    /// The figure as an SVG file, light or dark as the viewer asks.
     pub fn file(&self) -> String {
-        let columns = self.figure.panels.len().clamp(1, COLUMNS);
-        let width = (0..columns).fold(GAP, |width, _| width + WIDTH + GAP);
-        let message = wrapped(&self.figure.message, (width - 2 * GAP) as usize / 9);
+        let (rows, columns) = (self.legend_rows(), self.panels.len().clamp(1, COLUMNS));
+        let width = GAP + columns as f64 * (WIDTH + GAP);
+        let message = wrapped(&one_line(&self.message), (width - 2.0 * GAP) as usize / 9);
+        let mut y = 1.5 * GAP + LINE * message.len() as f64;
+        let mut places = Vec::new();
+        for row in self.panels.chunks(columns) {
+            places.extend(row.iter().enumerate().map(|(i, panel)| (GAP + i as f64 * (WIDTH + GAP), y, panel)));
+            y += row.iter().map(|panel| panel.full_height(rows)).fold(0.0, f64::max) + GAP;
+        }
         // A single panel is sized for a phone; a file is looked at on a desk.
-        let larger = if columns == 1 { 2 } else { 1 };
-        let head = message.iter().fold(GAP + GAP / 2, |head, _| head + LINE);
-        let mut body = String::new();
-        let mut y = head;
-        for row in (0..self.panels.len()).collect::<Vec<_>>().chunks(columns) {
-            let (mut x, mut height) = (GAP, 0);
-            for &index in row {
-                let panel = &self.figure.panels[index];
-                let _ = writeln!(
-                    body,
-                    "<svg x=\"{x}\" y=\"{y}\" width=\"{WIDTH}\" height=\"{}\" viewBox=\"{}\">\n{}</svg>",
-                    panel.height,
-                    panel.view_box(),
-                    self.panels[index]
-                );
-                x += WIDTH + GAP;
-                height = height.max(panel.height);
+        let scale = if columns == 1 { 2.0 } else { 1.0 };
+        let descriptions: Vec<_> = self.panels.iter().map(|p| format!("{}: {}", p.title, p.description())).collect();
+        html! {
+            (PreEscaped("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"))
+            svg xmlns="http://www.w3.org/2000/svg" width=(width * scale) height=(y * scale)
+                viewBox={ "0 0 " (width) " " (y) } role="img" aria-labelledby="t d"
+                font-family="system-ui, 'Segoe UI', Roboto, sans-serif" {
+                title id="t" { (one_line(&self.message)) }
+                desc id="d" { (one_line(&descriptions.join(" "))) }
+                style { (PreEscaped(Ink::style_sheet())) }
+                rect width=(width) height=(y) fill="#ffffff" class="f-paper" {}
+                g font-size="15" font-weight="bold" fill="#1c222a" {
+                    @for (line, text) in message.iter().enumerate() {
+                        text.f-text x=(GAP) y=(GAP - 8.0 + LINE * (line as f64 + 1.0)) { (text) }
+                    }
+                }
+                @for (x, y, panel) in places {
+                    g transform={ "translate(" (x) " " (y) ")" } { (panel.draw(rows)) }
+                }
             }
-            y += height + GAP;
+            (PreEscaped("\n"))
         }
-        let mut title = String::new();
-        let mut line = GAP - 8;
-        for text in &message {
-            line += LINE;
-            let _ = writeln!(
-                title,
-                "<text x=\"{GAP}\" y=\"{line}\" font-size=\"15\" font-weight=\"bold\" fill=\"#1C222A\" \
-                 class=\"f-text\">{}</text>",
-                escape(text)
-            );
-        }
-        let descriptions: Vec<_> =
-            self.figure.panels.iter().map(|p| format!("{}: {}", p.title, p.description)).collect();
-        format!(
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-             <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {width} {y}\" \
-             role=\"img\" aria-labelledby=\"t d\" font-family=\"system-ui, 'Segoe UI', Roboto, sans-serif\">\n\
-             <title id=\"t\">{}</title>\n<desc id=\"d\">{}</desc>\n\
-             <style>{}:root{{--paper:#fff}}.paper{{fill:var(--paper)}}\
-             svg svg text{{paint-order:stroke;stroke:var(--paper);stroke-width:12px;stroke-linejoin:round}}\
-             @media screen and (prefers-color-scheme:dark){{:root{{--paper:#161a20}}}}</style>\n\
-             <rect width=\"{width}\" height=\"{y}\" fill=\"#fff\" class=\"paper\"/>\n{title}{body}</svg>\n",
-            width * larger,
-            y * larger,
-            escape(&self.figure.message),
-            escape(&descriptions.join(" ")),
-            Ink::style_sheet(),
-        )
+        .into_string()
     }
 }
 
-/// `text` on one line for XML and HTML, in elements and attributes.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in one_line(text).chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            c => escaped.push(c),
+/// `items` by `key`, groups in the order in which they first appear.
+pub(super) fn grouped<T: Copy, K: PartialEq>(
+    items: impl IntoIterator<Item = T>,
+    key: impl Fn(&T) -> K,
+) -> Vec<(K, Vec<T>)> {
+    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
+    for item in items {
+        let key = key(&item);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, members)) => members.push(item),
+            None => groups.push((key, vec![item])),
         }
     }
-    escaped
+    groups
 }

@@ -4,10 +4,11 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use thiserror::Error;
 
-use super::figure::{Drawn, Figure};
-use super::{Run, VerifyJson, figures, junit, page, summary};
+use super::figure::Figure;
+use super::{Run, VerifyJson, figures, junit, summary, verify_page};
 
 /// Why there is no report.
 #[derive(Debug, Error)]
@@ -39,7 +40,7 @@ pub const DEFAULT: &str = "penetrode-report";
 /// [`FolderError::NotOurs`].
 pub fn check(folder: &Path) -> Result<(), FolderError> {
     let refuse = |why: String| Err(FolderError::NotOurs { path: folder.display().to_string(), why });
-    // A link is followed for reading and would be replaced in writing: refused like any other strange thing.
+    // Reading would follow a link, and writing would replace it: it is refused like any other foreign entry.
     match fs::symlink_metadata(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         Err(cause) => return Err(FolderError::Write { path: folder.display().to_string(), cause }),
@@ -67,7 +68,7 @@ fn contents(folder: &Path) -> io::Result<Vec<String>> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        // A report has folders of one level: what lies deeper is named by them, and is not ours.
+        // A report has folders of one level. What lies deeper is listed under them, and is not ours.
         if entry.file_type()?.is_dir() {
             let inside = fs::read_dir(entry.path())?
                 .map(|inner| inner.map(|inner| format!("{name}/{}", inner.file_name().to_string_lossy())))
@@ -95,21 +96,12 @@ fn manifest(folder: &Path) -> Option<Vec<String>> {
 /// The file that lists the files of a report, one a line: what is not in it is somebody else's.
 const MANIFEST: &str = "contents.txt";
 
-/// Writes the report of `run` to `folder`.
-///
-/// # Errors
-/// [`FolderError`]; the old report then stands untouched.
-pub fn write(run: &Run<'_>, folder: &Path) -> Result<(), FolderError> {
-    check(folder)?;
-    let failed = |cause| FolderError::Write { path: folder.display().to_string(), cause };
-    write_files(files(run).map_err(failed)?, folder)
-}
-
 /// Writes `files`, a path in the folder and bytes each, to `folder`, and their list. `report.json` must be among them.
 ///
 /// # Errors
 /// [`FolderError`]; the old report then stands untouched.
-pub fn write_files(mut files: Vec<(String, Vec<u8>)>, folder: &Path) -> Result<(), FolderError> {
+pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError> {
+    let mut files = files.map_err(|cause| FolderError::Write { path: folder.display().to_string(), cause })?;
     check(folder)?;
     let list: String =
         files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
@@ -151,35 +143,33 @@ pub fn without_temporary_name(error: io::Error) -> io::Error {
     if error.to_string().contains(TEMPORARY) { error.kind().into() } else { error }
 }
 
-/// Every file of the report: its path in the folder, and its bytes.
-///
-/// # Errors
-/// Only what makes memory run out, or a figure that cannot be drawn.
-pub fn files(run: &Run<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
-    let figures =
-        figures::all(run).into_iter().map(Figure::draw).collect::<Result<Vec<_>, _>>().map_err(io::Error::other)?;
-    let mut json = serde_json::to_vec_pretty(&VerifyJson::new(run))?;
-    json.push(b'\n');
-    let mut files = vec![
-        ("report.json".to_owned(), json),
-        ("report.html".to_owned(), page::to_html(run, &figures).into_bytes()),
-        ("junit.xml".to_owned(), junit::to_xml(run).map_err(io::Error::other)?.into_bytes()),
-        ("summary.md".to_owned(), summary::to_markdown(run).into_bytes()),
-    ];
-    files.extend(figure_files(&figures)?);
-    Ok(files)
-}
+/// The files of a report: path in its folder, and bytes.
+pub type Files = Vec<(String, Vec<u8>)>;
 
-/// The drawing and the numbers of each figure.
+/// Every file of the report of `verify`.
 ///
 /// # Errors
 /// Only what makes memory run out.
-pub fn figure_files(figures: &[Drawn]) -> io::Result<Vec<(String, Vec<u8>)>> {
-    let mut files = Vec::new();
-    for drawn in figures {
-        let name = &drawn.figure.name;
-        files.push((format!("figures/{name}.svg"), drawn.file().into_bytes()));
-        files.push((format!("tables/{name}.csv"), drawn.figure.table.to_csv().map_err(io::Error::other)?));
+pub fn files(run: &Run<'_>) -> io::Result<Files> {
+    let figures = figures::all(run);
+    let mut files = files_of(&VerifyJson::new(run), verify_page::to_html(run, &figures), &figures)?;
+    files.push(("junit.xml".to_owned(), junit::to_xml(run).map_err(io::Error::other)?.into_bytes()));
+    files.push(("summary.md".to_owned(), summary::to_markdown(run).into_bytes()));
+    Ok(files)
+}
+
+/// The files that every report has: its numbers, its page, and the drawing and the numbers of each figure.
+///
+/// # Errors
+/// Only what makes memory run out.
+pub(super) fn files_of(numbers: &impl Serialize, page: String, figures: &[Figure]) -> io::Result<Files> {
+    let mut json = serde_json::to_vec_pretty(numbers)?;
+    json.push(b'\n');
+    let mut files = vec![("report.json".to_owned(), json), ("report.html".to_owned(), page.into_bytes())];
+    for figure in figures {
+        let name = &figure.name;
+        files.push((format!("figures/{name}.svg"), figure.file().into_bytes()));
+        files.push((format!("tables/{name}.csv"), figure.table.to_csv().map_err(io::Error::other)?));
     }
     Ok(files)
 }

@@ -1,88 +1,125 @@
-//! `report.json`: what `verify --json` prints.
+//! `report.json`: what `verify --json` and `stress --json` print.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Environment, Run};
-use crate::suite::{Counts, Judged, Verdict, summary};
+use crate::studies::extreme_scenes::{self, Summary, Tally};
+use crate::suite::{Counts, Judged, Verdict};
 
 /// A judged suite.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct VerifyJson {
+pub struct VerifyJson<'a> {
     /// `penetrode/verify/1`.
     pub schema: &'static str,
     /// Title of the suite.
-    pub title: String,
+    pub title: &'a str,
     /// Verdict of the whole.
     pub verdict: Verdict,
     /// How many claims came to what.
     pub counts: Counts,
     /// The claims, in the suite's order.
-    pub claims: Vec<ClaimJson>,
+    pub claims: &'a [Judged],
     /// Where it ran and what remakes it.
-    pub environment: Environment,
+    pub environment: &'a Environment,
 }
 
-/// A judged claim.
+/// What `stress --json` prints, and `report.json` of its folder.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct ClaimJson {
-    /// Name.
-    pub id: String,
-    /// What is claimed.
-    pub statement: String,
-    /// Scene, where the claim has one.
-    pub scene: Option<String>,
-    /// Method, where the claim has one.
-    pub method: Option<&'static str>,
-    /// Quantity, where the claim has one.
-    pub quantity: Option<&'static str>,
-    /// What became of it.
+pub struct StressJson<'a> {
+    /// `penetrode/stress/1`.
+    pub schema: &'static str,
+    /// Verdict of the whole.
     pub verdict: Verdict,
-    /// Measured value; `null` where there is none, with the reason in `remark`.
-    pub measured: Option<f64>,
-    /// Largest admissible value.
-    pub limit: f64,
-    /// Unit of both.
-    pub unit: &'static str,
-    /// Why this limit.
-    pub reason: String,
-    /// What was seen, or why the claim was skipped or failed.
-    pub remark: String,
-    /// Time spent [ms].
+    /// How many cases came to what.
+    pub counts: Counts,
+    /// The cases, in the order of reports; last the random scenes as one.
+    pub claims: &'a [Judged],
+    /// What the random scenes showed; `null` where none were asked for.
+    pub random_scenes: Option<RandomScenesJson<'a>>,
+    /// Where it ran and what remakes it.
+    pub environment: &'a Environment,
+}
+
+/// What many random scenes showed.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct RandomScenesJson<'a> {
+    /// Scenes, critical velocities and defects, counted.
+    #[serde(flatten)]
+    pub summary: &'a Summary,
+    /// Outcomes by method.
+    pub methods: Vec<TallyJson>,
+    /// Worst errors by method and quantity.
+    pub worst: Vec<WorstJson>,
+    /// Time spent (ms).
     pub wall_ms: f64,
 }
 
-impl From<&Judged> for ClaimJson {
-    fn from(judged: &Judged) -> Self {
-        let claim = &judged.claim;
+/// Outcomes of one method.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TallyJson {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Its outcomes, counted.
+    #[serde(flatten)]
+    pub tally: Tally,
+}
+
+/// The worst error of a method in a quantity.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct WorstJson {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Quantity.
+    pub quantity: &'static str,
+    /// Error in units of round-off over max(1, condition number); `null` if it is not a number.
+    pub ulps: Option<f64>,
+    /// Number of the scene that makes it.
+    pub scene: u64,
+    /// That scene as a file; `null` if it has no such form.
+    pub text: Option<String>,
+}
+
+impl<'a> VerifyJson<'a> {
+    /// The run as data.
+    pub fn new(run: &'a Run<'_>) -> Self {
+        let counts = Counts::of_claims(run.judged);
+        let (schema, title) = ("penetrode/verify/1", run.suite.title.as_str());
+        Self { schema, title, verdict: counts.verdict(), counts, claims: run.judged, environment: &run.environment }
+    }
+}
+
+impl<'a> StressJson<'a> {
+    /// The run as data.
+    pub fn new(run: &'a Run<'_>) -> Self {
+        let counts = Counts::of_claims(run.judged);
         Self {
-            id: claim.id.clone(),
-            statement: claim.statement.clone(),
-            scene: claim.scene.clone(),
-            method: claim.method.map(crate::integrators::method::MethodName::name),
-            quantity: claim.quantity.map(crate::studies::Quantity::name),
-            verdict: judged.verdict,
-            measured: judged.measured,
-            limit: claim.limit,
-            unit: claim.check.unit(),
-            reason: claim.reason.clone(),
-            remark: judged.remark.clone(),
-            wall_ms: judged.wall_ms,
+            schema: "penetrode/stress/1",
+            verdict: counts.verdict(),
+            counts,
+            claims: run.judged,
+            random_scenes: run
+                .random
+                .map(|(summary, wall_ms)| RandomScenesJson::new(summary, run.environment.seed, wall_ms)),
+            environment: &run.environment,
         }
     }
 }
 
-impl VerifyJson {
-    /// The run as data.
-    pub fn new(run: &Run<'_>) -> Self {
-        let (verdict, counts) = summary(run.judged);
-        Self {
-            schema: "penetrode/verify/1",
-            title: run.suite.title.clone(),
-            verdict,
-            counts,
-            claims: run.judged.iter().map(ClaimJson::from).collect(),
-            environment: run.environment.clone(),
-        }
+impl<'a> RandomScenesJson<'a> {
+    fn new(summary: &'a Summary, seed: u64, wall_ms: f64) -> Self {
+        let text = |index: u64| {
+            let title = format!("random scene {index} of seed {seed}");
+            extreme_scenes::scene_text(&extreme_scenes::scene(seed, index), &title)
+        };
+        let methods = summary.tallies.iter().map(|(method, tally)| TallyJson { method: method.name(), tally: *tally });
+        let worst = summary.worst.iter().map(|((method, quantity), worst)| WorstJson {
+            method: method.name(),
+            quantity: quantity.name(),
+            ulps: Some(worst.units).filter(|units| units.is_finite()),
+            scene: worst.index,
+            text: text(worst.index),
+        });
+        Self { summary, methods: methods.collect(), worst: worst.collect(), wall_ms }
     }
 }

@@ -8,7 +8,6 @@ use std::time::Duration;
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::Run;
-use super::families::group_of;
 use super::text::one_line;
 use crate::suite::{Judged, Verdict};
 
@@ -18,8 +17,8 @@ use crate::suite::{Judged, Verdict};
 /// Only if memory for it cannot be had.
 pub fn to_xml(run: &Run<'_>) -> Result<String, SerializeError> {
     let mut report = Report::new(one_line(&run.suite.title));
-    for group in run.judged.chunk_by(|a, b| group_of(&a.claim.id) == group_of(&b.claim.id)) {
-        let name = group_of(&group[0].claim.id);
+    for group in run.judged.chunk_by(|a, b| a.claim.group() == b.claim.group()) {
+        let name = group[0].claim.group();
         let mut suite = TestSuite::new(one_line(name));
         suite.set_time(duration(group.iter().map(|j| j.wall_ms).sum()));
         suite.add_property(("seed", run.environment.seed.to_string().as_str()));
@@ -41,8 +40,8 @@ fn case(judged: &Judged, group: &str) -> TestCase {
         Verdict::Failed => TestCaseStatus::non_success(NonSuccessKind::Failure),
     };
     let measured = judged.measured.map_or_else(|| "nothing".to_owned(), |m| format!("{m:e}"));
-    let numbers = format!("measured {measured}, limit {:e} {}", claim.limit, claim.check.unit());
-    let told = format!(
+    let numbers = format!("measured {measured}, limit {:e} {}", claim.limit, claim.unit);
+    let text = format!(
         "{}\n{numbers}\nwhy this limit: {}\n{}",
         one_line(&claim.statement),
         one_line(&claim.reason),
@@ -54,13 +53,13 @@ fn case(judged: &Judged, group: &str) -> TestCase {
             status.set_message(one_line(&judged.remark));
         }
         Verdict::Undecided | Verdict::Failed => {
-            status.set_type(judged.verdict.name()).set_message(numbers.clone()).set_description(told.clone());
+            status.set_type(judged.verdict.name()).set_message(numbers.clone()).set_description(text.clone());
         }
     }
     let mut case = TestCase::new(one_line(&claim.id), status);
     case.set_classname(format!("penetrode.{}", one_line(group))).set_time(duration(judged.wall_ms));
     if judged.verdict == Verdict::Passed {
-        case.set_system_out(told);
+        case.set_system_out(text);
     }
     case
 }

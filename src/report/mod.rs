@@ -1,28 +1,27 @@
 //! How a run of the suite or of the stress cases is shown: JSON, and a folder with a page, figures and tables.
 
-mod applications;
 pub mod bench;
 pub mod chart;
 pub mod environment;
-pub mod families;
 pub mod figure;
 pub mod figure_data;
 pub mod figures;
 pub mod folder;
 pub mod json;
 pub mod junit;
-pub mod page;
+mod page;
 pub mod stability_figures;
 pub mod stress;
-mod stress_page;
 pub mod summary;
 pub mod sweep_figures;
 pub mod table;
-pub mod text;
+mod verify_page;
+pub use crate::text;
 
 pub use environment::Environment;
-pub use json::VerifyJson;
+pub use json::{StressJson, VerifyJson};
 
+use crate::studies::extreme_scenes::Summary;
 use crate::suite::{Judged, Suite};
 
 /// A finished run of a suite: everything that a report shows.
@@ -36,6 +35,8 @@ pub struct Run<'a> {
     pub environment: Environment,
     /// A user's measured critical energies (H/d, `E_c/(d³ fc)`), shown with the paper's curve.
     pub points: &'a [(f64, f64)],
+    /// What the random scenes of `stress` showed and the time spent on them (ms); `None` where none were asked for.
+    pub random: Option<(&'a Summary, f64)>,
 }
 
 #[cfg(test)]

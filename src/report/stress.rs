@@ -1,208 +1,140 @@
-//! The report of `stress`: its JSON, and a folder with a page of its own.
+//! The folder of `stress` and its page: what is asked of each case and why, then its verdict, method by method.
 
 use std::io;
 
-use schemars::JsonSchema;
-use serde::Serialize;
+use maud::{Markup, html};
 
-use super::environment::Environment;
+use super::chart::{Axis, Panel, Style};
 use super::figure::Figure;
-use super::folder::figure_files;
-use super::json::ClaimJson;
-use super::stress_page;
+use super::folder::{Files, files_of};
+use super::page::{Page, Table, cell, number_cell, slot};
+use super::table::Table as Numbers;
+use super::text::one_line;
+use super::{Run, StressJson, stability_figures};
 use crate::integrators::MethodName;
-use crate::studies::extreme_scenes::{self, Summary};
-use crate::suite::stress::{JudgedCase, counts};
-use crate::suite::{Counts, Verdict};
+use crate::studies::extreme_scenes::{Summary, ULPS_MAX};
+use crate::suite::{Counts, Evidence, Section, Verdict};
 
-/// A finished run of the stress cases.
-#[derive(Debug)]
-pub struct StressRun<'a> {
-    /// The cases, judged, in the order of reports; last the random scenes as one.
-    pub judged: &'a [JudgedCase],
-    /// What the random scenes showed and the time spent on them [ms]; `None` where none were asked for.
-    pub random: Option<(&'a Summary, f64)>,
-    /// Where it ran and what remakes it.
-    pub environment: Environment,
-}
-
-/// What `stress --json` prints, and `report.json` of its folder.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct StressJson {
-    /// `penetrode/stress/1`.
-    pub schema: &'static str,
-    /// Verdict of the whole.
-    pub verdict: Verdict,
-    /// How many cases came to what.
-    pub counts: Counts,
-    /// The cases, in the order of reports; last the random scenes as one.
-    pub claims: Vec<ClaimJson>,
-    /// What the random scenes showed; `null` where none were asked for.
-    pub random_scenes: Option<RandomScenesJson>,
-    /// Where it ran and what remakes it.
-    pub environment: Environment,
-}
-
-/// What many random scenes showed.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct RandomScenesJson {
-    /// Scenes examined.
-    pub scenes: u64,
-    /// Scenes whose coefficients leave the range of 64-bit numbers.
-    pub unresolved: u64,
-    /// Scenes for which 50 digits were asked.
-    pub asked_reference: u64,
-    /// Critical velocities that agree.
-    pub critical_found: u64,
-    /// Critical velocities refused with their cause, as out of range.
-    pub critical_refused: u64,
-    /// Outcomes by method.
-    pub methods: Vec<TallyJson>,
-    /// Worst errors by method and quantity.
-    pub worst: Vec<WorstJson>,
-    /// Limits missed, all of them.
-    pub defect_count: u64,
-    /// The first of them.
-    pub defects: Vec<DefectJson>,
-    /// Time spent [ms].
-    pub wall_ms: f64,
-}
-
-/// Outcomes of one method.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct TallyJson {
-    /// Name of the method.
-    pub method: &'static str,
-    /// Right outcomes.
-    pub right: u64,
-    /// Outcomes inside the method's own bar.
-    pub undecided: u64,
-    /// Scenes without an answer.
-    pub refused: u64,
-    /// Wrong outcomes.
-    pub wrong: u64,
-}
-
-/// The worst error of a method in a quantity.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct WorstJson {
-    /// Name of the method.
-    pub method: &'static str,
-    /// Quantity.
-    pub quantity: &'static str,
-    /// Error in units of round-off over max(1, condition number); `null` if it is not a number.
-    pub ulps: Option<f64>,
-    /// Number of the scene that makes it.
-    pub scene: u64,
-    /// That scene as a file; `null` if it has no such form.
-    pub text: Option<String>,
-}
-
-/// A limit missed.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct DefectJson {
-    /// Number of the scene.
-    pub scene: u64,
-    /// What is wrong.
-    pub what: String,
-}
-
-impl StressJson {
-    /// The run as data.
-    pub fn new(run: &StressRun<'_>) -> Self {
-        let counts = counts(run.judged);
-        let seed = run.environment.seed;
-        Self {
-            schema: "penetrode/stress/1",
-            verdict: counts.verdict(),
-            counts,
-            claims: run.judged.iter().map(ClaimJson::from).collect(),
-            random_scenes: run.random.map(|(summary, wall_ms)| RandomScenesJson::new(summary, seed, wall_ms)),
-            environment: run.environment.clone(),
-        }
-    }
-}
-
-impl RandomScenesJson {
-    fn new(summary: &Summary, seed: u64, wall_ms: f64) -> Self {
-        let text = |index: u64| {
-            let title = format!("random scene {index} of seed {seed}");
-            extreme_scenes::scene_text(&extreme_scenes::scene(seed, index), &title)
-        };
-        Self {
-            scenes: summary.scenes,
-            unresolved: summary.unresolved,
-            asked_reference: summary.asked_reference,
-            critical_found: summary.critical_found,
-            critical_refused: summary.critical_refused,
-            methods: summary
-                .tallies
-                .iter()
-                .map(|(method, tally)| TallyJson {
-                    method: method.name(),
-                    right: tally.right,
-                    undecided: tally.undecided,
-                    refused: tally.refused,
-                    wrong: tally.wrong,
-                })
-                .collect(),
-            worst: summary
-                .worst
-                .iter()
-                .map(|((method, quantity), worst)| WorstJson {
-                    method: method.name(),
-                    quantity: quantity.name(),
-                    ulps: Some(worst.units).filter(|units| units.is_finite()),
-                    scene: worst.index,
-                    text: text(worst.index),
-                })
-                .collect(),
-            defect_count: summary.defect_count,
-            defects: summary
-                .defects
-                .iter()
-                .map(|defect| DefectJson { scene: defect.index, what: defect.what.clone() })
-                .collect(),
-            wall_ms,
-        }
-    }
-}
-
-impl From<&JudgedCase> for ClaimJson {
-    fn from(case: &JudgedCase) -> Self {
-        Self {
-            id: case.id.clone(),
-            statement: case.statement.to_owned(),
-            scene: None,
-            method: case.method.map(MethodName::name),
-            quantity: None,
-            verdict: case.verdict,
-            measured: case.measured,
-            limit: case.limit,
-            unit: case.unit,
-            reason: case.reason.to_owned(),
-            remark: case.remark.clone(),
-            wall_ms: case.wall_ms,
-        }
-    }
-}
-
-/// Every file of the report: its path in the folder, and its bytes.
+/// Every file of the report.
 ///
 /// # Errors
-/// Only what makes memory run out, or a figure that cannot be drawn.
-pub fn files(run: &StressRun<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
-    let figures = stress_page::figures(run)
-        .into_iter()
-        .map(Figure::draw)
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(io::Error::other)?;
-    let mut json = serde_json::to_vec_pretty(&StressJson::new(run))?;
-    json.push(b'\n');
-    let mut files = vec![
-        ("report.json".to_owned(), json),
-        ("report.html".to_owned(), stress_page::to_html(run, &figures).into_bytes()),
-    ];
-    files.extend(figure_files(&figures)?);
-    Ok(files)
+/// Only what makes memory run out.
+pub fn files(run: &Run<'_>) -> io::Result<Files> {
+    let figures = figures(run);
+    files_of(&StressJson::new(run), to_html(run, &figures), &figures)
+}
+
+/// Figures of the run, from the evidence of its cases.
+fn figures(run: &Run<'_>) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    for case in run.judged {
+        figures.extend(match &case.evidence {
+            Some(Evidence::Boundary(points)) => stability_figures::boundary(points),
+            Some(Evidence::Rounding(rows)) => stability_figures::rounding(rows),
+            _ => None,
+        });
+    }
+    figures.extend(stiffness(run));
+    figures
+}
+
+/// Cost over r/M by method: a stage that resists, and one that is driven.
+fn stiffness(run: &Run<'_>) -> Option<Figure> {
+    let mut table = Numbers::new("case,method,r_over_m_per_s,force_evaluations");
+    let mut panels = Vec::new();
+    let mut series = Vec::new();
+    for (id, title) in [("S11", "a stage that resists"), ("S12", "a driven stage")] {
+        for case in run.judged.iter().filter(|case| case.claim.table == id) {
+            if let (Some(method), Some(Evidence::Series { points, .. })) = (case.claim.method, &case.evidence) {
+                series.push((title, method, points));
+                for (rate, cost) in points {
+                    table.push([&id, &method, rate, cost]);
+                }
+            }
+        }
+    }
+    let mut methods: Vec<MethodName> = Vec::new();
+    for (_, method, _) in &series {
+        if !methods.contains(method) {
+            methods.push(*method);
+        }
+    }
+    for title in ["a stage that resists", "a driven stage"] {
+        let mut panel = Panel::new(title, Axis::log("r/M", "1/s"), Axis::log("force evaluations", ""));
+        for (_, method, points) in series.iter().filter(|(of, ..)| *of == title) {
+            // One colour a method, in both panels.
+            let index = methods.iter().position(|known| known == method).unwrap_or_default();
+            panel = panel.series(method.to_string(), Style::marked_line(index), points.iter().copied());
+        }
+        panels.push(panel);
+    }
+    let is_implicit = |method: &MethodName| !matches!(method, MethodName::Taylor | MethodName::Tsit45);
+    let implicit = series.iter().any(|(title, method, _)| *title == "a driven stage" && is_implicit(method));
+    let message = format!(
+        "A stage that resists costs a logarithm more as r/M grows, a driven one in proportion by explicit methods{}",
+        if implicit { ", and no more by implicit ones" } else { "" }
+    );
+    let figure = Figure::new(
+        "stiffness",
+        Section::Stability,
+        message,
+        "Force evaluations of a solution at the default tolerance over the fast rate r/M. With a drive against the \
+         viscosity the explicit cost grows in proportion; without one, rest comes inside the fast transient.",
+        panels,
+        table,
+    )?;
+    Some(figure.sharing_axes())
+        // The message is what S11 and S12 claim: where one fails it is not said.
+        .filter(|_| {
+            run.judged
+                .iter()
+                .filter(|c| ["S11", "S12"].contains(&c.claim.table.as_str()))
+                .all(|c| c.verdict != Verdict::Failed)
+        })
+}
+
+/// The page of `run` with its figures.
+fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
+    Page {
+        title: &one_line(&run.suite.title),
+        outcome: Counts::of_claims(run.judged).verdict().name(),
+        purpose: "Purpose: to show where the program holds at its edges, how far, and what it refuses.",
+        environment: &run.environment,
+        text: include_str!("pages/stress.txt"),
+        slot: &|name, words| match (name, run.random) {
+            ("random-scenes", Some((summary, _))) => random_scenes(summary),
+            ("random-scenes", None) => html! {},
+            _ => slot(run, figures, name, words),
+        },
+        files: html! { a href="report.json" { "JSON" } },
+    }
+    .to_html()
+}
+
+fn random_scenes(summary: &Summary) -> Markup {
+    let outcomes =
+        Table::cards("Outcomes, over all scenes that resolve", ["method", "right", "undecided", "refused", "wrong"])
+            .numbers(1..5)
+            .rows(&summary.tallies, |(method, tally)| {
+                [cell(method.name()), cell(tally.right), cell(tally.undecided), cell(tally.refused), cell(tally.wrong)]
+            });
+    let worst = Table::cards(
+        format!(
+            "Worst errors in ulp over max(1, condition number), limit {ULPS_MAX}, and the scene that makes each: penetrode \
+             stress --show N"
+        ),
+        ["method", "quantity", "error", "scene"],
+    )
+    .numbers(2..4)
+    .rows(&summary.worst, |((method, quantity), worst)| {
+        [cell(method.name()), cell(quantity.name()), number_cell(Some(worst.units), 3), cell(worst.index)]
+    });
+    html! {
+        p { (summary.scenes) " scenes over the whole admissible range, every second one aimed at an edge; "
+            (summary.unresolved) " of them do not resolve, 50 digits were asked for " (summary.asked_reference)
+            ". Critical velocities: " (summary.critical_found) " agree, " (summary.critical_refused)
+            " are out of range and refused." }
+        (outcomes)
+        (worst)
+    }
 }

@@ -3,23 +3,22 @@
 use std::fmt::Write as _;
 
 use super::Run;
-use super::families::Family;
 use super::text::{number, one_line};
-use crate::suite::{Counts, Verdict, summary};
+use crate::suite::{Counts, Verdict, tables, worst};
 
-/// Claims told one by one at most; the others are in `report.html`.
-const TOLD_MAX: usize = 30;
+/// Claims listed one by one at most; the others are in `report.html`.
+const LISTED_MAX: usize = 30;
 
-/// The run in Markdown: verdict, what failed or is undecided, one line a family of claims, and the command.
+/// The run in Markdown: verdict, what failed or is undecided, one line a table of claims, and the command.
 pub fn to_markdown(run: &Run<'_>) -> String {
-    let (verdict, counts) = summary(run.judged);
+    let counts = Counts::of_claims(run.judged);
+    let verdict = counts.verdict();
     let mut text =
-        format!("## {} {}: {}\n\n{}\n\n", mark(verdict), escape(&run.suite.title), verdict.name(), told(counts));
-    let told: Vec<_> =
-        run.judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)).collect();
-    if !told.is_empty() {
+        format!("## {} {}: {}\n\n{}\n\n", mark(verdict), escape(&run.suite.title), verdict.name(), counts_text(counts));
+    let open: Vec<_> = run.judged.iter().filter(|j| j.is_open()).collect();
+    if !open.is_empty() {
         text.push_str("| | claim | measured | limit | what was seen |\n|---|---|---|---|---|\n");
-        for judged in told.iter().take(TOLD_MAX) {
+        for judged in open.iter().take(LISTED_MAX) {
             let claim = &judged.claim;
             let _ = writeln!(
                 text,
@@ -30,28 +29,28 @@ pub fn to_markdown(run: &Run<'_>) -> String {
                 escape(&claim.statement),
                 judged.measured.map_or_else(|| "—".to_owned(), |m| number(m, 3)),
                 number(claim.limit, 3),
-                claim.check.unit(),
+                claim.unit,
                 escape(&judged.remark)
             );
         }
-        if told.len() > TOLD_MAX {
-            let _ = writeln!(text, "\n{} more are in `report.html`.", told.len() - TOLD_MAX);
+        if open.len() > LISTED_MAX {
+            let _ = writeln!(text, "\n{} more are in `report.html`.", open.len() - LISTED_MAX);
         }
         text.push('\n');
     }
     text.push_str("<details><summary>All claims</summary>\n\n| | claims | worst | limit |\n|---|---|---|---|\n");
-    for family in Family::all(run.judged) {
-        let claim = &family.first().claim;
+    for claims in tables(run.judged) {
+        let claim = &claims[0].claim;
         let _ = writeln!(
             text,
             "| {} | {} ({})<br>{} | {} | {} {} |",
-            mark(family.verdict()),
-            code(family.id),
-            family.members.len(),
+            mark(Counts::of_claims(claims).of_group()),
+            code(&claim.table),
+            claims.len(),
             escape(&claim.statement),
-            family.worst().map_or_else(|| "—".to_owned(), |m| number(m, 3)),
+            worst(claims).map_or_else(|| "—".to_owned(), |m| number(m, 3)),
             number(claim.limit, 3),
-            claim.check.unit()
+            claim.unit
         );
     }
     let environment = &run.environment;
@@ -67,7 +66,7 @@ pub fn to_markdown(run: &Run<'_>) -> String {
     text
 }
 
-fn told(counts: Counts) -> String {
+fn counts_text(counts: Counts) -> String {
     format!(
         "**{} passed, {} failed, {} undecided**, {} skipped as not applicable",
         counts.passed, counts.failed, counts.undecided, counts.skipped

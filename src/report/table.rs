@@ -11,9 +11,9 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table of these columns without rows.
-    pub fn new<const N: usize>(header: [&'static str; N]) -> Self {
-        Self { header: header.to_vec(), rows: Vec::new() }
+    /// A table without rows, from its first line: names of columns with commas between.
+    pub fn new(header: &'static str) -> Self {
+        Self { header: header.split(',').collect(), rows: Vec::new() }
     }
 
     /// Adds a row. Numbers are printed so that they read back to the same f64.
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn values_are_quoted_where_they_need_it_and_numbers_read_back() {
-        let mut table = Table::new(["name", "value"]);
+        let mut table = Table::new("name,value");
         table.push([&"a,\"b\"\nc", &0.1_f64]);
         table.push([&"plain", &1e-300_f64]);
         let text = String::from_utf8(table.to_csv().unwrap()).unwrap();

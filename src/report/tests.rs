@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use super::stress::StressRun;
 use super::{Environment, Run, folder};
-use crate::suite::checks::PeerAnswers;
-use crate::suite::stress::JudgedCase;
+use crate::suite::checks::{Peer, PeerAnswers};
 use crate::suite::{Check, Evidence, Judged, Suite, Verdict};
 
 const HOSTILE: &str = "a\"b'<script>alert(1)</script>&|`*_\n\u{1b}[2J\u{202e},=1+1]]>";
@@ -32,6 +30,7 @@ fn judged() -> (Suite, Vec<Judged>) {
     for verdict in [Verdict::Failed, Verdict::Undecided, Verdict::Skipped] {
         let mut hostile = judged[0].clone();
         hostile.claim.id = format!("hostile/{HOSTILE}/{}", verdict.name());
+        hostile.claim.table.clone_from(&hostile.claim.id);
         hostile.claim.statement = HOSTILE.to_owned();
         hostile.claim.reason = HOSTILE.to_owned();
         hostile.claim.scene = Some(HOSTILE.to_owned());
@@ -39,8 +38,8 @@ fn judged() -> (Suite, Vec<Judged>) {
         hostile.verdict = verdict;
         judged.push(hostile);
     }
-    let mut peer = judged.iter().find(|j| matches!(j.claim.check, Check::Peer { .. })).unwrap().clone();
-    peer.claim.check = Check::Peer { name: HOSTILE.to_owned(), tolerance: 1e-6 };
+    let mut peer = judged.iter().find(|j| matches!(j.claim.check, Check::Peer(_))).unwrap().clone();
+    peer.claim.check = Check::Peer(Peer { name: HOSTILE.to_owned(), tolerance: 1e-6 });
     peer.measured = Some(0.5);
     judged.push(peer);
     suite.title = HOSTILE.to_owned();
@@ -49,7 +48,7 @@ fn judged() -> (Suite, Vec<Judged>) {
 
 fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
     let environment = Environment::here(1, HOSTILE.to_owned(), suite, vec![(HOSTILE.to_owned(), HOSTILE.to_owned())]);
-    let run = Run { suite, judged, environment, points: &[(5.0, 30.0)] };
+    let run = Run { suite, judged, environment, points: &[(5.0, 30.0)], random: None };
     let files = folder::files(&run).unwrap();
     files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect()
 }
@@ -118,32 +117,28 @@ fn without_times(text: &str) -> String {
 #[test]
 fn stress_reports_of_one_run_differ_in_times_alone() {
     // A few cases, judged, are enough: those with figures and one that failed.
-    let of = |id: &str, evidence, verdict, wall_ms| JudgedCase {
-        id: id.to_owned(),
-        statement: "a case of this test",
-        method: None,
+    let (suite, judged) = (Suite::edges().unwrap(), judged().1);
+    let of = |id: &str, evidence, verdict, wall_ms| Judged {
+        claim: suite.claims.iter().find(|claim| claim.id == id).unwrap().clone(),
         verdict,
         measured: Some(0.5),
-        limit: 1.0,
-        unit: "relative",
-        reason: "chosen for this test",
+        resolution: 0.0,
         remark: HOSTILE.to_owned(),
         evidence,
         wall_ms,
     };
-    let (_, judged) = judged();
     let figures = judged.iter().filter_map(|j| match &j.evidence {
         Some(evidence @ (Evidence::Boundary(_) | Evidence::Rounding(_))) => Some(evidence.clone()),
         _ => None,
     });
     let figures: Vec<Evidence> = figures.collect();
     assert_eq!(figures.len(), 2);
-    let suite = Suite::embedded().unwrap();
     let written = |wall_ms: f64| {
         let mut cases = vec![of("E1/taylor", None, Verdict::Failed, wall_ms)];
         cases.extend(figures.iter().map(|figure| of("S1", Some(figure.clone()), Verdict::Passed, wall_ms)));
         let environment = Environment::here(1, HOSTILE.to_owned(), &suite, Vec::new());
-        let files = super::stress::files(&StressRun { judged: &cases, random: None, environment }).unwrap();
+        let run = Run { suite: &suite, judged: &cases, environment, points: &[], random: None };
+        let files = super::stress::files(&run).unwrap();
         files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect::<Vec<_>>()
     };
     let (first, second) = (written(1.0), written(2.0));
@@ -180,23 +175,24 @@ fn an_interrupted_or_refused_run_leaves_what_was_there() {
         judged: &judged,
         environment: Environment::here(1, String::new(), &suite, vec![]),
         points: &[],
+        random: None,
     };
     let place = tempfile::tempdir().unwrap();
     let strange = place.path().join("strange");
     std::fs::create_dir(&strange).unwrap();
     std::fs::write(strange.join("thesis.txt"), "years of work").unwrap();
-    assert!(matches!(folder::write(&run, &strange), Err(folder::FolderError::NotOurs { .. })));
+    assert!(matches!(folder::write(folder::files(&run), &strange), Err(folder::FolderError::NotOurs { .. })));
     assert_eq!(std::fs::read_dir(&strange).unwrap().count(), 1);
     // Twice: a new folder, then one of ours in its place, with nothing left over beside it.
     let ours = place.path().join("report");
     for _ in 0..2 {
-        folder::write(&run, &ours).unwrap();
+        folder::write(folder::files(&run), &ours).unwrap();
         // As a report of other claims would have left it: listed, and so replaced.
         std::fs::write(ours.join("figures/old.svg"), "").unwrap();
         let list = std::fs::read_to_string(ours.join("contents.txt")).unwrap();
         std::fs::write(ours.join("contents.txt"), list + "figures/old.svg\n").unwrap();
     }
-    folder::write(&run, &ours).unwrap();
+    folder::write(folder::files(&run), &ours).unwrap();
     assert!(!ours.join("figures/old.svg").exists() && ours.join("figures/observed-orders.svg").exists());
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 2);
 }
@@ -205,11 +201,11 @@ fn an_interrupted_or_refused_run_leaves_what_was_there() {
 fn a_report_never_replaces_what_is_not_its_own() {
     let (suite, judged) = judged();
     let environment = Environment::here(1, String::new(), &suite, vec![]);
-    let run = Run { suite: &suite, judged: &judged, environment, points: &[] };
+    let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: None };
     for foreign in ["notes.txt", "tables/mine.csv", "figures/deep/mine.svg", "mine", ".hidden"] {
         let place = tempfile::tempdir().unwrap();
         let report = place.path().join("report");
-        folder::write(&run, &report).unwrap();
+        folder::write(folder::files(&run), &report).unwrap();
         let path = report.join(foreign);
         if foreign == "mine" {
             std::fs::create_dir(&path).unwrap();
@@ -217,7 +213,7 @@ fn a_report_never_replaces_what_is_not_its_own() {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(&path, "years of work").unwrap();
         }
-        let error = folder::write(&run, &report).unwrap_err();
+        let error = folder::write(folder::files(&run), &report).unwrap_err();
         let first = foreign.split("/mine.svg").next().unwrap();
         assert!(matches!(&error, folder::FolderError::NotOurs { why, .. } if why.contains(first)), "{error}");
         assert!(path.exists() && report.join("report.html").exists(), "{foreign}");
@@ -229,12 +225,12 @@ fn a_report_never_replaces_what_is_not_its_own() {
 fn an_empty_folder_is_filled() {
     let (suite, judged) = judged();
     let environment = Environment::here(1, String::new(), &suite, vec![]);
-    let run = Run { suite: &suite, judged: &judged, environment, points: &[] };
+    let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: None };
     let place = tempfile::tempdir().unwrap();
-    folder::write(&run, place.path().join("empty").as_path()).unwrap();
+    folder::write(folder::files(&run), place.path().join("empty").as_path()).unwrap();
     let empty = place.path().join("made by hand");
     std::fs::create_dir(&empty).unwrap();
-    folder::write(&run, &empty).unwrap();
+    folder::write(folder::files(&run), &empty).unwrap();
     assert!(empty.join("report.html").exists());
 }
 
@@ -244,4 +240,6 @@ fn an_empty_run_has_a_report() {
     suite.claims.clear();
     let html = files(&suite, &[]).into_iter().find(|(name, _)| name == "report.html").unwrap().1;
     assert!(html.contains("Nothing was decided"));
+    // A slot without contents of that name would be shown as it is written.
+    assert_eq!(html.lines().filter(|line| line.starts_with('@') && !line.starts_with("@media")).count(), 0);
 }

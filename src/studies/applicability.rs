@@ -14,6 +14,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
+use super::order::bisect;
 use crate::physics::groups::Groups;
 use crate::physics::semi_empirical::{self, static_factor_validity};
 use crate::physics::{CraterStiffness, Scene};
@@ -54,15 +55,8 @@ pub fn model_error(impact: f64, geometry: Option<f64>, crater_ratio: f64) -> f64
 /// Above that N it is smaller. Bisection in ln N over 1e-9 to 1e12, to 1e-12 relative.
 pub fn geometry_at(level: f64, impact: f64, crater_ratio: f64) -> Option<f64> {
     let beyond = |ln_n: f64| model_error(impact, Some(ln_n.exp()), crater_ratio).abs() > level;
-    let (mut low, mut high) = (1e-9_f64.ln(), 1e12_f64.ln());
-    if !beyond(low) || beyond(high) {
-        return None;
-    }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if beyond(middle) { low = middle } else { high = middle }
-    }
-    Some((0.5 * (low + high)).exp())
+    let (low, high) = (1e-9_f64.ln(), 1e12_f64.ln());
+    (beyond(low) && !beyond(high)).then(|| bisect(low, high, 60, beyond).exp())
 }
 
 /// A stretch of a line of equal error: (I, N), ascending in I.
@@ -86,7 +80,8 @@ pub fn contour(level: f64, impacts: &[f64], crater_ratio: f64) -> Vec<Stretch> {
 }
 
 /// A stretch of a line of equal error, with its error.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Line {
     /// Size of the relative error.
     pub level: f64,
@@ -105,7 +100,7 @@ pub fn lines(crater_ratio: f64) -> Vec<Line> {
     LEVELS.into_iter().flat_map(of).collect()
 }
 
-/// What a user should know of `scene` at `impact_speed` [m/s], one sentence each: Eq. 11-12 and 15 outside their
+/// What a user should know of `scene` at `impact_speed` (m/s), one sentence each: Eq. 11-12 and 15 outside their
 /// range, S outside the range of its fit. Empty for scenes of stages and layers, which have no Eq. 11-12.
 pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {
     let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) else { return Vec::new() };
@@ -153,15 +148,15 @@ fn rounded(group: f64) -> String {
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
+    use crate::exchange::scene_file::SHIPPED;
     use crate::integrators::{ClosedForm, Detail, Integrator, Taylor};
-    use crate::physics::scene_file::SHIPPED;
-    use crate::studies::parameter::Parameter;
+    use crate::physics::Parameter;
 
     fn slab() -> Scene {
         Scene::from_toml(SHIPPED.iter().find(|(name, _)| *name == "paper-slab").unwrap().1, "paper-slab").unwrap()
     }
 
-    /// (I, N, k -> X/d) of theory section 2.
+    /// (I, N, k -> X/d) of `docs/theory.md`, section 2.
     #[test]
     fn depth_is_that_of_li_and_chen_at_finite_n() {
         for (impact, geometry, k, expected) in [
@@ -184,7 +179,7 @@ mod tests {
             Parameter::Impact.set(&mut scene, impact).unwrap();
             let problem = scene.problem().unwrap();
             for method in [&Taylor::default() as &dyn Integrator, &ClosedForm] {
-                let ratio = method.fly(&problem, Detail::End).unwrap().end.depth / 0.06;
+                let ratio = method.solve(&problem, Detail::End).unwrap().end.depth / 0.06;
                 let error = semi_empirical::depth_ratio(impact, 2.0) / ratio - 1.0;
                 assert!((error - model_error(impact, Some(geometry), 2.0)).abs() < 1e-14, "{impact} {geometry}");
             }

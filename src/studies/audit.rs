@@ -1,15 +1,12 @@
-//! What are step-size results worth that another code produced?
+//! Do step-size results of another code converge, how fast, and to what?
 //!
 //! A table of `dt_s` and results comes in ([`Table::read`]), a verdict comes out ([`audit`]): order with interval,
 //! class, error bars by named rules, and agreement with the exact values where they are known.
 //!
-//! What is wrong with a table is named for what it is and never passes. A table that cannot be judged is an
-//! [`AuditError`] with file, line and column (exit code 2); NaN, divergence, oscillation, a missed order and a wrong
-//! limit fail (3); constants, zero errors and noise leave it undecided (4). Rows out of order and rows that say the
-//! same twice are put right and mentioned.
+//! A table that cannot be judged is an [`AuditError`] with file, line and column (exit code 2). NaN, divergence,
+//! oscillation, a missed order and a wrong limit fail (3); constants, zero errors and noise leave it undecided (4). Rows
+//! out of order and repeated rows are put right and mentioned.
 
-use csv::StringRecord;
-use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -19,8 +16,8 @@ use super::grid_convergence::{
 };
 use super::order::{Class, Exclusion, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
 use super::quantity::Quantity;
-use super::table_text::{LineEnds, counted, line_of, shortened};
-use crate::physics::Shown;
+use crate::exchange::tables::{self, At, Column, Fault, Format, Need, Place, Row, TableError};
+use crate::physics::{Advice, Shown};
 
 /// Two-sided level of the intervals behind a verdict on one table.
 ///
@@ -40,125 +37,45 @@ pub const ORDER_MAX: f64 = 32.0;
 /// Rows of a table at most: each costs some tens of microseconds, and an order is as sure with a hundred.
 pub const ROWS_MAX: usize = 10_000;
 
-/// Where in the file something stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// File name as given.
-    pub file: String,
-    /// Line, from 1; 0 in a file without lines.
-    pub line: u64,
-    /// Column, from 1; 0 for the whole line.
-    pub column: usize,
-}
+/// A table of results over the step size, the quantities in the order of [`Quantity::ALL`] behind the step.
+pub static RESULTS: Format = Format {
+    columns: &[
+        Column::number("dt_s"),
+        Column::number("depth_m").needed(Need::Optional),
+        Column::number("time_s").needed(Need::Optional),
+        Column::number("velocity_m_s").needed(Need::Optional),
+        Column::number("crater_end_time_s").needed(Need::Optional),
+        Column::number("crater_end_velocity_m_s").needed(Need::Optional),
+        Column::number("critical_velocity_m_s").needed(Need::Optional),
+    ],
+    ignores_others: false,
+    has_comments: true,
+};
 
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.file)?;
-        if self.line > 0 {
-            write!(f, ":{}", self.line)?;
-        }
-        if self.column > 0 { write!(f, ", column {}", self.column) } else { Ok(()) }
-    }
+/// Column of `quantity` in [`RESULTS`].
+fn column_of(quantity: Quantity) -> usize {
+    quantity as usize + 1
 }
 
 /// Why a table cannot be judged (exit code 2).
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum AuditError {
-    /// Not text, or no CSV.
-    #[error("{place}: {cause}")]
-    NotCsv {
-        /// Where.
-        place: Place,
-        /// What the reader said.
-        cause: String,
-    },
-    /// No row at all.
-    #[error("{file}: the file is empty")]
-    Empty {
-        /// File.
-        file: String,
-    },
-    /// The first row holds numbers.
-    #[error("{place}: the first row must name the columns, and this one holds numbers")]
-    NoHeader {
-        /// Where.
-        place: Place,
-    },
-    /// A column of another name.
-    #[error("{place}: there is no column `{}`", shortened(.name))]
-    UnknownColumn {
-        /// Where.
-        place: Place,
-        /// Name found.
-        name: String,
-    },
-    /// A name twice.
-    #[error("{place}: the column `{}` is there twice", shortened(.name))]
-    ColumnTwice {
-        /// Where.
-        place: Place,
-        /// Name.
-        name: String,
-    },
-    /// No `dt_s`.
-    #[error("{place}: the column `dt_s` is missing")]
-    NoSteps {
-        /// Where.
-        place: Place,
-    },
+    /// A fault of the table itself.
+    #[error(transparent)]
+    Table(#[from] Box<TableError>),
     /// Nothing but `dt_s`.
     #[error("{place}: there is no column of results")]
     NoResults {
-        /// Where.
+        /// Where the columns are named.
         place: Place,
-    },
-    /// A row longer or shorter than the header.
-    #[error("{place}: {} in a table of {}", counted(*.found as u64, "cell"), counted(*.expected as u64, "column"))]
-    Ragged {
-        /// Where.
-        place: Place,
-        /// Cells found.
-        found: usize,
-        /// Cells expected.
-        expected: usize,
-    },
-    /// A quote that is not closed in its line, and so swallows the lines behind it.
-    #[error("{place}: a quote is opened and not closed in this line")]
-    OpenQuote {
-        /// Where.
-        place: Place,
-    },
-    /// More rows than any study of step sizes has.
-    #[error("{place}: more than {ROWS_MAX} rows")]
-    TooManyRows {
-        /// Where the first of the others stands.
-        place: Place,
-    },
-    /// A cell that is no number.
-    #[error("{place}: {}", no_number(.text, .name))]
-    NotANumber {
-        /// Where.
-        place: Place,
-        /// Column name.
-        name: String,
-        /// Text found, empty for an empty cell.
-        text: String,
-    },
-    /// A step that is zero or negative.
-    #[error("{place}: the step {} s is not positive", Shown(*.step))]
-    BadStep {
-        /// Where.
-        place: Place,
-        /// Step [s].
-        step: f64,
     },
     /// Two results for one step.
     #[error("{place}: the step {} s has two values of `{name}`, {} here and {} in line {other}", Shown(*.step), Shown(*.second), Shown(*.first))]
     TwoValues {
         /// Where the second stands.
         place: Place,
-        /// Step [s].
+        /// Step (s).
         step: f64,
         /// Column name.
         name: &'static str,
@@ -177,7 +94,7 @@ pub enum AuditError {
         /// Steps found.
         found: usize,
     },
-    /// An order to compare with that no study of step sizes can tell.
+    /// An order to compare with that no study of step sizes can show.
     #[error("the order {} is not allowed: a number from {ORDER_MIN} to {ORDER_MAX}", Shown(*.order))]
     BadOrder {
         /// Order given.
@@ -185,45 +102,11 @@ pub enum AuditError {
     },
 }
 
-/// What is wrong with the cell `text` in the column `name`.
-fn no_number(text: &str, name: &str) -> String {
-    let name = shortened(name);
-    if text.is_empty() {
-        format!("the cell in `{name}` is empty")
-    } else {
-        format!("`{}` in `{name}` is not a number", shortened(text))
-    }
-}
-
-impl AuditError {
-    /// Exit code of the contract: 2, usage or input.
-    pub fn exit_code(&self) -> u8 {
-        2
-    }
-
-    /// What to change.
-    pub fn help(&self) -> String {
-        let names = || Quantity::ALL.map(column_name).join(", ");
+impl Advice for AuditError {
+    fn help(&self) -> String {
         match self {
-            Self::NotCsv { .. } => "give a comma-separated table in UTF-8".to_owned(),
-            Self::Empty { .. } | Self::NoHeader { .. } | Self::NoResults { .. } | Self::NoSteps { .. } => {
-                format!("start with a line of names: dt_s and any of {}", names())
-            }
-            Self::UnknownColumn { name, .. } if name.contains([';', '\t']) => {
-                "separate the cells by commas, and write decimals with a point".to_owned()
-            }
-            Self::UnknownColumn { .. } => {
-                format!("allowed are dt_s, {}: rename the column, convert its unit, or remove it", names())
-            }
-            Self::ColumnTwice { .. } => "remove one of the two".to_owned(),
-            Self::Ragged { .. } => "complete the row, or remove it".to_owned(),
-            Self::OpenQuote { .. } => "close the quote, or remove it".to_owned(),
-            Self::TooManyRows { .. } => "an order needs tens of steps, not thousands: keep every tenth row".to_owned(),
-            Self::NotANumber { text, .. } if text.is_empty() => {
-                "fill the cell, or remove the row or the column: a missing result is no result".to_owned()
-            }
-            Self::NotANumber { .. } => "write numbers with a decimal point and without units: 1.25e-6".to_owned(),
-            Self::BadStep { .. } => "a step is a time in seconds above zero".to_owned(),
+            Self::Table(error) => error.help(),
+            Self::NoResults { .. } => format!("add a column of results; allowed are the {}", RESULTS.allowed()),
             Self::TwoValues { .. } => {
                 "keep one of them: a result that a step does not determine has no order".to_owned()
             }
@@ -233,20 +116,9 @@ impl AuditError {
     }
 }
 
-/// Name of the column of a quantity in the contract.
-pub fn column_name(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Depth => "depth_m",
-        Quantity::Time => "time_s",
-        Quantity::Velocity => "velocity_m_s",
-        Quantity::CraterEndTime => "crater_end_time_s",
-        Quantity::CraterEndVelocity => "crater_end_velocity_m_s",
-        Quantity::CriticalVelocity => "critical_velocity_m_s",
-    }
-}
-
 /// What a finding is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FindingKind {
     /// Rows were out of order, and are sorted.
@@ -261,7 +133,7 @@ pub enum FindingKind {
     Constant,
     /// The errors are zero or round-off.
     ZeroError,
-    /// No law can be told from chance.
+    /// No law stands out from chance.
     Noise,
     /// The values run away.
     Diverging,
@@ -269,14 +141,15 @@ pub enum FindingKind {
     Oscillating,
     /// The order is not the one asked for.
     OrderMissed,
-    /// The order asked for is not told from its neighbours.
+    /// The order asked for cannot be distinguished from its neighbours.
     OrderUnclear,
     /// The values approach something else than the exact value.
     WrongLimit,
 }
 
 /// One remark about the table.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Finding {
     /// What it is about.
     pub kind: FindingKind,
@@ -290,13 +163,13 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     file: String,
-    rows: Vec<Row>,
-    columns: Vec<Column>,
+    rows: Vec<StepRow>,
+    columns: Vec<ResultColumn>,
     findings: Vec<Finding>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Row {
+struct StepRow {
     line: u64,
     step: f64,
     /// One per column of the table.
@@ -304,10 +177,34 @@ struct Row {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Column {
+struct ResultColumn {
     quantity: Quantity,
+    /// Number of the column in the file, from 1.
+    number: usize,
     /// Half a unit of the last digit printed, the finest in the column: short numbers may be exact.
     rounding: f64,
+}
+
+/// A row as it stands: line, step, and for each quantity the value and half a unit of its last digit, if there is one.
+type Cells = (u64, f64, [Option<(f64, f64)>; Quantity::ALL.len()]);
+
+fn cells_of(row: &Row<'_>) -> Result<Cells, Box<TableError>> {
+    let number = |column| match row.text(column)? {
+        "" => Ok(None),
+        text => match parse(text) {
+            Some(value) => Ok(Some((value, half_last_digit(text)))),
+            None => Err(row.refuse_cell(column, text, "not a number")),
+        },
+    };
+    let Some((step, _)) = number(0)? else { return Err(row.refuse_empty(0)) };
+    if step <= 0.0 {
+        return Err(row.refuse_cell(0, row.text(0)?, "not a time above zero, in seconds"));
+    }
+    let mut values = [None; Quantity::ALL.len()];
+    for (value, quantity) in values.iter_mut().zip(Quantity::ALL) {
+        *value = number(column_of(quantity))?;
+    }
+    Ok((row.at().number(), step, values))
 }
 
 impl Table {
@@ -320,88 +217,42 @@ impl Table {
     /// complete, every name known and there once, every step positive, with one value, and four of them different; of
     /// [`ROWS_MAX`] rows at most.
     pub fn read(file: &str, bytes: &[u8]) -> Result<Self, AuditError> {
-        let place = |line, column| Place { file: file.to_owned(), line, column };
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .comment(Some(b'#'))
-            .from_reader(LineEnds::new(bytes));
-        let mut records = Vec::new();
-        let mut record = StringRecord::new();
-        loop {
-            let is_read = reader.read_record(&mut record);
-            let line = line_of(&reader, record.as_slice().as_bytes());
-            let is_read = is_read.map_err(|error| AuditError::NotCsv {
-                place: place(line, 0),
-                cause: match error.kind() {
-                    csv::ErrorKind::Utf8 { .. } => "the file is not UTF-8 text".to_owned(),
-                    _ => error.to_string(),
-                },
-            })?;
-            if !is_read {
-                break;
+        let (mut count, mut header, mut positions) = (0, At::Table, Vec::new());
+        let cells = tables::read(file, bytes, &RESULTS, |row| {
+            count += 1;
+            if count > ROWS_MAX {
+                return Err(TableError::of_row(row.at(), 0, Fault::TooManyRows(ROWS_MAX)));
             }
-            if record.iter().any(|cell| cell.contains('\n')) {
-                return Err(AuditError::OpenQuote { place: place(line, 0) });
+            if count == 1 {
+                header = row.header();
+                positions = Quantity::ALL.map(|quantity| (row.position(column_of(quantity)), quantity)).to_vec();
             }
-            // The first is the header.
-            if records.len() > ROWS_MAX {
-                return Err(AuditError::TooManyRows { place: place(line, 0) });
-            }
-            records.push((line, record.clone()));
-        }
-        let Some(((header_line, header), records)) = records.split_first() else {
-            return Err(AuditError::Empty { file: file.to_owned() });
-        };
-        let names = header_names(header, |column| place(*header_line, column))?;
+            cells_of(row)
+        })?;
+        positions.sort_by_key(|(number, _)| *number);
         let mut table = Self { file: file.to_owned(), rows: Vec::new(), columns: Vec::new(), findings: Vec::new() };
-        let mut cells = Vec::new();
-        for (line, record) in records {
-            if record.len() != names.len() {
-                let (found, expected) = (record.len(), names.len());
-                return Err(AuditError::Ragged { place: place(*line, 0), found, expected });
-            }
-            cells.push((*line, record));
-        }
-        // A column of a template that was never filled says nothing; a gap in a column that is used hides something.
-        let empty = |index: usize| cells.iter().all(|(_, record)| record[index].is_empty());
-        let mut taken = Vec::new();
-        for (index, name) in names.iter().enumerate() {
-            let Some(quantity) = *name else { continue };
-            if empty(index) {
+        for (number, quantity) in positions.into_iter().filter(|(number, _)| *number > 0) {
+            let filled = || cells.iter().filter_map(|(.., values)| values[quantity as usize]);
+            // A column of a template that was never filled says nothing; a gap in a column that is used hides something.
+            if filled().next().is_none() {
                 table.remark(FindingKind::EmptyColumn, Some(quantity), "the column is empty and left out".to_owned());
-            } else {
-                taken.push((index, quantity));
-                table.columns.push(Column { quantity, rounding: f64::INFINITY });
+                continue;
             }
-        }
-        if taken.is_empty() {
-            return Err(AuditError::NoResults { place: place(*header_line, 0) });
-        }
-        let step_index = names.iter().position(Option::is_none).unwrap_or(0);
-        for (line, record) in cells {
-            let number = |index: usize| {
-                let text = &record[index];
-                parse(text).ok_or_else(|| AuditError::NotANumber {
-                    place: place(line, index + 1),
-                    name: header[index].to_owned(),
-                    text: text.to_owned(),
-                })
-            };
-            let step = number(step_index)?;
-            if step <= 0.0 {
-                return Err(AuditError::BadStep { place: place(line, step_index + 1), step });
+            if let Some((line, ..)) = cells.iter().find(|(.., values)| values[quantity as usize].is_none()) {
+                let fault = Fault::EmptyCell(RESULTS.columns[column_of(quantity)].name);
+                return Err(TableError::of_row(At::Line(*line), number, fault).in_file(file).into());
             }
-            let mut values = Vec::new();
-            for (column, &(index, _)) in table.columns.iter_mut().zip(&taken) {
-                values.push(number(index)?);
-                column.rounding = column.rounding.min(half_last_digit(&record[index]));
-            }
-            table.rows.push(Row { line, step, values });
+            let rounding = filled().map(|(_, rounding)| rounding).fold(f64::INFINITY, f64::min);
+            table.columns.push(ResultColumn { quantity, number, rounding });
         }
-        table.put_in_order(&taken)?;
+        if table.columns.is_empty() {
+            return Err(AuditError::NoResults { place: Place { file: file.to_owned(), at: header, column: 0 } });
+        }
+        for (line, step, cells) in cells {
+            let value = |column: &ResultColumn| cells[column.quantity as usize].map_or(f64::NAN, |(value, _)| value);
+            table.rows.push(StepRow { line, step, values: table.columns.iter().map(value).collect() });
+        }
+        table.put_in_order()?;
         Ok(table)
     }
 
@@ -410,32 +261,31 @@ impl Table {
     }
 
     /// Sorts by step, merges equal rows, refuses two values at one step.
-    fn put_in_order(&mut self, taken: &[(usize, Quantity)]) -> Result<(), AuditError> {
+    fn put_in_order(&mut self) -> Result<(), AuditError> {
         // From coarse to fine is an order too.
         let rises = self.rows.windows(2).any(|pair| pair[0].step < pair[1].step);
         let falls = self.rows.windows(2).any(|pair| pair[0].step > pair[1].step);
         if rises && falls {
-            self.remark(
-                FindingKind::Unsorted,
-                None,
-                "the rows are not in the order of the step and were sorted".into(),
-            );
+            let message = "the rows are not in the order of the step and were sorted".to_owned();
+            self.remark(FindingKind::Unsorted, None, message);
         }
         self.rows.sort_by(|a, b| a.step.total_cmp(&b.step).then(a.line.cmp(&b.line)));
         let mut merged = Vec::new();
-        let mut kept: Vec<Row> = Vec::new();
+        let mut different: Vec<StepRow> = Vec::new();
         for row in std::mem::take(&mut self.rows) {
-            let Some(before) = kept.last().filter(|before| before.step == row.step) else {
-                kept.push(row);
+            let Some(before) = different.last().filter(|before| before.step == row.step) else {
+                different.push(row);
                 continue;
             };
-            for (i, (&first, &second)) in before.values.iter().zip(&row.values).enumerate() {
+            for ((column, &first), &second) in self.columns.iter().zip(&before.values).zip(&row.values) {
                 // NaN twice is the same cell twice; -0 and 0 are one value.
                 if first != second && !(first.is_nan() && second.is_nan()) {
+                    let place = Place { file: self.file.clone(), at: At::Line(row.line), column: column.number };
+                    let name = RESULTS.columns[column_of(column.quantity)].name;
                     return Err(AuditError::TwoValues {
-                        place: Place { file: self.file.clone(), line: row.line, column: taken[i].0 + 1 },
+                        place,
                         step: row.step,
-                        name: column_name(taken[i].1),
+                        name,
                         first,
                         second,
                         other: before.line,
@@ -448,11 +298,11 @@ impl Table {
             let message = format!("{} repeated another row and was merged with it", lines(&merged));
             self.remark(FindingKind::DuplicateRows, None, message);
         }
-        let found = kept.iter().filter(|row| row.step.is_finite()).count();
+        let found = different.iter().filter(|row| row.step.is_finite()).count();
         if found < STEPS_MIN {
             return Err(AuditError::TooFewSteps { file: self.file.clone(), found });
         }
-        self.rows = kept;
+        self.rows = different;
         Ok(())
     }
 }
@@ -465,37 +315,6 @@ fn lines(lines: &[String]) -> String {
         2..=10 => format!("each of lines {named}"),
         count => format!("each of lines {named} and {} more", count - 10),
     }
-}
-
-/// The quantity of each column, `None` for the one of steps.
-fn header_names(
-    header: &csv::StringRecord,
-    place: impl Fn(usize) -> Place,
-) -> Result<Vec<Option<Quantity>>, AuditError> {
-    if header.iter().all(|cell| parse(cell).is_some()) {
-        return Err(AuditError::NoHeader { place: place(0) });
-    }
-    let mut names = Vec::new();
-    for (index, cell) in header.iter().enumerate() {
-        let name = if cell == "dt_s" {
-            None
-        } else {
-            let found = Quantity::ALL.into_iter().find(|&quantity| column_name(quantity) == cell);
-            let unknown = || AuditError::UnknownColumn { place: place(index + 1), name: cell.to_owned() };
-            Some(found.ok_or_else(unknown)?)
-        };
-        if names.contains(&name) {
-            return Err(AuditError::ColumnTwice { place: place(index + 1), name: cell.to_owned() });
-        }
-        names.push(name);
-    }
-    if !names.contains(&None) {
-        return Err(AuditError::NoSteps { place: place(0) });
-    }
-    if names.len() == 1 {
-        return Err(AuditError::NoResults { place: place(0) });
-    }
-    Ok(names)
 }
 
 /// A number as codes print them, NaN and infinity included also as the Microsoft runtime writes them (`1.#IND`).
@@ -524,33 +343,20 @@ fn half_last_digit(text: &str) -> f64 {
 /// Exact values to compare with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExactValues {
-    /// Impact velocity V0 [m/s]: every velocity error is relative to it.
+    /// Impact velocity V0 (m/s): every velocity error is relative to it.
     pub impact_velocity: f64,
-    /// Depth at the end [m].
-    pub depth: Option<f64>,
-    /// Time of the end [s].
-    pub time: Option<f64>,
-    /// Velocity at the end [m/s].
-    pub velocity: Option<f64>,
-    /// Time at x = k d [s].
-    pub crater_end_time: Option<f64>,
-    /// Velocity at x = k d [m/s].
-    pub crater_end_velocity: Option<f64>,
-    /// Critical velocity [m/s].
-    pub critical_velocity: Option<f64>,
+    /// Values in the order of [`Quantity::ALL`], where they are known.
+    pub values: [Option<f64>; Quantity::ALL.len()],
 }
 
 impl ExactValues {
     /// The exact value of a quantity and what its errors are relative to; `None` where either is not known or the
     /// latter is zero.
     fn of(&self, quantity: Quantity) -> Option<(f64, f64)> {
-        let (value, scale) = match quantity {
-            Quantity::Depth => (self.depth?, self.depth?),
-            Quantity::Time => (self.time?, self.time?),
-            Quantity::CraterEndTime => (self.crater_end_time?, self.crater_end_time?),
-            Quantity::Velocity => (self.velocity?, self.impact_velocity),
-            Quantity::CraterEndVelocity => (self.crater_end_velocity?, self.impact_velocity),
-            Quantity::CriticalVelocity => (self.critical_velocity?, self.impact_velocity),
+        let value = self.values[quantity as usize]?;
+        let scale = match quantity {
+            Quantity::Depth | Quantity::Time | Quantity::CraterEndTime => value,
+            Quantity::Velocity | Quantity::CraterEndVelocity | Quantity::CriticalVelocity => self.impact_velocity,
         };
         (value.is_finite() && scale.is_finite() && scale != 0.0).then_some((value, scale.abs()))
     }
@@ -566,24 +372,26 @@ pub struct Expectation {
 }
 
 /// A judgement. The order of the variants is the order of severity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Converging, and as expected where something was expected.
     Passed,
-    /// Cannot be told.
+    /// Neither can be shown.
     Undecided,
     /// A criterion failed.
     Failed,
 }
 
 /// One row of one column.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct AuditPoint {
-    /// Step [s].
+    /// Step (s).
     pub dt_s: f64,
     /// Value in the table; NaN and infinity are `null` in JSON.
-    #[schemars(with = "Option<f64>")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<f64>"))]
     pub value: f64,
     /// Size of its error, relative as in `converge`: against the exact value, else against the limit found; `null`
     /// where there is neither.
@@ -595,7 +403,8 @@ pub struct AuditPoint {
 }
 
 /// The judgement of one column.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct QuantityAudit {
     /// Which quantity.
     pub quantity: Quantity,
@@ -636,7 +445,8 @@ pub struct QuantityAudit {
 }
 
 /// The judgement of a table: what `penetrode audit --json` prints.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Audit {
     /// `penetrode/audit/1`.
     pub schema: &'static str,
@@ -649,7 +459,7 @@ pub struct Audit {
 }
 
 impl Audit {
-    /// Exit code of the contract: 0 passed, 3 failed, 4 undecided.
+    /// Exit code (docs/reference.md, "Exit codes"): 0 passed, 3 failed, 4 undecided.
     pub fn exit_code(&self) -> u8 {
         match self.verdict {
             Verdict::Passed => 0,
@@ -721,7 +531,7 @@ fn unjudged(table: &Table, index: usize, expectation: &Expectation) -> QuantityA
 /// One column of a table as grids, with the rounding of its digits.
 fn grids_of(table: &Table, index: usize) -> Vec<GridValue> {
     let rounding = table.columns[index].rounding;
-    let grid = |row: &Row| {
+    let grid = |row: &StepRow| {
         let value = row.values[index];
         GridValue { step: row.step, value, round_off: rounding.max(0.5 * f64::EPSILON * value.abs()) }
     };
@@ -819,14 +629,14 @@ fn verdict_of(
 fn order_verdict(observed: &Observed, formal: Option<f64>) -> (Verdict, Option<(FindingKind, String)>) {
     let ([low, high], [least, most]) = (observed.interval, observed.band);
     let text = format!("order {:.2}, 95 % interval {low:.2} to {high:.2}", observed.order);
-    let told = match formal {
+    let is_clear = match formal {
         Some(formal) if formal < least || most < formal => {
             return (Verdict::Failed, Some((FindingKind::OrderMissed, format!("{text}, where {formal} is expected"))));
         }
         Some(formal) => formal - 1.0 < low && high < formal + 1.0,
         None => high - low < 1.0,
     };
-    if told {
+    if is_clear {
         (Verdict::Passed, None)
     } else {
         (Verdict::Undecided, Some((FindingKind::OrderUnclear, format!("{text}: too few or too noisy rows to tell"))))
@@ -888,7 +698,7 @@ fn against_limit(judged: &mut QuantityAudit, own: &super::grid_convergence::Self
     })
 }
 
-/// Adds the error bars of the finest value: for columns that converge only, for a bar of a diverging one is none.
+/// Adds the error bars of the finest value, for columns that converge only: a diverging one has none.
 fn add_bands(judged: &mut QuantityAudit, grids: &[GridValue], least_squares: EcaHoekstra, formal: Option<f64>) {
     let apart = |from: &GridValue| grids.iter().copied().find(|grid| grid.step >= RATIO_MIN * from.step);
     let second = apart(&grids[0]);
@@ -924,7 +734,11 @@ mod tests {
     }
 
     fn judge_text(text: &str, order: Option<f64>, exact: Option<f64>) -> Audit {
-        let exact = exact.map(|depth| ExactValues { impact_velocity: 300.0, depth: Some(depth), ..Default::default() });
+        let exact = exact.map(|depth| {
+            let mut values = [None; Quantity::ALL.len()];
+            values[Quantity::Depth as usize] = Some(depth);
+            ExactValues { impact_velocity: 300.0, values }
+        });
         audit(&Table::read("run.csv", text.as_bytes()).unwrap(), &Expectation { order, exact }).unwrap()
     }
 
@@ -1003,7 +817,7 @@ mod tests {
             let audit = judge_text(text, order, exact);
             assert_eq!((audit.exit_code(), audit.quantities[0].class), (3, Class::Diverging));
             assert_eq!(kinds(&audit), [FindingKind::Diverging]);
-            assert!(audit.quantities[0].error_bands.is_empty(), "no bar for what diverges");
+            assert!(audit.quantities[0].error_bands.is_empty(), "no error bar for what diverges");
         }
     }
 
@@ -1109,38 +923,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals_name_file_line_and_column() {
-        let with = |row: &str| format!("dt_s,depth_m\n{BASE}{row}\n");
-        let messages = [
-            (refused(""), "run.csv: the file is empty"),
-            (refused(BASE), "run.csv:1: the first row must name the columns, and this one holds numbers"),
-            (refused("dt_s,depth_mm\n1,2\n"), "run.csv:1, column 2: there is no column `depth_mm`"),
-            (refused("dt_s;depth_m\n1;2\n"), "run.csv:1, column 1: there is no column `dt_s;depth_m`"),
-            (refused("dt_s,depth_m,depth_m\n1,2,2\n"), "run.csv:1, column 3: the column `depth_m` is there twice"),
-            (refused("depth_m\n1\n"), "run.csv:1: the column `dt_s` is missing"),
-            (refused("dt_s\n1\n"), "run.csv:1: there is no column of results"),
-            (refused(&with("16e-6")), "run.csv:6: 1 cell in a table of 2 columns"),
-            (refused(&with("16e-6,1,2")), "run.csv:6: 3 cells in a table of 2 columns"),
-            (refused(&with("16e-6,1.5 m")), "run.csv:6, column 2: `1.5 m` in `depth_m` is not a number"),
-            (refused(&with("16e-6,")), "run.csv:6, column 2: the cell in `depth_m` is empty"),
-            (refused(&with("0,1")), "run.csv:6, column 1: the step 0 s is not positive"),
-            (refused(&with("-1e-6,1")), "run.csv:6, column 1: the step -1e-6 s is not positive"),
-            (
-                refused(&with("2e-6,1.05")),
-                "run.csv:6, column 2: the step 2e-6 s has two values of `depth_m`, 1.05 here and 1.04 in line 3",
-            ),
-            (refused("dt_s,depth_m\n1e-6,1\n2e-6,2\n"), "run.csv: 2 different steps, and an order needs 4"),
-            (
-                refused("dt_s,depth_m\n1e-6,1\n2e-6,2\n3e-6,2\n3e-6,2\n"),
-                "run.csv: 3 different steps, and an order needs 4",
-            ),
-        ];
-        for (error, message) in messages {
-            assert_eq!(error.to_string(), message);
-            assert!(!error.help().is_empty());
-            assert_eq!(error.exit_code(), 2);
-        }
-        assert!(matches!(Table::read("x", b"dt_s,depth_m\n1,\xff\n").unwrap_err(), AuditError::NotCsv { .. }));
+    fn an_order_that_no_study_of_step_sizes_can_tell_is_refused() {
         let table = Table::read("x", format!("dt_s,depth_m\n{BASE}").as_bytes()).unwrap();
         for order in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(audit(&table, &Expectation { order: Some(order), exact: None }).is_err());

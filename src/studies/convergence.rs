@@ -2,19 +2,20 @@
 //!
 //! Fixed steps: the error over many step sizes with random ratios. Adaptive methods: the error over the tolerance
 //! (slope 1 is proportional) and over 1/evaluations (slope is the order). The fit and its verdict are
-//! [`super::order`]; what order to expect is [`super::formal_order`].
+//! [`super::order`]; what order to expect is [`super::formal_order`](mod@super::formal_order).
 
 use thiserror::Error;
 
 use super::critical_velocity::{self, CriticalError};
-use super::error::{flight_error, is_fixed, signed_error};
+pub use super::error::Truth as Yardstick;
+use super::error::{Truth, flight_error, free_quantities, signed_error};
 use super::formal_order::{Path, formal_order};
-use super::order::{FitError, OrderFit, StepError, fit};
+use super::order::{Class, FitError, OrderFit, OrderVerdict, StepError, fit};
 use super::quantity::Quantity;
 use super::random::Random;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
-use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, IntegrationError, Steps, VelocityAt};
-use crate::physics::{Problem, ResolveError, Scene};
+use crate::integrators::{CentralDifference, Detail, Flight, IntegrationError};
+use crate::physics::{Advice, Problem, ResolveError, Scene};
 
 /// Fewest sizes of a study, so that single unlucky ones do not decide.
 pub const POINTS_DEFAULT: u16 = 60;
@@ -67,6 +68,19 @@ pub struct QuantityStudy {
     pub lost: usize,
 }
 
+impl QuantityStudy {
+    /// Whether the fit confirms the order expected.
+    ///
+    /// Over tolerances the class decides: a controller holds the error of a step, not of the flight.
+    pub fn verdict(&self) -> OrderVerdict {
+        match (&self.fit, self.formal) {
+            (Ok(fit), _) if !self.evaluations.is_empty() && fit.class == Class::Converging => OrderVerdict::Pass,
+            (Ok(fit), Some(formal)) => fit.verdict(formal),
+            _ => OrderVerdict::Undecided,
+        }
+    }
+}
+
 /// Why there is no study.
 #[derive(Clone, Debug, Error)]
 pub enum ConvergenceError {
@@ -81,32 +95,28 @@ pub enum ConvergenceError {
     Critical(#[from] CriticalError<ResolveError>),
 }
 
-/// The exact flight of a problem, or a refined one where no closed form exists.
-#[derive(Clone, Debug)]
-pub struct Yardstick {
-    /// The flight.
-    pub flight: Flight,
-    /// Whether it is the closed form.
-    pub is_closed_form: bool,
-}
-
-impl Yardstick {
-    /// The closed form, else the Taylor series to round-off.
-    ///
-    /// # Errors
-    /// When neither has an answer.
-    pub fn of(problem: &Problem) -> Result<Self, IntegrationError> {
-        use crate::integrators::{ClosedForm, Integrator, Taylor};
-        match ClosedForm.fly(problem, Detail::Events) {
-            Ok(flight) => Ok(Self { flight, is_closed_form: true }),
-            Err(_) => Ok(Self { flight: Taylor::default().fly(problem, Detail::Events)?, is_closed_form: false }),
-        }
+impl Advice for ConvergenceError {
+    fn inner(&self) -> Option<&dyn Advice> {
+        Some(match self {
+            Self::Resolve(error) => error,
+            Self::Integration(error) => error,
+            Self::Critical(error) => error,
+        })
     }
 }
 
-/// Convergence of the central difference with the step, for every quantity that the scene leaves free.
+/// Studies of the quantities of one scene.
+#[derive(Clone, Debug)]
+pub struct Convergence {
+    /// One of each free quantity.
+    pub quantities: Vec<QuantityStudy>,
+    /// Why the critical velocity is not among them, where it was asked for and the target has a far side.
+    pub no_critical_velocity: Option<&'static str>,
+}
+
+/// Convergence of the central difference with the step, for every quantity that `exact` leaves free.
 ///
-/// `steps_of` turns a step size into the steps of one run (all equal, alternating ...). The critical velocity is
+/// `scheme` is the scheme of one step size: its steps may be equal, alternating and so on. The critical velocity is
 /// studied where `with_critical` asks for it and the scene has a thickness.
 ///
 /// # Errors
@@ -114,120 +124,91 @@ impl Yardstick {
 pub fn of_fixed_steps(
     scene: &Scene,
     problem: &Problem,
-    (velocity, boundaries): (VelocityAt, Boundaries),
+    exact: &Flight,
+    scheme: &dyn Fn(f64) -> CentralDifference,
     ladder: Ladder,
     with_critical: bool,
-    steps_of: &(dyn Fn(f64) -> Steps + Sync),
-) -> Result<Vec<QuantityStudy>, ConvergenceError> {
-    let exact = Yardstick::of(problem)?.flight;
-    let path = Path::of(problem, &exact);
+) -> Result<Convergence, ConvergenceError> {
     let sizes = ladder.sizes();
-    let scheme = |size: f64| CentralDifference {
-        steps: steps_of(size),
-        ..CentralDifference::uniform(size, velocity, boundaries)
+    let CentralDifference { velocity, boundaries, .. } = scheme(ladder.to);
+    let study = |quantity, path: &Path, points: &[StepError]| QuantityStudy {
+        quantity,
+        formal: formal_order(velocity, boundaries, path, quantity),
+        lost: sizes.len() - points.len(),
+        fit: fit(points),
+        work: None,
+        evaluations: Vec::new(),
     };
     let flights = sizes
         .iter()
-        .map(|&size| scheme(size).fly_in(problem, Detail::Events).map(|flight| (size, flight)))
+        .map(|&size| scheme(size).solve_in(problem, Detail::Events).map(|flight| (size, flight)))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut studies = Vec::new();
-    for quantity in Quantity::ALL {
-        if quantity == Quantity::CriticalVelocity || is_fixed(quantity, &exact) {
-            continue;
-        }
-        let points: Vec<StepError> = flights
-            .iter()
-            .filter_map(|(size, flight)| {
-                flight_error(quantity, flight, &exact, problem.impact_speed).map(|e| StepError::new(*size, e))
-            })
-            .collect();
-        studies.push(QuantityStudy {
-            quantity,
-            formal: formal_order(velocity, boundaries, &path, quantity),
-            lost: sizes.len() - points.len(),
-            fit: fit(&points),
-            work: None,
-            evaluations: Vec::new(),
-        });
+    let path = Path::of(problem, exact);
+    let mut found = Convergence { quantities: Vec::new(), no_critical_velocity: None };
+    for quantity in free_quantities(exact) {
+        let error = |flight| flight_error(quantity, flight, exact, problem.impact_speed);
+        let points: Vec<StepError> =
+            flights.iter().filter_map(|(size, flight)| Some(StepError::new(*size, error(flight)?))).collect();
+        found.quantities.push(study(quantity, &path, &points));
     }
-    if with_critical && problem.has_exit() {
-        let exact_critical = critical_velocity::exact_or_refined(scene)?;
-        if exact_critical == 0.0 {
-            // Nothing to be relative to; see `why_no_critical_velocity`.
-            return Ok(studies);
-        }
-        let critical_flight = Yardstick::of(&scene.resolve(exact_critical)?)?.flight;
-        let path = Path::of(&scene.resolve(exact_critical)?, &critical_flight);
-        let mut points = Vec::new();
-        for &size in &sizes {
-            let found = critical_velocity::of_scene(scene, &scheme(size))?;
-            let error = signed_error(Quantity::CriticalVelocity, found.velocity, exact_critical, 1.0);
-            points.push(StepError::new(size, error));
-        }
-        studies.push(QuantityStudy {
-            quantity: Quantity::CriticalVelocity,
-            formal: formal_order(velocity, boundaries, &path, Quantity::CriticalVelocity),
-            lost: 0,
-            fit: fit(&points),
-            work: None,
-            evaluations: Vec::new(),
-        });
+    if !(with_critical && problem.has_exit()) {
+        return Ok(found);
     }
-    Ok(studies)
+    let quantity = Quantity::CriticalVelocity;
+    let exact = critical_velocity::exact_or_refined(scene)?;
+    if exact == 0.0 {
+        let why = "it is 0: the target is perforated at any speed, and an error relative to it means nothing";
+        found.no_critical_velocity = Some(why);
+        return Ok(found);
+    }
+    let critical = scene.resolve(exact)?;
+    let path = Path::of(&critical, &Truth::of(&critical)?.flight);
+    let error = |size| -> Result<StepError, ConvergenceError> {
+        let velocity = critical_velocity::of_scene(scene, &scheme(size))?.velocity;
+        Ok(StepError::new(size, signed_error(quantity, velocity, exact, 1.0)))
+    };
+    let points = sizes.iter().map(|&size| error(size)).collect::<Result<Vec<_>, _>>()?;
+    found.quantities.push(study(quantity, &path, &points));
+    Ok(found)
 }
 
-/// Why the critical velocity of `scene` has no order to study, where the target has a far side and it still has none.
-///
-/// # Errors
-/// As the search for it.
-pub fn why_no_critical_velocity(scene: &Scene) -> Result<Option<&'static str>, ConvergenceError> {
-    if scene.thickness.is_none() {
-        return Ok(None);
-    }
-    let is_zero = critical_velocity::exact_or_refined(scene)? == 0.0;
-    Ok(is_zero.then_some("it is 0: the target is perforated at any speed, and an error relative to it means nothing"))
-}
-
-/// Convergence of an adaptive method with its tolerance and with its work.
+/// Convergence of an adaptive method with its tolerance and with its work, against `exact`.
 ///
 /// # Errors
 /// [`ConvergenceError`].
 pub fn of_tolerances(
     problem: &Problem,
+    exact: &Flight,
     method: MethodName,
     ladder: Ladder,
-) -> Result<Vec<QuantityStudy>, ConvergenceError> {
-    let exact = Yardstick::of(problem)?.flight;
+) -> Result<Convergence, ConvergenceError> {
     let mut flights = Vec::new();
     let mut order = None;
     for rtol in ladder.sizes() {
         let method = Method::new(method, &MethodOptions { rtol: Some(rtol), ..MethodOptions::default() })?;
         order = method.integrator().order();
-        flights.push((rtol, method.integrator().fly(problem, Detail::Events)?));
+        flights.push((rtol, method.integrator().solve(problem, Detail::Events)?));
     }
-    let mut studies = Vec::new();
-    for quantity in Quantity::ALL {
-        if quantity == Quantity::CriticalVelocity || is_fixed(quantity, &exact) {
-            continue;
-        }
-        let mut measured: Vec<(f64, u64, f64)> = flights
+    // Ascending, as a fit lists its points.
+    flights.reverse();
+    let study = |quantity| {
+        let measured: Vec<(f64, u64, f64)> = flights
             .iter()
             .filter_map(|(rtol, flight)| {
-                flight_error(quantity, flight, &exact, problem.impact_speed)
-                    .map(|e| (*rtol, flight.cost.force_evaluations, e))
+                let error = flight_error(quantity, flight, exact, problem.impact_speed)?;
+                Some((*rtol, flight.cost.force_evaluations, error))
             })
             .collect();
-        measured.sort_by(|a, b| a.0.total_cmp(&b.0));
         let over_tolerance: Vec<_> = measured.iter().map(|&(rtol, _, e)| StepError::new(rtol, e)).collect();
         let over_work: Vec<_> = measured.iter().map(|&(_, n, e)| StepError::new(1.0 / n.max(1) as f64, e)).collect();
-        studies.push(QuantityStudy {
+        QuantityStudy {
             quantity,
             formal: Some(1.0),
             lost: flights.len() - measured.len(),
             fit: fit(&over_tolerance),
             work: order.map(|_| fit(&over_work)),
             evaluations: measured.iter().map(|&(_, n, _)| n).collect(),
-        });
-    }
-    Ok(studies)
+        }
+    };
+    Ok(Convergence { quantities: free_quantities(exact).map(study).collect(), no_critical_velocity: None })
 }

@@ -1,31 +1,58 @@
-//! The error of a quantity: depth and times relative to the exact value, velocities relative to V0 (contract, "Words").
+//! How far off is a solution? The true answer, the error of each quantity, and what a scene itself does to rounding.
+//!
+//! Depth and times are judged relative to the true value, velocities relative to V0 (`docs/reference.md`, "Words").
+
+use std::cmp::Ordering;
+
+use num_dual::Dual64;
+use twofloat::TwoFloat;
 
 use super::quantity::Quantity;
-use crate::integrators::Flight;
+use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
+use crate::physics::reference::{Conditions, ExactFlight};
+use crate::physics::{Problem, Scalar, State};
 
-/// Value of `quantity` at the end of `flight`; `None` for what the flight does not have.
+/// The true solution of a problem, or a refined one where no closed form exists.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// The solution.
+    pub flight: Flight,
+    /// Whether it is the closed form.
+    pub is_closed_form: bool,
+}
+
+impl Truth {
+    /// The closed form, else the Taylor series to round-off.
+    ///
+    /// # Errors
+    /// When neither has an answer.
+    pub fn of(problem: &Problem) -> Result<Self, IntegrationError> {
+        match ClosedForm.solve(problem, Detail::Events) {
+            Ok(flight) => Ok(Self { flight, is_closed_form: true }),
+            Err(_) => Ok(Self { flight: Taylor::default().solve(problem, Detail::Events)?, is_closed_form: false }),
+        }
+    }
+}
+
+/// Value of `quantity` in `flight`; `None` for what the flight does not have.
 ///
 /// The critical velocity is no quantity of one flight.
-pub fn value_of(quantity: Quantity, flight: &Flight) -> Option<f64> {
+pub fn value_of<S: Scalar>(quantity: Quantity, flight: &Flight<S>) -> Option<S> {
+    let State { time, depth, velocity } = if quantity.is_at_crater_end() { flight.crater_end()? } else { flight.end };
     match quantity {
-        Quantity::Depth => Some(flight.end.depth),
-        Quantity::Time => Some(flight.end.time),
-        Quantity::Velocity => Some(flight.end.velocity),
-        Quantity::CraterEndTime => flight.crater_end().map(|s| s.time),
-        Quantity::CraterEndVelocity => flight.crater_end().map(|s| s.velocity),
+        Quantity::Depth => Some(depth),
+        Quantity::Time | Quantity::CraterEndTime => Some(time),
+        Quantity::Velocity | Quantity::CraterEndVelocity => Some(velocity),
         Quantity::CriticalVelocity => None,
     }
 }
 
-/// Error with its sign of `value` against `exact`: over `exact`, or over `impact_speed` [m/s] for velocities of a flight.
+/// Error with its sign of `value` against `exact`: over `exact`, or over `impact_speed` (m/s) for velocities of a flight.
 ///
 /// Zero when both are the same number, also where the scale is zero.
 pub fn signed_error(quantity: Quantity, value: f64, exact: f64, impact_speed: f64) -> f64 {
-    let scale = match quantity {
-        Quantity::Velocity | Quantity::CraterEndVelocity => impact_speed,
-        Quantity::Depth | Quantity::Time | Quantity::CraterEndTime | Quantity::CriticalVelocity => exact,
-    };
-    if value == exact { 0.0 } else { (value - exact) / fault!("error-not-relative", scale, 1.0) }
+    let scale = if quantity.is_over_impact_speed() { impact_speed } else { exact };
+    if value == exact { 0.0 } else { (value - exact) / scale }
 }
 
 /// Error with its sign of `quantity` of `flight` against `exact`; `None` where the outcomes differ, where either
@@ -47,4 +74,127 @@ pub fn is_fixed(quantity: Quantity, exact: &Flight) -> bool {
         Quantity::Time => false,
         Quantity::CriticalVelocity => exact.exit_margin.is_none(),
     }
+}
+
+/// The quantities of one flight that the scene leaves free.
+pub fn free_quantities(exact: &Flight) -> impl Iterator<Item = Quantity> {
+    Quantity::OF_A_FLIGHT.into_iter().filter(|quantity| !is_fixed(*quantity, exact))
+}
+
+/// Whether `value` is beyond `limit`; what is not a number is.
+pub fn exceeds(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
+}
+
+/// Order of two errors, in which a NaN is larger than every number.
+pub fn compare(a: f64, b: f64) -> Ordering {
+    a.is_nan().cmp(&b.is_nan()).then(a.total_cmp(&b))
+}
+
+/// Absolute errors of the quantities of one flight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Errors(pub Vec<(f64, Quantity)>);
+
+impl Errors {
+    /// Of `flight` against `exact`, in units of round-off: the difference in double-double.
+    pub fn in_double_double(flight: &Flight, exact: &Flight<TwoFloat>, impact_speed: f64) -> Self {
+        let error = |quantity: Quantity| {
+            let (value, exact) = value_of(quantity, flight).zip(value_of(quantity, exact))?;
+            let scale = if quantity.is_over_impact_speed() { impact_speed } else { exact.value() };
+            let error = (TwoFloat::from(value) - exact).value().abs();
+            let units = if error == 0.0 { 0.0 } else { error / scale.abs() / f64::EPSILON };
+            Some((units, quantity))
+        };
+        Self(Quantity::OF_A_FLIGHT.into_iter().filter_map(error).collect())
+    }
+
+    /// Of `flight` against 50 digits with the same outcome, in units of round-off over max(1, condition number).
+    pub fn in_50_digits(flight: &Flight, exact: &ExactFlight, conditions: &Conditions) -> Self {
+        let mut errors = Vec::with_capacity(5);
+        for quantity in Quantity::OF_A_FLIGHT {
+            let end = if quantity.is_at_crater_end() { exact.crater_end() } else { Some(&exact.end) };
+            let error = match (value_of(quantity, flight), end) {
+                (Some(value), Some(end)) => match quantity {
+                    Quantity::Depth => end.depth.relative_error(value),
+                    Quantity::Time | Quantity::CraterEndTime => end.time.relative_error(value),
+                    _ => end.velocity.error_over(value, &exact.impact_speed),
+                },
+                (None, None) => continue,
+                // One lacks an event that the other has: no number of units.
+                _ if quantity == Quantity::CraterEndTime => f64::NAN,
+                _ => continue,
+            };
+            let condition = condition_of(conditions, quantity).unwrap_or(1.0);
+            errors.push((error.abs() / f64::EPSILON / condition.max(1.0), quantity));
+        }
+        Self(errors)
+    }
+
+    /// The same over max(1, condition number).
+    #[must_use]
+    pub fn over(mut self, conditions: &Conditions) -> Self {
+        for (error, quantity) in &mut self.0 {
+            *error /= condition_of(conditions, *quantity).unwrap_or(1.0).max(1.0);
+        }
+        self
+    }
+
+    /// The largest; a NaN is the largest of all.
+    pub fn worst(&self) -> Option<(f64, Quantity)> {
+        self.0.iter().copied().max_by(|a, b| compare(a.0, b.0))
+    }
+
+    /// Whether one of them is beyond `limit`.
+    pub fn exceed(&self, limit: f64) -> bool {
+        self.0.iter().any(|(error, _)| exceeds(*error, limit))
+    }
+}
+
+/// Condition number of `quantity`; `None` where the flight does not have it.
+pub fn condition_of(conditions: &Conditions, quantity: Quantity) -> Option<f64> {
+    match quantity {
+        Quantity::Depth => Some(conditions.depth),
+        Quantity::Time => Some(conditions.time),
+        Quantity::Velocity => Some(conditions.velocity),
+        Quantity::CraterEndTime => conditions.crater_end_time,
+        Quantity::CraterEndVelocity => conditions.crater_end_velocity,
+        Quantity::CriticalVelocity => None,
+    }
+}
+
+/// Condition numbers of `problem` by dual numbers: one flight for each input that is not zero. As
+/// [`crate::physics::reference::conditions`], without that of the margin and far cheaper.
+///
+/// # Errors
+/// As [`Taylor::solve_in`].
+pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, IntegrationError> {
+    let mut sums = [0.0; 5];
+    let mut add = |input: &dyn Fn(&mut Problem<Dual64>) -> &mut Dual64| -> Result<(), IntegrationError> {
+        let mut dual = problem.cast::<Dual64>();
+        let number = input(&mut dual);
+        // df/dp times p: the derivative by the input starts as its value.
+        number.eps = number.re;
+        if number.re == 0.0 || number.re.is_infinite() {
+            return Ok(());
+        }
+        let flight = Taylor::default().solve_in(&dual, Detail::Events)?;
+        for (sum, quantity) in sums.iter_mut().zip(Quantity::OF_A_FLIGHT) {
+            let Some(Dual64 { re, eps, .. }) = value_of(quantity, &flight) else { continue };
+            let scale = if quantity.is_over_impact_speed() { problem.impact_speed } else { re };
+            *sum += if scale == 0.0 { 0.0 } else { (eps / scale).abs() };
+        }
+        Ok(())
+    };
+    add(&|p| &mut p.mass)?;
+    add(&|p| &mut p.impact_speed)?;
+    add(&|p| &mut p.exit_depth)?;
+    for index in 0..problem.stages.len() {
+        add(&|p| &mut p.stages[index].static_force)?;
+        add(&|p| &mut p.stages[index].stiffness)?;
+        add(&|p| &mut p.stages[index].drag)?;
+        add(&|p| &mut p.stages[index].end)?;
+    }
+    let [depth, time, velocity, at_crater_end @ ..] = sums;
+    let [crater_end_time, crater_end_velocity] = at_crater_end.map(Some);
+    Ok(Conditions { depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin: None })
 }

@@ -1,49 +1,54 @@
 //! Do the integrators agree anywhere? Random scenes over the whole admissible range, half of them aimed at the edges.
 //!
-//! A scene is a function of seed and number alone, so any of a million can be remade. Its problem is flown by the
+//! A scene is a function of seed and number alone, so any of a million can be remade. Its problem is solved by the
 //! closed form, the Taylor series and the energy formulation in `f64`, and by the Taylor series and the energy
 //! formulation in double-double, which judge the three; where an `f64` answer misses its limit, 50 digits
 //! ([`crate::physics::reference`]) judge again. The limits:
 //!
 //! - **outcome**: that of the double-double margin, or `undecided`;
-//! - **bar**: the margin differs from the double-double one by no more than its own stated bar, and 16 roundings of
+//! - **error bar**: the margin differs from the double-double one by no more than its error bar, and 16 roundings of
 //!   its own where it is large;
 //! - **end and crater end**: [`ULPS_MAX`] units of round-off times the condition number of the quantity, which is the
 //!   sum over all inputs p of `|p df/dp|/|f|`, from dual numbers;
-//! - **critical velocity**: the closed form and the search through the energy formulation, within the bar of the
+//! - **critical velocity**: the closed form and the search through the energy formulation, within the error bar of the
 //!   latter and the same units; one that leaves the range of 64-bit numbers must be refused with that cause.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use num_dual::Dual64;
 use rayon::prelude::*;
 use twofloat::TwoFloat;
 
 use super::critical_velocity;
+pub(crate) use super::error::exceeds;
+use super::error::{Errors, compare, conditions_in_dual_numbers};
 use super::quantity::Quantity;
 use super::random::Random;
-use crate::integrators::{ClosedForm, Detail, Energy, Flight, IntegrationError, Integrator, MethodName, Taylor};
+use super::random_scenes::errors_of;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::integrators::{ClosedForm, Detail, Energy, Integrator, MethodName, Taylor};
 use crate::physics::reference::{self, Source};
-use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Resistance, Scalar, Scene, groups};
+use crate::physics::{Advice, Concrete, CraterStiffness, Outcome, Problem, Resistance, Scalar, Scene, groups};
 
 /// Largest error in units of round-off times max(1, condition number).
 ///
 /// The closed form states 8. The integrators add a few roundings a step; the worst of 100,000 scenes is well below.
 pub const ULPS_MAX: f64 = 64.0;
 
-/// Errors up to this many units of round-off need no condition number to excuse them.
+/// Errors up to this many units of round-off are accepted without a condition number.
 const ULPS_UNCONDITIONED: f64 = 4.0;
 
-/// Critical velocities [m/s] beyond which the search may end without one: it tries speeds up to 1e80 m/s.
+/// Critical velocities (m/s) beyond which the search may end without one: it tries speeds up to 1e80 m/s.
 const SEARCHED_MAX: f64 = 1e77;
 
-/// Relative error of a margin that may exceed its bar: no outcome hangs on it.
+/// Relative error of a margin that may exceed its error bound: no outcome depends on it.
 const FAR_MARGIN_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Least |W(k d)|/V0² at which the time of rest is judged where the force jumps at k d: nearer, an ulp of an input
-/// decides which side stops the projectile, and the time is as uncertain as the root of an ulp (theory section 8). The
-/// depth is then as uncertain as the weaker side makes it.
+/// Below this |W(k d)|/V0² the rest time is not compared: if the force jumps at k d, one ulp of an input decides in which
+/// stage the projectile stops, and the time is as uncertain as the root of an ulp (`docs/theory.md`, section 8). The
+/// depth is then as uncertain as the weaker stage makes it.
 const CRATER_MARGIN_MIN: f64 = 64.0 * f64::EPSILON;
 
 /// Defects that a summary keeps in full; all are counted.
@@ -176,14 +181,9 @@ fn round_numbers(scene: &mut Scene, random: &mut Random) {
     }
 }
 
-/// Whether `value` is beyond `limit`; what is not a number is.
-pub(crate) fn exceeds(value: f64, limit: f64) -> bool {
-    value.is_nan() || value > limit
-}
-
 /// What one method made of one scene.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Fate {
+pub enum MethodVerdict {
     /// The right outcome.
     Right,
     /// Inside its own error bar.
@@ -195,9 +195,11 @@ pub enum Fate {
 }
 
 /// An answer that misses its limit.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "DefectJson")]
 pub struct Defect {
     /// Number of the scene.
+    #[serde(rename = "scene")]
     pub index: u64,
     /// What is wrong, with the numbers.
     pub what: String,
@@ -206,8 +208,8 @@ pub struct Defect {
 /// What one scene showed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Examination {
-    /// Fate of each method, in the order of [`METHODS`]; empty for a scene that does not resolve.
-    pub fates: Vec<Fate>,
+    /// MethodVerdict of each method, in the order of [`METHODS`]; empty for a scene that does not resolve.
+    pub verdicts: Vec<MethodVerdict>,
     /// Error of each quantity a method gave, in units of round-off times condition.
     pub errors: Vec<(MethodName, Quantity, f64)>,
     /// Limits missed.
@@ -220,116 +222,7 @@ pub struct Examination {
     pub critical: Option<Result<(), String>>,
 }
 
-/// Condition numbers of the end and of the crater's end.
-#[derive(Clone, Copy, Debug, Default)]
-struct Condition {
-    depth: f64,
-    time: f64,
-    velocity: f64,
-    crater_end_time: f64,
-    crater_end_velocity: f64,
-}
-
-impl Condition {
-    fn of(self, quantity: Quantity) -> f64 {
-        match quantity {
-            Quantity::Depth => self.depth,
-            Quantity::Time => self.time,
-            Quantity::Velocity => self.velocity,
-            Quantity::CraterEndTime => self.crater_end_time,
-            Quantity::CraterEndVelocity => self.crater_end_velocity,
-            Quantity::CriticalVelocity => 1.0,
-        }
-        .max(1.0)
-    }
-
-    /// From one flight in dual numbers for each input that is not zero.
-    fn measure(problem: &Problem) -> Result<Self, IntegrationError> {
-        let mut sum = Self::default();
-        let mut add = |seed: &dyn Fn(&mut Problem<Dual64>)| -> Result<(), IntegrationError> {
-            let mut dual = problem.cast::<Dual64>();
-            seed(&mut dual);
-            let flight = Taylor::default().fly_in(&dual, Detail::Events)?;
-            let relative = |number: Dual64| if number.re == 0.0 { 0.0 } else { (number.eps / number.re).abs() };
-            let speed = problem.impact_speed;
-            sum.depth += relative(flight.end.depth);
-            sum.time += relative(flight.end.time);
-            sum.velocity += (flight.end.velocity.eps / speed).abs();
-            if let Some(end) = flight.crater_end() {
-                sum.crater_end_time += relative(end.time);
-                sum.crater_end_velocity += (end.velocity.eps / speed).abs();
-            }
-            Ok(())
-        };
-        // df/dp times p: the seed is the value itself.
-        let own = |number: &mut Dual64| number.eps = number.re;
-        add(&|p| own(&mut p.mass))?;
-        add(&|p| own(&mut p.impact_speed))?;
-        if problem.has_exit() {
-            add(&|p| own(&mut p.exit_depth))?;
-        }
-        for (index, stage) in problem.stages.iter().enumerate() {
-            if stage.static_force != 0.0 {
-                add(&|p| own(&mut p.stages[index].static_force))?;
-            }
-            if stage.stiffness != 0.0 {
-                add(&|p| own(&mut p.stages[index].stiffness))?;
-            }
-            if stage.drag != 0.0 {
-                add(&|p| own(&mut p.stages[index].drag))?;
-            }
-            if stage.end.is_finite() {
-                add(&|p| own(&mut p.stages[index].end))?;
-            }
-        }
-        Ok(sum)
-    }
-}
-
-/// Errors of `flight` relative to `exact`, velocities to V0, in units of round-off.
-fn errors(flight: &Flight, exact: &Flight<TwoFloat>, speed: f64) -> Vec<(Quantity, f64)> {
-    let mut list = Vec::with_capacity(5);
-    let mut add = |quantity, value: f64, exact: TwoFloat, scale: f64| {
-        let error = (TwoFloat::from(value) - exact).value().abs();
-        let units = if error == 0.0 { 0.0 } else { error / scale.abs() / f64::EPSILON };
-        list.push((quantity, units));
-    };
-    add(Quantity::Depth, flight.end.depth, exact.end.depth, exact.end.depth.value());
-    add(Quantity::Time, flight.end.time, exact.end.time, exact.end.time.value());
-    add(Quantity::Velocity, flight.end.velocity, exact.end.velocity, speed);
-    if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
-        add(Quantity::CraterEndTime, found.time, end.time, end.time.value());
-        add(Quantity::CraterEndVelocity, found.velocity, end.velocity, speed);
-    }
-    list
-}
-
-/// The same against 50 digits, over their own condition numbers.
-fn errors_in_50_digits(problem: &Problem, flight: &Flight) -> Result<Vec<(Quantity, f64)>, String> {
-    let source = Source::Problem(problem);
-    let exact = reference::flight(source).map_err(|e| e.to_string())?;
-    if !flight.outcome.agrees_with(exact.outcome) {
-        return Err(format!("outcome {}, in 50 digits {}", flight.outcome, exact.outcome));
-    }
-    let conditions = reference::conditions(source).map_err(|e| e.to_string())?;
-    let mut list = Vec::with_capacity(5);
-    let mut add = |quantity, error: f64, condition: f64| {
-        list.push((quantity, error / f64::EPSILON / condition.max(1.0)));
-    };
-    let over = &exact.impact_speed;
-    add(Quantity::Depth, exact.end.depth.relative_error(flight.end.depth), conditions.depth);
-    add(Quantity::Time, exact.end.time.relative_error(flight.end.time), conditions.time);
-    add(Quantity::Velocity, exact.end.velocity.error_over(flight.end.velocity, over), conditions.velocity);
-    if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
-        let (time, velocity) =
-            (conditions.crater_end_time.unwrap_or(1.0), conditions.crater_end_velocity.unwrap_or(1.0));
-        add(Quantity::CraterEndTime, end.time.relative_error(found.time), time);
-        add(Quantity::CraterEndVelocity, end.velocity.error_over(found.velocity, over), velocity);
-    }
-    Ok(list)
-}
-
-/// Flies `scene` by every method and judges each.
+/// Solves `scene` by every method and judges each.
 ///
 /// A panic anywhere is a defect of the scene, not the end of the study.
 pub fn examine(scene: &Scene) -> Examination {
@@ -362,7 +255,7 @@ fn examine_unguarded(scene: &Scene) -> Examination {
 
 fn examine_problem(problem: &Problem, seen: &mut Examination) {
     let fine = problem.cast::<TwoFloat>();
-    let exact = match Taylor::default().fly_in(&fine, Detail::Events) {
+    let exact = match Taylor::default().solve_in(&fine, Detail::Events) {
         Ok(exact) => exact,
         Err(error) => {
             seen.defects.push(format!("no flight in double-double: {error}"));
@@ -388,65 +281,60 @@ fn examine_problem(problem: &Problem, seen: &mut Examination) {
         }
         None => exact.outcome == Outcome::Perforated,
     };
-    let mut condition = None;
+    let mut conditions = None;
     let jump = near_jump(problem);
     for method in METHODS {
-        let flown = match method {
-            MethodName::ClosedForm => ClosedForm.fly(problem, Detail::Events),
-            MethodName::Taylor => Taylor::default().fly(problem, Detail::Events),
-            _ => Energy::new().fly(problem, Detail::Events),
+        let solved = match method {
+            MethodName::ClosedForm => ClosedForm.solve(problem, Detail::Events),
+            MethodName::Taylor => Taylor::default().solve(problem, Detail::Events),
+            _ => Energy::new().solve(problem, Detail::Events),
         };
-        let flight = match flown {
+        let flight = match solved {
             Ok(flight) => flight,
             Err(error) => {
-                seen.defects.push(format!("{method} gives up where others fly: {error}"));
-                seen.fates.push(Fate::Refused(error.to_string()));
+                seen.defects.push(format!("{method} gives up where others solve: {error}"));
+                seen.verdicts.push(MethodVerdict::Refused(error.to_string()));
                 continue;
             }
         };
-        let fate = match flight.outcome {
-            Outcome::Undecided => Fate::Undecided,
-            outcome if (outcome == Outcome::Perforated) == perforates => Fate::Right,
-            outcome => Fate::Wrong(outcome),
+        let verdict = match flight.outcome {
+            Outcome::Undecided => MethodVerdict::Undecided,
+            outcome if (outcome == Outcome::Perforated) == perforates => MethodVerdict::Right,
+            outcome => MethodVerdict::Wrong(outcome),
         };
-        if let Fate::Wrong(outcome) = fate {
+        if let MethodVerdict::Wrong(outcome) = verdict {
             seen.defects.push(format!("{method} says {outcome} at a margin of {:?}", margin.map(|(m, _)| m.value())));
         }
-        if let (Some((exact, _)), Some(found), Some(bar)) = (margin, flight.exit_margin, flight.exit_margin_error) {
+        if let (Some((exact, _)), Some(found), Some(bound)) = (margin, flight.exit_margin, flight.exit_margin_error) {
             let off = (TwoFloat::from(found) - exact).value().abs();
-            // Far from zero the rounding of the margin itself exceeds a bar
-            // that is there to tell its sign.
-            if exceeds(off, bar + FAR_MARGIN_ROUNDING * exact.value().abs()) {
-                seen.defects.push(format!("{method}: margin {found:e} is off by {off:.2e}, beyond its bar {bar:.2e}"));
+            // The error bound is there to decide the sign: far from zero, the rounding of the margin exceeds it.
+            if exceeds(off, bound + FAR_MARGIN_ROUNDING * exact.value().abs()) {
+                seen.defects
+                    .push(format!("{method}: margin {found:e} is off by {off:.2e}, beyond its error bar {bound:.2e}"));
             }
         }
-        let decided = fate == Fate::Right;
-        seen.fates.push(fate);
+        let decided = verdict == MethodVerdict::Right;
+        seen.verdicts.push(verdict);
         if !decided || !exact.outcome.agrees_with(flight.outcome) {
             continue;
         }
-        let mut list = errors(&flight, &exact, problem.impact_speed);
-        excuse(&mut list, jump);
-        if list.iter().any(|(_, units)| exceeds(*units, ULPS_UNCONDITIONED)) {
-            if condition.is_none() {
-                condition = Condition::measure(problem).ok();
+        let mut errors = excused(Errors::in_double_double(&flight, &exact, problem.impact_speed), jump);
+        if errors.exceed(ULPS_UNCONDITIONED) {
+            if conditions.is_none() {
+                conditions = conditions_in_dual_numbers(problem).ok();
             }
-            let by = condition.unwrap_or_default();
-            for (quantity, units) in &mut list {
-                *units /= by.of(*quantity);
+            if let Some(conditions) = &conditions {
+                errors = errors.over(conditions);
             }
-            if list.iter().any(|(_, units)| exceeds(*units, ULPS_MAX)) {
+            if errors.exceed(ULPS_MAX) {
                 seen.asked_reference = true;
-                match errors_in_50_digits(problem, &flight) {
-                    Ok(again) => {
-                        list = again;
-                        excuse(&mut list, jump);
-                    }
+                match errors_of(Source::Problem(problem), &flight) {
+                    Ok(again) => errors = excused(again, jump),
                     Err(why) => seen.defects.push(format!("{method}: {why}")),
                 }
             }
         }
-        for (quantity, units) in list {
+        for (units, quantity) in errors.0 {
             if exceeds(units, ULPS_MAX) {
                 seen.defects.push(format!("{method}: {quantity} is off by {units:.1} ulp x condition"));
             }
@@ -466,15 +354,14 @@ fn near_jump(problem: &Problem) -> Option<f64> {
     (at_end.abs() <= CRATER_MARGIN_MIN && (ratio - 1.0).abs() > 1e-6).then(|| ratio.max(1.0))
 }
 
-/// Takes out of `list` what cannot be judged near a jump of the force ([`near_jump`]).
-fn excuse(list: &mut Vec<(Quantity, f64)>, jump: Option<f64>) {
-    let Some(ratio) = jump else { return };
-    list.retain(|(quantity, _)| *quantity != Quantity::Time);
-    for (quantity, units) in list {
-        if *quantity == Quantity::Depth {
-            *units /= ratio;
-        }
+/// `errors` without what cannot be judged near a jump of the force ([`near_jump`]).
+fn excused(mut errors: Errors, jump: Option<f64>) -> Errors {
+    let Some(ratio) = jump else { return errors };
+    errors.0.retain(|(_, quantity)| *quantity != Quantity::Time);
+    for (units, _) in errors.0.iter_mut().filter(|(_, quantity)| *quantity == Quantity::Depth) {
+        *units /= ratio;
     }
+    errors
 }
 
 fn examine_critical(scene: &Scene, seen: &mut Examination) {
@@ -542,12 +429,12 @@ pub struct Worst {
     pub index: u64,
 }
 
-/// How often each fate befell a method.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How often each verdict was given on a method.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Tally {
     /// Right outcomes.
     pub right: u64,
-    /// Outcomes inside the method's own bar.
+    /// Outcomes inside the method's own error bar.
     pub undecided: u64,
     /// Scenes without an answer.
     pub refused: u64,
@@ -556,7 +443,7 @@ pub struct Tally {
 }
 
 /// What many scenes showed.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Scenes examined.
     pub scenes: u64,
@@ -566,11 +453,13 @@ pub struct Summary {
     pub asked_reference: u64,
     /// Critical velocities that agree.
     pub critical_found: u64,
-    /// Critical velocities refused with their cause.
+    /// Critical velocities refused with their cause, as out of range.
     pub critical_refused: u64,
-    /// Fates by method.
+    /// Verdicts by method.
+    #[serde(skip)]
     pub tallies: BTreeMap<MethodName, Tally>,
     /// Worst error by method and quantity.
+    #[serde(skip)]
     pub worst: BTreeMap<(MethodName, Quantity), Worst>,
     /// Limits missed, all of them.
     pub defect_count: u64,
@@ -579,40 +468,37 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// With one more scene.
-    #[must_use]
-    pub fn with(mut self, index: u64, seen: Examination) -> Self {
-        self.scenes += 1;
-        self.unresolved += u64::from(seen.unresolved.is_some());
-        self.asked_reference += u64::from(seen.asked_reference);
-        match seen.critical {
-            Some(Ok(())) => self.critical_found += 1,
-            Some(Err(_)) => self.critical_refused += 1,
-            None => {}
-        }
-        for (method, fate) in METHODS.into_iter().zip(seen.fates) {
-            let tally = self.tallies.entry(method).or_default();
-            match fate {
-                Fate::Right => tally.right += 1,
-                Fate::Undecided => tally.undecided += 1,
-                Fate::Refused(_) => tally.refused += 1,
-                Fate::Wrong(_) => tally.wrong += 1,
-            }
+    /// Of scene `index` alone.
+    pub fn of(index: u64, seen: Examination) -> Self {
+        let mut summary = Self {
+            scenes: 1,
+            unresolved: u64::from(seen.unresolved.is_some()),
+            asked_reference: u64::from(seen.asked_reference),
+            critical_found: u64::from(matches!(seen.critical, Some(Ok(())))),
+            critical_refused: u64::from(matches!(seen.critical, Some(Err(_)))),
+            defect_count: seen.defects.len() as u64,
+            defects: seen.defects.into_iter().map(|what| Defect { index, what }).collect(),
+            ..Self::default()
+        };
+        for (method, verdict) in METHODS.into_iter().zip(&seen.verdicts) {
+            let tally = summary.tallies.entry(method).or_default();
+            *match verdict {
+                MethodVerdict::Right => &mut tally.right,
+                MethodVerdict::Undecided => &mut tally.undecided,
+                MethodVerdict::Refused(_) => &mut tally.refused,
+                MethodVerdict::Wrong(_) => &mut tally.wrong,
+            } += 1;
         }
         for (method, quantity, units) in seen.errors {
-            self.admit((method, quantity), Worst { units, index });
+            summary.admit((method, quantity), Worst { units, index });
         }
-        self.defect_count += seen.defects.len() as u64;
-        self.defects.extend(seen.defects.into_iter().map(|what| Defect { index, what }));
-        self.defects.truncate(DEFECTS_KEPT);
-        self
+        summary
     }
 
     fn admit(&mut self, key: (MethodName, Quantity), worst: Worst) {
         let held = self.worst.entry(key).or_insert(worst);
-        // A NaN is worse than any number; of equals the first scene stays, whatever the threads did.
-        let rank = |w: &Worst| if w.units.is_nan() { f64::INFINITY } else { w.units };
-        if rank(&worst) > rank(held) || (rank(&worst) == rank(held) && worst.index < held.index) {
+        // Of equal errors that of the first scene stays, whatever the threads did.
+        if compare(worst.units, held.units).then(held.index.cmp(&worst.index)).is_gt() {
             *held = worst;
         }
     }
@@ -643,16 +529,16 @@ impl Summary {
     }
 }
 
-/// Examines scenes 0 to `cases` of `seed` on every thread; `done` is told of each.
+/// Examines scenes 0 to `cases` of `seed` on every thread; `done` is called after each.
 ///
 /// Memory does not grow with the number of scenes, and the result does not depend on the threads.
 pub fn run(cases: u64, seed: u64, done: &(dyn Fn() + Sync)) -> Summary {
     (0..cases)
         .into_par_iter()
-        .fold(Summary::default, |summary, index| {
-            let seen = examine(&scene(seed, index));
+        .map(|index| {
+            let summary = Summary::of(index, examine(&scene(seed, index)));
             done();
-            summary.with(index, seen)
+            summary
         })
         .reduce(Summary::default, Summary::merged)
 }
@@ -706,7 +592,7 @@ mod tests {
 
     #[test]
     fn a_summary_does_not_depend_on_how_the_scenes_are_shared_out() {
-        let one_by_one = (0..60).fold(Summary::default(), |all, i| all.with(i, examine(&scene(3, i))));
+        let one_by_one = (0..60).map(|i| Summary::of(i, examine(&scene(3, i)))).reduce(Summary::merged).unwrap();
         assert_eq!(run(60, 3, &|| {}), one_by_one);
     }
 
@@ -714,10 +600,10 @@ mod tests {
     fn an_error_beyond_the_limit_is_seen() {
         let made = scene(1, 0);
         let problem = made.problem().unwrap();
-        let exact = Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap();
-        let mut flight = Taylor::default().fly(&problem, Detail::Events).unwrap();
+        let exact = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap();
+        let mut flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
         flight.end.time *= 1.0 + 1e-10;
-        let units = errors(&flight, &exact, problem.impact_speed)[1].1;
+        let units = Errors::in_double_double(&flight, &exact, problem.impact_speed).0[1].0;
         assert!((units * f64::EPSILON - 1e-10).abs() < 1e-14, "{units}");
     }
 }

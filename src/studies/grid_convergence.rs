@@ -6,7 +6,7 @@
 //!
 //! Five rules, each naming itself in its result (`rule`), for none of them is right for every table:
 //! - [`three_grids`]: Celik et al. (2008) with the **sign kept**. As published the order is `|ln|e32/e21| + q|/ln r21`; the
-//!   outer bars turn a diverging triple into a converging one, and a dropped `s` an oscillating one;
+//!   outer absolute value turns a diverging triple into a converging one, and a dropped `s` an oscillating one;
 //! - [`roache`]: the grid convergence index with Roache's factors 1.25 and 3, the order clamped as by Oberkampf and Roy;
 //! - [`xing_stern`]: the factor of safety that grows with the distance from the formal order;
 //! - [`eca_hoekstra`]: least squares over four grids or more, with an error bar that grows with the scatter;
@@ -18,12 +18,9 @@
 //! Computing (2010), section 8.6.4. T. Xing, F. Stern, J. Fluids Eng. 132 (2010) 061403. L. Eça, M. Hoekstra,
 //! J. Comput. Phys. 262 (2014) 104-130.
 
-use schemars::JsonSchema;
 use serde::Serialize;
-use thiserror::Error;
 
-use super::order::{Class, ORDER_RESOLUTION, alternates, student_t};
-use crate::physics::Shown;
+use super::order::{Class, FitError, ORDER_RESOLUTION, alternates, bisect, student_t};
 
 /// A value at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +41,8 @@ impl GridValue {
 }
 
 /// What the values do as the step shrinks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Behaviour {
     /// They approach a limit from one side.
@@ -57,12 +55,12 @@ pub enum Behaviour {
     OscillatingDiverging,
     /// They do not depend on the step.
     Constant,
-    /// None of this can be told.
+    /// None of this can be decided.
     Undecided,
 }
 
 impl Behaviour {
-    /// The class of the contract.
+    /// The class in reports.
     pub fn class(self) -> Class {
         match self {
             Self::MonotoneConverging => Class::Converging,
@@ -73,45 +71,9 @@ impl Behaviour {
     }
 }
 
-/// Why a rule gives no answer at all.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-pub enum GridError {
-    /// NaN or infinity.
-    #[error("value {value} at step {} is not finite", Shown(*.step))]
-    NotFinite {
-        /// Step.
-        step: f64,
-        /// Value.
-        value: f64,
-    },
-    /// A step that is none.
-    #[error("step {} is not a positive number", Shown(*.step))]
-    BadStep {
-        /// Step.
-        step: f64,
-    },
-    /// Too little to judge.
-    #[error("{found} different steps, and this rule needs {needed}")]
-    TooFewSteps {
-        /// Different steps found.
-        found: usize,
-        /// Different steps needed.
-        needed: usize,
-    },
-    /// One step with two values.
-    #[error("step {} has two values, {} and {}", Shown(*.step), Shown(*.first), Shown(*.second))]
-    TwoValues {
-        /// Step.
-        step: f64,
-        /// One value.
-        first: f64,
-        /// Another value.
-        second: f64,
-    },
-}
-
 /// An error bar of the value on the finest grid, and the rule it comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Uncertainty {
     /// Half-width, in the unit of the value.
     pub half_width: f64,
@@ -124,7 +86,8 @@ pub struct Uncertainty {
 }
 
 /// The result of [`three_grids`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct ThreeGrids {
     /// What the three values do.
     pub behaviour: Behaviour,
@@ -147,25 +110,20 @@ pub struct ThreeGrids {
 const ORDER_MAX: f64 = 10.0;
 
 /// The values in ascending step, equal rows merged.
-fn admissible(grids: &[GridValue], needed: usize) -> Result<Vec<GridValue>, GridError> {
-    for &GridValue { step, value, round_off } in grids {
-        if !value.is_finite() || !round_off.is_finite() || round_off < 0.0 {
-            return Err(GridError::NotFinite { step, value });
-        }
-        if !(step > 0.0 && step.is_finite()) {
-            return Err(GridError::BadStep { step });
-        }
+fn admissible(grids: &[GridValue], needed: usize) -> Result<Vec<GridValue>, FitError> {
+    for (index, grid) in grids.iter().enumerate() {
+        FitError::check(index, grid.step, grid.value, grid.round_off)?;
     }
     let mut sorted = grids.to_vec();
     sorted.sort_by(|a, b| a.step.total_cmp(&b.step));
     for pair in sorted.windows(2) {
         if pair[0].step == pair[1].step && pair[0].value != pair[1].value {
-            return Err(GridError::TwoValues { step: pair[0].step, first: pair[0].value, second: pair[1].value });
+            return Err(FitError::TwoValues { step: pair[0].step, first: pair[0].value, second: pair[1].value });
         }
     }
     sorted.dedup_by(|a, b| a.step == b.step);
     if sorted.len() < needed {
-        return Err(GridError::TooFewSteps { found: sorted.len(), needed });
+        return Err(FitError::TooFewSteps { found: sorted.len(), needed });
     }
     Ok(sorted)
 }
@@ -179,12 +137,12 @@ fn admissible(grids: &[GridValue], needed: usize) -> Result<Vec<GridValue>, Grid
 /// ```
 ///
 /// The left side grows with p, so the root is bracketed in -10..10 and bisected: the fixed-point iteration of the paper
-/// does not converge for every pair of ratios. The bar is `1.25 |e21|/(r21^p - 1)`, and half the range of the three
+/// does not converge for every pair of ratios. The error bar is `1.25 |e21|/(r21^p - 1)`, and half the range of the three
 /// values when they oscillate.
 ///
 /// # Errors
-/// [`GridError`]: not finite, not positive, equal steps.
-pub fn three_grids(grids: [GridValue; 3]) -> Result<ThreeGrids, GridError> {
+/// [`FitError`]: not finite, not positive, equal steps.
+pub fn three_grids(grids: [GridValue; 3]) -> Result<ThreeGrids, FitError> {
     let sorted = admissible(&grids, 3)?;
     let [f1, f2, f3] = [0, 1, 2].map(|i| sorted[i].value);
     let (l21, l32) = ((sorted[1].step / sorted[0].step).ln(), (sorted[2].step / sorted[1].step).ln());
@@ -214,18 +172,9 @@ pub fn three_grids(grids: [GridValue; 3]) -> Result<ThreeGrids, GridError> {
         };
         p * l21 + quotient.ln()
     };
-    let right = fault!("three-grid-order", e32.abs().ln() - e21.abs().ln(), e21.abs().ln() - e32.abs().ln());
-    let (mut low, mut high) = (-ORDER_MAX, ORDER_MAX);
-    if left(low) <= right && right <= left(high) {
-        for _ in 0..80 {
-            let middle = 0.5 * (low + high);
-            if left(middle) < right {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        result.order = Some(0.5 * (low + high));
+    let right = e32.abs().ln() - e21.abs().ln();
+    if left(-ORDER_MAX) <= right && right <= left(ORDER_MAX) {
+        result.order = Some(bisect(-ORDER_MAX, ORDER_MAX, 80, |p| left(p) < right));
     }
     let converging = result.order.map_or(right > 0.0, |p| p > 0.0);
     result.behaviour = match (oscillating, converging) {
@@ -258,8 +207,7 @@ pub fn three_grids(grids: [GridValue; 3]) -> Result<ThreeGrids, GridError> {
 /// # Panics
 /// If the two steps are not positive and different, or the order is not positive: a mistake of the caller.
 pub fn richardson(fine: GridValue, coarse: GridValue, order: f64) -> f64 {
-    fine.value
-        - fault!("richardson-sign", coarse.value - fine.value, fine.value - coarse.value) / growth(fine, coarse, order)
+    fine.value - (coarse.value - fine.value) / growth(fine, coarse, order)
 }
 
 /// r^p - 1 between two grids.
@@ -276,7 +224,7 @@ fn growth(fine: GridValue, coarse: GridValue, order: f64) -> f64 {
 /// - only a formal order (two grids): Fs = 3;
 /// - only an observed order: Fs = 1.25 with it, three grids.
 ///
-/// `None` where neither order is known, or the observed one is not positive: no bar for what diverges.
+/// `None` where neither order is known, or the observed one is not positive: no error bar for what diverges.
 ///
 /// # Panics
 /// As [`richardson`].
@@ -285,11 +233,9 @@ pub fn roache(fine: GridValue, coarse: GridValue, observed: Option<f64>, formal:
         return None;
     }
     let (safety_factor, order, rule) = match (observed, formal) {
-        (Some(p), Some(formal)) if (p - formal).abs() <= 0.1 * formal => (
-            fault!("gci-safety-factor", 1.25, 1.0),
-            formal,
-            "Roache GCI, Fs 1.25, observed order within 10 % of the formal one",
-        ),
+        (Some(p), Some(formal)) if (p - formal).abs() <= 0.1 * formal => {
+            (1.25, formal, "Roache GCI, Fs 1.25, observed order within 10 % of the formal one")
+        }
         (Some(p), Some(formal)) => {
             (3.0, p.min(formal).max(0.5_f64.min(formal)), "Roache GCI, Fs 3, order clamped (Oberkampf and Roy)")
         }
@@ -322,13 +268,14 @@ pub fn xing_stern(fine: GridValue, coarse: GridValue, observed: f64, formal: f64
 }
 
 /// The result of [`eca_hoekstra`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct EcaHoekstra {
     /// What the values do.
     pub behaviour: Behaviour,
     /// Order of the free fit, with its sign.
     pub order: f64,
-    /// Limit of the fit that gives the bar; only where there is one.
+    /// Limit of the fit that gives the error bar; only where there is one.
     pub extrapolated: Option<f64>,
     /// Standard deviation of that fit.
     pub scatter: f64,
@@ -350,8 +297,8 @@ pub struct EcaHoekstra {
 /// ```
 ///
 /// # Errors
-/// [`GridError`]: not finite, not positive, two values at a step, fewer than four steps.
-pub fn eca_hoekstra(grids: &[GridValue]) -> Result<EcaHoekstra, GridError> {
+/// [`FitError`]: not finite, not positive, two values at a step, fewer than four steps.
+pub fn eca_hoekstra(grids: &[GridValue]) -> Result<EcaHoekstra, FitError> {
     let table = admissible(grids, 4)?;
     let model = Separable::new(&table);
     let weights = [Weights::Equal, Weights::InverseStep];
@@ -361,9 +308,8 @@ pub fn eca_hoekstra(grids: &[GridValue]) -> Result<EcaHoekstra, GridError> {
     let range = model.range();
     let behaviour = if range == 0.0 {
         Behaviour::Constant
-    } else if model.alternates() {
-        // p* of the differences: positive when they shrink with the step.
-        if model.differences_shrink() { Behaviour::OscillatingConverging } else { Behaviour::OscillatingDiverging }
+    } else if let Some(oscillating) = model.oscillation() {
+        oscillating
     } else if free.order > 0.0 {
         Behaviour::MonotoneConverging
     } else {
@@ -406,7 +352,8 @@ pub fn eca_hoekstra(grids: &[GridValue]) -> Result<EcaHoekstra, GridError> {
 }
 
 /// The result of [`self_convergence`].
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct SelfConvergence {
     /// What the values do.
     pub behaviour: Behaviour,
@@ -442,8 +389,8 @@ pub struct SelfConvergence {
 /// - the 95 % interval of the order lies above zero.
 ///
 /// # Errors
-/// [`GridError`]: not finite, not positive, two values at a step, fewer than four steps.
-pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergence, GridError> {
+/// [`FitError`]: not finite, not positive, two values at a step, fewer than four steps.
+pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergence, FitError> {
     let table = admissible(grids, 4)?;
     let model = Separable::new(&table);
     let n = table.len() as f64;
@@ -466,12 +413,10 @@ pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergen
     let p = best.order;
     let (behaviour, reason) = if model.range() <= 4.0 * table.iter().fold(0.0, |m, grid| grid.round_off.max(m)) {
         (Behaviour::Constant, "the values agree within two units of their last digit".to_owned())
-    } else if model.alternates() {
-        if model.differences_shrink() {
-            (Behaviour::OscillatingConverging, "the values alternate, with falling amplitude".to_owned())
-        } else {
-            (Behaviour::OscillatingDiverging, "the values alternate, and the amplitude does not fall".to_owned())
-        }
+    } else if let Some(oscillating) = model.oscillation() {
+        let falls = oscillating == Behaviour::OscillatingConverging;
+        let amplitude = if falls { "with falling amplitude" } else { "and the amplitude does not fall" };
+        (oscillating, format!("the values alternate, {amplitude}"))
     } else if trend > TREND_LEVEL && !model.monotone() {
         (Behaviour::Undecided, format!("the values have no trend in the step (chance {trend:.2})"))
     } else if chance.is_nan() || chance > law_level(table.len()) {
@@ -481,7 +426,7 @@ pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergen
     } else if high < 0.0 {
         (Behaviour::MonotoneDiverging, format!("the values run away as h^{p:.2}"))
     } else {
-        (Behaviour::Undecided, format!("order {p:.2} is not told from zero, [{low:.2}, {high:.2}]"))
+        (Behaviour::Undecided, format!("order {p:.2} is not distinguished from zero, [{low:.2}, {high:.2}]"))
     };
     Ok(SelfConvergence {
         behaviour,
@@ -644,7 +589,7 @@ impl<'a> Separable<'a> {
         Fit { order, limit, constant, at_finest: fitted(0), sum: sum * n / total, likelihood, weights }
     }
 
-    /// `f0 + a h + b h²`; `None` when the three columns cannot be told apart.
+    /// `f0 + a h + b h²`; `None` when the three columns cannot be distinguished.
     fn first_and_second(&self, weights: Weights) -> Option<Fit> {
         let w = self.weights(weights);
         let total: f64 = w.iter().sum();
@@ -705,9 +650,9 @@ impl<'a> Separable<'a> {
             // From outside in, so that an interval of several pieces is covered whole.
             let place = |i: usize| best.order + side * 0.1 * i as f64;
             let Some(last) = (1..=steps).rev().find(|&i| inside(place(i))) else {
-                return bisect(best.order, place(1), inside);
+                return bisect(best.order, place(1), 50, inside);
             };
-            if last == steps { side * ORDER_MAX } else { bisect(place(last), place(last + 1), inside) }
+            if last == steps { side * ORDER_MAX } else { bisect(place(last), place(last + 1), 50, inside) }
         })
     }
 
@@ -737,8 +682,8 @@ impl<'a> Separable<'a> {
 
     /// Standard deviation of the rounding of row `i`, 1/sqrt(3) of its half-width, as it enters the likelihood.
     ///
-    /// Rounding is known and not estimated from the residuals, so the wide t of few rows must not multiply it: reduced
-    /// by 2/t, it adds two standard deviations to a 95 % interval.
+    /// The rounding error is known, so Student's t, which is large for few rows, must not inflate it. Scaled by 2/t, it
+    /// contributes two standard deviations to the 95 % interval.
     fn rounding(&self, i: usize) -> f64 {
         self.table[i].round_off * self.rounding_share
     }
@@ -761,50 +706,28 @@ impl<'a> Separable<'a> {
     }
 
     fn range(&self) -> f64 {
-        let (low, high) = self
-            .table
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), grid| (low.min(grid.value), high.max(grid.value)));
-        high - low
+        let values = self.table.iter().map(|grid| grid.value);
+        values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
     }
 
     fn differences(&self) -> Vec<f64> {
         self.table.windows(2).map(|pair| pair[1].value - pair[0].value).collect()
     }
 
-    /// Whether the values go up and down in turn.
-    fn alternates(&self) -> bool {
+    /// What values do that go up and down in turn; `None` for others.
+    ///
+    /// They converge if the changes between neighbours shrink with the step, by the slope of their logarithms.
+    fn oscillation(&self) -> Option<Behaviour> {
         let differences = self.differences();
         let down: Vec<bool> = differences.iter().map(|d| *d < 0.0).collect();
-        !differences.contains(&0.0) && alternates(&down)
-    }
-
-    /// Whether the changes between neighbours shrink with the step, by the slope of their logarithms.
-    fn differences_shrink(&self) -> bool {
-        let middle = |i: usize| 0.5 * (self.logs[i] + self.logs[i + 1]);
-        let differences = self.differences();
-        let mean = (0..differences.len()).map(middle).sum::<f64>() / differences.len() as f64;
-        let slope: f64 = differences
-            .iter()
-            .enumerate()
-            .filter(|(_, d)| **d != 0.0)
-            .map(|(i, d)| (middle(i) - mean) * d.abs().ln())
-            .sum();
-        slope > 0.0
-    }
-}
-
-/// The end of `inside` between a place within and one beyond.
-fn bisect(mut within: f64, mut beyond: f64, inside: impl Fn(f64) -> bool) -> f64 {
-    for _ in 0..50 {
-        let middle = 0.5 * (within + beyond);
-        if inside(middle) {
-            within = middle;
-        } else {
-            beyond = middle;
+        if differences.contains(&0.0) || !alternates(&down) {
+            return None;
         }
+        let middle = |i: usize| 0.5 * (self.logs[i] + self.logs[i + 1]);
+        let mean = (0..differences.len()).map(middle).sum::<f64>() / differences.len() as f64;
+        let slope: f64 = differences.iter().enumerate().map(|(i, d)| (middle(i) - mean) * d.abs().ln()).sum();
+        Some(if slope > 0.0 { Behaviour::OscillatingConverging } else { Behaviour::OscillatingDiverging })
     }
-    0.5 * (within + beyond)
 }
 
 #[cfg(test)]
@@ -967,12 +890,12 @@ mod tests {
     fn bad_tables_are_errors() {
         assert!(matches!(
             self_convergence(&grids(&[(1.0, 1.0); 8]), 1e-3),
-            Err(GridError::TooFewSteps { found: 1, .. })
+            Err(FitError::TooFewSteps { found: 1, .. })
         ));
         let with = |row| grids(&[(1.0, 1.0), (2.0, 2.0), (3.0, 2.5), (4.0, 2.6), row]);
-        assert!(matches!(eca_hoekstra(&with((5.0, f64::NAN))), Err(GridError::NotFinite { .. })));
-        assert!(matches!(self_convergence(&with((f64::NAN, 1.0)), 1e-3), Err(GridError::BadStep { .. })));
-        assert!(matches!(self_convergence(&with((2.0, 2.1)), 1e-3), Err(GridError::TwoValues { .. })));
+        assert!(matches!(eca_hoekstra(&with((5.0, f64::NAN))), Err(FitError::NotFinite { .. })));
+        assert!(matches!(self_convergence(&with((f64::NAN, 1.0)), 1e-3), Err(FitError::BadStep { .. })));
+        assert!(matches!(self_convergence(&with((2.0, 2.1)), 1e-3), Err(FitError::TwoValues { .. })));
         assert!(self_convergence(&with((2.0, 2.0)), 1e-3).is_ok());
     }
 }

@@ -3,8 +3,8 @@
 pub mod applicability;
 pub mod audit;
 pub mod batch;
+#[cfg(feature = "report")]
 pub mod bench;
-pub mod columns;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod error;
@@ -13,10 +13,6 @@ pub mod extreme_scenes;
 pub mod formal_order;
 pub mod grid_convergence;
 pub mod order;
-pub mod parameter;
-#[cfg(feature = "parquet")]
-pub mod parquet;
-pub mod peers;
 pub mod quantity;
 pub mod random;
 pub mod random_scenes;
@@ -25,7 +21,6 @@ pub mod rounding;
 pub mod sensitivity;
 pub mod stability;
 pub mod sweep;
-pub mod table_text;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;

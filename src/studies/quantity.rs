@@ -1,22 +1,21 @@
-//! The quantities whose error is studied, under their names in the contract.
+//! The quantities whose error is studied, and their names (`docs/reference.md`, "Words").
 
 /// A number that a flight, or a search over flights, gives.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// Depth at the end of the flight [m].
+    /// Depth at the end of the flight (m).
     Depth,
-    /// Time of the end of the flight [s].
+    /// Time of the end of the flight (s).
     Time,
-    /// Velocity at the end of the flight [m/s].
+    /// Velocity at the end of the flight (m/s).
     Velocity,
-    /// Time at x = k d [s].
+    /// Time at x = k d (s).
     CraterEndTime,
-    /// Velocity at x = k d [m/s].
+    /// Velocity at x = k d (m/s).
     CraterEndVelocity,
-    /// Least impact velocity that perforates [m/s].
+    /// Least impact velocity that perforates (m/s).
     CriticalVelocity,
 }
 
@@ -25,7 +24,21 @@ impl Quantity {
     pub const ALL: [Self; 6] =
         [Self::Depth, Self::Time, Self::Velocity, Self::CraterEndTime, Self::CraterEndVelocity, Self::CriticalVelocity];
 
-    /// Name in the contract.
+    /// The quantities of one flight, in the order of reports.
+    pub const OF_A_FLIGHT: [Self; 5] =
+        [Self::Depth, Self::Time, Self::Velocity, Self::CraterEndTime, Self::CraterEndVelocity];
+
+    /// Whether it belongs to the state at x = k d.
+    pub fn is_at_crater_end(self) -> bool {
+        matches!(self, Self::CraterEndTime | Self::CraterEndVelocity)
+    }
+
+    /// Whether its error is relative to V0, and not to its own value.
+    pub fn is_over_impact_speed(self) -> bool {
+        matches!(self, Self::Velocity | Self::CraterEndVelocity)
+    }
+
+    /// Name in JSON and in suites.
     pub fn name(self) -> &'static str {
         match self {
             Self::Depth => "depth",
@@ -36,28 +49,10 @@ impl Quantity {
             Self::CriticalVelocity => "critical_velocity",
         }
     }
-
-    /// The quantity called `name` in the contract.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|quantity| quantity.name() == name)
-    }
 }
 
 impl std::fmt::Display for Quantity {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_name_reads_back() {
-        for quantity in Quantity::ALL {
-            assert_eq!(Quantity::from_name(quantity.name()), Some(quantity));
-        }
-        assert_eq!(Quantity::from_name("Depth"), None);
     }
 }

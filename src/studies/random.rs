@@ -10,7 +10,7 @@ impl Random {
         Self(fastrand::Rng::with_seed(seed))
     }
 
-    /// A source for the part `name` of a study: parts keep their numbers when others come or go.
+    /// A source for the part `name` of a study: the numbers of a part do not change when others come or go.
     pub fn for_part(seed: u64, name: &str) -> Self {
         let hash = blake3::hash(name.as_bytes());
         let mut word = [0; 8];

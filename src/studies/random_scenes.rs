@@ -2,11 +2,12 @@
 
 use thiserror::Error;
 
-use super::quantity::Quantity;
+use super::error::Errors;
+pub use super::error::condition_of;
 use super::random::Random;
+use crate::integrators::closed_form::solve_crater_and_tunnel;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
-use crate::physics::closed_form::{CraterAndTunnel, solve_crater_and_tunnel};
-use crate::physics::reference::{self, Conditions, ExactFlight, ReferenceError, Source};
+use crate::physics::reference::{self, ReferenceError, Source};
 use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, ResolveError, Scene, groups};
 
 /// Draws scenes that cover the groups log-uniformly.
@@ -54,33 +55,6 @@ impl Generator {
     }
 }
 
-/// Errors of a flight in ulp over max(1, condition number), per quantity.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct UlpErrors(pub Vec<(f64, Quantity)>);
-
-impl UlpErrors {
-    /// The largest; a NaN is the largest of all.
-    pub fn worst(&self) -> Option<(f64, Quantity)> {
-        self.0.iter().copied().max_by(|a, b| match (a.0.is_nan(), b.0.is_nan()) {
-            (true, false) => std::cmp::Ordering::Greater,
-            (false, true) => std::cmp::Ordering::Less,
-            _ => a.0.total_cmp(&b.0),
-        })
-    }
-}
-
-/// Condition number of `quantity`; `None` where the flight does not have it.
-pub fn condition_of(conditions: &Conditions, quantity: Quantity) -> Option<f64> {
-    match quantity {
-        Quantity::Depth => Some(conditions.depth),
-        Quantity::Time => Some(conditions.time),
-        Quantity::Velocity => Some(conditions.velocity),
-        Quantity::CraterEndTime => conditions.crater_end_time,
-        Quantity::CraterEndVelocity => conditions.crater_end_velocity,
-        Quantity::CriticalVelocity => None,
-    }
-}
-
 /// Why a scene has no comparison.
 #[derive(Clone, Debug, Error)]
 pub enum ComparisonError {
@@ -94,12 +68,12 @@ pub enum ComparisonError {
     #[error(transparent)]
     Reference(#[from] ReferenceError),
     /// The outcomes differ, and not within the error bar.
-    #[error("the closed form says {found}, the reference {exact}")]
+    #[error("outcome {found}, in 50 digits {exact}")]
     Outcome {
         /// Outcome found.
-        found: String,
+        found: Outcome,
         /// Outcome of the reference.
-        exact: String,
+        exact: Outcome,
     },
 }
 
@@ -107,15 +81,15 @@ pub enum ComparisonError {
 /// condition number).
 ///
 /// The stages hold a continuous crater constant rounded to f64, which alone moves V1 by up to
-/// `sqrt(1 + k d Q/M)/4` ulp of V0: for k/N far above 100 only [`closed_form_errors_at_inputs`] tells rounding from fault.
+/// `sqrt(1 + k d Q/M)/4` ulp of V0: for k/N far above 100 only [`closed_form_errors_at_inputs`] distinguishes rounding from a fault.
 ///
 /// # Errors
 /// [`ComparisonError`].
-pub fn closed_form_errors(scene: &Scene) -> Result<UlpErrors, ComparisonError> {
+pub fn closed_form_errors(scene: &Scene) -> Result<Errors, ComparisonError> {
     let problem = scene.problem()?;
-    let flight = ClosedForm.fly(&problem, Detail::Events)?;
+    let flight = ClosedForm.solve(&problem, Detail::Events)?;
     let mut errors = errors_of(Source::Scene(scene, problem.impact_speed), &flight)?;
-    errors.0.extend(errors_of_numbers(scene, &problem, flight)?.0);
+    errors.0.extend(errors_without_stiffness(scene, &problem)?.0);
     Ok(errors)
 }
 
@@ -123,30 +97,20 @@ pub fn closed_form_errors(scene: &Scene) -> Result<UlpErrors, ComparisonError> {
 ///
 /// # Errors
 /// [`ComparisonError`].
-pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<UlpErrors, ComparisonError> {
+pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<Errors, ComparisonError> {
     let problem = scene.problem()?;
-    let flight = ClosedForm.fly(&problem, Detail::Events)?;
+    let flight = ClosedForm.solve(&problem, Detail::Events)?;
     let mut errors = errors_of(Source::Problem(&problem), &flight)?;
-    errors.0.extend(errors_of_numbers(scene, &problem, flight)?.0);
+    errors.0.extend(errors_without_stiffness(scene, &problem)?.0);
     Ok(errors)
 }
 
-/// The closed form from the numbers of the model, where `scene` is one crater and one tunnel; `flight` is overwritten.
-fn errors_of_numbers(scene: &Scene, problem: &Problem, mut flight: Flight) -> Result<UlpErrors, ComparisonError> {
-    let plain = scene.concrete().filter(|concrete| concrete.layers.is_empty());
-    let (Some(concrete), Some(static_force), Some(drag)) = (plain, scene.static_force(), scene.drag()) else {
-        return Ok(UlpErrors::default());
+/// As [`closed_form_errors`] for one crater and one tunnel, with the speed in the crater computed without c.
+fn errors_without_stiffness(scene: &Scene, problem: &Problem) -> Result<Errors, ComparisonError> {
+    let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) else {
+        return Ok(Errors::default());
     };
-    let model = CraterAndTunnel {
-        mass: scene.mass,
-        crater_depth: concrete.crater_depth(),
-        static_force,
-        drag,
-        crater_stiffness: concrete.crater_stiffness,
-    };
-    let solution =
-        solve_crater_and_tunnel(&model, problem.impact_speed, problem.exit_depth).map_err(IntegrationError::from)?;
-    (flight.outcome, flight.end, flight.events) = (solution.outcome, solution.end, solution.events);
+    let flight = solve_crater_and_tunnel(problem, concrete.crater_stiffness)?;
     errors_of(Source::Scene(scene, problem.impact_speed), &flight)
 }
 
@@ -156,47 +120,13 @@ fn errors_of_numbers(scene: &Scene, problem: &Problem, mut flight: Flight) -> Re
 ///
 /// # Errors
 /// [`ComparisonError`].
-pub fn errors_of(source: Source<'_>, flight: &Flight) -> Result<UlpErrors, ComparisonError> {
+pub fn errors_of(source: Source<'_>, flight: &Flight) -> Result<Errors, ComparisonError> {
     let exact = reference::flight(source)?;
     if flight.outcome == Outcome::Undecided {
-        return Ok(UlpErrors::default());
+        return Ok(Errors::default());
     }
-    compared(flight, &exact)?;
-    Ok(errors_beside(flight, &exact, &reference::conditions(source)?))
-}
-
-/// Refuses a flight with another outcome than the exact one.
-///
-/// # Errors
-/// [`ComparisonError::Outcome`].
-pub fn compared(flight: &Flight, exact: &ExactFlight) -> Result<(), ComparisonError> {
-    if flight.outcome.agrees_with(exact.outcome) {
-        return Ok(());
+    if !flight.outcome.agrees_with(exact.outcome) {
+        return Err(ComparisonError::Outcome { found: flight.outcome, exact: exact.outcome });
     }
-    Err(ComparisonError::Outcome { found: flight.outcome.to_string(), exact: exact.outcome.to_string() })
-}
-
-/// `flight` against `exact`, which has the same outcome, in ulp over max(1, condition number).
-pub fn errors_beside(flight: &Flight, exact: &ExactFlight, conditions: &Conditions) -> UlpErrors {
-    let mut errors = Vec::new();
-    let mut add = |error: f64, condition: f64, quantity| {
-        errors.push((error.abs() / f64::EPSILON / fault!("condition-left-out", condition.max(1.0), 1.0), quantity));
-    };
-    add(exact.end.depth.relative_error(flight.end.depth), conditions.depth, Quantity::Depth);
-    add(exact.end.time.relative_error(flight.end.time), conditions.time, Quantity::Time);
-    add(
-        exact.end.velocity.error_over(flight.end.velocity, &exact.impact_speed),
-        conditions.velocity,
-        Quantity::Velocity,
-    );
-    if flight.crater_end().is_some() != exact.crater_end().is_some() {
-        // One lacks an event that the other has: no number of ulps.
-        errors.push((f64::NAN, Quantity::CraterEndTime));
-    } else if let (Some(found), Some(end)) = (flight.crater_end(), exact.crater_end()) {
-        let (time, velocity) =
-            (conditions.crater_end_time.unwrap_or(1.0), conditions.crater_end_velocity.unwrap_or(1.0));
-        add(end.time.relative_error(found.time), time, Quantity::CraterEndTime);
-        add(end.velocity.error_over(found.velocity, &exact.impact_speed), velocity, Quantity::CraterEndVelocity);
-    }
-    UlpErrors(errors)
+    Ok(Errors::in_50_digits(flight, &exact, &reference::conditions(source)?))
 }

@@ -1,4 +1,4 @@
-//! Which problems must fly alike, whatever the answer? The same one in other units, and the way back.
+//! Which problems must have the same solution, whatever it is? The same one in other units, and the return from its end.
 
 use crate::integrators::Flight;
 use crate::physics::{Problem, Stage, Stages, Target};
@@ -14,7 +14,7 @@ pub struct Units {
     pub time: f64,
 }
 
-/// `problem` in other units: depths of its flight come out times `length`, times times `time`.
+/// `problem` in other units: depths of its solution come out times `length`, times times `time`.
 pub fn in_units(problem: &Problem, Units { length, mass, time }: Units) -> Problem {
     let force = mass * length / (time * time);
     Problem {
@@ -36,10 +36,10 @@ pub fn in_units(problem: &Problem, Units { length, mass, time }: Units) -> Probl
     }
 }
 
-/// The way back from the end of `there`, which left with velocity: `F` is even in V for r = 0, so with y = x_end - x it
-/// is a flight under -F, in which drag adds energy, and it must leave at y = x_end with V0 after the same time.
+/// The return from the end of `there`, which left with velocity. `F` is even in V for r = 0, so with y = x_end - x the
+/// return is a motion under -F, in which drag adds energy. It must leave at y = x_end with V0 after the same time.
 ///
-/// `None` where there is no such flight: viscosity, which is not even in V, or an end at rest.
+/// `None` where there is no such motion: viscosity, which is not even in V, or an end at rest.
 pub fn way_back(problem: &Problem, there: &Flight) -> Option<Problem> {
     let viscous = problem.stages.iter().any(|law| law.viscosity != 0.0);
     if viscous || there.outcome.is_stop() || there.end.velocity <= 0.0 {

@@ -6,7 +6,7 @@
 
 use twofloat::TwoFloat;
 
-use super::error::signed_error;
+use super::error::{signed_error, value_of};
 use super::quantity::Quantity;
 use crate::integrators::central_difference::{Boundaries, CentralDifference, Summation, VelocityAt};
 use crate::integrators::{Detail, Energy, Flight, IntegrationError, MethodName, Taylor};
@@ -25,16 +25,16 @@ pub struct DigitsLost {
     pub lost: Vec<(Quantity, f64)>,
 }
 
-/// Flies `problem` by `method` in `S`; the central difference lagged and located, with steps of `dt` [s].
-fn fly<S: Scalar>(method: MethodName, problem: &Problem, dt: f64) -> Result<Flight<S>, IntegrationError> {
+/// Solves `problem` by `method` in `S`; the central difference lagged and located, with steps of `dt` (s).
+fn solve<S: Scalar>(method: MethodName, problem: &Problem, dt: f64) -> Result<Flight<S>, IntegrationError> {
     let problem = problem.cast::<S>();
     match method {
-        MethodName::Energy => Energy::new().fly_in(&problem, Detail::Events),
+        MethodName::Energy => Energy::new().solve_in(&problem, Detail::Events),
         MethodName::CentralDifference => {
             CentralDifference::uniform(dt, VelocityAt::LaggedHalfStep, Boundaries::Interpolated)
-                .fly_in(&problem, Detail::Events)
+                .solve_in(&problem, Detail::Events)
         }
-        _ => Taylor::default().fly_in(&problem, Detail::Events),
+        _ => Taylor::default().solve_in(&problem, Detail::Events),
     }
 }
 
@@ -53,29 +53,23 @@ pub fn digits_lost(problem: &Problem, dt: f64) -> Result<Vec<DigitsLost>, Integr
             method,
             number,
             epsilon,
-            lost: errors(&found, &exact, problem.impact_speed)
-                .into_iter()
-                .map(|(quantity, error)| (quantity, (error / epsilon).log10().max(0.0)))
-                .collect(),
+            lost: digits(&found, &exact.values(), problem.impact_speed, epsilon),
         };
-        let single = fly::<f32>(method, &coarse, coarse_dt)?.values();
-        rows.push(row("f32", f64::from(f32::EPSILON), single, fly(method, &coarse, coarse_dt)?));
-        rows.push(row("f64", f64::EPSILON, fly::<f64>(method, problem, dt)?, fly(method, problem, dt)?));
+        let single = solve::<f32>(method, &coarse, coarse_dt)?.values();
+        rows.push(row("f32", f64::from(f32::EPSILON), single, solve(method, &coarse, coarse_dt)?));
+        rows.push(row("f64", f64::EPSILON, solve::<f64>(method, problem, dt)?, solve(method, problem, dt)?));
     }
     Ok(rows)
 }
 
-/// Absolute values of the errors of what both flights have.
-fn errors(found: &Flight, exact: &Flight<TwoFloat>, speed: f64) -> Vec<(Quantity, f64)> {
-    let exact = exact.values();
-    [Quantity::Depth, Quantity::Time, Quantity::Velocity, Quantity::CraterEndTime, Quantity::CraterEndVelocity]
-        .into_iter()
-        .filter_map(|quantity| {
-            let value = super::error::value_of(quantity, found)?;
-            let exact = super::error::value_of(quantity, &exact)?;
-            Some((quantity, signed_error(quantity, value, exact, speed).abs()))
-        })
-        .collect()
+/// Digits lost of what both flights have.
+fn digits(found: &Flight, exact: &Flight, speed: f64, epsilon: f64) -> Vec<(Quantity, f64)> {
+    let lost = |quantity| {
+        let (value, exact) = value_of(quantity, found).zip(value_of(quantity, exact))?;
+        let error = signed_error(quantity, value, exact, speed).abs();
+        Some((quantity, (error / epsilon).log10().max(0.0)))
+    };
+    Quantity::OF_A_FLIGHT.into_iter().filter_map(lost).collect()
 }
 
 /// Errors of the depth by the central difference after so many steps, relative.
@@ -83,7 +77,7 @@ fn errors(found: &Flight, exact: &Flight<TwoFloat>, speed: f64) -> Vec<(Quantity
 pub struct Floor {
     /// Steps to the end of the flight.
     pub steps: f64,
-    /// Time step [s].
+    /// Time step (s).
     pub dt: f64,
     /// Truncation error of the depth, in double-double: what the floor rises against. `None` beyond the steps for which
     /// double-double is fast enough.
@@ -131,15 +125,15 @@ pub fn floor(problem: &Problem, from: u32, split: u32, to: u32) -> Result<Vec<Fl
                 if power > split {
                     return Ok(None);
                 }
-                Ok(Some(scheme(dt, Summation::Plain).fly_in(problem, Detail::End)?.end.depth))
+                Ok(Some(scheme(dt, Summation::Plain).solve_in(problem, Detail::End)?.end.depth))
             };
             let (fine, single_fine) = (by_double_double(&wide, dt)?, by_double_double(&single_wide, single_dt)?);
             let in_double = |summation| -> Result<Errors, IntegrationError> {
-                let found = scheme(dt, summation).fly_in(problem, Detail::End)?.end.depth;
+                let found = scheme(dt, summation).solve_in(problem, Detail::End)?.end.depth;
                 Ok(Errors::of(TwoFloat::from(found), fine, exact.depth))
             };
             let in_single = |summation| -> Result<Errors, IntegrationError> {
-                let found = scheme(single_dt, summation).fly_in(&single, Detail::End)?.end.depth;
+                let found = scheme(single_dt, summation).solve_in(&single, Detail::End)?.end.depth;
                 Ok(Errors::of(TwoFloat::from(f64::from(found)), single_fine, single_exact.depth))
             };
             Ok(Floor {
@@ -168,7 +162,7 @@ fn off(found: TwoFloat, right: TwoFloat) -> f64 {
 
 /// The end of `problem` in double-double.
 fn exact_end(problem: &Problem) -> Result<State<TwoFloat>, IntegrationError> {
-    Ok(Taylor::default().fly_in(&problem.cast::<TwoFloat>(), Detail::End)?.end)
+    Ok(Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::End)?.end)
 }
 
 /// Slope of `ln error` over `ln steps` by least squares; errors of zero are left out. NaN with fewer than two points.

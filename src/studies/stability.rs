@@ -9,13 +9,13 @@
 //! predicted:  D = 1 - g + g²/2                  T = 1 + D - a² (1 - g/2)
 //! ```
 //!
-//! and amplitudes grow by the larger root of `z² - T z + D = 0` a step. The lagged line with g = 0 is theory section 5.
+//! and amplitudes grow by the larger root of `z² - T z + D = 0` a step. The lagged line with g = 0 is `docs/theory.md`, section 5.
 //! The formulas are derived here from Eq. 6-8 alone, apart from
 //! [`crate::integrators::central_difference::stability_limit`], which states the limit in closed form.
 
 use crate::integrators::IntegrationError;
 use crate::integrators::central_difference::{Boundaries, CentralDifference, VelocityAt};
-use crate::physics::{Problem, Stage, Stages, State, Target};
+use crate::physics::{Problem, Stage, State};
 
 /// Steps of a run that decides whether amplitudes grow. At 1e-3 beyond the limit they grow by e in about 30 steps.
 const STEPS: usize = 4000;
@@ -36,14 +36,7 @@ pub fn growth_in_theory(velocity: VelocityAt, w_dt: f64, drag_dt: f64) -> f64 {
 /// The free linear motion at unit frequency scale: M = 1, dt = 1, so that s = a² and r = g; V0 = 1.
 fn motion(w_dt: f64, drag_dt: f64) -> Problem {
     let law = Stage { static_force: 0.0, stiffness: w_dt * w_dt, viscosity: drag_dt, drag: 0.0, end: f64::INFINITY };
-    Problem {
-        mass: 1.0,
-        impact_speed: 1.0,
-        exit_depth: f64::INFINITY,
-        stages: Stages::from_slice(&[law]),
-        crater: None,
-        target: Target::Stages,
-    }
+    Problem::of_stages(1.0, 1.0, [law])
 }
 
 fn states(velocity: VelocityAt, w_dt: f64, drag_dt: f64, count: usize) -> Result<Vec<State>, IntegrationError> {
@@ -86,7 +79,7 @@ pub struct BoundaryPoint {
 /// As [`CentralDifference::free_states`].
 pub fn map(count: usize) -> Result<Vec<BoundaryPoint>, IntegrationError> {
     let mut points = Vec::with_capacity(3 * count);
-    for velocity in [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep] {
+    for velocity in VelocityAt::ALL {
         for i in 0..count {
             let drag_group = 0.9 * i as f64 / count as f64;
             let g = 2.0 * drag_group;
@@ -106,7 +99,7 @@ fn grows(velocity: VelocityAt, w_dt: f64, drag_dt: f64) -> Result<bool, Integrat
     let states = states(velocity, w_dt, drag_dt, STEPS)?;
     let (early, late) = states.split_at(STEPS / 2);
     let reach = |part: &[State]| part.iter().map(|s| s.depth.abs()).fold(0.0, f64::max);
-    // Beyond the range of the numbers there is no ratio: max passes over a NaN, and the last state tells it.
+    // Beyond the range of the numbers there is no ratio: max ignores a NaN, and the last state shows it.
     let overflows = late.last().is_none_or(|s| !s.depth.is_finite());
     Ok(overflows || reach(late) > 1.5 * reach(early))
 }
@@ -135,7 +128,7 @@ mod tests {
         // z² - (2 - a²) z + 1 = 0 at a = 3: z = (-7 ± sqrt(45))/2.
         let expected = 3.5 + 0.5 * 45f64.sqrt();
         assert!((growth_in_theory(VelocityAt::LaggedHalfStep, 3.0, 0.0) - expected).abs() < 1e-14);
-        for velocity in [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep] {
+        for velocity in VelocityAt::ALL {
             assert!((growth_measured(velocity, 3.0, 0.0, 100).unwrap() / expected - 1.0).abs() < 1e-9);
             assert!((growth_measured(velocity, 1.0, 0.0, 1000).unwrap() - 1.0).abs() < 1e-3);
         }

@@ -1,13 +1,16 @@
-//! A claim: what is said, of which scenes, methods and quantities, how it is checked, and its limit with the reason.
+//! A claim: what is stated, for which scenes, methods and quantities, how it is checked, and its limit with the reason.
 //!
-//! Claims are data. A suite file holds an array of `[[claim]]` tables; one table with several scenes, methods or
-//! quantities stands for one claim each (their product), so that a table of orders is a few lines.
+//! Claims are data. A suite file holds an array of `[[claim]]` tables. A table with several scenes, methods, quantities
+//! or rules stands for one claim each (their product), so that a table of orders takes a few lines.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::checks::Check;
+use super::verdict::Verdict;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::MethodName;
 use crate::studies::applicability::Line;
@@ -17,8 +20,6 @@ use crate::studies::quantity::Quantity;
 use crate::studies::rounding::Floor;
 use crate::studies::stability::BoundaryPoint;
 use crate::studies::sweep::{Plan, Row};
-
-use super::verdict::Verdict;
 
 /// One `[[claim]]` table.
 #[derive(Clone, Debug, Deserialize)]
@@ -30,6 +31,8 @@ pub struct ClaimSpec {
     pub statement: String,
     /// How it is checked.
     pub check: toml::Spanned<Check>,
+    /// Section of the report; by default that of the check.
+    pub section: Option<Section>,
     /// Scenes: names of shipped scenes, or files beside the suite.
     #[serde(default)]
     pub scenes: Vec<toml::Spanned<String>>,
@@ -51,368 +54,146 @@ pub struct ClaimSpec {
     pub reason: String,
 }
 
-/// How a claim is checked. Each kind states its measured value and unit.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Check {
-    /// Closed form against the 50-digit reference, over the scenes and `random` more drawn from the seed; worst
-    /// error in ulp over max(1, condition number).
-    Reference {
-        /// Random scenes besides those named.
-        #[serde(default)]
-        random: usize,
-    },
-    /// Method against the exact answer; relative error over max(1, condition number).
-    Agreement {
-        /// Relative tolerance of the method.
-        rtol: Option<f64>,
-    },
-    /// The claim's quantity of its scene against a number stated in the suite: published, measured, or computed
-    /// elsewhere; relative difference.
-    Stated {
-        /// The number, in SI units.
-        value: f64,
-    },
-    /// Exit margin and outcome against 50 digits at `points` impact speeds from a fifth of the critical velocity to
-    /// five times it: worst error of the margin over its error bar. A wrong outcome that is not `undecided` breaks it.
-    Margin {
-        /// How many, log-uniform from the seed.
-        points: usize,
-    },
-    /// Central difference: worst relative distance of the time of step i from i dt, over `steps` steps.
-    Clock {
-        /// How many steps.
-        steps: usize,
-    },
-    /// N* and height of every nose shape against the integral and the circle that they stand for; worst relative
-    /// difference.
-    Nose {},
-    /// Roache's GCI and Richardson's extrapolation on three runs of the central difference against the true error:
-    /// worst of |GCI/(1.25 |error|) - 1|, |extrapolated error/error|, and the distance of Celik's order from the formal
-    /// one over it.
-    GridConvergence {},
-    /// Central difference at rest in the crater, step ends: how far (X(dt)/X - 1)/(w dt)² leaves 0 to 1/8, over many
-    /// steps, and how far its extremes stay inside; relative to 1/8.
-    CraterBand {},
-    /// Outcome of the method; 0 when right or undecided, 1 when wrong.
-    Outcome {
-        /// Name of the outcome in the contract.
-        is: String,
-    },
-    /// Method at Q = 0 and continuous c against Eq. 11-12, `points` impact functions I from `from` to `to`; worst
-    /// relative difference of X/d.
-    SmallImpact {
-        /// Smallest I.
-        from: f64,
-        /// Largest I.
-        to: f64,
-        /// How many, log-uniform from the seed.
-        points: usize,
-    },
-    /// X/d at finite N against Eq. 11-12 as N grows: distance of the fitted order in 1/N from 1.
-    ApproachOrder {
-        /// Impact function I; its side of k pi/4 decides between Eq. 11 and Eq. 12.
-        impact: f64,
-    },
-    /// The same: relative distance of the constant from theory section 3.
-    ApproachConstant {
-        /// Impact function I.
-        impact: f64,
-    },
-    /// Eq. 15 against Eq. 11-12 with the ACE/NDRC relation over H/d; worst relative difference.
-    Eq15 {
-        /// `unrounded` or `printed`.
-        form: Eq15Form,
-        /// Smallest H/d.
-        from: f64,
-        /// Largest H/d.
-        to: f64,
-    },
-    /// Jump of Eq. 15 at a joint, in units of S: distance from the stated one.
-    Eq15Jump {
-        /// `unrounded` or `printed`.
-        form: Eq15Form,
-        /// The joint H/d.
-        at: f64,
-        /// Stated jump in units of S.
-        jump: f64,
-    },
-    /// Critical velocity with the NDRC criterion and Q = 0 against unrounded Eq. 15; worst relative difference.
-    NdrcCriterion {
-        /// How many H/d, log-uniform from the seed.
-        points: usize,
-    },
-    /// Central difference: distance of the fitted order from `order`.
-    Order {
-        /// Order expected.
-        order: f64,
-        /// Pattern of the steps.
-        #[serde(default)]
-        steps: StepPattern,
-        /// How many step sizes.
-        #[serde(default = "default_points")]
-        points: usize,
-    },
-    /// Central difference in the crater or at Q = 0: worst distance from the exact discrete solution over the amplitude.
-    DiscreteSolution {
-        /// w dt in the crater; in the tunnel dt over the tunnel time.
-        step: f64,
-        /// Number of steps at most.
-        steps: usize,
-    },
-    /// Central difference at rest in the crater: relative distance of error/(w dt)² from 1/8 (depth) or -1/24 (time).
-    CraterConstant {},
-    /// Lagged drag: relative distance of error/dt from the modified equation's constant.
-    LaggedConstant {},
-    /// Kinetic energy lost against work done, along the whole path; worst residual over M V0²/2.
-    EnergyBalance {},
-    /// From the end of a perforation back to the face; relative distance from V0.
-    TimeReversal {},
-    /// The scene scaled in length, mass and time; relative change of the depth and time in scaled units.
-    Similarity {
-        /// Factor of length.
-        length: f64,
-        /// Factor of mass.
-        mass: f64,
-        /// Factor of time.
-        time: f64,
-    },
-    /// Every stage cut into pieces and restarted; relative change of the quantity.
-    Split {
-        /// Pieces of a stage.
-        pieces: usize,
-    },
-    /// Central difference on a manufactured solution; distance of the fitted order from `order`.
-    Manufactured {
-        /// `smooth` or `kink`.
-        path: ManufacturedPath,
-        /// Order expected.
-        order: f64,
-    },
-    /// One method against another; difference over the sum of their tolerances.
-    Pair {
-        /// The other method.
-        with: MethodName,
-        /// Tolerance that each may claim, relative.
-        tolerance: f64,
-    },
-    /// Central difference of undamped crater motion: |w dt - 2|/2 at which growth sets in.
-    StabilityLimit {},
-    /// Error against tolerance: distance of the slope from 1.
-    Proportionality {
-        /// Largest tolerance.
-        from: f64,
-        /// Smallest tolerance.
-        to: f64,
-    },
-    /// Error against work: distance of the slope of error over 1/evaluations from the order of the method.
-    WorkOrder {
-        /// Largest tolerance.
-        from: f64,
-        /// Smallest tolerance.
-        to: f64,
-    },
-    /// Self-convergence without the exact answer: its error over its own uncertainty.
-    SelfConvergence {},
-    /// Events in time order, each at its place, none missing or twice; number of violations.
-    EventOrder {},
-    /// Critical velocity and energies of every point of a sweep of H/d against the closed form of a scene built for that
-    /// point alone; worst relative difference.
-    Sweep {
-        /// Smallest H/d.
-        from: f64,
-        /// Largest H/d.
-        to: f64,
-        /// How many, evenly.
-        points: usize,
-    },
-    /// Depth flown on the lines of equal error of Eq. 11-12: worst relative distance of its error from that of the line.
-    Map {
-        /// How many places of each line.
-        points: usize,
-    },
-    /// Median of predicted over measured depth of each set of the shipped data, shallow shots apart: worst distance
-    /// from 1.
-    MeasuredDepth {},
-    /// Elasticities of every quantity to every number of the scene, by the method against the closed form in dual
-    /// numbers: worst difference, relative to those above 1.
-    Sensitivities {},
-    /// Central difference: worst relative distance of the measured boundary of stability in w dt from the theoretical
-    /// one over the drag group Q V dt/M.
-    StabilityMap {
-        /// How many drag groups, for each velocity rule.
-        points: usize,
-    },
-    /// Central difference: rounding error of the depth with compensated sums over that with plain ones, after
-    /// 2^`from` to 2^`to` steps; nothing unless truncation falls at second order.
-    RoundingFloor {
-        /// Power of two of the fewest steps.
-        from: u32,
-        /// Power of two of the most steps.
-        to: u32,
-    },
-    /// Answers of another program; difference over the tolerance.
-    Peer {
-        /// Name of the recorded peer, or `user` for the one given on the command line.
-        name: String,
-        /// Relative tolerance claimed.
-        tolerance: f64,
-    },
-}
-
-fn default_points() -> usize {
-    60
-}
-
-/// Which coefficients of Eq. 15.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+/// The section of a report that shows a claim or a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Eq15Form {
-    /// As printed in the paper.
-    Printed,
-    /// Before rounding.
-    Unrounded,
-}
-
-/// How the steps of one run are laid out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum StepPattern {
-    /// All equal.
-    #[default]
-    Uniform,
-    /// Slowly varying.
-    Smooth,
-    /// Long and short in turn.
-    Alternating,
-    /// Drawn from the seed.
+pub enum Section {
+    /// What is solved.
+    Model,
+    /// Exact answers and formulas.
+    Exact,
+    /// Orders of convergence.
+    Orders,
+    /// Exact discrete solutions and error constants.
+    Constants,
+    /// Error estimates where nothing exact is known.
+    Solution,
+    /// Other methods and other programs.
+    CrossCode,
+    /// Events and outcomes.
+    Events,
+    /// Energy and other invariants.
+    Energy,
+    /// Stability and rounding.
+    Stability,
+    /// The paper's curve over the thickness.
+    Slab,
+    /// Where Eq. 11-12 holds.
+    Applicability,
+    /// Measured depths.
+    Measured,
+    /// Targets of layers.
+    Layers,
+    /// Sensitivities.
+    Sensitivities,
+    /// What an accuracy costs.
+    Cost,
+    /// Step sizes, range, rounding and stiffness at the edges.
+    Steps,
+    /// The search for the critical velocity at the edges.
+    Critical,
+    /// Random scenes by the million.
     Random,
 }
 
-/// Which manufactured path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ManufacturedPath {
-    /// One stage.
-    Smooth,
-    /// Through x = k d at a known time.
-    Kink,
-}
-
-impl Check {
-    /// Unit of the measured value and of the limit.
-    pub fn unit(&self) -> &'static str {
-        match self {
-            Self::Reference { .. } => "ulp x condition",
-            Self::Agreement { .. } => "relative x condition",
-            Self::Outcome { .. } => "wrong outcomes",
-            Self::EventOrder {} => "violations",
-            Self::ApproachOrder { .. }
-            | Self::Order { .. }
-            | Self::Manufactured { .. }
-            | Self::Proportionality { .. }
-            | Self::WorkOrder { .. } => "order",
-            Self::Eq15Jump { .. } => "S",
-            Self::Pair { .. } | Self::Peer { .. } => "tolerance",
-            Self::SelfConvergence {} => "uncertainty",
-            Self::Margin { .. } => "error bars",
-            Self::RoundingFloor { .. } => "compensated/plain",
-            _ => "relative",
-        }
-    }
-
-    /// One ulp in the unit of the check: no measurement is believed to be finer.
-    pub fn resolution(&self) -> f64 {
-        match self {
-            Self::Reference { .. } | Self::Outcome { .. } | Self::EventOrder {} => 1.0,
-            Self::Pair { tolerance, .. } | Self::Peer { tolerance, .. } => f64::EPSILON / tolerance,
-            _ => f64::EPSILON,
-        }
-    }
-}
-
-/// One claim: a table's claim for one scene, method and quantity.
-#[derive(Clone, Debug)]
+/// One claim: a table's claim for one scene, method, quantity and rule.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Claim {
-    /// Name, unique.
+    /// Name.
     pub id: String,
-    /// Name of its table, which it shares with the claims that differ in scene, method, quantity or rule alone.
+    /// Name of its table, shared by the claims that differ only in scene, method, quantity or rule.
+    #[serde(skip)]
     pub table: String,
     /// What is claimed.
     pub statement: String,
     /// How it is checked.
+    #[serde(skip)]
     pub check: Check,
-    /// Scene, where the check has one.
+    /// Section of the report that shows it.
+    #[serde(skip)]
+    pub section: Section,
+    /// Scene, where the claim has one.
     pub scene: Option<String>,
-    /// Method, where the check has one.
+    /// Method, where the claim has one.
+    #[serde(serialize_with = "by_name")]
+    #[schemars(with = "Option<String>")]
     pub method: Option<MethodName>,
-    /// Quantity, where the check has one.
+    /// Quantity, where the claim has one.
+    #[schemars(with = "Option<String>")]
     pub quantity: Option<Quantity>,
     /// Velocity rule, where the check has one.
+    #[serde(skip)]
     pub velocity: VelocityAt,
     /// Boundary rule, where the check has one.
+    #[serde(skip)]
     pub boundaries: Boundaries,
-    /// Largest admissible measured value.
+    /// Largest admissible value.
     pub limit: f64,
+    /// Unit of both.
+    pub unit: &'static str,
     /// Why this limit.
     pub reason: String,
+}
+
+impl Claim {
+    /// First part of the id, by which reports group claims.
+    pub fn group(&self) -> &str {
+        self.id.split('/').next().unwrap_or(&self.id)
+    }
+}
+
+#[expect(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "serde passes the field by reference")]
+fn by_name<S: serde::Serializer>(method: &Option<MethodName>, to: S) -> Result<S::Ok, S::Error> {
+    method.map(MethodName::name).serialize(to)
 }
 
 impl ClaimSpec {
     /// The claims of the table: the product of its scenes, methods, quantities and rules.
     pub fn expand(&self) -> Vec<Claim> {
-        fn axis<T: Clone>(values: &[T]) -> Vec<Option<T>> {
-            if values.is_empty() { vec![None] } else { values.iter().cloned().map(Some).collect() }
-        }
-        let mut claims = Vec::new();
-        for scene in axis(&self.scenes) {
-            for velocity in axis(&self.velocities) {
-                for boundaries in axis(&self.boundaries) {
-                    for method in axis(&self.methods) {
-                        for quantity in axis(&self.quantities) {
-                            let mut id = self.id.get_ref().clone();
-                            let mut suffix = |part: &dyn fmt::Display, many: bool| {
-                                if many {
-                                    id.push_str(&format!("/{part}"));
-                                }
-                            };
-                            if let Some(scene) = &scene {
-                                let stem = scene.get_ref().trim_end_matches(".toml");
-                                let stem = stem.rsplit('/').next().unwrap_or(stem);
-                                suffix(&stem, self.scenes.len() > 1);
-                            }
-                            if let Some(velocity) = velocity {
-                                suffix(&velocity, self.velocities.len() > 1);
-                            }
-                            if let Some(boundaries) = boundaries {
-                                suffix(&boundaries, self.boundaries.len() > 1);
-                            }
-                            if let Some(method) = method {
-                                suffix(&method, self.methods.len() > 1);
-                            }
-                            if let Some(quantity) = quantity {
-                                suffix(&quantity.name(), self.quantities.len() > 1);
-                            }
-                            claims.push(Claim {
-                                id,
-                                table: self.id.get_ref().clone(),
-                                statement: self.statement.clone(),
-                                check: self.check.get_ref().clone(),
-                                scene: scene.as_ref().map(|s| s.get_ref().clone()),
-                                method,
-                                quantity,
-                                velocity: velocity.unwrap_or_default(),
-                                boundaries: boundaries.unwrap_or_default(),
-                                limit: *self.limit.get_ref(),
-                                reason: self.reason.clone(),
-                            });
-                        }
-                    }
-                }
-            }
-        }
-        claims
+        let check = self.check.get_ref();
+        let claim = Claim {
+            id: self.id.get_ref().clone(),
+            table: self.id.get_ref().clone(),
+            statement: self.statement.clone(),
+            check: check.clone(),
+            section: self.section.unwrap_or(check.section()),
+            scene: None,
+            method: None,
+            quantity: None,
+            velocity: VelocityAt::default(),
+            boundaries: Boundaries::default(),
+            limit: *self.limit.get_ref(),
+            unit: check.unit(),
+            reason: self.reason.clone(),
+        };
+        let stem = |name: &toml::Spanned<String>| {
+            let stem = name.get_ref().trim_end_matches(".toml");
+            stem.rsplit('/').next().unwrap_or(stem).to_owned()
+        };
+        let claims = varied(&[claim], &self.scenes, stem, |claim, name| claim.scene = Some(name.get_ref().clone()));
+        let claims = varied(&claims, &self.velocities, ToString::to_string, |claim, rule| claim.velocity = *rule);
+        let claims = varied(&claims, &self.boundaries, ToString::to_string, |claim, rule| claim.boundaries = *rule);
+        let claims = varied(&claims, &self.methods, ToString::to_string, |claim, name| claim.method = Some(*name));
+        varied(&claims, &self.quantities, ToString::to_string, |claim, name| claim.quantity = Some(*name))
     }
+}
+
+/// Each of `claims` once for each of `values`, by `set`; where there are several, the id ends with the name of the value.
+fn varied<T>(claims: &[Claim], values: &[T], name: impl Fn(&T) -> String, set: impl Fn(&mut Claim, &T)) -> Vec<Claim> {
+    if values.is_empty() {
+        return claims.to_vec();
+    }
+    let pairs = claims.iter().flat_map(|claim| values.iter().map(move |value| (claim, value)));
+    pairs
+        .map(|(claim, value)| {
+            let mut claim = claim.clone();
+            if values.len() > 1 {
+                claim.id = format!("{}/{}", claim.id, name(value));
+            }
+            set(&mut claim, value);
+            claim
+        })
+        .collect()
 }
 
 /// What a check found.
@@ -434,6 +215,11 @@ impl Measurement {
     /// A plain measurement.
     pub fn new(value: f64) -> Self {
         Self { value, resolution: 0.0, verdict: None, remark: String::new(), evidence: None }
+    }
+
+    /// A measurement that decides nothing, with the reason.
+    pub fn undecided(reason: impl Into<String>) -> Self {
+        Self::new(f64::NAN).verdict(Verdict::Undecided).remark(reason)
     }
 
     /// With words for the report.
@@ -465,6 +251,9 @@ impl Measurement {
     }
 }
 
+/// What measuring a claim gives.
+pub type Found = Result<Measurement, NotMeasured>;
+
 /// Why a claim has no measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NotMeasured {
@@ -483,6 +272,13 @@ impl NotMeasured {
     /// The measurement failed.
     pub fn broken(reason: impl fmt::Display) -> Self {
         Self::Broken(reason.to_string())
+    }
+}
+
+impl<E: std::error::Error> From<E> for NotMeasured {
+    /// An error of what is measured: the claim fails.
+    fn from(error: E) -> Self {
+        Self::broken(error)
     }
 }
 
@@ -514,7 +310,7 @@ pub enum Evidence {
         /// Its points.
         rows: Vec<Row>,
     },
-    /// Measured shots beside their predictions.
+    /// Measured depths beside their predictions.
     Depths(Vec<Comparison>),
     /// The map of Eq. 11-12 for one k.
     Map {
@@ -522,7 +318,7 @@ pub enum Evidence {
         crater_ratio: f64,
         /// Lines of equal error.
         lines: Vec<Line>,
-        /// Measured shots on it.
+        /// Experiments on it.
         scenes: Vec<MarkedScene>,
     },
     /// The boundary of stability.
@@ -531,32 +327,41 @@ pub enum Evidence {
     Rounding(Vec<Floor>),
 }
 
-/// A claim and what became of it.
-#[derive(Clone, Debug)]
+/// A judged claim.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[schemars(rename = "ClaimJson")]
 pub struct Judged {
     /// The claim.
+    #[serde(flatten)]
     pub claim: Claim,
     /// What became of it.
     pub verdict: Verdict,
-    /// Measured value; `None` where nothing was measured or it is not a number.
+    /// Measured value; `null` where there is none, with the reason in `remark`.
     pub measured: Option<f64>,
     /// Half-width of what the measurement can resolve.
+    #[serde(skip)]
     pub resolution: f64,
-    /// What was seen, or why it was skipped or failed.
+    /// What was seen, or why the claim was skipped or failed.
     pub remark: String,
     /// Data for the figures.
+    #[serde(skip)]
     pub evidence: Option<Evidence>,
-    /// Time spent [ms].
+    /// Time spent (ms).
     pub wall_ms: f64,
 }
 
 impl Judged {
+    /// Whether the claim failed or is undecided.
+    pub fn is_open(&self) -> bool {
+        matches!(self.verdict, Verdict::Failed | Verdict::Undecided)
+    }
+
     /// How many times looser the limit is than what was measured, taken as at least one ulp and as at least what the
     /// measurement resolves.
     ///
     /// `None` where nothing was measured, and for counts and limits of zero.
     pub fn looseness(&self) -> Option<f64> {
-        if self.claim.limit == 0.0 || matches!(self.claim.check, Check::Outcome { .. } | Check::EventOrder {}) {
+        if self.claim.limit == 0.0 || self.claim.check.is_count() {
             return None;
         }
         let floor = self.resolution.max(self.claim.check.resolution());
@@ -566,6 +371,28 @@ impl Judged {
 
 /// Largest looseness of a limit that still guards something.
 pub const LOOSENESS_MAX: f64 = 100.0;
+
+/// The claims of each table of the suite together, in its order.
+pub fn tables(judged: &[Judged]) -> impl Iterator<Item = &[Judged]> {
+    judged.chunk_by(|a, b| a.claim.table == b.claim.table)
+}
+
+/// Why claims were skipped, each reason once with the number of claims.
+pub fn skipped(judged: &[Judged]) -> Vec<(&str, usize)> {
+    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    for judged in judged.iter().filter(|j| j.verdict == Verdict::Skipped) {
+        match reasons.iter_mut().find(|(known, _)| *known == judged.remark) {
+            Some((_, number)) => *number += 1,
+            None => reasons.push((&judged.remark, 1)),
+        }
+    }
+    reasons
+}
+
+/// The largest measured value.
+pub fn worst(judged: &[Judged]) -> Option<f64> {
+    judged.iter().filter_map(|j| j.measured).max_by(f64::total_cmp)
+}
 
 /// Looseness of each table that has one: a table has one limit, so the least of its claims decides.
 pub fn looseness(judged: &[Judged]) -> BTreeMap<&str, f64> {

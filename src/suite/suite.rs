@@ -1,37 +1,53 @@
 //! A suite: claims and scenes read from a file or shipped with the program, and the run that judges them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::checks::{self, Context, Memo, PeerAnswers};
-use super::claim::{Check, Claim, ClaimSpec, Judged, NotMeasured};
-use super::verdict::{Counts, Verdict};
-use crate::physics::Scene;
-use crate::physics::SceneError;
-use crate::physics::Shown;
-use crate::physics::scene_file::{SHIPPED, did_you_mean, nearest, read_text};
+use super::checks::{Context, Memo, PeerAnswers, Subject};
+use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
+use super::verdict::Verdict;
+use crate::exchange::SceneError;
+use crate::exchange::diagnostic::{Dialect, Fault, decode, did_you_mean, nearest, read_text};
+use crate::exchange::scene_file::SHIPPED;
+use crate::physics::{Problem, Scene, Shown};
 
 /// The suite that ships.
 pub const EMBEDDED: &str = include_str!("../../verification/suite.toml");
 
-/// Scenes by the name that claims use.
+/// The suite of the edge cases, which `stress` runs.
+pub const EDGES: &str = include_str!("../../verification/edges.toml");
+
+/// Scenes by the name that claims use, each resolved once.
 #[derive(Clone, Debug, Default)]
-pub struct Scenes(BTreeMap<String, Scene>);
+pub struct Scenes(BTreeMap<String, (Scene, Result<Problem, String>)>);
 
 impl Scenes {
     /// The scene `name`.
     pub fn get(&self, name: &str) -> Option<&Scene> {
-        self.0.get(name)
+        self.0.get(name).map(|(scene, _)| scene)
+    }
+
+    /// The problem that the scene `name` describes.
+    ///
+    /// # Errors
+    /// There is no such scene, or it does not resolve; in words.
+    pub fn problem(&self, name: &str) -> Result<&Problem, String> {
+        let (_, problem) = self.0.get(name).ok_or_else(|| format!("no scene {name}"))?;
+        problem.as_ref().map_err(Clone::clone)
     }
 
     /// Names and scenes, by name.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Scene)> {
-        self.0.iter().map(|(name, scene)| (name.as_str(), scene))
+        self.0.iter().map(|(name, (scene, _))| (name.as_str(), scene))
+    }
+
+    fn insert(&mut self, name: &str, scene: Scene) {
+        let problem = scene.problem().map_err(|error| error.to_string());
+        self.0.insert(name.to_owned(), (scene, problem));
     }
 }
 
@@ -41,6 +57,16 @@ struct SuiteFile {
     title: String,
     claim: Vec<ClaimSpec>,
 }
+
+/// What helps with most mistakes.
+const COMPARE: &str = "compare with `verification/suite.toml` of the project, which uses every kind of claim";
+
+const DIALECT: Dialect = Dialect {
+    root: "the suite",
+    table: |path| if path == "claim" { "[[claim]]".to_owned() } else { format!("`{path}`") },
+    remedy: |_| COMPARE.to_owned(),
+    unknown: |_, _| COMPARE.to_owned(),
+};
 
 /// Claims with their scenes, ready to run.
 #[derive(Clone, Debug)]
@@ -66,6 +92,14 @@ impl Suite {
         Self::from_toml(EMBEDDED, "verification/suite.toml", None).map(|suite| Self { is_embedded: true, ..suite })
     }
 
+    /// The edge cases: events, step sizes and range, the search for the critical velocity.
+    ///
+    /// # Errors
+    /// Only if the shipped file is broken, which a test excludes.
+    pub fn edges() -> Result<Self, Box<SceneError>> {
+        Self::from_toml(EDGES, "verification/edges.toml", None).map(|suite| Self { is_embedded: true, ..suite })
+    }
+
     /// The suite in the file at `path`; its scenes are files beside it, or shipped ones by name.
     ///
     /// # Errors
@@ -77,14 +111,10 @@ impl Suite {
     }
 
     fn from_toml(text: &str, file: &str, folder: Option<&Path>) -> Result<Self, Box<SceneError>> {
-        let refuse = |span: Range<usize>, message: String, allowed: &str, help: &str| {
-            SceneError::at(file, text, span, message, allowed, help)
+        let refuse = |span, message: String, allowed: &str, help: &str| {
+            Fault::new(span, message, allowed, help).in_file(file, text)
         };
-        let read: SuiteFile = toml::from_str(text).map_err(|error| {
-            let span = error.span().unwrap_or(0..0);
-            let (message, allowed, help) = told(error.message(), text.get(span.clone()).unwrap_or_default());
-            refuse(span, message, &allowed, &help)
-        })?;
+        let read: SuiteFile = decode(text, &DIALECT).map_err(|fault| fault.in_file(file, text))?;
         if read.claim.is_empty() {
             return Err(refuse(
                 0..0,
@@ -137,7 +167,7 @@ impl Suite {
                         ));
                     }
                 };
-                scenes.0.insert(name.clone(), found);
+                scenes.insert(name, found);
             }
             claims.extend(spec.expand());
         }
@@ -149,7 +179,7 @@ impl Suite {
         self.claims.retain(|claim| claim.id.contains(pattern));
     }
 
-    /// Judges every claim, in parallel, in the suite's order; `done` is told of each as it is judged.
+    /// Judges every claim, in parallel, in the suite's order; `done` is called with each once it is judged.
     pub fn run(&self, seed: u64, peers: &PeerAnswers, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
         let memo = Memo::default();
         let context = Context { scenes: &self.scenes, peers, memo: &memo, seed };
@@ -164,61 +194,34 @@ impl Suite {
     }
 }
 
-/// A reader's `message` on the text `at` in the words of scene files: what is wrong, what is allowed, what to do.
-fn told(message: &str, at: &str) -> (String, String, String) {
-    const COMPARE: &str = "compare with `verification/suite.toml` of the project, which uses every kind of claim";
-    /// Longest list of words that is told in one line [bytes].
-    const KNOWN_MAX: usize = 160;
-    // The reader quotes names: the offending one first, those it expected behind it.
-    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    match quoted[..] {
-        [name, ref known @ ..] if message.starts_with("unknown ") && !known.is_empty() => {
-            let help = nearest(name, known).map_or_else(|| COMPARE.to_owned(), did_you_mean);
-            let mut known = known.join(", ");
-            if known.len() > KNOWN_MAX {
-                "a word of the suite that ships".clone_into(&mut known);
-            }
-            (format!("`{name}` is not known here"), format!("known: {known}"), help)
-        }
-        [name] if message.starts_with("missing field") => {
-            (format!("`{name}` is missing"), format!("`{name}` is required here"), COMPARE.to_owned())
-        }
-        _ if message == "duplicate key" => {
-            (format!("`{at}` is given twice"), "each key once".to_owned(), "remove one of the two".to_owned())
-        }
-        _ => {
-            let message = message.replace("f64", "a number").replace("invalid type: ", "this is of another type: ");
-            (message, "a suite in TOML".to_owned(), COMPARE.to_owned())
-        }
-    }
-}
-
-/// Verdict and counts of a run.
-pub fn summary(judged: &[Judged]) -> (Verdict, Counts) {
-    let counts = Counts::of(judged.iter().map(|j| j.verdict));
-    (counts.verdict(), counts)
-}
-
-/// Measures one claim and holds it against its limit.
+/// Measures one claim and compares it with its limit.
 pub fn judge(claim: &Claim, context: Context<'_>) -> Judged {
     let started = Instant::now();
-    let result = checks::measure(claim, context);
-    let wall_ms = started.elapsed().as_secs_f64() * 1e3;
-    let (verdict, measured, resolution, remark, evidence) = match result {
-        Ok(found) => {
-            let verdict = match found.verdict {
-                Some(verdict) => verdict,
-                None => Verdict::of(found.value, claim.limit),
-            };
-            (verdict, Some(found.value).filter(|v| v.is_finite()), found.resolution, found.remark, found.evidence)
-        }
-        Err(NotMeasured::NotApplicable(reason)) => (Verdict::Skipped, None, 0.0, reason, None),
-        Err(NotMeasured::Broken(reason)) => (Verdict::Failed, None, 0.0, reason, None),
+    let lacks = claim.method.filter(|method| !method.is_built());
+    let found = match lacks {
+        Some(method) => Err(NotMeasured::skip(format!("this build leaves out {method}"))),
+        None => claim.check.measure(&Subject { claim, context }),
     };
-    Judged { claim: claim.clone(), verdict, measured, resolution, remark, evidence, wall_ms }
-}
-
-/// Whether `check` needs another program's answers.
-pub fn needs_peer(check: &Check) -> bool {
-    matches!(check, Check::Peer { .. })
+    let wall_ms = started.elapsed().as_secs_f64() * 1e3;
+    let judged = Judged {
+        claim: claim.clone(),
+        verdict: Verdict::Failed,
+        measured: None,
+        resolution: 0.0,
+        remark: String::new(),
+        evidence: None,
+        wall_ms,
+    };
+    match found {
+        Ok(found) => Judged {
+            verdict: found.verdict.unwrap_or_else(|| Verdict::of(found.value, claim.limit)),
+            measured: Some(found.value).filter(|v| v.is_finite()),
+            resolution: found.resolution,
+            remark: found.remark,
+            evidence: found.evidence,
+            ..judged
+        },
+        Err(NotMeasured::NotApplicable(remark)) => Judged { verdict: Verdict::Skipped, remark, ..judged },
+        Err(NotMeasured::Broken(remark)) => Judged { remark, ..judged },
+    }
 }

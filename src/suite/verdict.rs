@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::claim::Judged;
+
 /// What became of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -18,7 +20,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Name in the contract.
+    /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -60,6 +62,30 @@ impl Counts {
             }
         }
         counts
+    }
+
+    /// Counts the verdicts of judged claims.
+    pub fn of_claims<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Self {
+        Self::of(judged.into_iter().map(|judged| judged.verdict))
+    }
+
+    /// Verdicts and their numbers, the gravest first.
+    pub fn each(&self) -> [(Verdict, usize); 4] {
+        [
+            (Verdict::Failed, self.failed),
+            (Verdict::Undecided, self.undecided),
+            (Verdict::Passed, self.passed),
+            (Verdict::Skipped, self.skipped),
+        ]
+    }
+
+    /// The verdict of a group of claims: skipped if all of them were, else [`Counts::verdict`].
+    pub fn of_group(&self) -> Verdict {
+        if self.skipped > 0 && self.skipped == self.each().iter().map(|(_, number)| number).sum::<usize>() {
+            Verdict::Skipped
+        } else {
+            self.verdict()
+        }
     }
 
     /// The verdict of the whole: failed if a claim failed, else undecided if one is, else passed.

@@ -19,7 +19,7 @@ use std::time::Instant;
 use penetrode::integrators::diffsol::{Diffsol, Scheme};
 use penetrode::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
 use penetrode::physics::reference::{self, Conditions, Source};
-use penetrode::physics::scene_file::SHIPPED;
+use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::physics::{EventKind, Outcome, Problem, Scene, State};
 use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::random_scenes::Generator;
@@ -32,7 +32,7 @@ const LEVELS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 /// Rounds of timing: in each, every solver flies once.
 const ROUNDS: usize = 9;
 
-/// Time of one sample [s].
+/// Time of one sample (s).
 const SAMPLE: f64 = 2e-3;
 
 /// Share of the varied scenes that must reach an error.
@@ -112,25 +112,26 @@ impl Flown {
 }
 
 /// Flies `problems` by `config`, one after the other, with whatever the solver can keep kept.
-fn fly_all(config: Config, problems: &[Problem], mut answer: impl FnMut(Result<Flown, String>)) {
+fn solve_all(config: Config, problems: &[Problem], mut answer: impl FnMut(Result<Flown, String>)) {
     let rtol = config.rtol;
     let mut each = |fly_leg: &mut dyn FnMut(&Leg) -> Result<LegEnd, String>| {
         problems.iter().for_each(|problem| answer(chain(problem, &mut *fly_leg)));
     };
     match config.method {
-        Method::DiffsolTsit45 => diffsol_by_hand::with_tsit45(rtol, |fly| each(fly)),
-        Method::DiffsolBdf => diffsol_by_hand::with_bdf(rtol, |fly| each(fly)),
+        Method::DiffsolTsit45 => diffsol_by_hand::with_tsit45(rtol, |solve| each(solve)),
+        Method::DiffsolBdf => diffsol_by_hand::with_bdf(rtol, |solve| each(solve)),
         Method::OdeDopri5 => each(&mut |leg| ode_solvers_by_hand::dopri5(leg, rtol)),
         Method::OdeDop853 => each(&mut |leg| ode_solvers_by_hand::dop853(leg, rtol)),
         Method::DeDopri5 => each(&mut |leg| differential_equations_by_hand::dopri5(leg, rtol)),
         Method::DeDop853 => each(&mut |leg| differential_equations_by_hand::dop853(leg, rtol)),
-        Method::Adapter(scheme) => Diffsol::new(scheme, rtol)
-            .study(|fly_one| problems.iter().for_each(|p| answer(Flown::of(fly_one(p, Detail::Events)))))
-            .expect("a tolerance that the adapter takes"),
+        Method::Adapter(scheme) => {
+            let adapter = Diffsol::new(scheme, rtol).reusing().expect("a tolerance that the adapter takes");
+            problems.iter().for_each(|p| answer(Flown::of(adapter.solve(p, Detail::Events))));
+        }
         Method::Taylor | Method::ClosedForm => {
             let taylor = Taylor::with_rtol(rtol).expect("a tolerance that the series takes");
             let method: &dyn Integrator = if config.method == Method::Taylor { &taylor } else { &ClosedForm };
-            problems.iter().for_each(|p| answer(Flown::of(method.fly(p, Detail::Events))));
+            problems.iter().for_each(|p| answer(Flown::of(method.solve(p, Detail::Events))));
         }
     }
 }
@@ -182,7 +183,7 @@ impl Known {
     }
 }
 
-/// A solver on a list of scenes: its error there, failed flights, and times of one flight [s].
+/// A solver on a list of scenes: its error there, failed flights, and times of one flight (s).
 struct Measured {
     config: Config,
     error: f64,
@@ -209,7 +210,7 @@ fn measure(known: &[Known], copies: usize) -> Vec<Measured> {
     for config in configs() {
         let mut errors = Vec::with_capacity(problems.len());
         let mut answers = 0;
-        fly_all(config, &problems, |found| {
+        solve_all(config, &problems, |found| {
             errors.push(known[answers / copies].error(&found));
             answers += 1;
         });
@@ -225,7 +226,7 @@ fn measure(known: &[Known], copies: usize) -> Vec<Measured> {
         for one in measured.iter_mut().filter(|one| one.error <= LEVELS[0]) {
             let (start, mut flights) = (Instant::now(), 0);
             let elapsed = loop {
-                fly_all(one.config, &problems, |found| {
+                solve_all(one.config, &problems, |found| {
                     let _ = black_box(found);
                 });
                 flights += problems.len();
@@ -335,7 +336,7 @@ fn count(arguments: &[String]) {
     };
     let problems: Vec<Problem> =
         scenes.iter().map(|scene| scene.problem().unwrap_or_else(|error| panic!("{error}"))).collect();
-    fly_all(config, &problems, |found| {
+    solve_all(config, &problems, |found| {
         let _ = black_box(found);
     });
 }

@@ -14,8 +14,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::physics::{CraterStiffness, Criterion, Scene};
-use crate::studies::batch::{COLUMNS, PART, random_rows};
+use crate::exchange::tables::push_line;
+use crate::studies::batch::{PART, SCENES, cells_of, random_rows};
 
 /// Most scenes that are read from a file.
 pub const FILE_MAX: u64 = 1_000_000;
@@ -32,11 +32,11 @@ pub struct Growth {
     pub threads: u16,
     /// `file` or `generator`.
     pub source: Source,
-    /// Time of the whole process, start and end included [s]: the shortest of the runs.
+    /// Time of the whole process, start and end included (s): the shortest of the runs.
     pub seconds: f64,
-    /// That time over the scenes [ns].
+    /// That time over the scenes (ns).
     pub ns_a_scene: f64,
-    /// Peak memory of the process [bytes]; `null` where the system does not tell.
+    /// Peak memory of the process (bytes); `null` where the system does not report it.
     pub peak_bytes: Option<u64>,
     /// Runs.
     pub runs: usize,
@@ -92,7 +92,7 @@ pub fn measure(
     counts: &[u64],
     threads: &[u16],
     seed: u64,
-    tell: &dyn Fn(),
+    done: &dyn Fn(),
 ) -> Result<Vec<Growth>, GrowthError> {
     let folder = tempfile::tempdir().map_err(|cause| system("a temporary folder", cause))?;
     let mut growths = Vec::new();
@@ -104,7 +104,7 @@ pub fn measure(
         }
         for &threads in threads {
             growths.push(repeated(program, &table, (scenes, threads), source, seed)?);
-            tell();
+            done();
         }
     }
     Ok(growths)
@@ -140,7 +140,7 @@ fn repeated(
     Ok(growth)
 }
 
-/// Runs `command` to its end: time [s] and peak memory [bytes].
+/// Runs `command` to its end: time (s) and peak memory (bytes).
 fn run(command: &mut Command, scenes: u64) -> Result<(f64, Option<u64>), GrowthError> {
     let failed = |cause| system("penetrode batch", cause);
     let mut complaints = tempfile::tempfile().map_err(failed)?;
@@ -171,7 +171,7 @@ fn run(command: &mut Command, scenes: u64) -> Result<(f64, Option<u64>), GrowthE
     Err(GrowthError::Batch { scenes, status: status.to_string(), said })
 }
 
-/// High-water mark of the resident memory of process `id` [bytes], where the system has one to read.
+/// High-water mark of the resident memory of process `id` (bytes), where the system has one to read.
 fn peak_bytes(id: u32) -> Option<u64> {
     let status = fs::read_to_string(format!("/proc/{id}/status")).ok()?;
     let kilobytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -181,11 +181,13 @@ fn peak_bytes(id: u32) -> Option<u64> {
 /// Writes the first `count` scenes of the random table with `seed` as CSV.
 fn write_scenes(path: &Path, count: u64, seed: u64) -> io::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
-    writeln!(file, "{}", COLUMNS.join(","))?;
+    writeln!(file, "{}", SCENES.header())?;
     let mut left = count as usize;
     for part in 0.. {
         for scene in random_rows(seed, part).take(left) {
-            writeln!(file, "{}", scene_line(&scene))?;
+            let mut line = String::new();
+            push_line(&mut line, &cells_of(&scene));
+            file.write_all(line.as_bytes())?;
         }
         left = left.saturating_sub(PART);
         if left == 0 {
@@ -195,31 +197,13 @@ fn write_scenes(path: &Path, count: u64, seed: u64) -> io::Result<()> {
     file.flush()
 }
 
-/// A scene of the generator as a line of a table, in the order of [`COLUMNS`].
-fn scene_line(scene: &Scene) -> String {
-    let of = |value: f64| value.to_string();
-    let optional = |value: Option<f64>| value.map_or_else(String::new, of);
-    let mut cells = vec![of(scene.mass)];
-    if let Some(c) = scene.concrete() {
-        let stiffness = match c.crater_stiffness {
-            CraterStiffness::Continuous => None,
-            CraterStiffness::Given(stiffness) => Some(stiffness),
-        };
-        cells.extend([c.diameter, c.nose_factor, c.strength, c.density].map(of));
-        cells.push(optional(scene.thickness));
-        cells.extend([c.static_factor, c.inertia_factor, c.crater_ratio].map(of));
-        cells.push(optional(stiffness));
-    }
-    cells.push(optional(scene.velocity));
-    cells.push(if scene.criterion == Criterion::Ndrc { "ndrc" } else { "" }.to_owned());
-    cells.join(",")
-}
-
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
     use super::*;
-    use crate::studies::batch::csv::CsvScenes;
+    use crate::exchange::tables::{CsvTable, Rows};
+    use crate::physics::Scene;
+    use crate::studies::batch::Scenes;
 
     #[test]
     fn the_table_reads_back_to_the_scenes_of_the_generator() {
@@ -227,13 +211,10 @@ mod tests {
         let path = folder.path().join("scenes.csv");
         for count in [1, 1023, 1024, 1500] {
             write_scenes(&path, count, 7).unwrap();
-            let mut table = CsvScenes::new("scenes", File::open(&path).unwrap()).unwrap();
-            let records = table.next_rows(10_000, None).unwrap();
-            assert_eq!(records.len() as u64, count);
-            let expected: Vec<Scene> = (0..2).flat_map(|part| random_rows(7, part)).take(count as usize).collect();
-            for (index, scene) in expected.iter().enumerate() {
-                assert_eq!(records.scene(index).as_ref(), Ok(scene));
-            }
+            let mut table = CsvTable::new("scenes", File::open(&path).unwrap(), &SCENES).unwrap();
+            let read = Scenes::Table(Rows::Csv(table.next_rows(10_000, None).unwrap()));
+            let expected: Vec<Scene> = (0..6).flat_map(|part| random_rows(7, part)).take(count as usize).collect();
+            assert_eq!(read.scenes(0..read.len()), expected.into_iter().map(Ok).collect::<Vec<_>>());
         }
     }
 

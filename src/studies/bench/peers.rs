@@ -2,23 +2,20 @@
 //!
 //! A peer times itself (`wall_ns`, and `wall_ns_quartiles` where it gives the spread): reading, writing and whatever it
 //! prepares for a question do not count, so that a compiled integrator is timed compiled. The first question of each
-//! kind asks for one flight and warms it; the second asks for as many as are worth timing, and is left out where one is
-//! enough.
+//! kind asks for one flight and warms it; the second asks for as many as are timed, and is left out where one is enough.
 
 use super::timing::{Effort, Timing};
-use super::work_precision::{Case, Judgement, Known, Run, Setting, Tally};
-use crate::integrators::{Cost, Events, Flight};
-use crate::physics::{Event, Problem, State};
-use crate::studies::peers::{BundledPeer, Peer, PeerAnswer, PeerFailure, PeerRequest};
+use super::work_precision::{Case, Judgement, Known, Run, Setting, Tally, until_too_long};
+use crate::exchange::peers::{BundledPeer, Peer, PeerAnswer, PeerFailure, PeerRequest};
 
 /// Tolerances that peers are asked for, by their digits.
 const DIGITS: std::ops::RangeInclusive<i32> = 2..=13;
 
-/// Time that the repeats of one question may take [ns].
+/// Time that the repeats of one question may take (ns).
 const TOGETHER_NS: f64 = 1e9;
 
-/// A peer whose pass over the scenes took longer than this is not asked at finer tolerances [ns].
-const PASS_NS: f64 = 2e10;
+/// A peer whose pass over the scenes took longer than this is not asked at finer tolerances (s).
+const PASS_S: f64 = 20.0;
 
 /// Flights of one question at most.
 const REPEATS_MAX: u32 = 10_000;
@@ -26,7 +23,7 @@ const REPEATS_MAX: u32 = 10_000;
 /// Flights of one scene where a case has many.
 const REPEATS_OF_MANY: u32 = 3;
 
-/// Where a case has many scenes, a flight that takes longer is timed once [ns]: what a first one costs more is little
+/// Where a case has many scenes, a flight that takes longer is timed once (ns): what a first one costs more is little
 /// beside it, and the mean is over the scenes.
 const LONG_NS: f64 = 1e5;
 
@@ -42,25 +39,12 @@ pub const BUNDLED: [(&str, BundledPeer, &str); 6] = [
 
 /// Every tolerance of `peer`, called `name`, on `case`. What goes wrong is a run that failed.
 pub fn runs(case: &Case, name: &str, peer: &mut Peer, effort: Effort) -> Vec<Run> {
-    let mut runs = Vec::new();
-    let mut too_long: Option<String> = None;
-    for rtol in DIGITS.map(|digits| 10f64.powi(-digits)) {
-        let tally = Tally::new(case, name, Setting::Tolerance(rtol));
-        if let Some(why) = &too_long {
-            runs.push(tally.not_run(why));
-            continue;
-        }
-        let run = run(case, peer, rtol, effort, tally);
-        let pass = run.time.map_or(0.0, |time| time.median_ns * case.problems.len() as f64);
-        if pass > PASS_NS {
-            too_long = Some(format!("{rtol:.0e} took {:.0} s", pass * 1e-9));
-        }
-        runs.push(run);
-    }
-    runs
+    let settings = DIGITS.map(|digits| Setting::Tolerance(10f64.powi(-digits))).collect();
+    until_too_long(case, name, settings, PASS_S, |setting, tally| run(case, peer, setting, effort, tally))
 }
 
-fn run(case: &Case, peer: &mut Peer, rtol: f64, effort: Effort, mut tally: Tally) -> Run {
+fn run(case: &Case, peer: &mut Peer, setting: Setting, effort: Effort, mut tally: Tally) -> Run {
+    let Setting::Tolerance(rtol) = setting else { return tally.not_run("a peer is asked for a tolerance") };
     let mut timings = Vec::new();
     for known in &case.problems {
         let request = PeerRequest::from_problem(&known.problem, rtol);
@@ -75,7 +59,7 @@ fn run(case: &Case, peer: &mut Peer, rtol: f64, effort: Effort, mut tally: Tally
     tally.finish(mean(&timings))
 }
 
-/// The answer, and the time of one flight if the peer tells it.
+/// The answer, and the time of one flight if the peer measures it.
 fn ask(
     peer: &mut Peer,
     request: &PeerRequest,
@@ -111,29 +95,5 @@ fn mean(timings: &[Timing]) -> Option<Timing> {
 
 fn judge(known: &Known, answer: &PeerAnswer) -> Judgement {
     // Events are not compulsory: what is not listed is not judged, but the end always is.
-    known.judge(&flight_of(answer, &known.problem), !answer.events.is_empty())
-}
-
-/// The answer in the words of our flights.
-fn flight_of(answer: &PeerAnswer, problem: &Problem) -> Flight {
-    let events: Events = answer
-        .events
-        .iter()
-        .filter_map(|event| {
-            let state = State { time: event.time_s, depth: event.depth_m, velocity: event.velocity_m_s };
-            Some(Event { kind: event.kind(problem)?, state })
-        })
-        .collect();
-    Flight {
-        outcome: answer.outcome,
-        stage: 0,
-        end: State { time: answer.time_s, depth: answer.depth_m, velocity: answer.velocity_m_s },
-        events,
-        exit_margin: None,
-        exit_margin_error: None,
-        cost: Cost { force_evaluations: answer.force_evaluations.unwrap_or(0), ..Cost::default() },
-        trajectory: Vec::new(),
-        step_limit: None,
-        notes: Vec::new(),
-    }
+    known.judge(&answer.flight(&known.problem), !answer.events.is_empty())
 }

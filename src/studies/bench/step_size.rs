@@ -16,9 +16,8 @@ use crate::integrators::{
     MethodOptions, VelocityAt,
 };
 use crate::physics::{Problem, Scene};
-use crate::studies::convergence::Yardstick;
 use crate::studies::critical_velocity;
-use crate::studies::error::{flight_error, is_fixed, signed_error};
+use crate::studies::error::{Truth, flight_error, is_fixed, signed_error};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
@@ -29,11 +28,10 @@ pub const LEVELS: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 pub const QUANTITIES: [Quantity; 4] = [Quantity::Depth, Quantity::Time, Quantity::Velocity, Quantity::CriticalVelocity];
 
 /// Velocity rules of the variants.
-pub const VELOCITIES: [VelocityAt; 3] =
-    [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
+pub const VELOCITIES: [VelocityAt; 3] = VelocityAt::ALL;
 
 /// Boundary rules of the variants.
-pub const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
+pub const BOUNDARIES: [Boundaries; 3] = Boundaries::ALL;
 
 /// Adaptive methods that stand beside the variants, as far as the build has them.
 const ADAPTIVE: [MethodName; 2] = [MethodName::Taylor, MethodName::Tsit45];
@@ -57,7 +55,7 @@ pub struct Walk {
     pub from: f64,
     /// Smallest size.
     pub to: f64,
-    /// Sizes in each decade on the way down.
+    /// Sizes in each decade, from large to small.
     pub per_decade: usize,
     /// Sizes tried just below a crossing, a round.
     pub probes: usize,
@@ -65,7 +63,7 @@ pub struct Walk {
     pub seed: u64,
 }
 
-/// What was tried on the way down: size and error, descending; `None` where there is no error to measure.
+/// What was tried: size and error, descending; `None` where there is no error to measure.
 pub type Tried = Vec<(f64, Option<f64>)>;
 
 impl Walk {
@@ -151,11 +149,11 @@ fn halved(mut held: f64, mut failing: f64, level: f64, error: &mut dyn FnMut(f64
 /// A size that was tried.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Point {
-    /// Step [s] of a variant, tolerance of an adaptive method.
+    /// Step (s) of a variant, tolerance of an adaptive method.
     pub size: f64,
     /// Error, absolute; `null` with another outcome than the exact one.
     pub error: Option<f64>,
-    /// Time of one flight, or of one search for V_c [ns]; `null` where there was no answer.
+    /// Time of one flight, or of one search for V_c (ns); `null` where there was no answer.
     pub time_ns: Option<f64>,
 }
 
@@ -164,7 +162,7 @@ pub struct Point {
 pub struct Held {
     /// Error to hold.
     pub level: f64,
-    /// Largest step [s] or tolerance such that it and every smaller one that was tried hold the level; `null` if none.
+    /// Largest step (s) or tolerance such that it and every smaller one that was tried hold the level; `null` if none.
     pub size: Option<f64>,
     /// Steps of one flight, or of all flights of one search for V_c.
     pub steps: Option<u64>,
@@ -174,14 +172,14 @@ pub struct Held {
     pub time: Option<Timing>,
 }
 
-/// One way to compute a quantity, over its size.
+/// One method for a quantity, over its size.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Curve {
     /// `lagged/step-end` and the like, or the name of an adaptive method.
     pub method: String,
     /// Whether sizes are tolerances and not steps.
     pub adaptive: bool,
-    /// Sizes on the way down.
+    /// Sizes tried, descending.
     pub points: Vec<Point>,
     /// The largest that hold each level.
     pub held: Vec<Held>,
@@ -194,7 +192,7 @@ pub struct StepStudy {
     pub scene: String,
     /// Quantity.
     pub quantity: Quantity,
-    /// Time of the exact flight [s], which is the largest step tried.
+    /// Time of the exact flight (s), which is the largest step tried.
     pub flight_time_s: f64,
     /// Curves: the nine variants, then the adaptive methods.
     pub curves: Vec<Curve>,
@@ -206,7 +204,7 @@ struct Question<'a> {
     scene: &'a Scene,
     problem: &'a Problem,
     exact: &'a Flight,
-    /// Exact critical velocity [m/s], where that is the quantity.
+    /// Exact critical velocity (m/s), where that is the quantity.
     critical: Option<f64>,
     quantity: Quantity,
 }
@@ -219,7 +217,7 @@ impl Question<'_> {
             let error = signed_error(self.quantity, found.velocity, critical, 1.0).abs();
             return Some((error.is_finite().then_some(error), found.cost));
         }
-        let flight = method.fly(self.problem, Detail::Events).ok()?;
+        let flight = method.solve(self.problem, Detail::Events).ok()?;
         Some((flight_error(self.quantity, &flight, self.exact, self.problem.impact_speed).map(f64::abs), flight.cost))
     }
 
@@ -271,7 +269,7 @@ impl Question<'_> {
 /// [`CaseError`]: the scene does not resolve, or has nothing to measure by.
 pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<Vec<StepStudy>, CaseError> {
     let problem = scene.problem()?;
-    let exact = Yardstick::of(&problem)?.flight;
+    let exact = Truth::of(&problem)?.flight;
     let mut studies = Vec::new();
     for quantity in questions(scene, &problem, &exact) {
         let critical = match quantity {
@@ -370,11 +368,11 @@ mod tests {
     }
 
     fn study(scene: &str, quantity: Quantity) -> (Problem, Flight, StepStudy) {
-        use crate::physics::scene_file::SHIPPED;
+        use crate::exchange::scene_file::SHIPPED;
         let text = SHIPPED.iter().find(|(name, _)| *name == scene).unwrap().1;
         let scene_read = Scene::from_toml(text, scene).unwrap();
         let problem = scene_read.problem().unwrap();
-        let exact = Yardstick::of(&problem).unwrap().flight;
+        let exact = Truth::of(&problem).unwrap().flight;
         let studies = of_scene(scene, &scene_read, Effort { samples: 1 }, 3).unwrap();
         (problem, exact, studies.into_iter().find(|study| study.quantity == quantity).unwrap())
     }

@@ -5,27 +5,27 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Shortest sample [ns]; shorter work is repeated within one, so that the clock does not count.
+/// Shortest sample (ns); shorter work is repeated within one, so that the clock does not count.
 const SAMPLE_NS: f64 = 100_000.0;
 
-/// Longest time that the samples of one piece of work take together [ns], but for the first.
+/// Longest time that the samples of one piece of work take together (ns), but for the first.
 const TOGETHER_NS: f64 = 1e9;
 
 /// A measured time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Timing {
-    /// Median of the samples [ns].
+    /// Median of the samples (ns).
     pub median_ns: f64,
-    /// A quarter of the samples lies below [ns].
+    /// A quarter of the samples lies below (ns).
     pub low_ns: f64,
-    /// A quarter of the samples lies above [ns].
+    /// A quarter of the samples lies above (ns).
     pub high_ns: f64,
     /// Samples taken.
     pub samples: usize,
 }
 
 impl Timing {
-    /// Median and quartiles of `samples` [ns]; `None` without any.
+    /// Median and quartiles of `samples` (ns); `None` without any.
     pub fn of(mut samples: Vec<f64>) -> Option<Self> {
         samples.sort_by(f64::total_cmp);
         let last = samples.len().checked_sub(1)?;
@@ -46,7 +46,7 @@ impl Timing {
     }
 }
 
-/// How much effort a measurement is worth.
+/// The effort of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
     /// Samples of each time, at least one; fewer where one alone takes long.
@@ -67,7 +67,7 @@ impl Effort {
     }
 }
 
-/// Time of one of `count` runs [ns].
+/// Time of one of `count` runs (ns).
 fn elapsed(count: usize, work: &mut dyn FnMut()) -> f64 {
     let started = Instant::now();
     for _ in 0..count {

@@ -11,17 +11,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::timing::{Effort, Timing};
-use crate::integrators::batch::Batch;
 use crate::integrators::central_difference::default_time_step;
+use crate::integrators::lanes::Batch;
 use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Method, MethodName, MethodOptions, VelocityAt,
 };
 use crate::physics::reference::{self, Conditions, ExactFlight, Source};
-use crate::physics::{Outcome, Problem, ResolveError, Scene};
-use crate::studies::convergence::Yardstick;
-use crate::studies::error::{flight_error, is_fixed};
+use crate::physics::{Advice, Outcome, Problem, ResolveError, Scene};
+use crate::studies::error::{Errors, Truth, flight_error, free_quantities};
 use crate::studies::quantity::Quantity;
-use crate::studies::random_scenes::{Generator, errors_beside};
+use crate::studies::random_scenes::Generator;
 
 /// The accuracies at which the fastest run of a method is sought.
 pub const LEVELS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
@@ -32,9 +31,9 @@ const PASS_S: f64 = 2.0;
 /// Steps of the central difference over the default one ([`default_time_step`]), coarse to fine.
 const STEPS_OVER_DEFAULT: [f64; 6] = [1000.0, 100.0, 10.0, 1.0, 0.1, 0.01];
 
-/// What a flight is measured by.
+/// What a flight is compared with.
 #[derive(Clone, Debug)]
-enum Ruler {
+enum Reference {
     /// 50 digits, and how the problem itself magnifies errors of its inputs.
     Exact(Box<ExactFlight>, Conditions),
     /// The Taylor series to round-off, where nothing exact is known.
@@ -46,15 +45,15 @@ enum Ruler {
 pub struct Known {
     /// The problem.
     pub problem: Problem,
-    ruler: Ruler,
+    reference: Reference,
 }
 
-/// What became of one flight.
+/// The judgement on one solution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Judgement {
     /// The right outcome, its largest error and where.
     Right(f64, Quantity),
-    /// The method says that it cannot tell.
+    /// The method cannot decide the outcome.
     Undecided,
     /// Another outcome than the exact one, an event too few or too many, or not a number.
     Wrong(String),
@@ -69,16 +68,16 @@ impl Known {
     /// When it has neither.
     pub fn new(problem: Problem) -> Result<Self, IntegrationError> {
         let source = Source::Problem(&problem);
-        let ruler = match (reference::flight(source), reference::conditions(source)) {
-            (Ok(exact), Ok(conditions)) => Ruler::Exact(Box::new(exact), conditions),
-            _ => Ruler::Refined(Box::new(Yardstick::of(&problem)?.flight)),
+        let known = match (reference::flight(source), reference::conditions(source)) {
+            (Ok(exact), Ok(conditions)) => Reference::Exact(Box::new(exact), conditions),
+            _ => Reference::Refined(Box::new(Truth::of(&problem)?.flight)),
         };
-        Ok(Self { problem, ruler })
+        Ok(Self { problem, reference: known })
     }
 
     /// Whether the answer is known to 50 digits.
     pub fn is_exact(&self) -> bool {
-        matches!(self.ruler, Ruler::Exact(..))
+        matches!(self.reference, Reference::Exact(..))
     }
 
     /// The error of `flight`; without `with_crater_end` the state at x = k d is left out.
@@ -86,28 +85,20 @@ impl Known {
         if flight.outcome == Outcome::Undecided {
             return Judgement::Undecided;
         }
-        let exact = match &self.ruler {
-            Ruler::Exact(exact, _) => exact.outcome,
-            Ruler::Refined(refined) => refined.outcome,
+        let exact = match &self.reference {
+            Reference::Exact(exact, _) => exact.outcome,
+            Reference::Refined(refined) => refined.outcome,
         };
         if !flight.outcome.agrees_with(exact) {
             return Judgement::Wrong(format!("{} in place of {exact}", flight.outcome));
         }
-        let errors = match &self.ruler {
-            Ruler::Exact(exact, conditions) => {
-                let ulps = errors_beside(flight, exact, conditions).0;
-                ulps.into_iter().map(|(ulp, quantity)| (ulp * f64::EPSILON, quantity)).collect()
-            }
-            Ruler::Refined(refined) => self.errors_beside_refined(flight, refined),
-        };
         let mut worst = (0.0, Quantity::Depth);
-        for (error, quantity) in errors {
-            let at_crater_end = matches!(quantity, Quantity::CraterEndTime | Quantity::CraterEndVelocity);
-            if at_crater_end && !with_crater_end {
+        for (error, quantity) in self.errors(flight) {
+            if quantity.is_at_crater_end() && !with_crater_end {
                 continue;
             }
             if !error.is_finite() {
-                return Judgement::Wrong(if at_crater_end {
+                return Judgement::Wrong(if quantity.is_at_crater_end() {
                     "x = k d is an event too few or too many".to_owned()
                 } else {
                     format!("{quantity} is not a number")
@@ -120,19 +111,24 @@ impl Known {
         Judgement::Right(worst.0, worst.1)
     }
 
-    fn errors_beside_refined(&self, flight: &Flight, refined: &Flight) -> Vec<(f64, Quantity)> {
-        Quantity::ALL
-            .into_iter()
-            .filter(|quantity| !is_fixed(*quantity, refined) && *quantity != Quantity::CriticalVelocity)
-            .map(|quantity| {
-                let error = flight_error(quantity, flight, refined, self.problem.impact_speed);
-                (error.map_or(f64::NAN, f64::abs), quantity)
-            })
-            .collect()
+    /// Relative errors of a flight with the right outcome, over max(1, condition number) where that is known.
+    fn errors(&self, flight: &Flight) -> Vec<(f64, Quantity)> {
+        match &self.reference {
+            Reference::Exact(exact, conditions) => {
+                let errors = Errors::in_50_digits(flight, exact, conditions).0;
+                errors.into_iter().map(|(error, quantity)| (error * f64::EPSILON, quantity)).collect()
+            }
+            Reference::Refined(refined) => free_quantities(refined)
+                .map(|quantity| {
+                    let error = flight_error(quantity, flight, refined, self.problem.impact_speed);
+                    (error.map_or(f64::NAN, f64::abs), quantity)
+                })
+                .collect(),
+        }
     }
 }
 
-/// What is flown: one scene, or many one after the other.
+/// What is solved: one scene, or many one after the other.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// Name.
@@ -152,6 +148,15 @@ pub enum CaseError {
     /// It has no answer to measure by.
     #[error(transparent)]
     Integration(#[from] IntegrationError),
+}
+
+impl Advice for CaseError {
+    fn inner(&self) -> Option<&dyn Advice> {
+        Some(match self {
+            Self::Resolve(error) => error,
+            Self::Integration(error) => error,
+        })
+    }
 }
 
 impl Case {
@@ -210,14 +215,15 @@ impl std::fmt::Display for Setting {
     }
 }
 
-/// Flies one problem.
-pub type FlyOne<'a> = dyn FnMut(&Problem) -> Result<Flight, IntegrationError> + 'a;
+/// Solves one problem.
+pub type SolveOne<'a> = dyn FnMut(&Problem) -> Result<Flight, IntegrationError> + 'a;
 
 impl Contender {
     /// Every contender of this build: each method, the paper's variant of its scheme and the most accurate one.
     pub fn all() -> Vec<Self> {
         let mut all: Vec<_> = MethodName::ALL
-            .into_iter()
+            .iter()
+            .copied()
             .filter(|name| name.is_built() && *name != MethodName::CentralDifference)
             .map(Self::Method)
             .collect();
@@ -249,28 +255,25 @@ impl Contender {
         }
     }
 
-    /// Hands `work` the function that flies one problem, with whatever the method keeps from flight to flight.
-    fn with<R>(self, setting: Setting, work: impl FnOnce(&mut FlyOne<'_>) -> R) -> Result<R, IntegrationError> {
+    /// Calls `work` with the function that solves one problem, and that reuses what the method stores between solutions.
+    fn with<R>(self, setting: Setting, work: impl FnOnce(&mut SolveOne<'_>) -> R) -> Result<R, IntegrationError> {
         match self {
             Self::Batch => {
-                Ok(work(&mut |problem| Batch::new().fly(std::slice::from_ref(problem)).remove(0).map(|s| s.flight())))
+                Ok(work(&mut |problem| Batch::new().solve(std::slice::from_ref(problem)).remove(0).map(|s| s.flight())))
             }
             Self::Scheme(velocity, boundaries) => {
                 let factor = if let Setting::Step(factor) = setting { factor } else { 1.0 };
                 Ok(work(&mut |problem| {
                     let step = factor * default_time_step(problem, velocity);
-                    CentralDifference::uniform(step, velocity, boundaries).fly_in(problem, Detail::Events)
+                    CentralDifference::uniform(step, velocity, boundaries).solve_in(problem, Detail::Events)
                 }))
             }
             Self::Method(name) => {
                 let rtol = if let Setting::Tolerance(rtol) = setting { Some(rtol) } else { None };
-                match Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() })? {
-                    #[cfg(feature = "diffsol")]
-                    Method::Diffsol(method) => method.study(|fly| work(&mut |problem| fly(problem, Detail::Events))),
-                    #[cfg(feature = "diffsol")]
-                    Method::Adaptive(method) => method.study(|fly| work(&mut |problem| fly(problem, Detail::Events))),
-                    method => Ok(work(&mut |problem| method.integrator().fly(problem, Detail::Events))),
-                }
+                let method = Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() })?;
+                let reused = method.integrator().reusing();
+                let integrator = reused.as_deref().unwrap_or(method.integrator());
+                Ok(work(&mut |problem| integrator.solve(problem, Detail::Events)))
             }
         }
     }
@@ -281,11 +284,12 @@ pub fn variant_name(velocity: VelocityAt, boundaries: Boundaries) -> String {
     format!("{velocity}/{boundaries}")
 }
 
-/// What became of the flights of a run, at its worst.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+/// The judgement on all solutions of a run: the worst.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RunState {
     /// Every flight has the right outcome.
+    #[default]
     Right,
     /// A flight is undecided, the others are right.
     Undecided,
@@ -308,7 +312,7 @@ impl RunState {
 }
 
 /// One contender at one setting on one case.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Run {
     /// Case.
     pub scene: String,
@@ -320,7 +324,7 @@ pub struct Run {
     pub rtol: Option<f64>,
     /// Step over the default step of the scene, for the paper's scheme.
     pub step_over_default: Option<f64>,
-    /// What became of it.
+    /// The worst judgement on its solutions.
     pub state: RunState,
     /// Flights with the right outcome.
     pub right: usize,
@@ -336,7 +340,7 @@ pub struct Run {
     pub quantity: Option<Quantity>,
     /// Mean evaluations of the force a flight; `null` where they are not counted.
     pub force_evaluations: Option<f64>,
-    /// Time of one flight, the mean over the scenes of the case; `null` when nothing was flown.
+    /// Time of one flight, the mean over the scenes of the case; `null` when nothing was solved.
     pub time: Option<Timing>,
 }
 
@@ -356,15 +360,7 @@ impl Tally {
             setting: setting.to_string(),
             rtol: if let Setting::Tolerance(rtol) = setting { Some(rtol) } else { None },
             step_over_default: if let Setting::Step(factor) = setting { Some(factor) } else { None },
-            state: RunState::Right,
-            right: 0,
-            undecided: 0,
-            failed: 0,
-            reason: None,
-            error: None,
-            quantity: None,
-            force_evaluations: None,
-            time: None,
+            ..Run::default()
         };
         Self { run, evaluations: 0, counted: 0 }
     }
@@ -386,7 +382,7 @@ impl Tally {
             }
             Judgement::Wrong(why) | Judgement::Failed(why) => {
                 run.failed += 1;
-                // A failure tells more than an undecided flight before it.
+                // A failure says more than an undecided solution before it.
                 if run.state < RunState::Failed {
                     run.reason = None;
                 }
@@ -419,30 +415,42 @@ impl Tally {
 
 /// Every setting of `contender` on `case`, coarse to fine. Errors of the contender are runs that failed.
 pub fn runs(case: &Case, contender: Contender, effort: Effort) -> Vec<Run> {
-    let mut runs = Vec::new();
+    until_too_long(case, &contender.name(), contender.settings(), PASS_S, |setting, tally| {
+        run(case, contender, setting, effort, tally)
+    })
+}
+
+/// A run for each of `settings`, coarse to fine. Once a pass over the scenes takes longer than `pass_max` [s], the finer
+/// settings are not tried.
+pub(super) fn until_too_long(
+    case: &Case,
+    name: &str,
+    settings: Vec<Setting>,
+    pass_max: f64,
+    mut run: impl FnMut(Setting, Tally) -> Run,
+) -> Vec<Run> {
     let mut too_long: Option<String> = None;
-    for setting in contender.settings() {
-        let tally = Tally::new(case, &contender.name(), setting);
+    let mut run_of = |setting| {
+        let tally = Tally::new(case, name, setting);
         if let Some(why) = &too_long {
-            runs.push(tally.not_run(why));
-            continue;
+            return tally.not_run(why);
         }
         let started = Instant::now();
-        let run = run(case, contender, setting, effort, tally);
+        let run = run(setting, tally);
         let pass = run.time.map_or(0.0, |time| time.median_ns * case.problems.len() as f64 * 1e-9);
-        if pass > PASS_S {
-            too_long = Some(format!("{} took {:.0} s", run.setting, started.elapsed().as_secs_f64()));
+        if pass > pass_max {
+            too_long = Some(format!("{setting} took {:.0} s", started.elapsed().as_secs_f64()));
         }
-        runs.push(run);
-    }
-    runs
+        run
+    };
+    settings.into_iter().map(&mut run_of).collect()
 }
 
 fn run(case: &Case, contender: Contender, setting: Setting, effort: Effort, mut tally: Tally) -> Run {
-    let measured = contender.with(setting, |fly| {
+    let measured = contender.with(setting, |solve| {
         let mut answered = false;
         for known in &case.problems {
-            let (judgement, evaluations) = match fly(&known.problem) {
+            let (judgement, evaluations) = match solve(&known.problem) {
                 Ok(flight) => (known.judge(&flight, true), Some(flight.cost.force_evaluations)),
                 Err(error) => (Judgement::Failed(error.to_string()), None),
             };
@@ -458,7 +466,7 @@ fn run(case: &Case, contender: Contender, setting: Setting, effort: Effort, mut 
         }
         let timing = effort.time(&mut || {
             for known in &case.problems {
-                let _ = std::hint::black_box(fly(std::hint::black_box(&known.problem)));
+                let _ = std::hint::black_box(solve(std::hint::black_box(&known.problem)));
             }
         });
         Some(timing.over(case.problems.len()))
@@ -480,8 +488,8 @@ fn time_in_lanes(case: &Case, effort: Effort) -> Timing {
     let problems: Vec<Problem> = case.problems.iter().map(|known| known.problem.clone()).cycle().take(FULL).collect();
     let batch = Batch::new();
     // One pass before the clock runs, as every other method has had.
-    std::hint::black_box(batch.fly(&problems));
-    effort.time(&mut || drop(std::hint::black_box(batch.fly(std::hint::black_box(&problems))))).over(FULL)
+    std::hint::black_box(batch.solve(&problems));
+    effort.time(&mut || drop(std::hint::black_box(batch.solve(std::hint::black_box(&problems))))).over(FULL)
 }
 
 /// The fastest run of a method within an accuracy.
@@ -528,8 +536,8 @@ fn fastest_of(runs: &[Run], level: f64) -> Fastest {
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
+    use crate::exchange::scene_file::SHIPPED;
     use crate::integrators::{ClosedForm, Integrator};
-    use crate::physics::scene_file::SHIPPED;
 
     fn tunnel() -> Case {
         let text = SHIPPED.iter().find(|(name, _)| *name == "tunnel").unwrap().1;
@@ -568,7 +576,7 @@ mod tests {
     #[test]
     fn a_flight_is_judged_by_its_outcome_its_events_and_its_numbers() {
         let known = &tunnel().problems[0];
-        let right = ClosedForm.fly(&known.problem, Detail::Events).unwrap();
+        let right = ClosedForm.solve(&known.problem, Detail::Events).unwrap();
         assert!(matches!(known.judge(&right, true), Judgement::Right(error, _) if error < 1e-15));
         let mut off = right.clone();
         off.end.depth *= 1.0 + 1e-3;

@@ -1,10 +1,10 @@
-//! Eq. 11-12 and 15 beside the equation of motion (theory sections 3 and 4).
+//! Eq. 11-12 and 15 beside the equation of motion (docs/theory.md, sections 3 and 4).
 
-use super::super::claim::{Claim, Eq15Form, Evidence, Measurement, NotMeasured};
-use super::super::verdict::Verdict;
-use super::{Context, build};
+use serde::Deserialize;
+
+use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
+use super::{Subject, Worst, solve};
 use crate::integrators::Detail;
-use crate::integrators::method::MethodOptions;
 use crate::physics::nose::NoseShape;
 use crate::physics::semi_empirical::{
     NDRC_END, NDRC_FIRST_BRANCH_END, depth_ratio, eq15_printed, eq15_unrounded, jumps, model_difference,
@@ -13,6 +13,75 @@ use crate::physics::{Concrete, CraterStiffness, Criterion, Scene, groups};
 use crate::studies::critical_velocity;
 use crate::studies::order::{StepError, fit};
 use crate::studies::random::Random;
+
+check! {
+    /// N* and height of every nose shape against the integral and the circle that they stand for; worst relative
+    /// difference.
+    Nose {} in Exact, "relative", by nose;
+    /// Method at Q = 0 and continuous c against Eq. 11-12, `points` impact functions I from `from` to `to`; worst
+    /// relative difference of X/d.
+    SmallImpact {
+        /// Smallest I.
+        from: f64,
+        /// Largest I.
+        to: f64,
+        /// How many, log-uniform from the seed.
+        points: usize,
+    } in Exact, "relative", by small_impact;
+    /// X/d at finite N against Eq. 11-12 as N grows: distance of the fitted order in 1/N from 1.
+    ApproachOrder {
+        /// Impact function I; its side of k pi/4 decides between Eq. 11 and Eq. 12.
+        impact: f64,
+    } in Exact, "order", by approach_order;
+    /// The same: relative distance of the constant from docs/theory.md, section 3.
+    ApproachConstant {
+        /// Impact function I.
+        impact: f64,
+    } in Exact, "relative", by approach_constant;
+    /// Eq. 15 against Eq. 11-12 with the ACE/NDRC relation over H/d; worst relative difference.
+    Eq15 {
+        /// `unrounded` or `printed`.
+        form: Eq15Form,
+        /// Smallest H/d.
+        from: f64,
+        /// Largest H/d.
+        to: f64,
+    } in Exact, "relative", by eq15;
+    /// Jump of Eq. 15 at a joint, in units of S: distance from the stated one.
+    Eq15Jump {
+        /// `unrounded` or `printed`.
+        form: Eq15Form,
+        /// The joint H/d.
+        at: f64,
+        /// Stated jump in units of S.
+        jump: f64,
+    } in Exact, "S", by eq15_jump;
+    /// Critical velocity with the NDRC criterion and Q = 0 against unrounded Eq. 15 for H/d in (0, 18.06], the ends of the
+    /// branches and their neighbours among them; worst relative difference.
+    NdrcCriterion {
+        /// How many H/d, log-uniform from the seed.
+        points: usize,
+    } in Exact, "relative", by ndrc_criterion;
+}
+
+/// Which coefficients of Eq. 15.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Eq15Form {
+    /// As printed in the paper.
+    Printed,
+    /// Before rounding.
+    Unrounded,
+}
+
+impl Eq15Form {
+    fn formula(self) -> fn(f64) -> f64 {
+        match self {
+            Self::Printed => eq15_printed,
+            Self::Unrounded => eq15_unrounded,
+        }
+    }
+}
 
 /// Diameter, mass, strength and S of the formulas' scenes: any will do, the groups alone matter.
 const MASS: f64 = 2.0;
@@ -37,12 +106,16 @@ fn scene(geometry: Option<f64>) -> (Scene, Concrete) {
 }
 
 /// X/d by the claim's method at impact function `impact`.
-pub(super) fn flown_depth_ratio(claim: &Claim, geometry: Option<f64>, impact: f64) -> Result<f64, NotMeasured> {
+pub(super) fn solved_depth_ratio(
+    subject: &Subject<'_>,
+    geometry: Option<f64>,
+    impact: f64,
+) -> Result<f64, NotMeasured> {
     let (scene, concrete) = scene(geometry);
-    let method = build(claim.method.unwrap_or_default(), &MethodOptions::default())?;
+    let method = subject.method(None)?;
     let speed = groups::impact_speed_for(impact, MASS, &concrete);
-    let problem = scene.resolve(speed).map_err(NotMeasured::broken)?;
-    let flight = super::fly(&method, &problem, Detail::End)?;
+    let problem = scene.resolve(speed)?;
+    let flight = solve(&method, &problem, Detail::End)?;
     Ok(flight.end.depth / concrete.diameter)
 }
 
@@ -50,17 +123,14 @@ pub(super) fn flown_depth_ratio(claim: &Claim, geometry: Option<f64>, impact: f6
 ///
 /// In the radius y the integrand is a cubic for every shape, which Simpson's rule integrates exactly; `sin²` of the angle
 /// between axis and tangent comes from the normal of the circle.
-pub(super) fn nose() -> Result<Measurement, NotMeasured> {
+fn nose(_: &Subject<'_>) -> Found {
     let integral = |sine_squared: &dyn Fn(f64) -> f64| {
         let f = |y: f64| 8.0 * y * sine_squared(y);
         (f(0.0) + 4.0 * f(0.25) + f(0.5)) * 0.5 / 6.0
     };
-    let mut worst = (0.0_f64, String::new());
+    let mut worst = Worst::default();
     let mut take = |shape: NoseShape, found: f64, exact: f64| {
-        let error = (found / exact - 1.0).abs();
-        if error.is_nan() || error > worst.0 {
-            worst = (error, format!("{shape:?}"));
-        }
+        worst.take((found / exact - 1.0).abs(), || format!("for {shape:?}"));
     };
     for psi in [0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.25, 6.0] {
         let ogive = NoseShape::Ogive { caliber_radius_head: psi };
@@ -79,18 +149,12 @@ pub(super) fn nose() -> Result<Measurement, NotMeasured> {
         }
     }
     take(NoseShape::Flat, NoseShape::Flat.factor(), 1.0);
-    Ok(Measurement::new(worst.0).remark(format!("worst: {}", worst.1)))
+    Ok(worst.measurement())
 }
 
-/// Q = 0 and continuous c: X/d against Eq. 11-12.
-pub(super) fn small_impact(
-    claim: &Claim,
-    context: Context<'_>,
-    (from, to): (f64, f64),
-    points: usize,
-) -> Result<Measurement, NotMeasured> {
-    let mut random = Random::for_part(context.seed, &claim.id);
-    let mut worst = (0.0_f64, 0.0);
+fn small_impact(&SmallImpact { from, to, points }: &SmallImpact, subject: &Subject<'_>) -> Found {
+    let mut random = Random::for_part(subject.context.seed, &subject.claim.id);
+    let mut worst = Worst::default();
     for index in 0..points {
         let impact = match index {
             0 => from,
@@ -98,37 +162,33 @@ pub(super) fn small_impact(
             2 => std::f64::consts::FRAC_PI_2,
             _ => random.log_uniform(from, to),
         };
-        let ours = flown_depth_ratio(claim, None, impact)?;
-        let error = (ours / depth_ratio(impact, 2.0) - 1.0).abs();
-        if error.is_nan() || error > worst.0 {
-            worst = (error, impact);
-        }
+        let ours = solved_depth_ratio(subject, None, impact)?;
+        worst.take((ours / depth_ratio(impact, 2.0) - 1.0).abs(), || format!("at I = {impact:.4e}"));
     }
-    Ok(Measurement::new(worst.0).remark(format!("worst at I = {:.4e}", worst.1)))
+    Ok(worst.measurement())
 }
 
 /// Geometry functions of the approach: far enough for the first term to rule, not so far that it drowns.
 const GEOMETRY: [f64; 2] = [1e4, 1e7];
 
 /// Errors of Eq. 11-12 over 1/N at fixed I.
-fn approach(claim: &Claim, impact: f64) -> Result<Vec<StepError>, NotMeasured> {
+fn approach(subject: &Subject<'_>, impact: f64) -> Result<Vec<StepError>, NotMeasured> {
     const POINTS: usize = 40;
-    let mut random = Random::for_part(1, &claim.id);
+    let mut random = Random::for_part(1, &subject.claim.id);
     let limit = depth_ratio(impact, 2.0);
     (0..POINTS)
         .map(|_| {
             let n = random.log_uniform(GEOMETRY[0], GEOMETRY[1]);
-            let x = flown_depth_ratio(claim, Some(n), impact)?;
+            let x = solved_depth_ratio(subject, Some(n), impact)?;
             Ok(StepError::new(1.0 / n, x - limit))
         })
         .collect()
 }
 
-/// Distance of the order of the approach in 1/N from 1.
-pub(super) fn approach_order(claim: &Claim, impact: f64) -> Result<Measurement, NotMeasured> {
-    let fit = fit(&approach(claim, impact)?).map_err(NotMeasured::broken)?;
+fn approach_order(&ApproachOrder { impact }: &ApproachOrder, subject: &Subject<'_>) -> Found {
+    let fit = fit(&approach(subject, impact)?)?;
     let Some(line) = fit.line else {
-        return Ok(Measurement::new(f64::NAN).verdict(Verdict::Undecided).remark(fit.reason));
+        return Ok(Measurement::undecided(fit.reason));
     };
     let half_width = 0.5 * (line.interval95[1] - line.interval95[0]);
     Ok(Measurement::new((line.order - 1.0).abs())
@@ -137,12 +197,11 @@ pub(super) fn approach_order(claim: &Claim, impact: f64) -> Result<Measurement, 
         .evidence(Evidence::Fit { abscissa: "1/N", formal: 1.0, fit: Box::new(fit) }))
 }
 
-/// Relative distance of the constant of the approach from theory section 3.
-pub(super) fn approach_constant(claim: &Claim, impact: f64) -> Result<Measurement, NotMeasured> {
+fn approach_constant(&ApproachConstant { impact }: &ApproachConstant, subject: &Subject<'_>) -> Found {
     // (X(N) - limit) N = C + C'/N: two geometry functions extrapolate C' away.
     let n = 1e5;
     let limit = depth_ratio(impact, 2.0);
-    let at = |n: f64| -> Result<f64, NotMeasured> { Ok((flown_depth_ratio(claim, Some(n), impact)? - limit) * n) };
+    let at = |n: f64| -> Result<f64, NotMeasured> { Ok((solved_depth_ratio(subject, Some(n), impact)? - limit) * n) };
     let measured = 2.0 * at(2.0 * n)? - at(n)?;
     // The stated first-order difference is relative to X/d, and per 1/N.
     let predicted = model_difference(impact, 1.0, 2.0) * limit;
@@ -152,7 +211,7 @@ pub(super) fn approach_constant(claim: &Claim, impact: f64) -> Result<Measuremen
 
 /// E_c/(d³ fc S) of Eq. 11-12 (k = 2) with the ACE/NDRC relation, each branch with its coefficients spelled out.
 ///
-/// Written here once more, apart from the crate's formula: the plain form, which cancels for small H/d.
+/// Independent of the crate's own formula. The plain form loses digits by cancellation at small H/d.
 fn composed(thickness_ratio: f64) -> f64 {
     use std::f64::consts::PI;
     let h = thickness_ratio;
@@ -166,31 +225,19 @@ fn composed(thickness_ratio: f64) -> f64 {
     }
 }
 
-/// Eq. 15 against its two parents over H/d.
 #[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
-pub(super) fn eq15(form: Eq15Form, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
+fn eq15(&Eq15 { form, from, to }: &Eq15, _: &Subject<'_>) -> Found {
     const POINTS: usize = 2000;
-    let formula = match form {
-        Eq15Form::Printed => eq15_printed,
-        Eq15Form::Unrounded => eq15_unrounded,
-    };
-    let mut worst = (0.0_f64, 0.0);
+    let mut worst = Worst::default();
     for index in 0..POINTS {
         let ratio = from * (to / from).powf(index as f64 / (POINTS - 1) as f64);
-        let error = (formula(ratio) / composed(ratio) - 1.0).abs();
-        if error.is_nan() || error > worst.0 {
-            worst = (error, ratio);
-        }
+        worst.take((form.formula()(ratio) / composed(ratio) - 1.0).abs(), || format!("at H/d = {ratio:.4}"));
     }
-    Ok(Measurement::new(worst.0).remark(format!("worst at H/d = {:.4}", worst.1)))
+    Ok(worst.measurement())
 }
 
-/// Distance of a jump of Eq. 15 from the stated one.
-pub(super) fn eq15_jump(form: Eq15Form, at: f64, stated: f64) -> Result<Measurement, NotMeasured> {
-    let formula = match form {
-        Eq15Form::Printed => eq15_printed,
-        Eq15Form::Unrounded => eq15_unrounded,
-    };
+fn eq15_jump(&Eq15Jump { form, at, jump: stated }: &Eq15Jump, _: &Subject<'_>) -> Found {
+    let formula = form.formula();
     // The branches are closed to the left (H/d <= 3.0), so one ulp to the right is the next branch.
     let jump = formula(at.next_up()) - formula(at);
     let listed = jumps().iter().any(|j| (j.thickness_ratio - at).abs() < 1e-9);
@@ -200,29 +247,24 @@ pub(super) fn eq15_jump(form: Eq15Form, at: f64, stated: f64) -> Result<Measurem
     Ok(Measurement::new((jump - stated).abs()).remark(format!("jump {jump:+.9} S at H/d = {at}")))
 }
 
-/// V_c with the NDRC criterion, Q = 0 and continuous c, against unrounded Eq. 15 for H/d in (0, 18.06], the ends of the
-/// branches and their neighbours among them.
-pub(super) fn ndrc_criterion(claim: &Claim, context: Context<'_>, points: usize) -> Result<Measurement, NotMeasured> {
+fn ndrc_criterion(&NdrcCriterion { points }: &NdrcCriterion, subject: &Subject<'_>) -> Found {
     let (mut scene, concrete) = scene(None);
     scene.criterion = Criterion::Ndrc;
-    let method = build(claim.method.unwrap_or_default(), &MethodOptions::default())?;
-    let mut random = Random::for_part(context.seed, &claim.id);
+    let method = subject.method(None)?;
+    let mut random = Random::for_part(subject.context.seed, &subject.claim.id);
     let joints = [2.994, NDRC_FIRST_BRANCH_END, 3.0, 3.8]
         .into_iter()
         .flat_map(|joint: f64| [joint.next_down(), joint, joint.next_up()])
         .chain([1e-3, NDRC_END]);
     let drawn = std::iter::repeat_with(|| random.log_uniform(1e-2, NDRC_END));
-    let mut worst = (0.0_f64, 0.0);
+    let mut worst = Worst::default();
     for ratio in joints.chain(drawn).take(points) {
         scene.thickness = Some(ratio * concrete.diameter);
-        let found = critical_velocity::of_scene(&scene, method.integrator()).map_err(NotMeasured::broken)?;
+        let found = critical_velocity::of_scene(&scene, method.integrator())?;
         // From the thickness that the scene holds, which rounds H/d.
         let ratio = ratio * concrete.diameter / concrete.diameter;
         let ours = groups::dimensionless_energy(found.energy, &concrete) / concrete.static_factor;
-        let error = (ours / eq15_unrounded(ratio) - 1.0).abs();
-        if error.is_nan() || error > worst.0 {
-            worst = (error, ratio);
-        }
+        worst.take((ours / eq15_unrounded(ratio) - 1.0).abs(), || format!("at H/d = {ratio:.4} of {points}"));
     }
-    Ok(Measurement::new(worst.0).remark(format!("{points} thicknesses, worst at H/d = {:.4}", worst.1)))
+    Ok(worst.measurement())
 }

@@ -8,28 +8,50 @@
 //! come from second-order dual numbers: a chosen formula is the only thing that can be wrong here.
 //!
 //! # Source
-//! Theory section 7; P. J. Roache, J. Fluids Eng. 124 (2002) 4-10.
+//! docs/theory.md, section 7; P. J. Roache, J. Fluids Eng. 124 (2002) 4-10.
 
 use num_dual::{Dual2_64, DualNum, second_derivative};
 use rayon::prelude::*;
+use serde::Deserialize;
 
-use super::super::claim::{Claim, ManufacturedPath, Measurement, NotMeasured};
-use super::{Context, orders};
+use super::super::claim::{Found, NotMeasured};
+use super::{Subject, orders};
 use crate::integrators::CentralDifference;
 use crate::physics::{Problem, Stage, State, Target};
 use crate::studies::convergence::{Ladder, STEPS_OVER_TIME};
 use crate::studies::order::{StepError, fit};
 
+check! {
+    /// Central difference on a manufactured solution: distance of the fitted order of its largest distance from the path
+    /// at the nodes, over the depth reached, from `order`.
+    Manufactured {
+        /// `smooth` or `kink`.
+        path: ManufacturedPath,
+        /// Order expected.
+        order: f64,
+    } in Orders, "order", by order;
+}
+
+/// Which manufactured path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ManufacturedPath {
+    /// One stage.
+    Smooth,
+    /// Through x = k d at a known time.
+    Kink,
+}
+
 /// How many step sizes.
 const POINTS: usize = 40;
 
-/// When the path ends [s].
+/// When the path ends (s).
 const END: f64 = 1.0;
 
-/// When stage, force and acceleration change on the path with a kink [s]: at no simple share of the end.
+/// When stage, force and acceleration change on the path with a kink (s): at no simple share of the end.
 const KINK: f64 = 0.437;
 
-/// Mass [kg]. Every term of the force is of the size of the inertia, so that none can go wrong unseen.
+/// Mass (kg). Every term of the force is of the size of the inertia, so that none can go wrong unseen.
 const MASS: f64 = 2.0;
 
 const FIRST: Stage = Stage { static_force: 1.5, stiffness: 4.0, viscosity: 0.7, drag: 1.1, end: f64::INFINITY };
@@ -38,7 +60,7 @@ const FIRST: Stage = Stage { static_force: 1.5, stiffness: 4.0, viscosity: 0.7, 
 const SECOND: Stage = Stage { static_force: 3.5, stiffness: 1.0, viscosity: 0.2, drag: 2.3, end: f64::INFINITY };
 
 impl ManufacturedPath {
-    /// Times at which the stages end [s].
+    /// Times at which the stages end (s).
     fn ends(self) -> &'static [f64] {
         match self {
             Self::Smooth => &[END],
@@ -46,7 +68,7 @@ impl ManufacturedPath {
         }
     }
 
-    /// x_m(t) [m] in stage `stage`: always forward, at a speed that swings between 0.4 and 1.6 m/s.
+    /// x_m(t) (m) in stage `stage`: always forward, at a speed that swings between 0.4 and 1.6 m/s.
     ///
     /// Behind the kink a term in (t - t_k)² joins it: x_m' has a kink there and x_m'' a jump, so that a step around it
     /// with the acceleration of one side alone shows.
@@ -61,21 +83,14 @@ impl ManufacturedPath {
         second_derivative(|t| self.depth(stage, t), t)
     }
 
-    /// S(t) [N] in stage `stage`.
+    /// S(t) (N) in stage `stage`.
     fn source(self, problem: &Problem, stage: usize, t: f64) -> f64 {
         let (x, v, a) = self.at(stage, t);
         problem.mass * a + problem.stages[stage].force(x, v)
     }
 }
 
-/// Largest distance of the scheme from the path at its nodes, over the depth reached, fitted over the step size:
-/// distance of the order from `expected`.
-pub(super) fn order(
-    claim: &Claim,
-    context: Context<'_>,
-    path: ManufacturedPath,
-    expected: f64,
-) -> Result<Measurement, NotMeasured> {
+fn order(&Manufactured { path, order: expected }: &Manufactured, subject: &Subject<'_>) -> Found {
     let (_, impact_speed, _) = path.at(0, 0.0);
     let problem = Problem {
         mass: MASS,
@@ -87,20 +102,20 @@ pub(super) fn order(
     };
     let ends = path.ends();
     let (amplitude, ..) = path.at(ends.len() - 1, END);
-    let error = |size: f64| -> Result<StepError, NotMeasured> {
-        let states = CentralDifference::uniform(size, claim.velocity, claim.boundaries)
-            .forced_states(&problem, |stage, t| path.source(&problem, stage, t), ends)
-            .map_err(NotMeasured::broken)?;
-        let off = |state: &State| {
-            let stage = ends.iter().take_while(|&&end| end < state.time).count().min(ends.len() - 1);
-            state.depth - path.at(stage, state.time).0
+    let error =
+        |size: f64| -> Result<StepError, NotMeasured> {
+            let states = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries)
+                .forced_states(&problem, |stage, t| path.source(&problem, stage, t), ends)?;
+            let off = |state: &State| {
+                let stage = ends.iter().take_while(|&&end| end < state.time).count().min(ends.len() - 1);
+                state.depth - path.at(stage, state.time).0
+            };
+            // `f64::max` would drop a NaN.
+            let worst = states.iter().map(off).fold(0.0, |a: f64, b| if b.abs() <= a.abs() { a } else { b });
+            Ok(StepError::new(size, worst / amplitude))
         };
-        // `f64::max` would drop a NaN.
-        let worst = states.iter().map(off).fold(0.0, |a: f64, b| if b.abs() <= a.abs() { a } else { b });
-        Ok(StepError::new(size, worst / amplitude))
-    };
     let [from, to] = STEPS_OVER_TIME.map(|share| share * END);
-    let sizes = Ladder { from, to, points: POINTS, seed: context.seed }.sizes();
+    let sizes = Ladder { from, to, points: POINTS, seed: subject.context.seed }.sizes();
     let errors: Vec<StepError> = sizes.into_par_iter().map(error).collect::<Result<_, _>>()?;
     orders::judge(fit(&errors), 0, expected, "dt_s")
 }

@@ -1,27 +1,127 @@
-//! How each kind of claim is measured: one function a kind, grouped by what it needs.
+//! How each kind of claim is measured. A check is one struct: the fields that the suite file gives, the unit of the
+//! measured value, the section of the report, and the function that measures.
+//!
+//! To add one, declare it with `check!` in the file it belongs to, above its function, and name it in `every_check!` here.
+
+/// Declares checks: `Name { fields } in Section, "unit", by function;`.
+///
+/// The function is called with the subject, after the check itself where that has fields.
+macro_rules! check {
+    ($($(#[$about:meta])* $name:ident { $($(#[$of:meta])* $field:ident: $type:ty),* $(,)? }
+        in $section:ident, $unit:literal, by $measure:ident;)*) => {$(
+        $(#[$about])*
+        #[doc = concat!("\n\nUnit: ", $unit, ".")]
+        #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$of])* pub $field: $type,)*
+        }
+
+        impl $name {
+            pub(in crate::suite) const SECTION: $crate::suite::Section = $crate::suite::Section::$section;
+            pub(in crate::suite) const UNIT: &str = $unit;
+
+            pub(in crate::suite) fn measure(
+                &self,
+                subject: &$crate::suite::checks::Subject<'_>,
+            ) -> $crate::suite::claim::Found {
+                check!(@call self, subject, $measure, $($field)*)
+            }
+        }
+    )*};
+    (@call $self:ident, $subject:ident, $measure:ident,) => { $measure($subject) };
+    (@call $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => { $measure($self, $subject) };
+}
 
 mod agreement;
 mod applications;
+mod edges;
 mod formulas;
 mod invariants;
 mod manufactured;
 mod orders;
 mod peers;
-pub(super) mod scheme;
+mod scheme;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::claim::{Check, Claim, Measurement, NotMeasured};
+use serde::Deserialize;
+
+use super::claim::{Claim, Found, Measurement, NotMeasured, Section};
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
-use crate::integrators::{Detail, Flight};
-use crate::physics::{Problem, Resistance, Scene};
+use crate::integrators::{Detail, Flight, IntegrationError};
+use crate::physics::{Advice, Problem, Resistance, Scene};
 use crate::studies::convergence::{QuantityStudy, Yardstick};
 use crate::studies::quantity::Quantity;
-use crate::studies::relations::Units;
 
-pub use peers::PeerAnswers;
+pub use self::{
+    agreement::*, applications::*, edges::*, formulas::*, invariants::*, manufactured::*, orders::*, peers::*,
+    scheme::*,
+};
+
+macro_rules! every_check {
+    ($($name:ident)*) => {
+        /// How a claim is checked: a struct of this module under its name in kebab case.
+        #[derive(Clone, Debug, PartialEq, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Check {
+            $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
+        }
+
+        impl Check {
+            /// Unit of the measured value and of the limit.
+            pub fn unit(&self) -> &'static str {
+                match self { $(Self::$name(_) => $name::UNIT,)* }
+            }
+
+            /// Section of the report that shows such claims.
+            pub fn section(&self) -> Section {
+                match self { $(Self::$name(_) => $name::SECTION,)* }
+            }
+
+            /// Measures a claim.
+            ///
+            /// # Errors
+            /// [`NotMeasured`]: the claim does not apply to its scene, or the measurement itself failed.
+            pub fn measure(&self, subject: &Subject<'_>) -> Found {
+                match self { $(Self::$name(check) => check.measure(subject),)* }
+            }
+        }
+    };
+}
+
+every_check! {
+    Reference Agreement Stated Margin Outcome Pair EventOrder
+    Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
+    Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
+    DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
+    EnergyBalance TimeReversal Similarity Split
+    Sweep Map MeasuredDepth Sensitivities Peer
+    GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets TenEnds EventBehindEvent
+    EndsAnUlpApart ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
+    ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver
+    Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag
+    OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
+    Objectives NoRoot CriticalErrorBound JumpsOfEq15
+}
+
+impl Check {
+    /// One ulp in the unit of the check: no measurement is believed to be finer.
+    pub fn resolution(&self) -> f64 {
+        match self {
+            Self::Reference(_) => 1.0,
+            Self::Pair(Pair { tolerance, .. }) | Self::Peer(Peer { tolerance, .. }) => f64::EPSILON / tolerance,
+            _ => f64::EPSILON,
+        }
+    }
+
+    /// Whether the measured value is a number of things, to which no limit is loose.
+    pub fn is_count(&self) -> bool {
+        matches!(self, Self::Outcome(_) | Self::EventOrder(_))
+    }
+}
 
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.
 #[derive(Debug, Default)]
@@ -50,73 +150,29 @@ pub struct Context<'a> {
     pub seed: u64,
 }
 
-/// Measures `claim`.
-///
-/// # Errors
-/// [`NotMeasured`]: the claim does not apply to its scene, or the measurement itself failed.
-pub fn measure(claim: &Claim, context: Context<'_>) -> Result<Measurement, NotMeasured> {
-    let on = |check: fn(&Subject<'_>) -> Result<Measurement, NotMeasured>| check(&Subject::of(claim, context)?);
-    match claim.check {
-        Check::Reference { random } => agreement::reference(claim, context, random),
-        Check::Agreement { rtol } => agreement::with_exact(&Subject::of(claim, context)?, rtol),
-        Check::Stated { value } => agreement::stated(&Subject::of(claim, context)?, value),
-        Check::Margin { points } => agreement::margin(&Subject::of(claim, context)?, points),
-        Check::Clock { steps } => scheme::clock(&Subject::of(claim, context)?, steps),
-        Check::Nose {} => formulas::nose(),
-        Check::GridConvergence {} => on(orders::grid_convergence),
-        Check::CraterBand {} => on(scheme::crater_band),
-        Check::Outcome { ref is } => agreement::outcome(&Subject::of(claim, context)?, is),
-        Check::Pair { with, tolerance } => agreement::pair(&Subject::of(claim, context)?, with, tolerance),
-        Check::EventOrder {} => on(agreement::event_order),
-        Check::SmallImpact { from, to, points } => formulas::small_impact(claim, context, (from, to), points),
-        Check::ApproachOrder { impact } => formulas::approach_order(claim, impact),
-        Check::ApproachConstant { impact } => formulas::approach_constant(claim, impact),
-        Check::Eq15 { form, from, to } => formulas::eq15(form, from, to),
-        Check::Eq15Jump { form, at, jump } => formulas::eq15_jump(form, at, jump),
-        Check::NdrcCriterion { points } => formulas::ndrc_criterion(claim, context, points),
-        Check::Order { order, steps, points } => {
-            orders::fixed_step(&Subject::of(claim, context)?, order, steps, points)
-        }
-        Check::Proportionality { from, to } => orders::proportionality(&Subject::of(claim, context)?, from, to),
-        Check::WorkOrder { from, to } => orders::work_order(&Subject::of(claim, context)?, from, to),
-        Check::SelfConvergence {} => on(orders::self_convergence),
-        Check::DiscreteSolution { step, steps } => {
-            scheme::discrete_solution(&Subject::of(claim, context)?, step, steps)
-        }
-        Check::CraterConstant {} => on(scheme::crater_constant),
-        Check::LaggedConstant {} => on(scheme::lagged_constant),
-        Check::StabilityLimit {} => on(scheme::stability_limit),
-        Check::EnergyBalance {} => on(invariants::energy_balance),
-        Check::TimeReversal {} => on(invariants::time_reversal),
-        Check::Similarity { length, mass, time } => {
-            invariants::similarity(&Subject::of(claim, context)?, Units { length, mass, time })
-        }
-        Check::Split { pieces } => invariants::split(&Subject::of(claim, context)?, pieces),
-        Check::Manufactured { path, order } => manufactured::order(claim, context, path, order),
-        Check::Sweep { from, to, points } => applications::sweep(&Subject::of(claim, context)?, [from, to], points),
-        Check::Map { points } => applications::map(claim, points),
-        Check::MeasuredDepth {} => applications::measured_depth(claim),
-        Check::Sensitivities {} => on(applications::sensitivities),
-        Check::StabilityMap { points } => scheme::stability_map(points),
-        Check::RoundingFloor { from, to } => scheme::rounding_floor(&Subject::of(claim, context)?.problem, from, to),
-        Check::Peer { ref name, tolerance } => peers::agreement(&Subject::of(claim, context)?, name, tolerance),
-    }
-}
-
-/// A claim with its scene resolved.
-pub(super) struct Subject<'a> {
-    pub(super) claim: &'a Claim,
-    pub(super) context: Context<'a>,
-    pub(super) scene: &'a Scene,
-    pub(super) problem: Problem,
+/// A claim with what its check may use.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// The claim.
+    pub claim: &'a Claim,
+    /// Scenes, other programs, seed.
+    pub context: Context<'a>,
 }
 
 impl<'a> Subject<'a> {
-    fn of(claim: &'a Claim, context: Context<'a>) -> Result<Self, NotMeasured> {
-        let name = claim.scene.as_deref().ok_or_else(|| NotMeasured::broken("the claim names no scene"))?;
-        let scene = context.scenes.get(name).ok_or_else(|| NotMeasured::broken(format!("no scene {name}")))?;
-        let problem = scene.problem().map_err(NotMeasured::broken)?;
-        Ok(Self { claim, context, scene, problem })
+    fn scene_name(&self) -> Result<&'a str, NotMeasured> {
+        self.claim.scene.as_deref().ok_or_else(|| NotMeasured::broken("the claim names no scene"))
+    }
+
+    /// Scene of the claim.
+    fn scene(&self) -> Result<&'a Scene, NotMeasured> {
+        let name = self.scene_name()?;
+        self.context.scenes.get(name).ok_or_else(|| NotMeasured::broken(format!("no scene {name}")))
+    }
+
+    /// Problem of the claim's scene.
+    fn problem(&self) -> Result<&'a Problem, NotMeasured> {
+        self.context.scenes.problem(self.scene_name()?).map_err(NotMeasured::broken)
     }
 
     /// Quantity of the claim.
@@ -134,19 +190,19 @@ impl<'a> Subject<'a> {
         build(self.method_name(), &MethodOptions { rtol, ..MethodOptions::default() })
     }
 
-    /// A flight of the claim's problem; a method that refuses it makes the claim inapplicable.
-    fn fly(&self, method: &Method, detail: Detail) -> Result<Flight, NotMeasured> {
-        fly(method, &self.problem, detail)
+    /// Solution of the claim's problem by its method at the default tolerance.
+    fn solution(&self, detail: Detail) -> Result<Flight, NotMeasured> {
+        solve(&self.method(None)?, self.problem()?, detail)
     }
 
-    /// The exact flight, or a refined one.
+    /// The exact solution, or a refined one.
     fn yardstick(&self) -> Result<Yardstick, NotMeasured> {
-        Yardstick::of(&self.problem).map_err(NotMeasured::broken)
+        Yardstick::of(self.problem()?).map_err(NotMeasured::broken)
     }
 
     /// Whether the scene is one crater and one tunnel.
-    fn is_plain_concrete(&self) -> bool {
-        matches!(&self.scene.resistance, Resistance::Concrete(c) if c.layers.is_empty())
+    fn is_plain_concrete(&self) -> Result<bool, NotMeasured> {
+        Ok(matches!(&self.scene()?.resistance, Resistance::Concrete(c) if c.layers.is_empty()))
     }
 }
 
@@ -158,9 +214,41 @@ fn build(name: MethodName, options: &MethodOptions) -> Result<Method, NotMeasure
     Method::new(name, options).map_err(NotMeasured::broken)
 }
 
-/// A flight; a refusal of the method makes the claim inapplicable, a failure breaks it.
-fn fly(method: &Method, problem: &Problem, detail: Detail) -> Result<Flight, NotMeasured> {
-    method.integrator().fly(problem, detail).map_err(|error| {
-        if error.is_usage() { NotMeasured::skip(error.to_string()) } else { NotMeasured::broken(error) }
-    })
+/// A solution; a refusal of the method makes the claim inapplicable, a failure breaks it.
+fn solve(method: &Method, problem: &Problem, detail: Detail) -> Result<Flight, NotMeasured> {
+    method.integrator().solve(problem, detail).map_err(refusal_or_failure)
+}
+
+fn refusal_or_failure(error: IntegrationError) -> NotMeasured {
+    if error.is_usage() { NotMeasured::skip(error.to_string()) } else { NotMeasured::broken(error) }
+}
+
+/// The larger; NaN if either is.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// Largest of `errors`; NaN if one is.
+fn worst_of(errors: impl IntoIterator<Item = f64>) -> f64 {
+    errors.into_iter().fold(0.0, worse)
+}
+
+/// The largest of many errors, with the place where it was found. A NaN is larger than any number.
+#[derive(Default)]
+struct Worst {
+    value: f64,
+    place: String,
+}
+
+impl Worst {
+    fn take(&mut self, value: f64, place: impl FnOnce() -> String) {
+        if value.is_nan() || value > self.value {
+            (self.value, self.place) = (value, place());
+        }
+    }
+
+    fn measurement(self) -> Measurement {
+        let remark = if self.place.is_empty() { String::new() } else { format!("worst {}", self.place) };
+        Measurement::new(self.value).remark(remark)
+    }
 }

@@ -1,8 +1,10 @@
 //! Orders of convergence, with and without an exact answer.
 
-use super::super::claim::{Evidence, Measurement, NotMeasured, StepPattern};
+use serde::Deserialize;
+
+use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
 use super::super::verdict::Verdict;
-use super::Subject;
+use super::{Subject, worst_of};
 use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Steps};
 use crate::studies::convergence::{self, Ladder, QuantityStudy, STEPS_OVER_TIME};
 use crate::studies::error::{is_fixed, value_of};
@@ -12,13 +14,61 @@ use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
-/// Distance of the fitted order of the central difference from the order expected.
-pub(super) fn fixed_step(
-    subject: &Subject<'_>,
-    expected: f64,
-    pattern: StepPattern,
-    points: usize,
-) -> Result<Measurement, NotMeasured> {
+check! {
+    /// Central difference: distance of the fitted order from `order`.
+    Order {
+        /// Order expected.
+        order: f64,
+        /// Pattern of the steps.
+        #[serde(default)]
+        steps: StepPattern,
+        /// How many step sizes.
+        #[serde(default = "default_points")]
+        points: usize,
+    } in Orders, "order", by fixed_step;
+    /// Error against tolerance: distance of the slope from 1.
+    Proportionality {
+        /// Largest tolerance.
+        from: f64,
+        /// Smallest tolerance.
+        to: f64,
+    } in Orders, "order", by proportionality;
+    /// Error against work: distance of the slope of error over 1/evaluations from the order of the method.
+    WorkOrder {
+        /// Largest tolerance.
+        from: f64,
+        /// Smallest tolerance.
+        to: f64,
+    } in Orders, "order", by work_order;
+    /// Self-convergence without the exact answer: distance of the extrapolated value from the exact one over the
+    /// uncertainty that the fit itself states.
+    SelfConvergence {} in Solution, "uncertainty", by self_convergence;
+    /// Roache's GCI and Richardson's extrapolation on three runs of the central difference against the true error:
+    /// worst of |GCI/(1.25 |error|) - 1|, |extrapolated error/error|, and the distance of Celik's order from the formal
+    /// one over it.
+    GridConvergence {} in Solution, "relative", by grid_convergence;
+}
+
+fn default_points() -> usize {
+    60
+}
+
+/// How the steps of one run are laid out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StepPattern {
+    /// All equal.
+    #[default]
+    Uniform,
+    /// Slowly varying.
+    Smooth,
+    /// Long and short in turn.
+    Alternating,
+    /// Drawn from the seed.
+    Random,
+}
+
+fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subject: &Subject<'_>) -> Found {
     let quantity = free_quantity(subject)?;
     let exact = subject.yardstick()?;
     let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.flight.end.time);
@@ -32,13 +82,17 @@ pub(super) fn fixed_step(
         .memo
         .get(key, || {
             convergence::of_fixed_steps(
-                subject.scene,
-                &subject.problem,
-                (claim.velocity, claim.boundaries),
+                subject.scene()?,
+                subject.problem()?,
+                &exact.flight,
+                &|size| CentralDifference {
+                    steps: steps(pattern, size, seed),
+                    ..CentralDifference::uniform(size, claim.velocity, claim.boundaries)
+                },
                 ladder,
                 critical,
-                &|size| steps(pattern, size, seed),
             )
+            .map(|study| study.quantities)
             .map_err(NotMeasured::broken)
         })?
         .iter()
@@ -54,14 +108,12 @@ pub(super) fn fixed_step(
     judge(study.fit, study.lost, expected, "dt_s")
 }
 
-/// Distance of the slope of error against tolerance from 1.
-pub(super) fn proportionality(subject: &Subject<'_>, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
+fn proportionality(&Proportionality { from, to }: &Proportionality, subject: &Subject<'_>) -> Found {
     let study = tolerance_study(subject, from, to)?;
     judge(study.fit, study.lost, 1.0, "rtol")
 }
 
-/// Distance of the slope of error against 1/evaluations from the order of the method.
-pub(super) fn work_order(subject: &Subject<'_>, from: f64, to: f64) -> Result<Measurement, NotMeasured> {
+fn work_order(&WorkOrder { from, to }: &WorkOrder, subject: &Subject<'_>) -> Found {
     let order = subject
         .method(None)?
         .integrator()
@@ -72,21 +124,25 @@ pub(super) fn work_order(subject: &Subject<'_>, from: f64, to: f64) -> Result<Me
     judge(work, study.lost, f64::from(order), "1/evaluations")
 }
 
-/// Self-convergence from the values alone: distance of the extrapolated value from the exact one, over the
-/// uncertainty that the fit itself states.
-pub(super) fn self_convergence(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
-    let quantity = free_quantity(subject)?;
-    let exact = subject.yardstick()?.flight;
-    let value = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one flight"))?;
-    let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
-    let ladder = Ladder { from: from * 10.0, to, points: 40, seed: subject.context.seed };
+/// Values of `quantity` by the claim's scheme at the steps `sizes`.
+fn values_at(subject: &Subject<'_>, quantity: Quantity, sizes: &[f64]) -> Result<Vec<GridValue>, NotMeasured> {
     let mut grids = Vec::new();
-    for size in ladder.sizes() {
+    for &size in sizes {
         let scheme = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries);
-        let flight = scheme.fly(&subject.problem, Detail::Events).map_err(NotMeasured::broken)?;
+        let flight = scheme.solve(subject.problem()?, Detail::Events)?;
         grids.extend(value_of(quantity, &flight).map(|value| GridValue::new(size, value)));
     }
-    let found = fit_values(&grids, FALSE_ALARM_LEVEL).map_err(NotMeasured::broken)?;
+    Ok(grids)
+}
+
+fn self_convergence(subject: &Subject<'_>) -> Found {
+    let quantity = free_quantity(subject)?;
+    let exact = subject.yardstick()?.flight;
+    let value = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one solution"))?;
+    let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
+    let ladder = Ladder { from: from * 10.0, to, points: 40, seed: subject.context.seed };
+    let grids = values_at(subject, quantity, &ladder.sizes())?;
+    let found = fit_values(&grids, FALSE_ALARM_LEVEL)?;
     let [low, high] = found.limit_band;
     let measurement = Measurement::new((found.limit - value).abs() / (0.5 * (high - low)));
     let measurement = if found.behaviour.class() == Class::Converging {
@@ -97,53 +153,43 @@ pub(super) fn self_convergence(subject: &Subject<'_>) -> Result<Measurement, Not
     Ok(measurement.remark(format!("limit {} in [{low}, {high}]; {}; {}", found.limit, found.reason, found.rule)))
 }
 
-/// What the rules for few grids say of three runs, beside the true error: in the asymptotic range Roache's index is 1.25
-/// times it, Richardson's extrapolation leaves a small part of it, and the observed order is the formal one.
-///
 /// Steps and landing make the error smooth only for [`Boundaries::Landed`]; with any other rule a triple shows noise.
-pub(super) fn grid_convergence(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+fn grid_convergence(subject: &Subject<'_>) -> Found {
     let quantity = free_quantity(subject)?;
     let claim = subject.claim;
     if claim.boundaries != Boundaries::Landed {
         return Err(NotMeasured::skip("three runs show an order only where the steps land on k d"));
     }
     let exact = subject.yardstick()?.flight;
-    let formal = formal_order(claim.velocity, claim.boundaries, &Path::of(&subject.problem, &exact), quantity)
+    let formal = formal_order(claim.velocity, claim.boundaries, &Path::of(subject.problem()?, &exact), quantity)
         .ok_or_else(|| NotMeasured::skip("no formal order"))?;
-    let truth = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one flight"))?;
-    let mut grids = Vec::new();
-    for share in [1.0 / 20_011.3, 1.0 / 12_007.7, 1.0 / 7_001.9] {
-        let size = share * exact.end.time;
-        let scheme = CentralDifference::uniform(size, claim.velocity, claim.boundaries);
-        let flight = scheme.fly(&subject.problem, Detail::Events).map_err(NotMeasured::broken)?;
-        grids.extend(value_of(quantity, &flight).map(|value| GridValue::new(size, value)));
-    }
+    let truth = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one solution"))?;
+    let sizes = [1.0 / 20_011.3, 1.0 / 12_007.7, 1.0 / 7_001.9].map(|share| share * exact.end.time);
+    let grids = values_at(subject, quantity, &sizes)?;
     let [fine, middle, coarse] = grids[..] else { return Err(NotMeasured::broken("a run without the quantity")) };
     let error = (fine.value - truth).abs();
-    let order = three_grids([fine, middle, coarse])
-        .map_err(NotMeasured::broken)?
+    let order = three_grids([fine, middle, coarse])?
         .order
         .ok_or_else(|| NotMeasured::broken("two of three runs agree to the last digit"))?;
     let index = roache(fine, middle, Some(order), Some(formal)).ok_or_else(|| NotMeasured::broken("no index"))?;
     let (index, extrapolated) = (index.half_width / error, richardson(fine, middle, formal));
     let off = [(index / 1.25 - 1.0).abs(), (extrapolated - truth).abs() / error, (order / formal - 1.0).abs()];
-    let worst = off.into_iter().fold(0.0, |a: f64, b| if b <= a { a } else { b });
-    Ok(Measurement::new(worst)
+    Ok(Measurement::new(worst_of(off))
         .remark(format!("order {order:.4}, GCI {index:.4} times the error, extrapolated {:.1e} of it left", off[1])))
 }
 
 fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<QuantityStudy, NotMeasured> {
     let quantity = free_quantity(subject)?;
-    if !subject.method_name().is_built() {
-        return Err(NotMeasured::skip(format!("this build leaves out {}", subject.method_name())));
-    }
     let ladder = Ladder { from: to.min(from), to: to.max(from), points: 40, seed: subject.context.seed };
     let key = format!("{:?} {} {from} {to}", subject.claim.scene, subject.method_name());
     subject
         .context
         .memo
         .get(key, || {
-            convergence::of_tolerances(&subject.problem, subject.method_name(), ladder).map_err(NotMeasured::broken)
+            let exact = subject.yardstick()?.flight;
+            convergence::of_tolerances(subject.problem()?, &exact, subject.method_name(), ladder)
+                .map(|study| study.quantities)
+                .map_err(NotMeasured::broken)
         })?
         .iter()
         .find(|study| study.quantity == quantity)
@@ -154,7 +200,7 @@ fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<Quantity
 /// The claim's quantity, if the scene leaves it free.
 fn free_quantity(subject: &Subject<'_>) -> Result<Quantity, NotMeasured> {
     let quantity = subject.quantity()?;
-    if quantity == Quantity::CriticalVelocity && !subject.problem.has_exit() {
+    if quantity == Quantity::CriticalVelocity && !subject.problem()?.has_exit() {
         return Err(NotMeasured::skip("a target without a far side has no critical velocity"));
     }
     if quantity != Quantity::CriticalVelocity && is_fixed(quantity, &subject.yardstick()?.flight) {
@@ -186,22 +232,17 @@ fn steps(pattern: StepPattern, size: f64, seed: u64) -> Steps {
 const LOST_SHARE_MAX: f64 = 0.2;
 
 /// Distance of a fitted order from the one expected; `lost` runs gave no error to fit.
-pub(super) fn judge(
-    fit: Result<OrderFit, FitError>,
-    lost: usize,
-    expected: f64,
-    abscissa: &'static str,
-) -> Result<Measurement, NotMeasured> {
+pub(super) fn judge(fit: Result<OrderFit, FitError>, lost: usize, expected: f64, abscissa: &'static str) -> Found {
     let total = lost + fit.as_ref().map_or(0, |fit| fit.points.len());
     let fit: OrderFit = match fit {
         Ok(fit) => fit,
         Err(error @ FitError::TooFewSteps { .. }) => {
-            return Ok(Measurement::new(f64::NAN).verdict(Verdict::Undecided).remark(error.to_string()));
+            return Ok(Measurement::undecided(error.to_string()));
         }
         Err(error) => return Err(NotMeasured::broken(error)),
     };
     let Some(line) = fit.line else {
-        return Ok(Measurement::new(f64::NAN).verdict(Verdict::Undecided).remark(fit.reason.clone()));
+        return Ok(Measurement::undecided(fit.reason.clone()));
     };
     let distance = (line.order - expected).abs();
     let half_width = 0.5 * (line.interval95[1] - line.interval95[0]);

@@ -3,17 +3,27 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
-use super::super::claim::{Measurement, NotMeasured};
-use super::Subject;
+use super::super::claim::{Found, Measurement, NotMeasured};
+use super::{Subject, Worst};
+use crate::exchange::peers::{self, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
 use crate::integrators::Detail;
 use crate::physics::Problem;
-use crate::studies::peers::{Peer, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
+
+check! {
+    /// Answers of another program: largest difference from the claim's method, over its conditioning and the tolerance.
+    Peer {
+        /// Name of the recorded peer, or `user` for the one given on the command line.
+        name: String,
+        /// Relative tolerance claimed.
+        tolerance: f64,
+    } in CrossCode, "tolerance", by agreement;
+}
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
-pub(super) const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
+const RECORDED: [&str; 4] = ["heyoka-taylor", "sundae-adams", "sundae-bdf", "sundae-ida"];
 
 /// Name by which claims ask for the program given on the command line.
-pub(super) const USER: &str = "user";
+pub const USER: &str = "user";
 
 /// Relative tolerance that a running peer is asked for: tight enough to judge it, loose enough for any solver.
 const RTOL_USER: f64 = 1e-9;
@@ -28,7 +38,7 @@ pub struct PeerAnswers {
 enum Source {
     /// Answers recorded earlier.
     Recorded(Box<Recording>),
-    /// A program that greeted no one: why.
+    /// A program that failed before it could be asked: why.
     Failed(String),
     /// A program that is asked now.
     Running { peer: Box<Mutex<Asked>>, rtol: f64 },
@@ -37,7 +47,7 @@ enum Source {
 /// A running peer and, once it has failed, why it is not asked again.
 #[derive(Debug)]
 struct Asked {
-    peer: Peer,
+    peer: peers::Peer,
     given_up: Option<String>,
 }
 
@@ -60,7 +70,7 @@ impl PeerAnswers {
     /// # Errors
     /// [`PeerStartError`]: it cannot be started, or does not greet.
     pub fn start(&mut self, name: &str, command: &str) -> Result<(), PeerStartError> {
-        let peer = Peer::start(command)?;
+        let peer = peers::Peer::start(command)?;
         let rtol = match self.sources.get(name) {
             Some(Source::Recorded(recording)) => recording.rtol,
             _ => RTOL_USER,
@@ -156,24 +166,19 @@ fn is_same(a: &Problem, b: &Problem) -> bool {
         })
 }
 
-/// Largest difference of the program's answer from the claim's method, over its conditioning and `tolerance`.
-pub(super) fn agreement(subject: &Subject<'_>, name: &str, tolerance: f64) -> Result<Measurement, NotMeasured> {
-    let scene = subject.claim.scene.as_deref().unwrap_or_default();
-    let theirs = subject.context.peers.answer(name, scene, &subject.problem)?;
-    let ours = subject.fly(&subject.method(None)?, Detail::Events)?;
-    let reference = PeerAnswer::from_flight(&ours);
-    let differences = theirs.differences_from(&reference, &subject.problem).ok_or_else(|| {
+fn agreement(Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {
+    let problem = subject.problem()?;
+    let theirs = subject.context.peers.answer(name, subject.scene_name()?, problem)?;
+    let ours = subject.solution(Detail::Events)?;
+    let differences = theirs.differences_from(&ours, problem).ok_or_else(|| {
         NotMeasured::broken(format!(
             "{name} says {} at x = {} m where {} is right (x = {} m)",
             theirs.outcome, theirs.depth_m, ours.outcome, ours.end.depth
         ))
     })?;
-    let mut worst = (0.0_f64, "nothing");
+    let mut worst = Worst { place: "nothing".to_owned(), ..Worst::default() };
     for difference in &differences {
-        let value = difference.relative / difference.conditioning;
-        if value.is_nan() || value > worst.0 {
-            worst = (value, &difference.quantity);
-        }
+        worst.take(difference.relative / difference.conditioning, || difference.quantity.clone());
     }
-    Ok(Measurement::new(worst.0 / tolerance).remark(format!("largest in {}: {:.1e}", worst.1, worst.0)))
+    Ok(Measurement::new(worst.value / tolerance).remark(format!("largest in {}: {:.1e}", worst.place, worst.value)))
 }

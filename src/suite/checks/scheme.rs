@@ -1,16 +1,79 @@
-//! What the central difference must do at any step, and its error constants (theory section 5).
+//! What the central difference must do at any step, and its error constants (docs/theory.md, section 5).
 
-use super::super::claim::{Evidence, Measurement, NotMeasured};
+use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
 use super::super::verdict::Verdict;
-use super::Subject;
+use super::{Subject, worst_of};
 use crate::integrators::central_difference::stability_limit as stability_limit_of;
-use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, VelocityAt};
-use crate::physics::{Problem, Stage, State};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, VelocityAt};
+use crate::physics::{Outcome, Problem, Stage, State};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 use crate::studies::{rounding, stability};
 
-/// Worst distance from the exact discrete solution, over its amplitude.
+check! {
+    /// Central difference in the crater or at Q = 0: worst distance from the exact discrete solution over the amplitude.
+    DiscreteSolution {
+        /// w dt in the crater; in the tunnel dt over the tunnel time.
+        step: f64,
+        /// Number of steps at most.
+        steps: usize,
+    } in Constants, "relative", by discrete_solution;
+    /// Central difference: worst relative distance of the time of step i from i dt, over `steps` steps.
+    Clock {
+        /// How many steps.
+        steps: usize,
+    } in Constants, "relative", by clock;
+    /// Central difference at rest in the crater, rest located: relative distance of error/(w dt)² from 1/8 (depth) or
+    /// -1/24 (time).
+    CraterConstant {} in Constants, "relative", by crater_constant;
+    /// Central difference at rest in the crater, step ends: how far (X(dt)/X - 1)/(w dt)² leaves 0 to 1/8, over many
+    /// steps, and how far its extremes stay inside; relative to 1/8.
+    CraterBand {} in Constants, "relative", by crater_band;
+    /// Lagged drag: relative distance of error/dt from the modified equation's constant.
+    LaggedConstant {} in Constants, "relative", by lagged_constant;
+    /// Central difference of undamped crater motion: |w dt - 2|/2 at which growth sets in.
+    StabilityLimit {} in Stability, "relative", by stability_limit;
+    /// Central difference: worst relative distance of the measured boundary of stability in w dt from the theoretical
+    /// one over the drag group Q V dt/M, for every velocity rule.
+    StabilityMap {
+        /// How many drag groups, for each velocity rule.
+        points: usize,
+    } in Stability, "relative", by stability_map;
+    /// Central difference: rounding error of the depth with compensated sums over that with plain ones, after
+    /// 2^`from` to 2^`to` steps; not a number unless truncation falls at second order.
+    RoundingFloor {
+        /// Power of two of the fewest steps.
+        from: u32,
+        /// Power of two of the most steps.
+        to: u32,
+    } in Stability, "compensated/plain", by rounding_floor;
+}
+
+/// Solution by the claim's scheme at equal steps of `dt` (s).
+fn at_step(subject: &Subject<'_>, dt: f64) -> Result<Flight, NotMeasured> {
+    CentralDifference::uniform(dt, subject.claim.velocity, subject.claim.boundaries)
+        .solve(subject.problem()?, Detail::Events)
+        .map_err(NotMeasured::broken)
+}
+
+/// First `steps` nodes of the claim's scheme at equal steps of `dt` (s), boundaries ignored.
+fn free_states(subject: &Subject<'_>, problem: &Problem, dt: f64, steps: usize) -> Result<Vec<State>, NotMeasured> {
+    CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd)
+        .free_states(problem, steps)
+        .map_err(NotMeasured::broken)
+}
+
+/// The exact solution of a motion that comes to rest in the crater, and the frequency w (1/s) there.
+fn rest_in_crater(subject: &Subject<'_>) -> Result<(Flight, f64), NotMeasured> {
+    let problem = subject.problem()?;
+    let exact = subject.yardstick()?.flight;
+    if problem.crater != Some(0) || exact.stage != 0 || exact.outcome.agrees_with(Outcome::Perforated) {
+        return Err(NotMeasured::skip("the projectile does not come to rest in the crater"));
+    }
+    Ok((exact, (problem.stages[0].stiffness / problem.mass).sqrt()))
+}
+
+/// The exact discrete solution:
 ///
 /// ```text
 /// crater:        x(i) = V0 dt sin(i th)/sin(th),  2 sin(th/2) = w dt
@@ -18,8 +81,8 @@ use crate::studies::{rounding, stability};
 /// ```
 ///
 /// No velocity rule enters. `step` is w dt in the crater, dt over the time to rest in the tunnel.
-pub(super) fn discrete_solution(subject: &Subject<'_>, step: f64, steps: usize) -> Result<Measurement, NotMeasured> {
-    let problem = &subject.problem;
+fn discrete_solution(&DiscreteSolution { step, steps }: &DiscreteSolution, subject: &Subject<'_>) -> Found {
+    let problem = subject.problem()?;
     let Stage { static_force, stiffness, viscosity, drag, .. } = problem.stages[0];
     if viscosity != 0.0 || drag != 0.0 {
         return Err(NotMeasured::skip("the exact discrete solution has no velocity in the force"));
@@ -45,48 +108,31 @@ pub(super) fn discrete_solution(subject: &Subject<'_>, step: f64, steps: usize) 
     } else {
         return Err(NotMeasured::skip("neither a crater nor a constant force comes first"));
     }
-    let states = CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd)
-        .free_states(problem, steps)
-        .map_err(NotMeasured::broken)?;
-    // The parabola turns back; its amplitude is the way flown so far where that is larger.
+    let states = free_states(subject, problem, dt, steps)?;
+    // The parabola turns back. The largest distance reached is the scale where it is larger.
     let scale = states.iter().map(|s| s.depth.abs()).fold(amplitude.abs(), f64::max);
     let worst = worst_of(states.iter().enumerate().map(|(i, s)| (s.depth - exact(i)).abs() / scale));
     Ok(Measurement::new(worst).remark(format!("{} steps of {dt:.3e} s", states.len())))
 }
 
-/// Worst relative distance of the time of step i from i dt.
-///
-/// The step is a thousandth of the flight over an odd number, with a full significand: a running sum of it is off by
+/// The step is a thousandth of the duration over an odd number, with a full significand: a running sum of it is off by
 /// the square of the number of steps.
-pub(super) fn clock(subject: &Subject<'_>, steps: usize) -> Result<Measurement, NotMeasured> {
+fn clock(&Clock { steps }: &Clock, subject: &Subject<'_>) -> Found {
     let dt = subject.yardstick()?.flight.end.time / 1003.0;
-    let states = CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd)
-        .free_states(&subject.problem, steps)
-        .map_err(NotMeasured::broken)?;
+    let states = free_states(subject, subject.problem()?, dt, steps)?;
     let errors = states.iter().enumerate().skip(1).map(|(i, s)| (s.time / (i as f64 * dt) - 1.0).abs());
     Ok(Measurement::new(worst_of(errors)).remark(format!("{steps} steps of {dt:.3e} s")))
 }
 
-/// Largest of `errors`; NaN if one is.
-fn worst_of(errors: impl Iterator<Item = f64>) -> f64 {
-    errors.fold(0.0, |worst: f64, e| if e.is_nan() || worst.is_nan() { f64::NAN } else { worst.max(e) })
-}
-
 /// At rest in the crater `X(dt)/X - 1 -> (w dt)²/8` and `T(dt)/T - 1 -> -(w dt)²/24`, rest located.
-pub(super) fn crater_constant(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
-    let problem = &subject.problem;
-    let exact = subject.yardstick()?.flight;
-    if problem.crater != Some(0) || exact.stage != 0 || exact.outcome.agrees_with(crate::physics::Outcome::Perforated) {
-        return Err(NotMeasured::skip("the flight does not come to rest in the crater"));
-    }
+fn crater_constant(subject: &Subject<'_>) -> Found {
+    let (exact, w) = rest_in_crater(subject)?;
     if subject.claim.boundaries == Boundaries::StepEnd {
         return Err(NotMeasured::skip("step ends leave a depth error anywhere between 0 and (w dt)²/8"));
     }
-    let w = (problem.stages[0].stiffness / problem.mass).sqrt();
     // Richardson over two steps removes the next even power; what remains is (w dt)^4.
     let ratio = |w_dt: f64| -> Result<f64, NotMeasured> {
-        let scheme = CentralDifference::uniform(w_dt / w, subject.claim.velocity, subject.claim.boundaries);
-        let flight = scheme.fly(problem, Detail::Events).map_err(NotMeasured::broken)?;
+        let flight = at_step(subject, w_dt / w)?;
         Ok(match subject.quantity()? {
             Quantity::Depth => (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0,
             Quantity::Time => (flight.end.time / exact.end.time - 1.0) / (w_dt * w_dt) * -24.0,
@@ -106,20 +152,15 @@ pub(super) fn crater_constant(subject: &Subject<'_>) -> Result<Measurement, NotM
 /// At rest in the crater, seen at step ends, `(X(dt)/X - 1)/(w dt)²` lies between 0 and 1/8 and comes near to both.
 ///
 /// The deepest node is at most half a step from the deepest place of the discrete path, which is `(w dt)²/8` too deep.
-pub(super) fn crater_band(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
+fn crater_band(subject: &Subject<'_>) -> Found {
     const STEPS: usize = 200;
-    let problem = &subject.problem;
-    let exact = subject.yardstick()?.flight;
-    if problem.crater != Some(0) || exact.stage != 0 || !exact.outcome.is_stop() {
-        return Err(NotMeasured::skip("the flight does not come to rest in the crater"));
-    }
-    let w = (problem.stages[0].stiffness / problem.mass).sqrt();
+    let (exact, w) = rest_in_crater(subject)?;
     let mut random = Random::for_part(subject.context.seed, "crater band");
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for _ in 0..STEPS {
         let w_dt = random.log_uniform(1e-3, 1e-2);
         let scheme = CentralDifference::uniform(w_dt / w, subject.claim.velocity, Boundaries::StepEnd);
-        let flight = scheme.fly(problem, Detail::Events).map_err(NotMeasured::broken)?;
+        let flight = scheme.solve(subject.problem()?, Detail::Events)?;
         let share = (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0;
         if share.is_nan() {
             return Err(NotMeasured::broken(format!("no depth at w dt = {w_dt}")));
@@ -136,18 +177,18 @@ pub(super) fn crater_band(subject: &Subject<'_>) -> Result<Measurement, NotMeasu
 /// D = (V1 - V) - P (t - t1)/M,  the velocity lost to drag in the tunnel
 /// rest: X -> -D,  T -> -Q (X - k d)/M;      exit: V_r -> -(P + Q V_r²) D/(M V_r),  t -> D/V_r - Q (H - k d)/M
 /// ```
-pub(super) fn lagged_constant(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
-    let problem = &subject.problem;
+fn lagged_constant(subject: &Subject<'_>) -> Found {
+    let problem = subject.problem()?;
     let claim = subject.claim;
     if claim.velocity != VelocityAt::LaggedHalfStep {
         return Err(NotMeasured::skip("only a lagged drag has this constant"));
     }
     let exact = subject.yardstick()?.flight;
     let tunnel = match problem.stages.last() {
-        Some(stage) if subject.is_plain_concrete() && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0 => {
+        Some(stage) if subject.is_plain_concrete()? && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0 => {
             *stage
         }
-        _ => return Err(NotMeasured::skip("the flight does not end in a tunnel with drag")),
+        _ => return Err(NotMeasured::skip("the motion does not end in a tunnel with drag")),
     };
     let continuous = problem.crater.is_none_or(|i| {
         let at = exact.crater_end().unwrap_or(exact.end);
@@ -175,9 +216,7 @@ pub(super) fn lagged_constant(subject: &Subject<'_>) -> Result<Measurement, NotM
     // error(dt)/dt = C + C' dt: extrapolated from a step and twice the step, averaged over steps without common ratio.
     let error = |steps: f64| -> Result<f64, NotMeasured> {
         let dt = end.time / steps;
-        let flight = CentralDifference::uniform(dt, claim.velocity, claim.boundaries)
-            .fly(problem, Detail::Events)
-            .map_err(NotMeasured::broken)?;
+        let flight = at_step(subject, dt)?;
         if !flight.outcome.agrees_with(exact.outcome) {
             return Err(NotMeasured::broken("the scheme has another outcome at this step"));
         }
@@ -198,18 +237,17 @@ pub(super) fn lagged_constant(subject: &Subject<'_>) -> Result<Measurement, NotM
         .remark(format!("error/dt {measured:.6e}, predicted {predicted:.6e}")))
 }
 
-/// Where growth sets in: |w dt - 2|/2, by bisection on the growth of the free crater motion over many steps.
-pub(super) fn stability_limit(subject: &Subject<'_>) -> Result<Measurement, NotMeasured> {
-    let crater = subject.problem.stages[0];
+/// By bisection on the growth of the free crater motion over many steps.
+fn stability_limit(subject: &Subject<'_>) -> Found {
+    let problem = subject.problem()?;
+    let crater = problem.stages[0];
     if crater.stiffness <= 0.0 {
         return Err(NotMeasured::skip("a stage without stiffness has no step limit"));
     }
-    let free = Problem { exit_depth: f64::INFINITY, ..subject.problem.clone() };
+    let free = Problem { exit_depth: f64::INFINITY, ..problem.clone() };
     let w = (crater.stiffness / free.mass).sqrt();
     let grows = |w_dt: f64| -> Result<bool, NotMeasured> {
-        let states = CentralDifference::uniform(w_dt / w, subject.claim.velocity, Boundaries::StepEnd)
-            .free_states(&free, 4000)
-            .map_err(NotMeasured::broken)?;
+        let states = free_states(subject, &free, w_dt / w, 4000)?;
         let reach = |part: &[State]| worst_of(part.iter().map(|s| s.depth.abs()));
         let (early, late) = states.split_at(states.len() / 2);
         // Bounded below the limit: the later half reaches no farther, but for the grid of its sampling. Linear growth
@@ -236,21 +274,24 @@ pub(super) fn stability_limit(subject: &Subject<'_>) -> Result<Measurement, NotM
     Ok(Measurement::new(off).remark(format!("growth sets in at w dt = {limit:.9}")))
 }
 
-/// The measured boundary of stability against theory, for every velocity rule over the drag group.
-pub(in crate::suite) fn stability_map(points: usize) -> Result<Measurement, NotMeasured> {
-    let boundary = stability::map(points).map_err(NotMeasured::broken)?;
+fn stability_map(&StabilityMap { points }: &StabilityMap, _: &Subject<'_>) -> Found {
+    let boundary = stability::map(points)?;
     let worst = worst_of(boundary.iter().map(|p| (p.measured / p.theory - 1.0).abs()));
     Ok(Measurement::new(worst)
         .remark(format!("{} points of the boundary", boundary.len()))
         .evidence(Evidence::Boundary(boundary)))
 }
 
-/// What compensated sums leave of the rounding of plain ones, centred and landed; nothing unless truncation falls at
-/// second order. Beyond 2^`to` steps the error alone is followed, to where rounding outweighs it.
-pub(in crate::suite) fn rounding_floor(problem: &Problem, from: u32, to: u32) -> Result<Measurement, NotMeasured> {
+fn rounding_floor(&RoundingFloor { from, to }: &RoundingFloor, subject: &Subject<'_>) -> Found {
+    rounding_of(subject.problem()?, from, to)
+}
+
+/// The rounding that compensated sums leave, over that of plain ones, centred and landed; NaN unless truncation falls at
+/// second order. Beyond 2^`to` steps only the error is followed, up to where rounding outweighs it.
+pub(super) fn rounding_of(problem: &Problem, from: u32, to: u32) -> Found {
     /// Steps at which the truncation of second order has sunk to the rounding of f64.
     const FLOOR: u32 = 22;
-    let all = rounding::floor(problem, from, to, to.max(FLOOR)).map_err(NotMeasured::broken)?;
+    let all = rounding::floor(problem, from, to, to.max(FLOOR))?;
     let rows: Vec<_> = all
         .iter()
         .filter_map(|row| Some((row.steps, row.truncation?, row.plain.rounding?, row.compensated.rounding?)))

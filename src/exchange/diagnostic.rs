@@ -1,0 +1,377 @@
+//! What is wrong with a file, where in it, what is allowed there and what to do: for scenes, suites and their words.
+//!
+//! [`decode`] reads a TOML text into serde types and puts the reader's errors into the words of the project.
+
+use std::fs::File;
+use std::io::Read;
+use std::ops;
+use std::path::Path;
+
+use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
+use serde::Deserialize;
+use thiserror::Error;
+use toml::de::{DeTable, DeValue};
+
+use crate::physics::units::QuantityError;
+use crate::text::steers;
+
+/// Largest scene file that is read, 1 MiB. A scene takes about one KiB; more is a mistaken path.
+pub const SIZE_MAX: u64 = 1 << 20;
+
+/// Longest line that is shown in an error whole, in characters.
+const LINE_WIDTH_MAX: usize = 240;
+
+/// Longest piece of a file that is quoted within a message, in characters.
+const QUOTE_LENGTH_MAX: usize = 60;
+
+/// Where in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Bytes of the offending text, counted behind a byte order mark.
+    pub span: ops::Range<usize>,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+}
+
+/// Why a file is refused: what is wrong where, what is allowed, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}: {message}", self.location())]
+pub struct SceneError {
+    /// File name as given; `standard input` for `-`.
+    pub file: String,
+    /// Where; `None` if the file could not be read at all.
+    pub place: Option<Place>,
+    /// What is wrong.
+    pub message: String,
+    /// What is allowed.
+    pub allowed: String,
+    /// What to do.
+    pub help: String,
+    /// The text of the file.
+    text: String,
+}
+
+impl SceneError {
+    /// `file:line:column`, or the file alone if it could not be read.
+    pub fn location(&self) -> String {
+        let file = printable(&self.file);
+        match &self.place {
+            Some(place) => format!("{file}:{}:{}", place.line, place.column),
+            None => file,
+        }
+    }
+
+    /// The error for a terminal, the offending text underlined, with colours if `color`.
+    ///
+    /// Control characters of the file are replaced, so that no file steers the terminal that shows it.
+    pub fn render(&self, color: bool) -> String {
+        self.underlined(color).unwrap_or_else(|| {
+            format!(
+                "Error: {}\n  at {}\n  allowed: {}\n  Help: {}\n",
+                self.message,
+                self.location(),
+                self.allowed,
+                self.help
+            )
+        })
+    }
+
+    fn underlined(&self, color: bool) -> Option<String> {
+        let place = self.place.as_ref()?;
+        let text = printable(&self.text);
+        let start = place.span.start.min(text.len());
+        let line_start = text[..start].rfind('\n').map_or(0, |end| end + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |end| start + end);
+        if text[line_start..line_end].chars().count() > LINE_WIDTH_MAX {
+            return None;
+        }
+        let file = printable(&self.file);
+        // A span over several lines (an inline table) is underlined in its first.
+        let span = (file.as_str(), start..place.span.end.clamp(start, line_end));
+        let mut output = Vec::new();
+        Report::build(ReportKind::Error, span.clone())
+            .with_config(Config::default().with_color(color).with_index_type(IndexType::Byte))
+            .with_message(&self.message)
+            .with_label(Label::new(span).with_message(&self.allowed).with_color(ariadne::Color::Red))
+            .with_help(&self.help)
+            .finish()
+            .write((file.as_str(), Source::from(text.as_str())), &mut output)
+            .ok()?;
+        let shown = String::from_utf8(output).ok()?;
+        // Nothing stands behind the last visible character of a line.
+        Some(shown.lines().flat_map(|line| [line.trim_end(), "\n"]).collect())
+    }
+}
+
+/// `text` with every character that steers a terminal or breaks a line replaced by one of the same length in bytes.
+pub(super) fn printable(text: &str) -> String {
+    let replace = |(index, symbol): (usize, char)| match symbol {
+        '\n' | '\t' => symbol,
+        '\r' if text[index + 1..].starts_with('\n') => symbol,
+        _ if steers(symbol) => ['?', '¿', char::REPLACEMENT_CHARACTER][symbol.len_utf8().min(3) - 1],
+        _ => symbol,
+    };
+    text.char_indices().map(replace).collect()
+}
+
+/// A piece of the file within a message: one line, bounded, in backticks.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut piece: String = printable(text).replace(['\n', '\r', '\t'], " ").chars().take(QUOTE_LENGTH_MAX).collect();
+    if text.chars().count() > QUOTE_LENGTH_MAX {
+        piece.push('…');
+    }
+    format!("`{piece}`")
+}
+
+/// What is wrong with a text, before it is known which file it is from.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    span: ops::Range<usize>,
+    message: String,
+    allowed: String,
+    help: String,
+}
+
+impl Fault {
+    /// Refuses the bytes `span`: what is wrong, what is allowed, what to do.
+    pub(crate) fn new(
+        span: ops::Range<usize>,
+        message: impl Into<String>,
+        allowed: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
+        Self { span, message: message.into(), allowed: allowed.into(), help: help.into() }
+    }
+
+    /// The same in `file`, whose content is `text`.
+    pub(crate) fn in_file(self, file: &str, text: &str) -> Box<SceneError> {
+        let mut start = self.span.start.min(text.len());
+        while !text.is_char_boundary(start) {
+            start -= 1;
+        }
+        let line_start = text[..start].rfind('\n').map_or(0, |end| end + 1);
+        Box::new(SceneError {
+            file: file.to_owned(),
+            place: Some(Place {
+                line: 1 + text[..start].matches('\n').count(),
+                column: 1 + text[line_start..start].chars().count(),
+                span: start..self.span.end.clamp(start, text.len()),
+            }),
+            message: self.message,
+            allowed: self.allowed,
+            help: self.help,
+            text: text.to_owned(),
+        })
+    }
+}
+
+/// Name and text of the small UTF-8 file at `path`, without its byte order mark; `-` is standard input.
+///
+/// # Errors
+/// [`SceneError`]: the file cannot be read, is larger than [`SIZE_MAX`], or is not UTF-8.
+pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
+    let from_stdin = path.as_os_str() == "-";
+    let file = if from_stdin { "standard input".to_owned() } else { path.display().to_string() };
+    let unread = |message: &str, allowed: &str, help: &str| {
+        let [message, allowed, help] = [message, allowed, help].map(str::to_owned);
+        Box::new(SceneError { file: file.clone(), place: None, message, allowed, help, text: String::new() })
+    };
+    let unreadable = |error: std::io::Error| {
+        let message = format!("the file cannot be read: {error}");
+        unread(&message, "a readable file, or `-` for standard input", "check the path")
+    };
+    let too_large = || {
+        let message = "the file is larger than 1 MiB, and was not read";
+        unread(message, "a file of at most 1 MiB", "check that this is the file you mean")
+    };
+    let bytes = if from_stdin {
+        bounded(std::io::stdin().lock())
+    } else {
+        let metadata = std::fs::metadata(path).map_err(unreadable)?;
+        if metadata.is_dir() {
+            return Err(unread("this is a directory", "a file, or `-` for standard input", "name a file in it"));
+        }
+        if metadata.len() > SIZE_MAX {
+            return Err(too_large());
+        }
+        // A device or a pipe has no length beforehand.
+        File::open(path).and_then(bounded)
+    }
+    .map_err(unreadable)?;
+    if bytes.len() as u64 > SIZE_MAX {
+        return Err(too_large());
+    }
+    text_of(bytes, &file).map(|text| (file, text))
+}
+
+/// What `source` holds, up to one byte more than is allowed.
+fn bounded(source: impl Read) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    source.take(SIZE_MAX + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// `bytes` as UTF-8, without a byte order mark.
+pub(super) fn text_of(mut bytes: Vec<u8>, file: &str) -> Result<String, Box<SceneError>> {
+    if bytes.starts_with(b"\xef\xbb\xbf") {
+        bytes.drain(..3);
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let start = error.utf8_error().valid_up_to();
+        let byte = error.as_bytes()[start];
+        // The first replacement character stands where the first bad byte was; what is before it has not moved.
+        let text = String::from_utf8_lossy(error.as_bytes());
+        Fault::new(
+            start..start + char::REPLACEMENT_CHARACTER.len_utf8(),
+            format!("the byte 0x{byte:02x} is not UTF-8"),
+            "UTF-8 text",
+            "save the file in UTF-8",
+        )
+        .in_file(file, &text)
+    })
+}
+
+/// Remedy for a misspelt word.
+pub(crate) fn did_you_mean(known: &str) -> String {
+    format!("did you mean `{known}`?")
+}
+
+/// The one of `known` that `text` is most likely a misspelling of.
+pub(crate) fn nearest<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
+    let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
+    // A long text is no misspelling, and not worth the comparison.
+    let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
+    let best = candidates.min_by_key(distance)?;
+    let length = best.chars().count();
+    // One slip in three letters; in two letters one; a unit of one letter has no misspelling.
+    (distance(&best) <= (length / 3).max(1).min(length.saturating_sub(1))).then_some(best)
+}
+
+/// What differs between the kinds of TOML files: the words of [`decode`] for its errors.
+pub(crate) struct Dialect {
+    /// The whole file: `the scene`.
+    pub(crate) root: &'static str,
+    /// Name in messages of the table at a path without its indices: `[projectile]`.
+    pub(crate) table: fn(path: &str) -> String,
+    /// How to write the value at a path.
+    pub(crate) remedy: fn(path: &str) -> String,
+    /// What to do at a path about an unknown word that resembles no known one.
+    pub(crate) unknown: fn(path: &str, word: &str) -> String,
+}
+
+impl Dialect {
+    fn name_of(&self, path: &str) -> String {
+        if path.is_empty() { self.root.to_owned() } else { (self.table)(path) }
+    }
+
+    /// Refuses `table` for the lack of `key`, of which `example` is one.
+    pub(crate) fn missing(&self, table: &str, span: ops::Range<usize>, key: &str, help: String) -> Fault {
+        Fault::new(span, format!("{} has no `{key}`", self.name_of(table)), format!("`{key}` is required here"), help)
+    }
+}
+
+/// The `T` that the TOML `text` describes.
+///
+/// # Errors
+/// [`Fault`]: the text is not TOML, or its tables, keys and types are not those of `T`.
+pub(crate) fn decode<'t, T: Deserialize<'t>>(text: &'t str, dialect: &Dialect) -> Result<T, Fault> {
+    let document = DeTable::parse(text).map_err(|error| not_toml(text, &error))?;
+    T::deserialize(toml::Deserializer::from(document)).map_err(|error| misplaced(text, &error, dialect))
+}
+
+/// Fault of a TOML text that is no `T`, by the `error` of its reader.
+fn misplaced(text: &str, error: &toml::de::Error, dialect: &Dialect) -> Fault {
+    /// Longest list of words in one line (bytes).
+    const KNOWN_MAX: usize = 160;
+    let span = error.span().unwrap_or(0..0);
+    let at = text.get(span.clone()).unwrap_or_default();
+    let (message, shown) = (error.message(), error.to_string());
+    let path = shown.trim_end().rsplit_once("\nin `").map_or("", |(_, path)| path.trim_end_matches('`'));
+    let key = path.rsplit('.').next().unwrap_or(path);
+    let unknown = |what: &str, place: String, known: &[&str]| {
+        let word = at.trim_matches('"');
+        let help = nearest(word, known).map_or_else(|| (dialect.unknown)(path, word), did_you_mean);
+        let mut known = known.join(", ");
+        if known.len() > KNOWN_MAX {
+            "those that docs/reference.md lists".clone_into(&mut known);
+        }
+        let message = format!("unknown {what} {} in {place}", quoted(word));
+        Fault::new(span.clone(), message, format!("known {what}s: {known}"), help)
+    };
+    let expected = message.rsplit_once("expected ").map_or("", |(_, expected)| expected);
+    // The reader quotes the names that it expected.
+    let known: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+    if message.starts_with("unknown field") {
+        unknown("key", dialect.name_of(path), &known)
+    } else if message.starts_with("unknown variant") {
+        unknown("word", format!("`{key}`"), &known)
+    } else if let Some((_, known)) = message.split_once(", available keys: ") {
+        unknown("key", dialect.name_of(path), &known.split(", ").collect::<Vec<_>>())
+    } else if let Some(name) = message.strip_prefix("missing field `") {
+        dialect.missing(path, span, name.trim_end_matches('`'), (dialect.remedy)(path))
+    } else if message.starts_with("invalid type") {
+        let wanted = match expected {
+            _ if expected.starts_with("struct") => "a table",
+            "a sequence" => "an array",
+            "f64" => "a number",
+            other => other,
+        };
+        Fault::new(span, format!("`{key}` is {}", type_at(at)), format!("must be {wanted}"), (dialect.remedy)(path))
+    } else if message.ends_with("number overflowed") {
+        let message = format!("`{key}`: {}", QuantityError::NotFinite);
+        Fault::new(span, message, "a finite number", "correct the number")
+    } else {
+        Fault::new(span, printable(message), format!("what {} takes", dialect.name_of(path)), (dialect.remedy)(path))
+    }
+}
+
+/// Type of the value that `text` is, with its article.
+pub(super) fn type_at(text: &str) -> &'static str {
+    // A header and a dotted key are no values; what they begin is a table.
+    DeValue::parse(text).map_or("a table", |value| match value.get_ref() {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "an integer",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "a truth value",
+        DeValue::Datetime(_) => "a date or time",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    })
+}
+
+/// Span of `key` where its value is at `value`: in front of it, or within it if it is the header of a table.
+pub(super) fn key_span(text: &str, key: &str, value: ops::Range<usize>) -> ops::Range<usize> {
+    let line_start = text[..value.start].rfind('\n').map_or(0, |end| end + 1);
+    let found = if value.is_empty() {
+        // Dotted keys alone make a table that stands nowhere.
+        text.find(key)
+    } else if text[line_start..value.start].trim().is_empty() {
+        text[value.clone()].find(key).map(|offset| value.start + offset)
+    } else {
+        text[..value.start].rfind(key)
+    };
+    found.map_or(value, |start| start..start + key.len())
+}
+
+fn not_toml(text: &str, error: &toml::de::Error) -> Fault {
+    let span = error.span().unwrap_or(0..0);
+    // At most the rest of the line: some spans reach to the end of the file.
+    let line_end = text.get(span.start..).and_then(|rest| rest.find('\n')).map_or(text.len(), |end| span.start + end);
+    let span = span.start..span.end.clamp(span.start, line_end.max(span.start));
+    let named = text.get(span.clone()).unwrap_or_default();
+    if error.message() == "duplicate key" {
+        let message = format!("{} is given twice", quoted(named));
+        return Fault::new(span, message, "each key and table once", "remove one of the two");
+    }
+    let message = printable(error.message());
+    let help = if message.contains("recurs") {
+        "nest less deep: three levels are enough"
+    } else if message.contains("carriage return") {
+        "end the lines as Unix or Windows does"
+    } else {
+        "correct the syntax; strings need quotes"
+    };
+    Fault::new(span, format!("this is not TOML: {message}"), "TOML text", help)
+}

@@ -1,0 +1,8 @@
+//! What crosses the border of the program: scene files, tables, and other people's solvers.
+
+pub mod diagnostic;
+pub mod peers;
+pub mod scene_file;
+pub mod tables;
+
+pub use diagnostic::SceneError;

@@ -1,0 +1,474 @@
+//! A peer as a child process that may die, hang, babble or print megabytes.
+//!
+//! Its three pipes are served by a thread each, so that no full pipe can block the asker; every wait has a time limit,
+//! every line and buffer a size. A peer that breaks the protocol is ended at once, named, and not asked again.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use std::{io, thread};
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use thiserror::Error;
+
+use super::wire::{PeerAnswer, PeerRequest};
+use crate::physics::Outcome;
+
+/// Exit code by which a peer says, before its greeting, that a program it needs is missing.
+pub const EXIT_CODE_MISSING: i32 = 5;
+
+/// Characters of an answer that a failure quotes.
+const QUOTED_CHARS: usize = 200;
+/// Characters of a name, version or method that a peer may give itself.
+const NAME_CHARS: usize = 120;
+/// How long a peer that closed its output may take to end, and its last words to arrive.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// What is allowed to a peer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PeerLimits {
+    /// Longest wait for one answer.
+    pub silence: Duration,
+    /// Longest line of an answer (bytes).
+    pub line_bytes: usize,
+    /// Standard error stored (bytes): its end, where the cause is.
+    pub stderr_bytes: usize,
+}
+
+impl Default for PeerLimits {
+    fn default() -> Self {
+        Self { silence: Duration::from_secs(30), line_bytes: 1 << 20, stderr_bytes: 64 << 10 }
+    }
+}
+
+/// Who a peer says it is; control characters are replaced and lengths bounded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PeerIdentity {
+    /// Name of the program.
+    pub name: String,
+    /// Its version; empty when it gives none.
+    pub version: String,
+    /// Its method; empty when it gives none.
+    pub method: String,
+}
+
+impl std::fmt::Display for PeerIdentity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let parts = [&self.name, &self.version, &self.method].into_iter().filter(|part| !part.is_empty());
+        f.write_str(&parts.map(String::as_str).collect::<Vec<_>>().join(" "))
+    }
+}
+
+/// What a peer did instead of answering.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PeerFault {
+    /// It answered that it cannot solve this; other questions may follow.
+    #[error("reports an error: {message}")]
+    Reported {
+        /// Its words, bounded.
+        message: String,
+    },
+    /// It ended, or closed its output.
+    #[error("ended without an answer ({status})")]
+    Died {
+        /// Exit status in words.
+        status: String,
+    },
+    /// No line within the time limit.
+    #[error("was silent for {} s", silence.as_secs_f64())]
+    Silent {
+        /// The time limit.
+        silence: Duration,
+    },
+    /// A line that is no answer to the question.
+    #[error("answers nonsense: {why}")]
+    Nonsense {
+        /// What is wrong with it.
+        why: String,
+    },
+}
+
+/// A question without an answer, with everything a report needs.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{peer} {fault}{}{}", quote("; it printed ", printed), quote("; on standard error ", &last_line(stderr)))]
+pub struct PeerFailure {
+    /// Name of the peer, or its command before the greeting.
+    pub peer: String,
+    /// What happened.
+    pub fault: PeerFault,
+    /// What it printed in place of an answer, escaped and bounded; may be empty.
+    pub printed: String,
+    /// The end of its standard error, control characters replaced; may be empty.
+    pub stderr: String,
+}
+
+impl PeerFailure {
+    /// Whether the peer may be asked something else: it followed the protocol and only could not solve this.
+    pub fn is_reported(&self) -> bool {
+        matches!(self.fault, PeerFault::Reported { .. })
+    }
+}
+
+/// Why there is no peer to ask.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PeerStartError {
+    /// The command line names no program: a mistake of the caller, exit code 2.
+    #[error("`{command}` is not a command: {why}")]
+    Command {
+        /// As given.
+        command: String,
+        /// What is wrong.
+        why: &'static str,
+    },
+    /// The program, or something it needs, is missing: exit code 5.
+    #[error("`{command}` {why}")]
+    Missing {
+        /// As given.
+        command: String,
+        /// The system's reason, or the last line of its standard error.
+        why: String,
+    },
+    /// It started and did not greet: a failed peer like any other.
+    #[error(transparent)]
+    Greeting(#[from] PeerFailure),
+}
+
+impl PeerStartError {
+    /// Whether a required program is missing (exit code 5).
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Self::Missing { .. })
+    }
+
+    /// Whether the request was at fault (exit code 2).
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Command { .. })
+    }
+}
+
+/// What the reading thread heard on standard output.
+#[derive(Debug)]
+enum Heard {
+    /// A line, or what came before the end of the output.
+    Line(Vec<u8>),
+    /// The beginning of a line that went on beyond the limit.
+    TooLong(Vec<u8>),
+    /// The output ended.
+    End,
+}
+
+/// A running peer that has greeted. Dropped, it is killed.
+#[derive(Debug)]
+pub struct Peer {
+    identity: PeerIdentity,
+    command: String,
+    line: Line,
+    questions_asked: u64,
+    failure: Option<PeerFailure>,
+}
+
+/// The child process and the channels of its threads.
+#[derive(Debug)]
+struct Line {
+    child: Child,
+    /// Lines for its standard input.
+    to_peer: Sender<Vec<u8>>,
+    from_peer: Receiver<Heard>,
+    stderr: Arc<Mutex<Vec<u8>>>,
+    /// Disconnects when standard error has ended.
+    stderr_ended: Receiver<()>,
+    limits: PeerLimits,
+}
+
+impl Peer {
+    /// Starts `command` (split as a shell would, run without one) and waits for its greeting.
+    ///
+    /// # Errors
+    /// [`PeerStartError`]: no command, no such program, something it needs is missing, or no greeting.
+    pub fn start(command: &str) -> Result<Self, PeerStartError> {
+        Self::start_within(command, PeerLimits::default())
+    }
+
+    /// [`Peer::start`] with limits other than the usual.
+    ///
+    /// # Errors
+    /// As [`Peer::start`].
+    pub fn start_within(command: &str, limits: PeerLimits) -> Result<Self, PeerStartError> {
+        let refuse = |why| PeerStartError::Command { command: command.to_owned(), why };
+        let missing = |why| PeerStartError::Missing { command: command.to_owned(), why };
+        let words = shlex::split(command).ok_or_else(|| refuse("a quote is not closed"))?;
+        let (program, arguments) = words.split_first().ok_or_else(|| refuse("it is empty"))?;
+        let mut line = Line::open(Command::new(program).args(arguments), limits)
+            .map_err(|error| missing(format!("cannot be started: {error}")))?;
+        match line.exchange(&json!({"hello": 1})).and_then(|answer| greeting(&answer)) {
+            Ok(identity) => Ok(Self { identity, command: command.to_owned(), line, questions_asked: 0, failure: None }),
+            Err(lapse) => {
+                let code = line.end().and_then(|status| status.code());
+                let failure = lapse.into_failure(&format!("`{command}`"), &line);
+                if code == Some(EXIT_CODE_MISSING) && matches!(failure.fault, PeerFault::Died { .. }) {
+                    return Err(missing(format!("lacks what it needs: {}", last_line(&failure.stderr))));
+                }
+                Err(failure.into())
+            }
+        }
+    }
+
+    /// Who the peer says it is.
+    pub fn identity(&self) -> &PeerIdentity {
+        &self.identity
+    }
+
+    /// The command it was started with.
+    pub fn command(&self) -> &str {
+        &self.command
+    }
+
+    /// The end of what it wrote on standard error so far, control characters replaced.
+    pub fn stderr(&self) -> String {
+        self.line.stderr_text()
+    }
+
+    /// Asks for one flight and waits for the answer.
+    ///
+    /// # Errors
+    /// [`PeerFailure`]. Unless the peer itself reports an error, it is ended, and each later question gets the same
+    /// failure without being asked.
+    pub fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
+        self.questions_asked += 1;
+        let mut question = json!(request);
+        question["id"] = json!(self.questions_asked);
+        let answer = self.line.exchange(&question).and_then(|line| answer(&line, self.questions_asked, request));
+        answer.map_err(|lapse| {
+            let reported = matches!(lapse.fault, PeerFault::Reported { .. });
+            if !reported {
+                self.line.end();
+            }
+            let failure = lapse.into_failure(&self.identity.to_string(), &self.line);
+            if !reported {
+                self.failure = Some(failure.clone());
+            }
+            failure
+        })
+    }
+}
+
+/// A fault and what was printed, before it is known who and with which standard error.
+struct Lapse {
+    fault: PeerFault,
+    printed: String,
+}
+
+impl Lapse {
+    /// The reason may repeat what was printed, so it is bounded and escaped too.
+    fn nonsense(why: &str, printed: &[u8]) -> Self {
+        Self { fault: PeerFault::Nonsense { why: excerpt(why.as_bytes()) }, printed: excerpt(printed) }
+    }
+
+    fn into_failure(self, peer: &str, line: &Line) -> PeerFailure {
+        PeerFailure { peer: peer.to_owned(), fault: self.fault, printed: self.printed, stderr: line.stderr_text() }
+    }
+}
+
+impl Line {
+    fn open(command: &mut Command, limits: PeerLimits) -> io::Result<Self> {
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
+        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let (to_peer, questions) = channel();
+        // One line of look-ahead: a peer that floods its output waits in its own pipe.
+        let (heard, from_peer) = sync_channel(1);
+        let (alive, stderr_ended) = channel();
+        let stderr = Arc::new(Mutex::new(Vec::new()));
+        let line = Self { child, to_peer, from_peer, stderr: Arc::clone(&stderr), stderr_ended, limits };
+        let (Some(input), Some(output), Some(complaints)) = pipes else {
+            return Err(io::Error::other("a pipe to the peer is missing"));
+        };
+        // The threads are not joined: a grandchild may keep a pipe open for as long as it likes.
+        thread::Builder::new().spawn(move || write_lines(input, &questions))?;
+        thread::Builder::new().spawn(move || read_lines(output, &heard, limits.line_bytes))?;
+        thread::Builder::new().spawn(move || store_tail(complaints, &stderr, limits.stderr_bytes, &alive))?;
+        Ok(line)
+    }
+
+    /// Sends one object and waits for one line.
+    fn exchange(&mut self, question: &Value) -> Result<Vec<u8>, Lapse> {
+        // A writer that is gone means a peer that is gone, which the reader reports.
+        let _ = self.to_peer.send(format!("{question}\n").into_bytes());
+        let fault = match self.from_peer.recv_timeout(self.limits.silence) {
+            Ok(Heard::Line(line)) => return Ok(line),
+            Ok(Heard::TooLong(start)) => {
+                return Err(Lapse::nonsense(&format!("a line longer than {} bytes", self.limits.line_bytes), &start));
+            }
+            Ok(Heard::End) | Err(RecvTimeoutError::Disconnected) => PeerFault::Died { status: self.status_in_words() },
+            Err(RecvTimeoutError::Timeout) => PeerFault::Silent { silence: self.limits.silence },
+        };
+        Err(Lapse { fault, printed: String::new() })
+    }
+
+    /// How a peer without output has ended.
+    fn status_in_words(&mut self) -> String {
+        let deadline = Instant::now() + GRACE;
+        while Instant::now() < deadline {
+            match self.child.try_wait() {
+                Ok(Some(status)) => return status.to_string(),
+                Ok(None) => thread::sleep(Duration::from_millis(5)),
+                Err(error) => return error.to_string(),
+            }
+        }
+        "it closed its output and runs on".to_owned()
+    }
+
+    /// Ends the process, if it still runs, and lets its last words arrive.
+    fn end(&mut self) -> Option<ExitStatus> {
+        // Errors here mean that it is gone already.
+        let _ = self.child.kill();
+        let status = self.child.wait().ok();
+        let _ = self.stderr_ended.recv_timeout(GRACE);
+        status
+    }
+
+    fn stderr_text(&self) -> String {
+        let stored = self.stderr.lock().unwrap_or_else(PoisonError::into_inner);
+        printable(&String::from_utf8_lossy(&stored))
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Writes questions until the asker or the peer is gone.
+fn write_lines(mut input: ChildStdin, questions: &Receiver<Vec<u8>>) {
+    for question in questions {
+        if input.write_all(&question).and_then(|()| input.flush()).is_err() {
+            return;
+        }
+    }
+}
+
+/// Passes lines on until the asker is gone, the output ends, or a line is too long.
+fn read_lines(output: ChildStdout, heard: &SyncSender<Heard>, line_bytes: usize) {
+    let mut output = BufReader::new(output);
+    loop {
+        let mut line = Vec::new();
+        let what = match output.by_ref().take(line_bytes as u64 + 1).read_until(b'\n', &mut line) {
+            Ok(0) | Err(_) => Heard::End,
+            Ok(_) if line.len() > line_bytes => Heard::TooLong(line),
+            Ok(_) => Heard::Line(line),
+        };
+        let last = !matches!(what, Heard::Line(_));
+        if heard.send(what).is_err() || last {
+            return;
+        }
+    }
+}
+
+/// Reads standard error to its end and stores the last `limit` bytes. `_alive` is dropped at the end.
+fn store_tail(mut complaints: ChildStderr, tail: &Mutex<Vec<u8>>, limit: usize, _alive: &Sender<()>) {
+    let mut chunk = [0; 4096];
+    while let Ok(count @ 1..) = complaints.read(&mut chunk) {
+        let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
+        tail.extend_from_slice(&chunk[..count]);
+        let excess = tail.len().saturating_sub(limit);
+        tail.drain(..excess);
+    }
+}
+
+/// Reads the greeting.
+fn greeting(line: &[u8]) -> Result<PeerIdentity, Lapse> {
+    #[derive(Deserialize)]
+    struct Greeting {
+        name: String,
+        #[serde(default)]
+        version: String,
+        #[serde(default)]
+        method: String,
+    }
+    let Greeting { name, version, method } =
+        serde_json::from_slice(line).map_err(|error| Lapse::nonsense(&format!("no greeting ({error})"), line))?;
+    if name.trim().is_empty() {
+        return Err(Lapse::nonsense("a greeting without a name", line));
+    }
+    let [name, version, method] =
+        [name, version, method].map(|text| escaped(&text.chars().take(NAME_CHARS).collect::<String>()));
+    Ok(PeerIdentity { name, version, method })
+}
+
+/// Reads the answer to question number `id`.
+fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Lapse> {
+    #[derive(Deserialize)]
+    struct Head {
+        id: Value,
+        error: Option<String>,
+        outcome: Option<String>,
+    }
+    // NaN and Infinity are no tokens of JSON and 1e400 is no number of f64: both fail here.
+    let nonsense = |error: serde_json::Error| Lapse::nonsense(&error.to_string(), line);
+    let head: Head = serde_json::from_slice(line).map_err(nonsense)?;
+    if head.id != json!(id) {
+        let why = format!("it answers question {} and was asked question {id}", head.id);
+        return Err(Lapse::nonsense(&why, line));
+    }
+    if let Some(message) = head.error {
+        let message = excerpt(message.as_bytes());
+        return Err(Lapse { fault: PeerFault::Reported { message }, printed: String::new() });
+    }
+    let mut answer: PeerAnswer = serde_json::from_slice(line).map_err(nonsense)?;
+    if head.outcome.is_none() {
+        answer.outcome = outcome_of_depth(answer.depth_m, request);
+    }
+    Ok(answer)
+}
+
+/// The outcome that a depth means when the peer names none: perforated where the exit depth is reached within the
+/// tolerance asked for.
+fn outcome_of_depth(depth: f64, request: &PeerRequest) -> Outcome {
+    match request.exit_depth_m {
+        Some(exit) if exit - depth <= (request.rtol * exit).max(request.atol[0]) => Outcome::Perforated,
+        _ => Outcome::Stopped,
+    }
+}
+
+/// The beginning of what was printed, on one line and harmless on a terminal.
+fn excerpt(printed: &[u8]) -> String {
+    let start = &printed[..printed.len().min(4 * QUOTED_CHARS)];
+    let text = String::from_utf8_lossy(start);
+    let text = text.trim_end();
+    let mut quoted = escaped(&text.chars().take(QUOTED_CHARS).collect::<String>());
+    if printed.len() > start.len() || text.chars().count() > QUOTED_CHARS {
+        quoted.push('…');
+    }
+    quoted
+}
+
+/// Control characters as escapes, everything else as it is.
+fn escaped(text: &str) -> String {
+    text.chars().flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
+}
+
+/// Several lines, harmless on a terminal.
+fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() && c != '\n' { '\u{FFFD}' } else { c }).collect()
+}
+
+/// The last line of `text` that is not blank, bounded: a peer may write a line of megabytes.
+fn last_line(text: &str) -> String {
+    excerpt(text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("").as_bytes())
+}
+
+/// `text` in quotes after `before`, or nothing when there is none.
+fn quote(before: &str, text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("{before}`{text}`") }
+}
+
+#[cfg(all(test, unix))]
+mod tests;

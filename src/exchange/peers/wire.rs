@@ -1,0 +1,390 @@
+//! The objects of the peer protocol, and how far two answers to one question differ.
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::integrators::{Cost, Flight};
+use crate::physics::{Event, EventKind, Outcome, Problem, Stage, State, Target};
+
+/// A stage as it is written in JSON: the force `F = p + s x + r V + q V²` until `x = end`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct StageJson {
+    /// Static force p (N).
+    pub static_force_n: f64,
+    /// Stiffness s (N/m).
+    pub stiffness_n_m: f64,
+    /// Viscosity r (kg/s).
+    pub viscosity_kg_s: f64,
+    /// Drag q (kg/m).
+    pub drag_kg_m: f64,
+    /// Depth where the stage ends (m), from the impact face; `null` in the last.
+    pub end_m: Option<f64>,
+}
+
+impl From<&Stage> for StageJson {
+    fn from(stage: &Stage) -> Self {
+        Self {
+            static_force_n: stage.static_force,
+            stiffness_n_m: stage.stiffness,
+            viscosity_kg_s: stage.viscosity,
+            drag_kg_m: stage.drag,
+            end_m: finite(stage.end),
+        }
+    }
+}
+
+impl From<&StageJson> for Stage {
+    fn from(json: &StageJson) -> Self {
+        Self {
+            static_force: json.static_force_n,
+            stiffness: json.stiffness_n_m,
+            viscosity: json.viscosity_kg_s,
+            drag: json.drag_kg_m,
+            end: json.end_m.unwrap_or(f64::INFINITY),
+        }
+    }
+}
+
+/// JSON has no infinity: a depth that does not exist is `null`.
+fn finite(depth: f64) -> Option<f64> {
+    depth.is_finite().then_some(depth)
+}
+
+/// What an event is called in JSON.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum EventName {
+    /// x = k d.
+    CraterEnd,
+    /// End of the stage whose index is in `stage`.
+    StageEnd,
+    /// Velocity zero.
+    Rest,
+    /// Exit depth.
+    Exit,
+}
+
+/// An event as it is written in JSON.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct EventJson {
+    /// What happened.
+    pub event: EventName,
+    /// Index from 0 of the stage that ended; with `stage-end` only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<usize>,
+    /// Time since impact (s).
+    pub time_s: f64,
+    /// Depth from the impact face (m).
+    pub depth_m: f64,
+    /// Velocity (m/s).
+    pub velocity_m_s: f64,
+}
+
+impl EventJson {
+    /// What happened in `problem`. A peer does not know which stage is the crater: its `stage-end` there is the same
+    /// event as `crater-end`. `None` when the answer names a stage end without its stage.
+    pub fn kind(&self, problem: &Problem) -> Option<EventKind> {
+        match self.event {
+            EventName::Exit => Some(EventKind::Exit),
+            EventName::Rest => Some(EventKind::Rest),
+            EventName::CraterEnd => Some(EventKind::CraterEnd),
+            EventName::StageEnd => self.stage.map(|index| EventKind::boundary(problem, index)),
+        }
+    }
+}
+
+impl From<&Event> for EventJson {
+    fn from(event: &Event) -> Self {
+        let (name, stage) = match event.kind {
+            EventKind::CraterEnd => (EventName::CraterEnd, None),
+            EventKind::StageEnd(index) => (EventName::StageEnd, Some(index)),
+            EventKind::Exit => (EventName::Exit, None),
+            EventKind::Rest => (EventName::Rest, None),
+        };
+        let State { time, depth, velocity } = event.state;
+        Self { event: name, stage, time_s: time, depth_m: depth, velocity_m_s: velocity }
+    }
+}
+
+/// A flight that a peer is asked for. The client numbers the questions, so there is no `id` here.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerRequest {
+    /// Mass M (kg).
+    pub mass_kg: f64,
+    /// Impact speed V0 (m/s).
+    pub velocity_m_s: f64,
+    /// Exit depth (m); `null` for a semi-infinite target.
+    pub exit_depth_m: Option<f64>,
+    /// Relative tolerance.
+    pub rtol: f64,
+    /// Absolute tolerances of depth (m) and velocity (m/s).
+    pub atol: [f64; 2],
+    /// Flights to take the median time of; 1 unless time is measured.
+    pub repeats: u32,
+    /// The stages, in order.
+    pub stages: Vec<StageJson>,
+}
+
+impl PeerRequest {
+    /// Asks for `problem` at relative tolerance `rtol`; absolute tolerances are `rtol` times (first boundary in x, the
+    /// exit depth included; V0). Without a boundary the depth scale is the distance to rest under the force at impact.
+    pub fn from_problem(problem: &Problem, rtol: f64) -> Self {
+        Self {
+            mass_kg: problem.mass,
+            velocity_m_s: problem.impact_speed,
+            exit_depth_m: finite(problem.exit_depth),
+            rtol,
+            atol: [rtol * depth_scale(problem), rtol * problem.impact_speed],
+            repeats: 1,
+            stages: problem.stages.iter().map(StageJson::from).collect(),
+        }
+    }
+
+    /// The same question for the time of one flight, as the median of `repeats`.
+    #[must_use]
+    pub fn timed(mut self, repeats: u32) -> Self {
+        self.repeats = repeats;
+        self
+    }
+
+    /// The problem that this asks for; `crater` is the stage that ends at k d, if there is one.
+    ///
+    /// Takes the numbers as they are: meant for requests of ours, not for input from outside.
+    pub fn problem(&self, crater: Option<usize>) -> Problem {
+        let problem = Problem::of_stages(self.mass_kg, self.velocity_m_s, self.stages.iter().map(Stage::from))
+            .with_exit(self.exit_depth_m.unwrap_or(f64::INFINITY));
+        Problem { crater, target: if crater.is_some() { Target::CraterAndTunnel } else { Target::Stages }, ..problem }
+    }
+}
+
+/// Depth (m) that scales the absolute tolerance.
+fn depth_scale(problem: &Problem) -> f64 {
+    let boundaries = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]);
+    let first = boundaries.filter(|depth| *depth > 0.0).fold(f64::INFINITY, f64::min);
+    if first.is_finite() {
+        return first;
+    }
+    let speed = problem.impact_speed;
+    let to_rest = 0.5 * problem.mass * speed * speed / problem.stages[0].force(0.0, speed).abs();
+    // A crater without an end and no boundary at all: nothing gives a length, so the unit does.
+    if to_rest.is_finite() && to_rest > 0.0 { to_rest } else { 1.0 }
+}
+
+/// What a peer answered: an outcome and finite numbers.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct PeerAnswer {
+    /// How the flight ended; a peer may say `stopped` for any stop, or nothing: then the depth decides.
+    #[serde(default = "not_named", deserialize_with = "by_name")]
+    pub outcome: Outcome,
+    /// Depth at the end (m).
+    pub depth_m: f64,
+    /// Time of the end (s).
+    pub time_s: f64,
+    /// Velocity at the end (m/s).
+    pub velocity_m_s: f64,
+    /// Events in time order, as far as the peer lists them.
+    #[serde(default, deserialize_with = "none_if_null")]
+    pub events: Vec<EventJson>,
+    /// Evaluations of the force, where the peer counts them.
+    pub force_evaluations: Option<u64>,
+    /// Time of one flight (ns), the median of the repeats.
+    pub wall_ns: Option<f64>,
+    /// Quartiles of that time (ns), where the peer gives its spread.
+    pub wall_ns_quartiles: Option<[f64; 2]>,
+}
+
+/// How far one quantity of two answers differs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// `depth`, `time`, `velocity`, or an event and what of it: `crater-end time`, `stage-end 2 velocity`.
+    pub quantity: String,
+    /// Absolute value; depth and times relative to the reference, velocities to V0.
+    pub relative: f64,
+    /// How much the problem itself magnifies a relative error of the velocity or the energy in this quantity, at least
+    /// 1: V0/V at a place passed with velocity V; V0/(a T) in the time T of a rest that is reached with deceleration a.
+    /// Divide by it before comparing with what a program can do.
+    pub conditioning: f64,
+}
+
+impl PeerAnswer {
+    /// The answer as a flight through `problem`, with the events that the peer lists.
+    pub fn flight(&self, problem: &Problem) -> Flight {
+        let event = |event: &EventJson| {
+            let state = State { time: event.time_s, depth: event.depth_m, velocity: event.velocity_m_s };
+            Some(Event { kind: event.kind(problem)?, state })
+        };
+        Flight {
+            outcome: self.outcome,
+            stage: 0,
+            end: State { time: self.time_s, depth: self.depth_m, velocity: self.velocity_m_s },
+            events: self.events.iter().filter_map(event).collect(),
+            exit_margin: None,
+            exit_margin_error: None,
+            cost: Cost { force_evaluations: self.force_evaluations.unwrap_or(0), ..Cost::default() },
+            trajectory: Vec::new(),
+            step_limit: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Differences from `reference`, another solution of `problem`: the end, and each event that both list.
+    ///
+    /// `None` if the outcomes contradict each other: then no number can be compared.
+    pub fn differences_from(&self, reference: &Flight, problem: &Problem) -> Option<Vec<Difference>> {
+        if !self.outcome.agrees_with(reference.outcome) {
+            return None;
+        }
+        let ours = self.flight(problem);
+        let mut differences = compare("", ours.end, reference.end, problem);
+        for Event { kind, .. } in &reference.events {
+            if let (Some(ours), Some(theirs)) = (ours.at(*kind), reference.at(*kind)) {
+                let prefix = match kind {
+                    EventKind::StageEnd(index) => format!("stage-end {index} "),
+                    _ => format!("{} ", kind.name()),
+                };
+                differences.extend(compare(&prefix, ours, theirs, problem));
+            }
+        }
+        Some(differences)
+    }
+}
+
+/// Depth, time and velocity of two states, each with its conditioning.
+fn compare(prefix: &str, ours: State, theirs: State, problem: &Problem) -> Vec<Difference> {
+    let relative = |ours: f64, theirs: f64, scale: f64| {
+        // Equal zeros differ by nothing, whatever the scale.
+        if ours == theirs { 0.0 } else { ((ours - theirs) / scale).abs() }
+    };
+    let impact_speed = problem.impact_speed;
+    // W = V² has the relative error of the energy: dV = dW/2V, and the time at a place follows dx/V.
+    let passing = if theirs.velocity > 0.0 { (impact_speed / theirs.velocity).max(1.0) } else { 1.0 };
+    let timing =
+        if theirs.velocity > 0.0 { passing } else { (impact_speed / change_to_rest(theirs, problem)).max(1.0) };
+    [
+        ("depth", relative(ours.depth, theirs.depth, theirs.depth), 1.0),
+        ("time", relative(ours.time, theirs.time, theirs.time), timing),
+        ("velocity", relative(ours.velocity, theirs.velocity, impact_speed), passing),
+    ]
+    .into_iter()
+    .map(|(name, relative, conditioning)| Difference { quantity: format!("{prefix}{name}"), relative, conditioning })
+    .collect()
+}
+
+/// Velocity (m/s) that the deceleration at rest would take away in the whole time of the flight; infinite without one.
+fn change_to_rest(rest: State, problem: &Problem) -> f64 {
+    let index = problem.stages.iter().position(|stage| rest.depth <= stage.end).unwrap_or(problem.stages.len() - 1);
+    let change = problem.stages[index].force(rest.depth, 0.0).abs() / problem.mass * rest.time;
+    if change > 0.0 { change } else { f64::INFINITY }
+}
+
+/// Where a peer names no outcome; replaced by the outcome that the depth means.
+fn not_named() -> Outcome {
+    Outcome::Undecided
+}
+
+fn by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Outcome, D::Error> {
+    use Outcome::{Perforated, Stopped, StoppedInCrater, StoppedInTunnel, Undecided};
+    let Some(name) = Option::<String>::deserialize(deserializer)? else { return Ok(not_named()) };
+    let outcomes = [StoppedInCrater, StoppedInTunnel, Stopped, Perforated, Undecided];
+    outcomes
+        .into_iter()
+        .find(|outcome| outcome.name() == name)
+        .ok_or_else(|| D::Error::custom(format!("no outcome is called {name:?}")))
+}
+
+fn none_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<EventJson>, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or_default())
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+mod tests {
+    use smallvec::smallvec;
+
+    use super::*;
+
+    fn problem() -> Problem {
+        Problem::crater_and_tunnel(2.0, 300.0, Some(Stage::crater(1e7, 0.1)), Stage::tunnel(8e5, 3.25))
+    }
+
+    fn answer(outcome: Outcome, velocity: f64, events: &str) -> PeerAnswer {
+        let (depth, time) = ("\"depth_m\": 0.2", "\"time_s\": 1e-3");
+        let text =
+            format!(r#"{{"outcome": "{outcome}", {depth}, {time}, "velocity_m_s": {velocity}, "events": {events}}}"#);
+        serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn a_request_says_the_problem_and_reads_back_to_it() {
+        let request = PeerRequest::from_problem(&problem(), 1e-12);
+        let text = serde_json::to_string(&request).unwrap();
+        assert!(text.contains(r#""exit_depth_m":null"#) && text.contains(r#""end_m":null"#), "{text}");
+        assert_eq!(serde_json::from_str::<PeerRequest>(&text).unwrap().problem(Some(0)), problem());
+    }
+
+    #[test]
+    fn absolute_tolerances_scale_with_the_first_boundary_and_the_impact_speed() {
+        let depth_tolerance = |problem: &Problem| PeerRequest::from_problem(problem, 1e-12).atol[0];
+        assert_eq!(PeerRequest::from_problem(&problem(), 1e-12).atol, [1e-13, 3e-10]);
+        assert_eq!(depth_tolerance(&Problem { exit_depth: 0.05, ..problem() }), 5e-14);
+        let tunnel = Problem { stages: smallvec![Stage::tunnel(9e5, 0.0)], crater: None, ..problem() };
+        assert_eq!(depth_tolerance(&tunnel), 1e-13);
+        let nothing = Problem { stages: smallvec![Stage::crater(1e7, f64::INFINITY)], ..tunnel };
+        assert_eq!(depth_tolerance(&nothing), 1e-12);
+    }
+
+    #[test]
+    fn a_stage_end_of_a_peer_is_our_crater_end() {
+        let at = r#""depth_m": 0.1, "velocity_m_s": 150"#;
+        let stage_end = format!(r#"[{{"event": "stage-end", "stage": 0, "time_s": 4.0e-4, {at}}}]"#);
+        let crater_end = format!(r#"[{{"event": "crater-end", "time_s": 4.4e-4, {at}}}]"#);
+        let theirs = answer(Outcome::Stopped, 0.0, &stage_end);
+        let ours = answer(Outcome::StoppedInTunnel, 0.0, &crater_end);
+        let differences = theirs.differences_from(&ours.flight(&problem()), &problem()).unwrap();
+        let time = differences.iter().find(|d| d.quantity == "crater-end time").unwrap();
+        approx::assert_relative_eq!(time.relative, 1.0 / 11.0, max_relative = 1e-12);
+        // 150 m/s of 300 are left there: the time of the passage magnifies an error of the energy twice.
+        assert_eq!(time.conditioning, 2.0);
+        assert!(differences.iter().filter(|d| d.quantity != "crater-end time").all(|d| d.relative == 0.0));
+    }
+
+    #[test]
+    fn a_stop_and_a_perforation_cannot_be_compared() {
+        let stopped = answer(Outcome::Stopped, 0.0, "null");
+        let perforated = answer(Outcome::Perforated, 3.0, "null");
+        assert_eq!(stopped.differences_from(&perforated.flight(&problem()), &problem()), None);
+    }
+
+    #[test]
+    fn a_barely_perforating_flight_is_badly_conditioned_in_time_and_velocity_alone() {
+        let perforated = answer(Outcome::Perforated, 0.3, "null");
+        let differences = perforated.differences_from(&perforated.flight(&problem()), &problem()).unwrap();
+        let conditioning: Vec<_> = differences.iter().map(|d| d.conditioning).collect();
+        assert_eq!(conditioning, [1.0, 1000.0, 1000.0]);
+    }
+
+    #[test]
+    fn conditioning_is_never_below_one_where_a_drive_speeds_the_projectile_up() {
+        let driven = answer(Outcome::Perforated, 900.0, "null");
+        let differences = driven.differences_from(&driven.flight(&problem()), &problem()).unwrap();
+        assert!(differences.iter().all(|d| d.conditioning == 1.0), "{differences:?}");
+    }
+
+    #[test]
+    fn equal_zeros_differ_by_nothing_and_a_value_beside_an_exact_zero_by_everything() {
+        let at_impact = PeerAnswer { depth_m: 0.0, time_s: 0.0, ..answer(Outcome::Perforated, 300.0, "null") };
+        let beside = PeerAnswer { time_s: 1e-9, ..at_impact.clone() };
+        let relative = |ours: &PeerAnswer| -> Vec<f64> {
+            ours.differences_from(&at_impact.flight(&problem()), &problem())
+                .unwrap()
+                .iter()
+                .map(|d| d.relative)
+                .collect()
+        };
+        assert_eq!(relative(&at_impact), [0.0, 0.0, 0.0]);
+        assert_eq!(relative(&beside), [0.0, f64::INFINITY, 0.0]);
+    }
+}

@@ -1,0 +1,719 @@
+use approx::assert_relative_eq;
+use insta::assert_snapshot;
+
+use super::super::diagnostic::{Place, printable, text_of};
+use super::*;
+use crate::physics::{Problem, Target};
+
+/// A scene with every table and key.
+const FULL: &str = r#"title = "tunnel stop, blunt nose"
+[projectile]
+mass = "2 kg"
+diameter = "50 mm"
+nose = { factor = 0.72 }
+[target]
+strength = "36 MPa"
+density = "2300 kg/m^3"
+thickness = "180 mm"
+[resistance]
+S = 12.0
+B = 1.0
+k = 2.0
+crater_stiffness = "8.48e6 N/m"
+[impact]
+velocity = "300 m/s"
+[perforation]
+criterion = "ndrc"
+"#;
+
+/// A scene of two stages.
+const STAGES: &str = r#"[projectile]
+mass = 2
+[[stage]]
+stiffness = "8 MN/m"
+viscosity = "1e3 kg/s"
+end = "0.1 m"
+[[stage]]
+static_force = "-10 N"
+drag = "3 kg/m"
+[impact]
+velocity = 300
+"#;
+
+fn read(text: &str) -> Scene {
+    Scene::from_toml(text, "scene.toml").unwrap_or_else(|error| panic!("{}", error.render(false)))
+}
+
+fn refuse(text: &str) -> Box<SceneError> {
+    Scene::from_toml(text, "scene.toml").unwrap_err()
+}
+
+/// `FULL` with `from` replaced; the test would be void if it were not there.
+fn with(from: &str, to: &str) -> String {
+    assert!(FULL.contains(from), "{from}");
+    FULL.replace(from, to)
+}
+
+fn in_stages(from: &str, to: &str) -> String {
+    assert!(STAGES.contains(from), "{from}");
+    STAGES.replace(from, to)
+}
+
+fn shipped(name: &str) -> Problem {
+    let (name, text) = SHIPPED.iter().find(|(shipped, _)| *shipped == name).unwrap();
+    Scene::from_toml(text, name).unwrap().problem().unwrap()
+}
+
+#[test]
+fn every_key_is_read() {
+    let concrete = Concrete {
+        diameter: 0.05,
+        nose_factor: 0.72,
+        strength: 36e6,
+        density: 2300.0,
+        static_factor: 12.0,
+        inertia_factor: 1.0,
+        crater_ratio: 2.0,
+        crater_stiffness: CraterStiffness::Given(8.48e6),
+        layers: Vec::new(),
+    };
+    let scene = Scene {
+        title: Some("tunnel stop, blunt nose".to_owned()),
+        mass: 2.0,
+        resistance: Resistance::Concrete(concrete),
+        thickness: Some(0.18),
+        criterion: Criterion::Ndrc,
+        velocity: Some(300.0),
+    };
+    assert_eq!(read(FULL), scene);
+}
+
+#[test]
+fn every_number_of_a_file_stays_as_the_decimal_that_was_written() {
+    let text = with("\"50 mm\"", "\"26.90 mm\"").replace("S = 12.0", "S = 1_2.0");
+    let given = SceneFile::from_toml(&text, "scene.toml").unwrap().given;
+    let decimal = |parameter: Parameter| given.iter().find(|(p, _)| *p == parameter).map(|(_, q)| q.decimal.as_str());
+    assert_eq!(decimal(Parameter::Diameter), Some("2690e-5"));
+    assert_eq!(decimal(Parameter::StaticFactor), Some("12.0"));
+    assert_eq!(given.len(), 11);
+    for (parameter, quantity) in &given {
+        assert_eq!(quantity.decimal.parse(), Ok(quantity.value), "{parameter}");
+    }
+}
+
+#[test]
+fn everything_optional_has_the_default_of_the_table() {
+    let scene = read(
+        r#"
+        [projectile]
+        mass = 2
+        diameter = 0.05
+        nose.shape = "flat"
+        [target]
+        strength = 36e6
+        density = 2_300"#,
+    );
+    let concrete = scene.concrete().unwrap();
+    assert_eq!((concrete.static_factor, concrete.inertia_factor, concrete.crater_ratio), (12.0, 1.0, 2.0));
+    assert_eq!(concrete.crater_stiffness, CraterStiffness::Continuous);
+    assert_eq!((concrete.nose_factor, concrete.density), (1.0, 2300.0));
+    assert_eq!((scene.title, scene.thickness, scene.velocity), (None, None, None));
+    assert_eq!(scene.criterion, Criterion::FullDepth);
+}
+
+#[test]
+fn stages_are_read_as_given_and_a_key_left_out_is_0() {
+    let scene = read(STAGES);
+    let crater = Stage { static_force: 0.0, stiffness: 8e6, viscosity: 1e3, drag: 0.0, end: 0.1 };
+    let tunnel = Stage { static_force: -10.0, stiffness: 0.0, viscosity: 0.0, drag: 3.0, end: f64::INFINITY };
+    assert_eq!(scene.resistance, Resistance::Stages(vec![crater, tunnel]));
+    let closed = in_stages("[impact]", "end = 0.3\n[target]\nthickness = \"30 cm\"\n[impact]");
+    assert_eq!(read(&closed).problem().unwrap().exit_depth, 0.3);
+}
+
+#[test]
+fn noses_are_read_by_shape() {
+    for (nose, factor) in [
+        ("{ shape = \"flat\" }", 1.0),
+        ("{ shape = \"ogive\", caliber_radius_head = 2 }", 0.15625),
+        ("{ shape = \"cone\", length_ratio = 1.0 }", 0.2),
+        ("{ shape = \"spherical\", radius_ratio = 0.5 }", 0.5),
+        ("{ factor = 0 }", 0.0),
+    ] {
+        let scene = read(&with("{ factor = 0.72 }", nose));
+        assert_relative_eq!(scene.concrete().unwrap().nose_factor, factor, max_relative = 1e-15);
+    }
+}
+
+#[test]
+fn layers_sum_up_and_the_one_beyond_the_crater_stands_for_the_target() {
+    let problem = shipped("layered");
+    assert_eq!((problem.target, problem.crater), (Target::Stages, Some(0)));
+    assert_eq!(problem.stages.iter().map(|stage| stage.end).collect::<Vec<_>>(), [0.1, 0.12, 0.2, f64::INFINITY]);
+    assert_relative_eq!(problem.exit_depth, 0.4, max_relative = 1e-15);
+    let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
+    let gap = text.replace("25 MPa", "0 MPa").replace("thickness = \"200 mm\"\n", "S = 10\nviscosity = 5\n");
+    let scene = read(&gap.replace("velocity = \"250 m/s\"", "velocity = 1"));
+    let concrete = scene.concrete().unwrap();
+    assert_eq!((concrete.strength, scene.thickness), (60e6, None));
+    assert_eq!((concrete.layers[1].static_factor, concrete.layers[2].static_factor), (0.0, 10.0));
+    assert_eq!((concrete.layers[2].viscosity, concrete.layers[2].thickness), (5.0, f64::INFINITY));
+    assert!(scene.problem().is_ok());
+}
+
+#[test]
+fn shipped_scenes_are_the_files_and_each_resolves_with_a_title_and_a_comment() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes");
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), SHIPPED.len());
+    for (name, text) in SHIPPED {
+        let scene = Scene::read(&folder.join(name).with_extension("toml")).unwrap();
+        assert_eq!(scene, Scene::from_toml(text, name).unwrap());
+        assert!(scene.problem().is_ok() && scene.title.is_some() && text.starts_with("# "), "{name}");
+    }
+}
+
+#[test]
+fn the_shipped_shot_is_the_one_of_forrestal() {
+    let scene = Scene { title: None, ..read(SHIPPED[0].1) };
+    assert_eq!(scene, crate::testing::scene());
+}
+
+#[test]
+fn paper_slab_and_stage_scenes_are_what_their_comments_say() {
+    let paper = shipped("paper-slab");
+    assert_relative_eq!(paper.mass / (2400.0 * 0.06_f64.powi(3)), 38.58, epsilon = 5e-3);
+    assert_eq!((paper.exit_depth, paper.stages[0].end), (0.3, 0.12));
+    let stiff = shipped("stiff");
+    assert_eq!((stiff.exit_depth, stiff.stages[0].static_force, stiff.stages.len()), (9.0, -1000.0, 1));
+    let viscous = shipped("viscous");
+    assert!(viscous.stages[0].resists() && !viscous.has_exit());
+    assert_eq!(viscous.stages[0].viscosity, stiff.stages[0].viscosity);
+    assert_eq!(shipped("graze").exit_depth, 0.200_771_166_635);
+}
+
+#[test]
+fn a_byte_order_mark_and_windows_line_ends_are_no_fault() {
+    let text = text_of([b"\xef\xbb\xbf", FULL.replace('\n', "\r\n").as_bytes()].concat(), "scene.toml").unwrap();
+    assert_eq!(read(&text), read(FULL));
+    let bad = refuse(&text.replace("36 MPa", "36 m"));
+    assert_eq!(bad.location(), "scene.toml:7:16");
+    assert!(!bad.render(false).contains('?'), "{}", bad.render(false));
+    let first_line = text_of(b"\xef\xbb\xbfx = 1".to_vec(), "scene.toml").unwrap();
+    assert_eq!(refuse(&first_line).place.unwrap().span, 0..1);
+}
+
+/// Each refusal as a person sees it.
+#[test]
+#[expect(clippy::too_many_lines, reason = "the lines are what a person sees")]
+fn refusals_underline_the_fault_and_say_what_to_do() {
+    let rendered = |text: String| refuse(&text).render(false);
+    assert_snapshot!(rendered(with("\"2 kg\"", "\"2 m\"")), @r#"
+    Error: `mass` takes a mass; `m` is a unit of length
+       ╭─[ scene.toml:3:11 ]
+       │
+     3 │ mass = "2 m"
+       │           ┬
+       │           ╰── a mass, in kg, g, t, mg, lb, oz and others
+       │
+       │ Help: give it in kg
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("50 mm", "50 furlong")), @r#"
+    Error: `furlong` is no unit that is known
+       ╭─[ scene.toml:4:16 ]
+       │
+     4 │ diameter = "50 furlong"
+       │                ───┬───
+       │                   ╰───── a length, in m, mm, cm, µm, km, in, ft and others
+       │
+       │ Help: give it in m
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("36 MPa", "36 MPA")), @r#"
+    Error: `MPA` is no unit that is known
+       ╭─[ scene.toml:7:16 ]
+       │
+     7 │ strength = "36 MPA"
+       │                ─┬─
+       │                 ╰─── a pressure, in Pa, kPa, MPa, GPa, bar, psi, ksi and others
+       │
+       │ Help: did you mean `MPa`?
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("diameter", "diametr")), @r#"
+    Error: unknown key `diametr` in [projectile]
+       ╭─[ scene.toml:4:1 ]
+       │
+     4 │ diametr = "50 mm"
+       │ ───┬───
+       │    ╰───── known keys: mass, diameter, nose
+       │
+       │ Help: did you mean `diameter`?
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("mass = \"2 kg\"\n", "")), @r#"
+    Error: [projectile] has no `mass`
+       ╭─[ scene.toml:2:1 ]
+       │
+     2 │ [projectile]
+       │ ──────┬─────
+       │       ╰─────── `mass` is required here
+       │
+       │ Help: add mass = "2 kg"
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("B = 1.0", "S = 1.0")), @r#"
+    Error: `S` is given twice
+        ╭─[ scene.toml:12:1 ]
+        │
+     12 │ S = 1.0
+        │ ┬
+        │ ╰── each key and table once
+        │
+        │ Help: remove one of the two
+    ────╯
+    "#);
+    assert_snapshot!(rendered(with("k = 2.0", "k = \"2.0\"")), @r#"
+    Error: `k` is a string
+        ╭─[ scene.toml:13:5 ]
+        │
+     13 │ k = "2.0"
+        │     ──┬──
+        │       ╰──── must be a number >= 0, without unit or quotes
+        │
+        │ Help: write for instance k = 2.0
+    ────╯
+    "#);
+    assert_snapshot!(rendered(with("\"300 m/s\"", "inf")), @r#"
+    Error: `velocity`: the number is not finite in 64 bits
+        ╭─[ scene.toml:16:12 ]
+        │
+     16 │ velocity = inf
+        │            ─┬─
+        │             ╰─── a number >= 0
+        │
+        │ Help: correct the number
+    ────╯
+    "#);
+    assert_snapshot!(rendered(with("180 mm", "-180 mm")), @r#"
+    Error: `thickness = "-180 mm"` is out of range
+       ╭─[ scene.toml:9:13 ]
+       │
+     9 │ thickness = "-180 mm"
+       │             ────┬────
+       │                 ╰────── a number >= 0
+       │
+       │ Help: correct `thickness`; it is read in m as -0.18
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("{ factor = 0.72 }", "{ factor = 0.72, shape = \"flat\" }")), @r#"
+    Error: the nose has both a `factor` and a `shape`
+       ╭─[ scene.toml:5:25 ]
+       │
+     5 │ nose = { factor = 0.72, shape = "flat" }
+       │                         ──┬──
+       │                           ╰──── exactly one of `factor` and `shape`
+       │
+       │ Help: remove one of the two
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("{ factor = 0.72 }", "{ shape = \"ogive\", length_ratio = 3.0 }")), @r#"
+    Error: `length_ratio` has no place in the nose here
+       ╭─[ scene.toml:5:27 ]
+       │
+     5 │ nose = { shape = "ogive", length_ratio = 3.0 }
+       │                           ──────┬─────
+       │                                 ╰─────── the shape `ogive` takes `caliber_radius_head`
+       │
+       │ Help: remove `length_ratio`
+    ───╯
+    "#);
+    assert_snapshot!(rendered(with("\"ndrc\"", "\"ndcr\"")), @r#"
+    Error: unknown word `ndcr` in `criterion`
+        ╭─[ scene.toml:18:13 ]
+        │
+     18 │ criterion = "ndcr"
+        │             ───┬──
+        │                ╰──── known words: full-depth, ndrc
+        │
+        │ Help: did you mean `ndrc`?
+    ────╯
+    "#);
+    assert_snapshot!(rendered(in_stages("mass = 2", "mass = 2\ndiameter = \"50 mm\"")), @r#"
+    Error: `diameter` has no place in [projectile] here
+       ╭─[ scene.toml:3:1 ]
+       │
+     3 │ diameter = "50 mm"
+       │ ────┬───
+       │     ╰───── with [[stage]], [projectile] has only `mass`
+       │
+       │ Help: remove `diameter`
+    ───╯
+    "#);
+    assert_snapshot!(rendered(in_stages("drag", "end = \"9 cm\"\ndrag")), @r#"
+    Error: this stage ends at 0.09 m, in front of where it begins
+       ╭─[ scene.toml:9:7 ]
+       │
+     9 │ end = "9 cm"
+       │       ───┬──
+       │          ╰──── an end at 0.1 m or beyond
+       │
+       │ Help: give the ends in order, each from the impact face
+    ───╯
+    "#);
+    assert_snapshot!(rendered(in_stages("end = \"0.1 m\"\n", "")), @r#"
+    Error: this stage has no `end`, and another follows
+       ╭─[ scene.toml:3:1 ]
+       │
+     3 │ [[stage]]
+       │ ────┬────
+       │     ╰────── only the last stage goes without an `end`
+       │
+       │ Help: give it an `end`, or remove the stages behind it
+    ───╯
+    "#);
+    assert_snapshot!(rendered(FULL.replace("]\nvelocity", "\nvelocity")), @r#"
+    Error: this is not TOML: unclosed table, expected `]`
+        ╭─[ scene.toml:15:8 ]
+        │
+     15 │ [impact
+        │        │
+        │        ╰─ TOML text
+        │
+        │ Help: correct the syntax; strings need quotes
+    ────╯
+    "#);
+    assert_snapshot!(rendered(String::new()), @r#"
+    Error: the scene has no [projectile]
+       ╭─[ scene.toml:1:1 ]
+       │
+     1 │
+       │ │
+       │ ╰─ [projectile] is required
+       │
+       │ Help: add [projectile] with mass, diameter and nose
+    ───╯
+    "#);
+}
+
+/// Edits of `FULL` or `STAGES`, each with the place and the message of its refusal.
+#[test]
+fn every_other_refusal_names_its_place_and_cause() {
+    let nose = "{ factor = 0.72 }";
+    for (text, place, message) in [
+        (with("\"2 kg\"", "\"2\""), "3:8", "`mass` has no unit"),
+        (with("\"2 kg\"", "\"kg\""), "3:8", "`mass` is no quantity: there is no number in front of the unit"),
+        (with("\"2 kg\"", "true"), "3:8", "`mass` is a truth value"),
+        (with("\"2 kg\"", "\"nan kg\""), "3:8", "`mass`: the number is not finite in 64 bits"),
+        (with("\"2 kg\"", "1e400"), "3:8", "`mass`: the number is not finite in 64 bits"),
+        (
+            with("\"2 kg\"", "1e-400"),
+            "3:8",
+            "`mass`: the number is too small for 64 bits: below 2.3e-308 its digits are lost",
+        ),
+        (with("\"2 kg\"", "1979-05-27"), "3:8", "`mass` is a date or time"),
+        (with("50 mm", "1,5 mm"), "4:14", "`,5 mm` is no unit that is known"),
+        (with("title = \"tunnel stop, blunt nose\"", "title = 3"), "1:9", "`title` is an integer"),
+        (with("mass", "zz = 1\nmass"), "3:1", "unknown key `zz` in [projectile]"),
+        (with("[target]", "[taget]"), "6:2", "unknown key `taget` in the scene"),
+        (with("[target]\n", "[target]\nk = 2\n"), "7:1", "unknown key `k` in [target]"),
+        (with("[resistance]", "[target]"), "10:2", "`target` is given twice"),
+        (with("strength = \"36 MPa\"\n", ""), "6:1", "[target] has no `strength`"),
+        (with("density = \"2300 kg/m^3\"\n", ""), "6:1", "[target] has no `density`"),
+        (with("diameter = \"50 mm\"\n", ""), "2:1", "[projectile] has no `diameter`"),
+        (with("nose = { factor = 0.72 }\n", ""), "2:1", "[projectile] has no `nose`"),
+        (with("velocity = \"300 m/s\"\n", ""), "15:1", "[impact] has no `velocity`"),
+        (with(nose, "0.72"), "5:8", "`nose` is a number"),
+        (with(nose, "{}"), "5:8", "the nose has neither a `factor` nor a `shape`"),
+        (with(nose, "{ factor = 1.01 }"), "5:19", "`factor = 1.01` is out of range"),
+        (with(nose, "{ factor = \"0.7\" }"), "5:19", "`factor` is a string"),
+        (with(nose, "{ factor = 0.7, length_ratio = 1.0 }"), "5:24", "`length_ratio` has no place in the nose here"),
+        (
+            with(nose, "{ shape = \"flat\", radius_ratio = 1.0 }"),
+            "5:26",
+            "`radius_ratio` has no place in the nose here",
+        ),
+        (with(nose, "{ shape = \"ogiv\" }"), "5:18", "unknown nose shape `ogiv`"),
+        (with(nose, "{ shape = 3 }"), "5:18", "`shape` is an integer"),
+        (with(nose, "{ shape = \"cone\" }"), "5:8", "the nose has no `length_ratio`"),
+        (with("8.48e6 N/m", "continous"), "14:20", "unknown crater stiffness `continous`"),
+        (
+            with("8.48e6 N/m", "8.48e6 N"),
+            "14:28",
+            "`crater_stiffness` takes a stiffness (force per length); `N` is a unit of force",
+        ),
+        (with("[target]\n", "[target]\nlayer = []\n"), "7:9", "`layer` is empty"),
+        (with("[target]\n", "[target]\nlayer = 3\n"), "7:9", "`layer` is an integer"),
+        (with("[resistance]", "[[target.layer]]\n[resistance]"), "7:1", "`strength` has no place in [target] here"),
+        (in_stages("[impact]", "[resistance]\nk = 2\n[impact]"), "10:2", "`resistance` has no place in the scene here"),
+        (in_stages("[impact]", "[target]\ndensity = 1\n[impact]"), "11:1", "`density` has no place in [target] here"),
+        (
+            in_stages("[impact]", "[perforation]\ncriterion = \"ndrc\"\n[impact]"),
+            "11:13",
+            "`ndrc` needs a projectile diameter, and a scene of stages has none",
+        ),
+        (
+            in_stages("[impact]", "end = 1\n[target]\nthickness = 2\n[impact]"),
+            "10:7",
+            "the last stage ends inside the target",
+        ),
+        (in_stages("[impact]", "end = 1\n[impact]"), "10:7", "the last stage ends inside the target"),
+        (STAGES.replace("[[stage]]", "[stage]"), "7:2", "`stage` is given twice"),
+        ("stage = []\nprojectile.mass = 1".to_owned(), "1:9", "`stage` is empty"),
+        ("[stage]\n[projectile]\nmass = 1".to_owned(), "1:1", "`stage` is a table"),
+        ("stage = [3]\nprojectile.mass = 1".to_owned(), "1:10", "`stage` is an integer"),
+        ("projectile = 3".to_owned(), "1:14", "`projectile` is an integer"),
+        ("projectile.mss = 3".to_owned(), "1:12", "unknown key `mss` in [projectile]"),
+    ] {
+        let error = refuse(&text);
+        assert_eq!((error.location(), error.message.as_str()), (format!("scene.toml:{place}"), message), "{text}");
+        assert!(!error.allowed.is_empty() && !error.help.is_empty(), "{message}");
+    }
+}
+
+#[test]
+fn admissible_ranges_are_those_of_the_table() {
+    let (nan, inf) = ("nan", "inf");
+    let ogive = "{ shape = \"ogive\", caliber_radius_head = VALUE }";
+    let cone = "{ shape = \"cone\", length_ratio = VALUE }";
+    let cap = "{ shape = \"spherical\", radius_ratio = VALUE }";
+    let layer = "layer = [{ thickness = 1, strength = 0, density = VALUE, viscosity = 1 }]\n";
+    let nose = "{ factor = 0.72 }";
+    for (from, to, inside, outside) in [
+        ("\"2 kg\"", "VALUE", ["2.2250738585072014e-308", "1e300"], ["0", "-1"]),
+        ("\"50 mm\"", "VALUE", ["1e-6", "1e3"], ["0.0", "-1"]),
+        ("\"36 MPa\"", "VALUE", ["1", "1e9"], ["-0.0", "-1"]),
+        ("12.0", "VALUE", ["1e-3", "1e3"], ["0", "-12.0"]),
+        ("\"8.48e6 N/m\"", "VALUE", ["1", "1e12"], ["0", "-1"]),
+        ("0.72", "VALUE", ["0", "1"], ["-0.1", "1.1"]),
+        (nose, ogive, ["0.5", "1e9"], ["0.4999", "-1"]),
+        (nose, cap, ["0.5", "1e9"], ["0.4999", "0"]),
+        (nose, cone, ["1e-9", "1e9"], ["0", "-1"]),
+        ("\"2300 kg/m^3\"", "VALUE", ["0", "-0.0"], ["-1", "-1e-300"]),
+        ("B = 1.0", "B = VALUE", ["0", "1.1"], ["-1", "-0.1"]),
+        ("k = 2.0", "k = VALUE", ["0", "1e-8"], ["-1", "-0.1"]),
+        ("\"180 mm\"", "VALUE", ["0", "1e3"], ["-1", "-0.1"]),
+        ("\"300 m/s\"", "VALUE", ["0", "1e4"], ["-1", "-0.1"]),
+    ] {
+        let text = |value: &str| with(from, &to.replace("VALUE", value));
+        for value in inside {
+            read(&text(value));
+        }
+        for value in outside.into_iter().chain([nan, inf, "-inf", "\"\"", "[]"]) {
+            let error = refuse(&text(value));
+            assert!(!error.message.is_empty() && error.place.is_some(), "{from} = {value}: {error}");
+        }
+    }
+    for key in ["static_force", "stiffness", "viscosity", "drag", "end"] {
+        let text = |value: &str| format!("projectile.mass = 1\n[[stage]]\n{key} = {value}\n[target]\nthickness = 0");
+        read(&text("0"));
+        read(&text("1e300"));
+        assert_eq!(Scene::from_toml(&text("-1"), "").is_ok(), key == "static_force", "{key}");
+        for value in [nan, inf, "-inf"] {
+            refuse(&text(value));
+        }
+    }
+    let target = "strength = \"36 MPa\"\ndensity = \"2300 kg/m^3\"\nthickness = \"180 mm\"\n";
+    read(&with(target, &layer.replace("VALUE", "0")));
+    refuse(&with(target, &layer.replace("VALUE", "-1")));
+    refuse(&with(target, &layer.replace("VALUE", "1").replace("strength = 0", "strength = -1")));
+    refuse(&with(target, &layer.replace("VALUE", "1").replace("viscosity = 1", "viscosity = -1")));
+}
+
+#[test]
+fn only_the_last_layer_goes_without_a_thickness_and_the_sum_is_finite() {
+    let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
+    let error = refuse(&text.replace("thickness = \"80 mm\"\n", ""));
+    assert_eq!(error.message, "[[target.layer]] has no `thickness`");
+    assert_eq!(error.place.unwrap().line, 16);
+    let huge = text.replace("80 mm", "1.7e308 m").replace("200 mm", "1.7e308 m");
+    assert_eq!(refuse(&huge).message, "the layers sum up to no finite thickness");
+}
+
+#[test]
+fn a_static_factor_of_the_scene_holds_for_layers_without_their_own() {
+    let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
+    let scene = read(&text.replace("k = 2.0", "k = 2.0\nS = 9.0").replacen("density", "S = 7.0\ndensity", 1));
+    let factors: Vec<_> = scene.concrete().unwrap().layers.iter().map(|layer| layer.static_factor).collect();
+    assert_eq!(factors, [7.0, 9.0, 9.0]);
+}
+
+#[test]
+fn unreadable_files_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let refused = |path: &Path| {
+        let error = Scene::read(path).unwrap_err();
+        assert!(error.render(false).contains(&error.location()), "{error}");
+        (error.place.clone(), error.message)
+    };
+    assert_eq!(refused(folder.path()), (None, "this is a directory".to_owned()));
+    let (place, message) = refused(&at("absent.toml"));
+    assert!(place.is_none() && message.starts_with("the file cannot be read: "), "{message}");
+    std::fs::write(at("limit.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len())].concat()).unwrap();
+    assert!(Scene::read(&at("limit.toml")).is_ok());
+    std::fs::write(at("large.toml"), [FULL, &"#".repeat((1 << 20) - FULL.len() + 1)].concat()).unwrap();
+    let too_large = (None, "the file is larger than 1 MiB, and was not read".to_owned());
+    assert_eq!(refused(&at("large.toml")), too_large);
+    // A file whose length is known only by reading it.
+    #[cfg(target_os = "linux")]
+    assert_eq!(refused(Path::new("/dev/zero")), too_large);
+}
+
+#[test]
+fn bytes_that_are_not_utf_8_are_refused_at_their_place() {
+    let error = text_of(b"title = \"\xc3\xa4\"\nx = \"\xff\xfe\"".to_vec(), "scene.toml").unwrap_err();
+    assert_eq!(error.location(), "scene.toml:2:6");
+    assert_eq!(error.message, "the byte 0xff is not UTF-8");
+    assert_snapshot!(error.render(false), @r#"
+    Error: the byte 0xff is not UTF-8
+       ╭─[ scene.toml:2:6 ]
+       │
+     2 │ x = "��"
+       │      ┬
+       │      ╰── UTF-8 text
+       │
+       │ Help: save the file in UTF-8
+    ───╯
+    "#);
+}
+
+#[test]
+fn no_file_steers_the_terminal_that_shows_it() {
+    let hostile = "[projectile]\n\"ma\\u001b[31mss\\u202e\" = 1 # \u{1b}]0;owned\u{7}\u{9b}\u{202e}";
+    let hostiles = [hostile.to_owned(), hostile.replace('#', "\n#"), format!("x = {hostile}"), "a\rb".to_owned()];
+    for text in hostiles {
+        let error = Scene::from_toml(&text, "evil\u{1b}[2J.toml").unwrap_err();
+        for shown in [error.render(false), error.to_string()] {
+            let steers = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+            assert!(!shown.chars().any(steers), "{shown:?}");
+        }
+    }
+}
+
+#[test]
+fn a_carriage_return_stays_only_as_part_of_a_line_end() {
+    assert_eq!(printable("a\rb\r\nc\n\rd\r"), "a?b\r\nc\n?d?");
+}
+
+#[test]
+fn a_quoted_piece_is_cut_after_60_characters_and_says_so() {
+    for (length, shown, end) in [(59, 59, ""), (60, 60, ""), (61, 60, "…"), (62, 60, "…"), (200, 60, "…")] {
+        assert_eq!(quoted(&"ü".repeat(length)), format!("`{}{end}`", "ü".repeat(shown)), "{length}");
+    }
+}
+
+#[test]
+fn a_line_is_underlined_up_to_240_characters() {
+    // Neither the line before, which ends in a letter of two bytes, nor the one behind counts.
+    for (length, underlined) in [(1, true), (239, true), (240, true), (241, false), (242, false)] {
+        let line = if length == 1 { "x".to_owned() } else { format!("x = 1 # {}", "ü".repeat(length - 8)) };
+        let error = Fault::new(5..6, "no", "yes", "go").in_file("f", &format!("# é\n{line}\ny = 1\n"));
+        assert_eq!(error.location(), "f:2:1");
+        assert_eq!(error.render(false).contains("│ ┬"), underlined, "{}", error.render(false));
+    }
+}
+
+#[test]
+fn a_span_within_a_letter_begins_at_the_letter() {
+    for start in 8..11 {
+        let error = Fault::new(start..14, "no", "yes", "go").in_file("f", "a = 1\nä€ = 2");
+        assert_eq!((error.location().as_str(), error.place.unwrap().span), ("f:2:2", 8..14));
+    }
+}
+
+#[test]
+fn a_key_over_several_lines_is_refused_in_its_first() {
+    let error = refuse("a = 1\n\"\"\"b\nc\"\"\" = 2\nd = 3\n");
+    assert!(error.message.starts_with("this is not TOML: keys cannot be multi-line"), "{error}");
+    assert_eq!(error.place.unwrap(), Place { line: 2, column: 1, span: 6..10 });
+}
+
+#[test]
+fn a_number_in_place_of_a_table_is_refused_with_how_to_write_it() {
+    for (text, help) in [
+        (with("{ factor = 0.72 }", "0.72"), "write nose = { factor = 0.72 }"),
+        ("projectile = 3".to_owned(), "write [projectile]"),
+        ("impact = 3".to_owned(), "write [impact]"),
+    ] {
+        assert_eq!(refuse(&text).help, help, "{text}");
+    }
+}
+
+#[test]
+fn a_misspelling_has_one_slip_in_three_letters_and_never_in_all() {
+    for (text, known, likely) in [
+        ("xyzdefghi", "abcdefghi", true),
+        ("xyzwefghi", "abcdefghi", false),
+        ("xycdefgh", "abcdefgh", true),
+        ("xyzdefgh", "abcdefgh", false),
+        ("xbcd", "abcd", true),
+        ("xycd", "abcd", false),
+        ("xb", "ab", true),
+        ("xy", "ab", false),
+        ("A", "a", true),
+        ("x", "a", false),
+        ("bacd", "abcd", true),
+    ] {
+        assert_eq!(nearest(text, &[known]), likely.then_some(known), "{text} for {known}");
+    }
+    assert_eq!(nearest("abd", &["xyz", "abc", "abde"]), Some("abc"));
+    let long = "a".repeat(60);
+    assert_eq!(nearest(&long, &[&long]), Some(long.as_str()));
+    assert_eq!(nearest(&"a".repeat(61), &[&long]), None);
+}
+
+#[test]
+fn colours_appear_only_when_asked_for() {
+    let error = refuse("");
+    assert!(error.render(true).contains('\u{1b}') && !error.render(false).contains('\u{1b}'));
+}
+
+#[test]
+fn a_line_of_any_length_gives_a_short_message() {
+    let long = format!("{} = 1", "x".repeat(100_000));
+    let error = refuse(&long);
+    assert!(error.render(false).len() < 1000, "{}", error.render(false));
+    assert_eq!(error.location(), "scene.toml:1:1");
+    let unit = with("50 mm", &format!("50 {}", "y".repeat(100_000)));
+    assert!(refuse(&unit).render(false).len() < 1000);
+}
+
+proptest::proptest! {
+    /// Any text gives a scene or an error that can be shown, never a panic.
+    #[test]
+    fn arbitrary_text_is_read_or_refused(text in ".{0,80}") {
+        if let Err(error) = Scene::from_toml(&text, &text) {
+            proptest::prop_assert!(!error.render(true).is_empty());
+        }
+    }
+
+    /// So does a scene with any one piece replaced by any other text, and what is read resolves to finite numbers.
+    #[test]
+    fn a_mutilated_scene_is_read_or_refused(
+        stages in proptest::bool::ANY,
+        start in 0_usize..400,
+        length in 0_usize..12,
+        insert in "[-0-9a-z\\[\\]{}=\"'.,# \n\u{e4}\u{1b}]{0,6}",
+    ) {
+        let source = if stages { STAGES } else { FULL };
+        let start = start.min(source.len());
+        let end = (start + length).min(source.len());
+        let text = [&source[..start], &insert, &source[end..]].concat();
+        match Scene::from_toml(&text, "scene.toml") {
+            Err(error) => {
+                let place = error.place.clone().unwrap();
+                proptest::prop_assert!(text.get(place.span).is_some());
+                proptest::prop_assert!(error.render(false).contains(&error.message));
+            }
+            Ok(scene) => {
+                if let Ok(problem) = scene.problem() {
+                    for stage in &problem.stages {
+                        let force = [stage.static_force, stage.stiffness, stage.viscosity, stage.drag];
+                        proptest::prop_assert!(force.iter().all(|number| number.is_finite()));
+                    }
+                }
+            }
+        }
+    }
+}

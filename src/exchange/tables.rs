@@ -1,0 +1,542 @@
+//! How do tables come in and go out? From one list of columns, as CSV or as Parquet, a bounded number of rows at a time.
+//!
+//! A [`Format`] lists the columns of a table that comes in; a unit stands at the end of a column's name. [`CsvTable`]
+//! and `parquet::ParquetTable` read it in chunks of [`Rows`], and a [`Row`] gives the cells by the index of the column
+//! in that list. [`read`] goes through a small table in one call. A table that goes out is rows of [`Value`]s: lines of
+//! CSV ([`push_line`]) or columns of [`Cells`]. Whatever is wrong is a [`TableError`].
+//!
+//! A row that cannot be used stops no other one. A table is refused as a whole only where no row could be trusted: a
+//! first line that names no columns, or a quote that swallows the lines behind it.
+
+pub mod csv;
+pub mod error;
+pub mod lines;
+#[cfg(feature = "parquet")]
+pub mod parquet;
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use ::csv::ByteRecord;
+
+pub use csv::CsvTable;
+pub use error::{At, Fault, Place, TableError};
+
+use crate::physics::Range;
+use crate::physics::units::{QuantityError, number};
+use crate::text::{Shown, shortened, steers};
+
+/// Largest table that is read whole (bytes): a study of step sizes or a series of tests is some kilobytes.
+const SIZE_MAX: u64 = 64 << 20;
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Numbers from 1, never absent.
+    Count,
+    /// Real numbers.
+    Number,
+    /// Text.
+    Text,
+}
+
+/// Whether a column, or a cell of it, may be absent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Need {
+    /// Every row gives it.
+    Required,
+    /// An absent cell is no number, or an empty text.
+    Optional,
+    /// An absent cell is this number.
+    Default(f64),
+}
+
+/// A column of a table that comes in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// Its name, the unit last.
+    pub name: &'static str,
+    /// What it holds.
+    pub kind: Kind,
+    /// Whether it may be absent.
+    pub need: Need,
+    /// Range of its numbers.
+    pub range: Range,
+}
+
+impl Column {
+    /// A required column of finite numbers.
+    pub const fn number(name: &'static str) -> Self {
+        Self { name, kind: Kind::Number, need: Need::Required, range: Range::Finite }
+    }
+
+    /// A required column of text.
+    pub const fn text(name: &'static str) -> Self {
+        Self { kind: Kind::Text, ..Self::number(name) }
+    }
+
+    /// The same with numbers within `range`.
+    #[must_use]
+    pub const fn within(self, range: Range) -> Self {
+        Self { range, ..self }
+    }
+
+    /// The same, needed as `need` says.
+    #[must_use]
+    pub const fn needed(self, need: Need) -> Self {
+        Self { need, ..self }
+    }
+}
+
+/// What a table that comes in may look like.
+#[derive(Debug)]
+pub struct Format {
+    /// Its columns.
+    pub columns: &'static [Column],
+    /// Whether columns of other names are ignored; else they are refused.
+    pub ignores_others: bool,
+    /// Whether a line that begins with `#` is a comment.
+    pub has_comments: bool,
+}
+
+impl Format {
+    /// Its columns as the first line of a CSV table, without its end.
+    pub fn header(&self) -> String {
+        self.columns.iter().map(|column| column.name).collect::<Vec<_>>().join(",")
+    }
+
+    /// Its columns in words.
+    pub fn allowed(&self) -> String {
+        let names = |is_needed: bool| {
+            let of_kind = self.columns.iter().filter(|column| (column.need == Need::Required) == is_needed);
+            of_kind.map(|column| column.name).collect::<Vec<_>>().join(", ")
+        };
+        let mut text = format!("columns {}", names(true));
+        let optional = names(false);
+        if !optional.is_empty() {
+            text.push_str(&format!("; these may be left out: {optional}"));
+        }
+        text
+    }
+}
+
+/// Where each column of a [`Format`] stands in the table at hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    columns: &'static [Column],
+    /// Index of each column, from 0.
+    places: Vec<Option<usize>>,
+    /// Number of columns, unknown ones among them.
+    width: usize,
+    /// Line of the names.
+    header: At,
+}
+
+impl Layout {
+    /// The layout that the names of the columns describe; the first line is at `at` of `file`.
+    ///
+    /// # Errors
+    /// [`TableError`]: an unknown, doubled or missing column, or numbers in place of names.
+    pub fn new(names: &[&str], file: &str, at: At, format: &Format) -> Result<Self, Box<TableError>> {
+        let refuse = |column, fault| Err(TableError::new(Place { file: file.to_owned(), at, column }, fault, format));
+        if !names.is_empty() && names.iter().all(|name| name.trim().parse::<f64>().is_ok()) {
+            return refuse(1, Fault::NoHeader);
+        }
+        let mut places = vec![None; format.columns.len()];
+        for (index, name) in names.iter().map(|name| name.trim()).enumerate() {
+            match format.columns.iter().position(|known| known.name == name) {
+                Some(known) if places[known].replace(index).is_some() => {
+                    return refuse(index + 1, Fault::ColumnTwice(name.to_owned()));
+                }
+                None if !format.ignores_others => {
+                    let near = format.resembling(name);
+                    return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
+                }
+                _ => {}
+            }
+        }
+        let mut missing = format.columns.iter().zip(&places).filter(|(_, place)| place.is_none());
+        match missing.find(|(column, _)| column.need == Need::Required) {
+            Some((column, _)) => refuse(0, Fault::MissingColumn(column.name)),
+            None => Ok(Self { columns: format.columns, places, width: names.len(), header: at }),
+        }
+    }
+}
+
+impl Format {
+    /// The column whose name `name` resembles, if it is a word at all.
+    fn resembling(&self, name: &str) -> Option<&'static str> {
+        let is_word = name.chars().all(|c| c.is_alphanumeric() || "_ ()/".contains(c));
+        let likeness = |known: &str| strsim::jaro_winkler(&known.to_lowercase(), &name.to_lowercase());
+        let known = self.columns.iter().filter(|_| is_word).map(|column| (likeness(column.name), column.name));
+        known.filter(|(likeness, _)| *likeness > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, known)| known)
+    }
+}
+
+/// Rows of a table, some thousands of them.
+#[derive(Debug)]
+pub enum Rows {
+    /// Records of a CSV table.
+    Csv(csv::Records),
+    /// Columns of a Parquet table.
+    #[cfg(feature = "parquet")]
+    Parquet(parquet::Columns),
+}
+
+impl Rows {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Csv(records) => records.len(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => columns.len(),
+        }
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Line or number of row `index` in its table.
+    pub fn at(&self, index: usize) -> At {
+        match self {
+            Self::Csv(records) => records.at(index),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => columns.at(index),
+        }
+    }
+
+    /// Row `index`, from 0.
+    ///
+    /// # Errors
+    /// [`Fault::Ragged`].
+    pub fn row(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
+        match self {
+            Self::Csv(records) => records.row(index),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(columns) => Ok(columns.row(index)),
+        }
+    }
+}
+
+/// A row of a table; columns are counted in the list of its [`Format`].
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a> {
+    layout: &'a Layout,
+    at: At,
+    record: Record<'a>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Record<'a> {
+    Csv(&'a ByteRecord),
+    #[cfg(feature = "parquet")]
+    Parquet(&'a [Cells], usize),
+}
+
+impl<'a> Row<'a> {
+    /// Where it stands.
+    pub fn at(&self) -> At {
+        self.at
+    }
+
+    /// Where the columns are named.
+    pub fn header(&self) -> At {
+        self.layout.header
+    }
+
+    /// Position of `column` in the table, from 1; 0 where the table does not have it.
+    pub fn position(&self, column: usize) -> usize {
+        self.layout.places[column].map_or(0, |place| place + 1)
+    }
+
+    /// `fault` of the cell in `column`.
+    fn refuse(&self, column: usize, fault: Fault) -> Box<TableError> {
+        TableError::of_row(self.at, self.position(column), fault)
+    }
+
+    /// The cell of `text` in `column` is `reason`.
+    pub fn refuse_cell(&self, column: usize, text: &str, reason: impl Into<Cow<'static, str>>) -> Box<TableError> {
+        let (name, text) = (self.layout.columns[column].name, shortened(text));
+        self.refuse(column, Fault::Cell { name, text, reason: reason.into() })
+    }
+
+    /// The text in `column` without blanks at its ends; empty where it is absent.
+    ///
+    /// # Errors
+    /// [`Fault::NotText`].
+    #[inline]
+    pub fn text(&self, column: usize) -> Result<&'a str, Box<TableError>> {
+        let Some(place) = self.layout.places[column] else { return Ok("") };
+        match self.record {
+            Record::Csv(record) => std::str::from_utf8(record.get(place).unwrap_or_default())
+                .map(str::trim)
+                .map_err(|_| self.refuse(column, Fault::NotText)),
+            #[cfg(feature = "parquet")]
+            Record::Parquet(columns, index) => Ok(match &columns[column] {
+                Cells::Texts(cells) => cells[index].as_deref().map_or("", str::trim),
+                _ => "",
+            }),
+        }
+    }
+
+    /// The number in `column`, or its default; `None` where it is absent and has none.
+    ///
+    /// # Errors
+    /// [`Fault::Cell`] and [`Fault::EmptyCell`].
+    #[inline]
+    pub fn optional(&self, column: usize) -> Result<Option<f64>, Box<TableError>> {
+        let Column { need, range, .. } = self.layout.columns[column];
+        let refuse = |text: &str, error: Option<QuantityError>| {
+            let reason: Cow<'static, str> = match (range, error) {
+                (Range::Finite, Some(QuantityError::TooSmall)) => "too small for 64 bits".into(),
+                (Range::Finite, Some(QuantityError::NoNumber)) => "not a number".into(),
+                (Range::Finite, _) => "not finite".into(),
+                _ => format!("not {}", range.description()).into(),
+            };
+            Err(self.refuse_cell(column, text, reason))
+        };
+        let value = match self.record {
+            Record::Csv(_) => match self.text(column)? {
+                "" => None,
+                text => match number(text) {
+                    Ok(value) if range.contains(value) => return Ok(Some(value)),
+                    other => return refuse(text, other.err()),
+                },
+            },
+            #[cfg(feature = "parquet")]
+            Record::Parquet(columns, index) => match &columns[column] {
+                Cells::Numbers(cells) => cells.get(index).copied().flatten(),
+                _ => None,
+            },
+        };
+        match (value, need) {
+            (Some(value), _) if range.contains(value) => Ok(Some(value)),
+            (Some(value), _) => refuse(&Shown(value).to_string(), None),
+            (None, Need::Required) => Err(self.refuse_empty(column)),
+            (None, Need::Optional) => Ok(None),
+            (None, Need::Default(value)) => Ok(Some(value)),
+        }
+    }
+
+    /// The number in `column`, which is required or has a default.
+    ///
+    /// # Errors
+    /// As [`Row::optional`].
+    #[inline]
+    pub fn number(&self, column: usize) -> Result<f64, Box<TableError>> {
+        self.optional(column)?.ok_or_else(|| self.refuse_empty(column))
+    }
+
+    /// The cell in `column` is empty and must not be.
+    pub fn refuse_empty(&self, column: usize) -> Box<TableError> {
+        self.refuse(column, Fault::EmptyCell(self.layout.columns[column].name))
+    }
+}
+
+/// Name of the table at `path` in messages; `-` is standard input.
+pub fn name_of(path: &Path) -> String {
+    if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Opens the table at `path`; `None` for `-`, standard input.
+///
+/// # Errors
+/// [`Fault::Unreadable`]: a folder, or what the system says.
+pub fn open(path: &Path, format: &Format) -> Result<Option<File>, Box<TableError>> {
+    let file = match path {
+        _ if path.as_os_str() == "-" => return Ok(None),
+        _ if path.is_dir() => Err("is a folder".to_owned()),
+        _ => File::open(path).map_err(|error| error.to_string()),
+    };
+    file.map(Some).map_err(|cause| unreadable(path, cause, format))
+}
+
+fn unreadable(path: &Path, cause: impl Into<String>, format: &Format) -> Box<TableError> {
+    TableError::new(Place { file: name_of(path), ..Place::default() }, Fault::Unreadable(cause.into()), format)
+}
+
+/// The table at `path` whole, `-` for standard input.
+///
+/// # Errors
+/// [`Fault::Unreadable`]: as [`open`], or a table of more than 64 MiB.
+pub fn read_bytes(path: &Path, format: &Format) -> Result<Vec<u8>, Box<TableError>> {
+    let too_large = || unreadable(path, "larger than 64 MiB, which no such table is", format);
+    let input: Box<dyn Read> = match open(path, format)? {
+        None => Box::new(io::stdin()),
+        Some(file) if file.metadata().is_ok_and(|metadata| metadata.len() > SIZE_MAX) => return Err(too_large()),
+        Some(file) => Box::new(file),
+    };
+    let mut bytes = Vec::new();
+    // A pipe or a device has no length beforehand.
+    let length = input.take(SIZE_MAX + 1).read_to_end(&mut bytes);
+    let length = length.map_err(|error| unreadable(path, error.to_string(), format))?;
+    if length as u64 > SIZE_MAX { Err(too_large()) } else { Ok(bytes) }
+}
+
+/// What `each` makes of the rows of the CSV table `bytes`, some at a time; `file` is its name in messages.
+///
+/// # Errors
+/// [`TableError`] of the table, of its first bad row, or by `each`. Every cell must be text, used or not.
+pub fn read<T>(
+    file: &str,
+    bytes: &[u8],
+    format: &'static Format,
+    mut each: impl FnMut(&Row<'_>) -> Result<T, Box<TableError>>,
+) -> Result<Vec<T>, Box<TableError>> {
+    let mut table = CsvTable::new(file, bytes, format)?;
+    let (mut all, mut used) = (Vec::new(), None);
+    loop {
+        let records = table.next_rows(256, used.take())?;
+        if records.is_empty() {
+            let place = Place { file: file.to_owned(), ..Place::default() };
+            return if all.is_empty() { Err(TableError::new(place, Fault::NoRows, format)) } else { Ok(all) };
+        }
+        for index in 0..records.len() {
+            let row = records.row_of_text(index).and_then(|row| each(&row));
+            all.push(row.map_err(|error| error.in_file(file))?);
+        }
+        used = Some(records);
+    }
+}
+
+/// A cell of a table that goes out; an empty text is an absent one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value<'a> {
+    /// Of [`Kind::Count`].
+    Count(u64),
+    /// Of [`Kind::Number`].
+    Number(Option<f64>),
+    /// Of [`Kind::Text`].
+    Text(&'a str),
+}
+
+/// Appends `values` as a line of CSV with its end.
+pub fn push_line(line: &mut String, values: &[Value<'_>]) {
+    for (index, value) in values.iter().enumerate() {
+        if index > 0 {
+            line.push(',');
+        }
+        match value {
+            // Writing to a string cannot fail.
+            Value::Count(count) => write!(line, "{count}").unwrap_or_default(),
+            Value::Number(Some(number)) => push_number(line, *number),
+            Value::Number(None) => {}
+            Value::Text(text) => push_text(line, text),
+        }
+    }
+    line.push('\n');
+}
+
+/// The shortest digits that read back to the same number; with an exponent where there would be many zeros.
+pub fn push_number(text: &mut String, value: f64) {
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format(value);
+    text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
+}
+
+/// A text as one CSV cell of one line, quoted unless it is a word.
+fn push_text(line: &mut String, text: &str) {
+    if text.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_') {
+        line.push_str(text);
+        return;
+    }
+    line.push('"');
+    for c in text.chars() {
+        if c == '"' {
+            line.push('"');
+        }
+        line.push(printable(c));
+    }
+    line.push('"');
+}
+
+/// A character as a text in a table may have it: a cell is one line.
+fn printable(c: char) -> char {
+    if steers(c) { ' ' } else { c }
+}
+
+/// Cells of one column, one after the other.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cells {
+    /// Of [`Kind::Count`].
+    Counts(Vec<u64>),
+    /// Of [`Kind::Number`].
+    Numbers(Vec<Option<f64>>),
+    /// Of [`Kind::Text`].
+    Texts(Vec<Option<String>>),
+}
+
+impl Cells {
+    /// No cell of `kind`.
+    pub fn empty(kind: Kind) -> Self {
+        match kind {
+            Kind::Count => Self::Counts(Vec::new()),
+            Kind::Number => Self::Numbers(Vec::new()),
+            Kind::Text => Self::Texts(Vec::new()),
+        }
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Counts(cells) => cells.len(),
+            Self::Numbers(cells) => cells.len(),
+            Self::Texts(cells) => cells.len(),
+        }
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Appends `cells`.
+    ///
+    /// # Panics
+    /// If they are of another kind: a mistake of the caller.
+    pub fn append(&mut self, cells: Self) {
+        match (self, cells) {
+            (Self::Counts(all), Self::Counts(cells)) => all.extend(cells),
+            (Self::Numbers(all), Self::Numbers(cells)) => all.extend(cells),
+            (Self::Texts(all), Self::Texts(cells)) => all.extend(cells),
+            (all, cells) => unreachable!("{cells:?} behind {all:?}"),
+        }
+    }
+
+    /// Appends `value`.
+    ///
+    /// # Panics
+    /// If it is of another kind: a mistake of the caller.
+    pub fn push(&mut self, value: Value<'_>) {
+        match (self, value) {
+            (Self::Counts(cells), Value::Count(count)) => cells.push(count),
+            (Self::Numbers(cells), Value::Number(number)) => cells.push(number),
+            (Self::Texts(cells), Value::Text(text)) => {
+                cells.push((!text.is_empty()).then(|| text.chars().map(printable).collect()));
+            }
+            (cells, value) => unreachable!("{value:?} in {cells:?}"),
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_to_the_same_number() {
+        for value in [0.0_f64, -0.0, 1.0 / 3.0, 5e-324, 1.797e308, 1e-7, 123_456_789.125, -2.5e-12] {
+            let mut text = String::new();
+            push_number(&mut text, value);
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{text}");
+            // As in a message, but for the sign of an exponent.
+            assert_eq!(text.replace("e+", "e"), Shown(value).to_string());
+        }
+    }
+}

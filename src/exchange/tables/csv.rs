@@ -1,0 +1,226 @@
+//! Rows of a CSV table, some thousands at a time.
+
+use std::io::{self, Read};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use ::csv::{ByteRecord, Reader, ReaderBuilder};
+
+use super::error::{At, Fault, Place, TableError};
+use super::lines::{LineEnds, line_of};
+use super::{Format, Layout, Record, Row};
+
+/// Longest line (bytes): without a limit one open quote, or a file that is no table, would fill the memory.
+const LINE_MAX: u64 = 1 << 20;
+
+/// Records of a table, with the layout to read them by.
+#[derive(Debug)]
+pub struct Records {
+    layout: Arc<Layout>,
+    #[expect(clippy::struct_field_names, reason = "the records are what the type is of")]
+    records: Vec<ByteRecord>,
+    /// Line of each.
+    lines: Vec<u64>,
+    /// Records in use; the others wait to be filled again.
+    count: usize,
+}
+
+impl Records {
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Line of record `index`.
+    pub fn at(&self, index: usize) -> At {
+        At::Line(self.lines[index])
+    }
+
+    /// Record `index`, from 0.
+    ///
+    /// # Errors
+    /// [`Fault::Ragged`].
+    pub fn row(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
+        let (record, at) = (&self.records[index], self.at(index));
+        let (found, expected) = (record.len(), self.layout.width);
+        if found != expected {
+            return Err(TableError::of_row(at, 0, Fault::Ragged { found, expected }));
+        }
+        Ok(Row { layout: &self.layout, at, record: Record::Csv(record) })
+    }
+
+    /// Record `index`, every cell of which is text.
+    ///
+    /// # Errors
+    /// [`Fault::Ragged`] and [`Fault::NotText`].
+    pub fn row_of_text(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
+        match self.records[index].iter().position(|cell| std::str::from_utf8(cell).is_err()) {
+            Some(column) => Err(TableError::of_row(self.at(index), column + 1, Fault::NotText)),
+            None => self.row(index),
+        }
+    }
+}
+
+/// What a limited reader says when a line is too long.
+const TOO_LONG: &str = "line longer than 1 MiB";
+
+/// Bytes that may still be read for the line at hand.
+#[derive(Clone, Debug)]
+struct Allowance(Arc<AtomicU64>);
+
+/// A reader that stops when a line outgrows its allowance.
+struct Limited<R> {
+    inner: R,
+    allowance: Allowance,
+}
+
+impl<R: Read> Read for Limited<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let left = self.allowance.0.load(Ordering::Relaxed);
+        if left == 0 {
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, TOO_LONG));
+        }
+        let room = buffer.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+        let count = self.inner.read(&mut buffer[..room])?;
+        self.allowance.0.store(left - count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+}
+
+/// A CSV table that is being read.
+pub struct CsvTable<R> {
+    file: String,
+    reader: Reader<LineEnds<Limited<R>>>,
+    allowance: Allowance,
+    layout: Arc<Layout>,
+    format: &'static Format,
+}
+
+impl<R: Read> CsvTable<R> {
+    /// Reads the first line of `input`; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`TableError`] for a first line that does not name the columns of `format`.
+    pub fn new(file: &str, input: R, format: &'static Format) -> Result<Self, Box<TableError>> {
+        let allowance = Allowance(Arc::new(AtomicU64::new(LINE_MAX)));
+        let mut reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(format.has_comments.then_some(b'#'))
+            .buffer_capacity(1 << 16)
+            .from_reader(LineEnds::new(Limited { inner: input, allowance: allowance.clone() }));
+        let mut header = ByteRecord::new();
+        let refuse = |at, column, fault| TableError::new(Place { file: file.to_owned(), at, column }, fault, format);
+        if !reader.read_byte_record(&mut header).map_err(|error| failure(file, 1, &error, format))? {
+            return Err(refuse(At::Table, 0, Fault::Empty));
+        }
+        let at = At::Line(line_of(&reader, header.as_slice()));
+        if header.as_slice().contains(&b'\n') {
+            return Err(refuse(at, 0, Fault::OpenQuote));
+        }
+        let text_of = |(index, name)| {
+            let name = std::str::from_utf8(name).ok().filter(|name| !name.contains('\0'));
+            name.ok_or_else(|| refuse(at, index + 1, Fault::NotText))
+        };
+        let names = header.iter().enumerate().map(text_of).collect::<Result<Vec<_>, _>>()?;
+        let layout = Arc::new(Layout::new(&names, file, at, format)?);
+        Ok(Self { file: file.to_owned(), reader, allowance, layout, format })
+    }
+
+    /// At most `count` rows, none at the end; `used` is an earlier chunk whose memory is reused.
+    ///
+    /// # Errors
+    /// [`TableError`] for a table that cannot be read on.
+    pub fn next_rows(&mut self, count: usize, used: Option<Records>) -> Result<Records, Box<TableError>> {
+        let (mut records, mut lines) = used.map_or_else(Default::default, |used| (used.records, used.lines));
+        lines.clear();
+        while lines.len() < count {
+            let index = lines.len();
+            if records.len() == index {
+                records.push(ByteRecord::new());
+            }
+            let record = &mut records[index];
+            self.allowance.0.store(LINE_MAX, Ordering::Relaxed);
+            let line = self.reader.position().line();
+            let is_read = self.reader.read_byte_record(record);
+            if !is_read.map_err(|error| failure(&self.file, line, &error, self.format))? {
+                break;
+            }
+            let has_break = record.as_slice().contains(&b'\n');
+            let line = line_of(&self.reader, if has_break { record.as_slice() } else { b"" });
+            // A text that is ignored may have several lines.
+            if has_break && !(self.format.ignores_others && record.len() == self.layout.width) {
+                let place = Place { file: self.file.clone(), at: At::Line(line), column: 0 };
+                return Err(TableError::new(place, Fault::OpenQuote, self.format));
+            }
+            lines.push(line);
+        }
+        Ok(Records { layout: Arc::clone(&self.layout), records, count: lines.len(), lines })
+    }
+}
+
+/// A reader's `error` in the record that begins in `line`.
+fn failure(file: &str, line: u64, error: &::csv::Error, format: &Format) -> Box<TableError> {
+    let (at, fault) = match error.kind() {
+        ::csv::ErrorKind::Io(cause) if cause.kind() == io::ErrorKind::FileTooLarge => {
+            (At::Line(line), Fault::LineTooLong)
+        }
+        ::csv::ErrorKind::Io(cause) => (At::Table, Fault::Unreadable(cause.to_string())),
+        _ => (At::Table, Fault::Unreadable(error.to_string())),
+    };
+    TableError::new(Place { file: file.to_owned(), at, column: 0 }, fault, format)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+mod tests {
+    use super::super::{Column, Need};
+    use super::*;
+
+    static FORMAT: Format = Format {
+        columns: &[Column::number("a"), Column::number("b").needed(Need::Default(7.0)), Column::text("c")],
+        ignores_others: false,
+        has_comments: false,
+    };
+
+    /// The rows of `table`, read in chunks of two whose memory is reused.
+    fn rows(table: impl AsRef<[u8]>) -> Vec<Result<(f64, f64, String), String>> {
+        let mut table = CsvTable::new("t.csv", table.as_ref(), &FORMAT).unwrap();
+        let (mut all, mut used) = (Vec::new(), None);
+        loop {
+            let records = table.next_rows(2, used.take()).unwrap();
+            if records.is_empty() {
+                return all;
+            }
+            let cells = |row: Row<'_>| Ok((row.number(0)?, row.number(1)?, row.text(2)?.to_owned()));
+            let row = |index| records.row(index).and_then(cells).map_err(|error| error.to_string());
+            all.extend((0..records.len()).map(row));
+            used = Some(records);
+        }
+    }
+
+    #[test]
+    fn a_byte_order_mark_windows_lines_quotes_blanks_and_no_last_newline_change_nothing() {
+        for table in
+            ["a,b,c\n3,,x\n", "\u{feff}a,b,c\r\n3,7,x\r\n", "a,b,c\n\"3\",\"\",\"x\"", " a, b ,c\n\n 3 , 7, x\n\n"]
+        {
+            assert_eq!(rows(table), [Ok((3.0, 7.0, "x".to_owned()))], "{table}");
+        }
+    }
+
+    #[test]
+    fn a_bad_row_names_the_line_that_an_editor_shows_and_stops_nothing() {
+        for ends in ["\n", "\r\n", "\r"] {
+            let all = rows("a,b,c|1,2,x|||two,2,x||1,2,x|2".replace('|', ends));
+            assert_eq!(all[1], Err("line 5, column 1: `two` in `a` is not a number".to_owned()));
+            assert_eq!(all[3], Err("line 8: 1 cell in a table of 3 columns".to_owned()));
+            assert_eq!(all[0], all[2]);
+        }
+        assert_eq!(rows(b"a,b,c\n1,2,\xff\n"), [Err("line 2, column 3: not text in UTF-8".to_owned())]);
+    }
+}

@@ -1,0 +1,362 @@
+//! Tables in Parquet, a bounded number of rows at a time.
+//!
+//! The columns are those of the CSV tables, by the same names. Numbers are DOUBLE, so every bit survives; an empty cell
+//! of CSV is null. A table that comes in may have FLOAT and integer columns and row groups of any size, uncompressed or
+//! compressed by Snappy; other compressions need a C library and are refused by name. Tables that go out are not
+//! compressed: digits of solutions have no pattern to find.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use ::parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical};
+use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::properties::{EnabledStatistics, WriterProperties};
+use ::parquet::file::reader::{FileReader, SerializedFileReader};
+use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use ::parquet::schema::types::{ColumnDescriptor, ColumnPath, Type};
+
+use super::error::{At, Fault, Place, TableError};
+use super::{Cells, Column, Format, Kind, Layout, Record, Row};
+use crate::text::shortened;
+
+/// Rows of a row group that is written: some megabytes.
+const ROW_GROUP: usize = 1 << 16;
+
+/// How older writers mark integers without a sign, and those with one; newer ones say it both ways.
+const UNSIGNED: [ConvertedType; 4] =
+    [ConvertedType::UINT_8, ConvertedType::UINT_16, ConvertedType::UINT_32, ConvertedType::UINT_64];
+const SIGNED: [ConvertedType; 4] =
+    [ConvertedType::INT_8, ConvertedType::INT_16, ConvertedType::INT_32, ConvertedType::INT_64];
+
+/// What the library makes of a file, damaged ones included: its panics become errors.
+///
+/// Nothing that a panic may have left half done is looked at again: the table is refused.
+fn guarded<R>(work: impl FnOnce() -> Result<R, ParquetError>) -> Result<R, ParquetError> {
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|_| Err(ParquetError::General("the file is damaged".to_owned())))
+}
+
+/// Rows of a table, column by column.
+#[derive(Debug)]
+pub struct Columns {
+    layout: Arc<Layout>,
+    /// Number of the first row, from 1.
+    first: u64,
+    count: usize,
+    /// In the order of the format; empty for a column that the table does not have.
+    cells: Vec<Cells>,
+}
+
+impl Columns {
+    /// How many rows.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Number of row `index` in its table.
+    pub fn at(&self, index: usize) -> At {
+        At::Row(self.first + index as u64)
+    }
+
+    /// Row `index`, from 0.
+    pub fn row(&self, index: usize) -> Row<'_> {
+        Row { layout: &self.layout, at: self.at(index), record: Record::Parquet(&self.cells, index) }
+    }
+}
+
+/// A Parquet table that is being read.
+pub struct ParquetReader {
+    file: String,
+    reader: SerializedFileReader<File>,
+    layout: Arc<Layout>,
+    format: &'static Format,
+    /// Which columns hold integers without a sign, in the order of the format.
+    unsigned: Vec<bool>,
+    /// The row group that is read next.
+    group: usize,
+    /// Columns of the present row group, in the order of the format.
+    columns: Vec<Option<ColumnReader>>,
+    /// Rows left in the present row group.
+    left: usize,
+    /// Rows handed out.
+    rows: u64,
+}
+
+impl ParquetReader {
+    /// Reads what `input` says of itself; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`TableError`] for a file that is no Parquet table, or whose columns are not those of `format`.
+    pub fn new(file: &str, input: File, format: &'static Format) -> Result<Self, Box<TableError>> {
+        let refuse = |fault| TableError::new(Place { file: file.to_owned(), ..Place::default() }, fault, format);
+        let reader = guarded(|| SerializedFileReader::new(input)).map_err(|error| refuse(unsound(&error)))?;
+        let metadata = reader.metadata();
+        let schema = metadata.file_metadata().schema_descr_ptr();
+        let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        // A file without lines: its columns have numbers all the same.
+        let layout = Layout::new(&names, file, At::Table, format)?;
+        let mut unsigned = vec![false; format.columns.len()];
+        for ((known, place), unsigned) in format.columns.iter().zip(&layout.places).zip(&mut unsigned) {
+            let Some(place) = *place else { continue };
+            let column = schema.column(place);
+            check_type(known, &column).map_err(refuse)?;
+            *unsigned = UNSIGNED.contains(&column.converted_type())
+                || matches!(column.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
+            for chunk in metadata.row_groups().iter().filter_map(|group| group.columns().get(place)) {
+                let found = chunk.compression();
+                if !matches!(found, Compression::UNCOMPRESSED | Compression::SNAPPY) {
+                    let name = format!("{found:?}");
+                    return Err(refuse(Fault::Compressed(name.split('(').next().unwrap_or_default().to_owned())));
+                }
+            }
+        }
+        let (file, layout) = (file.to_owned(), Arc::new(layout));
+        Ok(Self { file, reader, layout, format, unsigned, group: 0, columns: Vec::new(), left: 0, rows: 0 })
+    }
+
+    /// Rows of the whole table.
+    pub fn rows(&self) -> u64 {
+        u64::try_from(self.reader.metadata().file_metadata().num_rows()).unwrap_or(0)
+    }
+
+    /// At most `count` rows, none at the end.
+    ///
+    /// # Errors
+    /// [`TableError`] for a table that cannot be read on.
+    pub fn next_rows(&mut self, count: usize) -> Result<Columns, Box<TableError>> {
+        guarded(|| self.read(count)).map_err(|error| {
+            TableError::new(Place { file: self.file.clone(), ..Place::default() }, unsound(&error), self.format)
+        })
+    }
+
+    fn read(&mut self, count: usize) -> Result<Columns, ParquetError> {
+        let cells = self.format.columns.iter().map(|column| Cells::empty(column.kind)).collect();
+        let mut rows = Columns { layout: Arc::clone(&self.layout), first: self.rows + 1, count: 0, cells };
+        while rows.count < count {
+            if self.left == 0 && !self.next_group()? {
+                break;
+            }
+            let part = self.left.min(count - rows.count);
+            for ((reader, cells), unsigned) in self.columns.iter_mut().zip(&mut rows.cells).zip(&self.unsigned) {
+                match (reader, cells) {
+                    (Some(reader), Cells::Numbers(numbers)) => read_numbers(reader, *unsigned, part, numbers)?,
+                    (Some(reader), Cells::Texts(texts)) => read_texts(reader, part, texts)?,
+                    _ => {}
+                }
+            }
+            self.left -= part;
+            rows.count += part;
+        }
+        self.rows += rows.count as u64;
+        Ok(rows)
+    }
+
+    /// Opens the next row group; false at the end.
+    fn next_group(&mut self) -> Result<bool, ParquetError> {
+        let metadata = self.reader.metadata();
+        // Ends with the list of row groups.
+        while let Some(found) = metadata.row_groups().get(self.group) {
+            let group = self.reader.get_row_group(self.group)?;
+            self.group += 1;
+            self.left = usize::try_from(found.num_rows())
+                .map_err(|_| ParquetError::General("a row group has fewer than no rows".to_owned()))?;
+            if self.left > 0 {
+                let open = |at: &Option<usize>| at.map(|at| group.get_column_reader(at)).transpose();
+                self.columns = self.layout.places.iter().map(open).collect::<Result<_, _>>()?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+fn unsound(error: &ParquetError) -> Fault {
+    Fault::Unreadable(format!("not a sound Parquet table: {error}"))
+}
+
+/// Refuses a column whose type is not that of `known`.
+fn check_type(known: &Column, column: &ColumnDescriptor) -> Result<(), Fault> {
+    let (logical, converted) = (column.logical_type_ref(), column.converted_type());
+    let is_plain = logical.is_none() && converted == ConvertedType::NONE;
+    let is_integer = is_plain
+        || matches!(logical, Some(LogicalType::Integer(_)))
+        || (logical.is_none() && (UNSIGNED.contains(&converted) || SIGNED.contains(&converted)));
+    let is_text = is_plain || converted == ConvertedType::UTF8;
+    let wants_text = known.kind == Kind::Text;
+    let fits = column.max_rep_level() == 0
+        // A column that was written without a value has no type.
+        && (logical == Some(&LogicalType::Unknown)
+            || match column.physical_type() {
+                Physical::BYTE_ARRAY => wants_text && is_text,
+                Physical::DOUBLE | Physical::FLOAT => !wants_text && is_plain,
+                Physical::INT32 | Physical::INT64 => !wants_text && is_integer,
+                _ => false,
+            });
+    if fits {
+        return Ok(());
+    }
+    let found = match (column.max_rep_level(), logical) {
+        (1.., _) => "lists".to_owned(),
+        (_, Some(logical)) => format!("{} ({logical:?})", column.physical_type()),
+        (_, None) if converted == ConvertedType::NONE => column.physical_type().to_string(),
+        (_, None) => format!("{} ({converted})", column.physical_type()),
+    };
+    Err(Fault::WrongType { name: known.name, found, expected: if wants_text { "text" } else { "numbers" } })
+}
+
+/// Appends `count` cells of `reader` to `cells`.
+fn read_cells<T: DataType, U>(
+    reader: &mut ColumnReaderImpl<T>,
+    count: usize,
+    cells: &mut Vec<Option<U>>,
+    cell: impl Fn(T::T) -> U,
+) -> Result<(), ParquetError> {
+    let (mut values, mut levels) = (Vec::new(), Vec::new());
+    let (records, present, _) = reader.read_records(count, Some(&mut levels), None, &mut values)?;
+    if records != count {
+        return Err(ParquetError::General("a column ends before its row group".to_owned()));
+    }
+    let mut values = values.into_iter().map(cell);
+    if present == count {
+        cells.extend(values.map(Some));
+    } else {
+        cells.extend(levels.into_iter().map(|level| if level > 0 { values.next() } else { None }));
+    }
+    Ok(())
+}
+
+fn read_numbers(
+    reader: &mut ColumnReader,
+    unsigned: bool,
+    count: usize,
+    cells: &mut Vec<Option<f64>>,
+) -> Result<(), ParquetError> {
+    match reader {
+        ColumnReader::DoubleColumnReader(reader) => read_cells(reader, count, cells, |value| value),
+        ColumnReader::FloatColumnReader(reader) => read_cells(reader, count, cells, f64::from),
+        ColumnReader::Int32ColumnReader(reader) if unsigned => {
+            read_cells(reader, count, cells, |value| f64::from(value.cast_unsigned()))
+        }
+        ColumnReader::Int32ColumnReader(reader) => read_cells(reader, count, cells, f64::from),
+        ColumnReader::Int64ColumnReader(reader) if unsigned => {
+            read_cells(reader, count, cells, |value| value.cast_unsigned() as f64)
+        }
+        ColumnReader::Int64ColumnReader(reader) => read_cells(reader, count, cells, |value| value as f64),
+        _ => Err(ParquetError::General("a column changes its type".to_owned())),
+    }
+}
+
+fn read_texts(reader: &mut ColumnReader, count: usize, cells: &mut Vec<Option<String>>) -> Result<(), ParquetError> {
+    match reader {
+        ColumnReader::ByteArrayColumnReader(reader) => read_cells(reader, count, cells, |value: ByteArray| {
+            // No longer than a message quotes: a cell may be of any size.
+            shortened(&String::from_utf8_lossy(value.data()))
+        }),
+        // A column without a value.
+        ColumnReader::Int32ColumnReader(reader) => read_cells(reader, count, cells, |value| value.to_string()),
+        _ => Err(ParquetError::General("a column changes its type".to_owned())),
+    }
+}
+
+/// A Parquet table that is being written.
+pub struct ParquetWriter<W: Write + Send> {
+    writer: SerializedFileWriter<W>,
+    /// Cells that do not fill a row group yet.
+    waiting: Vec<Cells>,
+}
+
+impl<W: Write + Send> ParquetWriter<W> {
+    /// A table with `columns`, each with its name.
+    ///
+    /// # Errors
+    /// When `output` cannot be written.
+    pub fn new(output: W, columns: &[(&str, Kind)]) -> io::Result<Self> {
+        let fields = columns.iter().map(|(name, kind)| {
+            let (physical, repetition, logical) = match kind {
+                Kind::Count => (Physical::INT64, Repetition::REQUIRED, None),
+                Kind::Number => (Physical::DOUBLE, Repetition::OPTIONAL, None),
+                Kind::Text => (Physical::BYTE_ARRAY, Repetition::OPTIONAL, Some(LogicalType::String)),
+            };
+            let field = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+            field.with_logical_type(logical).build().map(Arc::new)
+        });
+        let fields = fields.collect::<Result<_, _>>().map_err(io::Error::other)?;
+        let schema = Type::group_type_builder("penetrode").with_fields(fields).build().map_err(io::Error::other)?;
+        let mut properties = WriterProperties::builder()
+            .set_created_by(concat!("penetrode ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true);
+        for (name, kind) in columns {
+            // Numbers hardly repeat, texts do.
+            let path = ColumnPath::from(vec![(*name).to_owned()]);
+            properties = properties.set_column_dictionary_enabled(path, *kind == Kind::Text);
+        }
+        let writer = SerializedFileWriter::new(output, Arc::new(schema), Arc::new(properties.build()))
+            .map_err(io::Error::from)?;
+        Ok(Self { writer, waiting: columns.iter().map(|(_, kind)| Cells::empty(*kind)).collect() })
+    }
+
+    /// Adds rows: one entry a column, of the kind of the column and all of one length.
+    ///
+    /// # Errors
+    /// When the output cannot be written.
+    pub fn push(&mut self, columns: Vec<Cells>) -> io::Result<()> {
+        for (waiting, cells) in self.waiting.iter_mut().zip(columns) {
+            waiting.append(cells);
+        }
+        if self.waiting.first().is_some_and(|cells| cells.len() >= ROW_GROUP) { self.flush() } else { Ok(()) }
+    }
+
+    /// Writes what waits as a row group.
+    fn flush(&mut self) -> io::Result<()> {
+        if self.waiting.first().is_none_or(Cells::is_empty) {
+            return Ok(());
+        }
+        let mut group = self.writer.next_row_group()?;
+        for cells in &mut self.waiting {
+            let Some(mut column) = group.next_column()? else { break };
+            match cells {
+                Cells::Counts(counts) => {
+                    let values: Vec<i64> = counts.drain(..).map(|count| count as i64).collect();
+                    column.typed::<Int64Type>().write_batch(&values, None, None)?;
+                }
+                Cells::Numbers(numbers) => write_cells::<DoubleType, _>(&mut column, numbers, |value| value)?,
+                Cells::Texts(texts) => {
+                    write_cells::<ByteArrayType, _>(&mut column, texts, |text| ByteArray::from(text.into_bytes()))?;
+                }
+            }
+            column.close()?;
+        }
+        group.close()?;
+        Ok(())
+    }
+
+    /// Writes the rest and the footer, and gives the output back.
+    ///
+    /// # Errors
+    /// When the output cannot be written.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.flush()?;
+        Ok(self.writer.into_inner()?)
+    }
+}
+
+fn write_cells<T: DataType, U>(
+    column: &mut SerializedColumnWriter<'_>,
+    cells: &mut Vec<Option<U>>,
+    value: impl Fn(U) -> T::T,
+) -> Result<(), ParquetError> {
+    let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
+    let values: Vec<T::T> = cells.drain(..).flatten().map(value).collect();
+    column.typed::<T>().write_batch(&values, Some(&levels), None).map(|_| ())
+}

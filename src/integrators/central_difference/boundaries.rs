@@ -1,0 +1,326 @@
+//! Stage ends, exit and rest: where they lie inside a step, and what [`Boundaries`] makes of them.
+
+use super::scheme::{Node, Pause, Stepper, Sum};
+use super::stability::cannot_end;
+use super::{Boundaries, CentralDifference, Steps};
+use crate::integrators::outcome::{Detail, Events, Flight, IntegrationError, Sample};
+use crate::physics::exit_energy::exit_margin;
+use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, State};
+
+/// Steps without any change of x and V after which the scheme counts as stuck for ever.
+const STUCK_STEPS: u64 = 1 << 20;
+
+/// A step in which something happens, from one state to the next; the velocity at its end may be negative.
+struct Step<S> {
+    from: State<S>,
+    to: State<S>,
+    /// -a(i).
+    deceleration: S,
+    size: S,
+}
+
+impl<S: Scalar> Step<S> {
+    /// Time into the step at which V = 0, if V(i+1) <= 0.
+    fn rest(&self) -> Option<S> {
+        (self.to.velocity.value() <= 0.0)
+            .then(|| (self.size * self.from.velocity).over(self.from.velocity - self.to.velocity))
+    }
+
+    /// Depth after `tau`, on the parabola.
+    fn depth(&self, tau: S) -> S {
+        if tau.value() >= self.size.value() {
+            return self.to.depth;
+        }
+        self.from.depth + tau * (self.from.velocity - S::from_f64(0.5) * tau * self.deceleration)
+    }
+
+    /// Velocity after `tau`, on the chord; not below zero.
+    fn velocity(&self, tau: S) -> S {
+        let v = self.from.velocity + tau.over(self.size) * (self.to.velocity - self.from.velocity);
+        if v.value() > 0.0 { v } else { S::zero() }
+    }
+
+    /// When the parabola first comes to depth `place`, if it ever does.
+    fn passage(&self, place: S) -> Option<S> {
+        let distance = place - self.from.depth;
+        let v = self.from.velocity;
+        let discriminant = v * v - S::from_f64(2.0) * self.deceleration * distance;
+        (discriminant.value() >= 0.0).then(|| (S::from_f64(2.0) * distance).over(v + discriminant.sqrt()))
+    }
+
+    /// When depth `place` is reached within the step, before rest or with it; `None` if it is not.
+    fn reach(&self, place: S) -> Option<S> {
+        let rest = self.rest();
+        let last = rest.unwrap_or(self.size);
+        let passage = self.passage(place).filter(|tau| tau.value() <= last.value());
+        if self.depth(last).value() >= place.value() {
+            return Some(passage.unwrap_or(last));
+        }
+        // Whole steps decide; only in a step that comes to rest may the parabola turn after touching the place.
+        rest.and(passage)
+    }
+
+    /// State in which depth `place` is reached; `None` if it is not.
+    fn at(&self, place: S) -> Option<State<S>> {
+        let state = |tau| State { time: self.from.time + tau, depth: place, velocity: self.velocity(tau) };
+        self.reach(place).map(state)
+    }
+}
+
+/// One solution in the making: the scheme, and the events and samples so far.
+pub(super) struct Run<'a, S> {
+    stepper: Stepper<'a, S>,
+    detail: Detail,
+    events: Events<S>,
+    trajectory: Vec<Sample>,
+}
+
+impl<'a, S: Scalar> Run<'a, S> {
+    /// [`CentralDifference::solve_in`].
+    pub(super) fn solve(
+        options: &'a CentralDifference,
+        problem: &'a Problem<S>,
+        detail: Detail,
+    ) -> Result<Flight<S>, IntegrationError> {
+        let stepper = Stepper::new(options, problem);
+        let mut run = Self { stepper, detail, events: Events::new(), trajectory: Vec::new() };
+        // Ends at the face are reached at once; `Stepper::new` has passed them.
+        run.push_boundaries(0..run.stepper.stage, State::at_impact(problem));
+        run.record_node();
+        run.to_end()
+    }
+
+    fn to_end(mut self) -> Result<Flight<S>, IntegrationError> {
+        let (problem, max_steps) = (self.stepper.problem, self.stepper.options.max_steps);
+        let is_hopeless =
+            matches!(self.stepper.options.steps, Steps::Uniform(h) if cannot_end(problem, h * max_steps as f64));
+        // Steps up to the last change of x or V.
+        let mut moved = 0;
+        loop {
+            self.refuse_endless()?;
+            let (before, steps) = (self.stepper.state(), self.stepper.cost.steps);
+            let left = max_steps - steps;
+            if left == 0 || is_hopeless && steps >= STUCK_STEPS {
+                return Err(IntegrationError::StepBudgetSpent { max_steps, last: before.values() });
+            }
+            let allowance = if self.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
+            let limit = problem.limit_of(self.stepper.stage).value();
+            let has_ended = match self.stepper.cruise(limit, allowance) {
+                Pause::Allowance => false,
+                Pause::Crossing { x, u } => self.cross(x, u)?,
+                Pause::Rest(next) => self.come_to_rest(next)?,
+            };
+            if has_ended {
+                return Ok(self.finish());
+            }
+            self.record_node();
+            let (after, steps) = (self.stepper.state(), self.stepper.cost.steps);
+            if (after.depth.value(), after.velocity.value()) != (before.depth.value(), before.velocity.value()) {
+                moved = steps;
+            }
+            if steps - moved >= STUCK_STEPS {
+                return self.never_ends("a step no longer changes depth or velocity, which only approach their limits");
+            }
+        }
+    }
+
+    /// Without a far side, a last stage that does not resist at rest never stops the projectile.
+    fn refuse_endless(&self) -> Result<(), IntegrationError> {
+        let stage = &self.stepper.problem.stages[self.stepper.stage];
+        let resists = stage.stiffness.value() > 0.0 || stage.static_force.value() > 0.0;
+        if resists || self.stepper.problem.has_exit() || stage.end.value().is_finite() {
+            return Ok(());
+        }
+        self.never_ends("no exit depth, and the last stage has no static force that resists")
+    }
+
+    fn never_ends<T>(&self, why: &'static str) -> Result<T, IntegrationError> {
+        Err(IntegrationError::NeverEnds { why, last: self.stepper.state().values() })
+    }
+
+    fn finite(&self, what: &'static str, number: S) -> Result<(), IntegrationError> {
+        if number.value().is_finite() {
+            return Ok(());
+        }
+        Err(IntegrationError::NotFinite { what, last: self.stepper.state().values() })
+    }
+
+    /// The end of the present stage, where the scheme lands on it.
+    fn landing(&self) -> Option<S> {
+        let end = self.stepper.problem.stages[self.stepper.stage].end;
+        let lands = self.stepper.options.boundaries == Boundaries::Landed;
+        (lands && end.value() < self.stepper.problem.exit_depth.value()).then_some(end)
+    }
+
+    /// The step from the present node to depth `x` and velocity `v`. Its end has the time of its start until the clock
+    /// has ticked.
+    fn step_to(&self, x: S, v: S, size: S) -> Step<S> {
+        let from = self.stepper.state();
+        Step { from, to: State { depth: x, velocity: v, ..from }, deceleration: self.stepper.node.d, size }
+    }
+
+    /// Treats a next step that reaches a stage end or the exit. True if the run ends in it.
+    fn cross(&mut self, x: Sum<S>, u: Sum<S>) -> Result<bool, IntegrationError> {
+        self.finite("depth", x.value)?;
+        let h = self.stepper.clock.step();
+        if let Some(end) = self.landing() {
+            // The velocity at its end does not matter for the place.
+            let step = self.step_to(x.value, self.stepper.node.v, h);
+            return self.land(end, step.reach(end).unwrap_or(h));
+        }
+        // The stability limit of the old stage applies to this step; the force at its end is that of the new stage.
+        let first = self.stepper.stage;
+        self.stepper.step_max = self.stepper.step_max.max(h.value());
+        self.stepper.enter_stage_at(x.value);
+        let next = self.stepper.arrive(x, u, h);
+        self.finite("velocity", next.v)?;
+        Ok(self.complete(next, first))
+    }
+
+    /// Treats a next step, to the node `next`, that comes to rest before any stage end or exit. True if the run ends
+    /// in it.
+    fn come_to_rest(&mut self, next: Node<S>) -> Result<bool, IntegrationError> {
+        self.finite("velocity", next.v)?;
+        self.stepper.cost.force_evaluations += self.stepper.options.velocity.evaluations();
+        if let Some(end) = self.landing()
+            && let Some(part) = self.step_to(next.x.value, next.v, next.h).reach(end)
+        {
+            // The step went past the end and came back.
+            self.stepper.cost.rejected_steps += 1;
+            return self.land(end, part);
+        }
+        let static_force = self.stepper.law.force(next.x.value, S::zero()).value();
+        if static_force == 0.0 && next.v.value() == 0.0 {
+            return self.never_ends("the force dies out with the velocity");
+        }
+        Ok(self.complete(next, self.stepper.stage))
+    }
+
+    /// Takes the step shortened to `part`, which lands on the stage end `end`, and starts afresh behind it.
+    fn land(&mut self, end: S, part: S) -> Result<bool, IntegrationError> {
+        let first = self.stepper.stage;
+        self.stepper.step_max = self.stepper.step_max.max(part.value());
+        let (_, u) = self.stepper.node.ahead(part, self.stepper.options.summation);
+        let next = self.stepper.arrive(Sum::new(end), u, part);
+        self.finite("velocity", next.v)?;
+        if next.v.value() <= 0.0 {
+            return Ok(self.complete(next, first));
+        }
+        self.stepper.cost.steps += 1;
+        self.stepper.clock.tick_part(part);
+        let landing = State { time: self.stepper.clock.now(), depth: end, velocity: next.v };
+        self.stepper.enter_stage_at(end);
+        self.push_boundaries(first..self.stepper.stage, landing);
+        self.stepper.start(landing);
+        Ok(false)
+    }
+
+    /// Completes the step to the node `next`, with the events in it from stage `first` on. True if the run ends in it.
+    fn complete(&mut self, next: Node<S>, first: usize) -> bool {
+        self.stepper.cost.steps += 1;
+        let mut step = self.step_to(next.x.value, next.v, next.h);
+        self.stepper.clock.tick();
+        step.to.time = self.stepper.clock.now();
+        let has_ended = self.push_events(&step, first);
+        self.stepper.node = next;
+        has_ended
+    }
+
+    /// Lists the stage ends from stage `first` on, the exit and the rest of `step`. True if the run ends in it.
+    fn push_events(&mut self, step: &Step<S>, first: usize) -> bool {
+        let problem = self.stepper.problem;
+        let is_located = self.stepper.options.boundaries != Boundaries::StepEnd;
+        let at_rest = step.to.velocity.value() <= 0.0;
+        let arrival = if at_rest { State { velocity: S::zero(), ..step.to } } else { step.to };
+        let passed = |place: S| {
+            if is_located { step.at(place) } else { (place.value() <= arrival.depth.value()).then_some(arrival) }
+        };
+        let mut deepest = step.from.depth;
+        for index in first..problem.stages.len() {
+            let end = problem.stages[index].end;
+            if end.value() > problem.exit_depth.value() {
+                break;
+            }
+            let Some(state) = passed(end) else { break };
+            deepest = end;
+            self.push(EventKind::boundary(problem, index), state, index);
+        }
+        if problem.has_exit()
+            && let Some(state) = passed(problem.exit_depth)
+        {
+            self.push(EventKind::Exit, state, self.stepper.stage);
+            // A projectile without velocity rests there.
+            if state.velocity.value() <= 0.0 {
+                self.push(EventKind::Rest, state, self.stepper.stage);
+            }
+            return true;
+        }
+        let Some(tau) = step.rest() else { return false };
+        let rest = if is_located {
+            let depth = step.depth(tau);
+            let depth = if depth.value() > deepest.value() { depth } else { deepest };
+            State { time: step.from.time + tau, depth, velocity: S::zero() }
+        } else {
+            let turned_back = step.from.depth.value() > arrival.depth.value();
+            State { depth: if turned_back { step.from.depth } else { step.to.depth }, ..arrival }
+        };
+        self.push(EventKind::Rest, rest, self.stepper.stage);
+        true
+    }
+
+    fn push_boundaries(&mut self, stages: std::ops::Range<usize>, state: State<S>) {
+        for index in stages {
+            self.push(EventKind::boundary(self.stepper.problem, index), state, index);
+        }
+    }
+
+    fn push(&mut self, kind: EventKind, state: State<S>, stage: usize) {
+        self.events.push(Event { kind, state });
+        // An evaluation for the table, not work of the scheme: it is not counted.
+        self.record(state, self.stepper.problem.stages[stage].force(state.depth, state.velocity), stage);
+    }
+
+    fn record_node(&mut self) {
+        self.record(self.stepper.state(), self.stepper.node.d * self.stepper.problem.mass, self.stepper.stage);
+    }
+
+    fn record(&mut self, state: State<S>, force: S, stage: usize) {
+        if self.detail == Detail::Trajectory {
+            self.trajectory.push(Sample { state: state.values(), force: force.value(), stage });
+        }
+    }
+
+    /// The solution, whose last event is its end.
+    fn finish(mut self) -> Flight<S> {
+        let problem = self.stepper.problem;
+        self.stepper.leave_stage();
+        let perforated = self.events.iter().any(|event| event.kind == EventKind::Exit);
+        let end = self.events.last().map_or_else(|| self.stepper.state(), |event| event.state);
+        // A place at a stage end belongs to the stage that ends there.
+        let place = if perforated { problem.exit_depth } else { end.depth };
+        let stage = problem.stages.iter().take_while(|stage| stage.end.value() < place.value()).count();
+        let outcome = if perforated { Outcome::Perforated } else { problem.stop_in(stage) };
+        let mut flight = Flight {
+            outcome,
+            stage,
+            end,
+            events: self.events,
+            exit_margin: None,
+            exit_margin_error: None,
+            cost: self.stepper.cost,
+            trajectory: self.trajectory,
+            step_limit: Some(self.stepper.step_limit),
+            notes: Vec::new(),
+        };
+        let events: Vec<Event> =
+            flight.events.iter().map(|e| Event { kind: e.kind, state: e.state.values() }).collect();
+        flight.exit_margin = exit_margin(&problem.cast(), outcome, stage, end.values(), &events);
+        if self.detail == Detail::End {
+            flight.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest));
+        } else {
+            let note = "error bar of the exit margin not given: a fixed step has no error estimate";
+            flight.notes.push(note.to_owned());
+        }
+        flight
+    }
+}

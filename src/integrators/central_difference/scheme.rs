@@ -1,0 +1,374 @@
+//! Equations 6 to 8, step by step: the force rule, the sums, the clock, and the loop over whole steps.
+
+use super::stability::stability_limit;
+use super::{CentralDifference, Steps, Summation, VelocityAt};
+use crate::integrators::outcome::{Cost, IntegrationError, StepLimit};
+use crate::physics::{Problem, Scalar, Stage, State};
+
+impl VelocityAt {
+    /// Evaluations of the force in one step.
+    pub(super) fn evaluations(self) -> u64 {
+        if self == Self::PredictedHalfStep { 2 } else { 1 }
+    }
+
+    /// Deceleration F/M at depth `x`, from the velocity `u` half a step `half` before.
+    #[inline(always)]
+    pub(super) fn deceleration<S: Scalar>(self, law: &Stage<S>, x: S, u: S, half: S) -> S {
+        match self {
+            Self::LaggedHalfStep => law.force(x, u),
+            Self::Centred => {
+                // half q V² + (1 + half r) V = u - half (p + s x), in the form that does not cancel for small drag.
+                let known = u - half * (law.static_force + law.stiffness * x);
+                let linear = S::one() + half * law.viscosity;
+                let discriminant = linear * linear + S::from_f64(4.0) * half * law.drag * known;
+                // Without a real root the step goes far past rest; the vertex of the parabola is the least V there is.
+                let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
+                law.force(x, (S::from_f64(2.0) * known).over(linear + root))
+            }
+            Self::PredictedHalfStep => law.force(x, u - half * law.force(x, u)),
+        }
+    }
+}
+
+/// A number that increments are added to.
+#[derive(Clone, Copy)]
+pub(super) struct Sum<S> {
+    pub(super) value: S,
+    /// What the last addition rounded off, where [`Summation::Compensated`] keeps it.
+    lost: S,
+}
+
+impl<S: Scalar> Sum<S> {
+    pub(super) fn new(value: S) -> Self {
+        Self { value, lost: S::zero() }
+    }
+
+    #[inline(always)]
+    pub(super) fn plus(self, increment: S, summation: Summation) -> Self {
+        match summation {
+            Summation::Plain => Self { value: self.value + increment, ..self },
+            Summation::Compensated => {
+                let increment = increment + self.lost;
+                let value = self.value + increment;
+                Self { value, lost: increment - (value - self.value) }
+            }
+        }
+    }
+}
+
+/// The size of the step ahead, and the time that the steps behind add up to.
+#[derive(Clone, Copy)]
+pub(super) enum Clock<'a, S> {
+    /// Whole steps of `size` (s) since the impact or the last landing, at time `since`.
+    Equal { size: S, since: S, count: u64 },
+    /// [`Steps::Given`]: the index of the next size, and the sum of those before.
+    Given { sizes: &'a [f64], next: usize, time: Sum<S> },
+}
+
+impl<S: Scalar> Clock<'_, S> {
+    /// Size of the next step (s).
+    #[inline(always)]
+    pub(super) fn step(&self) -> S {
+        match *self {
+            Self::Equal { size, .. } => size,
+            Self::Given { sizes, next, .. } => S::from_f64(sizes[next]),
+        }
+    }
+
+    /// Time since impact (s).
+    pub(super) fn now(&self) -> S {
+        match *self {
+            Self::Equal { size, since, count } => since + S::from_f64(count as f64) * size,
+            Self::Given { time, .. } => time.value,
+        }
+    }
+
+    /// A whole step was taken.
+    #[inline(always)]
+    pub(super) fn tick(&mut self) {
+        match self {
+            Self::Equal { count, .. } => *count += 1,
+            Self::Given { .. } => self.tick_part(self.step()),
+        }
+    }
+
+    /// A step was shortened to `part` (s).
+    pub(super) fn tick_part(&mut self, part: S) {
+        let now = self.now();
+        match self {
+            Self::Equal { since, count, .. } => (*since, *count) = (now + part, 0),
+            Self::Given { sizes, next, time } => {
+                *time = time.plus(part, Summation::Compensated);
+                *next = if *next + 1 == sizes.len() { 0 } else { *next + 1 };
+            }
+        }
+    }
+}
+
+/// State of the scheme between two steps.
+#[derive(Clone, Copy)]
+pub(super) struct Node<S> {
+    /// x(i).
+    pub(super) x: Sum<S>,
+    /// V(i-1/2).
+    pub(super) u: Sum<S>,
+    /// V(i).
+    pub(super) v: S,
+    /// Deceleration -a(i).
+    pub(super) d: S,
+    /// dt(i).
+    pub(super) h: S,
+}
+
+impl<S: Scalar> Node<S> {
+    /// The node at a state known by its velocity: `V(i-1/2) = V(i) - dt/2 a(i)`, so that Eq. 6 continues from it.
+    fn start(law: &Stage<S>, state: State<S>, h: S) -> Self {
+        let d = law.force(state.depth, state.velocity);
+        let u = Sum::new(state.velocity + S::from_f64(0.5) * h * d);
+        Self { x: Sum::new(state.depth), u, v: state.velocity, d, h }
+    }
+
+    /// The node reached with V(i+1/2) = `u` at depth `x` by a step of size `h`.
+    #[inline(always)]
+    fn reached(velocity: VelocityAt, law: &Stage<S>, x: Sum<S>, u: Sum<S>, h: S) -> Self {
+        let half = S::from_f64(0.5) * h;
+        let d = velocity.deceleration(law, x.value, u.value, half);
+        Self { x, u, v: u.value - half * d, d, h }
+    }
+
+    /// x(i+1) and V(i+1/2) of a step of size `h` by Eq. 6 and 7.
+    #[inline(always)]
+    pub(super) fn ahead(&self, h: S, summation: Summation) -> (Sum<S>, Sum<S>) {
+        let u = self.u.plus(-(S::from_f64(0.5) * (self.h + h) * self.d), summation);
+        (self.x.plus(h * u.value, summation), u)
+    }
+}
+
+/// Why [`Stepper::cruise`] stopped before a step.
+pub(super) enum Pause<S> {
+    /// It took as many steps as it was allowed.
+    Allowance,
+    /// The next step, with V(i+1/2) = `u`, reaches the limit at x(i+1) = `x` (or x is NaN). Its force is not
+    /// evaluated: the boundary rule decides in which stage.
+    Crossing { x: Sum<S>, u: Sum<S> },
+    /// The next step comes to rest (or V is NaN) before the limit.
+    Rest(Node<S>),
+}
+
+/// The scheme at one node of a problem.
+pub(super) struct Stepper<'a, S> {
+    pub(super) options: &'a CentralDifference,
+    pub(super) problem: &'a Problem<S>,
+    pub(super) clock: Clock<'a, S>,
+    /// Stage that gives the force at the node, and its force rule divided by the mass.
+    pub(super) stage: usize,
+    pub(super) law: Stage<S>,
+    pub(super) node: Node<S>,
+    pub(super) cost: Cost,
+    /// Largest V(i) and dt in this stage.
+    speed_max: f64,
+    pub(super) step_max: f64,
+    pub(super) step_limit: StepLimit,
+}
+
+impl<'a, S: Scalar> Stepper<'a, S> {
+    /// The scheme at impact, behind every stage end at the face.
+    pub(super) fn new(options: &'a CentralDifference, problem: &'a Problem<S>) -> Self {
+        let impact = State::at_impact(problem);
+        let clock = match &options.steps {
+            Steps::Given(sizes) => Clock::Given { sizes, next: 0, time: Sum::new(S::zero()) },
+            _ => Clock::Equal { size: S::from_f64(options.time_step(problem)), since: S::zero(), count: 0 },
+        };
+        let stage = stage_at(problem, 0, impact.depth);
+        let law = per_mass(problem, stage);
+        Self {
+            options,
+            problem,
+            clock,
+            stage,
+            law,
+            node: Node::start(&law, impact, clock.step()),
+            cost: Cost { force_evaluations: 1, ..Cost::default() },
+            speed_max: 0.0,
+            step_max: 0.0,
+            step_limit: StepLimit { limit: f64::INFINITY, stable: true },
+        }
+    }
+
+    /// Starts afresh at a state known by its velocity.
+    pub(super) fn start(&mut self, state: State<S>) {
+        self.node = Node::start(&self.law, state, self.clock.step());
+        self.cost.force_evaluations += 1;
+    }
+
+    pub(super) fn state(&self) -> State<S> {
+        State { time: self.clock.now(), depth: self.node.x.value, velocity: self.node.v }
+    }
+
+    /// Enters the stage whose force holds at depth `x`.
+    pub(super) fn enter_stage_at(&mut self, x: S) {
+        let stage = stage_at(self.problem, self.stage, x);
+        if stage != self.stage {
+            self.leave_stage();
+            self.stage = stage;
+            self.law = per_mass(self.problem, stage);
+        }
+    }
+
+    /// Adds the stability limit of the present stage to that of the stages before, if a step was taken in it.
+    pub(super) fn leave_stage(&mut self) {
+        if self.step_max > 0.0 {
+            let law = &self.problem.stages[self.stage];
+            let limit = stability_limit(law, self.problem.mass.value(), self.speed_max, self.options.velocity);
+            self.step_limit.limit = self.step_limit.limit.min(limit);
+            self.step_limit.stable &= self.step_max < limit;
+        }
+        self.speed_max = 0.0;
+        self.step_max = 0.0;
+    }
+
+    /// Takes whole steps inside one stage up to the next event, `limit` (m) or `allowance`.
+    pub(super) fn cruise(&mut self, limit: f64, allowance: u64) -> Pause<S> {
+        use VelocityAt::{Centred, LaggedHalfStep, PredictedHalfStep};
+        let CentralDifference { velocity, summation, .. } = *self.options;
+        if let (Summation::Plain, Clock::Equal { size, since, count }) = (summation, self.clock) {
+            // Choices written as literals leave no branch in the loop: a third of its time.
+            let clock = Clock::Equal { size, since, count };
+            return match velocity {
+                LaggedHalfStep => self.whole_steps(LaggedHalfStep, Summation::Plain, clock, limit, allowance),
+                Centred => self.whole_steps(Centred, Summation::Plain, clock, limit, allowance),
+                PredictedHalfStep => self.whole_steps(PredictedHalfStep, Summation::Plain, clock, limit, allowance),
+            };
+        }
+        self.whole_steps(velocity, summation, self.clock, limit, allowance)
+    }
+
+    #[inline(always)]
+    fn whole_steps(
+        &mut self,
+        velocity: VelocityAt,
+        summation: Summation,
+        mut clock: Clock<'a, S>,
+        limit: f64,
+        allowance: u64,
+    ) -> Pause<S> {
+        let law = self.law;
+        let mut here = self.node;
+        let mut taken = 0;
+        let mut speed_max = here.v.value();
+        let mut step_max: f64 = 0.0;
+        let pause = loop {
+            if taken == allowance {
+                break Pause::Allowance;
+            }
+            let h = clock.step();
+            let (x, u) = here.ahead(h, summation);
+            // Both tests are written so that NaN leaves the loop.
+            let inside = x.value.value() < limit;
+            if !inside {
+                break Pause::Crossing { x, u };
+            }
+            step_max = step_max.max(h.value());
+            let next = Node::reached(velocity, &law, x, u, h);
+            let moving = next.v.value() > 0.0;
+            if !moving {
+                break Pause::Rest(next);
+            }
+            here = next;
+            clock.tick();
+            taken += 1;
+            speed_max = speed_max.max(here.v.value());
+        };
+        self.node = here;
+        self.clock = clock;
+        self.cost.steps += taken;
+        self.cost.force_evaluations += taken * velocity.evaluations();
+        self.speed_max = self.speed_max.max(speed_max);
+        self.step_max = self.step_max.max(step_max);
+        pause
+    }
+
+    /// [`Node::reached`] with the force of the present stage.
+    pub(super) fn arrive(&mut self, x: Sum<S>, u: Sum<S>, h: S) -> Node<S> {
+        self.cost.force_evaluations += self.options.velocity.evaluations();
+        Node::reached(self.options.velocity, &self.law, x, u, h)
+    }
+
+    /// A step of size `h`, without any event. The caller advances the clock.
+    fn advance(&mut self, h: S) {
+        let (x, u) = self.node.ahead(h, self.options.summation);
+        self.node = self.arrive(x, u, h);
+    }
+
+    /// [`CentralDifference::free_states`].
+    pub(super) fn free(mut self, count: usize) -> Vec<State<S>> {
+        let mut states = Vec::with_capacity(count);
+        for _ in 0..count {
+            states.push(self.state());
+            self.advance(self.clock.step());
+            self.clock.tick();
+        }
+        states
+    }
+
+    /// [`CentralDifference::forced_states`].
+    pub(super) fn forced(
+        mut self,
+        source: impl Fn(usize, S) -> S,
+        ends: &[f64],
+    ) -> Result<Vec<State<S>>, IntegrationError> {
+        let problem = self.problem;
+        let mut states = vec![self.state()];
+        for (stage, &end) in ends.iter().enumerate() {
+            let law = per_mass(problem, stage);
+            // At a given time the outer force is one more static force, whatever the velocity rule makes of the rest.
+            let law_at =
+                |time| Stage { static_force: law.static_force - source(stage, time).over(problem.mass), ..law };
+            let start = self.state();
+            self.law = law_at(start.time);
+            self.start(start);
+            loop {
+                if states.len() as u64 > self.options.max_steps {
+                    let (max_steps, last) = (self.options.max_steps, self.state().values());
+                    return Err(IntegrationError::StepBudgetSpent { max_steps, last });
+                }
+                let (now, h) = (self.clock.now(), self.clock.step());
+                let left = S::from_f64(end) - now;
+                let lands = left.value() <= h.value();
+                let h = if lands { left } else { h };
+                self.law = law_at(now + h);
+                self.advance(h);
+                if lands {
+                    self.clock.tick_part(h);
+                } else {
+                    self.clock.tick();
+                }
+                states.push(self.state());
+                if lands {
+                    break;
+                }
+            }
+        }
+        Ok(states)
+    }
+}
+
+/// Index of the stage whose force holds at depth `x`, not before `from`: beyond every end at or before `x`.
+///
+/// An end at the exit depth, or past it, changes nothing: the projectile does not get there.
+fn stage_at<S: Scalar>(problem: &Problem<S>, from: usize, x: S) -> usize {
+    let is_behind = |end: f64| end <= x.value() && end < problem.exit_depth.value();
+    from + problem.stages[from..].iter().take_while(|stage| is_behind(stage.end.value())).count()
+}
+
+/// The force rule of stage `index`, divided by the mass: [`Stage::force`] of it is the deceleration (m/s²).
+fn per_mass<S: Scalar>(problem: &Problem<S>, index: usize) -> Stage<S> {
+    let (law, mass) = (&problem.stages[index], problem.mass);
+    Stage {
+        static_force: law.static_force.over(mass),
+        stiffness: law.stiffness.over(mass),
+        viscosity: law.viscosity.over(mass),
+        drag: law.drag.over(mass),
+        end: law.end,
+    }
+}

@@ -1,0 +1,470 @@
+use super::*;
+use crate::physics::Advice;
+use crate::physics::Outcome;
+use crate::physics::exit_energy::propagate;
+use crate::testing::stage;
+
+/// Numbers in [0, 1) from a seed (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn log_between(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+}
+
+fn of_stages(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
+    Problem::of_stages(mass, impact_speed, stages.iter().copied()).with_exit(exit_depth)
+}
+
+/// Crater with the continuous constant c, and tunnel (theory section 1).
+fn concrete(mass: f64, p: f64, q: f64, kd: f64, speed: f64, exit_depth: f64) -> Problem {
+    Problem::continuous(mass, speed, kd, Stage::tunnel(p, q)).with_exit(exit_depth)
+}
+
+/// The scene `tunnel` of the comparison of solvers: stops at X = 0.14482620011221707, T = 8.2919669482493341e-4.
+fn tunnel_scene(exit_depth: f64) -> Problem {
+    concrete(2.0, 848_230.016_469_244_3, 3.251_548_396_465_436, 0.1, 300.0, exit_depth)
+}
+
+/// Margin by the exact energy law; for r = 0.
+fn exact_margin(problem: &Problem) -> f64 {
+    let mut w = problem.impact_speed * problem.impact_speed;
+    let (mut from, mut least) = (0.0, f64::INFINITY);
+    for (index, law) in problem.stages.iter().enumerate() {
+        let to = problem.limit_of(index).max(from);
+        w = propagate(law, problem.mass, w, from, to);
+        least = least.min(w);
+        from = to;
+        if law.end >= problem.exit_depth {
+            break;
+        }
+    }
+    least / (problem.impact_speed * problem.impact_speed)
+}
+
+fn random_concrete(random: &mut Random) -> Problem {
+    let d: f64 = random.log_between(0.01, 0.1);
+    let p = random.log_between(1e7, 1e9) * d * d;
+    let q = if random.unit() < 0.2 { 0.0 } else { random.log_between(1.0, 3000.0) * d * d };
+    let mass = random.log_between(0.1, 1000.0) * 4000.0 * d * d * d;
+    let kd = random.between(0.5, 3.0) * d;
+    let i = random.log_between(0.05, 300.0);
+    let speed = (i * p * d / mass).sqrt();
+    let reach = concrete(mass, p, q, kd, speed, f64::INFINITY);
+    // The exit near the depth of rest, in all degrees of nearness and on both sides.
+    let w1 = propagate(&reach.stages[0], mass, speed * speed, 0.0, kd);
+    let x = if w1 > 0.0 {
+        kd + if q > 0.0 { mass / (2.0 * q) * (q * w1 / p).ln_1p() } else { mass * w1 / (2.0 * p) }
+    } else {
+        speed * (mass / reach.stages[0].stiffness).sqrt()
+    };
+    let side = if random.unit() < 0.5 { 1.0 } else { -1.0 };
+    let exit = x * (1.0 + side * random.log_between(1e-12, 0.9));
+    concrete(mass, p, q, kd, speed, exit)
+}
+
+#[test]
+fn boundary_crossed_twice_within_a_step_is_found_at_its_first_crossing() {
+    // xi = 2 t - t², u = 2 - 2 t: past 0.75 at t = 0.5, at rest past it at t = 1, back before it at t = 1.5.
+    let law = Law { p: 2.0, ..Law::default() };
+    let at = |t: f64| Ok((2.0 * t - t * t, 2.0 - 2.0 * t));
+    let before = Node { time: 0.0, xi: 0.0, u: 2.0 };
+    let after = Node { time: 1.9, xi: 0.19, u: -1.8 };
+    let (end, place) = locate(&law, before, after, 0.75, at).unwrap();
+    assert_eq!((end, place.xi), (Found::Boundary, 0.75));
+    assert!((place.time - 0.5).abs() < 1e-15 && (place.u - 1.0).abs() < 1e-15, "{place:?}");
+    let (end, place) = locate(&law, before, after, 1.25, at).unwrap();
+    assert_eq!((end, place.u), (Found::Rest, 0.0));
+    assert!((place.time - 1.0).abs() < 1e-15 && (place.xi - 1.0).abs() < 1e-15, "{place:?}");
+    // Touching counts as reached.
+    let (end, place) = locate(&law, before, after, 1.0, at).unwrap();
+    assert_eq!(end, Found::Boundary);
+    assert!(place.u.abs() < 1e-7, "{place:?}");
+}
+
+#[test]
+fn bracketed_root_is_exact_for_flat_and_steep_functions_whatever_the_slopes() {
+    let node = |time| Node { time, xi: 0.0, u: 0.0 };
+    // A time of a millionth has its digits too: no absolute width ends the search.
+    let f = |node: Node| (node.time - 3e-7, 0.0);
+    let root = bracketed_root(node(0.0), node(1e-6), 0.0, f, |t| Ok(node(t))).unwrap();
+    assert!((root.time / 3e-7 - 1.0).abs() < 1e-15, "{root:?}");
+    for exponent in [1, 3, 9, 31] {
+        let value = |t: f64| (t - 0.3).powi(exponent);
+        let slope = |t: f64| f64::from(exponent) * (t - 0.3).powi(exponent - 1);
+        // Right, wrong, far too flat or steep, and none.
+        for share in [1.0, -3.0, 1e-3, 1e3, 1e300, 0.0, f64::INFINITY, f64::NAN] {
+            let f = |node: Node| (value(node.time), share * slope(node.time));
+            let mut evaluations = 0;
+            let at = |t| {
+                evaluations += 1;
+                Ok(node(t))
+            };
+            let root = bracketed_root(node(0.0), node(1.0), 0.0, f, at).unwrap();
+            assert!(value(root.time).abs() < 1e-15, "{exponent}, {share}: {}", root.time);
+            assert!(evaluations <= ROOT_EVALUATIONS_MAX);
+        }
+    }
+}
+
+#[test]
+fn an_event_takes_few_evaluations_of_the_interpolant() {
+    // u' = -(p + q u²) from u = 1 in one step past rest, and in one to a depth before it.
+    let law = Law { p: 1.0, q: 0.5, ..Law::default() };
+    let (root, speed) = (0.5_f64.sqrt(), 0.5_f64.sqrt().atan());
+    let u = |t: f64| (speed - root * t).tan() / root;
+    let xi = |t: f64| 2.0 * ((speed - root * t).cos() / speed.cos()).ln();
+    let rest = speed / root;
+    let node = |share: f64| Node { time: share * rest, xi: xi(share * rest), u: u(share * rest) };
+    // Rest, a boundary well before it, and one that it has all but reached.
+    for (after, distance, most) in [(1.05, 1.0, 3), (0.95, xi(0.9 * rest), 3), (1.05, 0.999 * xi(rest), 12)] {
+        let mut evaluations = 0;
+        let at = |t: f64| {
+            evaluations += 1;
+            Ok((xi(t), u(t)))
+        };
+        let (end, place) = locate(&law, node(0.8), node(after), distance, at).unwrap();
+        assert_eq!(end, if distance == 1.0 { Found::Rest } else { Found::Boundary });
+        let f = if distance == 1.0 { u(place.time) } else { xi(place.time) - distance };
+        assert!(f.abs() < 1e-15, "{place:?}");
+        assert!(evaluations <= most, "{after}, {distance}: {evaluations}");
+    }
+}
+
+#[test]
+fn spring_stops_at_its_first_turning_point_even_at_a_tenth_of_accuracy() {
+    for scheme in Scheme::ALL {
+        // A far exit loosens the absolute tolerance of the depth, and with it the steps.
+        for exit_depth in [f64::INFINITY, 1.0, 10.0, 100.0, 1e4] {
+            let problem = of_stages(2.0, 3.0, exit_depth, &[stage(0.0, 50.0, 0.0, 0.0, f64::INFINITY)]);
+            let flight = Diffsol::new(scheme, 0.1).solve(&problem, Detail::Events).unwrap();
+            assert!((flight.end.depth / 0.6 - 1.0).abs() < 0.5, "{scheme:?} {exit_depth}: {}", flight.end);
+            let time = std::f64::consts::FRAC_PI_2 / 5.0;
+            assert!((flight.end.time / time - 1.0).abs() < 0.5, "{scheme:?} {exit_depth}: {}", flight.end);
+        }
+    }
+}
+
+#[test]
+fn no_step_on_a_spring_is_longer_than_the_longest() {
+    // w = 5/s, driven: half a period lies before the turning point.
+    let problem = of_stages(2.0, 0.01, 1e4, &[stage(-25.0, 50.0, 0.0, 0.0, f64::INFINITY)]);
+    for scheme in Scheme::ALL {
+        let flight = Diffsol::new(scheme, 0.1).solve(&problem, Detail::Trajectory).unwrap();
+        let longest = flight.trajectory.windows(2).map(|rows| rows[1].state.time - rows[0].state.time);
+        assert!(longest.fold(0.0, f64::max) <= 0.2 * (1.0 + 1e-12), "{scheme:?}");
+        assert!(flight.outcome.is_stop() || flight.outcome == Outcome::Undecided, "{scheme:?}: {flight:?}");
+    }
+}
+
+#[test]
+fn longest_step_holds_for_underdamped_springs_alone() {
+    let law = |s, r| Law { p: 1.0, s, r, q: 0.0 };
+    assert_eq!(law(4.0, 0.0).longest_step(), 0.5);
+    assert_eq!(law(4.0, 3.9).longest_step(), 0.5);
+    assert_eq!(law(4.0, 4.0).longest_step(), f64::INFINITY);
+    assert_eq!(law(0.0, 0.0).longest_step(), f64::INFINITY);
+}
+
+#[test]
+fn pure_drag_reaches_every_depth() {
+    // V = V0 exp(-q x/M): exp(-3) of the speed is left; exp(-60) is below the tolerance, and said to be.
+    for scheme in Scheme::ALL {
+        let at = |exit_depth| {
+            let problem = of_stages(1.0, 1.0, exit_depth, &[stage(0.0, 0.0, 0.0, 1.0, f64::INFINITY)]);
+            Diffsol::new(scheme, 1e-8).solve(&problem, Detail::Events).unwrap()
+        };
+        assert!((at(3.0).end.velocity - (-3.0_f64).exp()).abs() < 1e-6, "{scheme:?}");
+        assert_eq!(at(3.0).outcome, Outcome::Perforated);
+        assert_eq!(at(60.0).outcome, Outcome::Undecided, "{scheme:?}");
+    }
+}
+
+#[test]
+fn rest_that_an_explicit_step_hides_in_its_middle_is_found() {
+    // Past rest the law would creep back at p/r, far below the tolerance: at the stability limit of the method u is
+    // then positive at every step's end while xi falls for ever.
+    let mut random = Random(5);
+    for _ in 0..300 {
+        let viscosity = random.log_between(3.0, 300.0);
+        let law = stage(viscosity * random.log_between(1e-6, 1e-2), 0.0, viscosity, 0.0, f64::INFINITY);
+        let method = Diffsol { max_steps: 1000, ..Diffsol::new(Scheme::Tsit45, 1e-3) };
+        let flight = method.solve(&of_stages(1.0, 1.0, 1.0, &[law]), Detail::Events).unwrap();
+        assert!(matches!(flight.outcome, Outcome::Stopped | Outcome::Undecided), "{law:?}: {flight:?}");
+        let z = viscosity / law.static_force;
+        let exact = (z - z.ln_1p()) / (z * viscosity);
+        assert!((flight.end.depth - exact).abs() < 1e-2, "{law:?}: {} not {exact}", flight.end);
+        assert!(flight.cost.rejected_steps < 1000, "{law:?}: {:?}", flight.cost);
+    }
+}
+
+#[test]
+fn drive_whose_speed_is_lost_in_the_tolerance_is_undecided_and_no_stop() {
+    // It leaves at the terminal velocity 1e-7 V0, which rtol 1e-3 cannot tell from rest.
+    let problem = of_stages(1.0, 1.0, 0.02, &[stage(-1e-5, 0.0, 100.0, 0.0, f64::INFINITY)]);
+    for scheme in Scheme::ALL {
+        let flight = Diffsol::new(scheme, 1e-3).solve(&problem, Detail::Events).unwrap();
+        assert_eq!(flight.outcome, Outcome::Undecided, "{scheme:?}: {flight:?}");
+    }
+}
+
+#[test]
+fn overdamped_spring_that_only_resists_comes_to_rest_at_any_tolerance() {
+    // Rest after ln(l1/l2)/(l1 - l2), about M V0/r deep: far below rtol times the exit depth.
+    let problem = of_stages(1.0, 1.0, 5.0, &[stage(0.0, 1.0, 2e4, 0.0, f64::INFINITY)]);
+    for scheme in Scheme::ALL {
+        for rtol in [1e-2, 1e-3, 1e-6, 1e-9] {
+            let flight = Diffsol::new(scheme, rtol).solve(&problem, Detail::Events).unwrap();
+            assert_eq!(flight.outcome, Outcome::Stopped, "{scheme:?} {rtol}");
+            assert!((flight.end.depth - 5e-5).abs() < 50.0 * rtol, "{scheme:?} {rtol}: {}", flight.end);
+        }
+    }
+}
+
+#[test]
+fn step_budget_is_kept_and_reported() {
+    let method = Diffsol { max_steps: 5, ..Diffsol::new(Scheme::Bdf, 1e-10) };
+    let error = method.solve(&tunnel_scene(f64::INFINITY), Detail::Events).unwrap_err();
+    let IntegrationError::StepBudgetSpent { max_steps, last } = error else { panic!("{error}") };
+    assert_eq!(max_steps, 5);
+    assert!(last.depth > 0.0 && last.velocity > 0.0, "{last}");
+}
+
+#[test]
+fn tolerances_at_the_end_of_the_range_give_a_flight() {
+    for scheme in Scheme::ALL {
+        for rtol in [0.1, 1e-13, scheme.rtol_min()] {
+            let flight = Diffsol::new(scheme, rtol).solve(&tunnel_scene(0.14), Detail::Events).unwrap();
+            let error = (flight.exit_margin.unwrap() - exact_margin(&tunnel_scene(0.14))).abs();
+            assert!(error < flight.exit_margin_error.unwrap(), "{scheme:?} {rtol}: {flight:?}");
+            assert_eq!(flight.outcome == Outcome::Perforated, rtol < 1e-3, "{scheme:?} {rtol}");
+        }
+    }
+}
+
+#[test]
+fn tolerance_outside_its_range_is_refused() {
+    for scheme in Scheme::ALL {
+        for rtol in [0.0, -1e-6, 0.9 * scheme.rtol_min(), 0.11, f64::NAN, f64::INFINITY] {
+            let error = Diffsol::new(scheme, rtol).solve(&tunnel_scene(0.1), Detail::End).unwrap_err();
+            assert!(error.is_usage(), "{rtol}: {error}");
+        }
+    }
+}
+
+const INF: f64 = f64::INFINITY;
+
+fn law(p: f64, s: f64, r: f64, q: f64) -> Law {
+    Law { p, s, r, q }
+}
+
+#[test]
+fn law_gives_force_per_mass_and_is_finite_only_as_a_whole() {
+    assert_eq!(law(1.0, 2.0, 4.0, 5.0).rate(3.0, 6.0), -211.0);
+    assert!(law(1.0, 2.0, 4.0, 5.0).is_finite());
+    for place in 0..4 {
+        let mut c = [1.0; 4];
+        c[place] = INF;
+        assert!(!law(c[0], c[1], c[2], c[3]).is_finite(), "{c:?}");
+    }
+}
+
+#[test]
+fn speed_hangs_where_no_static_force_is_left_and_a_creep_ends_where_the_drive_does() {
+    for hangs in [law(0.0, 0.0, 1.0, 0.0), law(0.0, 4.0, 0.0, 0.0), law(-1.0, 4.0, 4.0, 0.0)] {
+        assert!(hangs.may_hang(), "{hangs:?}");
+    }
+    for ends in [law(-1.0, 4.0, 3.0, 0.0), law(-1.0, 0.0, 1.0, 0.0), law(1.0, 4.0, 9.0, 0.0)] {
+        assert!(!ends.may_hang(), "{ends:?}");
+    }
+    let at = |xi: f64, u: f64| Node { time: 0.0, xi, u };
+    for (law, at, reach) in [
+        (law(-8.0, 2.0, 1.0, 0.0), at(1.0, 3.0), 3.0),
+        (law(-8.0, 2.0, 1.0, 0.0), at(5.0, 3.0), 0.0),
+        (law(-8.0, 0.0, 1.0, 0.0), at(1.0, 3.0), INF),
+        (law(0.0, 2.0, 2.0, 0.0), at(1.0, 3.0), 1.5),
+        (law(0.0, 0.0, 0.0, 1.0), at(1.0, 3.0), INF),
+    ] {
+        assert_eq!(law.reach(at), reach, "{law:?}");
+    }
+}
+
+#[test]
+fn first_step_is_a_share_of_the_fastest_time_that_keeps_its_local_error_at_the_tolerance() {
+    for (law, u, distance, time) in [
+        (law(0.0, 0.0, 0.0, 0.0), 2.0, 0.5, 0.25),
+        (law(-3.0, 0.0, 0.0, 0.0), 1.0, INF, 1.0 / 3.0),
+        (law(-3.0, 0.0, 0.0, 0.0), 0.5, INF, 1.0 / 6.0),
+        (law(-3.0, 0.0, 0.0, 0.0), 2.0, INF, 1.0 / 3.0),
+        (law(0.0, 25.0, 0.0, 0.0), 1.0, INF, 0.2),
+        (law(0.0, 0.0, 1.0, 2.0), 3.0, INF, 1.0 / 13.0),
+        (law(0.0, 0.0, 0.0, 0.0), 0.0, 1.0, 1.0),
+    ] {
+        assert_eq!(law.shortest_time(u, distance), time, "{law:?}, {u}");
+    }
+    // Orders 5, 1, 3 and 2, at the tolerance asked of the library.
+    for (scheme, rtol, share) in [
+        (Scheme::Tsit45, 1e-6, 0.05),
+        (Scheme::Bdf, 1e-6, 0.0005),
+        (Scheme::Esdirk34, 1e-3, 0.05),
+        (Scheme::TrBdf2, 1e-2 / 3.0, 0.5 * 1e-4_f64.cbrt()),
+    ] {
+        let off = scheme.first_step_share(rtol) / share - 1.0;
+        assert!(off.abs() < 1e-14, "{scheme:?}: {off:e}");
+    }
+}
+
+#[test]
+fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
+    let unit = |exit, stages: &[Stage]| Units::of(&of_stages(2.0, 3.0, exit, stages)).length;
+    let still = stage(0.0, 0.0, 0.0, 0.0, INF);
+    assert_eq!(unit(5.0, &[Stage { end: 0.0, ..still }, Stage { end: 4.0, ..still }, still]), 4.0);
+    assert_eq!(unit(0.5, &[Stage { end: 4.0, ..still }, still]), 0.5);
+    for (law, length) in [
+        (stage(4.0, 0.0, 0.0, 0.0, INF), 2.25),
+        (stage(-4.0, 0.0, 0.0, 0.0, INF), 2.25),
+        (stage(0.0, 8.0, 0.0, 0.0, INF), 1.5),
+        (stage(0.0, 0.0, 12.0, 0.0, INF), 0.5),
+        (stage(0.0, 0.0, 0.0, 8.0, INF), 0.25),
+        (stage(4.0, 8.0, 1.0, 0.0, INF), 1.5),
+        (still, 1.0),
+    ] {
+        assert_eq!(unit(INF, &[law]), length, "{law:?}");
+    }
+    // M/q = 1e-330 m is less than any number.
+    let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
+    assert!((Units::of(&light).length - 1.0).abs() < 1e-15);
+    let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
+    let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, xi: 5.0, u: 6.0 });
+    assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
+}
+
+#[test]
+fn standstill_is_a_rest_where_a_force_above_the_noise_holds_it() {
+    let at = |xi: f64| Node { time: 1.0, xi, u: -1e-9 };
+    let (rest, boundary, approach) = (Found::Rest, Found::Boundary, Found::Approach);
+    let noise = 0.01;
+    for (law, xi, distance, end) in [
+        // The static force resists from the start.
+        (law(1.0, 0.0, 1.0, 0.0), 2.0, 9.0, rest),
+        (law(0.0, 1.0, 1.0, 0.0), 2.0, 9.0, rest),
+        // A drive that springs out of balance: -8 + 2 xi.
+        (law(-8.0, 2.0, 1.0, 0.0), 4.01, 9.0, rest),
+        (law(-8.0, 2.0, 1.0, 0.0), 3.99, 9.0, approach),
+        (law(-8.0, 2.0, 1.0, 0.0), 3.99, 4.0, boundary),
+        // Overdamped it may hang: the brake must exceed a hundredth of 8 + 2 xi.
+        (law(-8.0, 2.0, 9.0, 0.0), 4.05, 9.0, approach),
+        (law(-8.0, 2.0, 9.0, 0.0), 4.12, 9.0, rest),
+        // Beyond its reach by the noise, a hundredth of 1 + xi, and by more.
+        (law(-8.0, 2.0, 9.0, 0.0), 3.5, 4.044, boundary),
+        (law(-8.0, 2.0, 9.0, 0.0), 3.5, 4.046, approach),
+        (law(-8.0, 2.0, 9.0, 0.0), 1.0, 4.019, boundary),
+        (law(-8.0, 2.0, 9.0, 0.0), 1.0, 4.022, approach),
+        // A drive alone goes on for ever.
+        (law(-8.0, 0.0, 1.0, 0.0), 1.0, 9.0, boundary),
+        (law(-8.0, 0.0, 1.0, 0.0), 1.0, INF, approach),
+    ] {
+        let (found, place) = law.meaning_of_standstill(at(xi), distance, noise);
+        assert_eq!(found, end, "{law:?}, {xi}, {distance}");
+        let (depth, speed) = match end {
+            Found::Boundary => (distance, 0.0),
+            Found::Rest => (xi, 0.0),
+            _ => (xi, -1e-9),
+        };
+        assert_eq!((place.xi, place.u), (depth, speed));
+    }
+}
+
+#[test]
+fn speed_is_lost_below_ten_tolerances_of_the_greatest() {
+    assert!(is_lost(0.3, 0.01, 9.0) && !is_lost(0.31, 0.01, 9.0));
+    assert!(is_lost(0.9e-5, 1e-6, 1.0) && !is_lost(1.1e-5, 1e-6, 1.0));
+}
+
+#[test]
+fn the_bar_holds_the_rounding_of_a_depth_that_is_long_beside_what_is_left() {
+    let mut random = Random(23);
+    let mut stops = 0;
+    for _ in 0..100 {
+        // What is left after 0.1 MN over a tenth of a metre, taken within about a nanometre: 4e7 spacings of depth.
+        let exit_depth: f64 = 0.1 + 1e-9;
+        let force = 0.98e6 / (2.0 * (exit_depth - 0.1)) * random.between(0.9, 1.5);
+        let stages = [stage(0.1e6, 0.0, 0.0, 0.0, 0.1), stage(force, 0.0, 0.0, 0.0, INF)];
+        let problem = of_stages(1.0, 1e3, exit_depth, &stages);
+        let margin = exact_margin(&problem);
+        for scheme in Scheme::ALL {
+            let flight = Diffsol::new(scheme, 1e-12).solve(&problem, Detail::End).unwrap();
+            let (found, bar) = (flight.exit_margin.unwrap(), flight.exit_margin_error.unwrap());
+            assert!((found - margin).abs() <= bar, "{scheme:?}: {found} +- {bar}, not {margin}");
+            assert!(bar < 1e-6, "{scheme:?}: {bar}");
+            stops += u32::from(flight.outcome == Outcome::Stopped);
+        }
+    }
+    assert!(stops > 200, "{stops} stops");
+}
+
+#[test]
+fn a_leg_adds_to_the_bar_by_the_energy_that_is_left_at_its_start() {
+    // W falls from 1 to 0.01 in the first metre: 50 N/kg of 99 percent of half V0².
+    let stages = [stage(0.495, 0.0, 0.0, 0.0, 1.0), stage(1e-3, 0.0, 0.0, 0.0, INF)];
+    for speed in [1.0, 1e3] {
+        let stages = stages.map(|law| Stage { static_force: law.static_force * speed * speed, ..law });
+        let problem = of_stages(1.0, speed, 2.0, &stages);
+        for scheme in Scheme::ALL {
+            let flight = Diffsol::new(scheme, 1e-6).solve(&problem, Detail::End).unwrap();
+            let parts = flight.exit_margin_error.unwrap() / scheme.margin_error(1e-6);
+            assert!((parts - 1.01).abs() < 1e-3, "{scheme:?}: {parts}");
+        }
+    }
+}
+
+#[test]
+fn an_explicit_flight_evaluates_the_force_once_a_leg_and_six_times_a_step_taken_or_not() {
+    let mut random = Random(31);
+    let mut rejected = 0;
+    for _ in 0..100 {
+        let problem = random_concrete(&mut random);
+        for rtol in [1e-2, 1e-5, 1e-9] {
+            let flight = Diffsol::new(Scheme::Tsit45, rtol).solve(&problem, Detail::Trajectory).unwrap();
+            let Cost { steps, rejected_steps, force_evaluations } = flight.cost;
+            let legs = 1 + flight.stage as u64;
+            // One at the start of each leg, and one in which the library makes the first solver.
+            assert_eq!(force_evaluations, 1 + legs + 6 * (steps + rejected_steps), "{:?}", flight.cost);
+            // Impact, every step but the last of each leg, which ends in its event, and the events.
+            let samples = 1 + steps - legs + flight.events.len() as u64;
+            assert_eq!(flight.trajectory.len() as u64, samples, "{:?}", flight.events);
+            rejected += rejected_steps;
+        }
+    }
+    assert!(rejected > 0, "no step was rejected");
+    // Speed that is lost in the tolerance ends a leg in a step that counts too.
+    let problem = of_stages(1.0, 1.0, 1.0, &[stage(5.9e-7, 0.0, 1360.0, 0.0, INF)]);
+    let flight = Diffsol::new(Scheme::Tsit45, 0.1).solve(&problem, Detail::Trajectory).unwrap();
+    assert_eq!(flight.trajectory.len() as u64, flight.cost.steps + 1, "{:?}", flight.cost);
+}
+
+#[test]
+fn a_step_that_is_tried_again_is_counted_and_time_goes_on_from_where_it_began() {
+    // A drag of 3e26/m beside a spring of 7e28/m²: the Newton iterations leave more of x open than a step moves.
+    let problem =
+        of_stages(1.0, 1.0, 1.0, &[stage(0.0, 6.859_735_044_546_989e28, 1.65, 2.987_378_155_631_558e26, INF)]);
+    for scheme in [Scheme::Bdf, Scheme::Esdirk34] {
+        let Ok(flight) = Diffsol::new(scheme, 1e-2).solve(&problem, Detail::Trajectory) else { panic!("{scheme:?}") };
+        let rises = flight.trajectory.windows(2).all(|pair| pair[0].state.time <= pair[1].state.time);
+        assert!(rises, "{scheme:?}");
+        assert!(flight.cost.rejected_steps > 0, "{scheme:?}: {:?}", flight.cost);
+    }
+}

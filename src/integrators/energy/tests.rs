@@ -1,0 +1,597 @@
+use std::f64::consts::PI;
+
+use num_dual::Dual64;
+use twofloat::TwoFloat;
+
+use super::*;
+use crate::integrators::{ClosedForm, Taylor};
+use crate::physics::Advice;
+use crate::physics::Outcome;
+use crate::physics::exit_energy;
+
+fn concrete(mass: f64, v0: f64, exit: f64, kd: f64, p: f64, q: f64, c: Option<f64>) -> Problem {
+    let c = c.unwrap_or(mass * (p + q * v0 * v0) / (kd * (mass + kd * q)));
+    Problem::crater_and_tunnel(mass, v0, Some(Stage::crater(c, kd)), Stage::tunnel(p, q)).with_exit(exit)
+}
+
+fn staged(mass: f64, v0: f64, exit: f64, stages: &[Stage]) -> Problem {
+    Problem::of_stages(mass, v0, stages.iter().copied()).with_exit(exit)
+}
+
+fn stage(p: f64, s: f64, q: f64, end: f64) -> Stage {
+    Stage { static_force: p, stiffness: s, viscosity: 0.0, drag: q, end }
+}
+
+/// Numbers in [0, 1) from a seed (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.unit())
+    }
+
+    /// Concrete of 15 to 135 megapascals, 1 to 10 cm, 30 to 1500 m/s; a quarter each without drag and with a given c.
+    fn scene(&mut self, with_exit: bool) -> Problem {
+        let d = self.between(0.01, 0.1);
+        let mass = self.between(200.0, 1e5) * d * d * d;
+        let fc = self.between(15e6, 135e6);
+        let area = PI * d * d / 4.0;
+        let p = area * 72.0 / (fc / 1e6).sqrt() * fc;
+        let q = if self.unit() < 0.25 { 0.0 } else { area * self.between(0.02, 1.0) * 2400.0 };
+        let kd = d * self.between(0.5, 3.0);
+        let c = if self.unit() < 0.25 { Some(p / kd * self.between(0.5, 2.0)) } else { None };
+        let exit = if with_exit { d * self.between(0.3, 20.0) } else { f64::INFINITY };
+        concrete(mass, self.between(30.0, 1500.0), exit, kd, p, q, c)
+    }
+}
+
+#[test]
+fn a_margin_out_of_range_is_an_error_with_the_last_speed() {
+    let endless = [stage(0.0, 1e300, 0.0, f64::INFINITY)];
+    let error = Energy::new().exit_margin_in(&staged(1.0, 3.0, 1e10, &endless)).unwrap_err();
+    assert!(matches!(error, IntegrationError::NotFinite { what: "V²", .. }), "{error}");
+    assert_eq!(error.last().map(|last| (last.depth, last.velocity)), Some((0.0, 3.0)));
+}
+
+#[test]
+fn the_root_of_nothing_has_no_infinite_derivative() {
+    assert_eq!(root_of(Dual64::new(0.0, 1.0)).eps, 0.0);
+}
+
+/// A barrier that cancels six digits of w, then drag alone, over which the error left by the barrier fades with w.
+#[test]
+fn bar_of_the_margin_fades_with_drag_as_the_error_does() {
+    let mut random = Random(7);
+    for case in 0..500 {
+        let length = random.between(0.9, 1.0);
+        let left = 1e-6 * (1.0 + random.unit());
+        let barrier = stage(0.5 * (1.0 - left) / length, 0.0, 0.0, length);
+        let problem = staged(1.0, 1.0, 6.0, &[barrier, stage(0.0, 0.0, 0.5, f64::INFINITY)]);
+        let (value, error, _) = Energy::new().exit_margin_in(&problem).unwrap().unwrap();
+        let (exact, ..) = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>()).unwrap().unwrap();
+        let true_error = (exact - TwoFloat::from(value)).value().abs();
+        assert!(true_error <= error, "case {case}: error {true_error:e}, bar {error:e}");
+        assert!(error < 1e-15 * (-5.0_f64).exp() * 3.0, "case {case}: bar {error:e}");
+    }
+}
+
+#[test]
+fn tolerance_is_obeyed_and_saves_work() {
+    let problem = concrete(2.0, 900.0, 0.4, 0.1, 848_230.0, 3.25, None);
+    let exact = Energy::new().solve(&problem, Detail::Events).unwrap();
+    let mut evaluations = exact.cost.force_evaluations;
+    for rtol in [1e-12, 1e-9, 1e-6, 1e-3] {
+        let flight = Energy::with_rtol(rtol).unwrap().solve(&problem, Detail::Events).unwrap();
+        assert!((flight.end.velocity / exact.end.velocity - 1.0).abs() < 10.0 * rtol);
+        assert!((flight.end.time / exact.end.time - 1.0).abs() < 10.0 * rtol);
+        assert!(flight.cost.force_evaluations < evaluations, "rtol {rtol:e}");
+        evaluations = flight.cost.force_evaluations;
+    }
+    for bad in [0.0, -1e-6, 0.5, f64::NAN] {
+        assert!(Energy::with_rtol(bad).unwrap_err().is_usage(), "rtol {bad}");
+    }
+}
+
+/// `exit_energy::propagate` is the closed form of the same quantity, from the depth of rest.
+#[test]
+fn margin_is_the_one_that_the_outcome_implies() {
+    let mut random = Random(3);
+    for case in 0..1000 {
+        let problem = random.scene(true);
+        let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
+        let implied =
+            exit_energy::exit_margin(&problem, flight.outcome, flight.stage, flight.end, &flight.events).unwrap();
+        let margin = flight.exit_margin.unwrap();
+        assert!((implied - margin).abs() <= 4e-14 * (1.0 + margin.abs()), "case {case}: {margin:e} {implied:e}");
+        let (alone, bar, _) = Energy::new().exit_margin_in(&problem).unwrap().unwrap();
+        assert_eq!((alone, Some(bar)), (margin, flight.exit_margin_error), "case {case}");
+    }
+}
+
+#[test]
+fn margin_is_affine_in_the_square_of_the_impact_speed() {
+    let w = |v0: f64| exit_energy_of(&concrete(2.0, v0, 0.4, 0.1, 848_230.0, 3.25, None)).unwrap().unwrap();
+    let (low, middle, high) = (w(100.0), w(500.0), w(900.0));
+    let line = low + (high - low) * (500.0_f64.powi(2) - 100.0_f64.powi(2)) / (900.0_f64.powi(2) - 100.0_f64.powi(2));
+    assert!(low < 0.0 && high > 0.0);
+    assert!((line - middle).abs() < 1e-14 * high.abs().max(low.abs()), "{line:e} {middle:e}");
+}
+
+#[test]
+fn viscous_stage_is_refused_unless_it_lies_beyond_the_exit() {
+    let mut problem = concrete(2.0, 300.0, 0.3, 0.1, 8e5, 3.0, None);
+    problem.stages[1].viscosity = 5.0;
+    let refusal = Energy::new().solve(&problem, Detail::Events).unwrap_err();
+    assert!(refusal.is_usage() && refusal.to_string().contains("viscosity of 5 kg/s"), "{refusal}");
+    assert!(exit_energy_of(&problem).is_err());
+    problem.exit_depth = 0.05;
+    assert!(Energy::new().solve(&problem, Detail::Events).is_ok());
+}
+
+#[test]
+fn numbers_out_of_range_are_errors_with_the_state_reached() {
+    let problem = staged(1e-300, 1e-5, 1.0, &[stage(1e300, 0.0, 0.0, f64::INFINITY)]);
+    let error = Energy::new().solve(&problem, Detail::Events).unwrap_err();
+    assert!(matches!(error, IntegrationError::NotFinite { .. }), "{error}");
+    // A drive that fades over 1e9 drag lengths, followed step by step: bounded, not hung.
+    let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 1e-10, 1.0, f64::INFINITY)]);
+    let error = Energy::new().solve(&problem, Detail::Events).unwrap_err();
+    assert!(matches!(error, IntegrationError::StepBudgetSpent { .. }), "{error}");
+}
+
+/// A terminal speed is the same however long it is kept.
+#[test]
+fn terminal_speed_over_a_billion_drag_lengths_takes_one_step() {
+    let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
+    let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
+    assert_eq!((flight.end.time, flight.end.velocity), (1e9, 1.0));
+    assert!(flight.cost.steps < 5 && flight.exit_margin_error.unwrap() > 0.0);
+}
+
+/// A gap, a jump and a coast: each piece has an elementary time.
+#[test]
+fn uniform_motion_and_parabola_are_exact() {
+    let problem = staged(2.0, 8.0, 5.0, &[stage(0.0, 0.0, 0.0, 1.0), stage(16.0, 0.0, 0.0, f64::INFINITY)]);
+    let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
+    // 1/8 s at 8 m/s, then a = -8 m/s²: rest after 1 s and 4 m, which is the exit: touched, at rest.
+    assert_eq!((flight.end.depth, flight.end.time, flight.end.velocity), (5.0, 1.125, 0.0));
+    let names: Vec<_> = flight.events.iter().map(|e| e.kind.name()).collect();
+    assert_eq!(names, ["stage-end", "exit", "rest"]);
+    assert_eq!(flight.outcome, Outcome::Undecided);
+    assert_eq!(flight.exit_margin, Some(0.0));
+}
+
+/// `p < 0, s > 0`: theory section 2, `p, s` with u0 = p/s. The speed first rises, then falls to rest.
+#[test]
+fn driven_flight_through_its_fastest_point_agrees_with_the_closed_form() {
+    let mut random = Random(4);
+    for _ in 0..300 {
+        let (m, s, p, v0) = (1.0, random.between(1.0, 1e4), -random.between(0.1, 1e4), random.between(1e-3, 1e3));
+        let (w, u0) = ((s / m).sqrt(), p / s);
+        // Below zero u0 the closed form of the depth cancels; this is the same root, added.
+        let depth = (v0 / w).hypot(u0) - u0;
+        let time = v0.atan2(w * u0) / w;
+        let flight =
+            Energy::new().solve(&staged(m, v0, f64::INFINITY, &[stage(p, s, 0.0, f64::INFINITY)]), Detail::Events);
+        let end = flight.unwrap().end;
+        assert!((end.depth / depth - 1.0).abs() < 2e-14, "s {s} p {p} v0 {v0}: {:e} {depth:e}", end.depth);
+        assert!((end.time / time - 1.0).abs() < 2e-13, "s {s} p {p} v0 {v0}: {:e} {time:e}", end.time);
+    }
+}
+
+/// `p, s, q`: the general stage, against its closed form.
+#[test]
+fn velocity_behind_a_general_stage_agrees_with_the_closed_form() {
+    let mut random = Random(5);
+    for _ in 0..300 {
+        let (p, s, q) = (random.unit() * 20.0 - 5.0, random.unit() * 50.0, random.unit() * 20.0);
+        let law = stage(p, s, q, f64::INFINITY);
+        let problem = staged(2.0, 10.0, 0.7, &[stage(0.0, 0.0, 0.0, 0.2), law]);
+        let w = exit_energy::propagate(&law, 2.0, 100.0, 0.2, 0.7);
+        let found = exit_energy_of(&problem).unwrap().unwrap();
+        assert!((found - w).abs() < 4e-14 * 100.0, "{found:e} {w:e}");
+    }
+}
+
+#[test]
+fn time_is_regular_when_the_speed_almost_vanishes_at_a_boundary() {
+    // W at the end of the first stage is 2^-40 V0²; the second stage drives, slows or lets go.
+    let tiny = 2.0_f64.powi(-40);
+    let first = stage(0.5 * (1.0 - tiny), 0.0, 0.0, 1.0);
+    let v1 = tiny.sqrt();
+    for p in [-0.5_f64, 0.5, 0.0] {
+        let problem = staged(1.0, 1.0, 1.0 + tiny, &[first, stage(p, 0.0, 0.0, f64::INFINITY)]);
+        let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
+        let t1 = 2.0 / (1.0 + v1);
+        assert!((flight.events[0].state.time / t1 - 1.0).abs() < 1e-14);
+        let v2 = (tiny * (1.0 - 2.0 * p)).sqrt();
+        let t2 = 2.0 * tiny / (v1 + v2);
+        assert!((flight.end.time - t1 - t2).abs() < 1e-14, "p {p}: {:e}", flight.end.time - t1 - t2);
+    }
+}
+
+/// dX/dV0, dT/dV0 and dW(H)/dV0 against differences of the closed form.
+#[test]
+fn dual_numbers_carry_sensitivities_through_rest() {
+    let (mass, p, q, kd, c) = (2.0, 848_230.0, 3.25, 0.1, 9e6);
+    let problem = |v0| concrete(mass, v0, f64::INFINITY, kd, p, q, Some(c));
+    let mut dual = problem(300.0).cast::<Dual64>();
+    dual.impact_speed = dual.impact_speed.derivative();
+    let flight = Energy::new().solve_in(&dual, Detail::Events).unwrap();
+    // V1² = V0² - c (k d)²/M; dX/dV1² = M/(2 (P + Q V1²)).
+    let v1_squared = 300.0_f64.powi(2) - c * kd * kd / mass;
+    let exact = 300.0 * mass / (p + q * v1_squared);
+    assert!((flight.end.depth.eps / exact - 1.0).abs() < 1e-13, "{:e} {exact:e}", flight.end.depth.eps);
+    let h = 1e-3;
+    let rest_time = |v0| ClosedForm.solve(&problem(v0), Detail::End).unwrap().end.time;
+    let difference = (rest_time(300.0 + h) - rest_time(300.0 - h)) / (2.0 * h);
+    assert!((flight.end.time.eps / difference - 1.0).abs() < 1e-8, "{:e} {difference:e}", flight.end.time.eps);
+}
+
+/// The same code in double-double takes the tunnel scene on to the twenty digits known of it: nothing in it is
+/// of `f64` only, and the series are summed as far as the number type asks.
+#[test]
+fn double_double_reaches_beyond_f64() {
+    let (p, q) = (848_230.016_469_244_3, 3.251_548_396_465_436);
+    // c is computed in double-double too, since the digits were.
+    let mut problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, p, q, Some(1.0)).cast::<TwoFloat>();
+    let of = TwoFloat::from;
+    let (mass, kd) = (problem.mass, problem.stages[0].end);
+    problem.stages[0].stiffness = (mass * (of(p) + of(q) * of(9e4))).over(kd * (mass + kd * of(q)));
+    let end = Energy::new().solve_in(&problem, Detail::End).unwrap().end;
+    // Twenty digits, 0.14482620011221707453 m and 8.2919669482493341157e-4 s, in two exact pieces each.
+    let digits = |head: f64, tail: f64, scale: f64| (TwoFloat::new_mul(head, 1e6) + of(tail)).over(of(scale));
+    let depth = (end.depth.over(digits(14_482_620_011_221.0, 707_453.0, 1e20)) - of(1.0)).value().abs();
+    let time = (end.time.over(digits(82_919_669_482_493.0, 341_157.0, 1e22).over(of(10.0))) - of(1.0)).value().abs();
+    assert!(depth < 5e-20 && time < 5e-20, "depth {depth:e}, time {time:e}");
+}
+
+/// Independent of any known digits: loosening the tolerance changes no more than it says.
+#[test]
+fn tolerance_is_obeyed_below_the_round_off_of_f64() {
+    let problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, 848_230.0, 3.25, None).cast::<TwoFloat>();
+    let fine = Energy::new().solve_in(&problem, Detail::End).unwrap();
+    let coarse = Energy::with_rtol(1e-25).unwrap().solve_in(&problem, Detail::End).unwrap();
+    let depth = ((fine.end.depth - coarse.end.depth).over(fine.end.depth)).value().abs();
+    let time = ((fine.end.time - coarse.end.time).over(fine.end.time)).value().abs();
+    assert!(depth < 1e-24 && time < 1e-24, "depth {depth:e}, time {time:e}");
+}
+
+#[test]
+fn trajectory_ascends_and_keeps_the_energy_balance() {
+    let problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, 848_230.0, 3.25, None);
+    let flight = Energy::new().solve(&problem, Detail::Trajectory).unwrap();
+    let rows = &flight.trajectory;
+    assert!(rows.len() > 8);
+    assert_eq!(rows[0].state, State::at_impact(&problem));
+    assert_eq!(rows[rows.len() - 1].state, flight.end);
+    for pair in rows.windows(2) {
+        assert!(pair[1].state.time > pair[0].state.time, "{pair:?}");
+        assert!(pair[1].state.depth > pair[0].state.depth, "{pair:?}");
+        let (before, after) = (pair[0].state, pair[1].state);
+        let law = &problem.stages[pair[1].stage];
+        let w = exit_energy::propagate(law, problem.mass, before.velocity.powi(2), before.depth, after.depth);
+        assert!((w - after.velocity.powi(2)).abs() < 1e-10, "{w:e} {:e}", after.velocity.powi(2));
+    }
+    assert!(Energy::new().solve(&problem, Detail::Events).unwrap().trajectory.is_empty());
+}
+
+#[test]
+fn work_without_times_is_two_terms_a_stage_when_there_is_no_drag() {
+    let problem = concrete(2.0, 300.0, 0.3, 0.1, 848_230.0, 0.0, None);
+    let (_, _, cost) = Energy::new().exit_margin_in(&problem).unwrap().unwrap();
+    assert_eq!(cost, Cost { steps: 2, rejected_steps: 0, force_evaluations: 4 });
+}
+
+#[test]
+fn flight_with_its_events_holds_no_heap_memory() {
+    let problem = concrete(2.0, 900.0, 0.3, 0.1, 848_230.0, 3.25, None);
+    let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
+    assert!(flight.events.len() == 2 && !flight.events.spilled());
+    assert_eq!((flight.trajectory.capacity(), flight.notes.capacity()), (0, 0));
+}
+
+/// Stages of either sign in any order over twelve decades of scale. Double-double takes other steps, and other
+/// variables in them, so it tells whether the times depend on the way they were computed.
+#[test]
+fn any_stages_at_any_scale_give_ascending_events_and_the_times_of_double_double() {
+    let mut random = Random(6);
+    let (mut flights, mut worst) = (0, 0.0_f64);
+    for case in 0..3000 {
+        let (m, v0, unit) = (random.between(1e-6, 1e6), random.between(1e-6, 1e6), random.between(1e-6, 1e6));
+        let energy = m * v0 * v0;
+        let mut stages = Vec::new();
+        let mut end = 0.0;
+        for _ in 0..4 {
+            let mut pick = |share: f64, size: f64| if random.unit() < share { random.unit() * size } else { 0.0 };
+            let (static_force, drive, s, q) = (pick(0.6, 2.0), pick(0.3, 2.0), pick(0.4, 2.0), pick(0.5, 4.0));
+            end += unit * pick(0.9, 1.0);
+            stages.push(stage((static_force - drive) * energy / unit, s * energy / unit / unit, q * m / unit, end));
+        }
+        let last = stages.len() - 1;
+        stages[last].end = f64::INFINITY;
+        let problem = staged(m, v0, if case % 2 == 0 { f64::INFINITY } else { end }, &stages);
+        let flight = match Energy::new().solve(&problem, Detail::Trajectory) {
+            Ok(flight) => flight,
+            Err(IntegrationError::NeverEnds { .. }) => continue,
+            Err(other) => panic!("case {case}: {other}"),
+        };
+        if flight.end.time == 0.0 {
+            continue;
+        }
+        flights += 1;
+        for pair in flight.trajectory.windows(2) {
+            assert!(pair[1].state.time >= pair[0].state.time, "case {case}: {pair:?}");
+            assert!(pair[1].state.depth >= pair[0].state.depth, "case {case}: {pair:?}");
+        }
+        assert!(flight.cost.steps < 400, "case {case}: {:?}", flight.cost);
+        let fine = Energy::new().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap().values();
+        let slowest = flight.events.iter().map(|e| e.state.velocity / v0).filter(|v| *v > 0.0).fold(1.0, f64::min);
+        assert_eq!(flight.events.len(), fine.events.len(), "case {case}");
+        // A time is conditioned like 1/v at a boundary, and once more where that speed is left uphill.
+        let error = (flight.end.time / fine.end.time - 1.0).abs() * slowest * slowest;
+        worst = worst.max(error);
+        assert!(error < 1e-13, "case {case}: {error:e} {flight:?}");
+    }
+    println!("{flights} flights, worst time error {worst:e}");
+    assert!(flights > 2000);
+}
+
+fn loss(steady: f64, growing: f64, drag: f64) -> Loss<f64> {
+    Loss { steady, growing, drag }
+}
+
+/// Two stages of any kind, driven ones among them, of a few drag lengths at most; M = 1.
+fn general(random: &mut Random) -> Problem {
+    let v0 = random.between(0.5, 2.0);
+    let mut law = |end: f64| {
+        let force = v0 * v0 * (4.0 * random.unit() - 2.0);
+        let stiffness = if random.unit() < 0.6 { v0 * v0 * random.between(0.1, 10.0) } else { 0.0 };
+        let drag = if random.unit() < 0.7 { random.between(0.05, 5.0) } else { 0.0 };
+        stage(force, stiffness, drag, end)
+    };
+    let stages = [law(0.3), law(f64::INFINITY)];
+    staged(1.0, v0, 0.3 + random.between(0.05, 1.0), &stages)
+}
+
+#[test]
+fn what_a_flight_costs_is_counted() {
+    let cost = |problem: &Problem| Energy::new().solve(problem, Detail::End).unwrap().cost;
+    let counted = |steps, force_evaluations| Cost { steps, rejected_steps: 0, force_evaluations };
+    // A gap: one step of two terms for w, one of 24 for the time.
+    assert_eq!(cost(&staged(1.0, 2.0, 1.0, &[stage(0.0, 0.0, 0.0, f64::INFINITY)])), counted(2, 26));
+    // Constant forces, w = 1/4 behind the first, rest in the second: two steps each, and one trial of two terms.
+    let stages = [stage(0.75, 0.0, 0.0, 1.0), stage(0.5, 0.0, 0.0, f64::INFINITY)];
+    assert_eq!(cost(&staged(2.0, 1.0, f64::INFINITY, &stages)), counted(4, 54));
+    assert_eq!(Energy::new().name(), "energy");
+}
+
+#[test]
+fn of_equal_margins_the_first_is_kept_with_its_error_bound() {
+    let mut walk = Walk::from_impact(f64::EPSILON);
+    for (w, error) in [(0.5, 0.125), (0.5, 0.25), (0.75, 0.5)] {
+        (walk.w, walk.error) = (w, error);
+        walk.note_least();
+        assert_eq!((walk.least, walk.least_error), (0.5, 0.125));
+    }
+}
+
+/// At one drag length, from w = 1 with drag alone, the terms are 1/n!.
+#[test]
+fn a_sum_ends_with_the_first_term_that_is_negligible_and_within_its_bound() {
+    let law = loss(0.0, 0.0, 1.0);
+    for (negligible, terms) in [(0.6, 2), (0.5, 2), (0.4, 3), (1e-3, 7), (0.0, TERMS_MAX)] {
+        assert_eq!(law.change(0.0, 1.0, 1.0, negligible).1, terms, "{negligible}");
+    }
+}
+
+#[test]
+fn the_static_reach_is_the_way_on_which_the_static_force_takes_all() {
+    for (a, b, x, w) in [
+        (3.0, 0.0, 0.0, 2.5),
+        (3.0, 2.0, 0.5, 0.7),
+        (-3.0, 2.0, 0.5, 0.7),
+        (-3.0, 2.0, 4.0, 0.7),
+        (0.0, 2.0, 0.0, 1e-3),
+        (-1e3, 5.0, 1.0, 4.0),
+    ] {
+        let reach = loss(a, b, 0.7).static_reach(x, w);
+        let (steady, growing) = ((a + b * x) * reach, 0.5 * b * reach * reach);
+        let off = (steady + growing - w).abs() / (steady.abs() + growing + w);
+        assert!(reach > 0.0 && off < 1e-15, "{a}, {b}, {x}, {w}: {reach}, {off:e}");
+    }
+    for a in [0.0, -1.0] {
+        assert_eq!(loss(a, 0.0, 1.0).static_reach(0.5, 1.0), f64::INFINITY);
+    }
+}
+
+/// Powers of two as units of length and speed: no number rounds differently, and no trial is taken more.
+#[test]
+fn units_are_free_to_the_bit() {
+    let mut random = Random(8);
+    for case in 0..200 {
+        let mut problem = general(&mut random);
+        if case % 2 == 0 {
+            problem.exit_depth = f64::INFINITY;
+        }
+        let Ok(flight) = Energy::new().solve(&problem, Detail::Events) else { continue };
+        for (length, speed) in [(67, 0), (-67, 0), (3, 40), (-2, -40)] {
+            let (l, v) = (2_f64.powi(length), 2_f64.powi(speed));
+            let mut scaled = problem.clone();
+            scaled.impact_speed *= v;
+            scaled.exit_depth *= l;
+            for law in &mut scaled.stages {
+                law.static_force *= v * v / l;
+                law.stiffness *= v * v / l / l;
+                law.drag /= l;
+                law.end *= l;
+            }
+            let other = Energy::new().solve(&scaled, Detail::Events).unwrap();
+            let end =
+                State { time: flight.end.time / v * l, depth: flight.end.depth * l, velocity: flight.end.velocity * v };
+            assert_eq!((other.end, other.cost), (end, flight.cost), "case {case}, 2^{length} m, 2^{speed} m/s");
+            assert_eq!(other.exit_margin_error, flight.exit_margin_error, "case {case}");
+        }
+    }
+}
+
+/// Two methods that share neither a variable nor a line.
+#[test]
+fn times_of_driven_and_resisted_flights_are_those_of_the_equation_in_time() {
+    let mut random = Random(9);
+    let (mut flights, mut worst) = (0, 0.0_f64);
+    for case in 0..600 {
+        let problem = general(&mut random);
+        let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
+        let exact = Taylor::default().solve(&problem, Detail::Events).unwrap();
+        let slowest = exact.events.iter().map(|e| e.state.velocity).filter(|v| *v > 0.0).fold(1.0, f64::min);
+        if flight.exit_margin.unwrap().abs() < 1e-3 || slowest < 0.05 {
+            continue;
+        }
+        flights += 1;
+        assert_eq!(flight.outcome, exact.outcome, "case {case}");
+        let off = flight.end.time / exact.end.time - 1.0;
+        worst = worst.max(off.abs());
+        assert!(off.abs() < 2e-14, "case {case}: {off:e} {problem:?}");
+    }
+    println!("{flights} flights, worst {worst:e}");
+    assert!(flights > 550, "{flights}");
+    // Out past the fastest point, half as fast again as at impact: -dw/dx = -10 + 5 x + w. A step of a loose tolerance
+    // could take the speed at the end for the same on the way up.
+    let problem = staged(1.0, 1.0, 2.2, &[stage(-5.0, 2.5, 0.5, f64::INFINITY)]);
+    let exact = Taylor::default().solve(&problem, Detail::End).unwrap().end.time;
+    for (method, limit) in [(Energy::new(), 2e-14), (Energy::with_rtol(1e-3).unwrap(), 1e-3)] {
+        let off = method.solve(&problem, Detail::End).unwrap().end.time / exact - 1.0;
+        assert!(off.abs() < limit, "{method:?}: {off:e}");
+    }
+}
+
+/// `V' = 1 - V²`: V = coth or tanh of t + c, `x = ln sinh(t + c)` or `ln cosh(t + c)` less the same at c.
+#[test]
+fn a_speed_that_comes_to_its_limit_is_kept_at_no_cost() {
+    for (v0, ahead) in [(2.0, (2.0_f64 / 3.0).ln()), (0.5, (4.0_f64 / 3.0).ln())] {
+        for depth in [40.0, 1e3, 1e9] {
+            let problem = staged(1.0, v0, depth, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
+            let flight = Energy::new().solve(&problem, Detail::End).unwrap();
+            let time = depth + ahead;
+            assert!((flight.end.time / time - 1.0).abs() < 1e-13, "{v0}, {depth:e}: {:e}", flight.end.time - time);
+            assert!((flight.end.velocity - 1.0).abs() < 1e-15, "{v0}, {depth:e}: {:e}", flight.end.velocity);
+            assert!(flight.cost.steps < 200, "{v0}, {depth:e}: {:?}", flight.cost);
+        }
+    }
+}
+
+/// w = 2^-53 is left at 1 m, and takes 2^-53 m more, which is less than depths can tell apart.
+#[test]
+fn a_rest_that_rounds_onto_a_boundary_has_its_time_beyond_it() {
+    let left = 2.0_f64.powi(-53);
+    let stages = [stage(0.5 * (1.0 - left), 0.0, 0.0, 1.0), stage(0.5, 0.0, 0.0, f64::INFINITY)];
+    let flight = Energy::new().solve(&staged(1.0, 1.0, f64::INFINITY, &stages), Detail::Events).unwrap();
+    let v1 = left.sqrt();
+    assert_eq!((flight.end.depth, flight.outcome), (1.0, Outcome::Stopped));
+    let (before, after) = (flight.events[0].state.time, flight.end.time - flight.events[0].state.time);
+    assert!((before * 0.5 * (1.0 + v1) - 1.0).abs() < 1e-14, "{before}");
+    assert!((after / (2.0 * v1) - 1.0).abs() < 1e-7, "{after:e}");
+}
+
+/// `dX/dV0 = M V0 e^(-κ X)/(p + s X)` from the energy at X, in one stage; behind another M V0 over the force there.
+#[test]
+fn the_depth_of_rest_moves_with_the_impact_speed() {
+    let derived = |problem: Problem| {
+        let mut dual = problem.cast::<Dual64>();
+        dual.impact_speed = dual.impact_speed.derivative();
+        Energy::new().solve_in(&dual, Detail::End).unwrap().end.depth
+    };
+    for (p, s, q) in [(2.0, 30.0, 0.7), (0.0, 30.0, 0.0), (-3.0, 30.0, 0.4), (5.0, 0.0, 0.6)] {
+        let depth = derived(staged(1.0, 5.0, f64::INFINITY, &[stage(p, s, q, f64::INFINITY)]));
+        let exact = 5.0 * (-2.0 * q * depth.re).exp() / (p + s * depth.re);
+        assert!((depth.eps / exact - 1.0).abs() < 1e-13, "{p}, {s}, {q}: {:e} {exact:e}", depth.eps);
+    }
+    // As above, nearer to the boundary than depths can tell apart.
+    let first = stage(0.5 * (1.0 - 2.0_f64.powi(-53)), 0.0, 0.0, 1.0);
+    let depth = derived(staged(1.0, 1.0, f64::INFINITY, &[first, stage(500.0, 0.0, 0.0, f64::INFINITY)]));
+    assert!(depth.re == 1.0 && (depth.eps * 500.0 - 1.0).abs() < 1e-13, "{depth:?}");
+}
+
+/// `w = 4 e^-x - 1`, over four drag lengths, where a tangent leads out of the bracket; and a stage of every term, in
+/// which halving would take five times the work. A trial is a sum of some 20 terms.
+#[test]
+fn the_root_of_w_is_found_in_few_trials() {
+    let mut walk = Walk::from_impact(f64::EPSILON);
+    let root = walk.root(&loss(1.0, 0.0, 1.0), 0.0, 3.0, 4.0, 1e-18);
+    assert!((root / 4.0_f64.ln() - 1.0).abs() < 1e-15, "{root}");
+    assert!(walk.cost.force_evaluations <= 150, "{:?}", walk.cost);
+    let problem = staged(1.0, 5.0, f64::INFINITY, &[stage(2.0, 30.0, 0.7, f64::INFINITY)]);
+    let cost = Energy::new().solve(&problem, Detail::End).unwrap().cost;
+    assert!(cost.force_evaluations <= 210, "{cost:?}");
+}
+
+#[test]
+fn a_bar_or_a_time_beyond_all_numbers_is_an_error() {
+    // w = 1 + 0.6e308 behind a drive of 1.2e308 that fades; the sum of the magnitudes is beyond f64.
+    let problem = staged(2.0, 1.0, 1.0, &[stage(-1.2e308, 1.2e308, 0.0, f64::INFINITY)]);
+    let error = Energy::new().exit_margin_in(&problem).unwrap_err();
+    assert!(matches!(error, IntegrationError::NotFinite { what: "V²", .. }), "{error}");
+    // 1e305 m at 1e-5 m/s.
+    let stages = [stage(0.5 * (1.0 - 1e-10), 0.0, 0.0, 1.0), stage(0.0, 0.0, 0.0, f64::INFINITY)];
+    let error = Energy::new().solve(&staged(1.0, 1.0, 1e305, &stages), Detail::End).unwrap_err();
+    assert!(matches!(error, IntegrationError::NotFinite { what: "time or speed", .. }), "{error}");
+}
+
+/// `tolerance^(1/n)` of the radius, n the last order of which a coefficient is left.
+#[test]
+fn a_step_in_time_follows_the_last_two_coefficients() {
+    let clock = Clock { loss: loss(1.0, 0.0, 0.0), tolerance: 1e-12 };
+    let length = |last: f64, before: f64| {
+        let mut series = [3.0; TIME_ORDER];
+        series[TIME_ORDER - 1] = last;
+        series[TIME_ORDER - 2] = before;
+        clock.step_length(&series, 1.0)
+    };
+    for (last, before, expected) in [
+        (3.0, 3.0, 1e-12_f64.powf(1.0 / 22.0)),
+        (3.0, 0.0, 1e-12_f64.powf(1.0 / 23.0)),
+        (0.0, -3.0, 1e-12_f64.powf(1.0 / 22.0)),
+    ] {
+        let (found, done) = length(last, before);
+        assert!((found / expected - 1.0).abs() < 1e-14 && !done, "{last}, {before}: {found}");
+    }
+    assert_eq!(length(0.0, 0.0), (1.0, true));
+}
+
+/// The walk and the clock differ by rounding: where no way is left no time passes, and a way left at the last speed is
+/// flown at it.
+#[test]
+fn a_clock_that_comes_to_its_end_too_early_goes_on_at_the_last_speed() {
+    let problem = staged(1.0, 1.0, 3.0, &[stage(0.5, 0.0, 0.0, f64::INFINITY)]);
+    let elapse = |steady, depth, velocity| {
+        let clock = Clock { loss: loss(steady, 0.0, 0.0), tolerance: f64::EPSILON };
+        let now = State { time: 2.0, depth: 1.0, velocity: 0.5 };
+        let mut course = Course::new(&problem, Detail::End);
+        clock.elapse(now, depth, velocity, &mut Cost::default(), &mut course).unwrap()
+    };
+    let slower = 0.5_f64.next_down();
+    assert_eq!(elapse(-1.0, 1.0, slower), State { time: 2.0, depth: 1.0, velocity: slower });
+    assert_eq!(elapse(1e-3, 3.0, 0.5), State { time: 6.0, depth: 3.0, velocity: 0.5 });
+}
+
+/// Steps as measured: the variable that is not chosen takes more, by one part in a hundred over scenes as varied as
+/// these.
+#[test]
+fn the_variable_of_time_is_the_one_that_takes_less_steps() {
+    let mut random = Random(10);
+    let (mut concrete, mut any) = (Cost::default(), Cost::default());
+    for _ in 0..300 {
+        concrete += Energy::new().solve(&random.scene(true), Detail::End).unwrap().cost;
+        any += Energy::new().solve(&general(&mut random), Detail::End).unwrap().cost;
+    }
+    assert!(concrete.steps <= 3450 && any.steps <= 2472, "{concrete:?}, {any:?}");
+}

@@ -1,0 +1,379 @@
+//! The one loop over the stages of a flight. What does a method have to solve, and what follows from its answers?
+//!
+//! A method solves one stage, from a state at its start to its limit: the stage's end or the exit depth, whichever
+//! comes first. It answers [`StageEnd`]: the limit is reached, the projectile comes to rest before it, or it approaches
+//! a place for ever. Everything else is decided here, once for all methods: which stage is next, which events happen at
+//! a place and in which order, whether the flight ends, the exit margin and its error bound, the outcome.
+//!
+//! Of the law of a stage the loop asks the force for the trajectory, whether it ever stops the projectile, and the
+//! energy or speed that is missing behind a stop ([`crate::physics::exit_energy`]).
+
+use std::cmp::Ordering;
+
+use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample};
+use crate::physics::exit_energy::{energy_beyond_stop, speed_missing};
+use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State};
+
+/// Where and how the solution through one stage ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum StageEnd<S = f64> {
+    /// At the limit of the stage; the velocity there may be zero.
+    Limit(State<S>),
+    /// At rest before the limit.
+    Rest(State<S>),
+    /// Neither: from the state given, a place before the limit is only approached.
+    Approach(State<S>, &'static str),
+}
+
+/// A method, as the loop sees it.
+pub(crate) trait StageSolver<S: Scalar> {
+    /// Solves stage `course.stage` from `course.state` (V > 0, before the limit) to [`Course::limit`].
+    ///
+    /// Adds its work to `course.cost` and the error of `W/V0²` to `course.error_bound`.
+    ///
+    /// # Errors
+    /// [`IntegrationError`]: the stage is refused, a budget is spent, or a number is not finite.
+    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError>;
+
+    /// Exit margin of the finished flight with its error bound.
+    ///
+    /// # Errors
+    /// As [`StageSolver::solve_stage`], for a method that integrates beyond a stop.
+    #[inline(always)]
+    fn margin(&mut self, course: &mut Course<'_, S>) -> Result<Bounded, IntegrationError> {
+        Ok(course.margin())
+    }
+}
+
+/// A value and the bound of its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bounded {
+    pub(crate) value: f64,
+    pub(crate) bound: f64,
+}
+
+impl Bounded {
+    /// No value yet: greater than all.
+    pub(crate) const NONE: Self = Self { value: f64::INFINITY, bound: 0.0 };
+
+    /// The lesser of the two. The error bound of the greater counts as far as it reaches below that of the lesser.
+    pub(crate) fn min(self, other: Self) -> Self {
+        let (lesser, greater) = if self.value <= other.value { (self, other) } else { (other, self) };
+        let bound = lesser.bound.max(greater.bound - (greater.value - lesser.value));
+        Self { bound, ..lesser }
+    }
+
+    /// Whether the sign of the value is certain. That of NaN is not.
+    pub(crate) fn is_decided(self) -> bool {
+        self.value.abs().partial_cmp(&self.bound) == Some(Ordering::Greater)
+    }
+}
+
+/// A flight in progress.
+pub(crate) struct Course<'a, S = f64> {
+    pub(crate) problem: &'a Problem<S>,
+    pub(crate) detail: Detail,
+    /// State at the start of the present stage; at the end of the flight, its end.
+    pub(crate) state: State<S>,
+    /// Index of the present stage.
+    pub(crate) stage: usize,
+    /// Whether the exit depth is reached.
+    pub(crate) is_through: bool,
+    pub(crate) cost: Cost,
+    /// Error bound of `W/V0²` at `state`.
+    pub(crate) error_bound: f64,
+    /// What the method reports about its choices.
+    pub(crate) notes: Vec<String>,
+    events: Events<S>,
+    trajectory: Vec<Sample>,
+    /// Least `W/V0²` at the stage ends passed so far.
+    least_at_ends: Bounded,
+}
+
+impl<'a, S: Scalar> Course<'a, S> {
+    /// A flight at impact.
+    #[inline(always)]
+    pub(crate) fn new(problem: &'a Problem<S>, detail: Detail) -> Self {
+        Self {
+            problem,
+            detail,
+            state: State::at_impact(problem),
+            stage: 0,
+            is_through: false,
+            cost: Cost::default(),
+            error_bound: 0.0,
+            notes: Vec::new(),
+            events: Events::new(),
+            trajectory: Vec::new(),
+            least_at_ends: Bounded::NONE,
+        }
+    }
+
+    /// Where the solution through the present stage ends [m]; infinite where only rest can end it.
+    ///
+    /// # Errors
+    /// [`IntegrationError::NeverEnds`] where nothing can.
+    #[inline(always)]
+    pub(crate) fn limit(&self) -> Result<S, IntegrationError> {
+        let limit = self.problem.limit_of(self.stage);
+        let law = &self.problem.stages[self.stage];
+        if limit.value() == f64::INFINITY && !stops_far_out(law) {
+            return self.never_ends();
+        }
+        Ok(limit)
+    }
+
+    #[cold]
+    fn never_ends(&self) -> Result<S, IntegrationError> {
+        let law = &self.problem.stages[self.stage];
+        let why = if law.static_force.value() < 0.0 {
+            "the last stage drives the projectile and has no far side"
+        } else if law.viscosity.value() == 0.0 && law.drag.value() == 0.0 {
+            "the last stage has no resistance and no far side"
+        } else {
+            "resistance vanishes with the velocity and there is no far side"
+        };
+        Err(IntegrationError::NeverEnds { why, last: self.state.values() })
+    }
+
+    /// Adds a row to the trajectory, if one is wanted: `state`, in the present stage.
+    #[inline(always)]
+    pub(crate) fn sample(&mut self, state: State<S>) {
+        if self.detail >= Detail::Trajectory {
+            self.push_sample(state);
+        }
+    }
+
+    #[cold]
+    fn push_sample(&mut self, state: State<S>) {
+        let force = self.problem.stages[self.stage].force(state.depth, state.velocity).value();
+        self.trajectory.push(Sample { state: state.values(), force, stage: self.stage });
+    }
+
+    #[inline(always)]
+    fn event(&mut self, kind: EventKind) {
+        if self.detail >= Detail::Events {
+            self.events.push(Event { kind, state: self.state });
+            self.sample(self.state);
+        }
+    }
+
+    /// `W/V0²` here.
+    #[inline(always)]
+    fn energy(&self) -> Bounded {
+        let relative = self.state.velocity.value() / self.problem.impact_speed.value();
+        Bounded { value: relative * relative, bound: self.error_bound }
+    }
+
+    /// Lists every stage end at the present depth and enters the stage beyond them.
+    #[inline(always)]
+    fn pass_ends(&mut self) {
+        while let Some(law) = self.problem.stages.get(self.stage)
+            && law.end.value() <= self.state.depth.value()
+        {
+            self.event(EventKind::boundary(self.problem, self.stage));
+            self.least_at_ends = self.least_at_ends.min(self.energy());
+            self.stage += 1;
+        }
+    }
+
+    /// Exit margin as it follows from the end of the flight, for a target with an exit.
+    ///
+    /// Perforated: the least `W/V0²` at the stage ends and the exit. Stopped: what the stop lacks, continued in `f64`
+    /// with a few roundings of its own.
+    #[inline(always)]
+    pub(crate) fn margin(&self) -> Bounded {
+        if self.is_through {
+            return self.least_at_ends.min(self.energy());
+        }
+        let scale = self.problem.impact_speed.value();
+        let value = energy_beyond_stop(self.problem, self.stage, self.state.depth.value()) / scale / scale;
+        Bounded { value, bound: self.error_bound + 8.0 * f64::EPSILON * value.abs() }
+    }
+
+    /// The state at the limit, without speed, where the error bound leaves open whether an approach gets there.
+    ///
+    /// The margin is then zero within its bound, so the outcome becomes `Undecided`.
+    ///
+    /// # Errors
+    /// [`IntegrationError::NeverEnds`] where more is missing than the error bound: `W(limit)` would be
+    /// `-missing (2 V + missing)` below that of the present state, and the place itself is rounded.
+    #[cold]
+    fn arrive_in_doubt(&self, at: State<S>, why: &'static str) -> Result<State<S>, IntegrationError> {
+        let (last, limit) = (at.values(), self.problem.limit_of(self.stage));
+        let (law, mass) = (self.problem.stages[self.stage].values(), self.problem.mass.value());
+        let v = last.velocity.max(0.0);
+        let v0 = self.problem.impact_speed.value();
+        let missing = speed_missing(&law, mass, State { velocity: v, ..last }, limit.value());
+        let bound = self.error_bound * v0 * v0 + 4.0 * f64::EPSILON * v * v;
+        if missing.is_none_or(|missing| missing * (2.0 * v + missing) > bound) {
+            return Err(IntegrationError::NeverEnds { why, last });
+        }
+        // Until the speed is an epsilon of what it was.
+        let time = if v > 0.0 { -f64::EPSILON.ln() * mass / law.viscosity } else { 0.0 };
+        Ok(State { time: at.time + S::from_f64(time), depth: limit, velocity: S::zero() })
+    }
+
+    #[inline(always)]
+    fn finish(self, margin: Option<Bounded>) -> Flight<S> {
+        let outcome = if margin.is_some_and(|margin| !margin.is_decided()) {
+            Outcome::Undecided
+        } else if self.is_through {
+            Outcome::Perforated
+        } else {
+            self.problem.stop_in(self.stage)
+        };
+        Flight {
+            outcome,
+            stage: self.stage,
+            end: self.state,
+            events: self.events,
+            exit_margin: margin.map(|margin| margin.value),
+            exit_margin_error: margin.map(|margin| margin.bound),
+            cost: self.cost,
+            trajectory: self.trajectory,
+            step_limit: None,
+            notes: self.notes,
+        }
+    }
+}
+
+/// Whether a stage without an end brings every projectile to rest: its static force is positive far out.
+#[inline(always)]
+fn stops_far_out<S: Scalar>(law: &Stage<S>) -> bool {
+    law.stiffness.value() > 0.0 || law.static_force.value() > 0.0
+}
+
+/// Solves `problem` stage by stage with `method`.
+///
+/// A stage end or an exit that is reached without speed counts as reached. A stage without length is passed where it
+/// stands. The flight ends in the stage solved last, and the samples of exit and rest show the force of that stage.
+///
+/// # Errors
+/// [`IntegrationError::NeverEnds`] where neither rest nor exit is reached; what `method` refuses.
+#[inline(always)]
+pub(crate) fn solve<S: Scalar>(
+    problem: &Problem<S>,
+    detail: Detail,
+    method: &mut impl StageSolver<S>,
+) -> Result<Flight<S>, IntegrationError> {
+    if let Some(mut flight) = Flight::at_once(problem) {
+        if detail == Detail::End {
+            flight.events.clear();
+        }
+        return Ok(flight);
+    }
+    let mut course = Course::new(problem, detail);
+    course.sample(course.state);
+    course.pass_ends();
+    while course.stage < problem.stages.len() {
+        let entered = course.stage;
+        let rests = match method.solve_stage(&mut course)? {
+            StageEnd::Limit(state) => {
+                course.state = state;
+                false
+            }
+            StageEnd::Rest(state) => {
+                let limit = problem.limit_of(entered);
+                let depth = if state.depth.value() > limit.value() { limit } else { state.depth };
+                course.state = State { depth, ..state };
+                true
+            }
+            StageEnd::Approach(state, why) => {
+                course.state = course.arrive_in_doubt(state, why)?;
+                false
+            }
+        };
+        if !rests {
+            course.pass_ends();
+            course.is_through = course.state.depth.value() >= problem.exit_depth.value();
+        }
+        let stopped = course.state.velocity.value() <= 0.0;
+        if course.is_through || stopped {
+            course.stage = entered;
+            if course.is_through {
+                course.event(EventKind::Exit);
+            }
+            if stopped {
+                course.event(EventKind::Rest);
+            }
+            let margin = if problem.has_exit() { Some(method.margin(&mut course)?) } else { None };
+            return Ok(course.finish(margin));
+        }
+    }
+    let last = course.state.values();
+    Err(IntegrationError::NeverEnds { why: "the last stage ends and nothing follows", last })
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+
+    /// Mass 2 kg, one stage, impact at 300 m/s.
+    fn alone(stage: Stage, exit_depth: f64) -> Problem {
+        Problem::of_stages(2.0, 300.0, [stage]).with_exit(exit_depth)
+    }
+
+    fn stage(p: f64, r: f64, q: f64) -> Stage {
+        Stage { viscosity: r, ..Stage::tunnel(p, q) }
+    }
+
+    #[test]
+    fn the_lesser_margin_has_the_bound_of_the_greater_as_far_as_it_reaches_below() {
+        let bounded = |value, bound| Bounded { value, bound };
+        for (greater, bound) in [(bounded(1.5, 0.75), 0.25), (bounded(1.5, 0.125), 0.125), (bounded(3.0, 0.5), 0.125)] {
+            let lesser = bounded(1.0, 0.125);
+            for least in [lesser.min(greater), greater.min(lesser)] {
+                assert_eq!(least, bounded(1.0, bound), "{}", greater.value);
+            }
+        }
+        for (value, bound, decided) in [(2.0, 1.0, true), (-2.0, 1.0, true), (1.0, 1.0, false), (f64::NAN, 0.0, false)]
+        {
+            assert_eq!(bounded(value, bound).is_decided(), decided, "{value}");
+        }
+    }
+
+    #[test]
+    fn a_stage_without_an_end_that_never_stops_is_refused_for_its_own_reason() {
+        for (stage, why) in [
+            (stage(-1.0, 0.0, 0.0), "drives"),
+            (stage(-1.0, 1.5, 0.0), "drives"),
+            (stage(0.0, 0.0, 0.0), "no resistance"),
+            (stage(0.0, 1.5, 0.0), "vanishes with the velocity"),
+            (stage(0.0, 0.0, 1.0), "vanishes with the velocity"),
+        ] {
+            let endless = alone(stage, f64::INFINITY);
+            let error = Course::new(&endless, Detail::End).limit().unwrap_err().to_string();
+            assert!(error.contains(why), "{error}");
+            assert_eq!(Course::new(&alone(stage, 4.0), Detail::End).limit(), Ok(4.0));
+        }
+    }
+
+    /// r/M = 0.75/s takes 3 m/s in 4 m: from x = 0.5 m no speed is left at 4.5 m.
+    #[test]
+    fn an_approach_that_the_error_bound_cannot_tell_from_arrival_counts_as_arrival() {
+        let v0 = 300.0;
+        let arrival = |exit: f64, velocity: f64, error_bound: f64| {
+            let problem = alone(stage(0.0, 1.5, 0.0), exit);
+            let course = Course { error_bound, ..Course::new(&problem, Detail::End) };
+            course.arrive_in_doubt(State { time: 1.0, depth: 0.5, velocity }, "")
+        };
+        let state = arrival(4.5, 3.0, 0.0).unwrap();
+        assert_eq!((state.depth, state.velocity), (4.5, 0.0));
+        // Until the speed is an epsilon of what it was: M/r ln(1/eps).
+        assert!(((state.time - 1.0) / (2.0 / 1.5 * 36.043_653_389_117_15) - 1.0).abs() < 1e-14, "{state}");
+        // The place is rounded: a spacing is 4e-15 of V², and 4 eps V² are 8e-15.
+        assert!(arrival(4.5_f64.next_up(), 3.0, 0.0).is_ok() && arrival(4.5 + 1e-14, 3.0, 0.0).is_err());
+        // r dx/M = 0.75e-9 m/s are missing, and 2 V as much of V²: 4.5e-9 m²/s².
+        assert!(arrival(4.5 + 1e-9, 3.0, 4.6e-9 / v0 / v0).is_ok());
+        assert!(arrival(4.5 + 1e-9, 3.0, 4.4e-9 / v0 / v0).is_err());
+        // At rest 4 m before it, 3 m/s are missing. Speed below zero is the error of a method.
+        for velocity in [0.0, -0.1] {
+            assert!(arrival(4.5, velocity, 9.1 / v0 / v0).is_ok() && arrival(4.5, velocity, 8.9 / v0 / v0).is_err());
+        }
+        // A resisting force stops the projectile, and nothing is in doubt.
+        let problem = alone(stage(1.0, 1.5, 0.0), 4.5);
+        assert!(Course::new(&problem, Detail::End).arrive_in_doubt(State::at_impact(&problem), "").is_err());
+    }
+}

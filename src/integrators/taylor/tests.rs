@@ -1,0 +1,603 @@
+use num_dual::Dual64;
+use proptest::prelude::Rng;
+use proptest::test_runner::{RngAlgorithm, TestRng};
+use twofloat::TwoFloat;
+
+use super::super::energy::Energy;
+use super::*;
+use crate::integrators::Cost;
+use crate::physics::{Advice, EventKind, Outcome, Stages};
+use crate::testing::kinds;
+
+/// Crater and tunnel with the continuous crater constant (theory section 1), and its closed form (section 2).
+#[derive(Clone, Copy, Debug)]
+struct Concrete {
+    mass: f64,
+    static_force: f64,
+    drag: f64,
+    crater_depth: f64,
+    impact_speed: f64,
+    exit_depth: f64,
+}
+
+impl Concrete {
+    fn problem(self) -> Problem {
+        let Self { mass, static_force, drag, crater_depth, impact_speed, exit_depth } = self;
+        let tunnel = Stage::tunnel(static_force, drag);
+        Problem::continuous(mass, impact_speed, crater_depth, tunnel).with_exit(exit_depth)
+    }
+
+    /// Depth and time of rest in a semi-infinite target.
+    fn rest(self) -> (f64, f64) {
+        let Self { mass: m, static_force: p, drag: q, crater_depth: kd, impact_speed: v0, .. } = self;
+        let w = ((p + q * v0 * v0) / (kd * (m + kd * q))).sqrt();
+        let v1_squared = (m * v0 * v0 - kd * p) / (m + kd * q);
+        if v1_squared <= 0.0 {
+            return (v0 / w, std::f64::consts::FRAC_PI_2 / w);
+        }
+        let v1 = v1_squared.sqrt();
+        let u = q * v1_squared / p;
+        let log_over = if u == 0.0 { 1.0 } else { u.ln_1p() / u };
+        let a = v1 * (q / p).sqrt();
+        let atan_over = if a == 0.0 { 1.0 } else { a.atan() / a };
+        (kd + m * v1_squared / (2.0 * p) * log_over, (w * kd).atan2(v1) / w + m / p * v1 * atan_over)
+    }
+}
+
+/// Uniform and log-uniform numbers from a fixed seed.
+struct Draw(TestRng);
+
+impl Draw {
+    fn new(seed: u8) -> Self {
+        Self(TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]))
+    }
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * ((self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+    fn log_between(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+    fn chance(&mut self, probability: f64) -> bool {
+        self.between(0.0, 1.0) < probability
+    }
+
+    /// Groups over the whole admitted range: I 1e-9..1e6, N 1e-3..1e12 or no drag, H/d 1e-3..1e3.
+    fn concrete(&mut self) -> Concrete {
+        let (i, n, h) = (self.log_between(1e-9, 1e6), self.log_between(1e-3, 1e12), self.log_between(1e-3, 1e3));
+        let (d, mass, strength) =
+            (self.log_between(1e-3, 1.0), self.log_between(1e-3, 1e3), self.log_between(1e6, 1e9));
+        let area = std::f64::consts::FRAC_PI_4 * d * d;
+        Concrete {
+            mass,
+            static_force: area * strength,
+            drag: if self.chance(0.1) { 0.0 } else { mass / (n * d * d * d) * area },
+            crater_depth: d * self.between(0.3, 3.0),
+            impact_speed: (i * strength * d * d * d / mass).sqrt(),
+            exit_depth: h * d,
+        }
+    }
+
+    /// One to four stages with any of the four terms, driven ones among them.
+    fn stages(&mut self) -> Problem {
+        let count = 1 + (self.0.next_u64() % 4) as usize;
+        let mut stages = Stages::new();
+        let mut end = 0.0;
+        for index in 0..count {
+            end += if self.chance(0.1) { 0.0 } else { self.between(0.01, 0.5) };
+            let driven = self.chance(0.2);
+            stages.push(Stage {
+                static_force: self.log_between(1.0, 1e3) * if driven { -1.0 } else { 1.0 },
+                stiffness: if self.chance(0.5) { self.log_between(1.0, 1e4) } else { 0.0 },
+                viscosity: if self.chance(0.5) { self.log_between(0.1, 300.0) } else { 0.0 },
+                drag: if self.chance(0.5) { self.log_between(0.01, 30.0) } else { 0.0 },
+                end: if index + 1 == count { f64::INFINITY } else { end },
+            });
+        }
+        let (impact_speed, is_endless) = (self.log_between(0.1, 100.0), self.chance(0.5));
+        let exit_depth = if is_endless { f64::INFINITY } else { self.between(0.02, 2.5) };
+        Problem::of_stages(1.0, impact_speed, stages).with_exit(exit_depth)
+    }
+}
+
+/// The scenes of the peer benchmark: strength 36e6 Pa, S 12, k 2, density 2300, nose factor 0.72, d 50 mm, M 2 kg.
+fn peer_scene(impact_speed: f64, exit_depth: f64) -> Concrete {
+    let d: f64 = 0.05;
+    let area = std::f64::consts::FRAC_PI_4 * d * d;
+    Concrete {
+        mass: 2.0,
+        static_force: area * 36.0e6 * 12.0,
+        drag: area * 0.72 * 2300.0,
+        crater_depth: 0.1,
+        impact_speed,
+        exit_depth,
+    }
+}
+
+fn solve(problem: &Problem) -> Flight {
+    Taylor::default().solve(problem, Detail::Events).unwrap()
+}
+
+fn relative(value: f64, exact: f64) -> f64 {
+    if value == exact { 0.0 } else { ((value - exact) / exact).abs() }
+}
+
+fn one_stage(stage: Stage, impact_speed: f64, exit_depth: f64) -> Problem {
+    Problem::of_stages(1.0, impact_speed, [stage]).with_exit(exit_depth)
+}
+
+#[test]
+fn f64_agrees_with_double_double_on_random_stages_of_every_kind() {
+    let mut draw = Draw::new(2);
+    let mut finished = 0;
+    for _ in 0..400 {
+        let problem = draw.stages();
+        let flight = Taylor::default().solve(&problem, Detail::Events);
+        let reference = Taylor::default().solve_in::<TwoFloat>(&problem.cast(), Detail::Events);
+        let (flight, reference) = match (flight, reference) {
+            (Ok(flight), Ok(reference)) => (flight, reference.values()),
+            (Err(a), Err(b)) => {
+                assert_eq!(std::mem::discriminant(&a), std::mem::discriminant(&b), "{problem:?}");
+                continue;
+            }
+            (a, b) => panic!("{problem:?}\n{a:?}\n{b:?}"),
+        };
+        finished += 1;
+        assert_eq!(flight.outcome, reference.outcome, "{problem:?}");
+        assert_eq!(kinds(&flight.events), kinds(&reference.events), "{problem:?}");
+        let fastest = reference.events.iter().map(|e| e.state.velocity).fold(problem.impact_speed, f64::max);
+        for (event, exact) in flight.events.iter().zip(&reference.events) {
+            // Inherent: a boundary passed slowly, before or here, scatters the time after it.
+            let condition = reference
+                .events
+                .iter()
+                .filter(|e| e.kind != EventKind::Rest)
+                .map(|e| fastest / e.state.velocity)
+                .fold(1.0, f64::max);
+            assert!(relative(event.state.depth, exact.state.depth) < 5e-15 * condition, "{event:?} {problem:?}");
+            assert!(relative(event.state.time, exact.state.time) < 2e-14 * condition, "{event:?} {problem:?}");
+            let off = (event.state.velocity - exact.state.velocity).abs() / fastest;
+            assert!(off < 2e-14 * condition, "{event:?} {exact:?} {problem:?}");
+        }
+    }
+    assert!(finished > 250, "only {finished} flights ended");
+}
+
+#[test]
+fn general_stages_agree_with_their_closed_forms() {
+    let drive = |p, s, r, q| Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end: f64::INFINITY };
+    // p, r: T = (M/r) log1p(z), X = (M V0²/p)(z - log1p(z))/z², z = r V0/p.
+    let (p, r, v) = (7.0, 3.0, 5.0);
+    let z: f64 = r * v / p;
+    let flight = solve(&one_stage(drive(p, 0.0, r, 0.0), v, f64::INFINITY));
+    assert!(relative(flight.end.time, z.ln_1p() / r) < 1e-15);
+    assert!(relative(flight.end.depth, v * v / p * (z - z.ln_1p()) / (z * z)) < 2e-15);
+    // p, s: X = (V0/w)²/(u0 + hypot(u0, V0/w)), T = atan2(V0, w u0)/w; driven and resisting.
+    for p in [7.0, -7.0_f64] {
+        let s: f64 = 11.0;
+        let (w, u) = (s.sqrt(), p / s);
+        let flight = solve(&one_stage(drive(p, s, 0.0, 0.0), v, f64::INFINITY));
+        assert!(relative(flight.end.depth, (v / w) * (v / w) / (u + u.hypot(v / w))) < 1e-15);
+        assert!(relative(flight.end.time, v.atan2(w * u) / w) < 1e-15);
+    }
+    // r alone with an exit: V = V0 - r H/M.
+    let flight = solve(&one_stage(drive(0.0, 0.0, 2.0, 0.0), 10.0, 4.0));
+    assert_eq!(flight.outcome, Outcome::Perforated);
+    assert!(relative(flight.end.velocity, 2.0) < 1e-14 && relative(flight.end.time, 5.0_f64.ln() / 2.0) < 1e-14);
+    // q alone with an exit: V = V0 exp(-q H/M).
+    let flight = solve(&one_stage(drive(0.0, 0.0, 0.0, 2.0), 10.0, 4.0));
+    assert!(relative(flight.end.velocity, 10.0 * (-8.0_f64).exp()) < 1e-14);
+    assert!(relative(flight.end.time, 8.0_f64.exp_m1() / 20.0) < 1e-14);
+    // No force at all: V0 t = H.
+    let flight = solve(&one_stage(drive(0.0, 0.0, 0.0, 0.0), 10.0, 4.0));
+    assert_eq!((flight.end.velocity, flight.end.time), (10.0, 0.4));
+}
+
+#[test]
+fn a_boundary_on_the_end_of_a_step_is_passed_once() {
+    let scene = peer_scene(900.0, f64::INFINITY);
+    let flight = Taylor::default().solve(&scene.problem(), Detail::Trajectory).unwrap();
+    // Samples: impact, crater end, steps of the tunnel, rest.
+    let inside = flight.trajectory.len() - 2;
+    assert!(inside > 3, "{:?}", flight.trajectory);
+    let depth = flight.trajectory[inside].state.depth;
+    for end in [depth.next_down(), depth, depth.next_up()] {
+        let mut problem = scene.problem();
+        problem.stages.insert(1, Stage { end, ..problem.stages[1] });
+        let again = Taylor::default().solve(&problem, Detail::Trajectory).unwrap();
+        assert_eq!(kinds(&again.events), [EventKind::CraterEnd, EventKind::StageEnd(1), EventKind::Rest]);
+        assert!(relative(again.end.depth, flight.end.depth) < 2e-15);
+        assert!(again.trajectory.windows(2).all(|s| s[0].state.time <= s[1].state.time));
+    }
+}
+
+#[test]
+fn rest_near_the_crater_end_is_continuous_and_cheap() {
+    // V1² = 0 at V0 = sqrt(k d P/M), approached from both sides down to one spacing.
+    let mut scene = peer_scene(0.0, f64::INFINITY);
+    let touching = (scene.crater_depth * scene.static_force / scene.mass).sqrt();
+    for j in 1..=17 {
+        for sign in [1.0, -1.0] {
+            scene.impact_speed = touching * (1.0 + sign * 10.0_f64.powi(-j));
+            let flight = solve(&scene.problem());
+            let (depth, time) = scene.rest();
+            assert!(relative(flight.end.depth, depth) < 5e-15, "1e-{j}: {flight:?}");
+            assert!(
+                relative(flight.end.time, time) < 1e-14,
+                "1e-{j}: {} {time} {:e}",
+                flight.end.time,
+                relative(flight.end.time, time)
+            );
+            assert!(flight.cost.steps <= 4, "{:?}", flight.cost);
+            if j < 14 {
+                assert_eq!(flight.outcome == Outcome::StoppedInTunnel, sign > 0.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_stiff_driven_scene_is_flown_and_its_cost_shows_why_not_to() {
+    // Theory section 1: leaves at H = 9 m after about (r/s) ln(1/(1 - s H/|p|)) = 23 s.
+    let law = Stage { static_force: -1000.0, stiffness: 100.0, viscosity: 1000.0, drag: 0.0, end: f64::INFINITY };
+    let flight = solve(&one_stage(law, 1.0, 9.0));
+    assert_eq!(flight.outcome, Outcome::Perforated);
+    // Slow rate l2 = r/2 - sqrt(r²/4 - s), and x = 10 - A exp(-l2 t) - B exp(-l1 t).
+    let root = (500.0_f64 * 500.0 - 100.0).sqrt();
+    let (fast, slow) = (500.0 + root, 100.0 / (500.0 + root));
+    let amplitude = (10.0 * fast - 1.0) / (fast - slow);
+    let time = amplitude.ln() / slow;
+    assert!(relative(flight.end.time, time) < 1e-12, "{} {time}", flight.end.time);
+    assert!((1000..20_000).contains(&flight.cost.steps), "{:?}", flight.cost);
+}
+
+#[test]
+fn no_step_spans_more_than_the_phase_in_which_the_sign_of_v_is_decisive() {
+    // Driven from far below its balance, a spring takes nearly half a period to rest; the loosest tolerance takes
+    // the longest steps.
+    let law = Stage { static_force: -100.0, stiffness: 1.0, viscosity: 0.0, drag: 0.0, end: f64::INFINITY };
+    for rtol in [0.1, 1e-3, 0.0] {
+        let taylor = Taylor::with_rtol(rtol).unwrap();
+        let flight = taylor.solve(&one_stage(law, 0.1, f64::INFINITY), Detail::Trajectory).unwrap();
+        let longest = flight.trajectory.windows(2).map(|s| s[1].state.time - s[0].state.time).fold(0.0, f64::max);
+        assert!(longest <= PHASE_MAX && flight.cost.steps >= 2, "{longest} at rtol {rtol}");
+        assert!(relative(flight.end.time, 0.1_f64.atan2(-100.0)) < rtol.max(1e-14), "{:?}", flight.end);
+    }
+}
+
+#[test]
+fn only_stages_entered_cost_anything() {
+    let flight = solve(&peer_scene(60.0, f64::INFINITY).problem());
+    assert_eq!(flight.outcome, Outcome::StoppedInCrater);
+    assert_eq!(flight.cost, Cost { steps: 1, rejected_steps: 0, force_evaluations: 23 });
+    assert!(flight.trajectory.is_empty() && flight.notes.is_empty());
+    let lines = Taylor::explain(&peer_scene(60.0, f64::INFINITY).problem(), &flight);
+    assert_eq!(lines, ["stage 0: a spring alone: recurrence of one term, no convolution"]);
+    // The end alone is the same end.
+    let end = Taylor::default().solve(&peer_scene(60.0, 1.0).problem(), Detail::End).unwrap();
+    assert!(end.events.is_empty());
+    assert_eq!(end.end, flight.end);
+}
+
+#[test]
+fn a_looser_tolerance_is_kept_at_less_work() {
+    let mut draw = Draw::new(5);
+    let mut work = Vec::new();
+    for rtol in [1e-3, 1e-6, 1e-9, 1e-12, 0.0] {
+        let taylor = Taylor::with_rtol(rtol).unwrap();
+        let mut evaluations = 0;
+        for _ in 0..200 {
+            let scene = Concrete { exit_depth: f64::INFINITY, ..draw.concrete() };
+            let flight = taylor.solve(&scene.problem(), Detail::Events).unwrap();
+            let (depth, time) = scene.rest();
+            assert!(relative(flight.end.depth, depth) < rtol.max(5e-15), "{rtol:e} {scene:?} {flight:?}");
+            assert!(relative(flight.end.time, time) < rtol.max(1e-13), "{rtol:e} {scene:?} {flight:?}");
+            evaluations += flight.cost.force_evaluations;
+        }
+        work.push(evaluations);
+    }
+    assert!(work.windows(2).all(|w| w[0] < w[1]), "{work:?}");
+    for bad in [-1e-3, 0.2, f64::NAN] {
+        assert!(Taylor::with_rtol(bad).is_err_and(|e| e.is_usage()));
+    }
+}
+
+#[test]
+fn the_same_code_runs_in_single_precision_and_in_dual_numbers() {
+    let scene = peer_scene(300.0, f64::INFINITY);
+    let single = Taylor::default().solve_in::<f32>(&scene.problem().cast(), Detail::Events).unwrap();
+    assert!(relative(single.end.depth.value(), 0.144_826_200_112_217_08) < 5e-7);
+    assert_eq!(single.outcome, Outcome::StoppedInTunnel);
+
+    // d/dV0 of the tunnel alone: X = (M/2Q) ln(1 + Q V0²/P), dX/dV0 = M V0/(P + Q V0²), dT/dV0 = M/(P + Q V0²).
+    let Concrete { mass, static_force, drag, .. } = scene;
+    let mut problem: Problem<Dual64> =
+        Problem::crater_and_tunnel(mass, 300.0, None, Stage::tunnel(static_force, drag)).cast();
+    problem.impact_speed = Dual64::new(300.0, 1.0);
+    let flight = Taylor::default().solve_in(&problem, Detail::Events).unwrap();
+    let force = static_force + drag * 300.0 * 300.0;
+    assert!(relative(flight.end.depth.eps, mass * 300.0 / force) < 1e-14);
+    assert!(relative(flight.end.time.eps, mass / force) < 1e-14);
+
+    // And through an exit: dV_r/dV0 = (V0/V_r) exp(-2 Q H/M).
+    problem.exit_depth = Dual64::from_re(0.05);
+    let flight = Taylor::default().solve_in(&problem, Detail::Events).unwrap();
+    let slope = 300.0 / flight.end.velocity.re * (-2.0 * drag * 0.05 / mass).exp();
+    assert!(relative(flight.end.velocity.eps, slope) < 1e-14, "{} {slope}", flight.end.velocity.eps);
+    assert_eq!(flight.end.depth.eps, 0.0);
+}
+
+#[test]
+fn forces_beyond_all_numbers_are_an_error_and_extreme_units_are_not() {
+    let error = Taylor::default().solve(&one_stage(Stage::tunnel(1e308, 1e308), 1e200, 1.0), Detail::Events);
+    assert!(matches!(error, Err(IntegrationError::NotFinite { .. })), "{error:?}");
+    // Scaling length by a, time by b and mass by c changes no outcome and scales depth and time.
+    let base = solve(&peer_scene(300.0, f64::INFINITY).problem());
+    for (a, b, c) in [(1e-12, 1e6, 1e-9), (1e9, 1e-12, 1e12), (1e-30, 1e-30, 1e-30)] {
+        let scene = peer_scene(300.0, f64::INFINITY);
+        let flight = solve(
+            &Concrete {
+                mass: scene.mass * c,
+                static_force: scene.static_force * c * a / (b * b),
+                drag: scene.drag * c / a,
+                crater_depth: scene.crater_depth * a,
+                impact_speed: scene.impact_speed * a / b,
+                exit_depth: f64::INFINITY,
+            }
+            .problem(),
+        );
+        assert!(relative(flight.end.depth, base.end.depth * a) < 2e-15);
+        assert!(relative(flight.end.time, base.end.time * b) < 2e-15);
+    }
+}
+
+/// Mass 2, one stage: a problem for the parts of a course that are asked directly.
+fn alone(stage: Stage, exit_depth: f64) -> Problem {
+    Problem::of_stages(2.0, 300.0, [stage]).with_exit(exit_depth)
+}
+
+fn course_at(problem: &Problem, depth: f64, velocity: f64) -> Course<'_> {
+    let mut course = Course::new(problem, Detail::End);
+    course.state = State { time: 0.0, depth, velocity };
+    course
+}
+
+fn orders() -> Orders<22, 24> {
+    Orders::new(f64::EPSILON)
+}
+
+/// `V' = -V²` from V = 1 is `1/(1 + t)`: coefficients 1, -1, 1, ... of V and of x over its order.
+#[test]
+fn coefficients_keep_the_digits_of_double_double() {
+    let law = Stage::<f64>::tunnel(0.0, 1.0);
+    let wide = Stage {
+        static_force: TwoFloat::from(law.static_force),
+        stiffness: TwoFloat::from(0.0),
+        viscosity: TwoFloat::from(0.0),
+        drag: TwoFloat::from(law.drag),
+        end: TwoFloat::from(1.0),
+    };
+    let series = Series::<TwoFloat, 40>::new::<false, true, true>(&wide, TwoFloat::from(1.0));
+    for k in 0..40 {
+        let sign = TwoFloat::from(if k % 2 == 0 { 1.0 } else { -1.0 });
+        let way = series.advance[k] * TwoFloat::from((k + 1) as f64);
+        for off in [series.velocity[k] - sign, way - sign] {
+            assert!(off.value().abs() < 1e-28, "order {k}: {:e}", off.value());
+        }
+    }
+}
+
+/// Every term of the bar with its own factor, in numbers that can be followed by hand.
+#[test]
+fn a_step_adds_its_roundings_to_a_bar_that_fades() {
+    let problem = alone(Stage::tunnel(1.0, 0.0), f64::INFINITY);
+    let mut course = course_at(&problem, 0.0, 300.0);
+    course.error_bound = f64::EPSILON;
+    let law = Stage { static_force: -1.1, stiffness: 0.7, viscosity: 0.3, drag: 0.9, end: 1.0 };
+    let start = State { time: 0.0, depth: 0.0, velocity: 1.5 };
+    let end = State { time: 0.4, depth: 0.6, velocity: 1.2 };
+    orders().widen_bound(&mut course, &law, &start, &end, 30.0, 0.8);
+    // Force 1.1 + 0.42 + 2.475; roundings 6 V² + 3 F (0.8 + 1.2), truncation 2 V²; a hundredth of it, for V/V0 = 0.1.
+    let added = 0.01 * (6.0 * 2.25 + 3.0 * 3.995 * 2.0 + 2.0 * 2.25);
+    let fading = (1.0_f64 + (0.3 * 0.4 + 2.0 * 0.9 * 0.6) / 8.0).powi(8);
+    let expected = 1.0 / fading + added;
+    assert!(
+        (course.error_bound / f64::EPSILON / expected - 1.0).abs() < 1e-14,
+        "{} for {expected}",
+        course.error_bound / f64::EPSILON
+    );
+}
+
+/// M = 2, r = 10, s = 8, p = -16: equilibrium 2 m, fast rate 2.5 + sqrt(6.25 - 4) = 4 /s.
+#[test]
+fn a_creep_begins_at_the_line_of_the_fast_rate_and_only_before_the_equilibrium() {
+    let stage = Stage { static_force: -16.0, stiffness: 8.0, viscosity: 10.0, drag: 0.0, end: f64::INFINITY };
+    let problem = alone(stage, f64::INFINITY);
+    for (depth, velocity, limit, creeps) in [
+        (0.5, 6.0, 2.0, true),
+        (0.5, 6.0_f64.next_up(), 2.0, false),
+        (0.5, 6.0, 2.0_f64.next_down(), false),
+        (2.0, 0.0, f64::INFINITY, false),
+    ] {
+        let refused = refuse_creep(&course_at(&problem, depth, velocity), limit);
+        assert_eq!(refused.is_err(), creeps, "{depth}, {velocity}, {limit}");
+    }
+}
+
+/// Orders as tabled, in evaluations a step; a tolerance at the seam takes the higher.
+#[test]
+fn the_order_follows_from_the_tolerance() {
+    let drag = one_stage(Stage::tunnel(1.0, 1.0), 10.0, f64::INFINITY);
+    let spring = one_stage(Stage { stiffness: 1.0, ..Stage::tunnel(1.0, 0.0) }, 10.0, f64::INFINITY);
+    let orders = |taylor: Taylor| {
+        [&drag, &spring].map(|problem| {
+            let cost = taylor.solve(problem, Detail::End).unwrap().cost;
+            cost.force_evaluations as f64 / cost.steps as f64
+        })
+    };
+    for (rtol, expected) in [
+        (1e-3, [7.0, 9.0]),
+        (5e-6, [11.0, 17.0]),
+        (1e-7, [11.0, 17.0]),
+        (5e-10, [15.0, 19.0]),
+        (1e-11, [15.0, 19.0]),
+        (5e-14, [21.0, 23.0]),
+        (0.0, [21.0, 23.0]),
+    ] {
+        assert_eq!(orders(Taylor::with_rtol(rtol).unwrap()), expected, "{rtol:e}");
+    }
+    for (rtol, expected) in [(1e-17, 21), (5e-18, 39), (0.0, 39)] {
+        let wide = Taylor::with_rtol(rtol).unwrap().solve_in::<TwoFloat>(&drag.cast(), Detail::End).unwrap();
+        assert_eq!(wide.cost.force_evaluations, expected * wide.cost.steps, "{rtol:e}");
+    }
+}
+
+#[test]
+fn every_kind_of_stage_is_explained() {
+    let law = |s, r, q, end| Stage { static_force: 1.0, stiffness: s, viscosity: r, drag: q, end };
+    let stages = [
+        law(0.0, 0.0, 0.0, 0.1),
+        law(1.0, 0.0, 0.0, 0.2),
+        law(1.0, 1.0, 0.0, 0.3),
+        law(0.0, 1.0, 1.0, 0.4),
+        law(1.0, 0.0, 1.0, f64::INFINITY),
+    ];
+    let problem = Problem::of_stages(1.0, 10.0, stages).with_exit(0.5);
+    assert_eq!(
+        Taylor::explain(&problem, &solve(&problem)),
+        [
+            "stage 0: constant force: the series ends, one step serves",
+            "stage 1: a spring alone: recurrence of one term, no convolution",
+            "stage 2: no drag: recurrence of two terms, no convolution",
+            "stage 3: no stiffness: V monotone, no search for hidden roots",
+            "stage 4: stiffness and drag: earliest root isolated on every step",
+        ]
+    );
+    assert_eq!(Taylor::default().name(), "taylor");
+}
+
+/// `(tolerance v[0]/|v[k]|)^(1/k)` in full precision; logarithms off by 1 % of h, a power short by up to 6 %.
+#[test]
+fn a_span_keeps_the_tolerance_in_each_of_the_last_two_orders() {
+    let span = |first, before, last, tolerance| {
+        let velocity = [first, 0.0, 0.0, 0.0, 0.0, 0.0, before, last];
+        Series { velocity, advance: [0.0; 8] }.span(tolerance)
+    };
+    for tolerance in [1e-3, 1e-9, 1e-16] {
+        for first in [1.0, 1.3, 1.9] {
+            for size in [1e-2, 1.0, 7e3_f64] {
+                let exact = |order: f64| (tolerance * first / size).powf(1.0 / order);
+                let last = span(first, 0.0, -size, tolerance) / exact(7.0);
+                let before = span(first, size, 0.0, tolerance) / exact(6.0);
+                for ratio in [last, before] {
+                    assert!(ratio > 0.93 && ratio < 1.01, "{ratio}: {tolerance:e}, {first}, {size}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_unit_has_an_inverse_that_is_a_normal_number() {
+    for x in [f64::MIN_POSITIVE, 0.75, 1.0, 1.5, f64::MAX, f64::INFINITY] {
+        let unit = power_of_two_below(x);
+        assert!(unit <= x && (1.0 / unit).is_normal(), "{unit:e} for {x:e}");
+    }
+}
+
+/// Theory section 2, `p, s, r` with p < 0: it swings through the balance at 10 m, on to rest.
+#[test]
+fn an_underdamped_drive_is_no_creep() {
+    let (p, s, r, v) = (-1000.0, 100.0, 15.0, 0.1_f64);
+    let law = Stage { static_force: p, stiffness: s, viscosity: r, drag: 0.0, end: f64::INFINITY };
+    let flight = solve(&one_stage(law, v, f64::INFINITY));
+    let (g, w, u) = (0.5 * r, s.sqrt(), p / s);
+    let m = (s - g * g).sqrt();
+    let time = (m * v).atan2(g * v + s * u) / m;
+    let depth = (-g * time).exp() * (v * (v + 2.0 * g * u) + s * u * u).sqrt() / w - u;
+    assert!(relative(flight.end.time, time) < 1e-14 && relative(flight.end.depth, depth) < 1e-14, "{flight:?}");
+}
+
+#[test]
+fn the_last_step_of_the_budget_may_end_a_flight_and_no_other_follows() {
+    let problem = alone(Stage::tunnel(1.0, 0.0), f64::INFINITY);
+    let mut course = course_at(&problem, 0.0, 3.0);
+    course.cost.steps = STEPS_MAX - 1;
+    assert!(orders().solve_stage(&mut course).is_ok());
+    let mut course = course_at(&problem, 0.0, 3.0);
+    course.cost.steps = STEPS_MAX;
+    assert!(matches!(
+        orders().solve_stage(&mut course),
+        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, .. })
+    ));
+}
+
+/// Depth over speed, near both ends of the range of numbers, and a depth that is a multiple of a small speed.
+#[test]
+fn a_gap_of_any_size_is_crossed_at_any_speed() {
+    for (speed, depth) in [(1e200, 1e-100), (1e-50, 1e150), (2.0_f64.powi(-60), 1.0)] {
+        let flight = solve(&one_stage(Stage::tunnel(0.0, 0.0), speed, depth));
+        assert_eq!((flight.end.depth, flight.end.velocity), (depth, speed));
+        assert!(relative(flight.end.time, depth / speed) < 1e-15, "{:e}", flight.end.time);
+    }
+}
+
+/// `d + (H - d)`, each rounded, is one spacing short of H.
+#[test]
+fn an_exit_is_at_its_own_depth_where_the_way_to_it_is_rounded() {
+    let (d, exit) = (0.5 * f64::EPSILON, 1.0 + 3.0 * f64::EPSILON);
+    assert!(d + (exit - d) < exit);
+    let gap = Stage::tunnel(0.0, 0.0);
+    let mut problem = one_stage(gap, 1.0, exit);
+    problem.stages.insert(0, Stage { end: d, ..gap });
+    let flight = solve(&problem);
+    assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Exit]);
+    assert_eq!((flight.end.depth, flight.cost.steps), (exit, 2));
+}
+
+/// F = 1, M = 1, V0 = 1: W/V0² = 1 - 2 H. Eight roundings of it are allowed, and a few of 1 for the way to rest.
+#[test]
+fn the_bar_of_a_deep_stop_is_that_of_the_way_it_lacks() {
+    let flight = solve(&one_stage(Stage::tunnel(1.0, 0.0), 1.0, 1000.0));
+    assert_eq!(flight.exit_margin, Some(-1999.0));
+    let units = flight.exit_margin_error.unwrap() / f64::EPSILON / 1999.0;
+    assert!(units > 8.0 && units < 8.02, "{units}");
+}
+
+/// Theory section 2, `p, s`: a boundary at which a twentieth of the energy is left, in units that are not the step's.
+#[test]
+fn a_boundary_that_takes_nearly_all_energy_is_within_reach() {
+    let (p, s, v, way) = (6.0, 400.0_f64, 10.0, 0.473);
+    let law = Stage { static_force: p, stiffness: s, viscosity: 0.0, drag: 0.0, end: way };
+    let series = Series::<f64, 24>::new::<true, false, false>(&law, v);
+    let start = State { time: 0.0, depth: 0.0, velocity: v };
+    let w = s.sqrt();
+    let Step::Limit(found) = search(&law, &series, start, PHASE_MAX / w, &Closing::new(f64::EPSILON)) else {
+        panic!("the boundary is missed")
+    };
+    let (u0, u) = (p / s, way + p / s);
+    let velocity = (v * v - way * (2.0 * p + s * way)).sqrt();
+    let time = (w * (u * v - u0 * velocity)).atan2(velocity * v + s * u * u0) / w;
+    assert!(relative(found.velocity, velocity) < 1e-13 && relative(found.time, time) < 1e-14, "{found:?}");
+}
+
+/// The method over depth has no root to isolate in time.
+#[test]
+fn rest_against_stiffness_and_drag_is_found_to_the_digits_of_double_double() {
+    for (p, s, q) in [(7.0, 11.0, 0.5), (0.0, 3.0, 2.0), (-4.0, 30.0, 0.1)] {
+        let law = Stage { static_force: p, stiffness: s, viscosity: 0.0, drag: q, end: f64::INFINITY };
+        let problem = one_stage(law, 5.0, f64::INFINITY).cast::<TwoFloat>();
+        let end = Taylor::default().solve_in(&problem, Detail::End).unwrap().end;
+        let other = Energy::new().solve_in(&problem, Detail::End).unwrap().end;
+        for (value, exact) in [(end.depth, other.depth), (end.time, other.time)] {
+            let off = (value - exact).value().abs() / exact.value();
+            assert!(off < 1e-28, "{p}, {s}, {q}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn every_entry_of_the_table_is_the_reciprocal_of_its_place() {
+    for (k, entry) in RECIPROCALS.iter().enumerate().skip(1) {
+        assert!((entry * k as f64 - 1.0).abs() <= 0.5 * f64::EPSILON, "{k}: {entry}");
+    }
+}

@@ -1,0 +1,451 @@
+//! Contracts of a solution, each tested once for every method: the rows are methods, the columns are contracts.
+//!
+//! A method that refuses a problem (`energy` a viscous stage, `closed-form` a stage without one) is left out of that
+//! problem. What only one method promises is tested beside it. The fixed-step scheme has other rules at boundaries.
+
+use twofloat::TwoFloat;
+
+use super::*;
+use crate::physics::closed_form::critical_of_stages;
+use crate::physics::{Advice, EventKind, Outcome, Problem, Stage, State, Target};
+use crate::testing::{Random, kinds, stage};
+
+const INF: f64 = f64::INFINITY;
+
+/// The methods at `rtol`; those that work to round-off by default, unless `rtol` is loose, do so.
+fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
+    let built =
+        MethodName::ALL.iter().copied().filter(|name| name.is_built() && *name != MethodName::CentralDifference);
+    let options = |name| MethodOptions { rtol: is_library(name).then_some(rtol), ..MethodOptions::default() };
+    built.map(|name| (name, Method::new(name, &options(name)).unwrap())).collect()
+}
+
+fn is_library(name: MethodName) -> bool {
+    name.needs_diffsol()
+}
+
+/// The answer, unless the method refuses the problem.
+fn answer(method: &Method, problem: &Problem, detail: Detail) -> Option<Result<Flight, IntegrationError>> {
+    match method.integrator().solve(problem, detail) {
+        Err(error) if error.is_usage() => None,
+        answer => Some(answer),
+    }
+}
+
+/// Every method's name with its flight, but for those that refuse the problem.
+fn flights(problem: &Problem) -> Vec<(MethodName, Flight)> {
+    let solve = |(name, method): (MethodName, Method)| Some((name, answer(&method, problem, Detail::Events)?.unwrap()));
+    methods(1e-10).into_iter().filter_map(solve).collect()
+}
+
+fn constant(static_force: f64, end: f64) -> Stage {
+    stage(static_force, 0.0, 0.0, 0.0, end)
+}
+
+fn of_stages(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
+    Problem::of_stages(mass, impact_speed, stages.iter().copied()).with_exit(exit_depth)
+}
+
+/// Crater with the continuous constant c, and tunnel (docs/theory.md, section 1).
+fn concrete(mass: f64, p: f64, q: f64, kd: f64, speed: f64, exit_depth: f64) -> Problem {
+    Problem::continuous(mass, speed, kd, Stage::tunnel(p, q)).with_exit(exit_depth)
+}
+
+/// The scene `tunnel` of the comparison of solvers.
+fn tunnel(exit_depth: f64) -> Problem {
+    concrete(2.0, 848_230.016_469_244_3, 3.251_548_396_465_436, 0.1, 300.0, exit_depth)
+}
+
+/// Crater and tunnel, stopping in either or perforating, with the exit in all degrees of nearness to the place of rest.
+fn random_concrete(random: &mut Random) -> Problem {
+    let d: f64 = random.log_uniform(0.01, 0.1);
+    let p = random.log_uniform(1e7, 1e9) * d * d;
+    let q = if random.chance(0.2) { 0.0 } else { random.log_uniform(1.0, 3000.0) * d * d };
+    let mass = random.log_uniform(0.1, 1000.0) * 4000.0 * d * d * d;
+    let kd = random.uniform(0.5, 3.0) * d;
+    let speed = (random.log_uniform(0.05, 300.0) * p * d / mass).sqrt();
+    let endless = concrete(mass, p, q, kd, speed, INF);
+    let rest = ClosedForm.solve(&endless, Detail::End).unwrap().end.depth;
+    let side = if random.chance(0.5) { 1.0 } else { -1.0 };
+    Problem { exit_depth: rest * (1.0 + side * random.log_uniform(1e-12, 0.9)), ..endless }
+}
+
+/// Up to five stages with jumps, gaps, springs, thin layers and drives.
+fn random_stages(random: &mut Random, viscous: bool) -> Problem {
+    let count = 1 + random.below(5);
+    let scale = random.log_uniform(1e-3, 1e6);
+    let mut end = 0.0;
+    let mut stages = Vec::new();
+    for index in 0..count {
+        end += random.log_uniform(1e-3, 1.0);
+        let size = scale * random.log_uniform(0.03, 3.0);
+        let mut share = || scale * random.log_uniform(0.1, 3.0);
+        let (also, drag) = (share(), share());
+        let (p, s, q) = match random.below(20) {
+            0..7 => (size, 0.0, 0.0),
+            7..9 => (-size, 0.0, 0.0),
+            9..11 => (0.0, 0.0, size),
+            11..13 => (0.0, size, 0.0),
+            13..18 => (size, also, drag),
+            18 => (-size, size * also / scale, 0.0),
+            _ => (0.0, 0.0, 0.0),
+        };
+        let r = if viscous && random.chance(0.7) { scale * random.log_uniform(0.01, 30.0) } else { 0.0 };
+        stages.push(stage(p, s, r, q, if index + 1 == count { INF } else { end }));
+    }
+    of_stages(scale, random.log_uniform(0.3, 3.0), end * random.uniform(0.7, 1.0), &stages)
+}
+
+/// References: closed form at 50 digits from these f64 inputs.
+#[test]
+fn the_tunnel_scene_has_the_depth_and_times_of_fifty_digits() {
+    for (name, method) in methods(1e-12) {
+        let limit = match name {
+            MethodName::Tsit45 | MethodName::Adaptive => 1e-10,
+            name if is_library(name) => 1e-8,
+            _ => 1e-14,
+        };
+        let flight = method.integrator().solve(&tunnel(INF), Detail::Events).unwrap();
+        assert_eq!((flight.outcome, flight.exit_margin), (Outcome::StoppedInTunnel, None), "{name}");
+        assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest], "{name}");
+        let crater = flight.crater_end().unwrap();
+        assert_eq!(crater.depth, 0.1, "{name}");
+        for (found, exact) in [
+            (flight.end.depth, 0.144_826_200_112_217_07),
+            (flight.end.time, 8.291_966_948_249_334e-4),
+            (crater.time, 3.749_918_414_549_262e-4),
+            (crater.velocity, 202.320_580_497_900_37),
+        ] {
+            assert!((found / exact - 1.0).abs() < limit, "{name}: {found:e} for {exact:e}");
+        }
+    }
+}
+
+/// A time is conditioned like V0/V at a boundary; a velocity by its square, in units of V0.
+#[test]
+fn random_flights_end_where_when_and_as_fast_as_the_closed_form_says() {
+    let mut random = Random::new(1);
+    let problems: Vec<_> = (0..400).map(|_| random_concrete(&mut random)).collect();
+    for (name, method) in methods(1e-12) {
+        let ([depth_limit, time_limit, energy_limit], count) = match name {
+            MethodName::Tsit45 | MethodName::Adaptive => ([1e-11, 1e-10, 1e-10], 40),
+            name if is_library(name) => ([1e-9, 1e-8, 1e-8], 20),
+            _ => ([5e-15, 1e-13, 2e-14], problems.len()),
+        };
+        let mut compared = 0;
+        for problem in problems.iter().take(count) {
+            let exact = ClosedForm.solve(problem, Detail::Events).unwrap();
+            let flight = method.integrator().solve(problem, Detail::Events).unwrap();
+            let speeds = || exact.events.iter().map(|e| e.state.velocity / problem.impact_speed);
+            let slowest = speeds().filter(|v| *v > 0.0).fold(1.0, f64::min);
+            if [flight.outcome, exact.outcome].contains(&Outcome::Undecided) || slowest < 0.1 {
+                continue;
+            }
+            compared += 1;
+            assert_eq!((flight.outcome, flight.stage), (exact.outcome, exact.stage), "{name}: {problem:?}");
+            assert_eq!(kinds(&flight.events), kinds(&exact.events), "{name}: {problem:?}");
+            for (event, exact) in flight.events.iter().zip(&exact.events) {
+                let (found, exact) = (event.state, exact.state);
+                let energy = |v: f64| (v / problem.impact_speed).powi(2);
+                assert!((found.depth / exact.depth - 1.0).abs() < depth_limit, "{name}: {found} {exact}");
+                assert!((found.time / exact.time - 1.0).abs() * slowest < time_limit, "{name}: {found} {exact}");
+                assert!((energy(found.velocity) - energy(exact.velocity)).abs() < energy_limit, "{name}: {found}");
+            }
+        }
+        assert!(4 * compared > count, "{name}: {compared} of {count}");
+    }
+}
+
+/// Exact margins: `energy` in double-double from the same coefficients; behind viscosity the series at round-off.
+#[test]
+fn the_error_bound_of_the_margin_holds_and_is_not_idle() {
+    let mut random = Random::new(7);
+    let exact = |problem: &Problem| Energy::new().exit_margin_in(&problem.cast::<TwoFloat>()).unwrap().unwrap().0;
+    let mut scenes: Vec<(Problem, TwoFloat)> = Vec::new();
+    for index in 0..120 {
+        let problem = if index < 60 { random_concrete(&mut random) } else { random_stages(&mut random, false) };
+        let margin = exact(&problem);
+        scenes.push((problem, margin));
+    }
+    let dry = scenes.len();
+    for _ in 0..60 {
+        let problem = random_stages(&mut random, true);
+        if let Ok(flight) = Taylor::default().solve(&problem, Detail::End) {
+            scenes.push((problem, flight.exit_margin.unwrap().into()));
+        }
+    }
+    assert!(scenes.len() > dry + 50);
+    for rtol in [1e-4, 1e-7, 1e-9] {
+        for (name, method) in methods(rtol) {
+            let mut worst = 0.0_f64;
+            let scenes = if is_library(name) { &scenes } else { &scenes[..dry] };
+            let reused = method.integrator().reusing();
+            let integrator = reused.as_deref().unwrap_or(method.integrator());
+            for (problem, exact) in scenes {
+                let flight = match integrator.solve(problem, Detail::End) {
+                    Err(error) if error.is_usage() => continue,
+                    flight => flight.unwrap_or_else(|error| panic!("{name}: {error} {problem:?}")),
+                };
+                let (margin, bound) = (flight.exit_margin.unwrap(), flight.exit_margin_error.unwrap());
+                let error = (*exact - TwoFloat::from(margin)).hi().abs();
+                assert!(error <= bound, "{name}: {error:e} of {bound:e} in {problem:?}");
+                worst = worst.max(error / bound);
+                let decided = flight.outcome != Outcome::Undecided;
+                assert_eq!(decided, margin.abs() > bound, "{name}: {problem:?}");
+                let perforated = flight.outcome == Outcome::Perforated;
+                assert!(!decided || perforated == (exact.hi() > 0.0), "{name}: {problem:?}");
+            }
+            println!("{name} {rtol:e}: at worst {worst:.3} of the error bound");
+            assert!(worst < 0.6 && worst > 0.004, "{name} at {rtol:e}: {worst} of the error bound");
+        }
+    }
+}
+
+/// At V0 = `V_c` (1 ± 10^-j) the outcome is right or undecided, and undecided only within the error bound.
+#[test]
+fn near_the_critical_velocity_the_outcome_is_right_or_undecided() {
+    let mut random = Random::new(3);
+    let mut problems = vec![
+        tunnel(0.14),
+        tunnel(0.05),
+        concrete(0.9, 245_000.0, 0.0, 0.0538, 390.0, 0.2),
+        // A barrier, then a drive: the least W is that behind the barrier.
+        of_stages(1.0, 4.0, 3.0, &[constant(8.0, 1.0), constant(-100.0, INF)]),
+        // What is left of a slab behind a jump of the force is a millionth of the depth before it.
+        of_stages(2.0, 1.0, 0.1 + 1e-6, &[stage(0.0, 1.0, 0.0, 0.0, 0.1), constant(84_823.0, INF)]),
+    ];
+    problems.extend((0..5).map(|_| random_concrete(&mut random)));
+    for problem in &problems {
+        let critical = critical_of_stages(problem).unwrap().velocity;
+        for (name, method) in methods(1e-8) {
+            let mut undecided = 0;
+            for power in 1..=17 {
+                for sign in [1.0, -1.0] {
+                    let impact_speed = critical * (1.0 + sign * 10_f64.powi(-power));
+                    let problem = Problem { impact_speed, ..problem.clone() };
+                    let flight = method.integrator().solve(&problem, Detail::End).unwrap();
+                    let (margin, bound) = (flight.exit_margin.unwrap(), flight.exit_margin_error.unwrap());
+                    assert_eq!(flight.outcome == Outcome::Undecided, margin.abs() <= bound, "{name}, 1e-{power}");
+                    match flight.outcome {
+                        Outcome::Undecided => undecided += 1,
+                        // Two spacings: the critical velocity is rounded.
+                        Outcome::Perforated => assert!(sign > 0.0 || power > 15, "{name}, 1e-{power}: {problem:?}"),
+                        _ => assert!(sign < 0.0 || power > 15, "{name}, 1e-{power}: {problem:?}"),
+                    }
+                }
+            }
+            let most = if is_library(name) { 28 } else { 16 };
+            assert!(undecided > 0 && undecided <= most, "{name}: {undecided} undecided of {problem:?}");
+        }
+    }
+}
+
+/// `V_c² = 1000/4 + 1/4`: behind a spring, 1 kg/s take 1 m/s for each metre of half a metre.
+#[test]
+fn an_approach_that_the_error_bound_cannot_tell_from_arrival_is_undecided() {
+    let stages = [stage(0.0, 1e3, 0.0, 0.0, 0.5), stage(0.0, 0.0, 1.0, 0.0, INF)];
+    for (name, method) in methods(1e-8) {
+        let mut undecided = 0;
+        for power in 4..=17 {
+            for sign in [1.0, -1.0] {
+                let speed = 250.25_f64.sqrt() * (1.0 + sign * 10_f64.powi(-power));
+                match answer(&method, &of_stages(1.0, speed, 1.0, &stages), Detail::End) {
+                    None => undecided = 4,
+                    Some(Ok(Flight { outcome: Outcome::Undecided, .. })) => undecided += 1,
+                    Some(Ok(flight)) => assert!(flight.outcome == Outcome::Perforated && sign > 0.0, "{name}"),
+                    Some(Err(error)) => {
+                        let never_ends = matches!(error, IntegrationError::NeverEnds { .. });
+                        assert!(never_ends && sign < 0.0, "{name}, 1e-{power}: {error}");
+                    }
+                }
+            }
+        }
+        assert!(undecided >= 2, "{name}: {undecided}");
+    }
+}
+
+#[test]
+fn events_at_one_place_are_listed_in_order() {
+    let (end, exit) = (EventKind::StageEnd, EventKind::Exit);
+    let no_length = [constant(1.0, 0.0), constant(1.0, 0.5), constant(9.0, 0.5), constant(1.0, INF)];
+    let many: Vec<_> = [0.01, 0.02, 0.02, 0.02, 0.03, 0.03_f64.next_up(), 0.05, 0.1, 0.1, 0.1_f64.next_up(), 0.14]
+        .map(|end| constant(1.0, end))
+        .into_iter()
+        .chain([constant(1.0, INF)])
+        .collect();
+    for (problem, expected, stage) in [
+        (tunnel(0.1), vec![EventKind::CraterEnd, exit], 0),
+        (tunnel(0.1_f64.next_up()), vec![EventKind::CraterEnd, exit], 1),
+        (tunnel(0.05), vec![exit], 0),
+        (tunnel(1e-9), vec![exit], 0),
+        (of_stages(1.0, 2.0, 1.0, &no_length), vec![end(0), end(1), end(2), exit], 3),
+        // Stages without length behind the one that ends at the exit are listed before it.
+        (of_stages(1.0, 2.0, 0.5, &no_length), vec![end(0), end(1), end(2), exit], 1),
+        (of_stages(1.0, 2.0, 0.14, &many), (0..11).map(end).chain([exit]).collect(), 10),
+    ] {
+        for (name, flight) in flights(&problem) {
+            assert_eq!((kinds(&flight.events), flight.stage), (expected.clone(), stage), "{name}");
+            assert_eq!((flight.outcome, flight.end.depth), (Outcome::Perforated, problem.exit_depth), "{name}");
+            assert!(flight.events.windows(2).all(|e| e[0].state.time <= e[1].state.time), "{name}");
+            assert_eq!(flight.events.last().unwrap().state, flight.end, "{name}");
+        }
+    }
+}
+
+/// Powers of two: 8 N stop 1 kg at 4 m/s after 1 m and 0.5 s. A library method has that within its tolerance only.
+#[test]
+fn a_place_that_is_touched_is_reached() {
+    let wall = |end| constant(8.0, end);
+    let at_exit = of_stages(1.0, 4.0, 1.0, &[wall(1.0), wall(1.0), wall(INF)]);
+    let mut at_crater_end = of_stages(1.0, 4.0, INF, &[wall(1.0), wall(INF)]);
+    (at_crater_end.crater, at_crater_end.target) = (Some(0), Target::CraterAndTunnel);
+    for (name, flight) in flights(&at_exit) {
+        assert_eq!((flight.outcome, flight.stage), (Outcome::Undecided, 0), "{name}");
+        if !is_library(name) {
+            let both = [EventKind::StageEnd(0), EventKind::StageEnd(1), EventKind::Exit, EventKind::Rest];
+            assert_eq!((kinds(&flight.events), flight.exit_margin), (both.to_vec(), Some(0.0)), "{name}");
+            assert_eq!(flight.end, State { time: 0.5, depth: 1.0, velocity: 0.0 }, "{name}");
+        }
+    }
+    for (name, flight) in flights(&at_crater_end).into_iter().filter(|(name, _)| !is_library(*name)) {
+        assert_eq!((flight.outcome, flight.stage), (Outcome::StoppedInCrater, 0), "{name}");
+        assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest], "{name}");
+        assert_eq!(flight.end, State { time: 0.5, depth: 1.0, velocity: 0.0 }, "{name}");
+    }
+}
+
+#[test]
+fn stages_that_are_not_reached_cost_nothing_and_are_not_asked() {
+    let first = constant(8.0, 2.0);
+    for unreached in [stage(f64::NAN, 0.0, 0.0, 0.0, INF), stage(1e308, 1e308, 0.0, 1e308, INF)] {
+        for exit_depth in [INF, 2.0] {
+            for (name, method) in methods(1e-10) {
+                let cost = |stages: &[Stage]| {
+                    let problem = of_stages(1.0, if exit_depth < INF { 8.0 } else { 4.0 }, exit_depth, stages);
+                    let flight = method.integrator().solve(&problem, Detail::End).unwrap();
+                    assert_eq!(flight.stage, 0, "{name}");
+                    (flight.cost, flight.end.velocity)
+                };
+                assert_eq!(cost(&[first, unreached]), cost(&[first, constant(1.0, INF)]), "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flight_without_an_end_is_an_error_with_the_state_reached() {
+    let endless = [
+        (stage(0.0, 0.0, 0.0, 0.0, INF), INF),
+        (stage(0.0, 0.0, 2.0, 0.0, INF), INF),
+        (stage(0.0, 0.0, 0.0, 2.0, INF), INF),
+        (stage(-1.0, 0.0, 3.0, 1.0, INF), INF),
+        (stage(-5.0, 0.0, 0.0, 1.0, INF), INF),
+        // r alone covers M V0/r = 5 m and no more; with drag ln(1 + q V0/r)/q.
+        (stage(0.0, 0.0, 2.0, 0.0, INF), 5.01),
+        (stage(0.0, 0.0, 2.0, 1.0, INF), 1.96),
+        // Overdamped towards x = 10.
+        (stage(-1000.0, 100.0, 1000.0, 0.0, INF), INF),
+        (stage(-1000.0, 100.0, 1000.0, 5.0, INF), 10.5),
+    ];
+    // Behind a first stage without force: the state reached is in the second.
+    for (law, exit_depth) in endless {
+        for (name, method) in methods(1e-8) {
+            for (problem, entered) in [
+                (of_stages(1.0, 10.0, exit_depth, &[law]), 0.0),
+                (of_stages(1.0, 10.0, exit_depth, &[stage(0.0, 0.0, 0.0, 0.0, 0.001), law]), 0.001),
+            ] {
+                let Some(answer) = answer(&method, &problem, Detail::Events) else { continue };
+                let error = answer.unwrap_err();
+                assert!(matches!(error, IntegrationError::NeverEnds { .. }), "{name} {law:?}: {error}");
+                assert!(error.last().unwrap().depth >= entered, "{name}: {error}");
+            }
+        }
+    }
+    // Just this side of each limit the flight ends.
+    for (law, exit_depth) in [
+        (stage(0.0, 0.0, 2.0, 0.0, INF), 4.99),
+        (stage(0.0, 0.0, 2.0, 1.0, INF), 1.79),
+        (stage(-1.0, 0.0, 3.0, 1.0, INF), 50.0),
+    ] {
+        for (name, flight) in flights(&of_stages(1.0, 10.0, exit_depth, &[law])) {
+            assert_eq!(flight.outcome, Outcome::Perforated, "{name}, {law:?}");
+        }
+    }
+}
+
+/// A coefficient over the mass is beyond the range; then each is within it and their sum is not.
+#[test]
+fn forces_beyond_the_range_of_numbers_are_errors_and_no_nan() {
+    for problem in [
+        of_stages(1e-300, 1.0, 1.0, &[constant(1e300, INF)]),
+        of_stages(1.0, 1e200, 1.0, &[stage(1e308, 0.0, 0.0, 1e308, INF)]),
+    ] {
+        for (name, method) in methods(1e-6) {
+            let Err(error) = method.integrator().solve(&problem, Detail::Events) else {
+                // The closed form of a stop may stay within the range.
+                assert_eq!(name, MethodName::ClosedForm);
+                continue;
+            };
+            let known = matches!(error, IntegrationError::NotFinite { .. } | IntegrationError::SolverFailed { .. });
+            assert!(known, "{name}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_flight_that_ends_at_impact_takes_no_step() {
+    for (name, method) in methods(1e-8) {
+        for (problem, outcome, events) in [
+            (Problem { impact_speed: 0.0, ..tunnel(0.2) }, Outcome::StoppedInCrater, vec![EventKind::Rest]),
+            (tunnel(0.0), Outcome::Perforated, vec![EventKind::Exit]),
+        ] {
+            let [flight, end] =
+                [Detail::Events, Detail::End].map(|detail| method.integrator().solve(&problem, detail).unwrap());
+            assert_eq!((flight.outcome, flight.cost), (outcome, Cost::default()), "{name}");
+            assert_eq!((kinds(&flight.events), end.events.len()), (events, 0), "{name}");
+        }
+    }
+}
+
+#[test]
+fn detail_changes_what_is_listed_and_no_number() {
+    for exit_depth in [0.12, INF] {
+        for (name, method) in methods(1e-8) {
+            let [end, events, trajectory] = [Detail::End, Detail::Events, Detail::Trajectory]
+                .map(|detail| method.integrator().solve(&tunnel(exit_depth), detail).unwrap());
+            for other in [&events, &trajectory] {
+                assert_eq!((end.end, end.cost, end.outcome), (other.end, other.cost, other.outcome), "{name}");
+                assert_eq!((end.exit_margin, end.exit_margin_error), (other.exit_margin, other.exit_margin_error));
+            }
+            assert!(end.events.is_empty() && end.trajectory.is_empty() && events.trajectory.is_empty(), "{name}");
+            assert_eq!(events.events, trajectory.events, "{name}");
+            let rows = &trajectory.trajectory;
+            assert_eq!(rows[0].state, State::at_impact(&tunnel(INF)), "{name}");
+            assert_eq!(rows.last().unwrap().state, end.end, "{name}");
+            assert!(rows.windows(2).all(|rows| rows[0].state.time < rows[1].state.time), "{name}");
+            let force = |row: &Sample| tunnel(INF).stages[row.stage].force(row.state.depth, row.state.velocity);
+            assert!(rows.iter().all(|row| row.force == force(row)), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_method_that_reuses_its_solver_has_the_same_name_order_and_answers() {
+    let mut random = Random::new(11);
+    let problems: Vec<_> = (0..20).map(|_| random_stages(&mut random, true)).collect();
+    for (name, method) in methods(1e-7) {
+        let integrator = method.integrator();
+        let Some(reused) = integrator.reusing() else {
+            assert!(!is_library(name), "{name}");
+            continue;
+        };
+        assert_eq!((reused.name(), reused.order()), (integrator.name(), integrator.order()));
+        for problem in &problems {
+            // Making a solver takes two evaluations, which a solver that is reused saves.
+            let without_cost = |flight: Flight| Flight { cost: Cost::default(), ..flight };
+            let [alone, again] =
+                [integrator, &*reused].map(|by| by.solve(problem, Detail::Trajectory).map(without_cost));
+            assert_eq!(alone, again, "{name}");
+        }
+    }
+}

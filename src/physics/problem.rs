@@ -1,0 +1,396 @@
+//! The initial value problem that every method solves, and what its solution consists of: states, events, outcome.
+//!
+//! ```text
+//! M dV/dt = -F(x, V),  dx/dt = V,  x(0) = 0,  V(0) = V0,   F = p + s x + r V + q V²   until x = end
+//! ```
+//!
+//! The crater (Eq. 4) is `s = c`; the tunnel (Eq. 5) is `p = P, q = Q`; weight or thrust is `p < 0`. Every
+//! integrator, closed form and event works on a [`Problem`] and on nothing else, so a new resistance law is one
+//! more way to make stages.
+//!
+//! How an integrator finds an event is described in [`crate::integrators::locate`].
+
+use serde::Serialize;
+use smallvec::SmallVec;
+
+use super::scalar::Scalar;
+use crate::text::Shown;
+
+/// Resistance `F = p + s x + r V + q V²` [N] until `x = end`; positive `F` slows the projectile.
+///
+/// Depth `x` counts from the impact face in every stage, not from the stage's own start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage<S = f64> {
+    /// Static force p [N], of any sign; negative drives the projectile.
+    pub static_force: S,
+    /// Stiffness s [N/m], not negative.
+    pub stiffness: S,
+    /// Viscosity r [kg/s], not negative.
+    pub viscosity: S,
+    /// Drag q [kg/m], not negative.
+    pub drag: S,
+    /// Depth where the stage ends [m], from the impact face; infinite when it does not end.
+    pub end: S,
+}
+
+impl<S: Scalar> Stage<S> {
+    /// The crater stage `F = c x` (Eq. 4) until `x = end`.
+    pub fn crater(stiffness: S, end: S) -> Self {
+        Self { stiffness, end, ..Self::free() }
+    }
+
+    /// The crater stage until `depth` = k d in front of `beyond`, with a force that is continuous there.
+    ///
+    /// ```text
+    /// c = M (P + Q V0²)/(k d (M + k d Q)),  divided through by M
+    /// ```
+    pub fn continuous_crater(depth: S, beyond: &Self, mass: S, impact_speed: S) -> Self {
+        let force = beyond.static_force + beyond.drag * impact_speed * impact_speed;
+        Self::crater(force / (S::one() + depth * (beyond.drag / mass)) / depth, depth)
+    }
+
+    /// The tunnel stage `F = P + Q V²` (Eq. 5), without an end.
+    pub fn tunnel(static_force: S, drag: S) -> Self {
+        Self { static_force, drag, ..Self::free() }
+    }
+
+    /// A stage without force and without an end.
+    pub fn free() -> Self {
+        let zero = S::zero();
+        Self { static_force: zero, stiffness: zero, viscosity: zero, drag: zero, end: S::from_f64(f64::INFINITY) }
+    }
+
+    /// The same stage until x = `end` [m].
+    #[must_use]
+    pub fn until(mut self, end: S) -> Self {
+        self.end = end;
+        self
+    }
+
+    /// Force [N] at depth `x` [m] and velocity `v` [m/s].
+    ///
+    /// Smooth for every argument: the law of this stage continued beyond its ends, without a branch on `x`.
+    #[inline(always)]
+    pub fn force(&self, x: S, v: S) -> S {
+        self.static_force + self.stiffness * x + (self.viscosity + self.drag * v) * v
+    }
+
+    /// Work of the static part `∫ (p + s x) dx` [J] from depth `from` to depth `to` [m].
+    ///
+    /// A lower bound of the energy lost on this path, at any velocity.
+    #[inline]
+    pub fn static_work(&self, from: S, to: S) -> S {
+        let half = S::from_f64(0.5);
+        (to - from) * (self.static_force + half * self.stiffness * (to + from))
+    }
+
+    /// Values as `f64`.
+    pub fn values(&self) -> Stage {
+        Stage {
+            static_force: self.static_force.value(),
+            stiffness: self.stiffness.value(),
+            viscosity: self.viscosity.value(),
+            drag: self.drag.value(),
+            end: self.end.value(),
+        }
+    }
+
+    /// Whether the stage can only slow the projectile (`p >= 0`); such a stage is never stiff.
+    pub fn resists(&self) -> bool {
+        self.static_force.value() >= 0.0
+    }
+}
+
+/// Which target the stages came from: decides only how boundaries and stops are named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Target {
+    /// One crater and one tunnel (a crater of no depth is left out).
+    CraterAndTunnel,
+    /// Stages given directly, or layers.
+    Stages,
+}
+
+/// The stages of a problem in the order of their ends; two fit without an allocation.
+pub type Stages<S = f64> = SmallVec<[Stage<S>; 2]>;
+
+/// An initial value problem: `M x'' = -F(x, x')`, `x(0) = 0`, `x'(0) = V0`, until rest or the exit depth.
+///
+/// [`Scene::resolve`](crate::physics::Scene::resolve) makes one from a scene, [`Problem::of_stages`] and
+/// [`Problem::crater_and_tunnel`] from numbers.
+///
+/// Invariants: mass > 0; impact speed and exit depth >= 0; stage ends do not fall; at least one stage; the last stage
+/// has no end. Everything is finite except absent ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem<S = f64> {
+    /// Mass M [kg].
+    pub mass: S,
+    /// Impact speed V0 [m/s].
+    pub impact_speed: S,
+    /// Exit depth [m]; infinite for a semi-infinite target.
+    pub exit_depth: S,
+    /// The stages, in order.
+    pub stages: Stages<S>,
+    /// Index of the stage that ends at the crater's depth k d, if there is a crater.
+    pub crater: Option<usize>,
+    /// How boundaries and stops are named.
+    pub target: Target,
+}
+
+impl<S: Scalar> Problem<S> {
+    /// A projectile of `mass` [kg] that enters `stages` at `impact_speed` [m/s]; no exit depth.
+    ///
+    /// # Panics
+    /// If an invariant of [`Problem`] is broken.
+    pub fn of_stages(mass: S, impact_speed: S, stages: impl IntoIterator<Item = Stage<S>>) -> Self {
+        let stages: Stages<S> = stages.into_iter().collect();
+        let exit_depth = S::from_f64(f64::INFINITY);
+        assert!(mass.value() > 0.0, "the mass is {} kg", mass.value());
+        assert!(impact_speed.value() >= 0.0, "the impact speed is {} m/s", impact_speed.value());
+        for (index, pair) in stages.windows(2).enumerate() {
+            let ordered = pair[0].end.value() <= pair[1].end.value();
+            assert!(ordered, "stage {} ends before the stage in front of it", index + 1);
+        }
+        assert!(stages.last().is_some_and(|last| last.end.value() == f64::INFINITY), "the last stage has an end");
+        Self { mass, impact_speed, exit_depth, stages, crater: None, target: Target::Stages }
+    }
+
+    /// As [`Problem::of_stages`], through a crater, if there is one, and a tunnel.
+    ///
+    /// # Panics
+    /// If an invariant of [`Problem`] is broken.
+    pub fn crater_and_tunnel(mass: S, impact_speed: S, crater: Option<Stage<S>>, tunnel: Stage<S>) -> Self {
+        let stages = crater.into_iter().chain([tunnel]);
+        let target = Target::CraterAndTunnel;
+        Self { crater: crater.map(|_| 0), target, ..Self::of_stages(mass, impact_speed, stages) }
+    }
+
+    /// As [`Problem::crater_and_tunnel`], through a crater to `depth` = k d [m] with the continuous constant c.
+    ///
+    /// # Panics
+    /// If an invariant of [`Problem`] is broken.
+    pub fn continuous(mass: S, impact_speed: S, depth: S, tunnel: Stage<S>) -> Self {
+        let crater = Stage::continuous_crater(depth, &tunnel, mass, impact_speed);
+        Self::crater_and_tunnel(mass, impact_speed, Some(crater), tunnel)
+    }
+
+    /// The same problem with a far side at `exit_depth` [m].
+    #[must_use]
+    pub fn with_exit(mut self, exit_depth: S) -> Self {
+        self.exit_depth = exit_depth;
+        self
+    }
+
+    /// Whether the target has a far side.
+    pub fn has_exit(&self) -> bool {
+        self.exit_depth.value().is_finite()
+    }
+
+    /// Depth [m] where the crater ends, zero without one, and the stage behind it.
+    pub fn crater_depth_and_tunnel(&self) -> (S, Stage<S>) {
+        self.crater.map_or((S::zero(), self.stages[0]), |crater| (self.stages[crater].end, self.stages[crater + 1]))
+    }
+
+    /// Depth where stage `index` begins [m].
+    pub fn start_of(&self, index: usize) -> S {
+        if index == 0 { S::zero() } else { self.stages[index - 1].end }
+    }
+
+    /// Depth [m] at which integration through stage `index` ends: its end or the exit depth, whichever comes first.
+    ///
+    /// Infinite when there is neither.
+    pub fn limit_of(&self, index: usize) -> S {
+        let end = self.stages[index].end;
+        if self.exit_depth.value() < end.value() { self.exit_depth } else { end }
+    }
+
+    /// Name of a stop in stage `index`.
+    pub fn stop_in(&self, index: usize) -> Outcome {
+        match (self.target, self.crater) {
+            (Target::Stages, _) => Outcome::Stopped,
+            (Target::CraterAndTunnel, Some(crater)) if index <= crater => Outcome::StoppedInCrater,
+            (Target::CraterAndTunnel, _) => Outcome::StoppedInTunnel,
+        }
+    }
+
+    /// The same problem in another number type, coefficients taken over by value.
+    pub fn cast<T: Scalar>(&self) -> Problem<T> {
+        let to = |v: S| T::from_f64(v.value());
+        Problem {
+            mass: to(self.mass),
+            impact_speed: to(self.impact_speed),
+            exit_depth: to(self.exit_depth),
+            stages: self
+                .stages
+                .iter()
+                .map(|s| Stage {
+                    static_force: to(s.static_force),
+                    stiffness: to(s.stiffness),
+                    viscosity: to(s.viscosity),
+                    drag: to(s.drag),
+                    end: to(s.end),
+                })
+                .collect(),
+            crater: self.crater,
+            target: self.target,
+        }
+    }
+}
+
+/// Time, depth and velocity at one instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct State<S = f64> {
+    /// Time since impact t [s].
+    #[serde(rename = "time_s")]
+    pub time: S,
+    /// Depth x from the impact face [m].
+    #[serde(rename = "depth_m")]
+    pub depth: S,
+    /// Velocity V [m/s], not negative.
+    #[serde(rename = "velocity_m_s")]
+    pub velocity: S,
+}
+
+impl<S: Scalar> State<S> {
+    /// The state at impact: `t = 0, x = 0, V = V0`.
+    pub fn at_impact(problem: &Problem<S>) -> Self {
+        Self { time: S::zero(), depth: S::zero(), velocity: problem.impact_speed }
+    }
+
+    /// Values as `f64`.
+    pub fn values(&self) -> State {
+        State { time: self.time.value(), depth: self.depth.value(), velocity: self.velocity.value() }
+    }
+}
+
+impl std::fmt::Display for State {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (time, depth, velocity) = (Shown(self.time), Shown(self.depth), Shown(self.velocity));
+        write!(f, "t = {time} s, x = {depth} m, V = {velocity} m/s")
+    }
+}
+
+/// What happened at a place. The order of the variants is the order of events at one place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum EventKind {
+    /// End of stage `.0` (index from 0) that is not the crater's.
+    StageEnd(usize),
+    /// Depth k d reached, touching included.
+    CraterEnd,
+    /// Exit depth reached, touching included.
+    Exit,
+    /// Velocity zero.
+    Rest,
+}
+
+impl EventKind {
+    /// The event at the end of stage `index` of `problem`.
+    pub fn boundary<S: Scalar>(problem: &Problem<S>, index: usize) -> Self {
+        if problem.crater == Some(index) { Self::CraterEnd } else { Self::StageEnd(index) }
+    }
+
+    /// Name in every output (docs/reference.md, "JSON"): `crater-end`, `stage-end`, `exit`, `rest`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::StageEnd(_) => "stage-end",
+            Self::CraterEnd => "crater-end",
+            Self::Exit => "exit",
+            Self::Rest => "rest",
+        }
+    }
+}
+
+/// An event and the state in which it happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event<S = f64> {
+    /// What happened.
+    pub kind: EventKind,
+    /// When, where and how fast.
+    pub state: State<S>,
+}
+
+/// How a solution ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Rest at x <= k d.
+    StoppedInCrater,
+    /// Rest beyond k d, before the exit depth.
+    StoppedInTunnel,
+    /// Rest in a target of stages or layers, before the exit depth.
+    Stopped,
+    /// The exit depth was reached, with or without velocity left.
+    Perforated,
+    /// The exit margin lies inside its error bound: this method cannot decide.
+    Undecided,
+}
+
+impl Outcome {
+    /// Name in every output (docs/reference.md, "JSON").
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::StoppedInCrater => "stopped-in-crater",
+            Self::StoppedInTunnel => "stopped-in-tunnel",
+            Self::Stopped => "stopped",
+            Self::Perforated => "perforated",
+            Self::Undecided => "undecided",
+        }
+    }
+
+    /// Whether the projectile came to rest inside the target.
+    pub fn is_stop(self) -> bool {
+        matches!(self, Self::StoppedInCrater | Self::StoppedInTunnel | Self::Stopped)
+    }
+
+    /// True for equal outcomes and for two stops: near k d, round-off decides the stage of a stop.
+    pub fn agrees_with(self, other: Self) -> bool {
+        self == other || (self.is_stop() && other.is_stop())
+    }
+}
+
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stage_resists_unless_its_static_force_drives() {
+        let resists = |static_force: f64| Stage::tunnel(static_force, 1.0).resists();
+        assert!(resists(1.0) && resists(0.0) && !resists(-1e-9));
+    }
+
+    #[test]
+    fn states_and_outcomes_are_shown_by_their_numbers_with_units_and_their_names() {
+        let state = State { time: 0.5, depth: 0.25, velocity: 100.0 };
+        assert_eq!(state.to_string(), "t = 0.5 s, x = 0.25 m, V = 100 m/s");
+        assert_eq!(Outcome::StoppedInCrater.to_string(), "stopped-in-crater");
+    }
+
+    #[test]
+    fn constructors_name_the_target_and_leave_the_exit_open() {
+        let tunnel = Stage::tunnel(100.0, 2.0);
+        let staged = Problem::of_stages(2.0, 300.0, [tunnel.until(0.5), tunnel]);
+        assert_eq!((staged.target, staged.crater, staged.has_exit()), (Target::Stages, None, false));
+        assert_eq!(staged.with_exit(0.7).limit_of(1), 0.7);
+        let crater = Problem::crater_and_tunnel(2.0, 300.0, Some(Stage::crater(5.0, 0.1)), tunnel);
+        assert_eq!((crater.target, crater.crater, crater.stages.len()), (Target::CraterAndTunnel, Some(0), 2));
+        assert_eq!(Problem::crater_and_tunnel(2.0, 300.0, None, tunnel).crater, None);
+        // Energy over the crater: M V1² = M V0² - c (k d)².
+        let continuous = Problem::continuous(2.0, 300.0, 0.1, tunnel);
+        let c = continuous.stages[0].stiffness;
+        let v1 = (300.0_f64.powi(2) - c * 0.01 / 2.0).sqrt();
+        approx::assert_relative_eq!(c * 0.1, tunnel.force(0.1, v1), max_relative = 1e-14);
+    }
+
+    #[test]
+    #[should_panic(expected = "stage 1 ends before the stage in front of it")]
+    fn stages_out_of_order_are_no_problem() {
+        let _ = Problem::of_stages(1.0, 1.0, [Stage::free().until(0.5), Stage::free().until(0.4), Stage::free()]);
+    }
+}

@@ -1,0 +1,291 @@
+//! The page of `verify`: what is solved, how it was verified, and where it was not tried.
+
+use maud::{Markup, Render, html};
+
+use super::figure::Figure;
+use super::figures::{fit_of, scenes_in_order, words_for};
+use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
+use super::text::{count, number, one_line};
+use super::{Environment, Run};
+use crate::integrators::{Boundaries, MethodName, VelocityAt};
+use crate::physics::groups::Groups;
+use crate::studies::experiments::{self, Comparison};
+use crate::studies::sweep::{WHY, explanation};
+use crate::studies::{Path, Quantity, Stretch, formal_order};
+use crate::suite::checks::{Order, StepPattern};
+use crate::suite::{Check, Counts, Evidence, Judged, LOOSENESS_MAX, looseness, skipped, tables};
+
+const VELOCITIES: [VelocityAt; 3] = [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
+const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
+
+/// The page of `run` with its figures.
+pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
+    Page {
+        title: &one_line(&run.suite.title),
+        outcome: Counts::of_claims(run.judged).verdict().name(),
+        purpose: "Purpose: to show what the program computes right, how far, and where it was not tried.",
+        environment: &run.environment,
+        text: include_str!("pages/verify.txt"),
+        slot: &|name, words| match name {
+            "scenes" => scenes(run),
+            "formal-orders" => formal_orders(),
+            "build" => build(&run.environment),
+            "observed-orders" => observed_orders(run),
+            "peers" => facts(run.environment.peers.iter().map(|(name, text)| (name.as_str(), cell(text)))),
+            "why-above-eq-15" => why_above_eq15(run),
+            "sets" => sets(run),
+            "meaning-of-data" => html! { p { (experiments::MEANING) } },
+            "layered-claims" => layered_claims(run),
+            "deviations" => deviations(run.judged),
+            _ => slot(run, figures, name, words),
+        },
+        files: html! { a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", "
+        a href="summary.md" { "Markdown" } },
+    }
+    .to_html()
+}
+
+/// Methods that this build leaves out, and for what it was built.
+fn build(e: &Environment) -> Markup {
+    let missing: Vec<_> = MethodName::ALL.iter().filter(|m| !m.is_built()).map(|m| m.name()).collect();
+    html! {
+        @if !missing.is_empty() { p { "This build leaves out " (missing.join(", ")) "; their claims are skipped." } }
+        p.quiet { "Built for " (e.target) " by " (e.rustc) "." }
+    }
+}
+
+fn why_above_eq15(run: &Run<'_>) -> Markup {
+    let why = evidence(run, |evidence| match evidence {
+        Evidence::Sweep { plan, rows } => Some(explanation(plan, rows)),
+        _ => None,
+    });
+    html! { @if let Some(why) = why {
+        h3 { (WHY) }
+        p { (why.strip_prefix(WHY).unwrap_or(&why).trim_start_matches(". ").replace('`', "")) }
+    } }
+}
+
+/// The tables of the suite that claim something of layered scenes.
+fn layered_claims(run: &Run<'_>) -> Markup {
+    let layered = |judged: &&Judged| {
+        let scene = judged.claim.scene.as_deref().and_then(|name| run.suite.scenes.get(name));
+        scene.and_then(|scene| scene.concrete()).is_some_and(|concrete| !concrete.layers.is_empty())
+    };
+    let all = Counts::of_claims(run.judged.iter().filter(layered));
+    let groups = tables(run.judged).filter(|claims| claims.iter().any(|judged| layered(&judged)));
+    let table = Table::cards("", ["claims", "verdict"]).rows(groups, |claims| {
+        let counts = Counts::of_claims(claims.iter().filter(layered));
+        [html! { code { (one_line(&claims[0].claim.table)) } }, counts_cell(counts)]
+    });
+    html! {
+        @if all == Counts::default() { p { "This suite claims nothing of this kind." } }
+        @else { (folded(html! { "What is claimed of layered scenes, all over this report: " (tally(all)) }, false, table)) }
+    }
+}
+
+/// The first evidence of a kind.
+fn evidence<'a, T>(run: &Run<'a>, pick: impl Fn(&'a Evidence) -> Option<T>) -> Option<T> {
+    run.judged.iter().find_map(|judged| judged.evidence.as_ref().and_then(&pick))
+}
+
+fn scenes(run: &Run<'_>) -> Markup {
+    let names = scenes_in_order(run);
+    let resolved: Vec<_> = names
+        .iter()
+        .filter_map(|name| Some((name, run.suite.scenes.get(name)?, run.suite.scenes.problem(name).ok()?)))
+        .collect();
+    if resolved.is_empty() {
+        return html! {};
+    }
+    let header = [
+        "scene",
+        "M [kg]",
+        "V₀ [m/s]",
+        "exit depth [m]",
+        "I",
+        "N",
+        "stages: p [N], s [N/m], r [kg/s], q [kg/m], until x [m]",
+    ];
+    let table = Table::grid("Parameters of the scenes", header).rows(&resolved, |(name, scene, problem)| {
+        let groups = Groups::of(scene, problem.impact_speed);
+        [
+            html! { code { (one_line(name)) } },
+            number_cell(Some(problem.mass), 6),
+            number_cell(Some(problem.impact_speed), 6),
+            number_cell(Some(problem.exit_depth), 6),
+            number_cell(groups.as_ref().map(|groups| groups.impact), 5),
+            number_cell(groups.map(|groups| groups.geometry.unwrap_or(f64::INFINITY)), 5),
+            html! { @for (index, stage) in problem.stages.iter().enumerate() {
+                @if index > 0 { br; }
+                (number(stage.static_force, 6)) ", " (number(stage.stiffness, 6)) ", "
+                (number(stage.viscosity, 6)) ", " (number(stage.drag, 6)) ", " (number(stage.end, 6))
+            } },
+        ]
+    });
+    folded(html! { "Parameters of " (count(resolved.len(), "scene")) ", in SI units" }, false, table)
+}
+
+/// The kinds of path that decide an order, in the order of the table.
+const PATHS: [(&str, bool, Stretch); 4] = [
+    ("rest in the crater", false, Stretch { velocity_dependent: false, force_jumps: false }),
+    ("tunnel without drag", true, Stretch { velocity_dependent: false, force_jumps: false }),
+    ("tunnel with drag", true, Stretch { velocity_dependent: true, force_jumps: false }),
+    ("tunnel with drag, force jumps at k d", true, Stretch { velocity_dependent: true, force_jumps: true }),
+];
+
+type Orders = [Option<f64>; 6];
+
+/// Formal orders of one variant on one kind of path, for a stop and for an exit together.
+fn orders_of(velocity: VelocityAt, boundaries: Boundaries, leaves_crater: bool, to_end: Stretch) -> Orders {
+    let to_crater_end = leaves_crater.then(Stretch::default);
+    Quantity::ALL.map(|quantity| {
+        let perforates = matches!(quantity, Quantity::Velocity | Quantity::CriticalVelocity);
+        if perforates && !leaves_crater {
+            return None;
+        }
+        formal_order(velocity, boundaries, &Path { perforates, to_crater_end, to_end }, quantity)
+    })
+}
+
+/// Velocity rules of the same orders, joined by "or", with those orders.
+fn formal_rows(boundaries: Boundaries, leaves_crater: bool, to_end: Stretch) -> Vec<(String, Orders)> {
+    let mut rows: Vec<(Vec<String>, Orders)> = Vec::new();
+    for velocity in VELOCITIES {
+        let orders = orders_of(velocity, boundaries, leaves_crater, to_end);
+        match rows.iter_mut().find(|(_, known)| *known == orders) {
+            Some((names, _)) => names.push(velocity.to_string()),
+            None => rows.push((vec![velocity.to_string()], orders)),
+        }
+    }
+    let joined = |names: Vec<String>| if names.len() == 3 { "any".to_owned() } else { names.join(" or ") };
+    rows.into_iter().map(|(names, orders)| (joined(names), orders)).collect()
+}
+
+fn formal_orders() -> Markup {
+    let header = ["path", "velocity", "boundaries"].into_iter().chain(Quantity::ALL.map(words_for));
+    let mut table = Table::grid("Formal orders of the central difference (Eq. 6-8) in the step", header).numbers(3..9);
+    for (path, leaves_crater, to_end) in PATHS {
+        for boundaries in BOUNDARIES {
+            for (velocities, orders) in formal_rows(boundaries, leaves_crater, to_end) {
+                let names = [cell(path), cell(velocities), cell(boundaries)];
+                table = table.row(names.into_iter().chain(orders.map(|order| number_cell(order, 2))));
+            }
+        }
+    }
+    table.render()
+}
+
+/// Scene by scene: variants of the scheme against quantities.
+fn observed_orders(run: &Run<'_>) -> Markup {
+    let is_order = |j: &&Judged| matches!(j.claim.check, Check::Order(Order { steps: StepPattern::Uniform, .. }));
+    let orders: Vec<&Judged> = run.judged.iter().filter(is_order).filter(|j| fit_of(j).is_some()).collect();
+    let mut blocks = Vec::new();
+    for scene in scenes_in_order(run) {
+        let mine: Vec<_> = orders.iter().copied().filter(|j| j.claim.scene.as_deref() == Some(&scene)).collect();
+        if !mine.is_empty() {
+            blocks.push(html! {
+                details open[blocks.is_empty()] {
+                    summary { "Observed orders, scene " code { (one_line(&scene)) } }
+                    (order_table(&one_line(&scene), &mine))
+                }
+            });
+        }
+    }
+    html! { @for block in blocks { (block) } }
+}
+
+fn order_table(scene: &str, mine: &[&Judged]) -> Table {
+    let quantities: Vec<_> =
+        Quantity::ALL.into_iter().filter(|q| mine.iter().any(|j| j.claim.quantity == Some(*q))).collect();
+    let caption =
+        format!("Scene {scene}: observed order, half-width of its 95 % interval, and the formal order in brackets");
+    let header = ["velocity", "boundaries"].into_iter().chain(quantities.iter().map(|q| words_for(*q)));
+    let variants = VELOCITIES.into_iter().flat_map(|velocity| BOUNDARIES.map(|boundaries| (velocity, boundaries)));
+    let mut table = Table::grid(caption, header).numbers(2..9);
+    for (velocity, boundaries) in variants {
+        let of_variant: Vec<_> =
+            mine.iter().filter(|j| j.claim.velocity == velocity && j.claim.boundaries == boundaries).collect();
+        if of_variant.is_empty() {
+            continue;
+        }
+        let orders = quantities.iter().map(|quantity| {
+            let judged = of_variant.iter().find(|j| j.claim.quantity == Some(*quantity));
+            judged.map_or_else(|| cell("—"), |judged| order_cell(judged))
+        });
+        table = table.row([cell(velocity), cell(boundaries)].into_iter().chain(orders));
+    }
+    table
+}
+
+fn order_cell(judged: &Judged) -> Markup {
+    html! {
+        @if let Some((_, formal, fit)) = fit_of(judged) {
+            @if let Some(line) = fit.line {
+                (format!("{:.2} ± {:.2} ({formal})", line.order, 0.5 * (line.interval95[1] - line.interval95[0])))
+            } @else { "no fit (" (formal) ")" }
+            " " span.(judged.verdict.name()) aria-label=(judged.verdict.name()) role="img" { (sign(judged.verdict)) }
+        }
+    }
+}
+
+/// Median and spread of each set of experiments, and the terms of ASME V&V 20.
+fn sets(run: &Run<'_>) -> Markup {
+    let comparisons = evidence(run, |evidence| match evidence {
+        Evidence::Depths(comparisons) => Some(comparisons.as_slice()),
+        _ => None,
+    });
+    let Some(comparisons) = comparisons else { return html! {} };
+    let percent = |share: f64| format!("{} %", number(100.0 * share, 2));
+    let numerical = comparisons.iter().map(|c| c.numerical_uncertainty / c.predicted).fold(0.0, f64::max);
+    let given = |get: fn(&Comparison) -> Option<f64>| match comparisons.iter().filter_map(get).count() {
+        0 => "not given".to_owned(),
+        n => format!("given for {n} of {}", count(comparisons.len(), "test")),
+    };
+    let table = Table::cards(
+        "Predicted over measured depth, set by set; E = S − D is the comparison error after ASME V&V 20",
+        ["set", "tests", "median", "spread", "range", "within ±20 %", "in range of S", "mean E/D", "u_val/D"],
+    )
+    .numbers(1..8)
+    .rows(experiments::summaries(comparisons), |set| {
+        [
+            cell(&set.group),
+            cell(set.experiments),
+            cell(format!("{:.2}", set.median)),
+            cell(format!("{:.2}", set.spread)),
+            cell(format!("{:.2} to {:.2}", set.least, set.greatest)),
+            cell(set.within_band),
+            cell(set.in_range_of_fit),
+            cell(percent(set.mean_error)),
+            cell(set.validation_uncertainty.map_or("not given".to_owned(), percent)),
+        ]
+    });
+    html! {
+        (table)
+        (facts([
+            ("u_num, numerical", html! { (number(numerical, 2)) " of the depth at most" }),
+            ("u_input, inputs", cell(given(|c| c.input_uncertainty))),
+            ("u_D, data", html! { (given(|c| c.experiment.depth_uncertainty)) " by the sources" }),
+        ]))
+        p { "The validation uncertainty u_val² = u_num² + u_input² + u_D² can only be stated where all three are. Where it is
+            not given, E alone is: whether it lies within the uncertainty cannot be said." }
+    }
+}
+
+fn deviations(judged: &[Judged]) -> Markup {
+    let open: Vec<_> = judged.iter().filter(|j| j.is_open()).collect();
+    let reasons = skipped(judged);
+    let loose: Vec<_> = looseness(judged).into_iter().filter(|(_, times)| *times > LOOSENESS_MAX).collect();
+    html! {
+        @if open.is_empty() { p { "No claim failed and none is undecided." } }
+        @else { (claims_table("Claims that failed or are undecided", open)) }
+        @if !reasons.is_empty() {
+            h3 { "Skipped, and why" }
+            ul { @for (reason, number) in reasons { li { (one_line(reason)) " (" (count(number, "claim")) ")" } } }
+        }
+        @if !loose.is_empty() {
+            h3 { "Limits that guard little" }
+            p { "More than " (LOOSENESS_MAX) " times what was measured in every scene:" }
+            ul { @for (id, times) in &loose { li { code { (one_line(id)) } ", " (number(*times, 2)) " times" } } }
+        }
+    }
+}

@@ -1,0 +1,373 @@
+use std::convert::Infallible;
+
+use super::*;
+use crate::integrators::{Detail, Energy, Flight, Margin};
+use crate::physics::exit_energy::expm1_over;
+use crate::physics::{Stage, Stages, Target};
+
+/// Crater and tunnel: mass, k d, P, Q, c if given, H.
+#[derive(Clone, Copy, Debug)]
+struct Slab {
+    mass: f64,
+    kd: f64,
+    p: f64,
+    q: f64,
+    c: Option<f64>,
+    h: f64,
+}
+
+const SLAB: Slab = Slab { mass: 2.0, kd: 0.1, p: 848_230.0, q: 3.25, c: None, h: 0.4 };
+
+impl Slab {
+    #[expect(clippy::unnecessary_wraps, reason = "it stands for a scene, which may refuse")]
+    fn at(self, v0: f64) -> Result<Problem, Infallible> {
+        let Self { mass, kd, p, q, c, h } = self;
+        let c = c.unwrap_or(mass * (p + q * v0 * v0) / (kd * (mass + kd * q)));
+        let crater = Stage::crater(c, kd);
+        Ok(Problem::crater_and_tunnel(mass, v0, Some(crater), Stage::tunnel(p, q)).with_exit(h))
+    }
+
+    /// `docs/theory.md`, section 2.
+    fn critical(self) -> f64 {
+        let Self { mass, kd, p, q, c, h } = self;
+        if h <= kd {
+            let squared = match c {
+                Some(c) => c * h * h / mass,
+                None => h * h * p / (kd * mass + q * (kd - h) * (kd + h)),
+            };
+            return squared.sqrt();
+        }
+        let v1 = 2.0 * p * (h - kd) / mass * expm1_over(2.0 * q * (h - kd) / mass);
+        let squared = match c {
+            Some(c) => v1 + c * kd * kd / mass,
+            None => (v1 * (mass + kd * q) + kd * p) / mass,
+        };
+        squared.sqrt()
+    }
+}
+
+fn stages_at(stages: &[Stage], exit: f64) -> impl Fn(f64) -> Result<Problem, Infallible> {
+    move |v0| Ok(Problem::of_stages(1.0, v0, stages.iter().copied()).with_exit(exit))
+}
+
+fn constant(p: f64, q: f64, end: f64) -> Stage {
+    Stage { end, ..Stage::tunnel(p, q) }
+}
+
+/// An integrator that only knows a margin.
+struct Oracle<F>(F);
+
+impl<F: Fn(&Problem) -> (f64, Option<f64>)> Integrator for Oracle<F> {
+    fn name(&self) -> &'static str {
+        "oracle"
+    }
+
+    fn solve(&self, _: &Problem, _: Detail) -> Result<Flight, IntegrationError> {
+        Err(IntegrationError::Refused { method: "oracle", why: "it knows the margin only".to_owned() })
+    }
+
+    fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
+        let (value, error) = (self.0)(problem);
+        Ok(Some(Margin { value, error, cost: Cost::default() }))
+    }
+}
+
+fn search(slab: Slab, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError<Infallible>> {
+    critical_velocity(|v0| slab.at(v0), integrator, Options::default())
+}
+
+/// True margin of the slab, affine in V0².
+fn true_margin(problem: &Problem) -> f64 {
+    Energy::new().exit_margin_in(problem).unwrap().unwrap().0
+}
+
+#[test]
+fn critical_velocity_agrees_with_the_closed_form_within_its_bar_and_twelve_flights() {
+    let (mut worst, mut flights, mut share) = (0.0_f64, 0, 0.0_f64);
+    let mut cases = 0;
+    for h in [1e-3, 0.05, 0.1, 0.1 + 1e-9, 0.15, 0.4, 1.0, 3.0, 10.0] {
+        for q in [0.0, 1e-6, 0.3, 3.25, 20.0] {
+            for c in [None, Some(4e6), Some(2e7)] {
+                for mass in [0.1, 2.0, 500.0] {
+                    let slab = Slab { mass, q, c, h, ..SLAB };
+                    if 2.0 * q * h / mass > 600.0 {
+                        continue;
+                    }
+                    let found = search(slab, &Energy::new()).unwrap_or_else(|e| panic!("{slab:?}: {e}"));
+                    let exact = slab.critical();
+                    let error = (found.velocity - exact).abs();
+                    // The drag exponent y = 2 q h/M is a condition number of V_c² once it is above one.
+                    let condition = (2.0 * q * h / mass).max(1.0);
+                    // The closed form has its own few ulp.
+                    let bar = found.error_bar.unwrap() + 4.0 * f64::EPSILON * condition * exact;
+                    assert!(error <= bar, "{slab:?}: {error:e} over {bar:e}");
+                    worst = worst.max(error / exact / condition);
+                    share = share.max(found.error_bar.unwrap() / exact / condition);
+                    // Beyond, V_c is e^50 times the speed that the static work alone would ask for.
+                    if condition < 100.0 {
+                        flights = flights.max(found.evaluations);
+                    }
+                    assert!(found.evaluations <= 16, "{slab:?}");
+                    cases += 1;
+                    assert!((found.energy / (0.5 * mass * found.velocity.powi(2)) - 1.0).abs() < 1e-15, "{slab:?}");
+                }
+            }
+        }
+    }
+    println!("{cases} cases: worst error {worst:e}, largest bar {share:e}, most flights {flights}");
+    assert!(worst < 1e-13 && share < 1e-13 && flights <= 12);
+}
+
+#[test]
+fn a_slab_that_takes_nearly_all_of_v0_is_searched_in_time_or_over_depth() {
+    // e^y times the static work per mass is V_c², e^130 of it at last.
+    for h in [12.0, 20.0, 40.0] {
+        let slab = Slab { h, ..SLAB };
+        let (exact, drag) = (slab.critical(), 2.0 * slab.q * h / slab.mass);
+        assert!(drag > 38.0);
+        let integrators: [&dyn Integrator; 2] = [&Energy::new(), &Taylor::default()];
+        for integrator in integrators {
+            let found = search(slab, integrator).unwrap();
+            assert!((found.velocity / exact - 1.0).abs() < 1e-15 * drag, "{found:?} and not {exact}");
+            assert!((found.velocity - exact).abs() < found.error_bar.unwrap(), "{found:?} and not {exact}");
+        }
+    }
+}
+
+#[test]
+fn an_error_bar_that_leaves_no_digit_is_undecided_and_not_a_number() {
+    // A bar of some ulp of V0², where the drag takes 1e17 of that.
+    let slab = Slab { h: 12.0, ..SLAB };
+    let coarse = Oracle(|problem: &Problem| (true_margin(problem), Some(1e-15)));
+    let refusal = search(slab, &coarse).unwrap_err();
+    let CriticalError::Undecided { velocity, error_bar } = refusal else { panic!("{refusal}") };
+    assert!(2.0 * error_bar >= velocity, "{velocity} {error_bar}");
+}
+
+/// Layers of F = r V in front of a static one, behind one, and alone: by hand from dV/dx = -r/M.
+#[test]
+fn layers_that_only_slow_have_a_critical_velocity_though_slower_flights_never_end() {
+    let slowing = |end| Stage { viscosity: 1.0, end, ..Stage::tunnel(0.0, 0.0) };
+    let resisting = |force, end| Stage { end, ..Stage::tunnel(force, 0.0) };
+    for (stages, exact) in [
+        (vec![slowing(0.5), resisting(0.1, f64::INFINITY)], 0.5 + 0.1_f64.sqrt()),
+        (vec![resisting(1.0, 0.5), slowing(f64::INFINITY)], 1.25_f64.sqrt()),
+        (vec![slowing(f64::INFINITY)], 1.0),
+    ] {
+        let at = |impact_speed| {
+            let stages = Stages::from_slice(&stages);
+            let target = Target::Stages;
+            Ok::<_, Infallible>(Problem { mass: 1.0, impact_speed, exit_depth: 1.0, stages, crater: None, target })
+        };
+        for integrator in [&Taylor::default() as &dyn Integrator, &crate::integrators::ClosedForm] {
+            let found = critical_velocity(at, integrator, Options::default()).unwrap();
+            let (error, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap());
+            assert!(error <= bar && error < 1e-14, "{} {stages:?}: {found:?} and not {exact}", integrator.name());
+        }
+    }
+}
+
+#[test]
+fn usual_slab_takes_four_flights() {
+    let found = search(SLAB, &Energy::new()).unwrap();
+    assert_eq!(found.evaluations, 4);
+    assert_eq!(found.note, "");
+    assert!(found.bracket.0 < found.velocity && found.velocity < found.bracket.1);
+    assert!(found.cost.force_evaluations > 0);
+}
+
+/// A looser method has a wider bar, which holds, and takes no more flights than the bar is worth.
+#[test]
+fn bar_of_a_loose_method_holds() {
+    let exact = SLAB.critical();
+    for rtol in [1e-12, 1e-9, 1e-6, 1e-4, 1e-2] {
+        let found = search(SLAB, &Energy::with_rtol(rtol).unwrap()).unwrap();
+        let (error, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap());
+        println!("{rtol:e}: {error:e} {bar:e} {}", found.evaluations);
+        assert!(error <= bar, "rtol {rtol:e}: {error:e} over {bar:e}");
+        assert!(bar < 10.0 * rtol * exact + 1e-12, "rtol {rtol:e}: bar {bar:e}");
+        assert!(found.evaluations <= 12);
+    }
+}
+
+#[test]
+fn tolerance_asked_for_is_kept_and_saves_flights() {
+    // Bent, so that the root finder has something to save.
+    let bent = Oracle(|problem: &Problem| {
+        let u = problem.impact_speed.powi(2);
+        ((u - 1e5 - 100.0 * u.sqrt()) / u, Some(1e-16))
+    });
+    let exact = 50.0 + (2500.0_f64 + 1e5).sqrt();
+    let viscous = |v0| {
+        let mut problem = SLAB.at(v0)?;
+        problem.stages[1].viscosity = 1.0;
+        Ok::<_, Infallible>(problem)
+    };
+    let fine = critical_velocity(viscous, &bent, Options::default()).unwrap();
+    assert!((fine.velocity / exact - 1.0).abs() < 1e-15, "{fine:?}");
+    assert!(fine.evaluations <= 15, "{}", fine.evaluations);
+    let coarse = critical_velocity(viscous, &bent, Options { rtol: 1e-4, ..Options::default() }).unwrap();
+    assert!((coarse.velocity - exact).abs() <= coarse.error_bar.unwrap());
+    assert!((coarse.velocity / exact - 1.0).abs() < 1e-4 && coarse.evaluations < fine.evaluations);
+    for rtol in [-1.0, f64::NAN, 1.0] {
+        let refusal = critical_velocity(viscous, &bent, Options { rtol, ..Options::default() }).unwrap_err();
+        assert!(refusal.is_usage(), "{refusal}");
+    }
+}
+
+/// Findings 4 and 5 of the survey: these objectives made `BrentRoot` "converge" at an end of its bracket.
+#[test]
+fn outcome_as_objective_is_refused() {
+    for bar in [None, Some(1e-15)] {
+        let boolean = Oracle(|problem: &Problem| (true_margin(problem).signum(), bar));
+        let refusal = search(SLAB, &boolean).unwrap_err();
+        assert!(matches!(refusal, CriticalError::Jump { .. }), "{refusal}");
+        assert!(!refusal.is_usage());
+    }
+}
+
+#[test]
+fn depth_capped_at_the_exit_as_objective_is_refused() {
+    for bar in [None, Some(1e-15)] {
+        let capped = Oracle(|problem: &Problem| (true_margin(problem).min(0.0), bar));
+        let refusal = search(SLAB, &capped).unwrap_err();
+        let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
+        assert!(low.exit_energy < 0.0 && high.exit_energy == 0.0);
+        assert!(refusal.to_string().contains(&low.to_string()) && refusal.to_string().contains(&high.to_string()));
+    }
+}
+
+/// The residual energy that is zero for every stop: the mirror image of the capped depth.
+#[test]
+fn residual_energy_without_a_sign_as_objective_is_refused() {
+    for bar in [None, Some(1e-15)] {
+        let residual = Oracle(|problem: &Problem| (true_margin(problem).max(0.0), bar));
+        let refusal = search(SLAB, &residual).unwrap_err();
+        let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
+        assert!(low.exit_energy == 0.0 && high.exit_energy > 0.0);
+    }
+}
+
+/// Noise within the bar, different at every speed, as adaptive steps make it.
+#[test]
+fn noise_within_the_bar_costs_neither_flights_nor_truth() {
+    for noise in [1e-12, 1e-9, 1e-6, 1e-3] {
+        let noisy = Oracle(|problem: &Problem| {
+            let wave = (problem.impact_speed * 1e9).sin();
+            (true_margin(problem) + noise * wave, Some(noise))
+        });
+        let found = search(SLAB, &noisy).unwrap();
+        let (error, bar) = ((found.velocity - SLAB.critical()).abs(), found.error_bar.unwrap());
+        assert!(error <= bar, "{noise:e}: {error:e} over {bar:e}");
+        assert!(bar < 10.0 * noise * found.velocity && found.evaluations <= 12, "{noise:e}: {found:?}");
+    }
+}
+
+/// The residual velocity with its sign has an infinite slope at `V_c`. Its zero is right, and so accepted.
+#[test]
+fn root_of_a_margin_with_an_infinite_slope_is_found() {
+    let root = Oracle(|problem: &Problem| {
+        let margin = true_margin(problem);
+        (margin.abs().sqrt().copysign(margin), None)
+    });
+    let found = search(SLAB, &root).unwrap();
+    assert!((found.velocity / SLAB.critical() - 1.0).abs() < 1e-13);
+    assert_eq!(found.error_bar, None);
+}
+
+/// A scheme that sees the exit at a step's end: W is a staircase over V0. Its sign change is still located, and no
+/// bar is invented.
+#[test]
+fn sign_change_of_a_staircase_is_located() {
+    let staircase = Oracle(|problem: &Problem| {
+        let u = problem.impact_speed.powi(2);
+        (((true_margin(problem) * u / 300.0).floor() * 300.0 + 40.0) / u, None)
+    });
+    let found = search(SLAB, &staircase).unwrap();
+    // The floor changes sign at W = 0.
+    assert!((found.velocity / SLAB.critical() - 1.0).abs() < 1e-12, "{} {}", found.velocity, SLAB.critical());
+    assert_eq!(found.error_bar, None);
+    assert!(found.evaluations < 80, "{}", found.evaluations);
+}
+
+#[test]
+fn nan_is_an_error_wherever_it_comes() {
+    let always = Oracle(|_: &Problem| (f64::NAN, None));
+    assert!(matches!(search(SLAB, &always), Err(CriticalError::NotFinite { .. })));
+    let exact = SLAB.critical();
+    // Within the bracket only, where argmin would call it convergence.
+    let inside = Oracle(|problem: &Problem| {
+        let near = (problem.impact_speed / exact - 1.0).abs() < 1e-8;
+        (if near { f64::NAN } else { true_margin(problem) }, None)
+    });
+    let refusal = search(SLAB, &inside).unwrap_err();
+    assert!(matches!(refusal, CriticalError::NotFinite { velocity, .. } if (velocity / exact - 1.0).abs() < 1e-8));
+}
+
+#[test]
+fn margin_of_one_sign_shows_both_ends() {
+    let never = Oracle(|_: &Problem| (-0.5, None));
+    let refusal = search(SLAB, &never).unwrap_err();
+    let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
+    assert!(low.velocity < high.velocity && low.exit_energy < 0.0 && high.exit_energy < 0.0);
+    // The slab of a kilometre: e^y leaves the range of the numbers.
+    let refusal = search(Slab { h: 1000.0, ..SLAB }, &Energy::new()).unwrap_err();
+    assert!(!refusal.is_usage() && refusal.to_string().contains("no critical velocity up to"), "{refusal}");
+}
+
+#[test]
+fn flights_are_bounded() {
+    let options = Options { flights_max: 3, ..Options::default() };
+    let refusal = critical_velocity(|v0| SLAB.at(v0), &Energy::new(), options).unwrap_err();
+    assert!(matches!(refusal, CriticalError::NotConverged { flights: 3, .. }), "{refusal}");
+}
+
+#[test]
+fn semi_infinite_target_is_a_mistake_of_the_caller() {
+    let refusal = search(Slab { h: f64::INFINITY, ..SLAB }, &Energy::new()).unwrap_err();
+    assert_eq!(refusal, CriticalError::NoExit);
+    assert!(refusal.is_usage());
+}
+
+#[test]
+fn target_without_thickness_takes_no_flight() {
+    let found = search(Slab { h: 0.0, ..SLAB }, &Energy::new()).unwrap();
+    assert_eq!((found.velocity, found.energy, found.evaluations, found.error_bar), (0.0, 0.0, 0, Some(0.0)));
+    assert!(!found.note.is_empty());
+}
+
+#[test]
+fn errors_of_scene_and_flight_come_through() {
+    let refusal = critical_velocity(|_| Err("no such scene"), &Energy::new(), Options::default()).unwrap_err();
+    assert!(refusal.is_usage() && refusal.to_string().contains("no such scene"), "{refusal}");
+    let viscous = |v0| {
+        let mut problem = SLAB.at(v0)?;
+        problem.stages[1].viscosity = 1.0;
+        Ok::<_, Infallible>(problem)
+    };
+    let refusal = critical_velocity(viscous, &Energy::new(), Options::default()).unwrap_err();
+    assert!(refusal.is_usage() && matches!(refusal, CriticalError::Flight { .. }), "{refusal}");
+}
+
+#[test]
+fn target_that_only_drives_or_drags_is_perforated_at_any_speed() {
+    let end = f64::INFINITY;
+    for stages in [vec![constant(-10.0, 0.0, end)], vec![constant(-10.0, 2.0, end)], vec![constant(0.0, 2.0, end)]] {
+        let found = critical_velocity(stages_at(&stages, 2.0), &Energy::new(), Options::default()).unwrap();
+        assert_eq!((found.velocity, found.energy), (0.0, 0.0), "{stages:?}");
+        assert!(found.error_bar.unwrap() < 1e-12 && !found.note.is_empty(), "{found:?}");
+    }
+}
+
+/// A drive before a barrier lowers `V_c`, a drive behind it does not; one that outdoes the barrier leaves none.
+#[test]
+fn barrier_decides_the_critical_velocity_of_a_driven_target() {
+    let search = |stages: &[Stage]| critical_velocity(stages_at(stages, 3.0), &Energy::new(), Options::default());
+    let (drive, barrier) = (constant(-4.0, 0.0, 1.0), constant(10.0, 0.0, 2.0));
+    let found = search(&[drive, barrier, constant(-100.0, 0.0, f64::INFINITY)]).unwrap();
+    assert!((found.velocity - 12.0_f64.sqrt()).abs() < 1e-14, "{found:?}");
+    assert!(found.evaluations <= 12);
+    let strong = constant(-20.0, 0.0, 1.0);
+    let found = search(&[strong, barrier, constant(0.0, 0.0, f64::INFINITY)]).unwrap();
+    assert_eq!(found.velocity, 0.0);
+}

@@ -1,0 +1,146 @@
+//! The search for the critical velocity under wrong objectives, without a root, and near its root.
+
+use super::super::{Subject, worse};
+use super::{Violations, critical_of, slab};
+use crate::integrators::{Cost, Detail, Energy, Flight, IntegrationError, Integrator, Margin};
+use crate::physics::{Outcome, Problem, Resistance, Scene, semi_empirical};
+use crate::studies::critical_velocity::{self, CriticalError};
+use crate::studies::extreme_scenes::exceeds;
+use crate::suite::claim::{Found, Measurement, NotMeasured};
+
+check! {
+    /// V1 of `verification/edges.toml`.
+    Objectives {} in Critical, "violations", by objectives;
+    /// V2 of `verification/edges.toml`.
+    NoRoot {} in Critical, "violations", by no_root;
+    /// V3 of `verification/edges.toml`.
+    CriticalErrorBound {} in Critical, "error/bar", by critical_error_bound;
+    /// V4 of `verification/edges.toml`.
+    JumpsOfEq15 {} in Critical, "S", by jumps_of_eq15;
+}
+
+/// What a search is given in place of the signed energy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Objective {
+    SignedEnergy,
+    SignedSpeed,
+    Perforated,
+    CappedDepth,
+    NotANumber,
+}
+
+/// The energy formulation with another objective as its margin.
+#[derive(Clone, Copy, Debug)]
+struct Disguised(Objective);
+
+impl Integrator for Disguised {
+    fn name(&self) -> &'static str {
+        "disguised"
+    }
+
+    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+        Energy::new().solve(problem, detail)
+    }
+
+    fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
+        let flight = Energy::new().solve(problem, Detail::End)?;
+        let margin = flight.exit_margin.unwrap_or(f64::NAN);
+        let value = match self.0 {
+            Objective::SignedEnergy => margin,
+            Objective::SignedSpeed => margin.abs().sqrt().copysign(margin),
+            Objective::Perforated => 1f64.copysign(margin),
+            Objective::CappedDepth => (flight.end.depth / problem.exit_depth - 1.0).min(0.0),
+            Objective::NotANumber => f64::NAN,
+        };
+        let error = (self.0 == Objective::SignedEnergy).then_some(flight.exit_margin_error).flatten();
+        Ok(Some(Margin { value, error, cost: Cost::default() }))
+    }
+}
+
+fn objectives(_: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    for drag in [false, true] {
+        let scene = slab(drag);
+        let exact = critical_of(&scene)?;
+        for objective in
+            [Objective::SignedEnergy, Objective::SignedSpeed, Objective::Perforated, Objective::CappedDepth]
+        {
+            match critical_velocity::of_scene(&scene, &Disguised(objective)) {
+                Ok(found) => {
+                    let off = (found.velocity / exact - 1.0).abs();
+                    seen.expect(off <= 1e-9, || format!("{objective:?} gives {} for {exact} m/s", found.velocity));
+                    if objective == Objective::SignedEnergy {
+                        seen.expect(off <= 1e-14 && found.evaluations <= 8, || {
+                            format!("off by {off:e} after {} solutions", found.evaluations)
+                        });
+                    }
+                }
+                Err(error) => {
+                    seen.expect(objective != Objective::SignedEnergy, || error.to_string());
+                    seen.notes.push(format!("{objective:?}: refused"));
+                }
+            }
+        }
+    }
+    Ok(seen.measurement())
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn no_root(_: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    let search = |scene: &Scene| critical_velocity::of_scene(scene, &Energy::new());
+    // Ten kilometres of concrete against 0.9 kg: the drag multiplies E_c by e for every 3 m, beyond 1e1000.
+    let deep = search(&Scene { thickness: Some(1e4), ..slab(true) });
+    let said = deep.as_ref().err().map(ToString::to_string).unwrap_or_default();
+    seen.expect(matches!(deep, Err(CriticalError::NoBracket { .. } | CriticalError::Flight { .. })), || {
+        format!("{deep:?}")
+    });
+    seen.expect(said.matches("m/s").count() >= 1, || said.clone());
+    seen.notes.push(said);
+    let none = search(&Scene { thickness: Some(0.0), ..slab(true) });
+    seen.expect(none.as_ref().is_ok_and(|c| c.velocity == 0.0 && !c.note.is_empty()), || format!("{none:?}"));
+    let open = search(&Scene { thickness: None, ..slab(true) });
+    seen.expect(matches!(open, Err(CriticalError::NoExit)), || format!("{open:?}"));
+    let nan = critical_velocity::of_scene(&slab(true), &Disguised(Objective::NotANumber));
+    seen.expect(matches!(nan, Err(CriticalError::NotFinite { .. })), || format!("{nan:?}"));
+    Ok(seen.measurement())
+}
+
+fn critical_error_bound(subject: &Subject<'_>) -> Found {
+    let method = subject.method(None)?;
+    let widest = if subject.method_name().needs_diffsol() { 1e-4 } else { 1e-12 };
+    let mut worst = 0.0;
+    for (drag, given) in [(false, false), (true, false), (true, true)] {
+        let mut scene = slab(drag);
+        if let (true, Resistance::Concrete(c)) = (given, &mut scene.resistance) {
+            c.crater_stiffness = crate::physics::CraterStiffness::Given(1e7);
+        }
+        let exact = critical_of(&scene)?;
+        let found = critical_velocity::of_scene(&scene, method.integrator())?;
+        let bar = found.error_bar.ok_or_else(|| NotMeasured::broken("no error bar"))?;
+        if exceeds(bar, widest * exact) {
+            return Err(NotMeasured::broken(format!("the error bar is {bar:e} m/s wide")));
+        }
+        // The exact value is itself rounded.
+        let rounding = 2.0 * f64::EPSILON * exact;
+        worst = worse(worst, (found.velocity - exact).abs() / (bar + rounding));
+        // A margin inside its error bound at V_c itself: dV_r/dV0 is infinite there, and V_r is no measure.
+        let problem = scene.resolve(exact)?;
+        let flight = method.integrator().solve(&problem, Detail::End)?;
+        if flight.outcome != Outcome::Undecided {
+            return Err(NotMeasured::broken(format!("{} at V_c itself", flight.outcome)));
+        }
+    }
+    Ok(Measurement::new(worst))
+}
+
+fn jumps_of_eq15(_: &Subject<'_>) -> Found {
+    let mut worst = 0.0;
+    for (jump, (at, height)) in semi_empirical::jumps().iter().zip([(3.0, 0.002_723_8), (3.8, -0.002_331_2)]) {
+        if jump.thickness_ratio != at {
+            return Err(NotMeasured::broken(format!("a jump at {}", jump.thickness_ratio)));
+        }
+        worst = worse(worst, (jump.above - jump.below - height).abs());
+    }
+    Ok(Measurement::new(worst))
+}

@@ -1,0 +1,504 @@
+//! Events at their edges: grazing, coincident, at the start, at a step end, early, late, and none.
+
+use std::collections::BTreeSet;
+
+use super::super::{Subject, worse};
+use super::{Violations, concrete, critical_of, exact, exact_margin, is_right, resolve, slab, staged};
+use crate::exchange::scene_file::SHIPPED;
+use crate::integrators::{
+    Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
+};
+use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
+use crate::studies::critical_velocity::{Options, critical_velocity};
+use crate::studies::relations::way_back;
+use crate::suite::claim::{Found, Measurement, NotMeasured};
+
+check! {
+    /// E1 of `verification/edges.toml`.
+    GrazingLadder {} in Events, "violations", by grazing_ladder;
+    /// E2 of `verification/edges.toml`.
+    Scan {} in Events, "violations", by scan;
+    /// E3 of `verification/edges.toml`.
+    BothCrossings {} in Events, "violations", by both_crossings;
+    /// E4 of `verification/edges.toml`.
+    ExactlyCritical {} in Events, "violations", by exactly_critical;
+    /// E5 of `verification/edges.toml`.
+    TripleCoincidence {} in Events, "violations", by triple_coincidence;
+    /// E6 of `verification/edges.toml`.
+    ThinTargets {} in Events, "violations", by thin_targets;
+    /// E7 of `verification/edges.toml`.
+    TenEnds {} in Events, "violations", by ten_ends;
+    /// E8 of `verification/edges.toml`.
+    EventBehindEvent {} in Events, "violations", by event_behind_event;
+    /// E9 of `verification/edges.toml`.
+    EndsAnUlpApart {} in Events, "violations", by ends_an_ulp_apart;
+    /// E10 of `verification/edges.toml`.
+    ScaledForces {} in Events, "promises", by scaled_forces;
+    /// E11 of `verification/edges.toml`.
+    Plateau {} in Events, "violations", by plateau;
+    /// E12 of `verification/edges.toml`.
+    AtAStepEnd {} in Events, "violations", by at_a_step_end;
+    /// E13 of `verification/edges.toml`.
+    SmallTimesAndFarStarts {} in Events, "promises", by small_times_and_far_starts;
+    /// E14 of `verification/edges.toml`.
+    VanishingSpeed {} in Events, "promises", by vanishing_speed;
+    /// E15 of `verification/edges.toml`.
+    LawsOutsideTheirRange {} in Events, "ulp", by laws_outside_their_range;
+    /// E16 of `verification/edges.toml`.
+    ForceJump {} in Events, "promises", by force_jump;
+    /// E17 of `verification/edges.toml`.
+    BackAgain {} in Events, "promises", by back_again;
+    /// E18 of `verification/edges.toml`.
+    AcrossTheCraterEnd {} in Events, "promises", by across_the_crater_end;
+    /// E19 of `verification/edges.toml`.
+    ApproachedForEver {} in Events, "violations", by approached_for_ever;
+}
+
+/// Widest |margin| at which a method may still be undecided.
+fn undecided_max(subject: &Subject<'_>) -> f64 {
+    if subject.method_name().needs_diffsol() { 1e-5 } else { 1e-12 }
+}
+
+/// Checks outcome and error bound of one solution near V_c.
+fn check_outcome(subject: &Subject<'_>, problem: &Problem, seen: &mut Violations) -> Result<Outcome, NotMeasured> {
+    let margin = exact_margin(problem)?;
+    let flight = subject.flight(problem)?;
+    seen.expect(is_right(flight.outcome, margin), || {
+        format!("{} at V0 = {:e}, margin {margin:e}", flight.outcome, problem.impact_speed)
+    });
+    let may = margin.abs() <= undecided_max(subject);
+    seen.expect(flight.outcome != Outcome::Undecided || may, || format!("undecided at a margin of {margin:e}"));
+    let (found, bar) = (flight.exit_margin.unwrap_or(f64::NAN), flight.exit_margin_error.unwrap_or(f64::NAN));
+    seen.expect((found - margin).abs() <= bar, || {
+        format!("margin {found:e} beyond its error bar {bar:e} of {margin:e} at V0 = {:e}", problem.impact_speed)
+    });
+    Ok(flight.outcome)
+}
+
+fn grazing_ladder(subject: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    for drag in [false, true] {
+        let scene = slab(drag);
+        let critical = critical_of(&scene)?;
+        let mut decided = 0;
+        for j in 1..=14 {
+            let mut both = true;
+            for sign in [-1.0, 1.0] {
+                let problem = resolve(&scene, critical * (1.0 + sign * 10f64.powi(-j)))?;
+                both &= check_outcome(subject, &problem, &mut seen)? != Outcome::Undecided;
+            }
+            if both {
+                decided = j;
+            }
+        }
+        check_outcome(subject, &resolve(&scene, critical)?, &mut seen)?;
+        seen.notes.push(format!("decided to 1e-{decided} {}", if drag { "with drag" } else { "without drag" }));
+    }
+    Ok(seen.measurement())
+}
+
+fn scan(subject: &Subject<'_>) -> Found {
+    const SIDE: i32 = 250;
+    let mut seen = Violations::default();
+    for drag in [false, true] {
+        let scene = slab(drag);
+        let critical = critical_of(&scene)?;
+        // From 10 % off to 1e-14 and out again on the other side, ascending.
+        let offset = |i: i32| 10f64.powf(-1.0 - 13.0 * f64::from(i) / f64::from(SIDE - 1));
+        let below = (0..SIDE).map(|i| 1.0 - offset(i));
+        let above = (0..SIDE).rev().map(|i| 1.0 + offset(i));
+        let (mut flips, mut last, mut undecided) = (0, None, 0);
+        for factor in below.chain(above) {
+            let flight = subject.flight(&resolve(&scene, critical * factor)?)?;
+            if flight.outcome == Outcome::Undecided {
+                undecided += 1;
+                continue;
+            }
+            let through = flight.outcome == Outcome::Perforated;
+            flips += usize::from(last.is_some_and(|last| last != through));
+            seen.expect(through == (factor > 1.0), || format!("{} at V_c (1 {:+e})", flight.outcome, factor - 1.0));
+            last = Some(through);
+        }
+        seen.expect(flips == 1, || format!("{flips} flips"));
+        seen.notes.push(format!("{flips} flip, {undecided} undecided"));
+    }
+    Ok(seen.measurement())
+}
+
+fn both_crossings(subject: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    for j in 1..=14 {
+        for side in [-1.0, 1.0] {
+            // X = M V0²/(2 P) = 0.5 m.
+            let exit = 0.5 * (1.0 + side * 10f64.powi(-j));
+            let problem = staged(1.0, 10.0, exit, &[Stage::tunnel(100.0, 0.0)]);
+            check_outcome(subject, &problem, &mut seen)?;
+        }
+    }
+    Ok(seen.measurement())
+}
+
+fn exactly_critical(subject: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    // Sums and products of powers of two are exact: X = H to the last bit.
+    for scale in [1.0, 2f64.powi(-20), 2f64.powi(20)] {
+        let problem = staged(2.0, 16.0 * scale, scale * scale, &[Stage::tunnel(256.0, 0.0)]);
+        let flight = subject.flight(&problem)?;
+        let outcome = flight.outcome;
+        seen.expect(matches!(outcome, Outcome::Perforated | Outcome::Undecided), || format!("{outcome}"));
+        let off = (flight.end.depth / problem.exit_depth - 1.0).abs();
+        seen.expect(off <= 10.0 * subject.promise(), || format!("ends off H by {off:e}"));
+        // Near rest V is the root of an error of W.
+        let left = flight.end.velocity / problem.impact_speed;
+        seen.expect(left * left <= 1e3 * subject.promise(), || format!("leaves at {left:e} V0"));
+    }
+    Ok(seen.measurement())
+}
+
+fn kinds(flight: &Flight) -> Vec<EventKind> {
+    flight.events.iter().map(|event| event.kind).collect()
+}
+
+/// Events rise in time and depth, and at one place in the order of their kinds.
+fn check_order(flight: &Flight, seen: &mut Violations) {
+    for pair in flight.events.windows(2) {
+        let (a, b) = (&pair[0], &pair[1]);
+        // An ulp of depth takes less than an ulp of time.
+        let rises = a.state.time <= b.state.time && a.state.depth < b.state.depth;
+        let at_once = a.state.time == b.state.time && a.state.depth == b.state.depth && a.kind < b.kind;
+        seen.expect(rises || at_once, || format!("{a:?} then {b:?}"));
+    }
+}
+
+fn triple_coincidence(subject: &Subject<'_>) -> Found {
+    use EventKind::{CraterEnd, Exit, Rest};
+    let mut seen = Violations::default();
+    for offset in [-1e-6, -1e-12, 0.0, 1e-12, 1e-6] {
+        // c = P/(k d), Q = 0: V0 = 1 comes to rest at 1 m = k d = H.
+        let problem = concrete(1.0, 1.0 + offset, 1.0, (1.0, 1.0), (1.0, 0.0));
+        let flight = subject.flight(&problem)?;
+        let found = kinds(&flight);
+        check_order(&flight, &mut seen);
+        let allowed: &[&[EventKind]] = match flight.outcome {
+            Outcome::Perforated => &[&[CraterEnd, Exit], &[CraterEnd, Exit, Rest]],
+            Outcome::StoppedInCrater | Outcome::StoppedInTunnel => &[&[Rest]],
+            _ => &[&[CraterEnd, Exit], &[CraterEnd, Exit, Rest], &[Rest], &[CraterEnd, Rest]],
+        };
+        seen.expect(allowed.contains(&found.as_slice()), || format!("{} with {found:?} at {offset:e}", flight.outcome));
+        let right = match flight.outcome {
+            Outcome::Undecided => 4.0 * offset.abs() <= undecided_max(subject),
+            Outcome::Perforated => offset >= 0.0,
+            _ => offset < 0.0,
+        };
+        seen.expect(right, || format!("{} at {offset:e}", flight.outcome));
+    }
+    Ok(seen.measurement())
+}
+
+fn thin_targets(subject: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    let scene = slab(true);
+    let problem = resolve(&scene, 400.0)?;
+    let depth = problem.stages[0].end;
+    for exit in [
+        0.0,
+        1e-300,
+        1e-30,
+        1e-9,
+        0.5 * depth,
+        depth * (1.0 - 1e-12),
+        depth.next_down(),
+        depth,
+        depth.next_up(),
+        depth * (1.0 + 1e-12),
+    ] {
+        // The library's steps end at times of about 1e-302 s: it reports so, and there is no solution to judge.
+        if exit == 1e-300 && subject.method_name().needs_diffsol() {
+            continue;
+        }
+        let thin = Problem { exit_depth: exit, ..problem.clone() };
+        let flight = subject.flight(&thin)?;
+        seen.expect(flight.outcome == Outcome::Perforated, || format!("{} at H = {exit:e}", flight.outcome));
+        let found = kinds(&flight);
+        let expected = if exit < depth { vec![EventKind::Exit] } else { vec![EventKind::CraterEnd, EventKind::Exit] };
+        seen.expect(found == expected, || format!("{found:?} at H = {exit:e}"));
+        seen.expect(flight.end.depth == exit, || format!("leaves at {:e} of {exit:e}", flight.end.depth));
+        if exit == 0.0 {
+            seen.expect(flight.end.velocity == 400.0 && flight.end.time == 0.0, || format!("{}", flight.end));
+        } else {
+            let off = (flight.end.velocity - exact(&thin)?.end.velocity.hi()).abs() / 400.0;
+            seen.expect(off <= 1e3 * subject.promise(), || format!("V_r off by {off:e} at H = {exit:e}"));
+        }
+        check_order(&flight, &mut seen);
+    }
+    Ok(seen.measurement())
+}
+
+/// Times and velocities of the events against the exact ones.
+fn check_events(subject: &Subject<'_>, problem: &Problem, count: usize) -> Found {
+    let mut seen = Violations::default();
+    let flight = subject.flight(problem)?;
+    let exact = exact(problem)?.values();
+    let (found, expected) = (kinds(&flight), kinds(&exact));
+    seen.expect(expected.len() == count, || format!("the case itself has {} events", expected.len()));
+    seen.expect(found == expected, || format!("{found:?}"));
+    check_order(&flight, &mut seen);
+    for (event, exact) in flight.events.iter().zip(&exact.events) {
+        let time = (event.state.time - exact.state.time).abs() / exact.state.time.max(f64::MIN_POSITIVE);
+        let speed = (event.state.velocity - exact.state.velocity).abs() / problem.impact_speed;
+        seen.expect(worse(time, speed) <= 1e3 * subject.promise(), || {
+            format!("{:?} off by {time:e} in time, {speed:e} in speed", event.kind)
+        });
+    }
+    seen.expect(flight.cost.steps < 10_000, || format!("{} steps", flight.cost.steps));
+    Ok(seen.measurement())
+}
+
+/// A constant force cut at `ends`, over 1 m from 10 m/s.
+fn cut(ends: &[f64]) -> Problem {
+    let mut stages: Vec<Stage> = ends.iter().map(|end| Stage { end: *end, ..Stage::tunnel(20.0, 0.0) }).collect();
+    stages.push(Stage::tunnel(20.0, 0.0));
+    staged(1.0, 10.0, 1.0, &stages)
+}
+
+fn ten_ends(subject: &Subject<'_>) -> Found {
+    check_events(subject, &cut(&[0.1, 0.2, 0.3, 0.3, 0.3, 0.45, 0.5, 0.6, 0.61, 0.9]), 11)
+}
+
+fn event_behind_event(subject: &Subject<'_>) -> Found {
+    check_events(subject, &cut(&[0.6, 0.6 * (1.0 + 1e-9), 0.85]), 4)
+}
+
+fn ends_an_ulp_apart(subject: &Subject<'_>) -> Found {
+    let depth: f64 = 0.3;
+    check_events(subject, &cut(&[0.0, depth.next_down(), depth, depth.next_up()]), 5)
+}
+
+fn scaled_forces(subject: &Subject<'_>) -> Found {
+    let mut worst = 0.0;
+    for exit in [f64::INFINITY, 0.75] {
+        // Powers of two throughout, so that no scaling rounds.
+        let plain = concrete(1.0, 2.0, exit, (8.0, 0.5), (4.0, 0.25));
+        let base = subject.flight(&plain)?;
+        for power in [-1000, -560, -100, 100, 980] {
+            let scale = |x: f64| x * 2f64.powi(power);
+            let problem = concrete(scale(1.0), 2.0, exit, (scale(8.0), 0.5), (scale(4.0), scale(0.25)));
+            let flight = subject.flight(&problem)?;
+            if !flight.outcome.agrees_with(base.outcome) || kinds(&flight) != kinds(&base) {
+                return Err(NotMeasured::broken(format!("{} became {} at 2^{power}", base.outcome, flight.outcome)));
+            }
+            worst = worse(worst, (flight.end.depth / base.end.depth - 1.0).abs());
+            worst = worse(worst, (flight.end.time / base.end.time - 1.0).abs());
+            worst = worse(worst, (flight.end.velocity - base.end.velocity).abs() / 2.0);
+        }
+    }
+    let subnormal =
+        Scene { mass: 1e-310, resistance: Resistance::Stages(vec![Stage::tunnel(1e-310, 0.0)]), ..slab(false) };
+    if subnormal.problem().is_ok() {
+        return Err(NotMeasured::broken("subnormal mass and force are taken"));
+    }
+    Ok(Measurement::new(worst / subject.promise()))
+}
+
+/// A spring of 1 kN/m over half a metre, then 1 kg/s over another, 1 kg: V_c² = s (1/2)² + (r/2)².
+fn approached_for_ever(subject: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    let spring = Stage { stiffness: 1e3, end: 0.5, ..Stage::tunnel(0.0, 0.0) };
+    let slowing = Stage { viscosity: 1.0, ..Stage::tunnel(0.0, 0.0) };
+    let at = |speed| staged(1.0, speed, 1.0, &[spring, slowing]);
+    let critical = 250.25_f64.sqrt();
+    let method = subject.method(None)?;
+    for power in 1..=14 {
+        for sign in [1.0, -1.0] {
+            let said = method.integrator().solve(&at(critical * (1.0 + sign * 10f64.powi(-power))), Detail::Events);
+            let right = match &said {
+                Ok(flight) if flight.outcome == Outcome::Undecided => power > 2,
+                // From a thousandth below V_c down the spring stops it.
+                Ok(flight) => (flight.outcome == Outcome::Perforated) == (sign > 0.0),
+                Err(error) => matches!(error, IntegrationError::NeverEnds { .. }) && sign < 0.0,
+            };
+            seen.expect(right, || format!("{sign}e-{power}: {:?}", said.map(|flight| flight.outcome)));
+        }
+    }
+    let resolve = |speed| Ok::<_, std::convert::Infallible>(at(speed));
+    let found = critical_velocity(resolve, method.integrator(), Options::default())?;
+    seen.expect((found.velocity - critical).abs() <= found.error_bar.unwrap_or(0.0), || {
+        format!("V_c {} +- {:?}", found.velocity, found.error_bar)
+    });
+    Ok(seen.measurement())
+}
+
+fn plateau(subject: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    let gap = Stage { end: 1.0, ..Stage::tunnel(0.0, 0.0) };
+    let open = Stage::tunnel(0.0, 0.0);
+    let flight = subject.flight(&staged(1.0, 3.0, 2.0, &[gap, open]))?;
+    let off = worse((flight.end.time * 1.5 - 1.0).abs(), (flight.end.velocity / 3.0 - 1.0).abs());
+    seen.expect(flight.outcome == Outcome::Perforated, || format!("{}", flight.outcome));
+    seen.expect(off <= 1e3 * subject.promise(), || format!("off by {off:e}"));
+    seen.expect(kinds(&flight) == [EventKind::StageEnd(0), EventKind::Exit], || format!("{:?}", kinds(&flight)));
+    let endless = staged(1.0, 3.0, f64::INFINITY, &[open]);
+    let said = subject.method(None)?.integrator().solve(&endless, Detail::Events);
+    seen.expect(matches!(said, Err(IntegrationError::NeverEnds { .. })), || format!("{said:?}"));
+    // Then a wall: nothing has been lost before it.
+    let flight = subject.flight(&staged(1.0, 3.0, f64::INFINITY, &[gap, Stage::tunnel(9.0, 0.0)]))?;
+    let off = (flight.end.depth / 1.5 - 1.0).abs();
+    seen.expect(off <= 1e3 * subject.promise(), || format!("stops off by {off:e}"));
+    Ok(seen.measurement())
+}
+
+fn at_a_step_end(_: &Subject<'_>) -> Found {
+    let mut seen = Violations::default();
+    let dt = 2f64.powi(-10);
+    for velocity in [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep] {
+        for boundaries in [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed] {
+            let scheme = CentralDifference::uniform(dt, velocity, boundaries);
+            let free = Stage { end: 0.25, ..Stage::tunnel(0.0, 0.0) };
+            let problem = staged(1.0, 1.0, 0.5, &[free, Stage::tunnel(0.0, 0.0)]);
+            let flight = scheme.solve(&problem, Detail::Trajectory)?;
+            let name = format!("{velocity}, {boundaries}");
+            seen.expect(kinds(&flight) == [EventKind::StageEnd(0), EventKind::Exit], || {
+                format!("{name}: {:?}", kinds(&flight))
+            });
+            let times: Vec<f64> = flight.events.iter().map(|event| event.state.time).collect();
+            seen.expect(times == [0.25, 0.5], || format!("{name}: {times:?}"));
+            // One row a step; an event at a step end may add its own at the same time, with the next stage's force.
+            let rises = flight.trajectory.windows(2).all(|w| {
+                w[0].state.time < w[1].state.time || (w[0].state.time == w[1].state.time && w[0].stage <= w[1].stage)
+            });
+            seen.expect(rises, || format!("{name}: times fall"));
+            // Rest exactly at a node: V = 1 - 2 t at t = 0.5, x = 0.25.
+            let stop = staged(1.0, 1.0, f64::INFINITY, &[Stage::tunnel(2.0, 0.0)]);
+            let flight = scheme.solve(&stop, Detail::Events)?;
+            seen.expect(kinds(&flight) == [EventKind::Rest], || format!("{name}: {:?}", kinds(&flight)));
+            seen.expect((flight.end.time, flight.end.depth) == (0.5, 0.25), || format!("{name}: {}", flight.end));
+        }
+    }
+    Ok(seen.measurement())
+}
+
+fn small_times_and_far_starts(subject: &Subject<'_>) -> Found {
+    let mut worst = 0.0;
+    let base = resolve(&slab(true), 500.0)?;
+    // Lengths by 1e-9: the motion takes picoseconds, at the same speed.
+    let tiny = Problem {
+        exit_depth: base.exit_depth * 1e-9,
+        stages: base
+            .stages
+            .iter()
+            .map(|s| Stage {
+                static_force: s.static_force * 1e9,
+                stiffness: s.stiffness * 1e18,
+                drag: s.drag * 1e9,
+                end: s.end * 1e-9,
+                ..*s
+            })
+            .collect(),
+        ..base
+    };
+    let far =
+        staged(1.0, 300.0, 1e6 + 0.25, &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)]);
+    // An ulp of the depth counts 4e6 times in the quarter of a metre behind 1e6 m.
+    for (problem, condition) in [(tiny, 1.0), (far, 4e6)] {
+        let flight = subject.flight(&problem)?;
+        let exact = exact(&problem)?.values();
+        worst = worse(worst, (flight.end.time / exact.end.time - 1.0).abs() / condition);
+        let margin = exact_margin(&problem)?;
+        worst = worse(worst, (flight.exit_margin.unwrap_or(f64::NAN) - margin).abs() / condition);
+    }
+    Ok(Measurement::new(worst / subject.promise()))
+}
+
+fn vanishing_speed(subject: &Subject<'_>) -> Found {
+    let mut worst = 0.0;
+    for power in [0, -3, -6, -9, -12, -20, -30] {
+        let speed = 10f64.powi(power);
+        let flight = subject.flight(&staged(2.0, speed, f64::INFINITY, &[Stage::tunnel(1e5, 3.0)]))?;
+        let depth = (flight.end.depth / (speed * speed / 1e5) - 1.0).abs();
+        let time = (flight.end.time / (2.0 * speed / 1e5) - 1.0).abs();
+        // The drag takes Q V0²/(2 P) of the depth, which counts at the first speeds.
+        let drag = 3.0 * speed * speed / 1e5;
+        worst = worse(worst, (worse(depth, time) - drag).max(0.0));
+    }
+    Ok(Measurement::new(worst / subject.promise()))
+}
+
+fn laws_outside_their_range(_: &Subject<'_>) -> Found {
+    let mut worst = 0.0;
+    for (name, text) in SHIPPED {
+        let scene = Scene::from_toml(text, name)?;
+        for stage in scene.problem()?.stages {
+            for x in [-1e3, -1e-3, 0.0, 0.1, 1e3] {
+                for v in [-1e3, -1e-9, 0.0, 1e-9, 1e3] {
+                    let terms = [stage.static_force, stage.stiffness * x, stage.viscosity * v, stage.drag * v * v];
+                    let size = terms.iter().fold(f64::MIN_POSITIVE, |a: f64, b| a.max(b.abs()));
+                    let plain: f64 = terms.iter().sum();
+                    worst = worse(worst, (stage.force(x, v) - plain).abs() / size / f64::EPSILON);
+                }
+            }
+        }
+    }
+    Ok(Measurement::new(worst))
+}
+
+/// Largest error of the end and of the crater's end over `promise`.
+fn errors(subject: &Subject<'_>, problem: &Problem) -> Result<f64, NotMeasured> {
+    let flight = subject.flight(problem)?;
+    let exact = exact(problem)?.values();
+    if !flight.outcome.agrees_with(exact.outcome) {
+        return Err(NotMeasured::broken(format!("{} is {}", exact.outcome, flight.outcome)));
+    }
+    let mut worst = (flight.end.depth / exact.end.depth - 1.0).abs();
+    worst = worse(worst, (flight.end.time / exact.end.time - 1.0).abs());
+    worst = worse(worst, (flight.end.velocity - exact.end.velocity).abs() / problem.impact_speed);
+    if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
+        worst = worse(worst, (found.time / end.time - 1.0).abs());
+        worst = worse(worst, (found.velocity - end.velocity).abs() / problem.impact_speed);
+    }
+    Ok(worst / subject.promise())
+}
+
+fn force_jump(subject: &Subject<'_>) -> Found {
+    let base = resolve(&slab(true), 500.0)?;
+    let mut worst = 0.0;
+    for factor in [0.1, 0.5, 2.0, 10.0] {
+        for exit in [f64::INFINITY, 0.2] {
+            let mut problem = Problem { exit_depth: exit, ..base.clone() };
+            problem.stages[0].stiffness *= factor;
+            worst = worse(worst, errors(subject, &problem)?);
+        }
+    }
+    Ok(Measurement::new(worst))
+}
+
+fn back_again(subject: &Subject<'_>) -> Found {
+    // In the direction back drag is negative, for which there is no closed form.
+    let drag = subject.method_name() != MethodName::ClosedForm;
+    let problem = resolve(&slab(drag), 600.0)?;
+    let there = subject.flight(&problem)?;
+    let back = way_back(&problem, &there).ok_or_else(|| NotMeasured::broken("the projectile does not leave"))?;
+    let again = subject.flight(&back)?;
+    let places: BTreeSet<_> = again.events.iter().map(|event| event.kind).collect();
+    if places != BTreeSet::from([EventKind::StageEnd(0), EventKind::Exit]) {
+        return Err(NotMeasured::broken(format!("in the direction back {places:?}")));
+    }
+    let speed = (again.end.velocity / problem.impact_speed - 1.0).abs();
+    let time = (again.end.time / there.end.time - 1.0).abs();
+    Ok(Measurement::new(worse(speed, time) / subject.promise()))
+}
+
+fn across_the_crater_end(subject: &Subject<'_>) -> Found {
+    let scene = Scene { thickness: None, ..slab(true) };
+    let law = resolve(&scene, 1.0)?;
+    let zero = (law.stages[0].end * law.stages[1].static_force / law.mass).sqrt();
+    let mut worst = 0.0;
+    for j in 1..=15 {
+        for sign in [-1.0, 0.0, 1.0] {
+            let problem = resolve(&scene, zero * (1.0 + sign * 10f64.powi(-j)))?;
+            let (flight, exact) = (subject.flight(&problem)?, exact(&problem)?.values());
+            worst = worse(worst, (flight.end.depth / exact.end.depth - 1.0).abs());
+            worst = worse(worst, (flight.end.time / exact.end.time - 1.0).abs());
+        }
+    }
+    Ok(Measurement::new(worst / subject.promise()))
+}

@@ -1,0 +1,147 @@
+//! Does everything hold at the edges? Checks of events, of step sizes and number range, and of the critical velocity.
+//!
+//! Their claims are those of `verification/edges.toml`. Each check builds scenes that no scene file should hold.
+//! [`crate::studies::extreme_scenes`] does the same for random scenes by the million.
+
+mod critical;
+mod events;
+mod steps;
+
+use twofloat::TwoFloat;
+
+use super::{Subject, solve};
+use crate::integrators::method::{MethodName, RTOL_DEFAULT};
+use crate::integrators::{Detail, Energy, Flight, Taylor};
+use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Scene, Stage, Stages, Target};
+use crate::suite::claim::{Measurement, NotMeasured};
+
+pub use self::{critical::*, events::*, steps::*};
+
+impl Subject<'_> {
+    /// Solution of `problem` at the method's default tolerance.
+    fn flight(&self, problem: &Problem) -> Result<Flight, NotMeasured> {
+        solve(&self.method(None)?, problem, Detail::Events)
+    }
+
+    /// The relative error that the method promises: round-off, or a multiple of its tolerance per step.
+    ///
+    /// The multiples are those by which the adapter widens the library's local tolerance into an error bound.
+    fn promise(&self) -> f64 {
+        match self.method_name() {
+            MethodName::TrBdf2 => 3.0 * RTOL_DEFAULT.powf(2.0 / 3.0),
+            method if method.needs_diffsol() => 10.0 * RTOL_DEFAULT,
+            _ => f64::EPSILON,
+        }
+    }
+}
+
+/// Counts expectations, and states the first that fails.
+#[derive(Debug, Default)]
+struct Violations {
+    checks: usize,
+    count: usize,
+    first: String,
+    notes: Vec<String>,
+}
+
+impl Violations {
+    fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        self.checks += 1;
+        if !holds {
+            self.count += 1;
+            if self.count == 1 {
+                self.first = what();
+            }
+        }
+    }
+
+    fn measurement(self) -> Measurement {
+        let mut remark = format!("{} checks", self.checks);
+        for note in self.notes {
+            remark = format!("{remark}; {note}");
+        }
+        if self.count > 0 {
+            remark = format!("{remark}; first violation: {}", self.first);
+        }
+        // No check at all shows nothing.
+        Measurement::new(if self.checks == 0 { f64::NAN } else { self.count as f64 }).remark(remark)
+    }
+}
+
+/// The solution in double-double.
+fn exact(problem: &Problem) -> Result<Flight<TwoFloat>, NotMeasured> {
+    Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).map_err(NotMeasured::broken)
+}
+
+/// The exit margin in double-double, rounded: its sign is the outcome.
+fn exact_margin(problem: &Problem) -> Result<f64, NotMeasured> {
+    let margin = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>())?;
+    margin.map(|(value, ..)| value.hi()).ok_or_else(|| NotMeasured::broken("the problem has no exit"))
+}
+
+/// Whether `outcome` is right for a margin of that sign; `Undecided` is not wrong.
+fn is_right(outcome: Outcome, margin: f64) -> bool {
+    match outcome {
+        Outcome::Undecided => true,
+        Outcome::Perforated => margin >= 0.0,
+        _ => margin < 0.0,
+    }
+}
+
+/// A scene of the paper's size for which other programs found a wrong critical velocity: 0.9 kg, 26.9 mm,
+/// 36 MPa, S 12, k 2, H 0.30 m; an ogive of N* 0.106 in 2370 kg/m³, or no drag.
+fn slab(drag: bool) -> Scene {
+    let concrete = Concrete {
+        diameter: 0.0269,
+        nose_factor: 0.106,
+        strength: 36e6,
+        density: if drag { 2370.0 } else { 0.0 },
+        static_factor: 12.0,
+        inertia_factor: 1.0,
+        crater_ratio: 2.0,
+        crater_stiffness: CraterStiffness::Continuous,
+        layers: Vec::new(),
+    };
+    Scene { thickness: Some(0.30), velocity: Some(400.0), ..Scene::of_concrete(0.9, concrete) }
+}
+
+fn resolve(scene: &Scene, speed: f64) -> Result<Problem, NotMeasured> {
+    scene.resolve(speed).map_err(NotMeasured::broken)
+}
+
+fn critical_of(scene: &Scene) -> Result<f64, NotMeasured> {
+    crate::studies::critical_velocity::exact(scene).map_err(NotMeasured::broken)
+}
+
+/// A problem of stages: laws with their ends.
+fn staged(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
+    Problem { mass, impact_speed, exit_depth, stages: Stages::from_slice(stages), crater: None, target: Target::Stages }
+}
+
+/// Crater and tunnel by their coefficients.
+fn concrete(mass: f64, impact_speed: f64, exit_depth: f64, crater: (f64, f64), tunnel: (f64, f64)) -> Problem {
+    Problem {
+        crater: Some(0),
+        target: Target::CraterAndTunnel,
+        ..staged(
+            mass,
+            impact_speed,
+            exit_depth,
+            &[Stage::crater(crater.0, crater.1), Stage::tunnel(tunnel.0, tunnel.1)],
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_without_expectations_shows_nothing() {
+        assert!(Violations::default().measurement().value.is_nan());
+        let mut one = Violations::default();
+        one.expect(false, || "it is not so".to_owned());
+        let measurement = one.measurement();
+        assert!(measurement.value == 1.0 && measurement.remark.contains("it is not so"));
+    }
+}

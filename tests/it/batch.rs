@@ -1,0 +1,280 @@
+//! `penetrode batch` from outside: every answer against 50 digits, the same bytes for any threads and neighbours,
+//! refusals at their place, and nothing half written.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use assert_cmd::Command;
+use penetrode::integrators::lanes::Summary;
+use penetrode::physics::reference::Source;
+use penetrode::physics::{CraterStiffness, Outcome, Scene, State};
+use penetrode::studies::random_scenes::{Generator, errors_of};
+
+const HEADER: &str = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,thickness_m,S,B,k,crater_stiffness_n_m,\
+                      velocity_m_s";
+
+/// A scene as a row.
+fn row(scene: &Scene) -> String {
+    let concrete = scene.concrete().unwrap();
+    let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    let stiffness = match concrete.crater_stiffness {
+        CraterStiffness::Continuous => None,
+        CraterStiffness::Given(stiffness) => Some(stiffness),
+    };
+    format!(
+        "{},{},{},{},{},{},{},{},{},{},{}",
+        scene.mass,
+        concrete.diameter,
+        concrete.nose_factor,
+        concrete.strength,
+        concrete.density,
+        optional(scene.thickness),
+        concrete.static_factor,
+        concrete.inertia_factor,
+        concrete.crater_ratio,
+        optional(stiffness),
+        scene.velocity.unwrap(),
+    )
+}
+
+fn table(rows: &[String]) -> String {
+    let mut text = format!("{HEADER}\n");
+    for row in rows {
+        writeln!(text, "{row}").unwrap();
+    }
+    text
+}
+
+fn random_scenes(count: usize) -> Vec<Scene> {
+    let mut generator = Generator::new(1, "tests/batch");
+    (0..count).map(|_| generator.next_scene()).collect()
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::cargo_bin("penetrode").unwrap().current_dir(folder).arg("batch").args(arguments).output().unwrap()
+}
+
+/// Results of the table `scenes` with more `arguments`.
+fn results(scenes: &str, arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
+    let mut all = vec!["scenes.csv", "--out", "results.csv"];
+    all.extend(arguments);
+    let output = run(folder.path(), &all);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    fs::read_to_string(folder.path().join("results.csv")).unwrap()
+}
+
+/// One line of results, read back.
+fn flight(line: &str) -> (Summary, Option<f64>) {
+    let cells: Vec<&str> = line.split(',').collect();
+    let [_, outcome, depth, time, velocity, crater_time, crater_velocity, margin, critical, error] = cells[..] else {
+        panic!("{line}")
+    };
+    assert_eq!(error, "", "{line}");
+    let number = |cell: &str| (!cell.is_empty()).then(|| cell.parse::<f64>().unwrap());
+    let outcomes = [Outcome::StoppedInCrater, Outcome::StoppedInTunnel, Outcome::Perforated, Outcome::Undecided];
+    let end = State { time: number(time).unwrap(), depth: number(depth).unwrap(), velocity: number(velocity).unwrap() };
+    let summary = Summary {
+        outcome: outcomes.into_iter().find(|o| o.name() == outcome).unwrap(),
+        stage: 0,
+        end,
+        crater_end: number(crater_time).map(|time| State {
+            time,
+            depth: 0.0,
+            velocity: number(crater_velocity).unwrap(),
+        }),
+        exit_margin: number(margin),
+        exit_margin_error: None,
+        cost: penetrode::integrators::Cost::default(),
+    };
+    (summary, number(critical))
+}
+
+#[test]
+fn a_thousand_random_scenes_agree_with_50_digits_in_every_outcome_and_number() {
+    let scenes = random_scenes(1000);
+    let rows: Vec<String> = scenes.iter().map(row).collect();
+    let text = results(&table(&rows), &[]);
+    let lines: Vec<&str> = text.lines().skip(1).collect();
+    assert_eq!(lines.len(), scenes.len());
+    let (mut worst, mut undecided) = (0.0_f64, 0);
+    for (index, (scene, line)) in scenes.iter().zip(lines).enumerate() {
+        assert!(line.starts_with(&format!("{},", index + 1)), "{line}");
+        let (found, _) = flight(line);
+        assert_eq!(found.exit_margin.is_some(), scene.thickness.is_some(), "{line}");
+        undecided += usize::from(found.outcome == Outcome::Undecided);
+        let errors = errors_of(Source::Scene(scene, scene.velocity.unwrap()), &found.flight())
+            .unwrap_or_else(|e| panic!("{line}: {e}"));
+        // In units of rounding, over max(1, condition number); the goal is 5e-15 in depth, 22 of them.
+        worst = errors.0.iter().fold(worst, |worst, (error, _)| if *error <= worst { worst } else { *error });
+    }
+    assert!(worst <= 8.0, "{worst} rounding units");
+    assert!(undecided <= 1, "{undecided} undecided");
+}
+
+#[test]
+fn threads_and_neighbours_change_no_bit() {
+    let mut rows: Vec<String> = random_scenes(3000).iter().map(row).collect();
+    let one = results(&table(&rows), &["--threads", "1"]);
+    assert_eq!(one, results(&table(&rows), &["--threads", "2"]));
+    assert_eq!(one, results(&table(&rows), &["--threads", "7"]));
+    // Row i moves to place 7 i mod 3001 - 1, so that everybody has other neighbours and another lane.
+    let answer_of = |text: &str| -> Vec<String> {
+        text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect()
+    };
+    let answers = answer_of(&one);
+    let places: Vec<usize> = (1..=3000).map(|i| 7 * i % 3001 - 1).collect();
+    let mut moved = vec![String::new(); 3000];
+    for (row, place) in rows.drain(..).zip(&places) {
+        moved[*place] = row;
+    }
+    let shuffled = answer_of(&results(&table(&moved), &[]));
+    for (answer, place) in answers.iter().zip(&places) {
+        assert_eq!(*answer, shuffled[*place]);
+    }
+}
+
+#[test]
+fn lanes_and_the_scalar_method_tell_the_same() {
+    let rows: Vec<String> = random_scenes(300).iter().map(row).collect();
+    let lanes = results(&table(&rows), &[]);
+    // The least tolerance is that of the default, and is solved row by row.
+    let scalar = results(&table(&rows), &["--rtol", "1e-15"]);
+    assert_ne!(lanes, scalar);
+    for (a, b) in lanes.lines().zip(scalar.lines()).skip(1) {
+        let ((a, _), (b, _)) = (flight(a), flight(b));
+        assert_eq!(a.outcome, b.outcome);
+        assert!((a.end.depth / b.end.depth - 1.0).abs() < 1e-14, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn critical_velocities_are_those_of_the_closed_form() {
+    let scenes = random_scenes(60);
+    let rows: Vec<String> = scenes.iter().map(row).collect();
+    for method in ["taylor", "energy"] {
+        let text = results(&table(&rows), &["--critical", "--method", method]);
+        for (line, scene) in text.lines().skip(1).zip(&scenes) {
+            let (_, critical) = flight(line);
+            assert_eq!(critical.is_some(), scene.thickness.is_some(), "{line}");
+            if let Some(critical) = critical {
+                let exact = penetrode::studies::critical_velocity::exact(scene).unwrap();
+                assert!((critical / exact - 1.0).abs() < 1e-12, "{method}: {critical} {exact}");
+            }
+        }
+    }
+}
+
+#[test]
+fn any_method_flies_a_table_and_refuses_options_that_it_does_not_use() {
+    let rows = vec![row(&random_scenes(1)[0])];
+    for method in ["taylor", "energy", "central-difference", "closed-form"] {
+        assert_eq!(results(&table(&rows), &["--method", method]).lines().count(), 2, "{method}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scenes.csv"), table(&rows)).unwrap();
+    let output = run(folder.path(), &["scenes.csv", "--out", "r.csv", "--dt", "1us"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!folder.path().join("r.csv").exists());
+}
+
+#[test]
+fn a_bad_row_says_what_is_wrong_and_the_others_are_answered() {
+    let good = "2,0.05,0.72,36e6,2300,,,,,,300";
+    let bad = "2,0.05,1.72,36e6,2300,,,,,,300";
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = format!("{HEADER}\n{good}\n{bad}\n2,0.05\n{good}\n\"2 kg\",0.05,0.72,36e6,2300,,,,,,300\n");
+    fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
+    let output = run(folder.path(), &["scenes.csv", "--out", "results.csv"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "5 rows: 3 bad, 0 undecided\n");
+    assert!(output.stdout.is_empty());
+    let text = fs::read_to_string(folder.path().join("results.csv")).unwrap();
+    let lines: Vec<&str> = text.lines().skip(1).collect();
+    assert_eq!(lines[0][1..], lines[3][1..]);
+    assert_eq!(
+        lines[1],
+        "2,,,,,,,,,\"line 3: the nose factor N* = 1.72 is not admissible: it must be a number from 0 to 1\""
+    );
+    assert_eq!(lines[2], "3,,,,,,,,,\"line 4: 2 cells in a table of 11 columns\"");
+    assert_eq!(lines[4], "5,,,,,,,,,\"line 6, column 1: `2 kg` in `mass_kg` is not a number\"");
+}
+
+#[test]
+fn a_flight_stays_where_its_critical_velocity_fails_or_is_undecided() {
+    // Drag over 2 km takes all that a number can hold; over 40 m, what the closed form's margin can resolve.
+    let of_thickness = |thickness: &str| format!("2,0.05,0.72,36e6,2300,{thickness},,,,,300");
+    let folder = tempfile::tempdir().unwrap();
+    for (thickness, bad, undecided, cause) in [("2000", 1, 0, "no critical velocity"), ("40", 0, 1, "V_c is undecided")]
+    {
+        let scenes = format!("{HEADER}\n{}\n{}\n", of_thickness(""), of_thickness(thickness));
+        fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
+        let output = run(folder.path(), &["scenes.csv", "--out", "r.csv", "--critical", "--method", "closed-form"]);
+        let said = format!("2 rows: {bad} bad, {undecided} undecided\n");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), said);
+        assert_eq!(output.status.code(), Some(if bad > 0 { 3 } else { 0 }));
+        let text = fs::read_to_string(folder.path().join("r.csv")).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.splitn(10, ',').collect()).collect();
+        // The flight of the thick slab ends in it as in the semi-infinite target.
+        assert_eq!(rows[1][1..7], rows[0][1..7]);
+        assert_eq!((rows[0][8], rows[0][9], rows[1][8]), ("", "", ""));
+        assert!(rows[1][9].starts_with(&format!("\"line 3: {cause}")), "{}", rows[1][9]);
+    }
+}
+
+#[test]
+fn a_table_without_rows_has_results_without_rows() {
+    assert_eq!(results(&format!("{HEADER}\n"), &[]).lines().count(), 1);
+}
+
+#[test]
+fn results_that_would_replace_the_scenes_are_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let refusal = |scenes: &[u8], out: &str| {
+        fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
+        let output = run(folder.path(), &["scenes.csv", "--out", out]);
+        assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stdout.is_empty());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "something was left behind");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(refusal(table(&[]).as_bytes(), "scenes.csv").contains("would replace the scenes"));
+    assert!(refusal(table(&[]).as_bytes(), "./scenes.csv").contains("would replace the scenes"));
+    if !cfg!(feature = "parquet") {
+        let said = refusal(table(&[]).as_bytes(), "r.parquet");
+        assert!(said.contains("CSV only") && said.contains("build with `--features parquet`"), "{said}");
+    }
+}
+
+#[test]
+fn a_table_may_come_from_a_pipe_and_go_into_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::cargo_bin("penetrode")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["batch", "-", "--out", "-"])
+        .write_stdin(format!("{HEADER}\n2,0.05,0.72,36e6,2300,,,,,,300\n"))
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(String::from_utf8(output.stdout).unwrap().contains("\n1,stopped-in-tunnel,0.1448"));
+}
+
+#[test]
+fn random_tables_are_fixed_by_their_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |scenes: &str, out: &str| {
+        assert_eq!(run(folder.path(), &[scenes, "--out", out]).status.code(), Some(0));
+        fs::read_to_string(folder.path().join(out)).unwrap()
+    };
+    let long = make("random:2000:7", "a.csv");
+    let short = make("random:1500:7", "b.csv");
+    assert_eq!(short.lines().count(), 1501);
+    assert!(long.starts_with(&short));
+    assert_ne!(short, make("random:1500:8", "c.csv"));
+}

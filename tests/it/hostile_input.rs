@@ -1,0 +1,192 @@
+//! Files that are no scenes, suites or tables: each is refused with its place, its cause and a remedy, fast, in little
+//! memory, and nothing is written.
+//!
+//! The files are in `tests/hostile/`, one folder a kind; their messages are in `tests/it/snapshots/`. Review a change
+//! with `INSTA_UPDATE=always cargo test --test it hostile_input` and `git diff`.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use insta::assert_snapshot;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_penetrode");
+
+/// Address space of the program [KiB]: threads reserve some hundred MiB and use little of it.
+const MEMORY_KIB: u32 = 1 << 20;
+
+/// Processor time (s), which is no less than the wall's on one thread, and does not depend on who else is at work.
+const SECONDS: u32 = 1;
+
+fn corpus() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile")
+}
+
+/// Runs the program in `folder` under the limits of memory and time.
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new("sh");
+    command.arg("-c").arg(format!("ulimit -v {MEMORY_KIB}; ulimit -t {SECONDS}; exec \"$0\" \"$@\""));
+    command.arg(PROGRAM).args(arguments).current_dir(folder).output().unwrap()
+}
+
+/// Names of what is in `folder`.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// What the program says of `bytes` in a file `name`, `{}` in `arguments` being the file; nothing else happens.
+fn refusal_of(name: &str, bytes: &[u8], arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join(name), bytes).unwrap();
+    // Beside each file lies what its command needs besides.
+    fs::copy(corpus().join("../../verification/scenes/paper-slab.toml"), folder.path().join("slab.toml")).unwrap();
+    let before = names(folder.path());
+    let arguments: Vec<_> = arguments.iter().map(|argument| argument.replace("{}", name)).collect();
+    let output = run(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{name}: {:?}: {said}", output.status);
+    assert!(output.stdout.is_empty(), "{name}: something is on standard output");
+    assert_eq!(names(folder.path()), before, "{name}: something was written");
+    assert!(!said.chars().any(|c| c.is_control() && c != '\n'), "{name}: {said:?}");
+    assert!(said.len() < 4000, "{name}: {} bytes of message", said.len());
+    said
+}
+
+/// The refusals of all files of `kind`, by name.
+fn refusals(kind: &str, arguments: &[&str]) -> String {
+    let folder = corpus().join(kind);
+    let mut all = String::new();
+    for name in names(&folder) {
+        let said = refusal_of(&name, &fs::read(folder.join(&name)).unwrap(), arguments);
+        writeln!(all, "== {name}\n{said}").unwrap();
+    }
+    all
+}
+
+#[test]
+fn the_corpus_is_of_eighty_files_and_more() {
+    let count: usize = names(&corpus()).iter().map(|kind| names(&corpus().join(kind)).len()).sum();
+    assert!(count >= 80, "{count}");
+}
+
+#[test]
+fn a_bad_scene_is_refused_at_its_place() {
+    assert_snapshot!("scenes", refusals("scene", &["solve", "{}", "--trajectory", "out.csv"]));
+}
+
+#[test]
+fn a_bad_suite_is_refused_at_its_place() {
+    assert_snapshot!("suites", refusals("suite", &["verify", "{}", "--out", "report"]));
+}
+
+#[test]
+fn a_bad_table_of_scenes_is_refused_at_its_place() {
+    let said = refusals("batch", &["batch", "{}", "--out", "out.csv"]);
+    // Nothing is on standard output either, not even the names of the columns.
+    assert!(refusals("batch", &["batch", "{}", "--out", "-"]) == said);
+    assert_snapshot!("batch_tables", said);
+}
+
+#[test]
+fn a_bad_table_of_step_sizes_is_refused_at_its_place() {
+    assert_snapshot!("audit_tables", refusals("audit", &["audit", "{}"]));
+}
+
+#[test]
+fn a_bad_table_of_measured_points_is_refused_at_its_place() {
+    let sweep = ["sweep", "slab.toml", "--vary", "H/d=1:5:3", "--data", "{}", "--out", "out.csv"];
+    assert_snapshot!("measured_points", refusals("points", &sweep));
+}
+
+#[test]
+fn a_bad_table_of_experiments_is_refused_at_its_place() {
+    assert_snapshot!("experiments", refusals("experiments", &["experiments", "{}", "--out", "out.csv"]));
+}
+
+/// The results say what is wrong with a row that is no scene, and the others are solved: exit code 3.
+#[test]
+fn a_bad_row_is_reported_in_its_own_line_of_the_results() {
+    let kind = corpus().join("rows");
+    let mut all = String::new();
+    for name in names(&kind) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::copy(kind.join(&name), folder.path().join(&name)).unwrap();
+        let output = run(folder.path(), &["batch", &name, "--out", "out.csv"]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{name}: {said}");
+        let results = fs::read_to_string(folder.path().join("out.csv")).unwrap();
+        assert!(!results.chars().any(|c| c.is_control() && c != '\n'), "{name}: {results:?}");
+        write!(all, "== {name}\n{said}").unwrap();
+        for row in csv::Reader::from_reader(results.as_bytes()).records() {
+            let row = row.unwrap();
+            let error = row.iter().next_back().unwrap();
+            // A spreadsheet takes a cell that begins so for a formula.
+            assert!(!error.starts_with(['=', '+', '-', '@']), "{name}: {error}");
+            writeln!(all, "row {}: {}", &row[0], if error.is_empty() { &row[1] } else { error }).unwrap();
+        }
+        all.push('\n');
+    }
+    assert_snapshot!("batch_rows", all);
+}
+
+#[test]
+fn a_hundred_megabytes_are_refused_and_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    // Holes: 100 MB that need no disk.
+    for name in ["big.toml", "big.csv"] {
+        fs::File::create(folder.path().join(name)).unwrap().set_len(100 << 20).unwrap();
+    }
+    // Lines without end would have to be read: the whole of it fits in no megabyte.
+    fs::write(folder.path().join("long.csv"), format!("dt_s,depth_m\n{}", "9".repeat(8 << 20))).unwrap();
+    let mut all = String::new();
+    for arguments in [
+        &["solve", "big.toml"][..],
+        &["critical", "big.toml"],
+        &["verify", "big.toml", "--out", "report"],
+        &["audit", "big.csv"],
+        &["batch", "big.csv", "--out", "out.csv"],
+        &["batch", "long.csv", "--out", "out.csv"],
+        &["sweep", "big.toml", "--vary", "H/d=1:5:3"],
+        &["experiments", "big.csv"],
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stdout.is_empty());
+        writeln!(all, "== {}\n{}", arguments.join(" "), String::from_utf8(output.stderr).unwrap()).unwrap();
+    }
+    let slab = corpus().join("../../verification/scenes/paper-slab.toml");
+    let output = run(folder.path(), &["sweep", slab.to_str().unwrap(), "--vary", "H/d=1:5:3", "--data", "big.csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    writeln!(all, "== sweep --data big.csv\n{}", String::from_utf8(output.stderr).unwrap()).unwrap();
+    assert_eq!(names(folder.path()), ["big.csv", "big.toml", "long.csv"]);
+    assert_snapshot!("large_files", all);
+}
+
+#[test]
+fn what_is_no_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("folder")).unwrap();
+    fs::copy(corpus().join("../../verification/scenes/paper-slab.toml"), folder.path().join("slab.toml")).unwrap();
+    let mut all = String::new();
+    let points = ["sweep", "slab.toml", "--vary", "H/d=1:5:3", "--data"];
+    for command in [&["solve"][..], &["verify"], &["audit"], &["batch", "--out", "out.csv"], &points, &["experiments"]]
+    {
+        // The last is a file that the system refuses to read, also to root.
+        for path in ["missing", "folder", "/proc/self/mem"] {
+            let arguments: Vec<_> = command.iter().copied().chain([path]).collect();
+            let output = run(folder.path(), &arguments);
+            let said = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+            assert!(output.stdout.is_empty());
+            writeln!(all, "== {} {path}\n{said}", command[0]).unwrap();
+        }
+    }
+    assert_eq!(names(folder.path()), ["folder", "slab.toml"]);
+    assert_snapshot!("no_files", all);
+}

@@ -1,0 +1,174 @@
+//! Layered targets, seen from outside: a scene file with layers becomes stages, and every road through them agrees.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+use penetrode::integrators::{ClosedForm, Detail, Energy, Flight, IntegrationError, Integrator, Taylor};
+use penetrode::physics::{EventKind, Outcome, Problem, Scene};
+use penetrode::studies::critical_velocity;
+use twofloat::TwoFloat;
+
+const LAYERED: &str = include_str!("../../verification/scenes/layered.toml");
+
+fn scene(text: &str) -> Scene {
+    Scene::from_toml(text, "test").unwrap_or_else(|error| panic!("{}", error.render(false)))
+}
+
+/// Layers of the given bodies behind a 50 mm, 10 kg ogive with k = 2, at `speed` (m/s).
+fn layers(speed: f64, bodies: &[&str]) -> Scene {
+    let layers: Vec<String> = bodies.iter().map(|body| format!("[[target.layer]]\n{body}\n")).collect();
+    scene(&format!(
+        "[projectile]\nmass = 10\ndiameter = 0.05\nnose = {{ shape = \"ogive\", caliber_radius_head = 3.0 }}\n{}\n\
+         [impact]\nvelocity = {speed}\n",
+        layers.concat()
+    ))
+}
+
+const FACE: &str = "thickness = 0.12\nstrength = 60e6\ndensity = 2450";
+const GAP: &str = "thickness = 0.3\nstrength = 0\ndensity = 0";
+const BACKING: &str = "thickness = 0.2\nstrength = 40e6\ndensity = 2350";
+
+/// Largest relative difference of depth, times and velocities (these by V0) of two flights with the same events.
+fn difference(a: &Flight, b: &Flight, problem: &Problem) -> f64 {
+    assert_eq!((a.outcome, a.stage), (b.outcome, b.stage));
+    let kinds = |flight: &Flight| flight.events.iter().map(|e| e.kind).collect::<Vec<_>>();
+    assert_eq!(kinds(a), kinds(b));
+    let mut worst = 0.0_f64;
+    for (a, b) in a.events.iter().zip(&b.events) {
+        worst = worst
+            .max((a.state.time / b.state.time - 1.0).abs())
+            .max((a.state.depth / b.state.depth - 1.0).abs())
+            .max((a.state.velocity - b.state.velocity).abs() / problem.impact_speed);
+    }
+    worst
+}
+
+#[test]
+fn three_layers_agree_with_the_piecewise_closed_form_to_1e_13() {
+    for speed in [60.0, 120.0, 180.0, 210.0, 250.0, 290.0, 320.0, 500.0] {
+        let problem = scene(LAYERED).resolve(speed).unwrap();
+        let exact = ClosedForm.solve(&problem, Detail::Events).unwrap();
+        for method in [&Taylor::default() as &dyn Integrator, &Energy::new()] {
+            let flight = method.solve(&problem, Detail::Events).unwrap();
+            let worst = difference(&flight, &exact, &problem);
+            assert!(worst < 1e-13, "{} at {speed} m/s: {worst:e}", method.name());
+        }
+    }
+}
+
+#[test]
+fn every_boundary_is_an_event_and_the_force_jumps_there() {
+    let problem = scene(LAYERED).resolve(500.0).unwrap();
+    let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+    let kinds: Vec<_> = flight.events.iter().map(|e| e.kind).collect();
+    assert_eq!(
+        kinds,
+        [EventKind::CraterEnd, EventKind::StageEnd(1), EventKind::StageEnd(2), EventKind::Exit],
+        "crater, face, core, backing"
+    );
+    assert_eq!(flight.outcome, Outcome::Perforated);
+    for (before, kind) in [(1, EventKind::StageEnd(1)), (2, EventKind::StageEnd(2))] {
+        let state = flight.at(kind).unwrap();
+        let force = |stage: usize| problem.stages[stage].force(state.depth, state.velocity);
+        assert!((force(before) / force(before + 1) - 1.0).abs() > 0.05, "no jump at {kind:?}");
+    }
+    // The force is continuous where the crater ends, at that very speed.
+    let end = flight.crater_end().unwrap();
+    let force = |stage: usize| problem.stages[stage].force(end.depth, end.velocity);
+    assert!((force(0) / force(1) - 1.0).abs() < 1e-14);
+}
+
+#[test]
+fn crater_takes_its_constant_from_the_layer_just_beyond_it() {
+    // k d = 100 mm: a face of 60 mm lies within the crater, and the layer behind it gives P and Q.
+    let thin = "thickness = 0.06\nstrength = 10e6\ndensity = 1000";
+    let through = layers(300.0, &[thin, BACKING]).problem().unwrap();
+    let alone = layers(300.0, &["thickness = 0.26\nstrength = 40e6\ndensity = 2350"]).problem().unwrap();
+    assert_eq!(through.stages[0], alone.stages[0]);
+    assert_eq!(through.stages.len(), 2);
+}
+
+#[test]
+fn an_air_gap_is_crossed_at_constant_speed() {
+    let problem = layers(320.0, &[FACE, GAP, BACKING]).problem().unwrap();
+    let exact = ClosedForm.solve(&problem, Detail::Events).unwrap();
+    for method in [&Taylor::default() as &dyn Integrator, &Energy::new()] {
+        let flight = method.solve(&problem, Detail::Events).unwrap();
+        let worst = difference(&flight, &exact, &problem);
+        assert!(worst < 1e-13, "{}: {worst:e}", method.name());
+        let (into, out) = (flight.at(EventKind::StageEnd(1)).unwrap(), flight.at(EventKind::StageEnd(2)).unwrap());
+        assert!((into.velocity - out.velocity).abs() <= f64::EPSILON * into.velocity, "{}", method.name());
+        assert!(((out.time - into.time) * into.velocity / 0.3 - 1.0).abs() < 1e-14, "{}", method.name());
+    }
+    assert!(matches!(exact.outcome, Outcome::Stopped | Outcome::Perforated));
+}
+
+#[test]
+fn a_crater_that_ends_in_a_gap_meets_no_force() {
+    let problem =
+        layers(320.0, &["thickness = 0.05\nstrength = 60e6\ndensity = 2450", GAP, BACKING]).problem().unwrap();
+    let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+    assert_eq!(flight.crater_end().unwrap().velocity, 320.0);
+    assert_eq!(flight.at(EventKind::StageEnd(1)).unwrap().velocity, 320.0);
+}
+
+#[test]
+fn a_viscous_layer_without_drag_has_a_closed_form() {
+    let viscous = "thickness = 0.4\nstrength = 40e6\ndensity = 0\nviscosity = 2e3";
+    for speed in [150.0, 250.0, 400.0] {
+        let problem = layers(speed, &[FACE, viscous]).problem().unwrap();
+        let exact = ClosedForm.solve(&problem, Detail::Events).unwrap();
+        let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+        let worst = difference(&flight, &exact, &problem);
+        assert!(worst < 1e-13, "{speed}: {worst:e}");
+    }
+}
+
+/// With viscosity and drag nothing is known in elementary functions: the reference is the same series in twice the
+/// digits, whose own truncation lies at 1e-32.
+#[test]
+fn a_viscous_layer_with_drag_agrees_with_a_refined_reference() {
+    let viscous = "thickness = 0.4\nstrength = 40e6\ndensity = 2350\nviscosity = 2e3";
+    for speed in [150.0, 250.0, 400.0] {
+        let problem = layers(speed, &[FACE, viscous, BACKING]).problem().unwrap();
+        if speed > 200.0 {
+            let refused = ClosedForm.solve(&problem, Detail::Events).unwrap_err();
+            assert!(matches!(refused, IntegrationError::Refused { .. }), "{refused}");
+        }
+        let refined = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap().values();
+        let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+        let worst = difference(&flight, &refined, &problem);
+        assert!(worst < 1e-13, "{speed}: {worst:e}");
+        assert!(refined.cost.steps > 0);
+    }
+}
+
+#[test]
+fn critical_velocity_of_layers_is_the_piecewise_one() {
+    for bodies in [&[FACE, BACKING][..], &[FACE, GAP, BACKING], &["thickness = 0.08\nstrength = 30e6\ndensity = 2300"]]
+    {
+        let scene = layers(300.0, bodies);
+        let exact = critical_velocity::exact(&scene).unwrap();
+        for method in [&Taylor::default() as &dyn Integrator, &Energy::new()] {
+            let found = critical_velocity::of_scene(&scene, method).unwrap().velocity;
+            assert!((found / exact - 1.0).abs() < 1e-13, "{} {bodies:?}: {found} {exact}", method.name());
+        }
+        // Just above it perforates, just below it does not.
+        let outcome = |factor: f64| {
+            Taylor::default().solve(&scene.resolve(exact * factor).unwrap(), Detail::End).unwrap().outcome
+        };
+        assert_eq!((outcome(1.0 + 1e-12), outcome(1.0 - 1e-12)), (Outcome::Perforated, Outcome::Stopped));
+    }
+}
+
+#[test]
+fn one_layer_is_the_homogeneous_target() {
+    let layered = layers(300.0, &["thickness = 0.5\nstrength = 40e6\ndensity = 2350"]);
+    let plain = scene(
+        "[projectile]\nmass = 10\ndiameter = 0.05\nnose = { shape = \"ogive\", caliber_radius_head = 3.0 }\n\
+         [target]\nthickness = 0.5\nstrength = 40e6\ndensity = 2350\n[impact]\nvelocity = 300\n",
+    );
+    let (a, b) = (layered.problem().unwrap(), plain.problem().unwrap());
+    assert_eq!((a.stages, a.exit_depth), (b.stages, b.exit_depth));
+    let (a, b) = (critical_velocity::exact(&layered).unwrap(), critical_velocity::exact(&plain).unwrap());
+    assert!((a / b - 1.0).abs() < 1e-15, "{a} {b}");
+}

@@ -1,0 +1,92 @@
+//! The stress cases pass, random scenes show no defect, and scenes that once made one are solved again.
+#![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use penetrode::physics::Scene;
+use penetrode::studies::extreme_scenes::{self, MethodVerdict};
+use penetrode::suite::checks::PeerAnswers;
+use penetrode::suite::{Judged, Suite, Verdict};
+
+#[test]
+fn every_stress_case_passes_for_every_method_that_this_build_has() {
+    // At seed 11, k/N is 1e4 in a scene of S3: its crater constant, rounded to f64, once passed for a fault.
+    let suite = Suite::edges().unwrap();
+    for judged in [1, 11].map(|seed| suite.run(seed, &PeerAnswers::default(), &|_| {})) {
+        let bad: Vec<&Judged> =
+            judged.iter().filter(|case| !matches!(case.verdict, Verdict::Passed | Verdict::Skipped)).collect();
+        assert!(bad.is_empty(), "{bad:#?}");
+        let passed = judged.iter().filter(|case| case.verdict == Verdict::Passed).count();
+        assert!(passed > 60, "{passed}");
+        // Only a method that is not built, or that has no viscosity, may be left out.
+        for case in judged.iter().filter(|case| case.verdict == Verdict::Skipped) {
+            assert!(case.remark.contains("leaves out") || case.remark.contains("cannot treat"), "{case:?}");
+        }
+    }
+}
+
+/// One run of the command: its text fits a terminal, its folder holds the page, and what is not ours stays.
+#[test]
+fn the_command_writes_every_case_as_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let run = |arguments: &[&str]| {
+        let output = Command::cargo_bin("penetrode").unwrap().args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let (code, text, err) = run(&["stress", "--cases", "100", "--out", out.to_str().unwrap()]);
+    assert_eq!(code, 0, "{text}{err}");
+    assert!(text.contains("E17") && text.contains("random scenes: 100"), "{text}");
+    for line in text.lines().filter(|line| !line.starts_with("report: ")) {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    let report = fs::read_to_string(out.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let schema: serde_json::Value = serde_json::from_str(&run(&["schema", "stress"]).1).unwrap();
+    assert!(jsonschema::validator_for(&schema).unwrap().is_valid(&report));
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    for claim in Suite::edges().unwrap().claims {
+        assert!(page.contains(&format!("<code>{}</code>", claim.table)), "{}", claim.id);
+    }
+    assert_eq!(report["claims"].as_array().unwrap().iter().filter(|c| c["id"] == "random-scenes").count(), 1);
+    for file in ["figures/stability-map.svg", "tables/rounding-floor.csv", "tables/stiffness.csv"] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+    let strange = folder.path().join("strange");
+    fs::create_dir(&strange).unwrap();
+    fs::write(strange.join("mine.txt"), "mine").unwrap();
+    let (code, said, err) = run(&["stress", "--out", strange.to_str().unwrap()]);
+    assert!(code == 2 && said.is_empty() && err.contains("is not a report of penetrode"), "{err}");
+    assert_eq!(fs::read_to_string(strange.join("mine.txt")).unwrap(), "mine");
+}
+
+#[test]
+fn random_scenes_over_the_whole_range_show_no_defect() {
+    let summary = extreme_scenes::run(4000, 7, &|| {});
+    assert_eq!(summary.defects, []);
+    assert_eq!(summary.scenes, 4000);
+}
+
+/// Each file says in its first line what it once showed.
+#[test]
+fn scenes_that_once_showed_a_defect_show_none() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/regressions");
+    let mut files: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    assert!(files.len() >= 8, "{}", files.len());
+    for file in files {
+        let scene = Scene::read(&file).unwrap();
+        let seen = extreme_scenes::examine(&scene);
+        assert_eq!(seen.defects, Vec::<String>::new(), "{}", file.display());
+        assert_eq!(seen.verdicts.len(), extreme_scenes::METHODS.len(), "{}", file.display());
+        assert!(
+            seen.verdicts.iter().all(|v| matches!(v, MethodVerdict::Right | MethodVerdict::Undecided)),
+            "{}",
+            file.display()
+        );
+        assert!(fs::read_to_string(&file).unwrap().starts_with("# "), "{}", file.display());
+    }
+}
