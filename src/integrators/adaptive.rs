@@ -53,7 +53,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// The choice for a stage of `problem` entered at `depth` [m] with `velocity` [m/s].
+    /// The choice for a stage of `problem` entered at `depth` (m) with `velocity` (m/s).
     ///
     /// From the coefficients alone: no force is evaluated.
     pub fn of(problem: &Problem, stage: usize, depth: f64, velocity: f64) -> Self {

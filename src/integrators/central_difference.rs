@@ -47,9 +47,9 @@ pub enum Steps {
     /// Chosen from the stages by [`default_time_step`].
     #[default]
     Default,
-    /// Equal steps [s].
+    /// Equal steps (s).
     Uniform(f64),
-    /// A sequence of sizes [s], taken in order and started over when it is used up: two entries alternate. A step
+    /// A sequence of sizes (s), taken in order and started over when it is used up: two entries alternate. A step
     /// that [`Boundaries::Landed`] shortens uses up its entry.
     Given(Vec<f64>),
 }
@@ -169,12 +169,12 @@ impl Integrator for CentralDifference {
 }
 
 impl CentralDifference {
-    /// The scheme with equal steps of `time_step` [s] and plain sums.
+    /// The scheme with equal steps of `time_step` (s) and plain sums.
     pub fn uniform(time_step: f64, velocity: VelocityAt, boundaries: Boundaries) -> Self {
         Self { steps: Steps::Uniform(time_step), velocity, boundaries, ..Self::default() }
     }
 
-    /// The step [s] with which `problem` is solved: what a report prints. Of a given sequence, its largest.
+    /// The step (s) with which `problem` is solved: what a report prints. Of a given sequence, its largest.
     pub fn time_step<S: Scalar>(&self, problem: &Problem<S>) -> f64 {
         match &self.steps {
             Steps::Default => default_time_step(problem, self.velocity),
@@ -217,8 +217,8 @@ impl CentralDifference {
         Ok(Stepper::new(self, problem).free(count))
     }
 
-    /// The states of the scheme under an outer force `source(j, t)` [N] that drives, the stages parted by time:
-    /// `M x'' = -F_j(x, x') + source(j, t)` until `ends[j]` [s], ascending, which is landed on as
+    /// The states of the scheme under an outer force `source(j, t)` (N) that drives, the stages parted by time:
+    /// `M x'' = -F_j(x, x') + source(j, t)` until `ends[j]` (s), ascending, which is landed on as
     /// [`Boundaries::Landed`] lands on a stage end. All other events are off. For manufactured solutions.
     ///
     /// # Errors

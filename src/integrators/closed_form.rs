@@ -68,7 +68,7 @@ pub fn solve_crater_and_tunnel(problem: &Problem, stiffness: CraterStiffness) ->
     flight::solve(problem, Detail::Events, &mut Exact { continuous })
 }
 
-/// The state in which the projectile passes `depth` [m], rest there included; `None` if it does not get there.
+/// The state in which the projectile passes `depth` (m), rest there included; `None` if it does not get there.
 ///
 /// Depths beyond the exit depth are not reached. The path V(x), t(x) of the exact solution.
 ///

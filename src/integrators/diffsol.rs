@@ -336,9 +336,9 @@ impl Law {
 /// The units of a stage.
 #[derive(Clone, Copy, Debug)]
 struct Units {
-    /// Depth L [m].
+    /// Depth L (m).
     length: f64,
-    /// Speed V0 [m/s].
+    /// Speed V0 (m/s).
     speed: f64,
 }
 

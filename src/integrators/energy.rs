@@ -11,7 +11,7 @@
 //! series of w in x, whose coefficients follow from the equation, to as many terms as the tolerance needs; where
 //! `q = 0` the series ends by itself. The stage's own formula, [`crate::physics::exit_energy::propagate`], is not used.
 //!
-//! The time `t̂ = V0 t` [m] comes after the depth and the speed at both ends of a stage are known. Its two forms
+//! The time `t̂ = V0 t` (m) comes after the depth and the speed at both ends of a stage are known. Its two forms
 //!
 //! ```text
 //! dt̂/dx = w^(-1/2)                           singular at rest
@@ -122,7 +122,7 @@ impl Energy {
             return Ok(None);
         }
         let mut walk = Walk::from_impact(self.tolerance::<S>());
-        walk.to_exit(problem, 0).map_err(|(fault, from)| {
+        walk.reach_exit(problem, 0).map_err(|(fault, from)| {
             let last = State { time: f64::NAN, depth: from.depth.value(), velocity: root_of(from.w).value() };
             fault.error(State { velocity: last.velocity * problem.impact_speed.value(), ..last })
         })?;
@@ -145,7 +145,7 @@ impl Integrator for Energy {
     }
 }
 
-/// Signed exit energy W(exit) [m²/s²] of `problem` at round-off, negative for a stop; `None` as
+/// Signed exit energy W(exit) (m²/s²) of `problem` at round-off, negative for a stop; `None` as
 /// [`Energy::exit_margin_in`].
 ///
 /// The least W over the stage ends where a target also drives ([`crate::physics::exit_energy`]).
@@ -246,7 +246,7 @@ impl<S: Scalar> Loss<S> {
         (first + higher, terms)
     }
 
-    /// Distance within which the static force alone takes all of `w` [m]; infinite where it never does.
+    /// Distance within which the static force alone takes all of `w` (m); infinite where it never does.
     ///
     /// Rest is not farther than this, since drag only takes more.
     fn static_reach(&self, x: f64, w: f64) -> f64 {
@@ -294,7 +294,7 @@ impl<S: Scalar> Walk<S> {
     }
 
     /// Propagates w from the start of stage `first` to the exit. An error comes with the state at the start of its stage.
-    fn to_exit(&mut self, problem: &Problem<S>, first: usize) -> Result<(), (Fault, Self)> {
+    fn reach_exit(&mut self, problem: &Problem<S>, first: usize) -> Result<(), (Fault, Self)> {
         for (index, stage) in problem.stages.iter().enumerate().skip(first) {
             let from = *self;
             let loss = Loss::of(stage, problem).map_err(|fault| (fault, from))?;
@@ -414,7 +414,7 @@ struct Clock<S> {
     tolerance: f64,
 }
 
-/// Depth [m], speed over V0, and `t̂ = V0 t` [m], in the fields of a state.
+/// Depth (m), speed over V0, and `t̂ = V0 t` (m), in the fields of a state.
 type Reduced<S> = State<S>;
 
 /// A reduced state in SI units.
@@ -450,7 +450,7 @@ impl<S: Scalar> StageSolver<S> for Stages<S> {
     fn margin(&mut self, course: &mut Course<'_, S>) -> Result<Bounded, IntegrationError> {
         let (problem, last) = (course.problem, course.state.values());
         if !course.is_through && problem.stages[course.stage].end.value() < problem.exit_depth.value() {
-            self.walk.to_exit(problem, course.stage + 1).map_err(|(fault, _)| fault.error(last))?;
+            self.walk.reach_exit(problem, course.stage + 1).map_err(|(fault, _)| fault.error(last))?;
             course.cost = self.walk.cost + self.clock;
         }
         Ok(Bounded { value: self.walk.least.value(), bound: self.walk.least_error })

@@ -109,7 +109,7 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
     }
 
-    /// Where the solution through the present stage ends [m]; infinite where only rest can end it.
+    /// Where the solution through the present stage ends (m); infinite where only rest can end it.
     ///
     /// # Errors
     /// [`IntegrationError::NeverEnds`] where nothing can.

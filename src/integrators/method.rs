@@ -78,7 +78,7 @@ impl MethodName {
 pub struct MethodOptions {
     /// Relative tolerance, for the diffsol methods and `adaptive` (1e-10), `taylor` and `energy` (round-off).
     pub rtol: Option<f64>,
-    /// Time step [s], for `central-difference`; chosen from the stages when absent.
+    /// Time step (s), for `central-difference`; chosen from the stages when absent.
     pub dt: Option<f64>,
     /// Velocity in the force, for `central-difference`.
     pub velocity: Option<VelocityAt>,

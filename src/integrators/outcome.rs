@@ -52,7 +52,7 @@ impl std::ops::AddAssign for Cost {
 pub struct Sample {
     /// Time, depth, velocity.
     pub state: State,
-    /// Force [N] in the stage below.
+    /// Force (N) in the stage below.
     pub force: f64,
     /// Index of the stage that gives the force.
     pub stage: usize,
@@ -61,7 +61,7 @@ pub struct Sample {
 /// The step limit of a fixed-step scheme, and whether the step respected it (`docs/theory.md`, section 5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLimit {
-    /// Largest stable step [s]; infinite where there is no limit.
+    /// Largest stable step (s); infinite where there is no limit.
     pub limit: f64,
     /// Whether every step was within it.
     pub stable: bool,

@@ -12,7 +12,7 @@
 //! velocity and the shortest time scale of the stage. Scaling by them rounds nothing, every coefficient is of order
 //! one, and scenes of any magnitude run alike, in `f32` as well.
 //!
-//! **Step.** Truncating after order K leaves about `|v[K]| h^K`, so `h` makes that `tolerance` times the velocity, for
+//! **Step.** Truncating after order K leaves about `|v(K)| h^K`, so `h` makes that `tolerance` times the velocity, for
 //! the last two orders: every second coefficient may vanish (`docs/theory.md`, section 2). The series of the tunnel has its
 //! nearest pole on the real axis, in the past, and the coefficients see it. The series of a stage without drag is
 //! entire: its step is capped by `w h <= 1.8`, so that no oscillation hides inside (proof 3 of [`super::locate`]).

@@ -33,7 +33,7 @@ use super::problem::{Problem, Stage, State};
 use super::scalar::Differentiable;
 use super::scene::CraterStiffness;
 
-/// `W = V²` [m²/s²] at `depth`, continued below zero beyond rest; `None` when a stage before `depth` has r > 0.
+/// `W = V²` (m²/s²) at `depth`, continued below zero beyond rest; `None` when a stage before `depth` has r > 0.
 ///
 /// It covers stages with stiffness and drag together, of which the time is not known.
 pub fn squared_speed_at<S: Differentiable>(problem: &Problem<S>, depth: S) -> Option<S> {
@@ -58,9 +58,9 @@ pub fn squared_speed_at<S: Differentiable>(problem: &Problem<S>, depth: S) -> Op
 
 /// How a stage is left.
 pub(crate) enum Crossing {
-    /// At its limit, after `time` [s], with `velocity` [m/s].
+    /// At its limit, after `time` (s), with `velocity` (m/s).
     Passes { time: f64, velocity: f64 },
-    /// Not at all: rest after `time` [s] and `distance` [m].
+    /// Not at all: rest after `time` (s) and `distance` (m).
     Rests { time: f64, distance: f64 },
     /// Not at all, and without rest.
     Endless(&'static str),
@@ -105,7 +105,7 @@ fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing {
     })
 }
 
-/// Time [s] from speed `v0` to `v` over the distance `xi` under `p + q V²`.
+/// Time (s) from speed `v0` to `v` over the distance `xi` under `p + q V²`.
 fn drag_time(stage: &Stage, mass: f64, xi: f64, decay: &Decay, v0: f64, v: f64) -> f64 {
     let (p, q) = (stage.static_force, stage.drag);
     if p == 0.0 {
@@ -225,9 +225,9 @@ fn cross_viscous(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing
 
 /// The linear motion `u'' + 2 g u' + w² u = 0`, `u = x + p/s`, from `u' = V0` and `w² u = f0`.
 struct Damped {
-    /// Speed at the start [m/s].
+    /// Speed at the start (m/s).
     v0: f64,
-    /// Static deceleration at the start `f0 = (p + s x0)/M` [m/s²].
+    /// Static deceleration at the start `f0 = (p + s x0)/M` (m/s²).
     f0: f64,
     /// `w² = s/M` [1/s²].
     w2: f64,
@@ -261,7 +261,7 @@ impl Damped {
         }
     }
 
-    /// Distance [m] and speed [m/s] after time `t` [s].
+    /// Distance (m) and speed (m/s) after time `t` (s).
     fn after(&self, t: f64) -> (f64, f64) {
         let Self { v0, f0, w2, g, m, .. } = *self;
         // 1 - e^(-gt) (cos + g sin) cancels where (g + w) t is small: so far in parts, each by its series.
@@ -302,7 +302,7 @@ impl Damped {
         (v0 * impulse - f0 * step, decay * (v0 * cosine - (g * v0 + f0) * sine))
     }
 
-    /// Distance [m] and speed [m/s] after time `t` [s], `(g + w) t` at most 1/2, by the Taylor series of u.
+    /// Distance (m) and speed (m/s) after time `t` (s), `(g + w) t` at most 1/2, by the Taylor series of u.
     ///
     /// 20 terms leave less than 1e-18 of the sum, and nothing cancels to first order.
     fn series(&self, v0: f64, f0: f64, t: f64) -> (f64, f64) {
@@ -319,7 +319,7 @@ impl Damped {
         (distance, speed / t)
     }
 
-    /// Time until rest [s]; `None` when overdamped and driven so that it never rests.
+    /// Time until rest (s); `None` when overdamped and driven so that it never rests.
     fn rest_time(&self) -> Option<f64> {
         let Self { v0, f0, g, m, .. } = *self;
         let brake = g * v0 + f0;
@@ -334,7 +334,7 @@ impl Damped {
         }
     }
 
-    /// Time to cover `distance` [m], which is reached before `rest` if there is one.
+    /// Time to cover `distance` (m), which is reached before `rest` if there is one.
     ///
     /// Newton steps inside a bracket that only shrinks, halved where they would leave it. `None` when the distance is
     /// only approached.
@@ -423,9 +423,9 @@ pub(crate) fn cross_continuous_crater(problem: &Problem, limit: f64) -> Crossing
 /// The impact speed that just perforates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
-    /// Critical velocity `V_c` [m/s].
+    /// Critical velocity `V_c` (m/s).
     pub velocity: f64,
-    /// Critical energy `E_c = M V_c²/2` [J].
+    /// Critical energy `E_c = M V_c²/2` (J).
     pub energy: f64,
 }
 

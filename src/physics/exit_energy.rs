@@ -42,7 +42,7 @@ pub(crate) fn second_exponential_integral<S: Differentiable>(y: S) -> S {
     }
 }
 
-/// W = V² at depth `to` [m²/s²], from `w` at depth `from`, through one stage without viscosity:
+/// W = V² at depth `to` (m²/s²), from `w` at depth `from`, through one stage without viscosity:
 ///
 /// ```text
 /// W(to) = W e^{-y} - (2 xi/M) ((p + s from) E(-y) + s xi (y + expm1(-y))/y²),  y = 2 q xi/M,  xi = to - from
@@ -79,12 +79,12 @@ pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State
     Some(energy_beyond_stop(problem, stage, end.depth) / scale / scale)
 }
 
-/// Least W [m²/s²] over the stage ends ahead and the exit, continued from rest at `depth` in stage `stage`.
+/// Least W (m²/s²) over the stage ends ahead and the exit, continued from rest at `depth` in stage `stage`.
 pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64) -> f64 {
     continued(problem, stage, depth, 0.0, f64::INFINITY)
 }
 
-/// Least W [m²/s²] of a flight that never ends, the counterpart of [`energy_beyond_stop`].
+/// Least W (m²/s²) of a flight that never ends, the counterpart of [`energy_beyond_stop`].
 ///
 /// `at` is any of its states in the stage in which it approaches a depth X for ever.
 ///
@@ -108,7 +108,7 @@ pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
     (problem.has_exit() && beyond.is_finite()).then_some(beyond)
 }
 
-/// The speed [m/s] that a projectile at `at` lacks to reach `limit` through a stage of viscosity and drag alone.
+/// The speed (m/s) that a projectile at `at` lacks to reach `limit` through a stage of viscosity and drag alone.
 ///
 /// `None` if it gets there, and for a stage of another kind.
 pub(crate) fn speed_missing(law: &Stage, mass: f64, at: State, limit: f64) -> Option<f64> {
@@ -122,7 +122,7 @@ pub(crate) fn speed_missing(law: &Stage, mass: f64, at: State, limit: f64) -> Op
     (missing >= 0.0).then_some(missing)
 }
 
-/// Least of `least` and of W [m²/s²] at the stage ends from stage `stage` on and at the exit, from `w` at `depth`.
+/// Least of `least` and of W (m²/s²) at the stage ends from stage `stage` on and at the exit, from `w` at `depth`.
 fn continued<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, least: f64) -> f64 {
     let (mut w, mut from, mut least) = (w, depth, least);
     for index in stage..problem.stages.len() {

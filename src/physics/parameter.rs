@@ -193,7 +193,7 @@ impl Parameter {
         name + &unit.to_lowercase().replace('/', "_").replace('^', "")
     }
 
-    /// Name, symbol and unit for messages: `the mass M [kg]`.
+    /// Name, symbol and unit for messages: `the mass M (kg)`.
     pub fn label(self) -> String {
         let Entry { name, dimension, .. } = self.entry();
         let whose = match self {

@@ -16,20 +16,20 @@ use smallvec::SmallVec;
 use super::scalar::Scalar;
 use crate::text::Shown;
 
-/// Resistance `F = p + s x + r V + q V²` [N] until `x = end`; positive `F` slows the projectile.
+/// Resistance `F = p + s x + r V + q V²` (N) until `x = end`; positive `F` slows the projectile.
 ///
 /// Depth `x` counts from the impact face in every stage, not from the stage's own start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage<S = f64> {
-    /// Static force p [N], of any sign; negative drives the projectile.
+    /// Static force p (N), of any sign; negative drives the projectile.
     pub static_force: S,
-    /// Stiffness s [N/m], not negative.
+    /// Stiffness s (N/m), not negative.
     pub stiffness: S,
-    /// Viscosity r [kg/s], not negative.
+    /// Viscosity r (kg/s), not negative.
     pub viscosity: S,
-    /// Drag q [kg/m], not negative.
+    /// Drag q (kg/m), not negative.
     pub drag: S,
-    /// Depth where the stage ends [m], from the impact face; infinite when it does not end.
+    /// Depth where the stage ends (m), from the impact face; infinite when it does not end.
     pub end: S,
 }
 
@@ -60,14 +60,14 @@ impl<S: Scalar> Stage<S> {
         Self { static_force: zero, stiffness: zero, viscosity: zero, drag: zero, end: S::from_f64(f64::INFINITY) }
     }
 
-    /// The same stage until x = `end` [m].
+    /// The same stage until x = `end` (m).
     #[must_use]
     pub fn until(mut self, end: S) -> Self {
         self.end = end;
         self
     }
 
-    /// Force [N] at depth `x` [m] and velocity `v` [m/s].
+    /// Force (N) at depth `x` (m) and velocity `v` (m/s).
     ///
     /// Smooth for every argument: the law of this stage continued beyond its ends, without a branch on `x`.
     #[inline(always)]
@@ -75,7 +75,7 @@ impl<S: Scalar> Stage<S> {
         self.static_force + self.stiffness * x + (self.viscosity + self.drag * v) * v
     }
 
-    /// Work of the static part `∫ (p + s x) dx` [J] from depth `from` to depth `to` [m].
+    /// Work of the static part `∫ (p + s x) dx` (J) from depth `from` to depth `to` (m).
     ///
     /// A lower bound of the energy lost on this path, at any velocity.
     #[inline]
@@ -122,11 +122,11 @@ pub type Stages<S = f64> = SmallVec<[Stage<S>; 2]>;
 /// has no end. Everything is finite except absent ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem<S = f64> {
-    /// Mass M [kg].
+    /// Mass M (kg).
     pub mass: S,
-    /// Impact speed V0 [m/s].
+    /// Impact speed V0 (m/s).
     pub impact_speed: S,
-    /// Exit depth [m]; infinite for a semi-infinite target.
+    /// Exit depth (m); infinite for a semi-infinite target.
     pub exit_depth: S,
     /// The stages, in order.
     pub stages: Stages<S>,
@@ -137,7 +137,7 @@ pub struct Problem<S = f64> {
 }
 
 impl<S: Scalar> Problem<S> {
-    /// A projectile of `mass` [kg] that enters `stages` at `impact_speed` [m/s]; no exit depth.
+    /// A projectile of `mass` (kg) that enters `stages` at `impact_speed` (m/s); no exit depth.
     ///
     /// # Panics
     /// If an invariant of [`Problem`] is broken.
@@ -164,7 +164,7 @@ impl<S: Scalar> Problem<S> {
         Self { crater: crater.map(|_| 0), target, ..Self::of_stages(mass, impact_speed, stages) }
     }
 
-    /// As [`Problem::crater_and_tunnel`], through a crater to `depth` = k d [m] with the continuous constant c.
+    /// As [`Problem::crater_and_tunnel`], through a crater to `depth` = k d (m) with the continuous constant c.
     ///
     /// # Panics
     /// If an invariant of [`Problem`] is broken.
@@ -173,7 +173,7 @@ impl<S: Scalar> Problem<S> {
         Self::crater_and_tunnel(mass, impact_speed, Some(crater), tunnel)
     }
 
-    /// The same problem with a far side at `exit_depth` [m].
+    /// The same problem with a far side at `exit_depth` (m).
     #[must_use]
     pub fn with_exit(mut self, exit_depth: S) -> Self {
         self.exit_depth = exit_depth;
@@ -185,17 +185,17 @@ impl<S: Scalar> Problem<S> {
         self.exit_depth.value().is_finite()
     }
 
-    /// Depth [m] where the crater ends, zero without one, and the stage behind it.
+    /// Depth (m) where the crater ends, zero without one, and the stage behind it.
     pub fn crater_depth_and_tunnel(&self) -> (S, Stage<S>) {
         self.crater.map_or((S::zero(), self.stages[0]), |crater| (self.stages[crater].end, self.stages[crater + 1]))
     }
 
-    /// Depth where stage `index` begins [m].
+    /// Depth where stage `index` begins (m).
     pub fn start_of(&self, index: usize) -> S {
         if index == 0 { S::zero() } else { self.stages[index - 1].end }
     }
 
-    /// Depth [m] at which integration through stage `index` ends: its end or the exit depth, whichever comes first.
+    /// Depth (m) at which integration through stage `index` ends: its end or the exit depth, whichever comes first.
     ///
     /// Infinite when there is neither.
     pub fn limit_of(&self, index: usize) -> S {
@@ -240,13 +240,13 @@ impl<S: Scalar> Problem<S> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct State<S = f64> {
-    /// Time since impact t [s].
+    /// Time since impact t (s).
     #[serde(rename = "time_s")]
     pub time: S,
-    /// Depth x from the impact face [m].
+    /// Depth x from the impact face (m).
     #[serde(rename = "depth_m")]
     pub depth: S,
-    /// Velocity V [m/s], not negative.
+    /// Velocity V (m/s), not negative.
     #[serde(rename = "velocity_m_s")]
     pub velocity: S,
 }

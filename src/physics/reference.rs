@@ -85,11 +85,11 @@ impl Exact {
 /// A place and an instant to 50 digits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactState {
-    /// Time since impact [s].
+    /// Time since impact (s).
     pub time: Exact,
-    /// Depth from the impact face [m].
+    /// Depth from the impact face (m).
     pub depth: Exact,
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     pub velocity: Exact,
 }
 
@@ -115,7 +115,7 @@ pub struct ExactFlight {
     pub events: Vec<ExactEvent>,
     /// Exit margin `W(exit)/V0²` ([`super::exit_energy`]).
     pub exit_margin: Option<Exact>,
-    /// Impact speed V0 [m/s], the scale of velocity errors.
+    /// Impact speed V0 (m/s), the scale of velocity errors.
     pub impact_speed: Exact,
 }
 
@@ -129,9 +129,9 @@ impl ExactFlight {
 /// Critical velocity and energy to 50 digits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactCritical {
-    /// Critical velocity `V_c` [m/s].
+    /// Critical velocity `V_c` (m/s).
     pub velocity: Exact,
-    /// Critical energy `E_c = M V_c²/2` [J].
+    /// Critical energy `E_c = M V_c²/2` (J).
     pub energy: Exact,
 }
 
@@ -190,7 +190,7 @@ pub enum ReferenceError {
 pub enum Source<'a> {
     /// A problem's coefficients.
     Problem(&'a Problem),
-    /// A scene's numbers, at this impact speed [m/s].
+    /// A scene's numbers, at this impact speed (m/s).
     Scene(&'a Scene, f64),
 }
 

@@ -27,13 +27,13 @@ pub enum Resistance {
 /// The numbers of Eq. 4-5, 13 and 14.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Concrete {
-    /// Projectile diameter d [m].
+    /// Projectile diameter d (m).
     pub diameter: f64,
     /// Nose factor N*, 0 to 1.
     pub nose_factor: f64,
-    /// Unconfined compressive strength fc [Pa]; with layers that of the layer just beyond k d.
+    /// Unconfined compressive strength fc (Pa); with layers that of the layer just beyond k d.
     pub strength: f64,
-    /// Density rho [kg/m³]; with layers that of the layer just beyond k d.
+    /// Density rho (kg/m³); with layers that of the layer just beyond k d.
     pub density: f64,
     /// Static strength over fc, S (Eq. 14 when not given); with layers that of the layer just beyond k d.
     pub static_factor: f64,
@@ -52,22 +52,22 @@ pub struct Concrete {
 pub enum CraterStiffness {
     /// The force is continuous at x = k d: `c = M (P + Q V0²)/(k d (M + k d Q))`.
     Continuous,
-    /// A given value [N/m]; the force generally jumps at k d.
+    /// A given value (N/m); the force generally jumps at k d.
     Given(f64),
 }
 
 /// One layer of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layer {
-    /// Thickness [m]; infinite in a semi-infinite last layer.
+    /// Thickness (m); infinite in a semi-infinite last layer.
     pub thickness: f64,
-    /// Unconfined compressive strength fc [Pa]; 0 is an air gap.
+    /// Unconfined compressive strength fc (Pa); 0 is an air gap.
     pub strength: f64,
-    /// Density rho [kg/m³].
+    /// Density rho (kg/m³).
     pub density: f64,
     /// Static strength over fc, S.
     pub static_factor: f64,
-    /// Linear viscosity r [kg/s].
+    /// Linear viscosity r (kg/s).
     pub viscosity: f64,
 }
 
@@ -87,15 +87,15 @@ pub enum Criterion {
 pub struct Scene {
     /// Title for people.
     pub title: Option<String>,
-    /// Projectile mass M [kg].
+    /// Projectile mass M (kg).
     pub mass: f64,
     /// What it meets.
     pub resistance: Resistance,
-    /// Target thickness H [m], with layers their sum; `None` for a semi-infinite target.
+    /// Target thickness H (m), with layers their sum; `None` for a semi-infinite target.
     pub thickness: Option<f64>,
     /// When it counts as perforated.
     pub criterion: Criterion,
-    /// Impact velocity V0 [m/s], where the scene gives one.
+    /// Impact velocity V0 (m/s), where the scene gives one.
     pub velocity: Option<f64>,
 }
 
@@ -173,23 +173,23 @@ pub enum ResolveError {
     StageEndsFall {
         /// Index of the stage, from 0.
         stage: usize,
-        /// Its end [m].
+        /// Its end (m).
         end: f64,
-        /// End of the stage before it [m]; infinite when that has no end.
+        /// End of the stage before it (m); infinite when that has no end.
         previous: f64,
     },
     /// The last stage ends inside the target.
     #[error("the last stage ends at {} m, inside the target", Shown(*.end))]
     TargetGoesOn {
-        /// End of the last stage [m].
+        /// End of the last stage (m).
         end: f64,
     },
     /// The thickness of a layered target is not the sum of its layers.
     #[error("the layers sum up to {} m, the target's thickness says {} m", Shown(*.sum), Shown(*.thickness))]
     LayersDoNotSumUp {
-        /// Sum of the layers [m]; infinite when the last has no end.
+        /// Sum of the layers (m); infinite when the last has no end.
         sum: f64,
-        /// Thickness of the target [m]; infinite when absent.
+        /// Thickness of the target (m); infinite when absent.
         thickness: f64,
     },
     /// A coefficient overflows, or underflows to where its digits are lost.
@@ -261,7 +261,7 @@ fn of_one_medium(which: LayerNumber) -> Parameter {
     }
 }
 
-/// Index of the layer that holds `depth` [m] just beyond it, of the last where all end before; `None` without layers.
+/// Index of the layer that holds `depth` (m) just beyond it, of the last where all end before; `None` without layers.
 pub(crate) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
     let mut end = 0.0;
     let holds = |layer: &Layer| {
@@ -272,7 +272,7 @@ pub(crate) fn layer_beyond(layers: &[Layer], depth: f64) -> Option<usize> {
 }
 
 impl Concrete {
-    /// S of a concrete of compressive strength `strength` [Pa] for which none is given (Eq. 14).
+    /// S of a concrete of compressive strength `strength` (Pa) for which none is given (Eq. 14).
     ///
     /// # Errors
     /// [`ResolveError::Inadmissible`] for a strength that is not positive.
@@ -281,7 +281,7 @@ impl Concrete {
         Ok(semi_empirical::static_factor(strength))
     }
 
-    /// Crater depth k d [m].
+    /// Crater depth k d (m).
     pub fn crater_depth(&self) -> f64 {
         self.crater_ratio * self.diameter
     }
@@ -347,7 +347,7 @@ impl Concrete {
         Ok(stages)
     }
 
-    /// The stages at `impact_speed` [m/s], and the index of the crater's.
+    /// The stages at `impact_speed` (m/s), and the index of the crater's.
     fn stages<S: Scalar>(
         &self,
         mass: S,
@@ -443,7 +443,7 @@ fn given<S: Scalar>(
 }
 
 impl Scene {
-    /// A projectile of `mass` [kg] and a target of `concrete` without a far side; no impact velocity, the full depth as
+    /// A projectile of `mass` (kg) and a target of `concrete` without a far side; no impact velocity, the full depth as
     /// criterion.
     pub fn of_concrete(mass: f64, concrete: Concrete) -> Self {
         Self {
@@ -525,7 +525,7 @@ impl Scene {
         self.resolve(self.velocity.ok_or(ResolveError::NoImpactSpeed)?)
     }
 
-    /// The same scene with impact velocity `velocity` [m/s].
+    /// The same scene with impact velocity `velocity` (m/s).
     #[must_use]
     pub fn with_velocity(mut self, velocity: f64) -> Self {
         self.velocity = Some(velocity);
@@ -540,22 +540,22 @@ impl Scene {
         }
     }
 
-    /// Projectile diameter d [m]; `None` for a scene of stages.
+    /// Projectile diameter d (m); `None` for a scene of stages.
     pub fn diameter(&self) -> Option<f64> {
         self.concrete().map(|concrete| concrete.diameter)
     }
 
-    /// Static force P [N] just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
+    /// Static force P (N) just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
     pub fn static_force(&self) -> Option<f64> {
         Some(self.concrete()?.beyond_crater(&plain).ok()?[0].static_force)
     }
 
-    /// Drag Q [kg/m] just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
+    /// Drag Q (kg/m) just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
     pub fn drag(&self) -> Option<f64> {
         Some(self.concrete()?.beyond_crater(&plain).ok()?[0].drag)
     }
 
-    /// Depth that perforates [m]: H, or `x_p(H)` by the ACE/NDRC relation; infinite for a semi-infinite target.
+    /// Depth that perforates (m): H, or `x_p(H)` by the ACE/NDRC relation; infinite for a semi-infinite target.
     ///
     /// # Errors
     /// [`ResolveError`]: the thickness or the diameter is not admissible, the criterion `ndrc` has no diameter to go

@@ -59,7 +59,7 @@ pub const NDRC_DATA_BEGIN: f64 = 1.7;
 /// H/d where the third branch of Eq. 15 begins, exact for k = 2 only.
 const THIRD_BRANCH: f64 = 3.8;
 
-/// Static strength over compressive strength S of a concrete of strength fc [Pa] (Eq. 14).
+/// Static strength over compressive strength S of a concrete of strength fc (Pa) (Eq. 14).
 ///
 /// `S = 72 (fc/MPa)^(-1/2)`, Not finite for fc = 0.
 pub fn static_factor(strength: f64) -> f64 {

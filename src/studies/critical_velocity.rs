@@ -23,7 +23,7 @@ use crate::physics::{
     Advice, Concrete, CraterStiffness, Problem, ResolveError, Scene, Shown, Stage, closed_form, exit_energy,
 };
 
-/// Speed [m/s] at which the scene is first resolved, for its exit depth and static work.
+/// Speed (m/s) at which the scene is first resolved, for its exit depth and static work.
 const PROBE_SPEED: f64 = 1.0;
 
 /// Relative half-width in u of the bracket around a predicted root. Wide against round-off and tolerances of 1e-6,
@@ -66,28 +66,28 @@ impl Default for Options {
 /// A critical velocity and how it was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CriticalVelocity {
-    /// `V_c` [m/s].
+    /// `V_c` (m/s).
     pub velocity: f64,
     /// Half-width of its error bar [m/s]: that of W at `V_c` over dW/dV0. `None` where the method states none.
     pub error_bar: Option<f64>,
-    /// Critical impact energy `E_c` = M `V_c²`/2 [J].
+    /// Critical impact energy `E_c` = M `V_c²`/2 (J).
     pub energy: f64,
     /// Flights it took.
     pub evaluations: u32,
     /// Work of all flights.
     pub cost: Cost,
-    /// Impact speeds [m/s] with opposite signs of W between which `V_c` was sought at last.
+    /// Impact speeds (m/s) with opposite signs of W between which `V_c` was sought at last.
     pub bracket: (f64, f64),
     /// What a reader should know of the result. Empty in the ordinary case.
     pub note: &'static str,
 }
 
-/// Impact speed [m/s] and the exit energy W [m²/s²] found there.
+/// Impact speed (m/s) and the exit energy W (m²/s²) found there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct End {
-    /// Impact speed [m/s].
+    /// Impact speed (m/s).
     pub velocity: f64,
-    /// Signed exit energy W [m²/s²].
+    /// Signed exit energy W (m²/s²).
     pub exit_energy: f64,
 }
 
@@ -117,7 +117,7 @@ pub enum CriticalError<E: Display> {
     /// The scene has no stages at this impact speed.
     #[error("the scene cannot be resolved at {} m/s: {cause}", Shown(*.velocity))]
     Scene {
-        /// Impact speed [m/s].
+        /// Impact speed (m/s).
         velocity: f64,
         /// What the scene says.
         cause: E,
@@ -125,7 +125,7 @@ pub enum CriticalError<E: Display> {
     /// A flight failed.
     #[error("the flight at {} m/s failed: {cause}", Shown(*.velocity))]
     Flight {
-        /// Impact speed [m/s].
+        /// Impact speed (m/s).
         velocity: f64,
         /// What the integrator says.
         cause: IntegrationError,
@@ -133,9 +133,9 @@ pub enum CriticalError<E: Display> {
     /// The margin of a flight was no number.
     #[error("the exit energy at {} m/s is {exit_energy}, not a finite number", Shown(*.velocity))]
     NotFinite {
-        /// Impact speed [m/s].
+        /// Impact speed (m/s).
         velocity: f64,
-        /// The value found [m²/s²].
+        /// The value found (m²/s²).
         exit_energy: f64,
     },
     /// W has the same sign, or is zero, at all speeds up to the largest tried.
@@ -165,9 +165,9 @@ pub enum CriticalError<E: Display> {
         Shown(*.velocity), Shown(*.error_bar)
     )]
     Undecided {
-        /// Where the search ended [m/s].
+        /// Where the search ended (m/s).
         velocity: f64,
-        /// Half-width of the error bar there [m/s].
+        /// Half-width of the error bar there (m/s).
         error_bar: f64,
     },
     /// The tolerance was not reached.
@@ -295,7 +295,7 @@ pub fn critical_velocity<E: Display>(
     })
 }
 
-/// `V_c = 0`, up to `error_bar` [m/s].
+/// `V_c = 0`, up to `error_bar` (m/s).
 fn at_any_speed(error_bar: f64, tally: Tally, note: &'static str) -> CriticalVelocity {
     CriticalVelocity {
         velocity: 0.0,
@@ -322,7 +322,7 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVe
     critical_velocity(resolve, reused.as_deref().unwrap_or(integrator), Options::default())
 }
 
-/// Exact critical velocity of `scene` [m/s], where it has a closed form.
+/// Exact critical velocity of `scene` (m/s), where it has a closed form.
 ///
 /// # Errors
 /// [`closed_form::CriticalError`]: no far side, a viscous stage, or out of range.
@@ -337,7 +337,7 @@ pub fn exact(scene: &Scene) -> Result<f64, ExactError> {
     Ok(critical.velocity)
 }
 
-/// Exact critical velocity [m/s] of layers behind a continuous crater (`docs/theory.md`, section 2).
+/// Exact critical velocity (m/s) of layers behind a continuous crater (`docs/theory.md`, section 2).
 ///
 /// ```text
 /// H <= k d : as in one concrete, that of the layer just beyond k d
@@ -356,7 +356,7 @@ fn of_layers(mut problem: Problem) -> Result<f64, ExactError> {
     Ok((at_crater_end * at_crater_end * (1.0 + crater_share * drag) + crater_share * static_force).sqrt())
 }
 
-/// Exact critical velocity of `scene` [m/s], or the one found through the Taylor series to round-off.
+/// Exact critical velocity of `scene` (m/s), or the one found through the Taylor series to round-off.
 ///
 /// # Errors
 /// [`CriticalError`].
@@ -379,7 +379,7 @@ pub enum ExactError {
     Closed(#[from] closed_form::CriticalError),
 }
 
-/// The result of one flight: `u = V0²`, `W(exit)`, and the error bar of W [m²/s²].
+/// The result of one flight: `u = V0²`, `W(exit)`, and the error bar of W (m²/s²).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Point {
     u: f64,
@@ -667,7 +667,7 @@ where
     }
 }
 
-/// A value of V0² [m²/s²] below which the target is not perforated, or a scale of it where there is no such bound.
+/// A value of V0² (m²/s²) below which the target is not perforated, or a scale of it where there is no such bound.
 ///
 /// - half the static work: the largest of `2/M ∫ (p + s x) dx` up to a stage end or the exit, since drag only takes more;
 ///   half, since without drag the bound itself is the root, and an end of a bracket must not be;

@@ -49,11 +49,11 @@ pub struct Sensitivity {
 /// The quantities themselves, at the scene's own numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quantities {
-    /// Depth at rest X [m].
+    /// Depth at rest X (m).
     pub depth: Option<f64>,
-    /// Residual velocity V_r [m/s].
+    /// Residual velocity V_r (m/s).
     pub velocity: Option<f64>,
-    /// Critical velocity V_c [m/s].
+    /// Critical velocity V_c (m/s).
     pub critical_velocity: Option<f64>,
 }
 
@@ -117,7 +117,7 @@ impl Advice for SensitivityError {
     }
 }
 
-/// The problem of `scene` at `speed` [m/s] with the derivative in `parameter`.
+/// The problem of `scene` at `speed` (m/s) with the derivative in `parameter`.
 fn dual_problem(scene: &Scene, speed: f64, parameter: Parameter) -> Result<Problem<Dual64>, ResolveError> {
     scene.resolve_in(speed, |number, value| Dual64::new(value, slope(scene, number, value, parameter)))
 }
@@ -203,7 +203,7 @@ fn differentiate(
     Ok(Sensitivities { quantities, entries, notes })
 }
 
-/// W = V² [m²/s²] at `depth`; `None` beyond a viscous stage, and where a viscosity has the derivative.
+/// W = V² (m²/s²) at `depth`; `None` beyond a viscous stage, and where a viscosity has the derivative.
 fn squared_speed(problem: &Problem<Dual64>, depth: Dual64) -> Option<Dual64> {
     let without_viscosity = problem.stages.iter().all(|law| law.viscosity.eps == 0.0);
     without_viscosity.then(|| closed_form::squared_speed_at(problem, depth))?
@@ -448,7 +448,7 @@ impl std::str::FromStr for Spread {
 /// Uncertainty of V_c from the spreads of its inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uncertainty {
-    /// V_c at the scene's own numbers [m/s].
+    /// V_c at the scene's own numbers (m/s).
     pub critical_velocity: f64,
     /// Standard deviation to first order [m/s]: root of the sum of squares of elasticity times spread, times V_c.
     pub first_order: f64,
@@ -458,11 +458,11 @@ pub struct Uncertainty {
     pub samples: usize,
     /// Samples left out because the scene is not admissible (a nose factor above one, say).
     pub inadmissible: usize,
-    /// Mean of the samples [m/s].
+    /// Mean of the samples (m/s).
     pub mean: f64,
-    /// Standard deviation of the samples [m/s].
+    /// Standard deviation of the samples (m/s).
     pub deviation: f64,
-    /// Quantiles 2.5, 50 and 97.5 % of the samples [m/s].
+    /// Quantiles 2.5, 50 and 97.5 % of the samples (m/s).
     pub quantiles: [f64; 3],
 }
 

@@ -1,6 +1,7 @@
 //! Every document of ours that is cited is in the repository, with the heading that is named.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Folders and files in which a document may be cited.
@@ -24,46 +25,45 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn texts(path: &Path, found: &mut Vec<(PathBuf, String)>) {
+fn texts(path: &Path, found: &mut Vec<(PathBuf, String)>) -> io::Result<()> {
     if path.is_dir() {
-        for entry in fs::read_dir(path).unwrap() {
-            let path = entry.unwrap().path();
+        for entry in fs::read_dir(path)? {
+            let path = entry?.path();
             if !path.ends_with("target") && !path.ends_with("hostile") {
-                texts(&path, found);
+                texts(&path, found)?;
             }
         }
     } else if let Ok(text) = fs::read_to_string(path) {
-        found.push((path.strip_prefix(root()).unwrap().to_owned(), text));
+        found.push((path.to_owned(), text));
     }
+    Ok(())
 }
 
 /// All text in which a document may be cited; comment marks and line breaks are spaces, for a citation may wrap.
-fn citing() -> Vec<(PathBuf, String)> {
+fn citing() -> io::Result<Vec<(PathBuf, String)>> {
     let mut found = Vec::new();
     for place in PLACES {
-        texts(&root().join(place), &mut found);
+        texts(&root().join(place), &mut found)?;
     }
     found.retain(|(path, _)| !path.ends_with("documents.rs"));
     for (_, text) in &mut found {
         let bare = text.lines().map(|line| line.trim_start().trim_start_matches(['/', '!', '#', '>', '*', ' ']));
         *text = bare.collect::<Vec<_>>().join(" ");
     }
-    found
+    Ok(found)
 }
 
-fn headings(document: &str) -> Vec<String> {
-    let text = fs::read_to_string(root().join(document)).unwrap();
-    text.lines()
-        .filter(|line| line.starts_with('#'))
-        .map(|line| line.trim_start_matches(['#', ' ']).to_owned())
-        .collect()
+fn headings(document: &str) -> io::Result<Vec<String>> {
+    let text = fs::read_to_string(root().join(document))?;
+    let marked = text.lines().filter(|line| line.starts_with('#'));
+    Ok(marked.map(|line| line.trim_start_matches(['#', ' ']).to_owned()).collect())
 }
 
 #[test]
-fn every_cited_section_of_the_theory_exists() {
-    let headings = headings("docs/theory.md");
+fn every_cited_section_of_the_theory_exists() -> io::Result<()> {
+    let headings = headings("docs/theory.md")?;
     let mut cited = 0;
-    for (path, text) in citing() {
+    for (path, text) in citing()? {
         for rest in text.split("theory.md").skip(1) {
             let rest = rest.trim_start_matches(['`', ')', ',', ' ']);
             let Some(numbers) = rest.strip_prefix("sections ").or_else(|| rest.strip_prefix("section ")) else {
@@ -79,13 +79,14 @@ fn every_cited_section_of_the_theory_exists() {
         }
     }
     assert!(cited >= 30, "only {cited} citations were found: is their form another one?");
+    Ok(())
 }
 
 #[test]
-fn every_cited_heading_of_the_reference_exists() {
-    let headings = headings("docs/reference.md");
+fn every_cited_heading_of_the_reference_exists() -> io::Result<()> {
+    let headings = headings("docs/reference.md")?;
     let mut cited = 0;
-    for (path, text) in citing() {
+    for (path, text) in citing()? {
         for rest in text.split("reference.md").skip(1) {
             let rest = rest.trim_start_matches(['`', ')', ',', ' ']);
             let Some((heading, _)) = rest.strip_prefix('"').and_then(|quoted| quoted.split_once('"')) else { continue };
@@ -98,11 +99,12 @@ fn every_cited_heading_of_the_reference_exists() {
         }
     }
     assert!(cited >= 10, "only {cited} citations were found: is their form another one?");
+    Ok(())
 }
 
 #[test]
-fn no_document_is_cited_that_is_not_here() {
-    for (path, text) in citing() {
+fn no_document_is_cited_that_is_not_here() -> io::Result<()> {
+    for (path, text) in citing()? {
         for stray in ["theory section", "theory, section", "the contract", "contract.md"] {
             assert!(!text.contains(stray), "{} cites \"{stray}\"", path.display());
         }
@@ -114,9 +116,9 @@ fn no_document_is_cited_that_is_not_here() {
                 if file.is_empty() || file.contains("://") {
                     continue;
                 }
-                let base = root().join(&path);
-                assert!(base.with_file_name(file).exists(), "{} links to {link}", path.display());
+                assert!(path.with_file_name(file).exists(), "{} links to {link}", path.display());
             }
         }
     }
+    Ok(())
 }

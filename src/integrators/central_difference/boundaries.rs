@@ -87,10 +87,10 @@ impl<'a, S: Scalar> Run<'a, S> {
         // Ends at the face are reached at once; `Stepper::new` has passed them.
         run.push_boundaries(0..run.stepper.stage, State::at_impact(problem));
         run.record_node();
-        run.to_end()
+        run.run_to_end()
     }
 
-    fn to_end(mut self) -> Result<Flight<S>, IntegrationError> {
+    fn run_to_end(mut self) -> Result<Flight<S>, IntegrationError> {
         let (problem, max_steps) = (self.stepper.problem, self.stepper.options.max_steps);
         let is_hopeless =
             matches!(self.stepper.options.steps, Steps::Uniform(h) if cannot_end(problem, h * max_steps as f64));

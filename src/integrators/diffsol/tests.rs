@@ -29,7 +29,7 @@ fn of_stages(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) ->
     Problem::of_stages(mass, impact_speed, stages.iter().copied()).with_exit(exit_depth)
 }
 
-/// Crater with the continuous constant c, and tunnel (theory section 1).
+/// Crater with the continuous constant c, and tunnel (docs/theory.md, section 1).
 fn concrete(mass: f64, p: f64, q: f64, kd: f64, speed: f64, exit_depth: f64) -> Problem {
     Problem::continuous(mass, speed, kd, Stage::tunnel(p, q)).with_exit(exit_depth)
 }
@@ -382,7 +382,7 @@ fn standstill_is_a_rest_where_a_force_above_the_noise_holds_it() {
         let (depth, speed) = match end {
             Found::Boundary => (distance, 0.0),
             Found::Rest => (xi, 0.0),
-            _ => (xi, -1e-9),
+            Found::Approach => (xi, -1e-9),
         };
         assert_eq!((place.xi, place.u), (depth, speed));
     }

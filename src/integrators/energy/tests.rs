@@ -169,7 +169,7 @@ fn uniform_motion_and_parabola_are_exact() {
     assert_eq!(flight.exit_margin, Some(0.0));
 }
 
-/// `p < 0, s > 0`: theory section 2, `p, s` with u0 = p/s. The speed first rises, then falls to rest.
+/// `p < 0, s > 0`: docs/theory.md, section 2: `p, s` with u0 = p/s. The speed first rises, then falls to rest.
 #[test]
 fn driven_flight_through_its_fastest_point_agrees_with_the_closed_form() {
     let mut random = Random(4);

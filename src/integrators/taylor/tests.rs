@@ -9,7 +9,7 @@ use crate::integrators::Cost;
 use crate::physics::{Advice, EventKind, Outcome, Stages};
 use crate::testing::kinds;
 
-/// Crater and tunnel with the continuous crater constant (theory section 1), and its closed form (section 2).
+/// Crater and tunnel with the continuous crater constant (docs/theory.md, section 1), and its closed form (section 2).
 #[derive(Clone, Copy, Debug)]
 struct Concrete {
     mass: f64,

@@ -213,7 +213,7 @@ fn shot_14(thickness: Option<f64>, criterion: Criterion) -> Scene {
 
 #[test]
 fn a_scene_has_the_50_digits_of_the_formulas_in_another_program() {
-    // mpmath 1.3.0 at 70 digits, theory section 2 in its plain forms.
+    // mpmath 1.3.0 at 70 digits, docs/theory.md, section 2, in its plain forms.
     let scene = shot_14(None, Criterion::FullDepth);
     let exact = flight(Source::Scene(&scene, 277.0)).unwrap();
     assert_digits(&exact.end.depth, "0.1671950802699606820281951756134182369920137166438979");

@@ -383,7 +383,7 @@ mod tests {
 
     #[test]
     fn at_rest_in_the_crater_the_largest_step_is_that_of_the_error_constant() {
-        // X(dt)/X - 1 = (w dt)²/8 with rest located, and the envelope of what step ends leave (theory, section 5).
+        // X(dt)/X - 1 = (w dt)²/8 with rest located, and the envelope of what step ends leave (docs/theory.md, section 5).
         let (problem, _, study) = study("crater", Quantity::Depth);
         let w = (problem.stages[0].stiffness / problem.mass).sqrt();
         for (boundaries, most) in [("step-end", 1.05), ("interpolated", 1.02), ("landed", 1.02)] {
@@ -396,7 +396,7 @@ mod tests {
 
     #[test]
     fn with_lagged_drag_the_largest_step_is_that_of_the_error_constant() {
-        // X(dt) - X = -D dt, D = V1 - P (T - t1)/M: the velocity lost to drag (theory, section 5).
+        // X(dt) - X = -D dt, D = V1 - P (T - t1)/M: the velocity lost to drag (docs/theory.md, section 5).
         let (problem, exact, study) = study("tunnel", Quantity::Depth);
         let start = exact.crater_end().unwrap();
         let lost = start.velocity - problem.stages[1].static_force * (exact.end.time - start.time) / problem.mass;

@@ -25,7 +25,7 @@ use crate::studies::random_scenes::Generator;
 /// The accuracies at which the fastest run of a method is sought.
 pub const LEVELS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 
-/// A method whose pass over the scenes took longer than this is not tried at finer settings [s].
+/// A method whose pass over the scenes took longer than this is not tried at finer settings (s).
 const PASS_S: f64 = 2.0;
 
 /// Steps of the central difference over the default one ([`default_time_step`]), coarse to fine.
@@ -420,7 +420,7 @@ pub fn runs(case: &Case, contender: Contender, effort: Effort) -> Vec<Run> {
     })
 }
 
-/// A run for each of `settings`, coarse to fine. Once a pass over the scenes takes longer than `pass_max` [s], the finer
+/// A run for each of `settings`, coarse to fine. Once a pass over the scenes takes longer than `pass_max` (s), the finer
 /// settings are not tried.
 pub(super) fn until_too_long(
     case: &Case,
@@ -501,7 +501,7 @@ pub struct Fastest {
     pub method: String,
     /// Largest error allowed.
     pub level: f64,
-    /// Median time of a flight [ns]; `null` when no run is as accurate.
+    /// Median time of a flight (ns); `null` when no run is as accurate.
     pub time_ns: Option<f64>,
     /// Setting of that run.
     pub setting: Option<String>,
