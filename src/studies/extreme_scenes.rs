@@ -25,7 +25,6 @@ use super::error::{Errors, compare, conditions_in_dual_numbers};
 use super::quantity::Quantity;
 use super::random::Random;
 use super::random_scenes::errors_of;
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::integrators::{ClosedForm, Detail, Energy, Integrator, MethodName, Taylor};
@@ -195,8 +194,9 @@ pub enum MethodVerdict {
 }
 
 /// An answer that misses its limit.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[schemars(rename = "DefectJson")]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "report", schemars(rename = "DefectJson"))]
 pub struct Defect {
     /// Number of the scene.
     #[serde(rename = "scene")]
@@ -430,7 +430,8 @@ pub struct Worst {
 }
 
 /// How often each verdict was given on a method.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Tally {
     /// Right outcomes.
     pub right: u64,
@@ -443,7 +444,8 @@ pub struct Tally {
 }
 
 /// What many scenes showed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Summary {
     /// Scenes examined.
     pub scenes: u64,
