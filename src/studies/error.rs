@@ -113,15 +113,15 @@ impl Errors {
         let mut errors = Vec::with_capacity(5);
         for quantity in Quantity::OF_A_FLIGHT {
             let end = if quantity.is_at_crater_end() { exact.crater_end() } else { Some(&exact.end) };
-            let error = match (value_of(quantity, flight), end) {
-                (Some(value), Some(end)) => match quantity {
-                    Quantity::Depth => end.depth.relative_error(value),
-                    Quantity::Time | Quantity::CraterEndTime => end.time.relative_error(value),
-                    _ => end.velocity.error_over(value, &exact.impact_speed),
-                },
-                (None, None) => continue,
-                // One lacks an event that the other has: no number of units.
-                _ if quantity == Quantity::CraterEndTime => f64::NAN,
+            let error = match (value_of(quantity, flight), end, quantity) {
+                (Some(value), Some(end), Quantity::Depth) => end.depth.relative_error(value),
+                (Some(value), Some(end), Quantity::Time | Quantity::CraterEndTime) => end.time.relative_error(value),
+                (Some(value), Some(end), _) => end.velocity.error_over(value, &exact.impact_speed),
+                // One lacks an event that the other has. The sign of W there decides that: W itself is the error.
+                (Some(v), None, Quantity::CraterEndVelocity) => (v / exact.impact_speed.to_f64()).powi(2),
+                (None, Some(end), Quantity::CraterEndVelocity) => {
+                    end.velocity.error_over(0.0, &exact.impact_speed).powi(2)
+                }
                 _ => continue,
             };
             let condition = condition_of(conditions, quantity).unwrap_or(1.0);
