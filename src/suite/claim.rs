@@ -198,6 +198,7 @@ fn varied<T>(claims: &[Claim], values: &[T], name: impl Fn(&T) -> String, set: i
 
 /// What a check found.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct Measurement {
     /// Measured value in the unit of the check.
     pub value: f64,
@@ -217,61 +218,41 @@ impl Measurement {
         Self { value, resolution: 0.0, verdict: None, remark: String::new(), evidence: None }
     }
 
-    /// A measurement that decides nothing, with the reason.
-    pub fn undecided(reason: impl Into<String>) -> Self {
-        Self::new(f64::NAN).verdict(Verdict::Undecided).remark(reason)
-    }
-
     /// With words for the report.
-    #[must_use]
-    pub fn remark(mut self, remark: impl Into<String>) -> Self {
-        self.remark = remark.into();
-        self
+    pub fn remark(self, remark: impl Into<String>) -> Self {
+        Self { remark: remark.into(), ..self }
     }
 
     /// With data for the figures.
-    #[must_use]
-    pub fn evidence(mut self, evidence: Evidence) -> Self {
-        self.evidence = Some(evidence);
-        self
-    }
-
-    /// With a verdict of its own.
-    #[must_use]
-    pub fn verdict(mut self, verdict: Verdict) -> Self {
-        self.verdict = Some(verdict);
-        self
-    }
-
-    /// With what it can resolve.
-    #[must_use]
-    pub fn resolution(mut self, resolution: f64) -> Self {
-        self.resolution = resolution;
-        self
+    pub fn evidence(self, evidence: Evidence) -> Self {
+        Self { evidence: Some(evidence), ..self }
     }
 }
 
 /// What measuring a claim gives.
 pub type Found = Result<Measurement, NotMeasured>;
 
-/// Why a claim has no measurement.
+/// Why a claim has no measurement, and the verdict that follows.
 #[derive(Clone, Debug, PartialEq)]
-pub enum NotMeasured {
-    /// It does not apply: skipped, with the reason.
-    NotApplicable(String),
-    /// The measurement itself failed: the claim fails.
-    Broken(String),
+pub struct NotMeasured {
+    verdict: Verdict,
+    reason: String,
 }
 
 impl NotMeasured {
-    /// The claim does not apply.
+    /// The claim does not apply: it is skipped.
     pub fn skip(reason: impl Into<String>) -> Self {
-        Self::NotApplicable(reason.into())
+        Self { verdict: Verdict::Skipped, reason: reason.into() }
     }
 
-    /// The measurement failed.
+    /// The measurement cannot decide.
+    pub fn undecided(reason: impl Into<String>) -> Self {
+        Self { verdict: Verdict::Undecided, reason: reason.into() }
+    }
+
+    /// The measurement itself failed: the claim fails.
     pub fn broken(reason: impl fmt::Display) -> Self {
-        Self::Broken(reason.to_string())
+        Self { verdict: Verdict::Failed, reason: reason.to_string() }
     }
 }
 
@@ -351,6 +332,17 @@ pub struct Judged {
 }
 
 impl Judged {
+    /// `claim` with what its check found in `wall_ms` (ms).
+    pub fn new(claim: Claim, found: Found, wall_ms: f64) -> Self {
+        let Measurement { value, resolution, verdict, remark, evidence } = found.unwrap_or_else(|lack| Measurement {
+            verdict: Some(lack.verdict),
+            ..Measurement::new(f64::NAN).remark(lack.reason)
+        });
+        let verdict = verdict.unwrap_or_else(|| Verdict::of(value, claim.limit));
+        let measured = Some(value).filter(|value| value.is_finite());
+        Self { claim, verdict, measured, resolution, remark, evidence, wall_ms }
+    }
+
     /// Whether the claim failed or is undecided.
     pub fn is_open(&self) -> bool {
         matches!(self.verdict, Verdict::Failed | Verdict::Undecided)

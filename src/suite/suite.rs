@@ -9,7 +9,6 @@ use serde::Deserialize;
 
 use super::checks::{Context, Memo, PeerAnswers, Subject};
 use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
-use super::verdict::Verdict;
 use crate::exchange::SceneError;
 use crate::exchange::diagnostic::{Dialect, Fault, decode, did_you_mean, nearest, read_text};
 use crate::exchange::scene_file::SHIPPED;
@@ -202,26 +201,5 @@ pub fn judge(claim: &Claim, context: Context<'_>) -> Judged {
         Some(method) => Err(NotMeasured::skip(format!("this build leaves out {method}"))),
         None => claim.check.measure(&Subject { claim, context }),
     };
-    let wall_ms = started.elapsed().as_secs_f64() * 1e3;
-    let judged = Judged {
-        claim: claim.clone(),
-        verdict: Verdict::Failed,
-        measured: None,
-        resolution: 0.0,
-        remark: String::new(),
-        evidence: None,
-        wall_ms,
-    };
-    match found {
-        Ok(found) => Judged {
-            verdict: found.verdict.unwrap_or_else(|| Verdict::of(found.value, claim.limit)),
-            measured: Some(found.value).filter(|v| v.is_finite()),
-            resolution: found.resolution,
-            remark: found.remark,
-            evidence: found.evidence,
-            ..judged
-        },
-        Err(NotMeasured::NotApplicable(remark)) => Judged { verdict: Verdict::Skipped, remark, ..judged },
-        Err(NotMeasured::Broken(remark)) => Judged { remark, ..judged },
-    }
+    Judged::new(claim.clone(), found, started.elapsed().as_secs_f64() * 1e3)
 }

@@ -1,15 +1,14 @@
 //! A method beside the exact answer, beside another method; outcomes and events.
 
 use super::super::claim::{Found, Measurement, NotMeasured};
-use super::{Subject, Worst, build, solve};
+use super::{FIXED, NO_FAR_SIDE, Subject, Worst, build, off, refusal_or_failure, solve};
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
 use crate::physics::reference::{self, Source};
-use crate::physics::{self, Advice, EventKind, Problem};
+use crate::physics::{self, EventKind, Problem};
 use crate::studies::critical_velocity;
-use crate::studies::error::{flight_error, is_fixed, signed_error, value_of};
+use crate::studies::error::{Truth, condition_of, flight_error, is_fixed, signed_error, value_of};
 use crate::studies::quantity::Quantity;
-use crate::studies::random::Random;
 use crate::studies::random_scenes;
 
 check! {
@@ -55,16 +54,15 @@ check! {
 
 fn reference(&Reference { random }: &Reference, subject: &Subject<'_>) -> Found {
     let mut worst = Worst::default();
-    if subject.claim.scene.is_some() {
+    if let Some(name) = &subject.claim.scene {
         let errors = random_scenes::closed_form_errors(subject.scene()?)?;
         let (error, quantity) = errors.worst().ok_or_else(|| NotMeasured::skip("the stages have no reference"))?;
-        worst.take(error, || format!("in the {} of {}", quantity.name(), subject.claim.scene.as_deref().unwrap_or("")));
+        worst.take(error, || format!("in the {quantity} of {name}"));
     }
     let mut scenes = random_scenes::Generator::new(subject.context.seed, "reference");
     for index in 0..random {
-        let errors = random_scenes::closed_form_errors(&scenes.next_scene())?;
-        if let Some((error, quantity)) = errors.worst() {
-            worst.take(error, || format!("in the {} of random scene {index}", quantity.name()));
+        if let Some((error, quantity)) = random_scenes::closed_form_errors(&scenes.next_scene())?.worst() {
+            worst.take(error, || format!("in the {quantity} of random scene {index}"));
         }
     }
     Ok(worst.measurement())
@@ -77,25 +75,19 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
     if quantity == Quantity::CriticalVelocity {
         return critical(subject, &method);
     }
-    let yardstick = subject.yardstick()?;
-    if !yardstick.is_closed_form && subject.method_name() == MethodName::Taylor {
-        return Err(NotMeasured::skip("no closed form, and the refined answer is the method's own"));
-    }
-    let exact = &yardstick.flight;
-    if is_fixed(quantity, exact) {
-        return Err(NotMeasured::skip("the scene fixes this quantity"));
-    }
+    let Truth { flight: exact, is_closed_form } = &subject.truth()?;
+    let is_independent = *is_closed_form || subject.method_name() != MethodName::Taylor;
+    applies!(is_independent, "no closed form, and the refined answer is the method's own");
+    applies!(!is_fixed(quantity, exact), "{FIXED}");
     let flight = solve(&method, problem, Detail::Events)?;
     if flight.outcome == physics::Outcome::Undecided {
         let remark = format!("undecided: margin {:?} within {:?}", flight.exit_margin, flight.exit_margin_error);
-        return Ok(Measurement::undecided(remark));
+        return Err(NotMeasured::undecided(remark));
     }
     let error = flight_error(quantity, &flight, exact, problem.impact_speed)
         .ok_or_else(|| NotMeasured::broken(format!("{} where {} is right", flight.outcome, exact.outcome)))?;
-    let condition = reference::conditions(Source::Problem(problem))
-        .ok()
-        .and_then(|c| random_scenes::condition_of(&c, quantity))
-        .map_or(1.0, |c| c.max(1.0));
+    let conditions = reference::conditions(Source::Problem(problem)).ok();
+    let condition = conditions.and_then(|c| condition_of(&c, quantity)).map_or(1.0, |c| c.max(1.0));
     let value = value_of(quantity, &flight).unwrap_or(f64::NAN);
     let mut remark = format!("{value} with {} evaluations, error {:.1e}", flight.cost.force_evaluations, error.abs());
     if condition > 1.0 {
@@ -105,14 +97,10 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
 }
 
 fn critical(subject: &Subject<'_>, method: &Method) -> Found {
-    if !subject.problem()?.has_exit() {
-        return Err(NotMeasured::skip("a target without a far side has no critical velocity"));
-    }
+    applies!(subject.problem()?.has_exit(), "{NO_FAR_SIDE}");
     let exact = critical_velocity::exact(subject.scene()?)
         .map_err(|error| NotMeasured::skip(format!("no closed form of the critical velocity: {error}")))?;
-    let found = critical_velocity::of_scene(subject.scene()?, method.integrator()).map_err(|error| {
-        if error.is_usage() { NotMeasured::skip(error.to_string()) } else { NotMeasured::broken(error) }
-    })?;
+    let found = critical_velocity::of_scene(subject.scene()?, method.integrator()).map_err(refusal_or_failure)?;
     let error = signed_error(Quantity::CriticalVelocity, found.velocity, exact, 1.0);
     Ok(Measurement::new(error.abs()).remark(format!("{} m/s after {} solutions", found.velocity, found.evaluations)))
 }
@@ -126,24 +114,22 @@ fn stated(&Stated { value: stated }: &Stated, subject: &Subject<'_>) -> Found {
         let flight = subject.solution(Detail::Events)?;
         value_of(quantity, &flight).ok_or_else(|| NotMeasured::broken(format!("{} has none", flight.outcome)))?
     };
-    Ok(Measurement::new((value / stated - 1.0).abs()).remark(format!("{value}, stated {stated}")))
+    Ok(Measurement::new(off(value, stated)).remark(format!("{value}, stated {stated}")))
 }
 
 /// The reference is that of the same stages: the error bound does not cover the rounding of a scene into stages.
 fn margin(&Margin { points }: &Margin, subject: &Subject<'_>) -> Found {
     let method = subject.method(None)?;
     let critical = critical_velocity::exact_or_refined(subject.scene()?)?;
-    let mut random = Random::for_part(subject.context.seed, "margin");
+    let mut random = subject.random("margin");
     let mut worst = Worst::default();
     for _ in 0..points {
         let speed = critical * random.log_uniform(0.2, 5.0);
         let problem = subject.scene()?.resolve(speed)?;
         let exact = reference::flight(Source::Problem(&problem))?;
         let flight = solve(&method, &problem, Detail::End)?;
-        if !(flight.outcome == physics::Outcome::Undecided || flight.outcome.agrees_with(exact.outcome)) {
-            let remark = format!("{} at {speed} m/s, where {} is right", flight.outcome, exact.outcome);
-            return Err(NotMeasured::broken(remark));
-        }
+        let is_right = flight.outcome == physics::Outcome::Undecided || flight.outcome.agrees_with(exact.outcome);
+        holds!(is_right, "{} at {speed} m/s, where {} is right", flight.outcome, exact.outcome);
         let (Some(margin), Some(bar), Some(exact)) = (flight.exit_margin, flight.exit_margin_error, exact.exit_margin)
         else {
             return Err(NotMeasured::skip("no exit margin with an error bound"));
@@ -164,14 +150,10 @@ fn outcome(Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
 fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
     let quantity = subject.quantity()?;
-    if subject.method_name() == with {
-        return Err(NotMeasured::skip("a method agrees with itself"));
-    }
+    applies!(subject.method_name() != with, "a method agrees with itself");
     let one = subject.solution(Detail::Events)?;
     let other = solve(&build(with, &MethodOptions::default())?, problem, Detail::Events)?;
-    if is_fixed(quantity, &other) {
-        return Err(NotMeasured::skip("the scene fixes this quantity"));
-    }
+    applies!(!is_fixed(quantity, &other), "{FIXED}");
     let error = flight_error(quantity, &one, &other, problem.impact_speed)
         .ok_or_else(|| NotMeasured::broken(format!("{} against {}", one.outcome, other.outcome)))?;
     Ok(Measurement::new(error.abs() / tolerance).remark(format!("difference {:.1e} from {with}", error.abs())))
@@ -180,12 +162,9 @@ fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
 fn event_order(subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::Events)?;
     let faults = faults(subject.problem()?, &flight);
-    Ok(Measurement::new(faults.len() as f64).remark(if faults.is_empty() {
-        let names: Vec<_> = flight.events.iter().map(|e| e.kind.name()).collect();
-        names.join(", ")
-    } else {
-        faults.join("; ")
-    }))
+    let names = flight.events.iter().map(|e| e.kind.name()).collect::<Vec<_>>();
+    let remark = if faults.is_empty() { names.join(", ") } else { faults.join("; ") };
+    Ok(Measurement::new(faults.len() as f64).remark(remark))
 }
 
 /// Violations of order, place and number among the events of `flight`.
@@ -211,13 +190,15 @@ fn faults(problem: &Problem, flight: &Flight) -> Vec<String> {
             faults.push(format!("end of stage {index} at {} and not at {end}", state.depth));
         }
     }
-    let exits = flight.events.iter().filter(|e| e.kind == EventKind::Exit).count();
-    if exits != usize::from(flight.outcome == physics::Outcome::Perforated) {
-        faults.push(format!("exit listed {exits} times"));
-    }
-    let rests = flight.events.iter().filter(|e| e.kind == EventKind::Rest).count();
-    if rests != usize::from(flight.end.velocity == 0.0) {
-        faults.push(format!("rest listed {rests} times"));
+    let ends = [
+        (EventKind::Exit, flight.outcome == physics::Outcome::Perforated),
+        (EventKind::Rest, flight.end.velocity == 0.0),
+    ];
+    for (kind, is_there) in ends {
+        let times = flight.events.iter().filter(|event| event.kind == kind).count();
+        if times != usize::from(is_there) {
+            faults.push(format!("{} listed {times} times", kind.name()));
+        }
     }
     faults
 }

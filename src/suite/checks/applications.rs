@@ -1,7 +1,7 @@
 //! What the equation is used for: sweeps, the map of Eq. 11-12, measured depths, sensitivities.
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
-use super::{Subject, Worst, formulas};
+use super::{Subject, Worst, formulas, off};
 use crate::integrators::MethodName;
 use crate::physics::Parameter;
 use crate::physics::groups::dimensionless_energy;
@@ -44,9 +44,7 @@ fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
     let rows = plan.run(method.integrator());
     let mut worst = Worst::default();
     for (index, row) in rows.iter().enumerate() {
-        if !row.error.is_empty() {
-            return Err(NotMeasured::broken(format!("point {index}: {}", row.error)));
-        }
+        holds!(row.error.is_empty(), "point {index}: {}", row.error);
         let ratio = from + (to - from) * index as f64 / (points - 1) as f64;
         let by = |criterion| -> Result<(f64, f64), NotMeasured> {
             let thickness = Some(ratio * concrete.diameter);
@@ -62,7 +60,7 @@ fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
             (row.energy_full_depth, full.1),
             (row.energy_ndrc, ndrc.1),
         ] {
-            worst.take((found.unwrap_or(f64::NAN) / exact - 1.0).abs(), || format!("at H/d = {ratio:.4}"));
+            worst.take(off(found.unwrap_or(f64::NAN), exact), || format!("at H/d = {ratio:.4}"));
         }
     }
     Ok(worst.measurement().evidence(Evidence::Sweep { plan: Box::new(plan), rows }))
@@ -77,26 +75,22 @@ fn map(&Map { points }: &Map, subject: &Subject<'_>) -> Found {
             let (impact, geometry) = line.points[index * (line.points.len() - 1) / (points - 1).max(1)];
             let solved = formulas::solved_depth_ratio(subject, Some(geometry), impact)?;
             let error = semi_empirical::depth_ratio(impact, CRATER_RATIO) / solved - 1.0;
-            worst.take((error.abs() / line.level - 1.0).abs(), || {
-                format!("on the line of {} at I = {impact:.4}, N = {geometry:.4}", line.level)
-            });
+            let place = || format!("on the line of {} at I = {impact:.4}, N = {geometry:.4}", line.level);
+            worst.take(off(error.abs(), line.level), place);
         }
     }
-    let shots = experiments::shipped()?;
-    let scenes = experiments::marked(&shots);
+    let scenes = experiments::marked(&experiments::shipped()?);
     Ok(worst.measurement().evidence(Evidence::Map { crater_ratio: CRATER_RATIO, lines, scenes }))
 }
 
 fn measured_depth(subject: &Subject<'_>) -> Found {
     let method = subject.method(None)?;
-    let shots = experiments::shipped()?;
-    let comparisons = experiments::compare(&shots, None, &[], method.integrator())?;
+    let comparisons = experiments::compare(&experiments::shipped()?, None, &[], method.integrator())?;
     let deep: Vec<_> = comparisons.iter().filter(|c| !c.is_shallow()).cloned().collect();
     let mut worst = Worst::default();
     for set in experiments::summaries(&deep) {
-        worst.take((set.median - 1.0).abs(), || {
-            format!("in {}: median {:.3} of {} tests", set.group, set.median, set.experiments)
-        });
+        let place = || format!("in {}: median {:.3} of {} tests", set.group, set.median, set.experiments);
+        worst.take((set.median - 1.0).abs(), place);
     }
     Ok(worst.measurement().evidence(Evidence::Depths(comparisons)))
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
-use super::{Subject, Worst, solve};
+use super::{Subject, Worst, half_width, off, solve};
 use crate::integrators::Detail;
 use crate::physics::nose::NoseShape;
 use crate::physics::semi_empirical::{
@@ -130,7 +130,7 @@ fn nose(_: &Subject<'_>) -> Found {
     };
     let mut worst = Worst::default();
     let mut take = |shape: NoseShape, found: f64, exact: f64| {
-        worst.take((found / exact - 1.0).abs(), || format!("for {shape:?}"));
+        worst.take(off(found, exact), || format!("for {shape:?}"));
     };
     for psi in [0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.25, 6.0] {
         let ogive = NoseShape::Ogive { caliber_radius_head: psi };
@@ -144,16 +144,14 @@ fn nose(_: &Subject<'_>) -> Found {
         take(ogive, (h * h + foot * foot).sqrt(), psi);
         let h = cap.height_ratio();
         take(cap, (0.25 + (psi - h) * (psi - h)).sqrt(), psi);
-        if h > psi {
-            return Err(NotMeasured::broken(format!("a cap of radius {psi} d cannot be {h} d high")));
-        }
+        holds!(h <= psi, "a cap of radius {psi} d cannot be {h} d high");
     }
     take(NoseShape::Flat, NoseShape::Flat.factor(), 1.0);
     Ok(worst.measurement())
 }
 
 fn small_impact(&SmallImpact { from, to, points }: &SmallImpact, subject: &Subject<'_>) -> Found {
-    let mut random = Random::for_part(subject.context.seed, &subject.claim.id);
+    let mut random = subject.random(&subject.claim.id);
     let mut worst = Worst::default();
     for index in 0..points {
         let impact = match index {
@@ -163,7 +161,7 @@ fn small_impact(&SmallImpact { from, to, points }: &SmallImpact, subject: &Subje
             _ => random.log_uniform(from, to),
         };
         let ours = solved_depth_ratio(subject, None, impact)?;
-        worst.take((ours / depth_ratio(impact, 2.0) - 1.0).abs(), || format!("at I = {impact:.4e}"));
+        worst.take(off(ours, depth_ratio(impact, 2.0)), || format!("at I = {impact:.4e}"));
     }
     Ok(worst.measurement())
 }
@@ -187,14 +185,13 @@ fn approach(subject: &Subject<'_>, impact: f64) -> Result<Vec<StepError>, NotMea
 
 fn approach_order(&ApproachOrder { impact }: &ApproachOrder, subject: &Subject<'_>) -> Found {
     let fit = fit(&approach(subject, impact)?)?;
-    let Some(line) = fit.line else {
-        return Ok(Measurement::undecided(fit.reason));
-    };
-    let half_width = 0.5 * (line.interval95[1] - line.interval95[0]);
-    Ok(Measurement::new((line.order - 1.0).abs())
-        .resolution(half_width)
-        .remark(format!("order {:.5} in 1/N at I = {impact}", line.order))
-        .evidence(Evidence::Fit { abscissa: "1/N", formal: 1.0, fit: Box::new(fit) }))
+    let line = fit.line.ok_or_else(|| NotMeasured::undecided(&fit.reason))?;
+    Ok(Measurement {
+        resolution: half_width(&line),
+        ..Measurement::new((line.order - 1.0).abs())
+            .remark(format!("order {:.5} in 1/N at I = {impact}", line.order))
+            .evidence(Evidence::Fit { abscissa: "1/N", formal: 1.0, fit: Box::new(fit) })
+    })
 }
 
 fn approach_constant(&ApproachConstant { impact }: &ApproachConstant, subject: &Subject<'_>) -> Found {
@@ -205,7 +202,7 @@ fn approach_constant(&ApproachConstant { impact }: &ApproachConstant, subject: &
     let measured = 2.0 * at(2.0 * n)? - at(n)?;
     // The stated first-order difference is relative to X/d, and per 1/N.
     let predicted = model_difference(impact, 1.0, 2.0) * limit;
-    Ok(Measurement::new((measured / predicted - 1.0).abs())
+    Ok(Measurement::new(off(measured, predicted))
         .remark(format!("(X/d - limit) N = {measured:.9}, predicted {predicted:.9}")))
 }
 
@@ -231,7 +228,7 @@ fn eq15(&Eq15 { form, from, to }: &Eq15, _: &Subject<'_>) -> Found {
     let mut worst = Worst::default();
     for index in 0..POINTS {
         let ratio = from * (to / from).powf(index as f64 / (POINTS - 1) as f64);
-        worst.take((form.formula()(ratio) / composed(ratio) - 1.0).abs(), || format!("at H/d = {ratio:.4}"));
+        worst.take(off(form.formula()(ratio), composed(ratio)), || format!("at H/d = {ratio:.4}"));
     }
     Ok(worst.measurement())
 }
@@ -241,9 +238,7 @@ fn eq15_jump(&Eq15Jump { form, at, jump: stated }: &Eq15Jump, _: &Subject<'_>) -
     // The branches are closed to the left (H/d <= 3.0), so one ulp to the right is the next branch.
     let jump = formula(at.next_up()) - formula(at);
     let listed = jumps().iter().any(|j| (j.thickness_ratio - at).abs() < 1e-9);
-    if !listed && form == Eq15Form::Printed {
-        return Err(NotMeasured::broken(format!("no joint at H/d = {at}")));
-    }
+    holds!(listed || form != Eq15Form::Printed, "no joint at H/d = {at}");
     Ok(Measurement::new((jump - stated).abs()).remark(format!("jump {jump:+.9} S at H/d = {at}")))
 }
 
@@ -251,7 +246,7 @@ fn ndrc_criterion(&NdrcCriterion { points }: &NdrcCriterion, subject: &Subject<'
     let (mut scene, concrete) = scene(None);
     scene.criterion = Criterion::Ndrc;
     let method = subject.method(None)?;
-    let mut random = Random::for_part(subject.context.seed, &subject.claim.id);
+    let mut random = subject.random(&subject.claim.id);
     let joints = [2.994, NDRC_FIRST_BRANCH_END, 3.0, 3.8]
         .into_iter()
         .flat_map(|joint: f64| [joint.next_down(), joint, joint.next_up()])
@@ -264,7 +259,7 @@ fn ndrc_criterion(&NdrcCriterion { points }: &NdrcCriterion, subject: &Subject<'
         // From the thickness that the scene holds, which rounds H/d.
         let ratio = ratio * concrete.diameter / concrete.diameter;
         let ours = groups::dimensionless_energy(found.energy, &concrete) / concrete.static_factor;
-        worst.take((ours / eq15_unrounded(ratio) - 1.0).abs(), || format!("at H/d = {ratio:.4} of {points}"));
+        worst.take(off(ours, eq15_unrounded(ratio)), || format!("at H/d = {ratio:.4} of {points}"));
     }
     Ok(worst.measurement())
 }

@@ -1,11 +1,10 @@
 //! What holds whatever the answer is: energy, reversal in time, similarity, composition.
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
-use super::{Subject, solve, worse};
+use super::{Subject, off, solve, worse, worst_of};
 use crate::integrators::{Detail, Flight};
-use crate::physics::{Problem, Stage, Stages, Target};
-use crate::studies::error::{is_fixed, value_of};
-use crate::studies::quantity::Quantity;
+use crate::physics::{Problem, Stage, Stages, State, Target};
+use crate::studies::error::{free_quantities, signed_error, value_of};
 use crate::studies::relations::{Units, in_units, way_back};
 
 check! {
@@ -34,10 +33,10 @@ check! {
 /// [`work`]: nothing of the method's own integration enters.
 fn energy_balance(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
-    if problem.stages.iter().any(|s| s.viscosity != 0.0) {
-        return Err(NotMeasured::skip("the work of a viscous force is not smooth in x at rest"));
-    }
+    let is_viscous = problem.stages.iter().any(|s| s.viscosity != 0.0);
+    applies!(!is_viscous, "the work of a viscous force is not smooth in x at rest");
     let flight = subject.solution(Detail::Trajectory)?;
+    applies!(flight.trajectory.len() > 1, "the solution has no path");
     let scale = 0.5 * problem.mass * problem.impact_speed * problem.impact_speed;
     let mut residual = 0.0_f64;
     let mut spent = 0.0;
@@ -54,9 +53,6 @@ fn energy_balance(subject: &Subject<'_>) -> Found {
             0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
         residual = worse(residual, (kinetic - spent).abs() / scale);
         points.push((b.state.depth, (kinetic - spent) / scale));
-    }
-    if flight.trajectory.len() < 2 {
-        return Err(NotMeasured::skip("the solution has no path"));
     }
     let evidence = Evidence::Series { abscissa: "depth_m", ordinate: "residual_over_initial_energy", points };
     Ok(Measurement::new(residual).remark(format!("{} rows of the path", flight.trajectory.len())).evidence(evidence))
@@ -100,7 +96,7 @@ fn time_reversal(subject: &Subject<'_>) -> Found {
         .ok_or_else(|| NotMeasured::skip("from rest, or through viscosity, there is no motion back"))?;
     let again = solve(&subject.method(None)?, &back, Detail::End)?;
     let speed = again.end.velocity / problem.impact_speed - 1.0;
-    let time = (again.end.time / there.end.time - 1.0).abs();
+    let time = off(again.end.time, there.end.time);
     Ok(Measurement::new(worse(speed.abs(), time)).remark(format!("back at the face with V0 (1 {speed:+.1e})")))
 }
 
@@ -110,7 +106,7 @@ fn similarity(&Similarity { length, mass, time }: &Similarity, subject: &Subject
     let scaled = in_units(problem, Units { length, mass, time });
     let scaled = solve(&subject.method(None)?, &scaled, Detail::Events)?;
     let back = Flight {
-        end: crate::physics::State {
+        end: State {
             time: scaled.end.time / time,
             depth: scaled.end.depth / length,
             velocity: scaled.end.velocity / length * time,
@@ -140,18 +136,11 @@ fn split(&Split { pieces }: &Split, subject: &Subject<'_>) -> Found {
 
 /// Largest relative difference of what the scene leaves free at the end.
 fn compare(problem: &Problem, plain: &Flight, other: &Flight) -> Found {
-    if !plain.outcome.agrees_with(other.outcome) {
-        return Err(NotMeasured::broken(format!("{} became {}", plain.outcome, other.outcome)));
-    }
-    let mut worst = 0.0;
-    for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
-        if is_fixed(quantity, plain) {
-            continue;
-        }
-        if let Some((a, b)) = value_of(quantity, plain).zip(value_of(quantity, other)) {
-            let scale = if quantity == Quantity::Velocity { problem.impact_speed } else { a };
-            worst = worse(worst, ((a - b) / scale).abs());
-        }
-    }
-    Ok(Measurement::new(worst))
+    holds!(plain.outcome.agrees_with(other.outcome), "{} became {}", plain.outcome, other.outcome);
+    let free = free_quantities(plain).filter(|quantity| !quantity.is_at_crater_end());
+    let change = |quantity| {
+        let (value, exact) = value_of(quantity, other).zip(value_of(quantity, plain))?;
+        Some(signed_error(quantity, value, exact, problem.impact_speed).abs())
+    };
+    Ok(Measurement::new(worst_of(free.filter_map(change))))
 }

@@ -33,6 +33,26 @@ macro_rules! check {
     (@call $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => { $measure($self, $subject) };
 }
 
+/// Skips the claim with a reason where it does not apply.
+macro_rules! applies {
+    ($condition:expr, $($reason:tt)+) => {
+        let applies: bool = $condition;
+        if !applies {
+            return Err(NotMeasured::skip(format!($($reason)+)));
+        }
+    };
+}
+
+/// Fails the claim where its measurement is none.
+macro_rules! holds {
+    ($condition:expr, $($reason:tt)+) => {
+        let holds: bool = $condition;
+        if !holds {
+            return Err(NotMeasured::broken(format!($($reason)+)));
+        }
+    };
+}
+
 mod agreement;
 mod applications;
 mod edges;
@@ -51,10 +71,12 @@ use serde::Deserialize;
 use super::claim::{Claim, Found, Measurement, NotMeasured, Section};
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
-use crate::integrators::{Detail, Flight, IntegrationError};
+use crate::integrators::{Detail, Flight};
 use crate::physics::{Advice, Problem, Resistance, Scene};
-use crate::studies::convergence::{QuantityStudy, Yardstick};
+use crate::studies::convergence::QuantityStudy;
+use crate::studies::error::Truth;
 use crate::studies::quantity::Quantity;
+use crate::studies::random::Random;
 
 pub use self::{
     agreement::*, applications::*, edges::*, formulas::*, invariants::*, manufactured::*, orders::*, peers::*,
@@ -99,8 +121,7 @@ every_check! {
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
     EnergyBalance TimeReversal Similarity Split
     Sweep Map MeasuredDepth Sensitivities Peer
-    GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets TenEnds EventBehindEvent
-    EndsAnUlpApart ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
+    GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver
     Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
@@ -195,9 +216,14 @@ impl<'a> Subject<'a> {
         solve(&self.method(None)?, self.problem()?, detail)
     }
 
+    /// Random numbers of `part`, from the seed of the run.
+    fn random(&self, part: &str) -> Random {
+        Random::for_part(self.context.seed, part)
+    }
+
     /// The exact solution, or a refined one.
-    fn yardstick(&self) -> Result<Yardstick, NotMeasured> {
-        Yardstick::of(self.problem()?).map_err(NotMeasured::broken)
+    fn truth(&self) -> Result<Truth, NotMeasured> {
+        Ok(Truth::of(self.problem()?)?)
     }
 
     /// Whether the scene is one crater and one tunnel.
@@ -208,10 +234,8 @@ impl<'a> Subject<'a> {
 
 /// The method `name`; one that this build lacks makes the claim inapplicable.
 fn build(name: MethodName, options: &MethodOptions) -> Result<Method, NotMeasured> {
-    if !name.is_built() {
-        return Err(NotMeasured::skip(format!("this build leaves out {name}")));
-    }
-    Method::new(name, options).map_err(NotMeasured::broken)
+    applies!(name.is_built(), "this build leaves out {name}");
+    Ok(Method::new(name, options)?)
 }
 
 /// A solution; a refusal of the method makes the claim inapplicable, a failure breaks it.
@@ -219,8 +243,17 @@ fn solve(method: &Method, problem: &Problem, detail: Detail) -> Result<Flight, N
     method.integrator().solve(problem, detail).map_err(refusal_or_failure)
 }
 
-fn refusal_or_failure(error: IntegrationError) -> NotMeasured {
+fn refusal_or_failure(error: impl Advice) -> NotMeasured {
     if error.is_usage() { NotMeasured::skip(error.to_string()) } else { NotMeasured::broken(error) }
+}
+
+/// Why a claim about a quantity is skipped.
+const FIXED: &str = "the scene fixes this quantity";
+const NO_FAR_SIDE: &str = "a target without a far side has no critical velocity";
+
+/// Relative difference of `value` from `exact`.
+fn off(value: f64, exact: f64) -> f64 {
+    (value / exact - 1.0).abs()
 }
 
 /// The larger; NaN if either is.

@@ -4,13 +4,13 @@ use serde::Deserialize;
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
 use super::super::verdict::Verdict;
-use super::{Subject, worst_of};
-use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Steps};
-use crate::studies::convergence::{self, Ladder, QuantityStudy, STEPS_OVER_TIME};
+use super::{FIXED, NO_FAR_SIDE, Subject, off, worst_of};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, Steps};
+use crate::studies::convergence::{self, Convergence, Ladder, QuantityStudy, STEPS_OVER_TIME};
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::formal_order::{Path, formal_order};
 use crate::studies::grid_convergence::{GridValue, richardson, roache, self_convergence as fit_values, three_grids};
-use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit};
+use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit, PowerLaw};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
@@ -69,42 +69,21 @@ pub enum StepPattern {
 }
 
 fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subject: &Subject<'_>) -> Found {
-    let quantity = free_quantity(subject)?;
-    let exact = subject.yardstick()?;
-    let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.flight.end.time);
-    let seed = subject.context.seed;
-    let ladder = Ladder { from, to, points, seed };
-    let claim = subject.claim;
-    let critical = quantity == Quantity::CriticalVelocity;
+    let (claim, seed) = (subject.claim, subject.context.seed);
+    let critical = claim.quantity == Some(Quantity::CriticalVelocity);
     let key = format!("{:?} {} {} {pattern:?} {points} {critical}", claim.scene, claim.velocity, claim.boundaries);
-    let study = subject
-        .context
-        .memo
-        .get(key, || {
-            convergence::of_fixed_steps(
-                subject.scene()?,
-                subject.problem()?,
-                &exact.flight,
-                &|size| CentralDifference {
-                    steps: steps(pattern, size, seed),
-                    ..CentralDifference::uniform(size, claim.velocity, claim.boundaries)
-                },
-                ladder,
-                critical,
-            )
-            .map(|study| study.quantities)
-            .map_err(NotMeasured::broken)
-        })?
-        .iter()
-        .find(|study| study.quantity == quantity)
-        .cloned()
-        .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))?;
-    if study.formal != Some(expected) {
-        return Err(NotMeasured::broken(format!(
-            "the claim expects order {expected}, the formal order is {:?}: one of them is wrong",
-            study.formal
-        )));
-    }
+    let study = shared_study(subject, key, |exact| {
+        let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
+        let scheme = |size| CentralDifference {
+            steps: steps(pattern, size, seed),
+            ..CentralDifference::uniform(size, claim.velocity, claim.boundaries)
+        };
+        let ladder = Ladder { from, to, points, seed };
+        Ok(convergence::of_fixed_steps(subject.scene()?, subject.problem()?, exact, &scheme, ladder, critical)?)
+    })?;
+    let formal = study.formal;
+    let agree = formal == Some(expected);
+    holds!(agree, "the claim expects order {expected}, the formal order is {formal:?}: one of them is wrong");
     judge(study.fit, study.lost, expected, "dt_s")
 }
 
@@ -137,33 +116,31 @@ fn values_at(subject: &Subject<'_>, quantity: Quantity, sizes: &[f64]) -> Result
 
 fn self_convergence(subject: &Subject<'_>) -> Found {
     let quantity = free_quantity(subject)?;
-    let exact = subject.yardstick()?.flight;
-    let value = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one solution"))?;
+    let exact = subject.truth()?.flight;
+    let value = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip(NOT_OF_A_FLIGHT))?;
     let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
     let ladder = Ladder { from: from * 10.0, to, points: 40, seed: subject.context.seed };
     let grids = values_at(subject, quantity, &ladder.sizes())?;
     let found = fit_values(&grids, FALSE_ALARM_LEVEL)?;
     let [low, high] = found.limit_band;
-    let measurement = Measurement::new((found.limit - value).abs() / (0.5 * (high - low)));
-    let measurement = if found.behaviour.class() == Class::Converging {
-        measurement
-    } else {
-        measurement.verdict(Verdict::Undecided)
-    };
-    Ok(measurement.remark(format!("limit {} in [{low}, {high}]; {}; {}", found.limit, found.reason, found.rule)))
+    let is_open = found.behaviour.class() != Class::Converging;
+    Ok(Measurement {
+        verdict: is_open.then_some(Verdict::Undecided),
+        ..Measurement::new((found.limit - value).abs() / (0.5 * (high - low)))
+            .remark(format!("limit {} in [{low}, {high}]; {}; {}", found.limit, found.reason, found.rule))
+    })
 }
 
 /// Steps and landing make the error smooth only for [`Boundaries::Landed`]; with any other rule a triple shows noise.
 fn grid_convergence(subject: &Subject<'_>) -> Found {
     let quantity = free_quantity(subject)?;
     let claim = subject.claim;
-    if claim.boundaries != Boundaries::Landed {
-        return Err(NotMeasured::skip("three runs show an order only where the steps land on k d"));
-    }
-    let exact = subject.yardstick()?.flight;
+    let lands = claim.boundaries == Boundaries::Landed;
+    applies!(lands, "three runs show an order only where the steps land on k d");
+    let exact = subject.truth()?.flight;
     let formal = formal_order(claim.velocity, claim.boundaries, &Path::of(subject.problem()?, &exact), quantity)
         .ok_or_else(|| NotMeasured::skip("no formal order"))?;
-    let truth = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip("no such quantity of one solution"))?;
+    let truth = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip(NOT_OF_A_FLIGHT))?;
     let sizes = [1.0 / 20_011.3, 1.0 / 12_007.7, 1.0 / 7_001.9].map(|share| share * exact.end.time);
     let grids = values_at(subject, quantity, &sizes)?;
     let [fine, middle, coarse] = grids[..] else { return Err(NotMeasured::broken("a run without the quantity")) };
@@ -173,38 +150,40 @@ fn grid_convergence(subject: &Subject<'_>) -> Found {
         .ok_or_else(|| NotMeasured::broken("two of three runs agree to the last digit"))?;
     let index = roache(fine, middle, Some(order), Some(formal)).ok_or_else(|| NotMeasured::broken("no index"))?;
     let (index, extrapolated) = (index.half_width / error, richardson(fine, middle, formal));
-    let off = [(index / 1.25 - 1.0).abs(), (extrapolated - truth).abs() / error, (order / formal - 1.0).abs()];
-    Ok(Measurement::new(worst_of(off))
-        .remark(format!("order {order:.4}, GCI {index:.4} times the error, extrapolated {:.1e} of it left", off[1])))
+    let left = (extrapolated - truth).abs() / error;
+    Ok(Measurement::new(worst_of([off(index, 1.25), left, off(order, formal)]))
+        .remark(format!("order {order:.4}, GCI {index:.4} times the error, extrapolated {left:.1e} of it left")))
 }
 
+const NOT_OF_A_FLIGHT: &str = "no such quantity of one solution";
+
 fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<QuantityStudy, NotMeasured> {
-    let quantity = free_quantity(subject)?;
     let ladder = Ladder { from: to.min(from), to: to.max(from), points: 40, seed: subject.context.seed };
     let key = format!("{:?} {} {from} {to}", subject.claim.scene, subject.method_name());
-    subject
-        .context
-        .memo
-        .get(key, || {
-            let exact = subject.yardstick()?.flight;
-            convergence::of_tolerances(subject.problem()?, &exact, subject.method_name(), ladder)
-                .map(|study| study.quantities)
-                .map_err(NotMeasured::broken)
-        })?
-        .iter()
-        .find(|study| study.quantity == quantity)
-        .cloned()
-        .ok_or_else(|| NotMeasured::skip("the scene fixes this quantity"))
+    shared_study(subject, key, |exact| {
+        Ok(convergence::of_tolerances(subject.problem()?, exact, subject.method_name(), ladder)?)
+    })
+}
+
+/// The study of the claim's quantity among those that `compute` makes with the exact solution, once for each `key`.
+fn shared_study(
+    subject: &Subject<'_>,
+    key: String,
+    compute: impl FnOnce(&Flight) -> Result<Convergence, NotMeasured>,
+) -> Result<QuantityStudy, NotMeasured> {
+    let quantity = free_quantity(subject)?;
+    let studies = subject.context.memo.get(key, || Ok(compute(&subject.truth()?.flight)?.quantities))?;
+    let study = studies.iter().find(|study| study.quantity == quantity);
+    study.cloned().ok_or_else(|| NotMeasured::skip(FIXED))
 }
 
 /// The claim's quantity, if the scene leaves it free.
 fn free_quantity(subject: &Subject<'_>) -> Result<Quantity, NotMeasured> {
     let quantity = subject.quantity()?;
-    if quantity == Quantity::CriticalVelocity && !subject.problem()?.has_exit() {
-        return Err(NotMeasured::skip("a target without a far side has no critical velocity"));
-    }
-    if quantity != Quantity::CriticalVelocity && is_fixed(quantity, &subject.yardstick()?.flight) {
-        return Err(NotMeasured::skip("the scene fixes this quantity"));
+    if quantity == Quantity::CriticalVelocity {
+        applies!(subject.problem()?.has_exit(), "{NO_FAR_SIDE}");
+    } else {
+        applies!(!is_fixed(quantity, &subject.truth()?.flight), "{FIXED}");
     }
     Ok(quantity)
 }
@@ -234,35 +213,31 @@ const LOST_SHARE_MAX: f64 = 0.2;
 /// Distance of a fitted order from the one expected; `lost` runs gave no error to fit.
 pub(super) fn judge(fit: Result<OrderFit, FitError>, lost: usize, expected: f64, abscissa: &'static str) -> Found {
     let total = lost + fit.as_ref().map_or(0, |fit| fit.points.len());
-    let fit: OrderFit = match fit {
-        Ok(fit) => fit,
-        Err(error @ FitError::TooFewSteps { .. }) => {
-            return Ok(Measurement::undecided(error.to_string()));
-        }
-        Err(error) => return Err(NotMeasured::broken(error)),
-    };
-    let Some(line) = fit.line else {
-        return Ok(Measurement::undecided(fit.reason.clone()));
-    };
-    let distance = (line.order - expected).abs();
-    let half_width = 0.5 * (line.interval95[1] - line.interval95[0]);
-    let mut remark = format!(
-        "order {:.3} [{:.3}, {:.3}] from {} of {} runs, constant {:.3e}",
+    let fit = fit.map_err(|error| match error {
+        FitError::TooFewSteps { .. } => NotMeasured::undecided(error.to_string()),
+        error => NotMeasured::broken(error),
+    })?;
+    let line = fit.line.ok_or_else(|| NotMeasured::undecided(&fit.reason))?;
+    let [low, high] = line.interval95;
+    let seen = format!(
+        "order {:.3} [{low:.3}, {high:.3}] from {} of {total} runs, constant {:.3e}",
         line.order,
-        line.interval95[0],
-        line.interval95[1],
         fit.used(),
-        total,
         line.error_constant
     );
-    let mut measurement = Measurement::new(distance).resolution(half_width);
-    if fit.class != Class::Converging {
-        remark = format!("{}: {}; {remark}", fit.class.name(), fit.reason);
+    let (verdict, remark) = if fit.class != Class::Converging {
         let verdict = if fit.class == Class::Diverging { Verdict::Failed } else { Verdict::Undecided };
-        measurement = measurement.verdict(verdict);
+        (Some(verdict), format!("{}: {}; {seen}", fit.class.name(), fit.reason))
     } else if lost as f64 > LOST_SHARE_MAX * total as f64 {
-        remark = format!("{lost} of {total} runs have another outcome; {remark}");
-        measurement = measurement.verdict(Verdict::Undecided);
-    }
-    Ok(measurement.remark(remark).evidence(Evidence::Fit { abscissa, formal: expected, fit: Box::new(fit) }))
+        (Some(Verdict::Undecided), format!("{lost} of {total} runs have another outcome; {seen}"))
+    } else {
+        (None, seen)
+    };
+    let evidence = Some(Evidence::Fit { abscissa, formal: expected, fit: Box::new(fit) });
+    Ok(Measurement { value: (line.order - expected).abs(), resolution: half_width(&line), verdict, remark, evidence })
+}
+
+/// Half of the 95 % interval of a fitted order.
+pub(super) fn half_width(line: &PowerLaw) -> f64 {
+    0.5 * (line.interval95[1] - line.interval95[0])
 }

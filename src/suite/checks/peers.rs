@@ -125,12 +125,8 @@ impl PeerAnswers {
                     .iter()
                     .find(|flight| flight.scene == scene)
                     .ok_or_else(|| NotMeasured::skip(format!("{name} was not asked for {scene}")))?;
-                if !is_same(&flight.problem(), problem) {
-                    let remake = &recording.recipe;
-                    return Err(NotMeasured::broken(format!(
-                        "{scene} was recorded with other numbers: remake with `{remake}`"
-                    )));
-                }
+                let (is_same, recipe) = (is_same(&flight.problem(), problem), &recording.recipe);
+                holds!(is_same, "{scene} was recorded with other numbers: remake with `{recipe}`");
                 Ok(flight.answer.clone())
             }
             Source::Failed(why) => Err(NotMeasured::broken(why)),
@@ -153,17 +149,12 @@ impl PeerAnswers {
 /// Whether two problems are the same but for the last digits of their coefficients.
 fn is_same(a: &Problem, b: &Problem) -> bool {
     let close = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-14 * a.abs().max(b.abs());
-    a.stages.len() == b.stages.len()
-        && close(a.mass, b.mass)
-        && close(a.impact_speed, b.impact_speed)
-        && close(a.exit_depth, b.exit_depth)
-        && a.stages.iter().zip(&b.stages).all(|(a, b)| {
-            close(a.static_force, b.static_force)
-                && close(a.stiffness, b.stiffness)
-                && close(a.viscosity, b.viscosity)
-                && close(a.drag, b.drag)
-                && close(a.end, b.end)
-        })
+    let numbers = |problem: &Problem| {
+        let stages = problem.stages.iter().flat_map(|s| [s.static_force, s.stiffness, s.viscosity, s.drag, s.end]);
+        [problem.mass, problem.impact_speed, problem.exit_depth].into_iter().chain(stages).collect::<Vec<_>>()
+    };
+    let (a, b) = (numbers(a), numbers(b));
+    a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| close(*a, *b))
 }
 
 fn agreement(Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {

@@ -1,13 +1,11 @@
 //! What the central difference must do at any step, and its error constants (docs/theory.md, section 5).
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
-use super::super::verdict::Verdict;
-use super::{Subject, worst_of};
+use super::{Subject, off, worst_of};
 use crate::integrators::central_difference::stability_limit as stability_limit_of;
 use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, VelocityAt};
 use crate::physics::{Outcome, Problem, Stage, State};
 use crate::studies::quantity::Quantity;
-use crate::studies::random::Random;
 use crate::studies::{rounding, stability};
 
 check! {
@@ -51,25 +49,21 @@ check! {
 
 /// Solution by the claim's scheme at equal steps of `dt` (s).
 fn at_step(subject: &Subject<'_>, dt: f64) -> Result<Flight, NotMeasured> {
-    CentralDifference::uniform(dt, subject.claim.velocity, subject.claim.boundaries)
-        .solve(subject.problem()?, Detail::Events)
-        .map_err(NotMeasured::broken)
+    let scheme = CentralDifference::uniform(dt, subject.claim.velocity, subject.claim.boundaries);
+    Ok(scheme.solve(subject.problem()?, Detail::Events)?)
 }
 
 /// First `steps` nodes of the claim's scheme at equal steps of `dt` (s), boundaries ignored.
 fn free_states(subject: &Subject<'_>, problem: &Problem, dt: f64, steps: usize) -> Result<Vec<State>, NotMeasured> {
-    CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd)
-        .free_states(problem, steps)
-        .map_err(NotMeasured::broken)
+    Ok(CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd).free_states(problem, steps)?)
 }
 
 /// The exact solution of a motion that comes to rest in the crater, and the frequency w (1/s) there.
 fn rest_in_crater(subject: &Subject<'_>) -> Result<(Flight, f64), NotMeasured> {
     let problem = subject.problem()?;
-    let exact = subject.yardstick()?.flight;
-    if problem.crater != Some(0) || exact.stage != 0 || exact.outcome.agrees_with(Outcome::Perforated) {
-        return Err(NotMeasured::skip("the projectile does not come to rest in the crater"));
-    }
+    let exact = subject.truth()?.flight;
+    let rests = problem.crater == Some(0) && exact.stage == 0 && exact.outcome != Outcome::Perforated;
+    applies!(rests, "the projectile does not come to rest in the crater");
     Ok((exact, (problem.stages[0].stiffness / problem.mass).sqrt()))
 }
 
@@ -84,9 +78,8 @@ fn rest_in_crater(subject: &Subject<'_>) -> Result<(Flight, f64), NotMeasured> {
 fn discrete_solution(&DiscreteSolution { step, steps }: &DiscreteSolution, subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
     let Stage { static_force, stiffness, viscosity, drag, .. } = problem.stages[0];
-    if viscosity != 0.0 || drag != 0.0 {
-        return Err(NotMeasured::skip("the exact discrete solution has no velocity in the force"));
-    }
+    let is_free_of_velocity = viscosity == 0.0 && drag == 0.0;
+    applies!(is_free_of_velocity, "the exact discrete solution has no velocity in the force");
     let v0 = problem.impact_speed;
     let exact: Box<dyn Fn(usize) -> f64>;
     let (dt, amplitude);
@@ -118,18 +111,17 @@ fn discrete_solution(&DiscreteSolution { step, steps }: &DiscreteSolution, subje
 /// The step is a thousandth of the duration over an odd number, with a full significand: a running sum of it is off by
 /// the square of the number of steps.
 fn clock(&Clock { steps }: &Clock, subject: &Subject<'_>) -> Found {
-    let dt = subject.yardstick()?.flight.end.time / 1003.0;
+    let dt = subject.truth()?.flight.end.time / 1003.0;
     let states = free_states(subject, subject.problem()?, dt, steps)?;
-    let errors = states.iter().enumerate().skip(1).map(|(i, s)| (s.time / (i as f64 * dt) - 1.0).abs());
+    let errors = states.iter().enumerate().skip(1).map(|(i, s)| off(s.time, i as f64 * dt));
     Ok(Measurement::new(worst_of(errors)).remark(format!("{steps} steps of {dt:.3e} s")))
 }
 
 /// At rest in the crater `X(dt)/X - 1 -> (w dt)²/8` and `T(dt)/T - 1 -> -(w dt)²/24`, rest located.
 fn crater_constant(subject: &Subject<'_>) -> Found {
     let (exact, w) = rest_in_crater(subject)?;
-    if subject.claim.boundaries == Boundaries::StepEnd {
-        return Err(NotMeasured::skip("step ends leave a depth error anywhere between 0 and (w dt)²/8"));
-    }
+    let is_located = subject.claim.boundaries != Boundaries::StepEnd;
+    applies!(is_located, "step ends leave a depth error anywhere between 0 and (w dt)²/8");
     // Richardson over two steps removes the next even power; what remains is (w dt)^4.
     let ratio = |w_dt: f64| -> Result<f64, NotMeasured> {
         let flight = at_step(subject, w_dt / w)?;
@@ -155,16 +147,14 @@ fn crater_constant(subject: &Subject<'_>) -> Found {
 fn crater_band(subject: &Subject<'_>) -> Found {
     const STEPS: usize = 200;
     let (exact, w) = rest_in_crater(subject)?;
-    let mut random = Random::for_part(subject.context.seed, "crater band");
+    let mut random = subject.random("crater band");
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for _ in 0..STEPS {
         let w_dt = random.log_uniform(1e-3, 1e-2);
         let scheme = CentralDifference::uniform(w_dt / w, subject.claim.velocity, Boundaries::StepEnd);
         let flight = scheme.solve(subject.problem()?, Detail::Events)?;
         let share = (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0;
-        if share.is_nan() {
-            return Err(NotMeasured::broken(format!("no depth at w dt = {w_dt}")));
-        }
+        holds!(!share.is_nan(), "no depth at w dt = {w_dt}");
         (least, most) = (least.min(share), most.max(share));
     }
     Ok(Measurement::new(least.abs().max((most - 1.0).abs()))
@@ -180,10 +170,8 @@ fn crater_band(subject: &Subject<'_>) -> Found {
 fn lagged_constant(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
     let claim = subject.claim;
-    if claim.velocity != VelocityAt::LaggedHalfStep {
-        return Err(NotMeasured::skip("only a lagged drag has this constant"));
-    }
-    let exact = subject.yardstick()?.flight;
+    applies!(claim.velocity == VelocityAt::LaggedHalfStep, "only a lagged drag has this constant");
+    let exact = subject.truth()?.flight;
     let tunnel = match problem.stages.last() {
         Some(stage) if subject.is_plain_concrete()? && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0 => {
             *stage
@@ -195,9 +183,8 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
         let (left, right) = (problem.stages[i].force(at.depth, at.velocity), tunnel.force(at.depth, at.velocity));
         (left - right).abs() <= 1e-9 * right.abs()
     });
-    if !continuous && claim.boundaries != Boundaries::Landed {
-        return Err(NotMeasured::skip("after a jump that is not landed on, error/dt has no limit"));
-    }
+    let has_limit = continuous || claim.boundaries == Boundaries::Landed;
+    applies!(has_limit, "after a jump that is not landed on, error/dt has no limit");
     let (p, q, mass) = (tunnel.static_force, tunnel.drag, problem.mass);
     let entry = exact.crater_end().unwrap_or(State { time: 0.0, depth: 0.0, velocity: problem.impact_speed });
     let end = exact.end;
@@ -210,16 +197,13 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
         (Some(Quantity::Time), true) => lost / end.velocity - q * (end.depth - entry.depth) / mass,
         _ => return Err(NotMeasured::skip("the scene fixes this quantity, or no constant is known for it")),
     };
-    if claim.boundaries == Boundaries::StepEnd && claim.quantity != Some(Quantity::Depth) {
-        return Err(NotMeasured::skip("with step ends only the depth has a limit of error/dt"));
-    }
+    let has_limit = claim.boundaries != Boundaries::StepEnd || claim.quantity == Some(Quantity::Depth);
+    applies!(has_limit, "with step ends only the depth has a limit of error/dt");
     // error(dt)/dt = C + C' dt: extrapolated from a step and twice the step, averaged over steps without common ratio.
     let error = |steps: f64| -> Result<f64, NotMeasured> {
         let dt = end.time / steps;
         let flight = at_step(subject, dt)?;
-        if !flight.outcome.agrees_with(exact.outcome) {
-            return Err(NotMeasured::broken("the scheme has another outcome at this step"));
-        }
+        holds!(flight.outcome.agrees_with(exact.outcome), "the scheme has another outcome at this step");
         let difference = match claim.quantity {
             Some(Quantity::Depth) => flight.end.depth - end.depth,
             Some(Quantity::Time) => flight.end.time - end.time,
@@ -233,17 +217,14 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
         sum += 2.0 * error(count)? - error(0.5 * count)?;
     }
     let measured = sum / steps.len() as f64;
-    Ok(Measurement::new((measured / predicted - 1.0).abs())
-        .remark(format!("error/dt {measured:.6e}, predicted {predicted:.6e}")))
+    Ok(Measurement::new(off(measured, predicted)).remark(format!("error/dt {measured:.6e}, predicted {predicted:.6e}")))
 }
 
 /// By bisection on the growth of the free crater motion over many steps.
 fn stability_limit(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
     let crater = problem.stages[0];
-    if crater.stiffness <= 0.0 {
-        return Err(NotMeasured::skip("a stage without stiffness has no step limit"));
-    }
+    applies!(crater.stiffness > 0.0, "a stage without stiffness has no step limit");
     let free = Problem { exit_depth: f64::INFINITY, ..problem.clone() };
     let w = (crater.stiffness / free.mass).sqrt();
     let grows = |w_dt: f64| -> Result<bool, NotMeasured> {
@@ -256,27 +237,21 @@ fn stability_limit(subject: &Subject<'_>) -> Found {
         Ok(ratio.is_nan() || ratio > 1.5)
     };
     let (mut stable, mut unstable) = (1.0, 3.0);
-    if grows(stable)? || !grows(unstable)? {
-        return Ok(Measurement::new(f64::NAN).verdict(Verdict::Failed).remark("no limit between w dt = 1 and 3"));
-    }
+    holds!(!grows(stable)? && grows(unstable)?, "no limit between w dt = 1 and 3");
     for _ in 0..40 {
         let middle = 0.5 * (stable + unstable);
-        if grows(middle)? {
-            unstable = middle;
-        } else {
-            stable = middle;
-        }
+        *if grows(middle)? { &mut unstable } else { &mut stable } = middle;
     }
     let limit = 0.5 * (stable + unstable);
     // What the crate states, for a crater without drag.
     let stated = w * stability_limit_of(&crater, free.mass, free.impact_speed, subject.claim.velocity);
-    let off = worst_of([limit, stated].into_iter().map(|limit| (limit - 2.0).abs() / 2.0));
-    Ok(Measurement::new(off).remark(format!("growth sets in at w dt = {limit:.9}")))
+    let error = worst_of([limit, stated].map(|limit| (limit - 2.0).abs() / 2.0));
+    Ok(Measurement::new(error).remark(format!("growth sets in at w dt = {limit:.9}")))
 }
 
 fn stability_map(&StabilityMap { points }: &StabilityMap, _: &Subject<'_>) -> Found {
     let boundary = stability::map(points)?;
-    let worst = worst_of(boundary.iter().map(|p| (p.measured / p.theory - 1.0).abs()));
+    let worst = worst_of(boundary.iter().map(|p| off(p.measured, p.theory)));
     Ok(Measurement::new(worst)
         .remark(format!("{} points of the boundary", boundary.len()))
         .evidence(Evidence::Boundary(boundary)))

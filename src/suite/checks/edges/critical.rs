@@ -1,11 +1,10 @@
 //! The search for the critical velocity under wrong objectives, without a root, and near its root.
 
-use super::super::{Subject, worse};
-use super::{Violations, critical_of, slab};
+use super::super::{Subject, off, worse};
+use super::{Violations, slab};
 use crate::integrators::{Cost, Detail, Energy, Flight, IntegrationError, Integrator, Margin};
 use crate::physics::{Outcome, Problem, Resistance, Scene, semi_empirical};
 use crate::studies::critical_velocity::{self, CriticalError};
-use crate::studies::extreme_scenes::exceeds;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 check! {
@@ -19,15 +18,8 @@ check! {
     JumpsOfEq15 {} in Critical, "S", by jumps_of_eq15;
 }
 
-/// What a search is given in place of the signed energy.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Objective {
-    SignedEnergy,
-    SignedSpeed,
-    Perforated,
-    CappedDepth,
-    NotANumber,
-}
+/// What a search may be given in place of the signed energy: from the margin, and the share of the target crossed.
+type Objective = fn(f64, f64) -> f64;
 
 /// The energy formulation with another objective as its margin.
 #[derive(Clone, Copy, Debug)]
@@ -44,41 +36,32 @@ impl Integrator for Disguised {
 
     fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
         let flight = Energy::new().solve(problem, Detail::End)?;
-        let margin = flight.exit_margin.unwrap_or(f64::NAN);
-        let value = match self.0 {
-            Objective::SignedEnergy => margin,
-            Objective::SignedSpeed => margin.abs().sqrt().copysign(margin),
-            Objective::Perforated => 1f64.copysign(margin),
-            Objective::CappedDepth => (flight.end.depth / problem.exit_depth - 1.0).min(0.0),
-            Objective::NotANumber => f64::NAN,
-        };
-        let error = (self.0 == Objective::SignedEnergy).then_some(flight.exit_margin_error).flatten();
-        Ok(Some(Margin { value, error, cost: Cost::default() }))
+        let value = self.0(flight.exit_margin.unwrap_or(f64::NAN), flight.end.depth / problem.exit_depth);
+        Ok(Some(Margin { value, error: None, cost: Cost::default() }))
     }
 }
 
 fn objectives(_: &Subject<'_>) -> Found {
+    let wrong: [(&str, Objective); 3] = [
+        ("SignedSpeed", |margin, _| margin.abs().sqrt().copysign(margin)),
+        ("Perforated", |margin, _| 1f64.copysign(margin)),
+        ("CappedDepth", |_, share| (share - 1.0).min(0.0)),
+    ];
     let mut seen = Violations::default();
     for drag in [false, true] {
         let scene = slab(drag);
-        let exact = critical_of(&scene)?;
-        for objective in
-            [Objective::SignedEnergy, Objective::SignedSpeed, Objective::Perforated, Objective::CappedDepth]
-        {
+        let exact = critical_velocity::exact(&scene)?;
+        let found = critical_velocity::of_scene(&scene, &Energy::new())?;
+        let error = off(found.velocity, exact);
+        seen.expect(error <= 1e-14 && found.evaluations <= 8, || {
+            format!("off by {error:e} after {} solutions", found.evaluations)
+        });
+        for (name, objective) in wrong {
             match critical_velocity::of_scene(&scene, &Disguised(objective)) {
-                Ok(found) => {
-                    let off = (found.velocity / exact - 1.0).abs();
-                    seen.expect(off <= 1e-9, || format!("{objective:?} gives {} for {exact} m/s", found.velocity));
-                    if objective == Objective::SignedEnergy {
-                        seen.expect(off <= 1e-14 && found.evaluations <= 8, || {
-                            format!("off by {off:e} after {} solutions", found.evaluations)
-                        });
-                    }
-                }
-                Err(error) => {
-                    seen.expect(objective != Objective::SignedEnergy, || error.to_string());
-                    seen.notes.push(format!("{objective:?}: refused"));
-                }
+                Ok(found) => seen.expect(off(found.velocity, exact) <= 1e-9, || {
+                    format!("{name} gives {} for {exact} m/s", found.velocity)
+                }),
+                Err(_) => seen.notes.push(format!("{name}: refused")),
             }
         }
     }
@@ -101,7 +84,7 @@ fn no_root(_: &Subject<'_>) -> Found {
     seen.expect(none.as_ref().is_ok_and(|c| c.velocity == 0.0 && !c.note.is_empty()), || format!("{none:?}"));
     let open = search(&Scene { thickness: None, ..slab(true) });
     seen.expect(matches!(open, Err(CriticalError::NoExit)), || format!("{open:?}"));
-    let nan = critical_velocity::of_scene(&slab(true), &Disguised(Objective::NotANumber));
+    let nan = critical_velocity::of_scene(&slab(true), &Disguised(|_, _| f64::NAN));
     seen.expect(matches!(nan, Err(CriticalError::NotFinite { .. })), || format!("{nan:?}"));
     Ok(seen.measurement())
 }
@@ -115,21 +98,17 @@ fn critical_error_bound(subject: &Subject<'_>) -> Found {
         if let (true, Resistance::Concrete(c)) = (given, &mut scene.resistance) {
             c.crater_stiffness = crate::physics::CraterStiffness::Given(1e7);
         }
-        let exact = critical_of(&scene)?;
+        let exact = critical_velocity::exact(&scene)?;
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let bar = found.error_bar.ok_or_else(|| NotMeasured::broken("no error bar"))?;
-        if exceeds(bar, widest * exact) {
-            return Err(NotMeasured::broken(format!("the error bar is {bar:e} m/s wide")));
-        }
+        holds!(bar <= widest * exact, "the error bar is {bar:e} m/s wide");
         // The exact value is itself rounded.
         let rounding = 2.0 * f64::EPSILON * exact;
         worst = worse(worst, (found.velocity - exact).abs() / (bar + rounding));
         // A margin inside its error bound at V_c itself: dV_r/dV0 is infinite there, and V_r is no measure.
         let problem = scene.resolve(exact)?;
         let flight = method.integrator().solve(&problem, Detail::End)?;
-        if flight.outcome != Outcome::Undecided {
-            return Err(NotMeasured::broken(format!("{} at V_c itself", flight.outcome)));
-        }
+        holds!(flight.outcome == Outcome::Undecided, "{} at V_c itself", flight.outcome);
     }
     Ok(Measurement::new(worst))
 }
@@ -137,9 +116,7 @@ fn critical_error_bound(subject: &Subject<'_>) -> Found {
 fn jumps_of_eq15(_: &Subject<'_>) -> Found {
     let mut worst = 0.0;
     for (jump, (at, height)) in semi_empirical::jumps().iter().zip([(3.0, 0.002_723_8), (3.8, -0.002_331_2)]) {
-        if jump.thickness_ratio != at {
-            return Err(NotMeasured::broken(format!("a jump at {}", jump.thickness_ratio)));
-        }
+        holds!(jump.thickness_ratio == at, "a jump at {}", jump.thickness_ratio);
         worst = worse(worst, (jump.above - jump.below - height).abs());
     }
     Ok(Measurement::new(worst))

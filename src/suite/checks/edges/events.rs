@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use super::super::{Subject, worse};
-use super::{Violations, concrete, critical_of, exact, exact_margin, is_right, resolve, slab, staged};
+use super::super::{Subject, off, worse, worst_of};
+use super::{Violations, concrete, end_error, exact, exact_margin, is_right, slab, staged};
 use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
 };
 use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
-use crate::studies::critical_velocity::{Options, critical_velocity};
+use crate::studies::critical_velocity::{self, Options};
 use crate::studies::relations::way_back;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 
@@ -26,12 +26,13 @@ check! {
     TripleCoincidence {} in Events, "violations", by triple_coincidence;
     /// E6 of `verification/edges.toml`.
     ThinTargets {} in Events, "violations", by thin_targets;
-    /// E7 of `verification/edges.toml`.
-    TenEnds {} in Events, "violations", by ten_ends;
-    /// E8 of `verification/edges.toml`.
-    EventBehindEvent {} in Events, "violations", by event_behind_event;
-    /// E9 of `verification/edges.toml`.
-    EndsAnUlpApart {} in Events, "violations", by ends_an_ulp_apart;
+    /// E7 to E9 of `verification/edges.toml`: a constant force over 1 m from 10 m/s, in stages that end at `ends`.
+    StageEnds {
+        /// Depths (m), ascending.
+        ends: Vec<f64>,
+        /// How many events there are.
+        events: usize,
+    } in Events, "violations", by stage_ends;
     /// E10 of `verification/edges.toml`.
     ScaledForces {} in Events, "promises", by scaled_forces;
     /// E11 of `verification/edges.toml`.
@@ -79,19 +80,19 @@ fn grazing_ladder(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     for drag in [false, true] {
         let scene = slab(drag);
-        let critical = critical_of(&scene)?;
+        let critical = critical_velocity::exact(&scene)?;
         let mut decided = 0;
         for j in 1..=14 {
             let mut both = true;
             for sign in [-1.0, 1.0] {
-                let problem = resolve(&scene, critical * (1.0 + sign * 10f64.powi(-j)))?;
+                let problem = scene.resolve(critical * (1.0 + sign * 10f64.powi(-j)))?;
                 both &= check_outcome(subject, &problem, &mut seen)? != Outcome::Undecided;
             }
             if both {
                 decided = j;
             }
         }
-        check_outcome(subject, &resolve(&scene, critical)?, &mut seen)?;
+        check_outcome(subject, &scene.resolve(critical)?, &mut seen)?;
         seen.notes.push(format!("decided to 1e-{decided} {}", if drag { "with drag" } else { "without drag" }));
     }
     Ok(seen.measurement())
@@ -102,14 +103,14 @@ fn scan(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     for drag in [false, true] {
         let scene = slab(drag);
-        let critical = critical_of(&scene)?;
+        let critical = critical_velocity::exact(&scene)?;
         // From 10 % off to 1e-14 and out again on the other side, ascending.
         let offset = |i: i32| 10f64.powf(-1.0 - 13.0 * f64::from(i) / f64::from(SIDE - 1));
         let below = (0..SIDE).map(|i| 1.0 - offset(i));
         let above = (0..SIDE).rev().map(|i| 1.0 + offset(i));
         let (mut flips, mut last, mut undecided) = (0, None, 0);
         for factor in below.chain(above) {
-            let flight = subject.flight(&resolve(&scene, critical * factor)?)?;
+            let flight = subject.flight(&scene.resolve(critical * factor)?)?;
             if flight.outcome == Outcome::Undecided {
                 undecided += 1;
                 continue;
@@ -146,8 +147,8 @@ fn exactly_critical(subject: &Subject<'_>) -> Found {
         let flight = subject.flight(&problem)?;
         let outcome = flight.outcome;
         seen.expect(matches!(outcome, Outcome::Perforated | Outcome::Undecided), || format!("{outcome}"));
-        let off = (flight.end.depth / problem.exit_depth - 1.0).abs();
-        seen.expect(off <= 10.0 * subject.promise(), || format!("ends off H by {off:e}"));
+        let error = off(flight.end.depth, problem.exit_depth);
+        seen.expect(error <= 10.0 * subject.promise(), || format!("ends off H by {error:e}"));
         // Near rest V is the root of an error of W.
         let left = flight.end.velocity / problem.impact_speed;
         seen.expect(left * left <= 1e3 * subject.promise(), || format!("leaves at {left:e} V0"));
@@ -198,7 +199,7 @@ fn triple_coincidence(subject: &Subject<'_>) -> Found {
 fn thin_targets(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     let scene = slab(true);
-    let problem = resolve(&scene, 400.0)?;
+    let problem = scene.resolve(400.0)?;
     let depth = problem.stages[0].end;
     for exit in [
         0.0,
@@ -226,21 +227,23 @@ fn thin_targets(subject: &Subject<'_>) -> Found {
         if exit == 0.0 {
             seen.expect(flight.end.velocity == 400.0 && flight.end.time == 0.0, || format!("{}", flight.end));
         } else {
-            let off = (flight.end.velocity - exact(&thin)?.end.velocity.hi()).abs() / 400.0;
-            seen.expect(off <= 1e3 * subject.promise(), || format!("V_r off by {off:e} at H = {exit:e}"));
+            let error = (flight.end.velocity - exact(&thin)?.end.velocity.hi()).abs() / 400.0;
+            seen.expect(error <= 1e3 * subject.promise(), || format!("V_r off by {error:e} at H = {exit:e}"));
         }
         check_order(&flight, &mut seen);
     }
     Ok(seen.measurement())
 }
 
-/// Times and velocities of the events against the exact ones.
-fn check_events(subject: &Subject<'_>, problem: &Problem, count: usize) -> Found {
+fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
-    let flight = subject.flight(problem)?;
-    let exact = exact(problem)?.values();
+    let ends = ends.iter().copied().chain([f64::INFINITY]);
+    let stages: Vec<Stage> = ends.map(|end| Stage { end, ..Stage::tunnel(20.0, 0.0) }).collect();
+    let problem = staged(1.0, 10.0, 1.0, &stages);
+    let flight = subject.flight(&problem)?;
+    let exact = exact(&problem)?.values();
     let (found, expected) = (kinds(&flight), kinds(&exact));
-    seen.expect(expected.len() == count, || format!("the case itself has {} events", expected.len()));
+    seen.expect(expected.len() == *events, || format!("the case itself has {} events", expected.len()));
     seen.expect(found == expected, || format!("{found:?}"));
     check_order(&flight, &mut seen);
     for (event, exact) in flight.events.iter().zip(&exact.events) {
@@ -254,26 +257,6 @@ fn check_events(subject: &Subject<'_>, problem: &Problem, count: usize) -> Found
     Ok(seen.measurement())
 }
 
-/// A constant force cut at `ends`, over 1 m from 10 m/s.
-fn cut(ends: &[f64]) -> Problem {
-    let mut stages: Vec<Stage> = ends.iter().map(|end| Stage { end: *end, ..Stage::tunnel(20.0, 0.0) }).collect();
-    stages.push(Stage::tunnel(20.0, 0.0));
-    staged(1.0, 10.0, 1.0, &stages)
-}
-
-fn ten_ends(subject: &Subject<'_>) -> Found {
-    check_events(subject, &cut(&[0.1, 0.2, 0.3, 0.3, 0.3, 0.45, 0.5, 0.6, 0.61, 0.9]), 11)
-}
-
-fn event_behind_event(subject: &Subject<'_>) -> Found {
-    check_events(subject, &cut(&[0.6, 0.6 * (1.0 + 1e-9), 0.85]), 4)
-}
-
-fn ends_an_ulp_apart(subject: &Subject<'_>) -> Found {
-    let depth: f64 = 0.3;
-    check_events(subject, &cut(&[0.0, depth.next_down(), depth, depth.next_up()]), 5)
-}
-
 fn scaled_forces(subject: &Subject<'_>) -> Found {
     let mut worst = 0.0;
     for exit in [f64::INFINITY, 0.75] {
@@ -284,19 +267,14 @@ fn scaled_forces(subject: &Subject<'_>) -> Found {
             let scale = |x: f64| x * 2f64.powi(power);
             let problem = concrete(scale(1.0), 2.0, exit, (scale(8.0), 0.5), (scale(4.0), scale(0.25)));
             let flight = subject.flight(&problem)?;
-            if !flight.outcome.agrees_with(base.outcome) || kinds(&flight) != kinds(&base) {
-                return Err(NotMeasured::broken(format!("{} became {} at 2^{power}", base.outcome, flight.outcome)));
-            }
-            worst = worse(worst, (flight.end.depth / base.end.depth - 1.0).abs());
-            worst = worse(worst, (flight.end.time / base.end.time - 1.0).abs());
-            worst = worse(worst, (flight.end.velocity - base.end.velocity).abs() / 2.0);
+            let is_same = flight.outcome.agrees_with(base.outcome) && kinds(&flight) == kinds(&base);
+            holds!(is_same, "{} became {} at 2^{power}", base.outcome, flight.outcome);
+            worst = worse(worst, end_error(&flight, &base, 2.0));
         }
     }
     let subnormal =
         Scene { mass: 1e-310, resistance: Resistance::Stages(vec![Stage::tunnel(1e-310, 0.0)]), ..slab(false) };
-    if subnormal.problem().is_ok() {
-        return Err(NotMeasured::broken("subnormal mass and force are taken"));
-    }
+    holds!(subnormal.problem().is_err(), "subnormal mass and force are taken");
     Ok(Measurement::new(worst / subject.promise()))
 }
 
@@ -321,7 +299,7 @@ fn approached_for_ever(subject: &Subject<'_>) -> Found {
         }
     }
     let resolve = |speed| Ok::<_, std::convert::Infallible>(at(speed));
-    let found = critical_velocity(resolve, method.integrator(), Options::default())?;
+    let found = critical_velocity::critical_velocity(resolve, method.integrator(), Options::default())?;
     seen.expect((found.velocity - critical).abs() <= found.error_bar.unwrap_or(0.0), || {
         format!("V_c {} +- {:?}", found.velocity, found.error_bar)
     });
@@ -333,25 +311,25 @@ fn plateau(subject: &Subject<'_>) -> Found {
     let gap = Stage { end: 1.0, ..Stage::tunnel(0.0, 0.0) };
     let open = Stage::tunnel(0.0, 0.0);
     let flight = subject.flight(&staged(1.0, 3.0, 2.0, &[gap, open]))?;
-    let off = worse((flight.end.time * 1.5 - 1.0).abs(), (flight.end.velocity / 3.0 - 1.0).abs());
+    let error = worse((flight.end.time * 1.5 - 1.0).abs(), off(flight.end.velocity, 3.0));
     seen.expect(flight.outcome == Outcome::Perforated, || format!("{}", flight.outcome));
-    seen.expect(off <= 1e3 * subject.promise(), || format!("off by {off:e}"));
+    seen.expect(error <= 1e3 * subject.promise(), || format!("off by {error:e}"));
     seen.expect(kinds(&flight) == [EventKind::StageEnd(0), EventKind::Exit], || format!("{:?}", kinds(&flight)));
     let endless = staged(1.0, 3.0, f64::INFINITY, &[open]);
     let said = subject.method(None)?.integrator().solve(&endless, Detail::Events);
     seen.expect(matches!(said, Err(IntegrationError::NeverEnds { .. })), || format!("{said:?}"));
     // Then a wall: nothing has been lost before it.
     let flight = subject.flight(&staged(1.0, 3.0, f64::INFINITY, &[gap, Stage::tunnel(9.0, 0.0)]))?;
-    let off = (flight.end.depth / 1.5 - 1.0).abs();
-    seen.expect(off <= 1e3 * subject.promise(), || format!("stops off by {off:e}"));
+    let error = off(flight.end.depth, 1.5);
+    seen.expect(error <= 1e3 * subject.promise(), || format!("stops off by {error:e}"));
     Ok(seen.measurement())
 }
 
 fn at_a_step_end(_: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     let dt = 2f64.powi(-10);
-    for velocity in [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep] {
-        for boundaries in [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed] {
+    for velocity in VelocityAt::ALL {
+        for boundaries in Boundaries::ALL {
             let scheme = CentralDifference::uniform(dt, velocity, boundaries);
             let free = Stage { end: 0.25, ..Stage::tunnel(0.0, 0.0) };
             let problem = staged(1.0, 1.0, 0.5, &[free, Stage::tunnel(0.0, 0.0)]);
@@ -379,7 +357,7 @@ fn at_a_step_end(_: &Subject<'_>) -> Found {
 
 fn small_times_and_far_starts(subject: &Subject<'_>) -> Found {
     let mut worst = 0.0;
-    let base = resolve(&slab(true), 500.0)?;
+    let base = slab(true).resolve(500.0)?;
     // Lengths by 1e-9: the motion takes picoseconds, at the same speed.
     let tiny = Problem {
         exit_depth: base.exit_depth * 1e-9,
@@ -400,11 +378,9 @@ fn small_times_and_far_starts(subject: &Subject<'_>) -> Found {
         staged(1.0, 300.0, 1e6 + 0.25, &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)]);
     // An ulp of the depth counts 4e6 times in the quarter of a metre behind 1e6 m.
     for (problem, condition) in [(tiny, 1.0), (far, 4e6)] {
-        let flight = subject.flight(&problem)?;
-        let exact = exact(&problem)?.values();
-        worst = worse(worst, (flight.end.time / exact.end.time - 1.0).abs() / condition);
-        let margin = exact_margin(&problem)?;
-        worst = worse(worst, (flight.exit_margin.unwrap_or(f64::NAN) - margin).abs() / condition);
+        let (flight, exact) = subject.beside_exact(&problem)?;
+        let margin = (flight.exit_margin.unwrap_or(f64::NAN) - exact_margin(&problem)?).abs();
+        worst = worst_of([worst, off(flight.end.time, exact.end.time) / condition, margin / condition]);
     }
     Ok(Measurement::new(worst / subject.promise()))
 }
@@ -414,8 +390,8 @@ fn vanishing_speed(subject: &Subject<'_>) -> Found {
     for power in [0, -3, -6, -9, -12, -20, -30] {
         let speed = 10f64.powi(power);
         let flight = subject.flight(&staged(2.0, speed, f64::INFINITY, &[Stage::tunnel(1e5, 3.0)]))?;
-        let depth = (flight.end.depth / (speed * speed / 1e5) - 1.0).abs();
-        let time = (flight.end.time / (2.0 * speed / 1e5) - 1.0).abs();
+        let depth = off(flight.end.depth, speed * speed / 1e5);
+        let time = off(flight.end.time, 2.0 * speed / 1e5);
         // The drag takes Q V0²/(2 P) of the depth, which counts at the first speeds.
         let drag = 3.0 * speed * speed / 1e5;
         worst = worse(worst, (worse(depth, time) - drag).max(0.0));
@@ -441,63 +417,49 @@ fn laws_outside_their_range(_: &Subject<'_>) -> Found {
     Ok(Measurement::new(worst))
 }
 
-/// Largest error of the end and of the crater's end over `promise`.
-fn errors(subject: &Subject<'_>, problem: &Problem) -> Result<f64, NotMeasured> {
-    let flight = subject.flight(problem)?;
-    let exact = exact(problem)?.values();
-    if !flight.outcome.agrees_with(exact.outcome) {
-        return Err(NotMeasured::broken(format!("{} is {}", exact.outcome, flight.outcome)));
-    }
-    let mut worst = (flight.end.depth / exact.end.depth - 1.0).abs();
-    worst = worse(worst, (flight.end.time / exact.end.time - 1.0).abs());
-    worst = worse(worst, (flight.end.velocity - exact.end.velocity).abs() / problem.impact_speed);
-    if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
-        worst = worse(worst, (found.time / end.time - 1.0).abs());
-        worst = worse(worst, (found.velocity - end.velocity).abs() / problem.impact_speed);
-    }
-    Ok(worst / subject.promise())
-}
-
 fn force_jump(subject: &Subject<'_>) -> Found {
-    let base = resolve(&slab(true), 500.0)?;
+    let base = slab(true).resolve(500.0)?;
     let mut worst = 0.0;
     for factor in [0.1, 0.5, 2.0, 10.0] {
         for exit in [f64::INFINITY, 0.2] {
             let mut problem = Problem { exit_depth: exit, ..base.clone() };
             problem.stages[0].stiffness *= factor;
-            worst = worse(worst, errors(subject, &problem)?);
+            let (flight, exact) = subject.beside_exact(&problem)?;
+            worst = worse(worst, end_error(&flight, &exact, problem.impact_speed));
+            if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
+                let speed = (found.velocity - end.velocity).abs() / problem.impact_speed;
+                worst = worst_of([worst, off(found.time, end.time), speed]);
+            }
         }
     }
-    Ok(Measurement::new(worst))
+    Ok(Measurement::new(worst / subject.promise()))
 }
 
 fn back_again(subject: &Subject<'_>) -> Found {
     // In the direction back drag is negative, for which there is no closed form.
     let drag = subject.method_name() != MethodName::ClosedForm;
-    let problem = resolve(&slab(drag), 600.0)?;
+    let problem = slab(drag).resolve(600.0)?;
     let there = subject.flight(&problem)?;
     let back = way_back(&problem, &there).ok_or_else(|| NotMeasured::broken("the projectile does not leave"))?;
     let again = subject.flight(&back)?;
     let places: BTreeSet<_> = again.events.iter().map(|event| event.kind).collect();
-    if places != BTreeSet::from([EventKind::StageEnd(0), EventKind::Exit]) {
-        return Err(NotMeasured::broken(format!("in the direction back {places:?}")));
-    }
-    let speed = (again.end.velocity / problem.impact_speed - 1.0).abs();
-    let time = (again.end.time / there.end.time - 1.0).abs();
+    let right = BTreeSet::from([EventKind::StageEnd(0), EventKind::Exit]);
+    holds!(places == right, "in the direction back {places:?}");
+    let speed = off(again.end.velocity, problem.impact_speed);
+    let time = off(again.end.time, there.end.time);
     Ok(Measurement::new(worse(speed, time) / subject.promise()))
 }
 
 fn across_the_crater_end(subject: &Subject<'_>) -> Found {
     let scene = Scene { thickness: None, ..slab(true) };
-    let law = resolve(&scene, 1.0)?;
+    let law = scene.resolve(1.0)?;
     let zero = (law.stages[0].end * law.stages[1].static_force / law.mass).sqrt();
     let mut worst = 0.0;
     for j in 1..=15 {
         for sign in [-1.0, 0.0, 1.0] {
-            let problem = resolve(&scene, zero * (1.0 + sign * 10f64.powi(-j)))?;
-            let (flight, exact) = (subject.flight(&problem)?, exact(&problem)?.values());
-            worst = worse(worst, (flight.end.depth / exact.end.depth - 1.0).abs());
-            worst = worse(worst, (flight.end.time / exact.end.time - 1.0).abs());
+            let problem = scene.resolve(zero * (1.0 + sign * 10f64.powi(-j)))?;
+            let (flight, exact) = subject.beside_exact(&problem)?;
+            worst = worst_of([worst, off(flight.end.depth, exact.end.depth), off(flight.end.time, exact.end.time)]);
         }
     }
     Ok(Measurement::new(worst / subject.promise()))

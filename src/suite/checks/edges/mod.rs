@@ -9,7 +9,7 @@ mod steps;
 
 use twofloat::TwoFloat;
 
-use super::{Subject, solve};
+use super::{Subject, off, solve, worst_of};
 use crate::integrators::method::{MethodName, RTOL_DEFAULT};
 use crate::integrators::{Detail, Energy, Flight, Taylor};
 use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Scene, Stage, Stages, Target};
@@ -21,6 +21,13 @@ impl Subject<'_> {
     /// Solution of `problem` at the method's default tolerance.
     fn flight(&self, problem: &Problem) -> Result<Flight, NotMeasured> {
         solve(&self.method(None)?, problem, Detail::Events)
+    }
+
+    /// The method's solution of `problem`, and the exact one of the same outcome, rounded from double-double.
+    fn beside_exact(&self, problem: &Problem) -> Result<(Flight, Flight), NotMeasured> {
+        let (flight, exact) = (self.flight(problem)?, exact(problem)?.values());
+        holds!(flight.outcome.agrees_with(exact.outcome), "{} is {}", exact.outcome, flight.outcome);
+        Ok((flight, exact))
     }
 
     /// The relative error that the method promises: round-off, or a multiple of its tolerance per step.
@@ -70,13 +77,22 @@ impl Violations {
 
 /// The solution in double-double.
 fn exact(problem: &Problem) -> Result<Flight<TwoFloat>, NotMeasured> {
-    Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).map_err(NotMeasured::broken)
+    Ok(Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events)?)
 }
 
 /// The exit margin in double-double, rounded: its sign is the outcome.
 fn exact_margin(problem: &Problem) -> Result<f64, NotMeasured> {
     let margin = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>())?;
     margin.map(|(value, ..)| value.hi()).ok_or_else(|| NotMeasured::broken("the problem has no exit"))
+}
+
+/// Largest error of the end: depth and time relative to the exact ones, velocity to V0.
+fn end_error(flight: &Flight, exact: &Flight, impact_speed: f64) -> f64 {
+    worst_of([
+        off(flight.end.depth, exact.end.depth),
+        off(flight.end.time, exact.end.time),
+        (flight.end.velocity - exact.end.velocity).abs() / impact_speed,
+    ])
 }
 
 /// Whether `outcome` is right for a margin of that sign; `Undecided` is not wrong.
@@ -105,12 +121,9 @@ fn slab(drag: bool) -> Scene {
     Scene { thickness: Some(0.30), velocity: Some(400.0), ..Scene::of_concrete(0.9, concrete) }
 }
 
-fn resolve(scene: &Scene, speed: f64) -> Result<Problem, NotMeasured> {
-    scene.resolve(speed).map_err(NotMeasured::broken)
-}
-
-fn critical_of(scene: &Scene) -> Result<f64, NotMeasured> {
-    crate::studies::critical_velocity::exact(scene).map_err(NotMeasured::broken)
+/// The same without a far side, at 400 m/s: it comes to rest in the tunnel.
+fn stop(drag: bool) -> Result<Problem, NotMeasured> {
+    Ok(Scene { thickness: None, ..slab(drag) }.resolve(400.0)?)
 }
 
 /// A problem of stages: laws with their ends.
@@ -120,16 +133,8 @@ fn staged(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Pr
 
 /// Crater and tunnel by their coefficients.
 fn concrete(mass: f64, impact_speed: f64, exit_depth: f64, crater: (f64, f64), tunnel: (f64, f64)) -> Problem {
-    Problem {
-        crater: Some(0),
-        target: Target::CraterAndTunnel,
-        ..staged(
-            mass,
-            impact_speed,
-            exit_depth,
-            &[Stage::crater(crater.0, crater.1), Stage::tunnel(tunnel.0, tunnel.1)],
-        )
-    }
+    let stages = [Stage::crater(crater.0, crater.1), Stage::tunnel(tunnel.0, tunnel.1)];
+    Problem { crater: Some(0), target: Target::CraterAndTunnel, ..staged(mass, impact_speed, exit_depth, &stages) }
 }
 
 #[cfg(test)]

@@ -1,23 +1,21 @@
 //! Step sizes, number range, rounding and stiffness.
 
 use super::super::scheme::rounding_of;
-use super::super::{Subject, worse};
-use super::{Violations, concrete, exact, resolve, slab, staged};
+use super::super::{Subject, Worst, off, solve, worse, worst_of};
+use super::{Violations, concrete, end_error, exact, slab, staged, stop};
 use crate::integrators::central_difference::stability_limit;
 use crate::integrators::{
     Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, Taylor, VelocityAt,
 };
-use crate::physics::{Outcome, Problem, Scene, Stage};
-use crate::studies::extreme_scenes::exceeds;
-use crate::studies::order::{OrderVerdict, StepError, fit};
+use crate::physics::{Outcome, Problem, Stage};
+use crate::studies::error::flight_error;
+use crate::studies::order::{OrderFit, OrderVerdict, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 use crate::studies::random_scenes::closed_form_errors_at_inputs;
 use crate::studies::{Path, extreme_scenes, formal_order, rounding, stability};
 use crate::suite::claim::{Claim, Evidence, Found, Judged, Measurement, NotMeasured, Section};
 use crate::suite::{Check, Verdict};
-
-const RULES: [VelocityAt; 3] = [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
 
 check! {
     /// S1 of `verification/edges.toml`.
@@ -50,7 +48,7 @@ check! {
 
 fn growth(_: &Subject<'_>) -> Found {
     let (mut worst, mut remark) = (0.0, Vec::new());
-    for velocity in RULES {
+    for velocity in VelocityAt::ALL {
         // With dt = 1 in the study the step moves both groups; drag decays below the limit, to nothing to compare.
         for (drag, parts) in [(0.0, &[0.5, 0.99, 1.0, 1.01, 2.0][..]), (0.3, &[1.01, 2.0][..])] {
             let law = Stage { static_force: 0.0, stiffness: 1.0, viscosity: drag, drag: 0.0, end: f64::INFINITY };
@@ -58,16 +56,11 @@ fn growth(_: &Subject<'_>) -> Found {
             for &part in parts {
                 let dt = part * limit;
                 // Growth by a third a step, and by fourteen at twice the limit, stays within the range of the numbers.
-                let steps = if part <= 1.0 {
-                    4000
-                } else if part < 1.5 {
-                    1000
-                } else {
-                    100
-                };
+                let steps =
+                    [(1.0, 4000), (1.5, 1000)].iter().find(|(most, _)| part <= *most).map_or(100, |found| found.1);
                 let found = stability::growth_measured(velocity, dt, drag * dt, steps)?;
                 let theory = stability::growth_in_theory(velocity, dt, drag * dt);
-                worst = worse(worst, (found / theory - 1.0).abs());
+                worst = worse(worst, off(found, theory));
                 if velocity == VelocityAt::LaggedHalfStep {
                     remark.push(format!("{part} of the limit, r dt/M {:.2}: {found:.5}", drag * dt));
                 }
@@ -79,27 +72,25 @@ fn growth(_: &Subject<'_>) -> Found {
 
 fn stated_step_limits(_: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
-    let solve = |problem: &Problem, dt: f64, velocity| {
-        CentralDifference::uniform(dt, velocity, Boundaries::StepEnd)
-            .solve(problem, Detail::Events)
-            .map_err(NotMeasured::broken)
+    let limit = |problem: &Problem, dt, velocity| -> Result<Option<StepLimit>, NotMeasured> {
+        let scheme = CentralDifference::uniform(dt, velocity, Boundaries::StepEnd);
+        Ok(scheme.solve(problem, Detail::Events)?.step_limit)
     };
+    let is_right = |limit: Option<StepLimit>, part| limit.is_some_and(|t| t.stable == (part < 1.0));
     // Crater alone: 2/w = 1 s. Tunnel alone at 100 m/s: M/(Q V) = 1 s for the lagged drag.
     let crater = staged(1.0, 1.0, f64::INFINITY, &[Stage::crater(4.0, f64::INFINITY)]);
     let tunnel = staged(1.0, 100.0, f64::INFINITY, &[Stage::tunnel(1e-3, 0.01)]);
     for part in [0.5, 0.99, 1.01, 2.0] {
-        for velocity in RULES {
-            let limit = solve(&crater, part, velocity)?.step_limit;
-            seen.expect(limit.is_some_and(|t| t.stable == (part < 1.0)), || {
-                format!("crater, {velocity}, {part}: {limit:?}")
-            });
+        for velocity in VelocityAt::ALL {
+            let found = limit(&crater, part, velocity)?;
+            seen.expect(is_right(found, part), || format!("crater, {velocity}, {part}: {found:?}"));
         }
-        let limit: Option<StepLimit> = solve(&tunnel, part, VelocityAt::LaggedHalfStep)?.step_limit;
-        seen.expect(limit.is_some_and(|t| t.stable == (part < 1.0)), || format!("lagged drag at {part}: {limit:?}"));
+        let found = limit(&tunnel, part, VelocityAt::LaggedHalfStep)?;
+        seen.expect(is_right(found, part), || format!("lagged drag at {part}: {found:?}"));
     }
     // One step of twice the duration: V falls below zero in it, and P + Q V² would drive it on to minus infinity.
-    for boundaries in [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed] {
-        for velocity in RULES {
+    for boundaries in Boundaries::ALL {
+        for velocity in VelocityAt::ALL {
             let problem = staged(1.0, 10.0, f64::INFINITY, &[Stage::tunnel(100.0, 1.0)]);
             let flight = CentralDifference::uniform(0.2, velocity, boundaries).solve(&problem, Detail::Events)?;
             let found = flight.outcome == Outcome::Stopped && flight.end.velocity <= 0.0 && flight.cost.steps <= 2;
@@ -114,34 +105,27 @@ fn stated_step_limits(_: &Subject<'_>) -> Found {
 }
 
 fn closed_form_everywhere(subject: &Subject<'_>) -> Found {
-    let mut worst = 0.0;
-    let mut at = String::new();
-    for index in 0..150 {
-        let scene = extreme_scenes::scene(subject.context.seed, 2 * index);
-        let errors = closed_form_errors_at_inputs(&scene)
-            .map_err(|e| NotMeasured::broken(format!("scene {}: {e}", 2 * index)))?;
+    let mut worst = Worst::default();
+    for index in (0..300).step_by(2) {
+        let scene = extreme_scenes::scene(subject.context.seed, index);
+        let errors =
+            closed_form_errors_at_inputs(&scene).map_err(|e| NotMeasured::broken(format!("scene {index}: {e}")))?;
         if let Some((error, quantity)) = errors.worst() {
-            if exceeds(error, worst) {
-                at = format!("{quantity} of scene {}", 2 * index);
-            }
-            worst = worse(worst, error);
+            worst.take(error, || format!("{quantity} of scene {index}"));
         }
     }
-    Ok(Measurement::new(worst).remark(at))
+    Ok(worst.measurement())
 }
 
 fn tolerance_sweep(subject: &Subject<'_>) -> Found {
     let mut worst = 0.0;
     let mut points = Vec::new();
-    for problem in [resolve(&Scene { thickness: None, ..slab(true) }, 400.0)?, resolve(&slab(true), 600.0)?] {
+    for problem in [stop(true)?, slab(true).resolve(600.0)?] {
         let exact = exact(&problem)?.values();
         for power in -12..=-3 {
             let rtol = 10f64.powi(power);
-            let method = subject.method(Some(rtol))?;
-            let flight = method.integrator().solve(&problem, Detail::Events)?;
-            let mut error = (flight.end.depth / exact.end.depth - 1.0).abs();
-            error = worse(error, (flight.end.time / exact.end.time - 1.0).abs());
-            error = worse(error, (flight.end.velocity - exact.end.velocity).abs() / problem.impact_speed);
+            let flight = solve(&subject.method(Some(rtol))?, &problem, Detail::Events)?;
+            let error = end_error(&flight, &exact, problem.impact_speed);
             worst = worse(worst, (error - 16.0 * f64::EPSILON).max(0.0) / rtol);
             points.push((rtol, error));
         }
@@ -150,7 +134,7 @@ fn tolerance_sweep(subject: &Subject<'_>) -> Found {
 }
 
 fn slab_rounding(_: &Subject<'_>) -> Found {
-    rounding_of(&resolve(&Scene { thickness: None, ..slab(true) }, 400.0)?, 8, 17)
+    rounding_of(&stop(true)?, 8, 17)
 }
 
 /// Fitted order of `quantity` over the steps `sizes`.
@@ -159,12 +143,12 @@ fn fitted(
     scheme: (VelocityAt, Boundaries),
     quantity: Quantity,
     sizes: &[f64],
-) -> Result<(f64, crate::studies::order::OrderFit), NotMeasured> {
+) -> Result<(f64, OrderFit), NotMeasured> {
     let exact = Taylor::default().solve(problem, Detail::Events)?;
     let mut points = Vec::with_capacity(sizes.len());
     for &dt in sizes {
         let flight = CentralDifference::uniform(dt, scheme.0, scheme.1).solve(problem, Detail::Events)?;
-        let error = crate::studies::error::flight_error(quantity, &flight, &exact, problem.impact_speed)
+        let error = flight_error(quantity, &flight, &exact, problem.impact_speed)
             .ok_or_else(|| NotMeasured::broken(format!("no {quantity} at {dt} s")))?;
         points.push(StepError::new(dt, error));
     }
@@ -173,25 +157,17 @@ fn fitted(
     Ok((order, fit))
 }
 
-/// `count` random steps over `from` to `to` of the duration of the motion of `problem`.
-fn random_steps(
-    seed: u64,
-    part: &str,
-    problem: &Problem,
-    from: f64,
-    to: f64,
-    count: usize,
-) -> Result<Vec<f64>, NotMeasured> {
+/// `count` random steps over two decades of the duration of the motion of `problem`, up to the share `to` of it.
+fn random_steps(mut random: Random, problem: &Problem, to: f64, count: usize) -> Result<Vec<f64>, NotMeasured> {
     let time = exact(problem)?.end.time.hi();
-    let mut random = Random::for_part(seed, part);
-    Ok((0..count).map(|_| time * random.log_uniform(from, to)).collect())
+    Ok((0..count).map(|_| time * random.log_uniform(0.01 * to, to)).collect())
 }
 
 fn ladder_ratios(subject: &Subject<'_>) -> Found {
-    let problem = resolve(&Scene { thickness: None, ..slab(true) }, 400.0)?;
+    let problem = stop(true)?;
     let scheme = (VelocityAt::Centred, Boundaries::Landed);
     let time = exact(&problem)?.end.time.hi();
-    let random = random_steps(subject.context.seed, "S6", &problem, 1e-4, 1e-2, 40)?;
+    let random = random_steps(subject.random("S6"), &problem, 1e-2, 40)?;
     let mut ladders = vec![("random", random)];
     for (name, ratio) in [("1.1", 1.1_f64), ("1.3", 1.3), ("golden", 1.618_033_988_749_895), ("2", 2.0)] {
         let count = (100f64.ln() / ratio.ln()).ceil() as i32;
@@ -209,16 +185,16 @@ fn ladder_ratios(subject: &Subject<'_>) -> Found {
 fn orders_by_rule(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     for drag in [false, true] {
-        let problem = resolve(&Scene { thickness: None, ..slab(drag) }, 400.0)?;
+        let problem = stop(drag)?;
         let exact = Taylor::default().solve(&problem, Detail::Events)?;
         let path = Path::of(&problem, &exact);
-        for velocity in RULES {
-            for boundaries in [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed] {
+        for velocity in VelocityAt::ALL {
+            for boundaries in Boundaries::ALL {
                 for quantity in [Quantity::Depth, Quantity::Time] {
                     let Some(formal) = formal_order(velocity, boundaries, &path, quantity) else { continue };
                     // Above 3e-3 the next power still bends the depth of a lagged drag: 26 of 202 seeds missed the order.
                     // Over 1,002 seeds these 90 steps confirmed each order.
-                    let sizes = random_steps(subject.context.seed, "S7", &problem, 3e-5, 3e-3, 90)?;
+                    let sizes = random_steps(subject.random("S7"), &problem, 3e-3, 90)?;
                     let (order, fit) = fitted(&problem, (velocity, boundaries), quantity, &sizes)?;
                     seen.expect(fit.verdict(formal) == OrderVerdict::Pass, || {
                         format!("{velocity}, {boundaries}, {quantity}: {order:.2} of {formal}, {}", fit.reason)
@@ -239,8 +215,8 @@ fn vanishing_drag(subject: &Subject<'_>) -> Found {
         problem.stages[1].drag = 10f64.powi(power);
         let flight = subject.flight(&problem)?;
         let share = problem.stages[1].drag * 400.0 * 400.0 / 2.4e5;
-        for off in [flight.end.depth / plain.end.depth - 1.0, flight.end.time / plain.end.time - 1.0] {
-            worst = worse(worst, (off.abs() - share).max(0.0));
+        for error in [off(flight.end.depth, plain.end.depth), off(flight.end.time, plain.end.time)] {
+            worst = worse(worst, (error - share).max(0.0));
         }
     }
     Ok(Measurement::new(worst / subject.promise()))
@@ -250,7 +226,7 @@ fn order_crossover(subject: &Subject<'_>) -> Found {
     let (mut worst, mut remark) = (0.0, Vec::new());
     for (drag, formal) in [(0.0, 2.0), (1e-9, 2.0), (1.0, 1.0)] {
         let problem = concrete(0.9, 400.0, f64::INFINITY, (4.5e6, 0.0538), (2.4e5, drag));
-        let sizes = random_steps(subject.context.seed, "S8", &problem, 1e-4, 1e-2, 40)?;
+        let sizes = random_steps(subject.random("S8"), &problem, 1e-2, 40)?;
         let scheme = (VelocityAt::LaggedHalfStep, Boundaries::Landed);
         let (order, _) = fitted(&problem, scheme, Quantity::Depth, &sizes)?;
         worst = worse(worst, (order - formal).abs());
@@ -273,76 +249,65 @@ fn random_scenes(subject: &Subject<'_>) -> Found {
 /// The random scenes of `stress --cases` as one claim; `wall_ms` is the time spent on them (ms).
 pub fn judged_random_scenes(summary: &extreme_scenes::Summary, wall_ms: f64) -> Judged {
     let first = summary.defects.first().map(|d| format!("; scene {}: {}", d.index, d.what)).unwrap_or_default();
+    let claim = Claim {
+        id: "random-scenes".to_owned(),
+        table: "random-scenes".to_owned(),
+        statement: "every random scene: outcomes right or undecided, every number within its limit".to_owned(),
+        check: Check::RandomScenes(RandomScenes {}),
+        section: Section::Random,
+        scene: None,
+        method: None,
+        quantity: None,
+        velocity: VelocityAt::default(),
+        boundaries: Boundaries::default(),
+        limit: 0.0,
+        unit: RandomScenes::UNIT,
+        reason: "zero: an outcome is right, or inside its own error bar; numbers keep to 64 ulp times their condition number"
+            .to_owned(),
+    };
     let nothing_seen = summary.scenes == summary.unresolved;
-    let defects = summary.defect_count as f64;
-    Judged {
-        claim: Claim {
-            id: "random-scenes".to_owned(),
-            table: "random-scenes".to_owned(),
-            statement: "every random scene: outcomes right or undecided, every number within its limit".to_owned(),
-            check: Check::RandomScenes(RandomScenes {}),
-            section: Section::Random,
-            scene: None,
-            method: None,
-            quantity: None,
-            velocity: VelocityAt::default(),
-            boundaries: Boundaries::default(),
-            limit: 0.0,
-            unit: RandomScenes::UNIT,
-            reason:
-                "zero: an outcome is right, or inside its own error bar; numbers keep to 64 ulp times their condition \
-                     number"
-                    .to_owned(),
-        },
-        verdict: if nothing_seen { Verdict::Undecided } else { Verdict::of(defects, 0.0) },
-        measured: Some(defects),
-        resolution: 0.0,
-        remark: format!("{} scenes, {} unresolved{first}", summary.scenes, summary.unresolved),
-        evidence: None,
-        wall_ms,
-    }
+    let found = Measurement {
+        verdict: nothing_seen.then_some(Verdict::Undecided),
+        ..Measurement::new(summary.defect_count as f64)
+            .remark(format!("{} scenes, {} unresolved{first}", summary.scenes, summary.unresolved))
+    };
+    Judged::new(claim, Ok(found), wall_ms)
 }
 
 fn digits_lost(_: &Subject<'_>) -> Found {
-    let problem = resolve(&Scene { thickness: None, ..slab(true) }, 400.0)?;
+    let problem = stop(true)?;
     let dt = exact(&problem)?.end.time.hi() / 2000.0;
     let rows = rounding::digits_lost(&problem, dt)?;
     let (mut worst, mut remark) = (0.0, Vec::new());
     for row in &rows {
-        let most = row.lost.iter().fold(0.0, |most, (_, lost)| worse(most, *lost));
+        let most = worst_of(row.lost.iter().map(|(_, lost)| *lost));
         worst = worse(worst, most);
         remark.push(format!("{} {}: {most:.1}", row.method, row.number));
     }
     Ok(Measurement::new(worst).remark(format!("digits lost at most: {}", remark.join(", "))))
 }
 
+fn cost_over_rate(points: Vec<(f64, f64)>) -> Evidence {
+    Evidence::Series { abscissa: "r/M, 1/s", ordinate: "force evaluations", points }
+}
+
 /// Viscosity r (kg/s) on 1 kg from 10 m/s, with 10 N and 100 N/m that resist.
 fn viscous_resisting(subject: &Subject<'_>) -> Found {
-    let mut worst = 0.0;
     let mut points = Vec::new();
     for power in 0..=8 {
         let rate = 10f64.powi(power);
         let law = Stage { static_force: 10.0, stiffness: 100.0, viscosity: rate, drag: 0.0, end: f64::INFINITY };
         let problem = staged(1.0, 10.0, f64::INFINITY, &[law]);
-        let (flight, exact) = (subject.flight(&problem)?, exact(&problem)?.values());
+        let (flight, exact) = subject.beside_exact(&problem)?;
         // An error of the velocity, relative to V0, moves the time of rest by dV/a: V0/(a T) times as much of T.
         let deceleration = law.force(exact.end.depth, 0.0) / problem.mass;
         let condition = (problem.impact_speed / (deceleration * exact.end.time)).max(1.0);
-        let off = worse(
-            (flight.end.depth / exact.end.depth - 1.0).abs(),
-            (flight.end.time / exact.end.time - 1.0).abs() / condition,
-        );
-        if exceeds(off, 1e3 * subject.promise()) {
-            return Err(NotMeasured::broken(format!("off by {off:e} at r/M = {rate:e}")));
-        }
-        worst = worse(worst, flight.cost.force_evaluations as f64);
+        let error = worse(off(flight.end.depth, exact.end.depth), off(flight.end.time, exact.end.time) / condition);
+        holds!(error <= 1e3 * subject.promise(), "off by {error:e} at r/M = {rate:e}");
         points.push((rate, flight.cost.force_evaluations as f64));
     }
-    Ok(Measurement::new(worst).evidence(Evidence::Series {
-        abscissa: "r/M, 1/s",
-        ordinate: "force evaluations",
-        points,
-    }))
+    let most = worst_of(points.iter().map(|point| point.1));
+    Ok(Measurement::new(most).evidence(cost_over_rate(points)))
 }
 
 /// The driven scene of docs/theory.md, section 1, with its drive in proportion to r, so that the slow motion stays the same.
@@ -356,10 +321,9 @@ fn viscous_driven(subject: &Subject<'_>) -> Found {
         let problem = staged(1.0, 1.0, 9.0, &[law]);
         let flight = subject.flight(&problem)?;
         // x = 10 (1 - e^(-0.1 t)) but for the transient, of the order of M/r: t = 10 ln 10 s.
-        let off = (flight.end.time / (10.0 * 10f64.ln()) - 1.0).abs();
-        if exceeds(off, 2.0 / rate + 1e3 * subject.promise()) {
-            return Err(NotMeasured::broken(format!("leaves after {} s at r/M = {rate:e}", flight.end.time)));
-        }
+        let error = off(flight.end.time, 10.0 * 10f64.ln());
+        let allowed = 2.0 / rate + 1e3 * subject.promise();
+        holds!(error <= allowed, "leaves after {} s at r/M = {rate:e}", flight.end.time);
         points.push((rate, flight.cost.force_evaluations as f64));
     }
     let slope = rounding::slope(points.iter().copied());
@@ -367,11 +331,7 @@ fn viscous_driven(subject: &Subject<'_>) -> Found {
     let remark = format!("cost ~ (r/M)^{slope:.2}, {last} evaluations at {:.0e} /s", rates[rates.len() - 1]);
     // For an explicit method the claim is that the scene is stiff.
     let value = if explicit { (0.5 - slope).max(0.0) } else { slope.max(0.0) };
-    Ok(Measurement::new(value).remark(remark).evidence(Evidence::Series {
-        abscissa: "r/M, 1/s",
-        ordinate: "force evaluations",
-        points,
-    }))
+    Ok(Measurement::new(value).remark(remark).evidence(cost_over_rate(points)))
 }
 
 #[cfg(test)]
