@@ -266,8 +266,12 @@ pub(crate) fn solve<S: Scalar>(
     let mut course = Course::new(problem, detail);
     course.sample(course.state);
     course.pass_ends();
-    while course.stage < problem.stages.len() {
+    // Each round passes a stage, or ends the flight.
+    for _ in 0..problem.stages.len() {
         let entered = course.stage;
+        if entered >= problem.stages.len() {
+            break;
+        }
         let rests = match method.solve_stage(&mut course)? {
             StageEnd::Limit(state) => {
                 course.state = state;
