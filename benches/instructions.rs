@@ -1,5 +1,5 @@
 //! Instructions of a flight by every method, of a critical velocity and of a batch, and what each saving that
-//! `solve --explain` names is worth, as a pair with and without it.
+//! `solve --explain` names saves, as a pair with and without it.
 //!
 //! `cargo bench --bench instructions` counts them under Callgrind, each in a process of its own, so that no load on the
 //! machine changes a count; it needs valgrind, which has no 512-bit vectors: lanes are counted with 256-bit ones. Every

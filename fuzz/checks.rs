@@ -146,8 +146,8 @@ pub fn order(data: &[u8]) {
 
 /// The first root in (0, 1] is where exact arithmetic has one, and none is missed.
 ///
-/// Coefficients are small integers, so that Sturm's sequence is exact. Where the values cannot be told from zero by
-/// their rounding error, a root found there is right, too, as [`first_root`] says.
+/// Coefficients are small integers, so that Sturm's sequence is exact. Where the values cannot be distinguished from zero
+/// by their rounding error, a root found there is right, too, as [`first_root`] says.
 pub fn locate(data: &[u8]) {
     let count = data.len().min(COEFFICIENTS_MAX).min(12);
     let numbers = &data[..count];
@@ -174,7 +174,7 @@ pub fn locate(data: &[u8]) {
             let is_simple = exact.square_free().degree() == exact.degree();
             let width = if is_simple { f64::EPSILON } else { 2f64.powi(-40) };
             assert!(value(root).abs() <= noise + slope * width, "{coefficients:?}: {} at {root}", value(root));
-            // Nothing in front of it, unless the values between cannot be told from zero.
+            // Nothing in front of it, unless the values between cannot be distinguished from zero.
             if let Some(first) = exact.first_root_before(root) {
                 let between = (0..=16).map(|i| first + (root - first) * f64::from(i) / 16.0);
                 let largest = between.map(|t| value(t).abs()).fold(0.0, f64::max);

@@ -56,12 +56,12 @@ pub fn wrapped(head: &str, text: &str) -> String {
     format!("{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
 }
 
-/// Tells a person on standard error, `head` (`warning: `) in front.
+/// Prints for a person on standard error, `head` (`warning: `) in front.
 pub fn tell(head: &str, text: &str) {
     tell_line(&wrapped(head, text));
 }
 
-/// A line as it is on standard error. If that is gone nobody is left to be told, and the work goes on.
+/// A line as it is on standard error. Where it is closed the work goes on.
 pub fn tell_line(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
@@ -104,7 +104,7 @@ pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), 
     Ok(())
 }
 
-/// Why no file can be written at `path`, as far as can be told before trying, and what to do.
+/// Why no file can be written at `path`, as far as is known before trying, and what to do.
 fn obstacle(path: &Path) -> Option<(String, &'static str)> {
     if path.is_dir() {
         return Some(("it is a folder".to_owned(), "name a file in it"));

@@ -241,7 +241,7 @@ pub(crate) fn did_you_mean(known: &str) -> String {
 /// The one of `known` that `text` is most likely a misspelling of.
 pub(crate) fn nearest<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
-    // A long text is no misspelling, and not worth the comparison.
+    // A long text is no misspelling.
     let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
     let best = candidates.min_by_key(distance)?;
     let length = best.chars().count();

@@ -1,4 +1,4 @@
-//! Ways to fly a problem, each returning the same [`Flight`].
+//! Methods that solve a problem, each returning the same [`Flight`].
 //!
 //! None branches on x inside the force of a stage: each integrates a stage as a smooth problem and restarts at its end.
 

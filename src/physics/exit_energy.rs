@@ -177,7 +177,7 @@ mod tests {
         // A drive spent at 6 N/8 N/m = 0.75 m: 8 (2 - 0.75)²/2 to the end.
         let driven = Stage { static_force: -6.0, stiffness: 8.0, ..slowing };
         assert_relative_eq!(energy_beyond_approach(&of(driven, 2.0), at).unwrap(), -6.25, max_relative = 1e-15);
-        // Nothing else is approached: not what a force or a spring stops, nor what a drive carries through.
+        // Nothing else is approached: not what a force or a spring stops, nor what a drive pushes through.
         for (static_force, stiffness) in [(1.0, 0.0), (1.0, 2.0), (0.0, 8.0), (-1.0, 0.0)] {
             let other = Stage { static_force, stiffness, ..slowing };
             assert_eq!(energy_beyond_approach(&of(other, 2.0), at), None, "{other:?}");

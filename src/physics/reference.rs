@@ -630,12 +630,12 @@ impl Model {
     }
 }
 
-/// Flies the model.
+/// Solves the model.
 fn solve(model: &Model) -> Result<Raw, ReferenceError> {
     let zero = int(0, model.bits);
     let mut now = Point { time: zero.clone(), depth: zero.clone(), velocity: model.impact_speed.clone() };
     let mut events: Vec<(EventKind, Point)> = Vec::new();
-    let mut flown = None;
+    let mut solved_last = None;
     let finish = |outcome, stage, end: Point, events: Vec<(EventKind, Point)>| {
         let margin = margin(model, outcome, stage, &end, &events);
         Raw { outcome, stage, end, events, margin, impact_speed: model.impact_speed.clone() }
@@ -648,12 +648,12 @@ fn solve(model: &Model) -> Result<Raw, ReferenceError> {
             } else {
                 let (next, rests) = through(model, index, law, &now, limit)?;
                 now = next;
-                flown = Some(index);
+                solved_last = Some(index);
                 rests
             };
             if rests {
                 events.push((EventKind::Rest, now.clone()));
-                let stage = flown.unwrap_or(index);
+                let stage = solved_last.unwrap_or(index);
                 return Ok(finish(model.stop_in(stage), stage, now, events));
             }
         }
@@ -665,7 +665,7 @@ fn solve(model: &Model) -> Result<Raw, ReferenceError> {
             if is_zero(&now.velocity) {
                 events.push((EventKind::Rest, now.clone()));
             }
-            return Ok(finish(Outcome::Perforated, flown.unwrap_or(index), now, events));
+            return Ok(finish(Outcome::Perforated, solved_last.unwrap_or(index), now, events));
         }
     }
     Err(ReferenceError::NeverEnds)
@@ -703,7 +703,7 @@ fn through(
     Ok((Point { time, depth, velocity }, true))
 }
 
-/// W at `to` as gain minus loss, `w` at `from` carried through a stage without viscosity.
+/// W at `to` as gain minus loss, `w` at `from` taken through a stage without viscosity.
 fn squared_speed_terms(law: &Law, mass: &Big, w: &Big, from: &Big, to: &Big, bits: usize) -> (Big, Big) {
     let Law { p, s, q, .. } = law;
     if is_zero(q) {
@@ -1017,7 +1017,7 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
             if is_positive(&law.r) {
                 return Err(ReferenceError::NoCritical);
             }
-            let carried = |law: &Law, w: &Big| {
+            let beyond = |law: &Law, w: &Big| {
                 let (gain, loss) = squared_speed_terms(law, &model.mass, w, &from, to, bits);
                 gain - loss
             };
@@ -1025,9 +1025,9 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
             slope = if law.s == moved_law.s {
                 slope * (-(twice(&law.q * (to - &from)) / &model.mass)).exp()
             } else {
-                carried(moved_law, &(&w + slope)) - carried(law, &w)
+                beyond(moved_law, &(&w + slope)) - beyond(law, &w)
             };
-            w = carried(law, &w);
+            w = beyond(law, &w);
             from.clone_from(to);
             let demand = -(&w / &slope);
             if demand > squared {

@@ -623,7 +623,7 @@ fn verdict_of(
     }
 }
 
-/// Fails an order outside the wide band; passes one that the 95 % interval tells from its neighbours one away.
+/// Fails an order outside the wide band; passes one that the 95 % interval separates from its neighbours one away.
 ///
 /// Without an expected order the interval must still be narrower than one, or nothing is known of the order.
 fn order_verdict(observed: &Observed, formal: Option<f64>) -> (Verdict, Option<(FindingKind, String)>) {

@@ -2,7 +2,7 @@
 
 Coefficients and the limit are runtime parameters, so one compiled integrator serves every stage of its kind (which
 coefficients are not zero, whether there is a limit) at one tolerance, and later requests compile nothing.
-`--lanes N` times batch mode: N equal flights at once, the time divided by N. heyoka has no absolute tolerance.
+`--lanes N` times batch mode: N equal solves at once, the time divided by N. heyoka has no absolute tolerance.
 """
 
 import functools
@@ -74,7 +74,7 @@ def stage_flight(stage, request, lanes):
     state, pars = integrator.state, integrator.pars
     natural_time = functools.cache(functools.partial(protocol.natural_time, stage))
 
-    def fly(t, x, v):
+    def solve_stage(t, x, v):
         integrator.reset_cooldowns()
         pars[:] = values
         state[0] = x
@@ -94,7 +94,7 @@ def stage_flight(stage, request, lanes):
         at_limit = fired == 1 or end_x >= stage.limit
         return protocol.Landing(end_t, end_x, end_v, at_limit, at_rest, 0)
 
-    return fly
+    return solve_stage
 
 
 def bare_flight(request, lanes):
@@ -144,7 +144,7 @@ def bare_flight(request, lanes):
 
 def main():
     parser = protocol.arguments(__doc__.splitlines()[0], ["taylor"])
-    parser.add_argument("--lanes", type=int, default=1, metavar="N", help="flights at once when timing; default 1")
+    parser.add_argument("--lanes", type=int, default=1, metavar="N", help="solves at once when timing; default 1")
     lanes = parser.parse_args().lanes
     if not 1 <= lanes <= 64:
         parser.error("--lanes must be from 1 to 64")

@@ -1,6 +1,6 @@
 """The line protocol of a peer: one JSON object a line in, one a line out.
 
-A peer program says how it flies one stage; everything else (reading and checking requests, walking from stage to
+A peer program says how it solves one stage; everything else (reading and checking requests, walking from stage to
 stage, naming events, timing, answering) is here and the same for all. The equation of motion of a stage is
 
     M x'' = -(p + s x + r V + q V^2),    until x = limit or V = 0,
@@ -65,8 +65,8 @@ class PeerError(Exception):
     """Something to say in the `error` of the answer."""
 
 
-Fly = Callable[[float, float, float], Landing]
-"""Flies one stage from (t, x, V)."""
+SolveStage = Callable[[float, float, float], Landing]
+"""Solves one stage from (t, x, V)."""
 
 
 def number(value, what, low=-math.inf):
@@ -126,7 +126,7 @@ def natural_time(stage: Stage, x: float, v: float) -> float:
     return min(scales)
 
 
-def walk(request: Request, flights: list) -> dict:
+def walk(request: Request, solvers: list) -> dict:
     """One flight from impact to rest or exit, stage by stage."""
     t, x, v = 0.0, 0.0, request.velocity
     at_rest, outcome, evaluations, events = v == 0.0, "stopped", 0, []
@@ -134,12 +134,12 @@ def walk(request: Request, flights: list) -> dict:
     def happened(event, **more):
         events.append({"event": event, **more, "time_s": t, "depth_m": x, "velocity_m_s": v})
 
-    for index, (stage, end, fly) in enumerate(zip(request.stages, request.ends, flights)):
+    for index, (stage, end, solve_stage) in enumerate(zip(request.stages, request.ends, solvers)):
         # Several boundaries may lie at one place: those already reached are passed without a flight.
         if x < stage.limit:
             if at_rest:
                 break
-            landing = fly(t, x, v)
+            landing = solve_stage(t, x, v)
             t, x, v, at_rest = landing.t, landing.x, landing.v, landing.at_rest
             evaluations += landing.force_evaluations
             if at_rest:
@@ -178,14 +178,14 @@ def timed(repeats: int, flight: Callable[[], object], lanes: int = 1):
     return median, [low, high]
 
 
-def fly_request(message, prepare, batch) -> dict:
+def solve_request(message, prepare, batch) -> dict:
     request = parse_request(message)
-    flights = prepare(request)
+    solvers = prepare(request)
     started = time.perf_counter_ns()
-    answer = walk(request, flights)
+    answer = walk(request, solvers)
     wall_ns, quartiles = time.perf_counter_ns() - started, None
     if request.repeats > 1:
-        lanes, flight = batch(request) if batch else (1, lambda: walk(request, flights))
+        lanes, flight = batch(request) if batch else (1, lambda: walk(request, solvers))
         if batch:
             # Nobody times a flight that ends elsewhere than the one of the answer.
             depth = flight()[1]
@@ -208,7 +208,7 @@ def answer_line(line: str, hello: dict, prepare, batch) -> dict:
         ident = message.get("id")
         if "hello" in message:
             return hello
-        answer = {"id": ident, **fly_request(message, prepare, batch)}
+        answer = {"id": ident, **solve_request(message, prepare, batch)}
         json.dumps(answer, allow_nan=False)
         return answer
     # Whatever a solver raises belongs in the answer: the peer lives on for the next request.
@@ -220,7 +220,7 @@ def serve(name: str, version: str, method: str, prepare: Callable[[Request], lis
     """Answers requests until standard input ends.
 
     `prepare(request)` gives one function a stage, each `(t, x, V) -> Landing`; it is called once a request, outside
-    the timed part. `batch(request)`, where a peer has it, gives `(lanes, flight)` for timing several flights at once.
+    the timed part. `batch(request)`, where a peer has it, gives `(lanes, flight)` for timing several solves at once.
     """
     # Solver libraries print on standard output when they please; the protocol keeps it for itself.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")

@@ -41,7 +41,7 @@ def stage_flight(stage, method, request):
         events.append(event(lambda t, y: y[0] - limit, 1))
     implicit = {"jac": jacobian} if method in ("Radau", "BDF") else {}
 
-    def fly(t, x, v):
+    def solve_stage(t, x, v):
         until = t + HORIZON * protocol.natural_time(stage, x, v)
         result = solve_ivp(
             rhs, (t, until), [x, v], method=method, events=events, rtol=request.rtol, atol=np.array(request.atol), **implicit
@@ -53,7 +53,7 @@ def stage_flight(stage, method, request):
         at_limit = len(fired) > 1 and fired[1]
         return protocol.Landing(float(result.t[-1]), end_x, end_v, at_limit, fired[0], int(result.nfev))
 
-    return fly
+    return solve_stage
 
 
 def main():

@@ -2,7 +2,7 @@
 
 Each stage is one solve with the events x = limit and V = 0. A step may jump over the turning point and see x below
 the limit at both ends, so that V = 0 is found and the limit is missed although it lay before it. When the depth at
-V = 0 lies beyond the limit, the stage is therefore flown once more, to the time of V = 0 and with x = limit alone:
+V = 0 lies beyond the limit, the stage is therefore solved once more, to the time of V = 0 and with x = limit alone:
 depth grows monotonically until then, so the sign change cannot be missed.
 
 CVODE at rtol 1e-12 is good to about 2e-11 on these problems, not better.
@@ -85,7 +85,7 @@ class Solver:
             )
         self.starts_with_slope = method == "ida"
 
-    def fly(self, t, x, v, until):
+    def solve_stage(self, t, x, v, until):
         """The first event: (t, x, V, limit reached, rest reached, evaluations)."""
         y0 = np.array([x, v])
         # Three times make the solver return the last state alone instead of every step.
@@ -111,14 +111,14 @@ def stage_flight(stage, method, request):
     both = Solver(stage, method, request)
     limit_alone = Solver(stage, method, request, watch_rest=False) if math.isfinite(stage.limit) else None
 
-    def fly(t, x, v):
-        landing = both.fly(t, x, v, t + HORIZON * protocol.natural_time(stage, x, v))
+    def solve_stage(t, x, v):
+        landing = both.solve_stage(t, x, v, t + HORIZON * protocol.natural_time(stage, x, v))
         if landing.at_rest and not landing.at_limit and landing.x >= stage.limit:
-            again = limit_alone.fly(t, x, v, landing.t)
+            again = limit_alone.solve_stage(t, x, v, landing.t)
             return again._replace(force_evaluations=again.force_evaluations + landing.force_evaluations)
         return landing
 
-    return fly
+    return solve_stage
 
 
 def main():

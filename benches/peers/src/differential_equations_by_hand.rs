@@ -5,7 +5,7 @@ use differential_equations::methods::ExplicitRungeKutta;
 use differential_equations::ode::solve_ode;
 use differential_equations::prelude::{ControlFlag, Interpolation, ODE, Solout, Solution};
 
-use crate::leg::{Law, Leg, LegEnd, Node, locate};
+use crate::reduced::{Law, Node, Reduced, StageEnd, locate};
 
 struct Motion(Law);
 
@@ -18,7 +18,7 @@ impl ODE<f64, [f64; 2]> for Motion {
 
 /// Stops at the first step that passes an event.
 struct Watch {
-    leg: Leg,
+    stage: Reduced,
     step: (Node, Node),
 }
 
@@ -38,7 +38,7 @@ impl Solout<f64, [f64; 2]> for Watch {
         let node = |time, y: &[f64; 2]| Node { time, xi: y[0], u: y[1] };
         self.step = (node(time_before, y_before), node(time, y));
         let after = self.step.1;
-        if after.is_past(&self.leg) || !after.is_finite() { ControlFlag::Terminate } else { ControlFlag::Continue }
+        if after.is_past(&self.stage) || !after.is_finite() { ControlFlag::Terminate } else { ControlFlag::Continue }
     }
 }
 
@@ -65,26 +65,26 @@ impl Solout<f64, [f64; 2]> for Last {
 
 macro_rules! by_hand {
     ($name:ident) => {
-        #[doc = concat!("One leg by ", stringify!($name), ".")]
-        pub fn $name(leg: &Leg, rtol: f64) -> Result<LegEnd, String> {
-            let start = Node { time: 0.0, xi: 0.0, u: leg.speed };
-            let mut watch = Watch { leg: *leg, step: (start, start) };
-            let longest = leg.law.longest_step();
+        #[doc = concat!("One stage by ", stringify!($name), ".")]
+        pub fn $name(stage: &Reduced, rtol: f64) -> Result<StageEnd, String> {
+            let start = Node { time: 0.0, xi: 0.0, u: stage.speed };
+            let mut watch = Watch { stage: *stage, step: (start, start) };
+            let longest = stage.law.longest_step();
             let mut method =
                 ExplicitRungeKutta::$name().rtol(rtol).atol(rtol).h_max(longest).max_steps(1_000_000).h_min(0.0);
-            solve_ode(&mut method, &Motion(leg.law), 0.0, 1e6, &[0.0, leg.speed], &mut watch)
+            solve_ode(&mut method, &Motion(stage.law), 0.0, 1e6, &[0.0, stage.speed], &mut watch)
                 .map_err(|error| format!("{error:?}"))?;
             let (before, after) = watch.step;
-            if !after.is_finite() || !after.is_past(leg) {
+            if !after.is_finite() || !after.is_past(stage) {
                 return Err("no event".to_owned());
             }
-            locate(leg, before, after, |span| {
+            locate(stage, before, after, |span| {
                 if span <= 0.0 {
                     return Ok(before);
                 }
                 let mut last = Last([before.xi, before.u]);
                 let mut method = ExplicitRungeKutta::$name().rtol(rtol).atol(rtol).h0(span).h_min(0.0);
-                solve_ode(&mut method, &Motion(leg.law), 0.0, span, &[before.xi, before.u], &mut last)
+                solve_ode(&mut method, &Motion(stage.law), 0.0, span, &[before.xi, before.u], &mut last)
                     .map_err(|error| format!("{error:?}"))?;
                 Ok(Node { time: before.time + span, xi: last.0[0], u: last.0[1] })
             })

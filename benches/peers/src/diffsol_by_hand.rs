@@ -7,7 +7,7 @@ use diffsol::{
     OdeSolverStopReason, Tableau,
 };
 
-use crate::leg::{Law, Leg, LegEnd, Node};
+use crate::reduced::{Law, Node, Reduced, StageEnd};
 
 type Matrix = NalgebraMat<f64>;
 type Pair = NalgebraVec<f64>;
@@ -38,8 +38,8 @@ impl Now {
     }
 }
 
-/// Hands what flies legs with `tsit45` to `work`.
-pub fn with_tsit45<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Leg) -> Result<LegEnd, String>) -> R) -> R {
+/// Hands what solves stages with `tsit45` to `work`.
+pub fn with_tsit45<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Reduced) -> Result<StageEnd, String>) -> R) -> R {
     let now = Now::default();
     let problem = OdeBuilder::<Matrix>::new()
         .rtol(rtol)
@@ -51,10 +51,10 @@ pub fn with_tsit45<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Leg) -> Resul
         .expect("a problem that diffsol takes");
     let tableau = Tableau::<f64>::tsit45();
     let mut kept = None;
-    work(&mut |leg| {
-        now.law.set(leg.law);
-        now.distance.set(leg.distance);
-        now.speed.set(leg.speed);
+    work(&mut |stage| {
+        now.law.set(stage.law);
+        now.distance.set(stage.distance);
+        now.speed.set(stage.speed);
         let h = 0.5 * rtol.powf(1.0 / 6.0);
         let mut solver = match kept.take() {
             Some(solver) => solver,
@@ -65,17 +65,17 @@ pub fn with_tsit45<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Leg) -> Resul
             }
         };
         let state = solver.state_mut();
-        (state.y[0], state.y[1]) = (0.0, leg.speed);
-        (state.dy[0], state.dy[1]) = (leg.speed, leg.law.rate(0.0, leg.speed));
+        (state.y[0], state.y[1]) = (0.0, stage.speed);
+        (state.dy[0], state.dy[1]) = (stage.speed, stage.law.rate(0.0, stage.speed));
         (*state.t, *state.h) = (0.0, h);
-        let end = run(leg, &mut solver);
+        let end = run(stage, &mut solver);
         kept = Some(solver);
         end
     })
 }
 
-/// Hands what flies legs with `bdf` to `work`: a solver a leg, since Newton failures and Jacobians outlive one.
-pub fn with_bdf<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Leg) -> Result<LegEnd, String>) -> R) -> R {
+/// Hands what solves stages with `bdf` to `work`: a solver a stage, since Newton failures and Jacobians outlive one.
+pub fn with_bdf<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Reduced) -> Result<StageEnd, String>) -> R) -> R {
     let now = Now::default();
     let problem = OdeBuilder::<Matrix>::new()
         .rtol(rtol)
@@ -85,24 +85,24 @@ pub fn with_bdf<R>(rtol: f64, work: impl FnOnce(&mut dyn FnMut(&Leg) -> Result<L
         .root(|y, _p, _t, g| now.roots(y, g), 2)
         .build()
         .expect("a problem that diffsol takes");
-    work(&mut |leg| {
-        now.law.set(leg.law);
-        now.distance.set(leg.distance);
-        now.speed.set(leg.speed);
+    work(&mut |stage| {
+        now.law.set(stage.law);
+        now.distance.set(stage.distance);
+        now.speed.set(stage.speed);
         let mut state = problem.bdf_state::<Factors>().map_err(|error| error.to_string())?;
-        let fastest = (leg.law.r + 2.0 * leg.law.q).max(1.0);
+        let fastest = (stage.law.r + 2.0 * stage.law.q).max(1.0);
         *state.as_mut().h = 0.5 * rtol.sqrt() / fastest;
         let mut solver = problem.bdf_solver::<Factors>(state).map_err(|error| error.to_string())?;
-        run(leg, &mut solver)
+        run(stage, &mut solver)
     })
 }
 
-fn run<'a, Eqn, S>(leg: &Leg, solver: &mut S) -> Result<LegEnd, String>
+fn run<'a, Eqn, S>(stage: &Reduced, solver: &mut S) -> Result<StageEnd, String>
 where
     Eqn: OdeEquations<T = f64, V = Pair> + 'a,
     S: OdeSolverMethod<'a, Eqn>,
 {
-    let longest = leg.law.longest_step();
+    let longest = stage.law.longest_step();
     let mut before = 0.0;
     for _ in 0..1_000_000 {
         match solver.step().map_err(|error| error.to_string())? {
@@ -110,21 +110,21 @@ where
                 let y = solver.interpolate(time).map_err(|error| error.to_string())?;
                 let at = Node { time, xi: y[0], u: y[1].max(0.0) };
                 if index == 0 {
-                    return Ok(LegEnd { at, rests: false });
+                    return Ok(StageEnd { at, rests: false });
                 }
-                if at.xi < leg.distance {
-                    return Ok(LegEnd { at: Node { u: 0.0, ..at }, rests: true });
+                if at.xi < stage.distance {
+                    return Ok(StageEnd { at: Node { u: 0.0, ..at }, rests: true });
                 }
                 // Crossed and not seen: between the start of the step and rest.
                 let (mut low, mut high) = (before, time);
                 for _ in 0..60 {
                     let middle = 0.5 * (low + high);
                     let xi = solver.interpolate(middle).map_err(|error| error.to_string())?[0];
-                    if xi < leg.distance { low = middle } else { high = middle }
+                    if xi < stage.distance { low = middle } else { high = middle }
                 }
                 let y = solver.interpolate(high).map_err(|error| error.to_string())?;
                 let u = y[1].max(0.0);
-                return Ok(LegEnd { at: Node { time: high, xi: leg.distance, u }, rests: false });
+                return Ok(StageEnd { at: Node { time: high, xi: stage.distance, u }, rests: false });
             }
             OdeSolverStopReason::InternalTimestep => {
                 let state = solver.state();
@@ -133,7 +133,7 @@ where
                 if !node.is_finite() {
                     return Err("a number is not finite".to_owned());
                 }
-                if node.is_past(leg) {
+                if node.is_past(stage) {
                     return Err("an event was passed unseen".to_owned());
                 }
                 before = node.time;

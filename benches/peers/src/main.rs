@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release` (or `taskset -c 1 cargo run --release -- tunnel varied`, pinned, for some scenes only). Every
 //! answer is compared with the closed form before anything is timed. An error is the largest of time, depth, velocity
-//! and the state at the first boundary, over max(1, condition number). Each solver flies at tolerances from 1e-3 to
+//! and the state at the first boundary, over max(1, condition number). Each solver solves them at tolerances from 1e-3 to
 //! 1e-13; a column shows the fastest that reached its error, as the median of interleaved rounds, with half the
 //! spread of the middle half of the rounds, and over the time of penetrode's Taylor series.
 
@@ -10,26 +10,26 @@
 
 mod differential_equations_by_hand;
 mod diffsol_by_hand;
-mod leg;
 mod ode_solvers_by_hand;
+mod reduced;
 
 use std::hint::black_box;
 use std::time::Instant;
 
+use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::integrators::diffsol::{Diffsol, Scheme};
 use penetrode::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
 use penetrode::physics::reference::{self, Conditions, Source};
-use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::physics::{EventKind, Outcome, Problem, Scene, State};
 use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::random_scenes::Generator;
 
-use leg::{Flown, Leg, LegEnd, chain};
+use reduced::{Reduced, Solved, StageEnd, chain};
 
 /// Errors of the columns.
 const LEVELS: [f64; 4] = [1e-3, 1e-6, 1e-9, 1e-12];
 
-/// Rounds of timing: in each, every solver flies once.
+/// Rounds of timing: in each, every solver solves them once.
 const ROUNDS: usize = 9;
 
 /// Time of one sample (s).
@@ -96,7 +96,7 @@ fn configs() -> Vec<Config> {
     configs
 }
 
-impl Flown {
+impl Solved {
     fn of(flight: Result<Flight, IntegrationError>) -> Result<Self, String> {
         let flight = flight.map_err(|error| error.to_string())?;
         if flight.outcome == Outcome::Undecided {
@@ -111,27 +111,27 @@ impl Flown {
     }
 }
 
-/// Flies `problems` by `config`, one after the other, with whatever the solver can keep kept.
-fn solve_all(config: Config, problems: &[Problem], mut answer: impl FnMut(Result<Flown, String>)) {
+/// Solves `problems` by `config`, one after the other, with what the solver reuses left in place.
+fn solve_all(config: Config, problems: &[Problem], mut answer: impl FnMut(Result<Solved, String>)) {
     let rtol = config.rtol;
-    let mut each = |fly_leg: &mut dyn FnMut(&Leg) -> Result<LegEnd, String>| {
-        problems.iter().for_each(|problem| answer(chain(problem, &mut *fly_leg)));
+    let mut each = |solve_stage: &mut dyn FnMut(&Reduced) -> Result<StageEnd, String>| {
+        problems.iter().for_each(|problem| answer(chain(problem, &mut *solve_stage)));
     };
     match config.method {
         Method::DiffsolTsit45 => diffsol_by_hand::with_tsit45(rtol, |solve| each(solve)),
         Method::DiffsolBdf => diffsol_by_hand::with_bdf(rtol, |solve| each(solve)),
-        Method::OdeDopri5 => each(&mut |leg| ode_solvers_by_hand::dopri5(leg, rtol)),
-        Method::OdeDop853 => each(&mut |leg| ode_solvers_by_hand::dop853(leg, rtol)),
-        Method::DeDopri5 => each(&mut |leg| differential_equations_by_hand::dopri5(leg, rtol)),
-        Method::DeDop853 => each(&mut |leg| differential_equations_by_hand::dop853(leg, rtol)),
+        Method::OdeDopri5 => each(&mut |stage| ode_solvers_by_hand::dopri5(stage, rtol)),
+        Method::OdeDop853 => each(&mut |stage| ode_solvers_by_hand::dop853(stage, rtol)),
+        Method::DeDopri5 => each(&mut |stage| differential_equations_by_hand::dopri5(stage, rtol)),
+        Method::DeDop853 => each(&mut |stage| differential_equations_by_hand::dop853(stage, rtol)),
         Method::Adapter(scheme) => {
             let adapter = Diffsol::new(scheme, rtol).reusing().expect("a tolerance that the adapter takes");
-            problems.iter().for_each(|p| answer(Flown::of(adapter.solve(p, Detail::Events))));
+            problems.iter().for_each(|p| answer(Solved::of(adapter.solve(p, Detail::Events))));
         }
         Method::Taylor | Method::ClosedForm => {
             let taylor = Taylor::with_rtol(rtol).expect("a tolerance that the series takes");
             let method: &dyn Integrator = if config.method == Method::Taylor { &taylor } else { &ClosedForm };
-            problems.iter().for_each(|p| answer(Flown::of(method.solve(p, Detail::Events))));
+            problems.iter().for_each(|p| answer(Solved::of(method.solve(p, Detail::Events))));
         }
     }
 }
@@ -139,7 +139,7 @@ fn solve_all(config: Config, problems: &[Problem], mut answer: impl FnMut(Result
 /// A problem with what is known of it.
 struct Known {
     problem: Problem,
-    exact: Flown,
+    exact: Solved,
     conditions: Conditions,
 }
 
@@ -148,7 +148,7 @@ impl Known {
         let problem = scene.problem().unwrap_or_else(|error| panic!("{error}"));
         // The closed form, or for a stage without one the Taylor series to round-off.
         let exact = Yardstick::of(&problem).unwrap_or_else(|error| panic!("{error}")).flight;
-        let exact = Flown::of(Ok(exact)).unwrap_or_else(|error| panic!("{error}"));
+        let exact = Solved::of(Ok(exact)).unwrap_or_else(|error| panic!("{error}"));
         let conditions = reference::conditions(Source::Problem(&problem)).unwrap_or(Conditions {
             depth: 1.0,
             time: 1.0,
@@ -161,7 +161,7 @@ impl Known {
     }
 
     /// Largest error of `found`; infinite for another outcome, or none.
-    fn error(&self, found: &Result<Flown, String>) -> f64 {
+    fn error(&self, found: &Result<Solved, String>) -> f64 {
         let Ok(found) = found else { return f64::INFINITY };
         let (exact, conditions) = (&self.exact, &self.conditions);
         if found.perforated != exact.perforated || found.first_boundary.is_some() != exact.first_boundary.is_some() {
@@ -203,7 +203,7 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
-/// `copies` of each scene fly in a row, so that what a solver keeps is kept.
+/// `copies` of each scene follow one another, so that a solver reuses what it built.
 fn measure(known: &[Known], copies: usize) -> Vec<Measured> {
     let problems: Vec<Problem> = known.iter().flat_map(|k| std::iter::repeat_n(k.problem.clone(), copies)).collect();
     let mut measured: Vec<Measured> = Vec::new();

@@ -5,10 +5,10 @@ use std::cell::Cell;
 
 use ode_solvers::{Dop853, Dopri5, OutputType, System, Vector2};
 
-use crate::leg::{Law, Leg, LegEnd, Node, locate};
+use crate::reduced::{Law, Node, Reduced, StageEnd, locate};
 
 struct Run<'a> {
-    leg: Leg,
+    stage: Reduced,
     /// The ends of the last step.
     step: &'a Cell<(Node, Node)>,
 }
@@ -16,13 +16,13 @@ struct Run<'a> {
 impl System<f64, Vector2<f64>> for Run<'_> {
     #[inline]
     fn system(&self, _t: f64, y: &Vector2<f64>, dy: &mut Vector2<f64>) {
-        (dy[0], dy[1]) = (y[1], self.leg.law.rate(y[0], y[1]));
+        (dy[0], dy[1]) = (y[1], self.stage.law.rate(y[0], y[1]));
     }
 
     fn solout(&mut self, time: f64, y: &Vector2<f64>, _dy: &Vector2<f64>) -> bool {
         let after = Node { time, xi: y[0], u: y[1] };
         self.step.set((self.step.get().1, after));
-        after.is_past(&self.leg) || !after.is_finite()
+        after.is_past(&self.stage) || !after.is_finite()
     }
 }
 
@@ -35,18 +35,18 @@ impl System<f64, Vector2<f64>> for Plain {
     }
 }
 
-/// Longest time of a leg, in its own unit: no scene here takes longer.
+/// Longest time of a stage, in its own unit: no scene here takes longer.
 const TIME_MAX: f64 = 1e6;
 
 macro_rules! by_hand {
     ($name:ident, $solver:ident, $beta:expr, $least:expr, $largest:expr) => {
-        #[doc = concat!("One leg by ", stringify!($solver), ".")]
-        pub fn $name(leg: &Leg, rtol: f64) -> Result<LegEnd, String> {
-            let start = Node { time: 0.0, xi: 0.0, u: leg.speed };
+        #[doc = concat!("One stage by ", stringify!($solver), ".")]
+        pub fn $name(stage: &Reduced, rtol: f64) -> Result<StageEnd, String> {
+            let start = Node { time: 0.0, xi: 0.0, u: stage.speed };
             let step = Cell::new((start, start));
-            let y = Vector2::new(0.0, leg.speed);
-            let run = Run { leg: *leg, step: &step };
-            let longest = leg.law.longest_step();
+            let y = Vector2::new(0.0, stage.speed);
+            let run = Run { stage: *stage, step: &step };
+            let longest = stage.law.longest_step();
             let mut solver = $solver::from_param(
                 run,
                 0.0,
@@ -67,16 +67,16 @@ macro_rules! by_hand {
             );
             solver.integrate().map_err(|error| error.to_string())?;
             let (before, after) = step.get();
-            if !after.is_finite() || !after.is_past(leg) {
+            if !after.is_finite() || !after.is_past(stage) {
                 return Err("no event".to_owned());
             }
-            locate(leg, before, after, |span| {
+            locate(stage, before, after, |span| {
                 let y = Vector2::new(before.xi, before.u);
                 if span <= 0.0 {
                     return Ok(before);
                 }
                 let mut solver = $solver::from_param(
-                    Plain(leg.law),
+                    Plain(stage.law),
                     0.0,
                     span,
                     0.0,

@@ -1,4 +1,4 @@
-//! What every solver is given: a flight as a chain of legs, each with one smooth law, restarted at each boundary.
+//! What every solver is given: a flight as a chain of stages, each with one smooth law, restarted at each boundary.
 //!
 //! ```text
 //! dxi/dtau = u,  du/dtau = -(p + s xi + r u + q u²),  until xi = distance or u = 0
@@ -8,7 +8,7 @@
 
 use penetrode::physics::{Problem, State};
 
-/// The law of a leg.
+/// The law of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Law {
     pub p: f64,
@@ -38,15 +38,15 @@ impl Law {
     }
 }
 
-/// A leg from xi = 0 at speed `speed`.
+/// A stage from xi = 0 at speed `speed`.
 #[derive(Clone, Copy, Debug)]
-pub struct Leg {
+pub struct Reduced {
     pub law: Law,
     pub distance: f64,
     pub speed: f64,
 }
 
-/// A state within a leg.
+/// A state within a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
     pub time: f64,
@@ -60,28 +60,31 @@ impl Node {
     }
 
     /// Whether an event lies at or before it.
-    pub fn is_past(self, leg: &Leg) -> bool {
-        self.u <= 0.0 || self.xi >= leg.distance
+    pub fn is_past(self, stage: &Reduced) -> bool {
+        self.u <= 0.0 || self.xi >= stage.distance
     }
 }
 
-/// How a leg ended.
+/// How a stage ended.
 #[derive(Clone, Copy, Debug)]
-pub struct LegEnd {
+pub struct StageEnd {
     pub at: Node,
     pub rests: bool,
 }
 
 /// A flight: what is compared.
 #[derive(Clone, Copy, Debug)]
-pub struct Flown {
+pub struct Solved {
     pub perforated: bool,
     pub first_boundary: Option<State>,
     pub end: State,
 }
 
-/// Flies `problem` leg by leg.
-pub fn chain(problem: &Problem, mut fly_leg: impl FnMut(&Leg) -> Result<LegEnd, String>) -> Result<Flown, String> {
+/// Solves `problem` stage by stage.
+pub fn chain(
+    problem: &Problem,
+    mut solve_stage: impl FnMut(&Reduced) -> Result<StageEnd, String>,
+) -> Result<Solved, String> {
     let speed = problem.impact_speed;
     let ends = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]);
     let length = ends.filter(|end| *end > 0.0 && end.is_finite()).fold(f64::INFINITY, f64::min);
@@ -100,17 +103,17 @@ pub fn chain(problem: &Problem, mut fly_leg: impl FnMut(&Leg) -> Result<LegEnd, 
             r: stage.viscosity / m * length / speed,
             q: stage.drag / m * length,
         };
-        let end = fly_leg(&Leg { law, distance: (limit - at.depth) / length, speed: at.velocity / speed })?;
+        let end = solve_stage(&Reduced { law, distance: (limit - at.depth) / length, speed: at.velocity / speed })?;
         at = State {
             time: at.time + end.at.time * length / speed,
             depth: if end.rests { at.depth + end.at.xi * length } else { limit },
             velocity: if end.rests { 0.0 } else { end.at.u * speed },
         };
         if end.rests {
-            return Ok(Flown { perforated: false, first_boundary, end: at });
+            return Ok(Solved { perforated: false, first_boundary, end: at });
         }
         if limit == problem.exit_depth {
-            return Ok(Flown { perforated: true, first_boundary, end: at });
+            return Ok(Solved { perforated: true, first_boundary, end: at });
         }
         first_boundary = first_boundary.or(Some(at));
     }
@@ -122,27 +125,27 @@ pub fn chain(problem: &Problem, mut fly_leg: impl FnMut(&Leg) -> Result<LegEnd, 
 ///
 /// Rest comes first; a boundary behind the place of rest is crossed before it, exactly once.
 pub fn locate(
-    leg: &Leg,
+    stage: &Reduced,
     before: Node,
     after: Node,
     mut advance: impl FnMut(f64) -> Result<Node, String>,
-) -> Result<LegEnd, String> {
+) -> Result<StageEnd, String> {
     let mut last = after;
     if after.u <= 0.0 {
-        let rest = newton(leg, before, after, |node| node.u, 0, &mut advance)?;
-        if rest.xi < leg.distance {
-            return Ok(LegEnd { at: Node { u: 0.0, ..rest }, rests: true });
+        let rest = newton(stage, before, after, |node| node.u, 0, &mut advance)?;
+        if rest.xi < stage.distance {
+            return Ok(StageEnd { at: Node { u: 0.0, ..rest }, rests: true });
         }
         last = rest;
     }
-    let at = newton(leg, before, last, |node| node.xi - leg.distance, 1, &mut advance)?;
-    Ok(LegEnd { at: Node { u: at.u.max(0.0), ..at }, rests: false })
+    let at = newton(stage, before, last, |node| node.xi - stage.distance, 1, &mut advance)?;
+    Ok(StageEnd { at: Node { u: at.u.max(0.0), ..at }, rests: false })
 }
 
 /// A root of `value` between two nodes: cubic Hermite for the guess, then integration to it, then the law's own
-/// derivatives for the rest of the way.
+/// derivatives for the rest of the distance.
 fn newton(
-    leg: &Leg,
+    stage: &Reduced,
     before: Node,
     after: Node,
     value: impl Fn(Node) -> f64,
@@ -153,7 +156,7 @@ fn newton(
     if span <= 0.0 {
         return Ok(after);
     }
-    let slope = |node: Node| if order == 0 { leg.law.rate(node.xi, node.u) } else { node.u };
+    let slope = |node: Node| if order == 0 { stage.law.rate(node.xi, node.u) } else { node.u };
     let (f0, f1, d0, d1) = (value(before), value(after), slope(before) * span, slope(after) * span);
     let hermite = |t: f64| {
         let (a, b) = (2.0 * (f0 - f1) + d0 + d1, -3.0 * (f0 - f1) - 2.0 * d0 - d1);
@@ -168,14 +171,14 @@ fn newton(
     let mut node = before;
     for _ in 0..8 {
         node = advance(time)?;
-        let [a, b, c] = leg.law.derivatives(node);
+        let [a, b, c] = stage.law.derivatives(node);
         // Newton on the Taylor polynomial of xi or u around the node.
         let mut delta = 0.0_f64;
         for _ in 0..20 {
             let u = node.u + delta * (a + delta * (b / 2.0 + delta * c / 6.0));
             let du = a + delta * (b + delta * c / 2.0);
             let xi = node.xi + delta * (node.u + delta * (a / 2.0 + delta * (b / 6.0 + delta * c / 24.0)));
-            let (f, slope) = if order == 0 { (u, du) } else { (xi - leg.distance, u) };
+            let (f, slope) = if order == 0 { (u, du) } else { (xi - stage.distance, u) };
             let step = f / slope;
             if !step.is_finite() {
                 break;
