@@ -108,7 +108,7 @@ impl ExperimentsArgs {
 
 /// The table and the figure. Both are made before the first is written.
 fn write_files(path: &Path, comparisons: &[Comparison]) -> Result<(), CliError> {
-    let figure = sweep_figures::measured_depths(comparisons);
+    let figure = sweep_figures::measured_depths(comparisons, &[]);
     let csv = sweep_figures::measured_table(comparisons).to_csv();
     let mut files = vec![(path.to_owned(), csv.map_err(|error| CliError::write(path, std::io::Error::other(error)))?)];
     if let Some(figure) = figure.filter(|_| !is_standard(path)) {

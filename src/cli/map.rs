@@ -65,7 +65,7 @@ impl MapArgs {
         let scenes = experiments::marked(&experiments::shipped()?);
         let report = MapJson { schema: "penetrode/map/1", k: self.k, lines: applicability::lines(self.k), scenes };
         if let Some(path) = &self.out {
-            let figure = sweep_figures::applicability(self.k, &report.lines, &report.scenes);
+            let figure = sweep_figures::applicability(self.k, &report.lines, &report.scenes, &[]);
             let mut csv = vec!["level,I,N".to_owned()];
             for line in &report.lines {
                 csv.extend(line.points.iter().map(|(i, n)| format!("{},{i},{n}", line.level)));

@@ -308,7 +308,7 @@ fn draws_eq15(plan: &Plan) -> bool {
 /// Writes table and figures; every one is drawn before the first is written.
 fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) -> Result<(), CliError> {
     let figures = if draws_eq15(plan) {
-        vec![sweep_figures::critical_energy(rows, points), sweep_figures::critical_energy_difference(rows)]
+        vec![sweep_figures::critical_energy(rows, points, &[]), sweep_figures::critical_energy_difference(rows, &[])]
     } else {
         vec![sweep_figures::critical_velocity(plan, rows)]
     };

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
 
+use super::table::Table;
 use super::text::{number, one_line, power_of_ten};
 
 /// Width of a panel: it fits a phone of 375 px.
@@ -168,6 +169,7 @@ pub struct Axis {
     is_log: bool,
     included: Vec<f64>,
     range: Option<[f64; 2]>,
+    least: f64,
 }
 
 impl Axis {
@@ -182,6 +184,11 @@ impl Axis {
         Self { is_log: true, ..Self::linear(title, unit) }
     }
 
+    /// Draws what is below `least` there, zero included. For a logarithmic axis.
+    pub fn from(self, least: f64) -> Self {
+        Self { least, ..self }
+    }
+
     /// Extends the range to `values`.
     pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
         self.included.extend(values);
@@ -194,12 +201,17 @@ impl Axis {
     }
 
     fn has(&self, value: f64) -> bool {
-        value.is_finite() && (value > 0.0 || !self.is_log)
+        value.is_finite() && (value.max(self.least) > 0.0 || !self.is_log)
+    }
+
+    /// Where `value` is drawn.
+    fn drawn(&self, value: f64) -> f64 {
+        if self.is_log { value.max(self.least) } else { value }
     }
 
     /// The axis over `values`, with a margin, and `headroom` as a share of its length above them.
     fn fitted(&self, values: impl Iterator<Item = f64>, headroom: f64) -> Span {
-        let all = values.chain(self.included.iter().copied()).filter(|v| self.has(*v));
+        let all = values.chain(self.included.iter().copied()).filter(|v| self.has(*v)).map(|v| self.drawn(v));
         let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let [low, high] = match self.range {
             Some(range) => range,
@@ -281,6 +293,7 @@ pub enum Anchor {
 #[derive(Clone, Debug, PartialEq)]
 struct Series {
     name: String,
+    is_listed: bool,
     style: Style,
     points: Vec<Point>,
 }
@@ -326,11 +339,17 @@ impl Panel {
         Self { height, ..self }
     }
 
-    /// Adds a series. One with a name stands in the legend, series of the same name once.
+    /// Adds a series. It stands in the legend, series of the same name once.
     pub fn series(mut self, name: impl Into<String>, style: Style, points: impl IntoIterator<Item = Point>) -> Self {
-        let points = points.into_iter().filter(|(x, y)| self.x.has(*x) && self.y.has(*y)).collect();
-        self.series.push(Series { name: name.into(), style, points });
+        self.series.push(Series { name: name.into(), is_listed: true, style, points: points.into_iter().collect() });
         self
+    }
+
+    /// Adds a series that is not in the legend; its name is in the table.
+    pub fn unlisted(self, name: impl Into<String>, style: Style, points: impl IntoIterator<Item = Point>) -> Self {
+        let mut panel = self.series(name, style, points);
+        panel.series.iter_mut().rev().take(1).for_each(|series| series.is_listed = false);
+        panel
     }
 
     /// Adds a rectangle: a bar, a cell of a matrix, a limit.
@@ -364,7 +383,7 @@ impl Panel {
 
     /// Whether there is nothing to draw.
     pub fn is_empty(&self) -> bool {
-        self.series.iter().all(|series| series.points.is_empty())
+        self.points().next().is_none()
     }
 
     /// Gives all `panels` the same ranges.
@@ -376,9 +395,24 @@ impl Panel {
         }
     }
 
-    /// What determines the ranges.
+    /// What is drawn and determines the ranges.
     fn points(&self) -> impl Iterator<Item = Point> {
-        self.series.iter().flat_map(|series| series.points.iter().copied())
+        self.series.iter().flat_map(|series| self.drawn(series))
+    }
+
+    /// The points of `series` that have a place on the axes.
+    fn drawn(&self, series: &Series) -> impl Iterator<Item = Point> {
+        let has_place = |(x, y): &&Point| self.x.has(*x) && self.y.has(*y);
+        series.points.iter().filter(has_place).map(|(x, y)| (self.x.drawn(*x), self.y.drawn(*y)))
+    }
+
+    /// A row for each point of each series.
+    pub(super) fn tabulate(&self, table: &mut Table) {
+        for Series { name, points, .. } in &self.series {
+            for (x, y) in points {
+                table.push([&self.title, name, &self.x.label, x, &self.y.label, y]);
+            }
+        }
     }
 
     /// Rows in which the names of upright lines stand.
@@ -395,7 +429,7 @@ impl Panel {
     fn legend(&self) -> Vec<(f64, usize, &Series)> {
         let mut entries: Vec<(f64, usize, &Series)> = Vec::new();
         let (mut x, mut row) = (2.0, 0);
-        for series in self.series.iter().filter(|series| !series.name.is_empty()) {
+        for series in self.series.iter().filter(|series| series.is_listed && !series.name.is_empty()) {
             if entries.iter().any(|(.., known)| known.name == series.name) {
                 continue;
             }
@@ -449,7 +483,7 @@ impl Panel {
         let (shades, others): (Vec<_>, Vec<_>) = self.series.iter().partition(|s| s.style.ink == Ink::Shade);
         let (shaded, lines): (Vec<_>, Vec<_>) = self.references.iter().partition(|line| line.is_shaded);
         let draw =
-            |series: &Series| symbol(&series.style, &series.points.iter().map(|p| frame.at(*p)).collect::<Vec<_>>());
+            |series: &Series| symbol(&series.style, &self.drawn(series).map(|p| frame.at(p)).collect::<Vec<_>>());
         html! {
             g.plot font-size="11" {
                 @for series in shades { (draw(series)) }
@@ -732,7 +766,7 @@ mod tests {
             .series("name", Style::marks(0), [(0.5, 0.5)]);
         let frame = panel.frame(1);
         assert_eq!(frame.at((0.0, -5.0)), frame.at((0.0, 0.0)));
-        assert_eq!((panel.legend_rows(), panel.series[0].points.len()), (1, 2));
+        assert_eq!((panel.legend_rows(), panel.points().count()), (1, 3));
         let drawing = panel.draw(1).into_string();
         assert_eq!(drawing.matches(">name<").count(), 1);
         assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{drawing}");

@@ -1,11 +1,25 @@
 //! A figure: one message, its panels, its numbers, and where they come from.
+//!
+//! Its words are in `pages/figures.txt`, a block of lines each, with `{0}`, `{1}` … for what the run itself gives:
+//!
+//! ```text
+//! name section
+//! + message, if every claim behind the figure passed
+//! - message otherwise
+//! how to read it, as many lines as needed
+//! ```
+
+use std::fmt::Display;
 
 use maud::{PreEscaped, html};
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::Error;
 
 use super::chart::{Ink, Panel, WIDTH};
 use super::table::Table;
-use super::text::{one_line, wrapped};
-use crate::suite::Section;
+use super::text::{count, one_line, wrapped};
+use crate::suite::{Judged, Section, Verdict};
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
@@ -30,28 +44,67 @@ pub struct Figure {
     pub claims: Vec<String>,
     /// The panels.
     pub panels: Vec<Panel>,
-    /// Every number in it.
-    pub table: Table,
+}
+
+/// The section that a text of ours names.
+pub(super) fn section(name: &str) -> Option<Section> {
+    Section::deserialize(IntoDeserializer::<Error>::into_deserializer(name)).ok()
 }
 
 impl Figure {
-    /// A figure that no claim judges; `None` if its panels show nothing.
+    /// The figure `kind` of `pages/figures.txt`, judged by the claims `judged`; `None` if its panels show nothing.
+    ///
+    /// `of` sets it apart from others of its kind and ends its name, `values` fill the gaps of its words.
     pub fn new(
-        name: impl Into<String>,
-        section: Section,
-        message: impl Into<String>,
-        reading: impl Into<String>,
-        panels: Vec<Panel>,
-        table: Table,
+        kind: &str,
+        of: &str,
+        judged: &[&Judged],
+        values: &[&dyn Display],
+        mut panels: Vec<Panel>,
     ) -> Option<Self> {
-        let (name, message, reading) = (name.into(), message.into(), reading.into());
-        let is_empty = panels.iter().all(Panel::is_empty);
-        (!is_empty).then_some(Self { name, section, message, reading, claims: Vec::new(), panels, table })
+        panels.retain(|panel| !panel.is_empty());
+        let blocks = include_str!("pages/figures.txt").split("\n\n");
+        let (head, lines) = blocks
+            .filter_map(|block| block.split_once('\n'))
+            .find(|(head, _)| head.split_once(' ').is_some_and(|(name, _)| name == kind))?;
+        let open = judged.iter().filter(|judged| judged.verdict != Verdict::Passed).count();
+        let (mut messages, mut reading) = (["", ""], Vec::new());
+        for line in lines.lines() {
+            match line.split_at(line.len().min(2)) {
+                ("+ ", message) => messages = [message; 2],
+                ("- ", message) => messages[1] = message,
+                _ => reading.push(line),
+            }
+        }
+        let filled = |words: &str| {
+            let values = values.iter().enumerate();
+            values.fold(words.to_owned(), |words, (index, value)| {
+                words.replace(&format!("{{{index}}}"), &value.to_string())
+            })
+        };
+        let mut message = filled(messages[usize::from(open > 0)]);
+        if messages[0] != messages[1] && open > 0 {
+            message = format!("{message} ({open} of {})", count(judged.len(), "claim"));
+        }
+        let claims = grouped(judged.iter().map(|judged| judged.claim.table.as_str()), |table| *table);
+        let figure = Self {
+            name: name_of(kind, of),
+            section: section(head.split_once(' ')?.1)?,
+            message,
+            reading: filled(&reading.join(" ")),
+            claims: claims.into_iter().map(|(table, _)| table.to_owned()).collect(),
+            panels,
+        };
+        (!figure.panels.is_empty()).then_some(figure)
     }
 
-    /// The same with the claims that judge it.
-    pub fn judged_by(self, claims: Vec<String>) -> Self {
-        Self { claims, ..self }
+    /// Every number in it: one row a point.
+    pub fn table(&self) -> Table {
+        let mut table = Table::new("panel,series,x_axis,x,y_axis,y");
+        for panel in &self.panels {
+            panel.tabulate(&mut table);
+        }
+        table
     }
 
     /// The same with equal ranges in all panels.
@@ -133,4 +186,10 @@ pub(super) fn grouped<T: Copy, K: PartialEq>(
         }
     }
     groups
+}
+
+/// Name of the files of the figure `kind` of `of`: letters, digits and hyphens.
+pub(super) fn name_of(kind: &str, of: &str) -> String {
+    let name = if of.is_empty() { kind.to_owned() } else { format!("{kind}-{}", of.trim_end_matches(".toml")) };
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).take(80).collect()
 }

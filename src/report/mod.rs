@@ -4,7 +4,6 @@ pub mod bench;
 pub mod chart;
 pub mod environment;
 pub mod figure;
-pub mod figure_data;
 pub mod figures;
 pub mod folder;
 pub mod json;

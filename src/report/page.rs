@@ -9,23 +9,21 @@
 //! @results events Caption      its claims, one row a table of the suite
 //! ```
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
-use serde::Deserialize;
-use serde::de::IntoDeserializer;
-use serde::de::value::Error;
 
 use super::chart::Ink;
-use super::figure::Figure;
+use super::figure::{self, Figure};
 use super::text::{count, number, one_line};
 use super::{Environment, Run};
-use crate::suite::{Claim, Counts, Judged, Section, Verdict, tables, worst};
+use crate::suite::{Claim, Counts, Judged, Verdict, tables, worst};
 
 /// A page.
 pub(super) struct Page<'a> {
     /// Its main heading.
-    pub(super) title: &'a str,
+    pub(super) title: Cow<'a, str>,
     /// What the title of its window adds to that.
     pub(super) outcome: &'a str,
     /// One sentence below the title: what the report is for.
@@ -48,7 +46,20 @@ struct Part<'a> {
     is_shown: bool,
 }
 
-impl Page<'_> {
+impl<'a> Page<'a> {
+    /// The page of a judged suite.
+    pub(super) fn of_run(
+        run: &'a Run<'_>,
+        purpose: &'a str,
+        text: &'a str,
+        slot: &'a dyn Fn(&str, &str) -> Markup,
+        files: Markup,
+    ) -> Self {
+        let outcome = Counts::of_claims(run.judged).verdict().name();
+        let title = one_line(&run.suite.title).into();
+        Self { title, outcome, purpose, environment: &run.environment, text, slot, files }
+    }
+
     /// The sections of the text that have something to show.
     fn parts(&self) -> Vec<Part<'_>> {
         let mut parts: Vec<Part<'_>> = Vec::new();
@@ -120,14 +131,14 @@ impl Page<'_> {
 /// A slot that the pages of all judged suites share; another is shown by its name, which a test excludes.
 pub(super) fn slot(run: &Run<'_>, figures: &[Figure], name: &str, words: &str) -> Markup {
     let (section, caption) = words.split_once(' ').unwrap_or((words, ""));
-    let section = Section::deserialize(IntoDeserializer::<Error>::into_deserializer(section)).ok();
+    let section = figure::section(section);
     let claims = || tables(run.judged).filter(|claims| section.is_none_or(|of| claims[0].claim.section == of));
     match name {
         "verdict" => verdict(run.judged, words),
         "criteria" if section.is_some() => criteria(caption, &claims().collect::<Vec<_>>()),
         "criteria" => every_criterion(&claims().collect::<Vec<_>>()),
         "figures" => html! { @for shown in figures.iter().filter(|f| Some(f.section) == section) {
-            (figure(shown, run.environment.seed))
+            (figure(shown, &run.environment.command))
         } },
         "results" => results(caption, &claims().collect::<Vec<_>>()),
         "each" => {
@@ -350,14 +361,14 @@ fn every_claim(judged: &[Judged]) -> Markup {
     } }
 }
 
-/// A figure with its message, how to read it, the claims that judge it, and its files.
-pub(super) fn figure(figure: &Figure, seed: u64) -> Markup {
+/// A figure with its message, how to read it, the claims that judge it and the command that remakes them, and its files.
+pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
     const NAMED: usize = 3;
     html! {
         figure id={ "figure-" (figure.name) } {
             figcaption {
                 b { (one_line(&figure.message)) }
-                (figure.reading)
+                (figure.reading) " "
                 span.quiet {
                     @if let Some(first) = figure.claims.first() {
                         "Judged by "
@@ -366,14 +377,23 @@ pub(super) fn figure(figure: &Figure, seed: u64) -> Markup {
                             code { (one_line(id)) }
                         }
                         @if figure.claims.len() > NAMED { " and " (figure.claims.len() - NAMED) " more" }
-                        "; remade by " code { "penetrode verify --only " (one_line(first)) " --seed " (seed) } ". "
+                        "; remade by " code { (one_line(&only(command, first))) } ". "
                     }
-                    a href={ "tables/" (figure.name) ".csv" } { (count(figure.table.len(), "row")) " as CSV" } ", "
+                    a href={ "tables/" (figure.name) ".csv" } { (count(figure.table().len(), "row")) " as CSV" } ", "
                     a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
                 }
             }
             div.panels { @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) } }
         }
+    }
+}
+
+/// `command`, restricted to the claims of the table `id` where it can be.
+fn only(command: &str, id: &str) -> String {
+    if command.starts_with("penetrode verify") && !command.contains("--only") {
+        format!("{command} --only {id}")
+    } else {
+        command.to_owned()
     }
 }
 

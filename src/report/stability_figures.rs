@@ -2,43 +2,27 @@
 
 use super::chart::{Axis, Ink, Panel, Style};
 use super::figure::{Figure, grouped};
-use super::table::{Table, or_empty};
 use super::text::number;
 use crate::studies::rounding::{Errors, Floor};
 use crate::studies::stability::BoundaryPoint;
-use crate::suite::Section;
+use crate::suite::Judged;
 
 /// Where amplitudes begin to grow: measured points on the lines of theory, over the drag group.
 ///
 /// `None` without a point.
-pub fn boundary(points: &[BoundaryPoint]) -> Option<Figure> {
-    let mut table = Table::new("velocity_rule,drag_group,w_dt_measured,w_dt_theory");
-    for p in points {
-        table.push([&p.velocity, &p.drag_group, &p.measured, &p.theory]);
-    }
+pub fn boundary(points: &[BoundaryPoint], judged: &[&Judged]) -> Option<Figure> {
     let off = points.iter().map(|p| (p.measured / p.theory - 1.0).abs()).reduce(f64::max)?;
     let off = number(100.0 * off, 2);
     let origin = |title| Axis::linear(title, "").including([0.0]);
     let mut panel = Panel::new("onset of growth, w dt over Q V dt/M", origin("Q V dt/M"), origin("w dt"))
         .described(format!("Measured and in theory, at most {off} % apart."));
     for (index, (rule, members)) in grouped(points, |p| p.velocity).into_iter().enumerate() {
-        let theory = Style::marks(index).as_line();
-        panel = panel.series("", theory, members.iter().map(|p| (p.drag_group, p.theory))).series(
-            rule.to_string(),
-            Style::marks(index),
-            members.iter().map(|p| (p.drag_group, p.measured)),
-        );
+        let style = Style::marks(index);
+        panel = panel
+            .unlisted(format!("{rule}, theory"), style.as_line(), members.iter().map(|p| (p.drag_group, p.theory)))
+            .series(rule.to_string(), style, members.iter().map(|p| (p.drag_group, p.measured)));
     }
-    Figure::new(
-        "stability-map",
-        Section::Stability,
-        format!("The measured boundary of stability lies on the theoretical one within {off} %"),
-        "Below its line a velocity rule is stable, above it amplitudes grow. Points: where growth begins within 4000 \
-         steps, by bisection. Lines: the spectral radius of one step. With a lagged drag the stable step shrinks as the \
-         drag grows; centred drag leaves it at 2.",
-        vec![panel],
-        table,
-    )
+    Figure::new("stability-map", "", judged, &[&off], vec![panel])
 }
 
 /// The series of the rounding figure: numbers, sums, style, and their errors.
@@ -47,7 +31,7 @@ type Series = (&'static str, &'static str, Style, fn(&Floor) -> Errors);
 /// Error of the depth against dt down to the floor of each number type, and the rounding in it alone.
 ///
 /// `None` without a row.
-pub fn rounding(rows: &[Floor]) -> Option<Figure> {
+pub fn rounding(rows: &[Floor], judged: &[&Judged]) -> Option<Figure> {
     let series: [Series; 4] = [
         ("f64", "plain", Style::marks(0), |row| row.plain),
         ("f64", "compensated", Style::marks(0).hollow(), |row| row.compensated),
@@ -55,14 +39,6 @@ pub fn rounding(rows: &[Floor]) -> Option<Figure> {
         ("f32", "compensated", Style::marks(1).hollow(), |row| row.single_compensated),
     ];
     let last = rows.iter().rfind(|row| row.truncation.is_some())?;
-    let mut table = Table::new("dt_s,steps,numbers,sums,total_error,rounding_error");
-    for row in rows {
-        table.push([&row.dt, &row.steps, &"double-double", &"plain", &or_empty(row.truncation), &""]);
-        for (numbers, sums, _, errors) in &series {
-            let errors = errors(row);
-            table.push([&row.dt, &row.steps, numbers, sums, &errors.total, &or_empty(errors.rounding)]);
-        }
-    }
     let least =
         |pick: fn(&Floor) -> Errors| number(rows.iter().map(|row| pick(row).total).fold(f64::INFINITY, f64::min), 1);
     let floors = format!("{} in f32, {} in f64", least(|row| row.single), least(|row| row.plain));
@@ -83,18 +59,5 @@ pub fn rounding(rows: &[Floor]) -> Option<Figure> {
         panel("rounding in it", |errors| errors.rounding)
             .described(format!("Rounding grows with the number of steps. Compensated sums leave {gain} times less.")),
     ];
-    let figure = Figure::new(
-        "rounding-floor",
-        Section::Stability,
-        format!(
-            "Rounding sets the floor: {floors}; after {} steps compensated sums leave {gain} times less of it",
-            last.steps
-        ),
-        "Left: error against the exact depth as the step falls from right to left. It follows the truncation, of second \
-         order, until rounding outweighs it. Right: the rounding alone, against the same steps in double-double. Hollow: \
-         compensated sums.",
-        panels,
-        table,
-    )?;
-    Some(figure.sharing_axes())
+    Some(Figure::new("rounding-floor", "", judged, &[&floors, &last.steps, &gain], panels)?.sharing_axes())
 }

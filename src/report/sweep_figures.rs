@@ -2,14 +2,16 @@
 //!
 //! The commands `sweep`, `map` and `experiments` write them as files; the report of the suite shows the same ones.
 
+use std::fmt::Display;
+
 use super::chart::{Anchor, Axis, Ink, Panel, Point, Style};
 use super::figure::{Figure, grouped};
 use super::table::{Table, or_empty};
 use super::text::{count, number};
 use crate::studies::applicability::{ERROR_ALLOWED, Line};
 use crate::studies::experiments::{BAND, Comparison, MarkedScene, summaries};
-use crate::studies::sweep::{Plan, Row};
-use crate::suite::Section;
+use crate::studies::sweep::{self, Plan, Row};
+use crate::suite::Judged;
 
 /// Least H/d at which differences are drawn: for thinner slabs they run to thousands of percent and hide the rest.
 const THICK: f64 = 1.0;
@@ -47,21 +49,7 @@ fn difference(rows: &[Row], energy: impl Fn(&Row) -> Option<f64>, formula: impl 
 /// The paper's Figure 4: `E_c/(d³ fc)` over H/d of the simulation by both criteria, Eq. 15, and measured `points`.
 ///
 /// `None` where there is nothing to draw: no row has a finite energy.
-pub fn critical_energy(rows: &[Row], points: &[Point]) -> Option<Figure> {
-    let mut table = Table::new("H_over_d,energy_full_depth,energy_ndrc,eq15_printed,eq15_unrounded,measured");
-    for row in rows {
-        table.push([
-            &or_empty(row.thickness_ratio),
-            &or_empty(row.energy_full_depth),
-            &or_empty(row.energy_ndrc),
-            &or_empty(row.eq15_printed),
-            &or_empty(row.eq15_unrounded),
-            &"",
-        ]);
-    }
-    for (ratio, energy) in points {
-        table.push([ratio, &"", &"", &"", &"", energy]);
-    }
+pub fn critical_energy(rows: &[Row], points: &[Point], judged: &[&Judged]) -> Option<Figure> {
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_unrounded);
     let ndrc = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
     let gap = match (extremes(&full), extremes(&ndrc)) {
@@ -79,59 +67,31 @@ pub fn critical_energy(rows: &[Row], points: &[Point]) -> Option<Figure> {
     let energies = along(rows, |row| row.energy_full_depth);
     extremes(&energies)?;
     let origin = |title| Axis::linear(title, "").including([0.0]);
-    let measured = if points.is_empty() { "" } else { "measured" };
     let panel = Panel::new("critical impact energy", origin("H/d"), origin("E_c/(d³ f_c)"))
         .series("simulation, full depth x = H", Style::line(0), energies)
         .series("simulation, ndrc x = x_p(H)", Style::line(3), along(rows, |row| row.energy_ndrc))
         .series("Eq. 15, printed", Style::line(1), along(rows, |row| row.eq15_printed))
         .series("Eq. 15, unrounded", Style::line(2), along(rows, |row| row.eq15_unrounded))
-        .series(measured, Style::marks(0).ink(Ink::Red), points.iter().copied())
         .tall(TALL);
-    Figure::new(
-        "critical-energy",
-        Section::Slab,
-        format!("Critical impact energy over the thickness (Figure 4): {gap}"),
-        "Four lines over H/d: the equation of motion until x = H (full depth), the same until the depth from which the \
-         ACE/NDRC relation lets the rest fail (ndrc), and Eq. 15 as printed and before its coefficients were rounded. \
-         The percentages are of unrounded Eq. 15, from H/d = 1.",
-        vec![panel],
-        table,
-    )
+    let measured = Style::marks(0).ink(Ink::Red);
+    let panel = if points.is_empty() { panel } else { panel.series("measured", measured, points.iter().copied()) };
+    Figure::new("critical-energy", "", judged, &[&gap], vec![panel])
 }
 
 /// The paper's Figure 5: simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria.
 ///
 /// `None` where no row has H/d of at least one.
-pub fn critical_energy_difference(rows: &[Row]) -> Option<Figure> {
+pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Figure> {
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_printed);
     let printed = difference(rows, |row| row.energy_ndrc, |row| row.eq15_printed);
     let unrounded = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
-    let mut table = Table::new("H_over_d,full_depth_over_printed,ndrc_over_printed,ndrc_over_unrounded,N");
-    for row in rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio >= THICK)) {
-        let over = |energy: Option<f64>, formula: Option<f64>| or_empty(energy.zip(formula).map(|(e, f)| e / f - 1.0));
-        table.push([
-            &or_empty(row.thickness_ratio),
-            &over(row.energy_full_depth, row.eq15_printed),
-            &over(row.energy_ndrc, row.eq15_printed),
-            &over(row.energy_ndrc, row.eq15_unrounded),
-            &or_empty(row.geometry),
-        ]);
-    }
-    let first = full.first()?;
-    let least = full.iter().fold(first, |least, point| if point.1 < least.1 { point } else { least });
+    let first = *full.first()?;
+    let least = full.iter().fold(first, |least, point| if point.1 < least.1 { *point } else { least });
     let [low, high] = extremes(&unrounded).unwrap_or([0.0, 0.0]);
     let geometry =
         rows.iter().find(|row| row.thickness_ratio.is_some()).and_then(|row| row.geometry).unwrap_or(f64::INFINITY);
     let panel = |title| Panel::new(title, Axis::linear("H/d", ""), Axis::linear("difference", "%").including([0.0]));
     let limit: Vec<Point> = full.iter().map(|(ratio, _)| (*ratio, 24.0)).collect();
-    let message = format!(
-        "Difference from Eq. 15 (Figure 5), N = {}: {} % at the least with the whole thickness, {} to {} % with the \
-         criterion of Eq. 15",
-        number(geometry, 3),
-        signed(least.1),
-        signed(low),
-        signed(high),
-    );
     let panels = vec![
         panel("full depth")
             .described(format!("Least at H/d = {}.", number(least.0, 3)))
@@ -143,15 +103,8 @@ pub fn critical_energy_difference(rows: &[Row]) -> Option<Figure> {
             unrounded,
         ),
     ];
-    Figure::new(
-        "critical-energy-difference",
-        Section::Slab,
-        message,
-        "Simulation less Eq. 15 in percent of Eq. 15, from H/d = 1. Left: exit at x = H. Right, on its own scale: exit at \
-         x_p(H). The two lines differ by the rounding of the printed coefficients.",
-        panels,
-        table,
-    )
+    let values = [&number(geometry, 3) as &dyn Display, &signed(least.1), &signed(low), &signed(high)];
+    Figure::new("critical-energy-difference", "", judged, &values, panels)
 }
 
 /// Critical velocity over the first axis of any sweep: one line, or up to six values of a second axis.
@@ -164,37 +117,21 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Option<Figure> {
     let unit = first.parameter.dimension().map_or("", |dimension| dimension.units()[0]);
     let x = Axis::linear(&first.parameter.to_string(), unit);
     let mut panel = Panel::new("critical velocity", x, Axis::linear("V_c", "m/s")).tall(TALL);
-    let mut table = Table::new("first,second,critical_velocity_m_s");
     for index in 0..shown {
         let column = if shown == 1 { 0 } else { index * (inner - 1) / (shown - 1) };
-        let second = rest.first().map(|axis| (axis.parameter, axis.value(column)));
         let points = (0..first.count).filter_map(|i| {
             let row = &rows[i * inner + column];
-            Some((row.values[0], row.critical_velocity.filter(|velocity| velocity.is_finite())?))
+            Some((row.values[0], row.critical_velocity?))
         });
-        let points: Vec<Point> = points.filter(|(value, _)| value.is_finite()).collect();
-        for (value, velocity) in &points {
-            table.push([value, &or_empty(second.map(|(_, value)| value)), velocity]);
-        }
-        let name = second.map_or_else(String::new, |(name, value)| format!("{name} = {}", number(value, 4)));
-        panel = panel.series(name, Style::line(index), points);
+        let name = |axis: &sweep::Axis| format!("{} = {}", axis.parameter, number(axis.value(column), 4));
+        panel = panel.series(rest.first().map_or_else(String::new, name), Style::line(index), points);
     }
     let paths: Vec<_> = plan.axes().iter().map(|axis| axis.parameter.to_string()).collect();
-    let message = format!("Critical velocity over {}", paths.join(" and "));
-    Figure::new("critical-velocity", Section::Slab, message, "", vec![panel], table)
+    Figure::new("critical-velocity", "", &[], &[&paths.join(" and ")], vec![panel])
 }
 
 /// The map of Eq. 11-12 over (I, N) for one k: lines of equal error, and the scenes of measured sets.
-pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene]) -> Option<Figure> {
-    let mut table = Table::new("kind,level,set,I,N,k,error");
-    for found in lines {
-        for (impact, geometry) in &found.points {
-            table.push([&"line", &found.level, &"", impact, geometry, &crater_ratio, &""]);
-        }
-    }
-    for scene in scenes {
-        table.push([&"shot", &"", &scene.set, &scene.impact, &scene.geometry, &scene.crater_ratio, &scene.error]);
-    }
+pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene], judged: &[&Judged]) -> Option<Figure> {
     let (x, y) = ([0.01, 1000.0], [0.1, 1e5]);
     let mut panel =
         Panel::new("error of Eq. 11-12 over I and N", Axis::log("I", "").over(x), Axis::log("N", "").over(y))
@@ -217,28 +154,15 @@ pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene]) 
         panel = panel.series(set, Style::marks(index).radius(2.5), members.iter().map(|s| (s.impact, s.geometry)));
     }
     let within = scenes.iter().filter(|scene| scene.error.abs() <= ERROR_ALLOWED).count();
-    Figure::new(
-        "applicability-map",
-        Section::Applicability,
-        format!(
-            "Eq. 11-12 is within {} % of the equation of motion for {within} of {}",
-            number(100.0 * ERROR_ALLOWED, 2),
-            count(scenes.len(), "measured test"),
-        ),
-        format!(
-            "Lines of equal error of the depth of Eq. 11-12 for k = {}; above a line the error is smaller. It vanishes at \
-             I = k π/4 for every N. Points are the measured tests, judged by their own k.",
-            number(crater_ratio, 3)
-        ),
-        vec![panel],
-        table,
-    )
+    let (allowed, tests) = (number(100.0 * ERROR_ALLOWED, 2), count(scenes.len(), "measured test"));
+    let values = [&allowed as &dyn Display, &within, &tests, &number(crater_ratio, 3)];
+    Figure::new("applicability-map", "", judged, &values, vec![panel])
 }
 
 /// Predicted over measured depth (m) with the band of ±20 %; one kind of mark for each set.
 ///
 /// `None` without a test.
-pub fn measured_depths(comparisons: &[Comparison]) -> Option<Figure> {
+pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option<Figure> {
     let depths = comparisons.iter().flat_map(|c| [c.experiment.depth, c.predicted]).filter(|depth| *depth > 0.0);
     let [low, high] = extremes(&depths.map(|depth| (0.0, depth)).collect::<Vec<_>>())?;
     let ends = [low / 1.5, high * 1.5];
@@ -253,19 +177,8 @@ pub fn measured_depths(comparisons: &[Comparison]) -> Option<Figure> {
         panel = panel.series(set, Style::marks(index).radius(2.5), points);
     }
     let within: usize = summaries(comparisons).iter().map(|set| set.within_band).sum();
-    Figure::new(
-        "measured-depths",
-        Section::Measured,
-        format!(
-            "Predicted depth is within {} % of the measured one for {within} of {}",
-            number(100.0 * BAND, 2),
-            count(comparisons.len(), "test"),
-        ),
-        "Each point is one test: S of Eq. 14, N* of its nose, semi-infinite target. On the dashed line prediction and \
-         measurement are equal; shaded is the band of ±20 %.",
-        vec![panel],
-        measured_table(comparisons),
-    )
+    let values = [&number(100.0 * BAND, 2) as &dyn Display, &within, &count(comparisons.len(), "test")];
+    Figure::new("measured-depths", "", judged, &values, vec![panel])
 }
 
 /// The comparison of measured depths, one row a test.
@@ -314,7 +227,7 @@ mod tests {
     #[test]
     fn same_data_give_the_same_figure() {
         let rows = [row(1.0, 2.0), row(2.0, 9.0), row(3.0, 20.0)];
-        let file = |points: &[Point]| critical_energy(&rows, points).unwrap().file();
+        let file = |points: &[Point]| critical_energy(&rows, points, &[]).unwrap().file();
         assert_eq!(file(&[(2.0, 5.0)]), file(&[(2.0, 5.0)]));
         assert_ne!(file(&[(2.0, 5.0)]), file(&[]));
         assert!(file(&[(2.0, 5.0)]).contains("E_c/(d³ f_c)") && file(&[(2.0, 5.0)]).contains("measured"));
@@ -322,36 +235,36 @@ mod tests {
 
     #[test]
     fn nothing_finite_is_no_figure() {
-        assert_eq!(critical_energy(&[], &[]), None);
-        assert_eq!(critical_energy(&[row(1.0, f64::NAN)], &[]), None);
-        assert_eq!(critical_energy_difference(&[row(0.5, 1.0)]), None);
-        assert_eq!(measured_depths(&[]), None);
+        assert_eq!(critical_energy(&[], &[], &[]), None);
+        assert_eq!(critical_energy(&[row(1.0, f64::NAN)], &[], &[]), None);
+        assert_eq!(critical_energy_difference(&[row(0.5, 1.0)], &[]), None);
+        assert_eq!(measured_depths(&[], &[]), None);
     }
 
     #[test]
     fn a_single_point_has_a_figure() {
-        let file = critical_energy(&[row(5.0, 40.0)], &[]).unwrap().file();
+        let file = critical_energy(&[row(5.0, 40.0)], &[], &[]).unwrap().file();
         assert!(file.trim_end().ends_with("</svg>"));
     }
 
     /// What is said of the lines is computed from them.
     #[test]
     fn the_message_gives_the_gap_and_what_is_left_of_it() {
-        let figure = critical_energy(&[row(1.0, 2.0), row(2.0, 9.0)], &[]).unwrap();
+        let figure = critical_energy(&[row(1.0, 2.0), row(2.0, 9.0)], &[], &[]).unwrap();
         assert!(figure.message.contains("100 to 100 % above Eq. 15"), "{}", figure.message);
-        let figure = critical_energy_difference(&[row(1.0, 2.0), row(2.0, 9.0)]).unwrap();
+        let figure = critical_energy_difference(&[row(1.0, 2.0), row(2.0, 9.0)], &[]).unwrap();
         assert!(figure.message.contains("+100 % at the least"), "{}", figure.message);
     }
 
     #[test]
     fn the_map_names_its_lines_and_holds_every_test() {
         let scenes = experiments::marked(&experiments::shipped().unwrap());
-        let figure = super::applicability(2.0, &applicability::lines(2.0), &scenes).unwrap();
+        let figure = super::applicability(2.0, &applicability::lines(2.0), &scenes, &[]).unwrap();
         let file = figure.file();
         for words in ["1 %", "5 %", "20 %", "Sliter1980", "Eq. 12 too deep"] {
             assert!(file.contains(words), "{words}");
         }
         assert_eq!(scenes.len(), 107);
-        assert!(figure.table.len() > 107);
+        assert!(figure.table().len() > 107);
     }
 }

@@ -2,7 +2,7 @@
 
 use maud::{Markup, Render, html};
 
-use super::figure::Figure;
+use super::figure::{Figure, grouped};
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
 use super::text::{count, number, one_line};
@@ -15,34 +15,26 @@ use crate::studies::{Path, Quantity, Stretch, formal_order};
 use crate::suite::checks::{Order, StepPattern};
 use crate::suite::{Check, Counts, Evidence, Judged, LOOSENESS_MAX, looseness, skipped, tables};
 
-const VELOCITIES: [VelocityAt; 3] = [VelocityAt::LaggedHalfStep, VelocityAt::Centred, VelocityAt::PredictedHalfStep];
-const BOUNDARIES: [Boundaries; 3] = [Boundaries::StepEnd, Boundaries::Interpolated, Boundaries::Landed];
-
 /// The page of `run` with its figures.
 pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
-    Page {
-        title: &one_line(&run.suite.title),
-        outcome: Counts::of_claims(run.judged).verdict().name(),
-        purpose: "Purpose: to show what the program computes right, how far, and where it was not tried.",
-        environment: &run.environment,
-        text: include_str!("pages/verify.txt"),
-        slot: &|name, words| match name {
-            "scenes" => scenes(run),
-            "formal-orders" => formal_orders(),
-            "build" => build(&run.environment),
-            "observed-orders" => observed_orders(run),
-            "peers" => facts(run.environment.peers.iter().map(|(name, text)| (name.as_str(), cell(text)))),
-            "why-above-eq-15" => why_above_eq15(run),
-            "sets" => sets(run),
-            "meaning-of-data" => html! { p { (experiments::MEANING) } },
-            "layered-claims" => layered_claims(run),
-            "deviations" => deviations(run.judged),
-            _ => slot(run, figures, name, words),
-        },
-        files: html! { a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", "
-        a href="summary.md" { "Markdown" } },
-    }
-    .to_html()
+    let filled = |name: &str, words: &str| match name {
+        "scenes" => scenes(run),
+        "formal-orders" => formal_orders(),
+        "build" => build(&run.environment),
+        "observed-orders" => observed_orders(run),
+        "peers" => facts(run.environment.peers.iter().map(|(name, text)| (name.as_str(), cell(text)))),
+        "why-above-eq-15" => why_above_eq15(run),
+        "sets" => sets(run),
+        "meaning-of-data" => html! { p { (experiments::MEANING) } },
+        "layered-claims" => layered_claims(run),
+        "deviations" => deviations(run.judged),
+        _ => slot(run, figures, name, words),
+    };
+    let purpose = "Purpose: to show what the program computes right, how far, and where it was not tried.";
+    let files = html! {
+        a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", " a href="summary.md" { "Markdown" }
+    };
+    Page::of_run(run, purpose, include_str!("pages/verify.txt"), &filled, files).to_html()
 }
 
 /// Methods that this build leaves out, and for what it was built.
@@ -89,24 +81,13 @@ fn evidence<'a, T>(run: &Run<'a>, pick: impl Fn(&'a Evidence) -> Option<T>) -> O
 }
 
 fn scenes(run: &Run<'_>) -> Markup {
-    let names = scenes_in_order(run);
-    let resolved: Vec<_> = names
-        .iter()
-        .filter_map(|name| Some((name, run.suite.scenes.get(name)?, run.suite.scenes.problem(name).ok()?)))
+    let resolved: Vec<_> = scenes_in_order(run)
+        .into_iter()
+        .filter_map(|name| Some((run.suite.scenes.get(&name)?, run.suite.scenes.problem(&name).ok()?, name)))
         .collect();
-    if resolved.is_empty() {
-        return html! {};
-    }
-    let header = [
-        "scene",
-        "M [kg]",
-        "V₀ [m/s]",
-        "exit depth [m]",
-        "I",
-        "N",
-        "stages: p [N], s [N/m], r [kg/s], q [kg/m], until x [m]",
-    ];
-    let table = Table::grid("Parameters of the scenes", header).rows(&resolved, |(name, scene, problem)| {
+    let stages = "stages: p [N], s [N/m], r [kg/s], q [kg/m], until x [m]";
+    let header = ["scene", "M [kg]", "V₀ [m/s]", "exit depth [m]", "I", "N", stages];
+    let table = Table::grid("Parameters of the scenes", header).rows(&resolved, |(scene, problem, name)| {
         let groups = Groups::of(scene, problem.impact_speed);
         [
             html! { code { (one_line(name)) } },
@@ -115,14 +96,14 @@ fn scenes(run: &Run<'_>) -> Markup {
             number_cell(Some(problem.exit_depth), 6),
             number_cell(groups.as_ref().map(|groups| groups.impact), 5),
             number_cell(groups.map(|groups| groups.geometry.unwrap_or(f64::INFINITY)), 5),
-            html! { @for (index, stage) in problem.stages.iter().enumerate() {
+            html! { @for (index, s) in problem.stages.iter().enumerate() {
                 @if index > 0 { br; }
-                (number(stage.static_force, 6)) ", " (number(stage.stiffness, 6)) ", "
-                (number(stage.viscosity, 6)) ", " (number(stage.drag, 6)) ", " (number(stage.end, 6))
+                ([s.static_force, s.stiffness, s.viscosity, s.drag, s.end].map(|value| number(value, 6)).join(", "))
             } },
         ]
     });
-    folded(html! { "Parameters of " (count(resolved.len(), "scene")) ", in SI units" }, false, table)
+    let summary = html! { "Parameters of " (count(resolved.len(), "scene")) ", in SI units" };
+    html! { @if !resolved.is_empty() { (folded(summary, false, table)) } }
 }
 
 /// The kinds of path that decide an order, in the order of the table.
@@ -147,26 +128,17 @@ fn orders_of(velocity: VelocityAt, boundaries: Boundaries, leaves_crater: bool, 
     })
 }
 
-/// Velocity rules of the same orders, joined by "or", with those orders.
-fn formal_rows(boundaries: Boundaries, leaves_crater: bool, to_end: Stretch) -> Vec<(String, Orders)> {
-    let mut rows: Vec<(Vec<String>, Orders)> = Vec::new();
-    for velocity in VELOCITIES {
-        let orders = orders_of(velocity, boundaries, leaves_crater, to_end);
-        match rows.iter_mut().find(|(_, known)| *known == orders) {
-            Some((names, _)) => names.push(velocity.to_string()),
-            None => rows.push((vec![velocity.to_string()], orders)),
-        }
-    }
-    let joined = |names: Vec<String>| if names.len() == 3 { "any".to_owned() } else { names.join(" or ") };
-    rows.into_iter().map(|(names, orders)| (joined(names), orders)).collect()
-}
-
 fn formal_orders() -> Markup {
     let header = ["path", "velocity", "boundaries"].into_iter().chain(Quantity::ALL.map(words_for));
     let mut table = Table::grid("Formal orders of the central difference (Eq. 6-8) in the step", header).numbers(3..9);
     for (path, leaves_crater, to_end) in PATHS {
-        for boundaries in BOUNDARIES {
-            for (velocities, orders) in formal_rows(boundaries, leaves_crater, to_end) {
+        for boundaries in Boundaries::ALL {
+            // One row for all velocity rules of the same orders.
+            let orders = |velocity: &VelocityAt| orders_of(*velocity, boundaries, leaves_crater, to_end);
+            for (orders, rules) in grouped(VelocityAt::ALL, orders) {
+                let names: Vec<_> = rules.iter().map(ToString::to_string).collect();
+                let velocities =
+                    if names.len() == VelocityAt::ALL.len() { "any".to_owned() } else { names.join(" or ") };
                 let names = [cell(path), cell(velocities), cell(boundaries)];
                 table = table.row(names.into_iter().chain(orders.map(|order| number_cell(order, 2))));
             }
@@ -179,19 +151,13 @@ fn formal_orders() -> Markup {
 fn observed_orders(run: &Run<'_>) -> Markup {
     let is_order = |j: &&Judged| matches!(j.claim.check, Check::Order(Order { steps: StepPattern::Uniform, .. }));
     let orders: Vec<&Judged> = run.judged.iter().filter(is_order).filter(|j| fit_of(j).is_some()).collect();
-    let mut blocks = Vec::new();
-    for scene in scenes_in_order(run) {
-        let mine: Vec<_> = orders.iter().copied().filter(|j| j.claim.scene.as_deref() == Some(&scene)).collect();
-        if !mine.is_empty() {
-            blocks.push(html! {
-                details open[blocks.is_empty()] {
-                    summary { "Observed orders, scene " code { (one_line(&scene)) } }
-                    (order_table(&one_line(&scene), &mine))
-                }
-            });
-        }
-    }
-    html! { @for block in blocks { (block) } }
+    let scenes = scenes_in_order(run).into_iter().map(|scene| {
+        let mine = orders.iter().copied().filter(|j| j.claim.scene.as_ref() == Some(&scene)).collect::<Vec<_>>();
+        (one_line(&scene), mine)
+    });
+    html! { @for (index, (scene, mine)) in scenes.filter(|(_, mine)| !mine.is_empty()).enumerate() {
+        details open[index == 0] { summary { "Observed orders, scene " code { (scene) } } (order_table(&scene, &mine)) }
+    } }
 }
 
 fn order_table(scene: &str, mine: &[&Judged]) -> Table {
@@ -200,26 +166,18 @@ fn order_table(scene: &str, mine: &[&Judged]) -> Table {
     let caption =
         format!("Scene {scene}: observed order, half-width of its 95 % interval, and the formal order in brackets");
     let header = ["velocity", "boundaries"].into_iter().chain(quantities.iter().map(|q| words_for(*q)));
-    let variants = VELOCITIES.into_iter().flat_map(|velocity| BOUNDARIES.map(|boundaries| (velocity, boundaries)));
-    let mut table = Table::grid(caption, header).numbers(2..9);
-    for (velocity, boundaries) in variants {
-        let of_variant: Vec<_> =
-            mine.iter().filter(|j| j.claim.velocity == velocity && j.claim.boundaries == boundaries).collect();
-        if of_variant.is_empty() {
-            continue;
-        }
-        let orders = quantities.iter().map(|quantity| {
-            let judged = of_variant.iter().find(|j| j.claim.quantity == Some(*quantity));
-            judged.map_or_else(|| cell("—"), |judged| order_cell(judged))
-        });
-        table = table.row([cell(velocity), cell(boundaries)].into_iter().chain(orders));
-    }
-    table
+    let mut variants = grouped(mine.iter().copied(), |j| (j.claim.velocity, j.claim.boundaries));
+    variants.sort_by_key(|((velocity, boundaries), _)| (*velocity as usize, *boundaries as usize));
+    Table::grid(caption, header).numbers(2..9).rows(variants, |((velocity, boundaries), members)| {
+        let of = |quantity: &Quantity| members.iter().find(|j| j.claim.quantity == Some(*quantity)).copied();
+        let orders = quantities.iter().map(|quantity| of(quantity).map_or_else(|| cell("—"), order_cell));
+        [cell(velocity), cell(boundaries)].into_iter().chain(orders).collect::<Vec<_>>()
+    })
 }
 
 fn order_cell(judged: &Judged) -> Markup {
     html! {
-        @if let Some((_, formal, fit)) = fit_of(judged) {
+        @if let Some((formal, fit)) = fit_of(judged) {
             @if let Some(line) = fit.line {
                 (format!("{:.2} ± {:.2} ({formal})", line.order, 0.5 * (line.interval95[1] - line.interval95[0])))
             } @else { "no fit (" (formal) ")" }

@@ -184,7 +184,7 @@ fn the_report_of_the_suite_shows_measured_points_with_the_curve_or_refuses_them(
     let (code, _, err) = run(&["verify", "--only", "sweep/", "--data", &points, "--out", &out]);
     assert_eq!(code, 0, "{err}");
     let table = std::fs::read_to_string(folder.path().join("report/tables/critical-energy.csv")).unwrap();
-    assert!(table.contains("\n5,,,,,30.5\n"), "{table:.300}");
+    assert!(table.contains("\ncritical impact energy,measured,H/d,5,E_c/(d³ f_c),30.5\n"), "{table:.300}");
     let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(page.contains("measured</text>") && page.contains("--data "));
     // Nothing of the suite sweeps H/d: the points would be shown nowhere.

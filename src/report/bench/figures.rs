@@ -1,18 +1,16 @@
 //! The figures of `bench`: error against time and against work, error against the step, cost as work grows.
 
+use std::fmt::Display;
+
 use super::BenchJson;
-use crate::integrators::MethodName;
+use crate::integrators::{Boundaries, MethodName, VelocityAt};
 use crate::report::chart::{Axis, Panel, Point, Style};
 use crate::report::figure::{Figure, grouped};
 use crate::report::figures::words_for;
-use crate::report::table::{Table, or_empty};
 use crate::report::text::{count, one_line};
-use crate::studies::Quantity;
-use crate::studies::bench::Timing;
 use crate::studies::bench::growth::Growth;
-use crate::studies::bench::step_size::{BOUNDARIES, StepStudy, VELOCITIES};
+use crate::studies::bench::step_size::StepStudy;
 use crate::studies::bench::work_precision::{Contender, Run, RunState, variant_name};
-use crate::suite::Section;
 
 /// Series in one panel at most, besides the one that stands in all: more cannot be distinguished.
 const SERIES_MAX: usize = 7;
@@ -60,14 +58,9 @@ const COSTS: [Cost; 2] = [
     },
 ];
 
-/// Name of the figure that shows what an accuracy costs on `scene`.
-pub(super) fn cost_figure_name(scene: &str) -> String {
-    format!("cost-{}", file_name(scene))
-}
-
-/// Name of the figure of `study`.
-pub(super) fn step_figure_name(study: &StepStudy) -> String {
-    format!("steps-{}-{}", file_name(&study.scene), study.quantity.name().replace('_', "-"))
+/// What sets the figure of `study` apart from others of its kind.
+pub(super) fn step_figure_of(study: &StepStudy) -> String {
+    format!("{}-{}", study.scene, study.quantity.name())
 }
 
 fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
@@ -77,34 +70,8 @@ fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
     methods.dedup();
     let groups = groups(&methods);
     let panels = COSTS.iter().flat_map(|cost| groups.iter().map(|group| panel(&runs, group, cost))).collect();
-    let mut table = Table::new("method,setting,state,error,quantity,time_us,low_us,high_us,evaluations");
-    for run in &runs {
-        let time = |of: fn(&Timing) -> f64| or_empty(run.time.as_ref().map(|t| 1e-3 * of(t)));
-        table.push([
-            &run.method,
-            &run.setting,
-            &run.state.name(),
-            &or_empty(run.error),
-            &run.quantity.map_or("", Quantity::name),
-            &time(|t| t.median_ns),
-            &time(|t| t.low_ns),
-            &time(|t| t.high_ns),
-            &or_empty(run.force_evaluations),
-        ]);
-    }
     let failed = runs.iter().filter(|run| run.state != RunState::Right).count();
-    Figure::new(
-        cost_figure_name(scene),
-        Section::Cost,
-        format!("{}: error against time and against force evaluations", one_line(scene)),
-        format!(
-            "Each point is a method at one setting; to the left is cheaper, below is more accurate. An error of zero \
-             stands at 10⁻¹⁷; at the top, hollow, what is wrong or undecided: {}. ",
-            count(failed, "run")
-        ),
-        panels,
-        table,
-    )
+    Figure::new("cost", scene, &[], &[&one_line(scene), &count(failed, "run")], panels)
 }
 
 /// Methods that share a panel: those of the program itself, those of diffsol, other programs.
@@ -128,17 +95,17 @@ fn groups<'a>(methods: &[&'a str]) -> Vec<(&'static str, Vec<&'a str>)> {
 fn panel(runs: &[&Run], (title, methods): &(&str, Vec<&str>), cost: &Cost) -> Panel {
     // The same range in all panels of a unit, whatever methods they show.
     let costs = Axis::log(cost.title, cost.unit).including(runs.iter().filter_map(|run| (cost.of)(run)));
-    let errors = Axis::log("relative error", "").over([LEAST / 2.0, 3.0 * FAILED_AT]);
+    let errors = Axis::log("relative error", "").from(LEAST).over([LEAST / 2.0, 3.0 * FAILED_AT]);
     let mut panel = Panel::new(format!("{title}, {}", cost.words), costs, errors);
     for (series, method) in methods.iter().enumerate() {
         let points = |is_right: bool| {
             let mine =
                 runs.iter().filter(move |run| run.method == *method && (run.state == RunState::Right) == is_right);
-            let error = move |run: &Run| if is_right { run.error.unwrap_or(LEAST).max(LEAST) } else { FAILED_AT };
+            let error = move |run: &Run| if is_right { run.error.unwrap_or(0.0) } else { FAILED_AT };
             mine.filter_map(move |run| Some(((cost.of)(run)?, error(run)))).collect::<Vec<Point>>()
         };
-        panel = panel.series(one_line(method), Style::marked_line(series), points(true)).series(
-            "",
+        panel = panel.series(one_line(method), Style::marked_line(series), points(true)).unlisted(
+            format!("{method}, not right"),
             Style::marks(series).hollow(),
             points(false),
         );
@@ -147,45 +114,23 @@ fn panel(runs: &[&Run], (title, methods): &(&str, Vec<&str>), cost: &Cost) -> Pa
 }
 
 fn step_size(study: &StepStudy) -> Option<Figure> {
-    let mut table = Table::new("method,size,error,time_us");
-    for curve in &study.curves {
-        for point in &curve.points {
-            let time = or_empty(point.time_ns.map(|ns| 1e-3 * ns));
-            table.push([&curve.method, &point.size, &or_empty(point.error), &time]);
-        }
-    }
     let panel = |velocity| {
-        let axes = (Axis::log("time step", "s"), Axis::log("relative error", ""));
-        let panel = Panel::new(format!("{velocity} velocity"), axes.0, axes.1);
-        BOUNDARIES.into_iter().enumerate().fold(panel, |panel, (index, boundaries)| {
+        let errors = Axis::log("relative error", "").from(LEAST);
+        let panel = Panel::new(format!("{velocity} velocity"), Axis::log("time step", "s"), errors);
+        Boundaries::ALL.into_iter().enumerate().fold(panel, |panel, (index, boundaries)| {
             let name = variant_name(velocity, boundaries);
             let curves = study.curves.iter().filter(|curve| !curve.adaptive && curve.method == name);
             let points = curves.flat_map(|curve| &curve.points);
-            let points = points.filter_map(|point| Some((point.size, point.error?.max(LEAST))));
+            let points = points.filter_map(|point| Some((point.size, point.error?)));
             panel.series(boundaries.to_string(), Style::marks(index).radius(2.0), points)
         })
     };
-    let message =
-        format!("{}: error of the {} against the time step", one_line(&study.scene), words_for(study.quantity));
-    let figure = Figure::new(
-        step_figure_name(study),
-        Section::Cost,
-        message,
-        "The nine variants of the paper's scheme, from one step for the whole path downwards. Points that jump belong to \
-         boundaries seen at step ends: one of them may be small by luck. ",
-        VELOCITIES.map(panel).into(),
-        table,
-    )?;
-    Some(figure.sharing_axes())
+    let of = step_figure_of(study);
+    let values = [&one_line(&study.scene) as &dyn Display, &words_for(study.quantity)];
+    Some(Figure::new("steps", &of, &[], &values, VelocityAt::ALL.map(panel).into())?.sharing_axes())
 }
 
 fn growth(growth: &[Growth]) -> Option<Figure> {
-    let mut table = Table::new("scenes,threads,source,seconds,ns_a_scene,peak_bytes");
-    for g in growth {
-        let peak = g.peak_bytes.map_or_else(String::new, |bytes| bytes.to_string());
-        let source = format!("{:?}", g.source).to_lowercase();
-        table.push([&g.scenes, &g.threads, &source, &g.seconds, &g.ns_a_scene, &peak]);
-    }
     let mut by_threads = grouped(growth, |g| g.threads);
     by_threads.sort_unstable_by_key(|(threads, _)| *threads);
     let panel = |title, y: Axis, of: fn(&Growth) -> Option<f64>| {
@@ -197,21 +142,9 @@ fn growth(growth: &[Growth]) -> Option<Figure> {
     };
     let time = Axis::log("time for each scene", "µs");
     let memory = Axis::linear("peak memory", "MB").including([0.0]);
-    Figure::new(
-        "growth",
-        Section::Cost,
-        "Cost of a batch as work grows",
-        "Time of the whole process over the number of scenes, and its peak memory. From files to a million scenes, beyond \
-         from the generator. ",
-        vec![
-            panel("time", time, |g| Some(1e-3 * g.ns_a_scene)),
-            panel("memory", memory, |g| g.peak_bytes.map(|bytes| 1e-6 * bytes as f64)),
-        ],
-        table,
-    )
-}
-
-/// A name of a file from the name of a scene: letters, digits and hyphens.
-fn file_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
+    let panels = vec![
+        panel("time", time, |g| Some(1e-3 * g.ns_a_scene)),
+        panel("memory", memory, |g| g.peak_bytes.map(|bytes| 1e-6 * bytes as f64)),
+    ];
+    Figure::new("growth", "", &[], &[], panels)
 }

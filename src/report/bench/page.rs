@@ -2,10 +2,10 @@
 
 use maud::{Markup, html};
 
-use super::figures::{cost_figure_name, step_figure_name};
+use super::figures::step_figure_of;
 use super::{BenchJson, CaseJson};
 use crate::report::Environment;
-use crate::report::figure::Figure;
+use crate::report::figure::{Figure, name_of};
 use crate::report::figures::words_for;
 use crate::report::page::{Page, Table, cell, figure, folded, number_cell, reproduction};
 use crate::report::text::{count, number, one_line};
@@ -17,7 +17,7 @@ use crate::studies::bench::work_precision::{LEVELS, Run, RunState};
 pub(super) fn to_html(report: &BenchJson, figures: &[Figure]) -> String {
     let e = &report.environment;
     Page {
-        title: "What an accuracy costs",
+        title: "What an accuracy costs".into(),
         outcome: "penetrode bench",
         purpose: &format!("On {}, profile {}.", one_line(&e.cpu), e.profile),
         environment: e,
@@ -41,8 +41,9 @@ fn profile(e: &Environment) -> Markup {
     } }
 }
 
-fn figure_named(figures: &[Figure], name: &str) -> Markup {
-    html! { @for shown in figures.iter().filter(|shown| shown.name == name) { (figure(shown, 0)) } }
+fn figure_named(figures: &[Figure], kind: &str, of: &str) -> Markup {
+    let name = name_of(kind, of);
+    html! { @for shown in figures.iter().filter(|shown| shown.name == name) { (figure(shown, "")) } }
 }
 
 /// Whole microseconds where they are many, else three digits.
@@ -64,7 +65,7 @@ fn fastest(report: &BenchJson, case: &CaseJson, figures: &[Figure]) -> Markup {
                 to round-off." }
         }
         (table)
-        (figure_named(figures, &cost_figure_name(&case.name)))
+        (figure_named(figures, "cost", &case.name))
         (all_runs(report, &case.name))
     }
 }
@@ -132,7 +133,7 @@ fn step_size(study: &StepStudy, figures: &[Figure]) -> Markup {
         .rows(&study.curves, |curve| {
             [cell(&curve.method)].into_iter().chain(curve.held.iter().map(|held| held_cell(curve, held)))
         });
-    html! { h3 { (title) } (table) (figure_named(figures, &step_figure_name(study))) }
+    html! { h3 { (title) } (table) (figure_named(figures, "steps", &step_figure_of(study))) }
 }
 
 fn held_cell(curve: &Curve, held: &Held) -> Markup {
@@ -157,5 +158,5 @@ fn growth(report: &BenchJson, figures: &[Figure]) -> Markup {
             number_cell(g.peak_bytes.map(|bytes| 1e-6 * bytes as f64), 3),
         ]
     });
-    html! { (table) (figure_named(figures, "growth")) }
+    html! { (table) (figure_named(figures, "growth", "")) }
 }
