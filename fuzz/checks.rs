@@ -5,9 +5,10 @@ use dashu_int::{IBig, Sign};
 use penetrode::exchange::tables::{CsvTable, Rows};
 use penetrode::integrators::locate::{COEFFICIENTS_MAX, first_root};
 use penetrode::physics::{Advice, Scene};
-use penetrode::studies::audit::{Expectation, Table, Verdict, audit as judge};
+use penetrode::studies::Verdict;
+use penetrode::studies::audit::{Expectation, Table, audit as judge};
 use penetrode::studies::batch::{SCENES, Scenes};
-use penetrode::studies::order::{Class, OrderVerdict, StepError, fit};
+use penetrode::studies::order::{Class, StepError, fit};
 
 /// What is run on any bytes, and panics where a promise is broken.
 type Check = fn(&[u8]);
@@ -134,7 +135,7 @@ pub fn order(data: &[u8]) {
                 assert!(line.order.is_finite() && line.interval95[0] <= line.interval95[1], "{line:?}");
             }
             for formal in [1.0, 2.0] {
-                if fit.verdict(formal) == OrderVerdict::Pass {
+                if fit.verdict(formal) == Verdict::Passed {
                     assert!(fit.class == Class::Converging && fit.line.is_some(), "{fit:?}");
                 }
             }

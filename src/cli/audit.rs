@@ -4,18 +4,20 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::output::{escape_terminal, is_standard, print_json, print_text, significant, table, table_lines, wrapped};
-use super::{CliError, Exit, problem_of, read_scene};
+use super::output::{Text, escape_terminal, interval_text, is_standard, significant};
+use super::{Answer, Ask, CliError, problem_of, read_scene};
 use crate::exchange::tables::{name_of, read_bytes};
 use crate::physics::Problem;
-use crate::studies::audit::{Audit, ExactValues, Expectation, RESULTS, Table, Verdict, audit};
+use crate::studies::audit::{Audit, ExactValues, Expectation, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::convergence::Yardstick;
 use crate::studies::critical_velocity;
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::quantity::Quantity;
+use crate::text::or_dash;
 
 /// Arguments of `audit`.
 #[derive(Args, Debug)]
+#[command(after_help = "Example: penetrode audit results.csv --scene slab.toml --order 2")]
 pub struct AuditArgs {
     /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
     /// critical_velocity_m_s; - for standard input.
@@ -26,17 +28,12 @@ pub struct AuditArgs {
     /// Formal order of the code; without it any order above zero converges.
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub order: Option<f64>,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
 }
 
-impl AuditArgs {
-    /// Judges the table and prints the judgement.
-    ///
-    /// # Errors
-    /// A table or a scene that cannot be used (exit 2).
-    pub fn run(&self) -> Result<Exit, CliError> {
+impl Ask for AuditArgs {
+    type Answer = Audit;
+
+    fn ask(&self) -> Result<Answer<Audit>, CliError> {
         if is_standard(&self.results) && self.scene.as_deref() == Some("-") {
             return Err(CliError::usage(
                 "the results and the scene cannot both come from standard input",
@@ -44,16 +41,10 @@ impl AuditArgs {
             ));
         }
         let file = name_of(&self.results);
-        let bytes = read_bytes(&self.results, &RESULTS)?;
-        let results = Table::read(&file, &bytes)?;
+        let results = Table::read(&file, &read_bytes(&self.results, &RESULTS)?)?;
         let exact = self.scene.as_deref().map(exact_values).transpose()?;
         let judged = audit(&results, &Expectation { order: self.order, exact })?;
-        if self.json { print_json(&judged) } else { print_text(&text(&file, &judged)) }.map_err(CliError::stdout)?;
-        Ok(match judged.verdict {
-            Verdict::Passed => Exit::Success,
-            Verdict::Failed => Exit::Criterion,
-            Verdict::Undecided => Exit::Undecided,
-        })
+        Ok(Answer { text: text(&file, &judged), exit: judged.verdict.into(), data: Some(judged) })
     }
 }
 
@@ -71,41 +62,35 @@ fn exact_values(path: &str) -> Result<ExactValues, CliError> {
 }
 
 fn text(file: &str, judged: &Audit) -> String {
-    let mut lines = vec![escape_terminal(file), String::new()];
-    let mut rows = table(&["quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"]);
-    let verdict = |verdict: Verdict| match verdict {
-        Verdict::Passed => "passed",
-        Verdict::Undecided => "undecided",
-        Verdict::Failed => "failed",
-    };
-    for q in &judged.quantities {
-        let band = q.error_bands.first();
-        rows.add_row([
+    let mut text = Text::titled(Some(file));
+    text.gap();
+    let header = ["quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"];
+    let row = |q: &QuantityAudit| {
+        [
             q.quantity.name().to_owned(),
-            q.observed_order.map_or("-".to_owned(), |p| format!("{p:.2}")),
-            q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}")),
-            q.limit.map_or("-".to_owned(), significant),
-            band.map_or("-".to_owned(), |b| format!("{:.1e}", b.half_width)),
+            or_dash(q.observed_order, |order| format!("{order:.2}")),
+            interval_text(q.interval),
+            or_dash(q.limit, significant),
+            or_dash(q.error_bands.first().map(|band| band.half_width), |half| format!("{half:.1e}")),
             q.class.name().to_owned(),
-            verdict(q.verdict).to_owned(),
-        ]);
-    }
-    lines.extend(table_lines(&rows));
-    lines.push(String::new());
+            q.verdict.name().to_owned(),
+        ]
+    };
+    text.table(&header, judged.quantities.iter().map(row));
+    text.gap();
     for q in &judged.quantities {
-        lines.push(wrapped("  ", &format!("{}: {}", q.quantity.name(), q.reason)));
+        text.wrapped("  ", &format!("{}: {}", q.quantity.name(), q.reason));
         for band in &q.error_bands {
-            lines.push(wrapped("    ", &format!("+- {:.2e} by {}", band.half_width, band.rule)));
+            text.wrapped("    ", &format!("+- {:.2e} by {}", band.half_width, band.rule));
         }
         if let (Some(exact), Some(agrees)) = (q.exact, q.agrees_with_exact) {
             let word = if agrees { "agrees with" } else { "misses" };
-            lines.push(format!("    the limit {word} the exact {}", significant(exact)));
+            text.line(format!("    the limit {word} the exact {}", significant(exact)));
         }
     }
     for finding in &judged.findings {
-        lines.push(wrapped("  note: ", &escape_terminal(&finding.message)));
+        text.wrapped("  note: ", &escape_terminal(&finding.message));
     }
-    lines.push(format!("  verdict    {}", verdict(judged.verdict)));
-    lines.push(String::new());
-    lines.join("\n")
+    text.line(format!("  verdict    {}", judged.verdict.name()));
+    text.finish()
 }

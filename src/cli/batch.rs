@@ -1,22 +1,19 @@
 //! `penetrode batch`: many scenes from a table, one line of results each, in bounded memory.
 
 use std::io::ErrorKind::BrokenPipe;
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use tempfile::NamedTempFile;
 
 use super::method_args::MethodArgs;
+use super::output::{Destination, check_format, check_outputs, is_parquet, is_standard, tell};
+use super::{CliError, Exit, Run};
 #[cfg(feature = "parquet")]
-use super::output::is_parquet;
-use super::output::{check_format, check_outputs, is_standard, persist, tell, temporary_beside, unless_closed};
-use super::{CliError, Exit};
-#[cfg(feature = "parquet")]
-use crate::exchange::tables::parquet::{ParquetReader, ParquetWriter};
-use crate::exchange::tables::{self, Cells, CsvTable, Rows};
+use crate::exchange::tables::parquet::ParquetReader;
+use crate::exchange::tables::{self, Block, CsvTable, Rows, TableWriter};
 use crate::integrators::Method;
 use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, answers};
 use crate::text::count;
@@ -29,6 +26,7 @@ const CHUNK: usize = 128 * PART;
 
 /// Arguments of `batch`.
 #[derive(Args, Debug)]
+#[command(after_help = "Example: penetrode batch scenes.csv --out results.csv --critical")]
 pub struct BatchArgs {
     /// Scenes: a .csv or .parquet table, - for standard input (CSV), or random:N or random:N:SEED for N random
     /// scenes.
@@ -47,12 +45,8 @@ pub struct BatchArgs {
     pub threads: Option<u16>,
 }
 
-impl BatchArgs {
-    /// Solves every row and writes the results in the same order.
-    ///
-    /// # Errors
-    /// A table or options that cannot be used (exit 2), results that cannot be written (exit 1).
-    pub fn run(&self) -> Result<Exit, CliError> {
+impl Run for BatchArgs {
+    fn run(&self) -> Result<Exit, CliError> {
         check_format(&self.scenes)?;
         check_format(&self.out)?;
         check_outputs(&[("the scenes", &self.scenes)], &[("the results", &self.out)])?;
@@ -65,7 +59,8 @@ impl BatchArgs {
         let mut source = Source::open(&self.scenes, &progress)?;
         // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
         let first = source.next_scenes(None)?;
-        let mut sink = Sink::create(&self.out).map_err(|cause| self.unwritable(cause))?;
+        let unwritable = |cause| CliError::write(&self.out, cause);
+        let mut sink = self.sink().map_err(unwritable)?;
         let tally = match pool.install(|| self.solve_all(first, &mut source, &mut sink, &method)) {
             // Whoever reads the results (`| head`) has enough.
             Err(CliError::Write { cause, .. }) if is_standard(&self.out) && cause.kind() == BrokenPipe => {
@@ -73,10 +68,21 @@ impl BatchArgs {
             }
             other => other?,
         };
-        sink.finish(&self.out).map_err(|cause| self.unwritable(cause))?;
+        let written = sink.finish().and_then(|output| Ok(output.into_inner()?));
+        written.and_then(|output| output.finish(&self.out)).map_err(unwritable)?;
         progress.finish_and_clear();
         tell("", &summary(&tally));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
+    }
+}
+
+/// Where the results go.
+type Sink = TableWriter<BufWriter<Destination>>;
+
+impl BatchArgs {
+    fn sink(&self) -> io::Result<Sink> {
+        let output = BufWriter::with_capacity(1 << 20, Destination::open(&self.out)?);
+        TableWriter::new(output, &RESULT_COLUMNS, is_parquet(&self.out))
     }
 
     /// Solves one chunk, `scenes` to begin with, while the one before is written and the next is read.
@@ -88,15 +94,16 @@ impl BatchArgs {
         method: &Method,
     ) -> Result<Tally, CliError> {
         keep_freed_memory();
-        let as_lines = sink.takes_lines();
+        let is_parquet = is_parquet(&self.out);
         let mut tally = Tally::default();
         let (mut results, mut used) = (Vec::new(), None);
         // Ends with the table: each turn but the last has scenes.
         while scenes.is_some() || !results.is_empty() {
             let (solved, moved) = rayon::join(
-                || scenes.as_ref().map(|scenes| solve(scenes, tally.rows + 1, method, self.critical, as_lines)),
+                || scenes.as_ref().map(|scenes| solve(scenes, tally.rows + 1, method, self.critical, is_parquet)),
                 || -> Result<_, CliError> {
-                    sink.write(results).map_err(|cause| self.unwritable(cause))?;
+                    let written = results.into_iter().try_for_each(|block| sink.push(block));
+                    written.map_err(|cause| CliError::write(&self.out, cause))?;
                     // After the last row nothing is left to read.
                     if scenes.is_some() { source.next_scenes(used.take()) } else { Ok(None) }
                 },
@@ -107,10 +114,6 @@ impl BatchArgs {
             used = std::mem::replace(&mut scenes, moved?);
         }
         Ok(tally)
-    }
-
-    fn unwritable(&self, cause: io::Error) -> CliError {
-        if is_standard(&self.out) { CliError::stdout(cause) } else { CliError::write(&self.out, cause) }
     }
 }
 
@@ -131,39 +134,26 @@ fn summary(tally: &Tally) -> String {
     text
 }
 
-/// Results of some rows.
-enum Results {
-    Lines(String),
-    #[cfg_attr(not(feature = "parquet"), expect(dead_code, reason = "only a Parquet table takes columns"))]
-    Columns(Vec<Cells>),
-}
-
 /// Results of a chunk, part by part; `first` is the number of its first row.
-fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, as_lines: bool) -> (Tally, Vec<Results>) {
+fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parquet: bool) -> (Tally, Vec<Block>) {
     let total = scenes.len();
-    let parts: Vec<(Tally, Results)> = (0..total.div_ceil(PART))
+    let parts: Vec<(Tally, Block)> = (0..total.div_ceil(PART))
         .into_par_iter()
         // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
         .with_max_len(1)
         .map(|index| {
             let from = index * PART;
             let answers = answers(scenes.scenes(from..total.min(from + PART)), method, critical);
-            let first = first + from as u64;
-            let results = if as_lines {
-                Results::Lines(scenes.result_lines(from, first, &answers))
-            } else {
-                Results::Columns(scenes.result_columns(from, first, &answers))
-            };
-            (Tally::of(&answers), results)
+            (Tally::of(&answers), scenes.results(from, first + from as u64, &answers, is_parquet))
         })
         .collect();
     let mut tally = Tally::default();
-    let mut all = Vec::with_capacity(parts.len());
-    for (counted, results) in parts {
+    let blocks = parts.into_iter().map(|(counted, block)| {
         tally += counted;
-        all.push(results);
-    }
-    (tally, all)
+        block
+    });
+    let blocks = blocks.collect();
+    (tally, blocks)
 }
 
 /// Where the scenes come from.
@@ -242,55 +232,6 @@ fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
             format!("random:{text}: not a number of scenes above zero and a seed"),
             "write random:1000000:7 for a million scenes of seed 7",
         )),
-    }
-}
-
-/// Where the results go.
-enum Sink {
-    File(BufWriter<NamedTempFile>),
-    Standard(BufWriter<io::Stdout>),
-    #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetWriter<NamedTempFile>>),
-}
-
-impl Sink {
-    fn create(path: &Path) -> io::Result<Self> {
-        #[cfg(feature = "parquet")]
-        if is_parquet(path) {
-            let table = ParquetWriter::new(temporary_beside(path)?, &RESULT_COLUMNS)?;
-            return Ok(Self::Parquet(Box::new(table)));
-        }
-        let mut sink = if is_standard(path) {
-            Self::Standard(BufWriter::with_capacity(1 << 20, io::stdout()))
-        } else {
-            Self::File(BufWriter::with_capacity(1 << 20, temporary_beside(path)?))
-        };
-        sink.write(vec![Results::Lines(RESULT_COLUMNS.map(|(name, _)| name).join(",") + "\n")])?;
-        Ok(sink)
-    }
-
-    /// True if it takes lines of CSV.
-    fn takes_lines(&self) -> bool {
-        matches!(self, Self::File(_) | Self::Standard(_))
-    }
-
-    fn write(&mut self, results: Vec<Results>) -> io::Result<()> {
-        results.into_iter().try_for_each(|part| match (&mut *self, part) {
-            (Self::File(writer), Results::Lines(lines)) => writer.write_all(lines.as_bytes()),
-            (Self::Standard(writer), Results::Lines(lines)) => writer.write_all(lines.as_bytes()),
-            #[cfg(feature = "parquet")]
-            (Self::Parquet(table), Results::Columns(columns)) => table.push(columns),
-            _ => unreachable!("`takes_lines` chose the form of the results"),
-        })
-    }
-
-    fn finish(self, path: &Path) -> io::Result<()> {
-        match self {
-            Self::File(writer) => persist(writer.into_inner().map_err(io::IntoInnerError::into_error)?, path),
-            Self::Standard(mut writer) => unless_closed(writer.flush()),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(table) => persist(table.finish()?, path),
-        }
     }
 }
 

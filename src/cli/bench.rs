@@ -3,22 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
-use super::output::escape_terminal;
-use super::output::{print_json, print_text, table, table_lines, tell_line};
-use super::verify::{not_started, quoted};
-use super::{CliError, Exit, read_scene};
-use crate::exchange::peers::{Environment as PeerEnvironment, Peer, PeerStartError};
+use super::output::{Text, error_text, escape_terminal, progress, tell_line, wrapped};
+use super::verify::{quoted, report_line};
+use super::{Answer, Ask, CliError, Exit, read_scene};
+use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
 use crate::exchange::scene_file::SHIPPED;
 use crate::physics::Scene;
 use crate::report::bench::{BenchJson, CaseJson, files};
-use crate::report::text::{number, prefixed, wrapped};
 use crate::report::{Environment, folder};
 use crate::studies::bench::growth::{self, Growth};
-use crate::studies::bench::step_size::{self, Held, LEVELS as STEP_LEVELS, StepStudy};
+use crate::studies::bench::step_size::{self, Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
 use crate::studies::bench::work_precision::{self, Case, Contender, LEVELS, Run, RunState, fastest};
 use crate::studies::bench::{Effort, peers};
+use crate::text::{number, or_dash, prefixed};
 
 /// Scenes that are measured where none is given: those of the comparison with other solvers, and the stiff one.
 const DEFAULT_SCENES: [&str; 5] = ["crater", "tunnel", "perforate", "graze", "stiff"];
@@ -26,20 +25,9 @@ const DEFAULT_SCENES: [&str; 5] = ["crater", "tunnel", "perforate", "graze", "st
 /// Varied scenes where no scene is given.
 const VARIED: usize = 1000;
 
-/// Width of a line for people.
-const WIDTH: usize = 80;
-
 /// Arguments of `bench`.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Errors are the largest of all quantities over max(1, condition number), against 50 digits; wrong \
-    outcomes and failures are shown and count at no accuracy. Times are medians after warming, and belong to this \
-    machine: pin the program (taskset -c 0) and keep the machine idle.\n\n\
-    --out writes a report folder of its own and adds nothing to that of verify: the numbers of verify are the same in \
-    every run, and no claim rests on a time.\n\n\
-    The part scaling runs `penetrode batch` with 1 and 2 threads on 1, 10, 100 ... scenes, so leave the program unpinned \
-    for it; its tables take some 300 MB in the folder for temporary files."
-)]
+#[command(after_help = include_str!("help/bench.txt"))]
 pub struct BenchArgs {
     /// Scene files [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
     pub scenes: Vec<String>,
@@ -68,9 +56,6 @@ pub struct BenchArgs {
     /// Folder of a report with tables and figures.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// A part of the bench.
@@ -84,13 +69,10 @@ pub enum Part {
     Scaling,
 }
 
-impl BenchArgs {
-    /// Measures, writes the report and prints the tables.
-    ///
-    /// # Errors
-    /// A scene or a folder that cannot be used (exit 2), a scene without an answer or a report that cannot be written
-    /// (exit 1), a peer that cannot be started (exit 5).
-    pub fn run(&self) -> Result<Exit, CliError> {
+impl Ask for BenchArgs {
+    type Answer = BenchJson;
+
+    fn ask(&self) -> Result<Answer<BenchJson>, CliError> {
         if let Some(folder) = &self.out {
             folder::check(folder)?;
         }
@@ -100,10 +82,11 @@ impl BenchArgs {
         if let Some(folder) = &self.out {
             folder::write(files(&report), folder)?;
         }
-        if self.json { print_json(&report) } else { print_text(&self.text(&report)) }.map_err(CliError::stdout)?;
-        Ok(Exit::Success)
+        Ok(Answer { text: self.text(&report), data: Some(report), exit: Exit::Success })
     }
+}
 
+impl BenchArgs {
     fn has(&self, part: Part) -> bool {
         self.parts.contains(&part)
     }
@@ -147,14 +130,13 @@ impl BenchArgs {
         let mut peers = Vec::new();
         if self.peers {
             for (name, bundled, options) in peers::BUNDLED {
-                let environment = PeerEnvironment::ensure(bundled, &mut |line| tell_line(line))
-                    .map_err(|error| CliError::peer_missing(error.to_string()))?;
+                let environment = PeerEnvironment::ensure(bundled, &mut |line| tell_line(line))?;
                 let command = format!("{} {options}", environment.command(bundled));
-                peers.push((name.to_owned(), start(&command)?));
+                peers.push((name.to_owned(), Peer::start(&command)?));
             }
         }
         for command in &self.peer {
-            let peer = start(command)?;
+            let peer = Peer::start(command)?;
             let name = escape_terminal(&peer.identity().name);
             let taken = peers.iter().filter(|(known, _): &&(String, Peer)| known.starts_with(&name)).count();
             peers.push((if taken == 0 { name } else { format!("{name} {}", taken + 1) }, peer));
@@ -167,10 +149,7 @@ impl BenchArgs {
 
     fn measure(&self, scenes: &[(String, Scene)], peers: &mut [(String, Peer)]) -> Result<BenchJson, CliError> {
         let effort = Effort { samples: usize::from(self.repeats) };
-        let progress = ProgressBar::new(0);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}, {eta} left {msg}") {
-            progress.set_style(style);
-        }
+        let progress = progress(0, "{bar:30} {pos}/{len}, {eta} left {msg}");
         let mut cases = Vec::new();
         if self.has(Part::WorkPrecision) {
             progress.set_message("exact answers");
@@ -249,72 +228,49 @@ impl BenchArgs {
     }
 
     fn text(&self, report: &BenchJson) -> String {
-        let mut parts = Vec::new();
+        let mut text = Text::default();
         if report.environment.profile != "release" {
-            parts.push(vec![format!("built with profile {}: times mean little", report.environment.profile)]);
+            text.part(format!("built with profile {}: times mean little", report.environment.profile));
         }
         if !report.runs.is_empty() {
-            parts.push(vec!["Fastest median time of a flight in µs within an error, and the setting".to_owned()]);
-            parts.extend(report.scenes.iter().map(|case| case_lines(report, case)));
+            text.part("Fastest median time of a flight in µs within an error, and the setting");
+            report.scenes.iter().for_each(|case| add_case(&mut text, report, case));
         }
         if !report.step_size.is_empty() {
-            let title = "Largest step that holds an error: step [s] or tolerance, steps, time [s]";
-            let rules = "  boundaries: end = step-end, int. = interpolated, land = landed";
-            parts.push(vec![title.to_owned(), rules.to_owned()]);
-            parts.extend(report.step_size.iter().map(study_lines));
+            text.part("Largest step that holds an error: step [s] or tolerance, steps, time [s]");
+            text.line("  boundaries: end = step-end, int. = interpolated, land = landed");
+            report.step_size.iter().for_each(|study| add_study(&mut text, study));
         }
         if !report.growth.is_empty() {
-            parts.push(growth_lines(&report.growth));
+            add_growth(&mut text, &report.growth);
         }
         if let Some(folder) = &self.out {
-            parts.push(vec![format!("report: {}", folder.join("report.html").display())]);
+            text.part(report_line(folder));
         }
-        let mut text = parts.iter().map(|lines| lines.join("\n")).collect::<Vec<_>>().join("\n\n");
-        text.push('\n');
-        text
+        text.finish()
     }
 }
 
-/// A running peer, or the exit code that its absence has.
-fn start(command: &str) -> Result<Peer, CliError> {
-    Peer::start(command).map_err(|error| match error {
-        PeerStartError::Greeting(failure) => {
-            CliError::failed(failure.to_string(), "see the peer protocol: verification/peers/README.md")
-        }
-        error => not_started(&error),
-    })
-}
-
-fn case_lines(report: &BenchJson, case: &CaseJson) -> Vec<String> {
+fn add_case(text: &mut Text, report: &BenchJson, case: &CaseJson) {
     let title = case.title.as_deref().map_or(String::new(), |title| format!(": {title}"));
-    let mut lines = wrapped(&escape_terminal(&format!("{}{title}", case.name)), WIDTH);
+    text.part(wrapped("", &escape_terminal(&format!("{}{title}", case.name))));
     if case.exact < case.problems {
-        lines.push("  no closed form: errors against a Taylor series to round-off".to_owned());
+        text.line("  no closed form: errors against a Taylor series to round-off");
     }
-    let mut rows = table(&["method", "1e-3", "1e-6", "1e-9", "1e-12", "least"]);
-    let mut notes = Vec::new();
-    for runs in report.runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method) {
-        if runs[0].scene != case.name {
-            continue;
-        }
-        let mut cells = vec![clipped(&runs[0].method, 16)];
-        for level in LEVELS {
-            let best = report
-                .fastest
-                .iter()
-                .find(|f| f.scene == case.name && f.method == runs[0].method && f.level == level)
-                .and_then(|f| f.time_ns.zip(f.setting.as_ref()));
-            cells.push(best.map_or("-".to_owned(), |(ns, setting)| format!("{} {setting}", micro(ns))));
-        }
+    let methods = report.runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method);
+    let methods: Vec<_> = methods.filter(|runs| runs[0].scene == case.name).collect();
+    let row = |runs: &&[Run]| {
+        let fastest = LEVELS.map(|level| {
+            let mut found = report.fastest.iter().filter(|f| f.scene == case.name && f.method == runs[0].method);
+            let best = found.find(|f| f.level == level).and_then(|f| f.time_ns.zip(f.setting.as_ref()));
+            best.map_or("-".to_owned(), |(ns, setting)| format!("{} {setting}", micro(ns)))
+        });
         let right = runs.iter().filter(|run| run.state == RunState::Right);
-        let least = right.filter_map(|run| run.error).min_by(f64::total_cmp);
-        cells.push(super::output::error_text(least));
-        rows.add_row(cells);
-        notes.extend(notes_of(runs));
-    }
-    lines.extend(table_lines(&rows));
-    lines.extend(notes);
-    lines
+        let least = error_text(right.filter_map(|run| run.error).min_by(f64::total_cmp));
+        [clipped(&runs[0].method, 16)].into_iter().chain(fastest).chain([least]).collect::<Vec<_>>()
+    };
+    text.table(&["method", "1e-3", "1e-6", "1e-9", "1e-12", "least"], methods.iter().map(row));
+    methods.iter().for_each(|runs| text.lines(notes_of(runs)));
 }
 
 /// What was not right, one paragraph for each reason of a method.
@@ -338,22 +294,21 @@ fn notes_of(runs: &[Run]) -> Vec<String> {
             settings.collect::<Vec<_>>().join(", ")
         };
         let text = format!("{}: {} at {settings}: {reason}", state.name(), members[0].method);
-        let indent = |(index, line)| format!("{}{line}", if index == 0 { "  " } else { "    " });
-        wrapped(&escape_terminal(&text), WIDTH - 4).into_iter().enumerate().map(indent).collect::<Vec<_>>()
+        // Further lines are indented by four.
+        wrapped("    ", &escape_terminal(&text)).replacen("    ", "  ", 1)
     };
-    groups.into_iter().flat_map(paragraph).collect()
+    groups.into_iter().map(paragraph).collect()
 }
 
 fn flights_of(run: &Run) -> usize {
     run.right + run.undecided + run.failed
 }
 
-fn study_lines(study: &StepStudy) -> Vec<String> {
-    let mut lines = vec![format!("{}: {}", clipped(&study.scene, 40), study.quantity)];
-    let mut header = vec!["method".to_owned()];
-    header.extend(STEP_LEVELS.iter().map(|level| format!("{} %", 100.0 * level)));
-    let mut rows = table(&header.iter().map(String::as_str).collect::<Vec<_>>());
-    for curve in &study.curves {
+fn add_study(text: &mut Text, study: &StepStudy) {
+    text.part(format!("{}: {}", clipped(&study.scene, 40), study.quantity));
+    let levels = STEP_LEVELS.map(|level| format!("{} %", 100.0 * level));
+    let header: Vec<_> = ["method"].into_iter().chain(levels.iter().map(String::as_str)).collect();
+    let row = |curve: &Curve| {
         let cell = |held: &Held| match (held.size, held.steps, held.time) {
             (Some(size), Some(steps), Some(time)) => {
                 let size = if curve.adaptive { format!("{size:.0e}") } else { compact(size) };
@@ -361,12 +316,9 @@ fn study_lines(study: &StepStudy) -> Vec<String> {
             }
             _ => "none".to_owned(),
         };
-        let mut cells = vec![short_variant(&curve.method)];
-        cells.extend(curve.held.iter().map(cell));
-        rows.add_row(cells);
-    }
-    lines.extend(table_lines(&rows));
-    lines
+        [short_variant(&curve.method)].into_iter().chain(curve.held.iter().map(cell)).collect::<Vec<_>>()
+    };
+    text.table(&header, study.curves.iter().map(row));
 }
 
 /// `predicted/int.`: names of variants are shortened to leave room for the numbers.
@@ -374,21 +326,22 @@ fn short_variant(name: &str) -> String {
     name.replace("interpolated", "int.").replace("step-end", "end").replace("landed", "land")
 }
 
-fn growth_lines(growths: &[Growth]) -> Vec<String> {
-    let mut rows = table(&["scenes", "source", "threads", "time [s]", "a scene [µs]", "peak memory [MB]"]);
-    for g in growths {
-        rows.add_row([
+fn add_growth(text: &mut Text, growths: &[Growth]) {
+    text.part("Cost of a batch as work grows");
+    let row = |g: &Growth| {
+        [
             g.scenes.to_string(),
             format!("{:?}", g.source).to_lowercase(),
             g.threads.to_string(),
             number(g.seconds, 3),
             micro(g.ns_a_scene),
-            g.peak_bytes.map_or("-".to_owned(), |bytes| number(1e-6 * bytes as f64, 3)),
-        ]);
-    }
-    let mut lines = vec!["Cost of a batch as work grows".to_owned()];
-    lines.extend(table_lines(&rows));
-    lines
+            or_dash(g.peak_bytes.map(|bytes| 1e-6 * bytes as f64), |megabytes| number(megabytes, 3)),
+        ]
+    };
+    text.table(
+        &["scenes", "source", "threads", "time [s]", "a scene [µs]", "peak memory [MB]"],
+        growths.iter().map(row),
+    );
 }
 
 /// A time in µs: three digits, two below one, and thousands as `17k`, so that a slow machine widens no table.

@@ -5,16 +5,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, time_option};
-use super::output::{escape_terminal, table, table_lines, wrapped};
-use super::{Answer, Ask, CliError, Exit, problem_of, read_scene};
+use super::output::{Text, interval_text};
+use super::{Answer, Ask, CliError, problem_of, read_scene};
 use crate::integrators::{CentralDifference, Method, MethodName, Steps};
 use crate::physics::Shown;
-use crate::studies::Quantity;
 use crate::studies::convergence::{
     Ladder, POINTS_DEFAULT, QuantityStudy, STEPS_OVER_TIME, TOLERANCES, of_fixed_steps, of_tolerances,
 };
 use crate::studies::error::Truth;
-use crate::studies::order::{Class, Exclusion, FittedPoint, OrderVerdict};
+use crate::studies::order::{Class, Exclusion, FittedPoint};
+use crate::studies::{Quantity, Verdict};
 use crate::text::or_dash;
 
 /// Arguments of `converge`.
@@ -53,7 +53,7 @@ pub struct ConvergeJson {
     pub seed: u64,
     /// `closed-form`, or `taylor` where no closed form exists.
     pub reference: &'static str,
-    pub verdict: &'static str,
+    pub verdict: Verdict,
     pub quantities: Vec<QuantityJson>,
     /// What was not studied, and why.
     pub skipped: Vec<String>,
@@ -71,7 +71,7 @@ pub struct QuantityJson {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub work_order: Option<Option<f64>>,
     pub class: Class,
-    pub verdict: &'static str,
+    pub verdict: Verdict,
     /// Why this class, or why there is no fit.
     pub reason: String,
     /// Runs with another outcome than the exact one.
@@ -129,14 +129,8 @@ impl Ask for ConvergeArgs {
             _ => of_tolerances(&problem, &truth.flight, self.method, ladder)?,
         };
         // Failed if a quantity diverges or misses its formal order, else undecided if one is.
-        let any = |verdict| study.quantities.iter().any(|study| study.verdict() == verdict);
-        let (verdict, exit) = match () {
-            () if any(OrderVerdict::Fail) => (OrderVerdict::Fail, Exit::Criterion),
-            () if any(OrderVerdict::Undecided) || study.quantities.is_empty() => {
-                (OrderVerdict::Undecided, Exit::Undecided)
-            }
-            () => (OrderVerdict::Pass, Exit::Success),
-        };
+        let verdicts = study.quantities.iter().map(QuantityStudy::verdict);
+        let verdict = verdicts.max().unwrap_or(Verdict::Undecided);
         let without = |why| format!("{} does not apply: {why}", Quantity::CriticalVelocity);
         let data = ConvergeJson {
             schema: "penetrode/converge/1",
@@ -144,11 +138,11 @@ impl Ask for ConvergeArgs {
             method: MethodJson::new(self.method, &method.options()?, None, None),
             seed: self.seed,
             reference: if truth.is_closed_form { "closed-form" } else { "taylor" },
-            verdict: participle(verdict),
+            verdict: verdict,
             quantities: study.quantities.into_iter().map(|study| QuantityJson::new(study, fixed)).collect(),
             skipped: study.no_critical_velocity.map(without).into_iter().collect(),
         };
-        Ok(Answer { text: data.text(problem.impact_speed), data, exit })
+        Ok(Answer { text: data.text(problem.impact_speed), exit: verdict.into(), data: Some(data) })
     }
 }
 
@@ -170,17 +164,9 @@ impl ConvergeArgs {
     }
 }
 
-fn participle(verdict: OrderVerdict) -> &'static str {
-    match verdict {
-        OrderVerdict::Pass => "passed",
-        OrderVerdict::Fail => "failed",
-        OrderVerdict::Undecided => "undecided",
-    }
-}
-
 impl QuantityJson {
     fn new(study: QuantityStudy, fixed: bool) -> Self {
-        let verdict = participle(study.verdict());
+        let verdict = study.verdict();
         let work = study.work.and_then(Result::ok).and_then(|fit| fit.line);
         let (line, class, reason, points) = match study.fit {
             Ok(fit) => (fit.line, fit.class, fit.reason, fit.points),
@@ -212,30 +198,30 @@ impl QuantityJson {
 
 impl ConvergeJson {
     fn text(&self, impact_speed: f64) -> String {
-        let mut lines: Vec<_> = self.title.iter().map(|title| escape_terminal(title)).collect();
-        lines.push(format!("  method     {}{}", self.method.name, self.method.rules()));
-        lines.push(format!("  reference  {}, V0 = {} m/s", self.reference, Shown(impact_speed)));
-        lines.push(String::new());
-        let mut rows = table(&["quantity", "formal", "found", "95 % interval", "constant", "used", "class"]);
-        for q in &self.quantities {
+        let mut text = Text::titled(self.title.as_deref());
+        text.line(format!("  method     {}{}", self.method.name, self.method.rules()));
+        text.line(format!("  reference  {}, V0 = {} m/s", self.reference, Shown(impact_speed)));
+        text.gap();
+        let row = |q: &QuantityJson| {
             let order = |value| or_dash(value, |order| format!("{order:.2}"));
             let used = q.points.iter().filter(|p| p.used).count();
-            rows.add_row([
+            [
                 q.quantity.to_string(),
                 order(q.formal_order),
                 order(q.observed_order),
-                q.interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}")),
+                interval_text(q.interval),
                 or_dash(q.error_constant, |constant| format!("{constant:.1e}")),
                 format!("{used}/{}", q.points.len() + q.lost_runs),
                 q.class.name().to_owned(),
-            ]);
+            ]
+        };
+        let header = ["quantity", "formal", "found", "95 % interval", "constant", "used", "class"];
+        text.table(&header, self.quantities.iter().map(row));
+        for q in self.quantities.iter().filter(|q| q.verdict != Verdict::Passed) {
+            text.wrapped("  ", &format!("{}: {} ({})", q.quantity, q.verdict.name(), q.reason));
         }
-        lines.extend(table_lines(&rows));
-        for q in self.quantities.iter().filter(|q| q.verdict != "passed") {
-            lines.push(wrapped("  ", &format!("{}: {} ({})", q.quantity, q.verdict, q.reason)));
-        }
-        lines.extend(self.skipped.iter().map(|note| wrapped("  ", note)));
-        lines.push(format!("  verdict    {}\n", self.verdict));
-        lines.join("\n")
+        self.skipped.iter().for_each(|note| text.wrapped("  ", note));
+        text.line(format!("  verdict    {}", self.verdict.name()));
+        text.finish()
     }
 }

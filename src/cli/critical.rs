@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{engineering, error_text, escape_terminal, significant, table, table_lines, tell, wrapped};
+use super::output::{Text, engineering, error_text, significant, tell};
 use super::scene_json::SceneJson;
 use super::{Answer, Ask, CliError, Exit, read_scene};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
@@ -176,7 +176,7 @@ impl Ask for CriticalArgs {
             uncertainty,
             skipped: no_spread.into_iter().collect(),
         };
-        Ok(Answer { text: data.text(scene.criterion), data, exit: Exit::Success })
+        Ok(Answer { text: data.text(scene.criterion), data: Some(data), exit: Exit::Success })
     }
 }
 
@@ -207,66 +207,65 @@ impl CriticalJson {
             Criterion::FullDepth => "x = H",
             Criterion::Ndrc => "x = x_p(H), the NDRC relation",
         };
-        let mut lines: Vec<_> = self.scene.title.iter().map(|title| escape_terminal(title)).collect();
-        lines.push(format!("  method     {}, perforation at {criterion}", self.method.name));
+        let mut text = Text::titled(self.scene.title.as_deref());
+        text.line(format!("  method     {}, perforation at {criterion}", self.method.name));
         let bar = self.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {}", error_text(Some(bar))));
         let velocity = Shown(self.critical_velocity_m_s);
-        lines.push(format!("  V_c        {velocity}{bar} m/s, {} flights", self.evaluations));
-        lines.push(format!("  E_c        {}", engineering(self.critical_energy_j, "J")));
+        text.line(format!("  V_c        {velocity}{bar} m/s, {} flights", self.evaluations));
+        text.line(format!("  E_c        {}", engineering(self.critical_energy_j, "J")));
         if !self.note.is_empty() {
-            lines.push(wrapped("  note       ", self.note));
+            text.wrapped("  note       ", self.note);
         }
         if let Some(exact) = &self.closed_form {
             let error = error_text(self.relative_error);
-            lines.push(format!("  exact      {} m/s, relative error {error}", Shown(exact.critical_velocity_m_s)));
+            text.line(format!("  exact      {} m/s, relative error {error}", Shown(exact.critical_velocity_m_s)));
         }
-        lines.extend(self.skipped.iter().map(|note| wrapped("  note       ", note)));
-        lines.extend(self.uncertainty.iter().flat_map(UncertaintyJson::text));
+        self.skipped.iter().for_each(|note| text.wrapped("  note       ", note));
+        if let Some(uncertainty) = &self.uncertainty {
+            uncertainty.add_to(&mut text);
+        }
         if let Some((ours, eq15)) = self.dimensionless_energy.zip(self.eq15.as_ref()) {
-            lines.extend(eq15.text(ours));
+            eq15.add_to(&mut text, ours);
         }
-        lines.push(String::new());
-        lines.join("\n")
+        text.finish()
     }
 }
 
 impl UncertaintyJson {
-    fn text(&self) -> Vec<String> {
-        let mut lines = vec![format!("  spread     +- {:.4} m/s to first order", self.first_order_m_s)];
+    fn add_to(&self, text: &mut Text) {
+        text.line(format!("  spread     +- {:.4} m/s to first order", self.first_order_m_s));
         for SpreadJson { path, relative, share } in &self.spreads {
-            lines.push(format!("             {path} {} %: {:.1} % of the variance", 100.0 * relative, 100.0 * share));
+            text.line(format!("             {path} {} %: {:.1} % of the variance", 100.0 * relative, 100.0 * share));
         }
         let [low, median, high] = self.quantiles_m_s;
-        lines.push(format!("  sampled    mean {:.4}, deviation {:.4} m/s", self.mean_m_s, self.deviation_m_s));
-        lines.push(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
+        text.line(format!("  sampled    mean {:.4}, deviation {:.4} m/s", self.mean_m_s, self.deviation_m_s));
+        text.line(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
         let left_out = match self.inadmissible {
             0 => String::new(),
             count => format!(", {count} inadmissible left out"),
         };
-        lines.push(format!("             {} random scenes, seed {}{left_out}", self.samples, self.seed));
-        lines
+        text.line(format!("             {} random scenes, seed {}{left_out}", self.samples, self.seed));
     }
 }
 
 impl Eq15Json {
-    /// The formula beside `ours`, the simulated E_c/(d³ fc).
-    fn text(&self, ours: f64) -> Vec<String> {
-        let mut rows = table(&["E_c/(d³ fc)", "value", "simulation over it"]);
-        rows.add_row(["simulation".to_owned(), significant(ours), String::new()]);
-        for (name, value) in [("Eq. 15, printed", self.printed), ("Eq. 15, unrounded", self.unrounded)] {
+    /// Adds the formula beside `ours`, the simulated E_c/(d³ fc).
+    fn add_to(&self, text: &mut Text, ours: f64) {
+        let row = |(name, value): (&str, f64)| {
             // A target without thickness needs no energy by either.
             let over = match 100.0 * (ours / value - 1.0) {
                 percent if !percent.is_finite() => "-".to_owned(),
                 percent if percent.abs() < 1e6 => format!("{percent:+.1} %"),
                 percent => format!("{percent:+.1e} %"),
             };
-            rows.add_row([name.to_owned(), significant(value), over]);
-        }
-        let mut lines = vec![String::new()];
-        lines.extend(table_lines(&rows));
+            [name.to_owned(), significant(value), over]
+        };
+        let simulation = ["simulation".to_owned(), significant(ours), String::new()];
+        let formulas = [("Eq. 15, printed", self.printed), ("Eq. 15, unrounded", self.unrounded)].map(row);
+        text.gap();
+        text.table(&["E_c/(d³ fc)", "value", "simulation over it"], [simulation].into_iter().chain(formulas));
         if !self.valid {
-            lines.push(wrapped("  ", &format!("Eq. 15 does not apply: {}", self.note)));
+            text.wrapped("  ", &format!("Eq. 15 does not apply: {}", self.note));
         }
-        lines
     }
 }

@@ -96,6 +96,7 @@ pub enum CliError {
 impl<E: Advice> From<E> for CliError {
     fn from(error: E) -> Self {
         let exit = match () {
+            () if error.is_missing() => Exit::PeerMissing,
             () if error.is_undecided() => Exit::Undecided,
             () if error.is_usage() => Exit::Usage,
             () => Exit::Failed,
@@ -130,19 +131,15 @@ impl CliError {
         Self::stated(Exit::Failed, message, help)
     }
 
-    /// A peer that could not be started: exit 5.
-    pub fn peer_missing(message: impl Into<String>) -> Self {
-        Self::stated(Exit::PeerMissing, message, "")
-    }
-
-    /// A file that could not be written.
+    /// A file that could not be written; `-` is standard output.
     pub fn write(path: &Path, cause: io::Error) -> Self {
-        Self::Write { path: path.display().to_string(), cause: without_temporary_name(cause) }
+        let path = if output::is_standard(path) { "standard output".to_owned() } else { path.display().to_string() };
+        Self::Write { path, cause: without_temporary_name(cause) }
     }
 
     /// Standard output that could not be written.
     pub fn stdout(cause: io::Error) -> Self {
-        Self::Write { path: "standard output".to_owned(), cause }
+        Self::write(Path::new("-"), cause)
     }
 
     /// The same about the file at `path`, where it is about what the file holds.
@@ -232,8 +229,8 @@ pub trait Ask: Args {
 /// What a command found.
 #[derive(Debug)]
 pub struct Answer<T> {
-    /// For programs.
-    pub data: T,
+    /// For programs; `None` where the answer is a text whoever asks.
+    pub data: Option<T>,
     /// For people.
     pub text: String,
     /// Exit code.
@@ -255,10 +252,12 @@ impl<A: Ask> Run for Printing<A> {
     fn run(&self) -> Result<Exit, CliError> {
         let is_table_printed = output::takes_standard_output(self.args.table(), self.json)?;
         let answer = self.args.ask()?;
-        if !is_table_printed {
-            if self.json { output::print_json(&answer.data) } else { output::print_text(&answer.text) }
-                .map_err(CliError::stdout)?;
+        match answer.data {
+            _ if is_table_printed => Ok(()),
+            Some(data) if self.json => output::print_json(&data),
+            _ => output::print_text(&answer.text),
         }
+        .map_err(CliError::stdout)?;
         Ok(answer.exit)
     }
 
@@ -268,41 +267,6 @@ impl<A: Ask> Run for Printing<A> {
 
     fn schema() -> Option<Schema> {
         Some(schema_for!(A::Answer))
-    }
-}
-
-/// Commands that print for themselves.
-macro_rules! printing_for_themselves {
-    ($($arguments:ty => $json:ty,)+) => {
-        $(impl Run for $arguments {
-            fn run(&self) -> Result<Exit, CliError> {
-                <$arguments>::run(self)
-            }
-
-            fn wants_json(&self) -> bool {
-                self.json
-            }
-
-            fn schema() -> Option<Schema> {
-                Some(schema_for!($json))
-            }
-        })+
-    };
-}
-
-printing_for_themselves! {
-    audit::AuditArgs => crate::studies::audit::Audit,
-    bench::BenchArgs => crate::report::bench::BenchJson,
-    experiments::ExperimentsArgs => experiments::ExperimentsJson<'static>,
-    map::MapArgs => map::MapJson,
-    stress::StressArgs => crate::report::StressJson<'static>,
-    sweep::SweepArgs => sweep::SweepJson<'static>,
-    verify::VerifyArgs => crate::report::VerifyJson<'static>,
-}
-
-impl Run for batch::BatchArgs {
-    fn run(&self) -> Result<Exit, CliError> {
-        Self::run(self)
     }
 }
 
@@ -343,19 +307,19 @@ commands! {
     /// Order of convergence of every quantity, fitted and classified.
     Converge = "converge": Printing<converge::ConvergeArgs>,
     /// V_c, E_c/(d³ fc), depth and Eq. 15 along one number of a scene, or over two.
-    Sweep = "sweep": sweep::SweepArgs,
+    Sweep = "sweep": Printing<sweep::SweepArgs>,
     /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
-    Map = "map": map::MapArgs,
+    Map = "map": Printing<map::MapArgs>,
     /// What an accuracy costs: time and work against error, and the largest steps.
-    Bench = "bench": bench::BenchArgs,
+    Bench = "bench": Printing<bench::BenchArgs>,
     /// Measured penetration depths beside predicted ones: shipped data or your own.
-    Experiments = "experiments": experiments::ExperimentsArgs,
+    Experiments = "experiments": Printing<experiments::ExperimentsArgs>,
     /// Order, error band and verdict for step-size results of another code.
-    Audit = "audit": audit::AuditArgs,
+    Audit = "audit": Printing<audit::AuditArgs>,
     /// The verification suite and its report.
-    Verify = "verify": verify::VerifyArgs,
+    Verify = "verify": Printing<verify::VerifyArgs>,
     /// Numerical stability and event stress cases, and random scenes by the million.
-    Stress = "stress": stress::StressArgs,
+    Stress = "stress": Printing<stress::StressArgs>,
     /// JSON schema of what a command prints.
     Schema = "schema": schema::SchemaArgs,
     /// Shell completion.

@@ -1,12 +1,16 @@
 //! How results leave the program: JSON, numbers for people, tables, and files written whole or not at all.
 
+use std::ffi::{OsStr, OsString};
+use std::fmt::Display;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::CliError;
+use crate::report::figure::Figure;
 use crate::report::folder::TEMPORARY;
 pub use crate::text::{engineering, error_text, harmless as escape_terminal, significant};
 
@@ -132,6 +136,46 @@ pub fn takes_standard_output(out: Option<&Path>, json: bool) -> Result<bool, Cli
     Ok(takes)
 }
 
+/// Where the figures beside the table at `path` go, one for each ending of its name; none beside standard output.
+pub fn figure_paths(path: &Path, endings: &[&str]) -> Vec<PathBuf> {
+    let stem = path.file_stem().filter(|_| !is_standard(path));
+    let name =
+        |stem: &OsStr, ending: &&str| [stem, OsStr::new(ending), OsStr::new(".svg")].into_iter().collect::<OsString>();
+    stem.map_or(Vec::new(), |stem| endings.iter().map(|ending| path.with_file_name(name(stem, ending))).collect())
+}
+
+/// [`check_outputs`] of the table at `out`, if one is asked for, and of the figures beside it.
+///
+/// # Errors
+/// As [`check_outputs`].
+pub fn check_table(inputs: &[Named<'_>], out: Option<&Path>, endings: &[&str]) -> Result<(), CliError> {
+    let Some(out) = out else { return Ok(()) };
+    let figures = figure_paths(out, endings);
+    let outputs = figures.iter().map(|path| ("the figure", path.as_path()));
+    check_outputs(inputs, &[("the table", out)].into_iter().chain(outputs).collect::<Vec<_>>())
+}
+
+/// Writes the table to `path` and the figures beside it, as [`write_all`] does; a figure without a point is left out.
+///
+/// # Errors
+/// As [`write_all`].
+pub fn write_table(
+    path: &Path,
+    table: io::Result<Vec<u8>>,
+    endings: &[&str],
+    figures: impl IntoIterator<Item = Option<Figure>>,
+) -> Result<(), CliError> {
+    let mut files = vec![(path.to_owned(), table.map_err(|cause| CliError::write(path, cause))?)];
+    for (path, figure) in figure_paths(path, endings).into_iter().zip(figures) {
+        match figure {
+            Some(figure) => files.push((path, figure.file().into_bytes())),
+            // A sweep of bad rows has a table, and nothing to draw.
+            None => tell("warning: ", &format!("{} not written: no point in its range", path.display())),
+        }
+    }
+    write_all(&files)
+}
+
 /// Writes `files`, all of them whole or none: each into a temporary file beside its place, then all moved into place.
 ///
 /// A path `-` is standard output.
@@ -179,6 +223,52 @@ pub fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
         _ => Path::new("."),
     };
     tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder)
+}
+
+/// Where a table goes: standard output, or a file that appears when it is whole.
+#[derive(Debug)]
+pub enum Destination {
+    /// Standard output.
+    Standard(io::Stdout),
+    /// A temporary file.
+    File(tempfile::NamedTempFile),
+}
+
+impl Destination {
+    /// The destination at `path`, `-` being standard output.
+    ///
+    /// # Errors
+    /// As [`temporary_beside`].
+    pub fn open(path: &Path) -> io::Result<Self> {
+        Ok(if is_standard(path) { Self::Standard(io::stdout()) } else { Self::File(temporary_beside(path)?) })
+    }
+
+    /// Lets the file appear at `path`.
+    ///
+    /// # Errors
+    /// As [`persist`]; a reader that has gone away is none.
+    pub fn finish(self, path: &Path) -> io::Result<()> {
+        match self {
+            Self::Standard(mut output) => unless_closed(output.flush()),
+            Self::File(file) => persist(file, path),
+        }
+    }
+}
+
+impl Write for Destination {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Standard(output) => output.write(bytes),
+            Self::File(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Standard(output) => output.flush(),
+            Self::File(file) => file.flush(),
+        }
+    }
 }
 
 /// What to do about a file that cannot be written.
@@ -231,7 +321,12 @@ pub fn check_format(path: &Path) -> Result<(), CliError> {
     ))
 }
 
-/// An empty table in the house style: no frame, so that it copies well.
+/// `1.92 .. 2.07`, or a dash.
+pub fn interval_text(interval: Option<[f64; 2]>) -> String {
+    interval.map_or("-".to_owned(), |[low, high]| format!("{low:.2} .. {high:.2}"))
+}
+
+/// A table without a frame, so that it copies well.
 pub fn table(header: &[&str]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     table.load_style(comfy_table::presets::NOTHING);
@@ -242,8 +337,70 @@ pub fn table(header: &[&str]) -> comfy_table::Table {
     table
 }
 
+/// Text for people, made line by line.
+#[derive(Debug, Default)]
+pub struct Text(String);
+
+impl Text {
+    /// Text that begins with `title`, where there is one.
+    pub fn titled(title: Option<&str>) -> Self {
+        let mut text = Self::default();
+        text.lines(title.map(escape_terminal));
+        text
+    }
+
+    /// Adds a line as it is.
+    pub fn line(&mut self, line: impl Display) {
+        self.0.push_str(&format!("{line}\n"));
+    }
+
+    /// Adds each of `lines`.
+    pub fn lines(&mut self, lines: impl IntoIterator<Item = impl Display>) {
+        lines.into_iter().for_each(|line| self.line(line));
+    }
+
+    /// Begins a part with `line`, an empty line in front of it unless it is the first.
+    pub fn part(&mut self, line: impl Display) {
+        if !self.0.is_empty() {
+            self.gap();
+        }
+        self.line(line);
+    }
+
+    /// Adds an empty line.
+    pub fn gap(&mut self) {
+        self.line("");
+    }
+
+    /// Adds `text` behind `head`, in lines that are not too long.
+    pub fn wrapped(&mut self, head: &str, text: &str) {
+        self.line(wrapped(head, text));
+    }
+
+    /// Adds a table, indented by two.
+    pub fn table(&mut self, header: &[&str], rows: impl IntoIterator<Item = impl Into<comfy_table::Row>>) {
+        let mut table = table(header);
+        table.add_rows(rows);
+        self.lines(table_lines(&table));
+    }
+
+    /// What was added.
+    pub fn finish(self) -> String {
+        self.0
+    }
+}
+
 /// The lines of a table, indented by two, without blanks at their ends.
 pub fn table_lines(table: &comfy_table::Table) -> Vec<String> {
     // The style pads each cell by one blank.
     table.to_string().lines().map(|line| format!(" {line}").trim_end().to_owned()).collect()
+}
+
+/// A bar with the time left, on a terminal only; `template` is that of [`ProgressStyle`].
+pub fn progress(length: u64, template: &str) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
 }

@@ -4,9 +4,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::CliError;
-use super::output::{table, table_lines, wrapped};
+use super::output::Text;
 use crate::physics::{Scene, Shown};
 use crate::studies::sensitivity::{Sensitivity, by_closed_form, by_taylor, elasticity};
+use crate::text::or_dash;
 
 /// `sensitivities` in the JSON of `solve`.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -70,31 +71,19 @@ impl SensitivitiesJson {
         })
     }
 
-    /// The table of elasticities.
-    pub fn text(&self) -> String {
-        let mut rows = table(&["elasticity to", "value (SI)", "X", "V_r", "V_c"]);
-        let cell = |d: &Option<DerivativeJson>| {
-            d.as_ref().and_then(|d| d.elasticity).map_or("-".to_owned(), |e| format!("{e:+.6}"))
+    /// Adds the table of elasticities to `text`.
+    pub fn add_to(&self, text: &mut Text) {
+        let row = |p: &ParameterJson| {
+            let derivatives = [&p.depth, &p.velocity, &p.critical_velocity];
+            let cells = derivatives.map(|d| or_dash(d.as_ref().and_then(|d| d.elasticity), |e| format!("{e:+.6}")));
+            [p.path.clone(), Shown(p.value).to_string()].into_iter().chain(cells).collect::<Vec<_>>()
         };
-        for p in &self.parameters {
-            rows.add_row([
-                p.path.clone(),
-                Shown(p.value).to_string(),
-                cell(&p.depth),
-                cell(&p.velocity),
-                cell(&p.critical_velocity),
-            ]);
-        }
-        let mut lines = vec![String::new()];
-        lines.extend(table_lines(&rows));
-        lines.push(match self.disagreement {
-            Some(difference) => {
-                format!("  dual numbers through taylor; {difference:.1e} from those through the closed form")
-            }
-            None => "  dual numbers through taylor; no closed form beside them".to_owned(),
+        text.gap();
+        text.table(&["elasticity to", "value (SI)", "X", "V_r", "V_c"], self.parameters.iter().map(row));
+        let beside = self.disagreement.map_or("no closed form beside them".to_owned(), |difference| {
+            format!("{difference:.1e} from those through the closed form")
         });
-        lines.extend(self.notes.iter().map(|note| wrapped("  note: ", note)));
-        lines.push(String::new());
-        lines.join("\n")
+        text.line(format!("  dual numbers through taylor; {beside}"));
+        self.notes.iter().for_each(|note| text.wrapped("  note: ", note));
     }
 }

@@ -8,16 +8,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{
-    check_outputs, engineering, error_text, escape_terminal, significant, table, table_lines, tell, wrapped, write_all,
-};
+use super::output::{Text, check_outputs, engineering, error_text, significant, tell, write_table};
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
 use super::{Answer, Ask, CliError, Exit, problem_of, read_scene};
 use crate::exchange::peers::EventJson;
+use crate::exchange::tables::{Kind, Value, table_of};
 use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Sample};
 use crate::physics::groups::Groups;
-use crate::physics::{EventKind, Outcome, Scene, Shown, State};
+use crate::physics::{Event, EventKind, Outcome, Scene, State};
 use crate::studies::applicability;
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
@@ -170,7 +169,8 @@ impl Ask for SolveArgs {
             tell("warning: ", &warning);
         }
         if let Some(path) = &self.trajectory {
-            write_all(&[(path.clone(), trajectory_csv(&flight).into_bytes())])?;
+            let table = table_of(&TRAJECTORY, false, flight.trajectory.iter().map(trajectory_row));
+            write_table(path, table, &[], [])?;
         }
         for warning in applicability::warnings(&scene, problem.impact_speed) {
             tell("warning: ", &warning);
@@ -202,14 +202,14 @@ impl Ask for SolveArgs {
             Outcome::Undecided => Exit::Undecided,
             _ => Exit::Success,
         };
-        Ok(Answer { text: self.text(&data, &flight), data, exit })
+        Ok(Answer { text: self.text(&data, &flight), data: Some(data), exit })
     }
 }
 
 impl SolveArgs {
     fn text(&self, data: &SolveJson, flight: &Flight) -> String {
-        let mut lines: Vec<_> = data.scene.title.iter().map(|title| escape_terminal(title)).collect();
-        lines.push(format!("  method   {}", data.method.text()));
+        let mut text = Text::titled(data.scene.title.as_deref());
+        text.line(format!("  method   {}", data.method.text()));
         let margin = match data.exit_margin.zip(data.exit_margin_error) {
             Some((margin, bar)) if margin.is_finite() && bar.is_finite() => {
                 format!(" (exit margin {} +- {bar:.0e} of V0²)", significant(margin))
@@ -217,34 +217,36 @@ impl SolveArgs {
             Some(_) => " (the exit margin leaves the range of 64-bit numbers)".to_owned(),
             None => String::new(),
         };
-        lines.push(format!("  outcome  {}{margin}", data.outcome));
-        lines.extend(data.groups.text(data.scene.velocity_m_s));
-        lines.push(String::new());
-        let mut events = table(&["event", "time", "depth", "velocity"]);
-        for event in &flight.events {
+        text.line(format!("  outcome  {}{margin}", data.outcome));
+        text.lines(data.groups.text(data.scene.velocity_m_s));
+        text.gap();
+        let row = |event: &Event| {
             let name = match event.kind {
                 EventKind::StageEnd(index) => format!("stage-end {index}"),
                 kind => kind.name().to_owned(),
             };
             let State { time, depth, velocity } = event.state;
-            events.add_row([name, engineering(time, "s"), engineering(depth, "m"), engineering(velocity, "m/s")]);
-        }
-        lines.extend(table_lines(&events));
-        lines.push(String::new());
-        lines.extend(data.beside_exact());
+            [name, engineering(time, "s"), engineering(depth, "m"), engineering(velocity, "m/s")]
+        };
+        text.table(&["event", "time", "depth", "velocity"], flight.events.iter().map(row));
+        text.gap();
+        data.add_exact(&mut text);
         if let Some(limit) = flight.step_limit.filter(|limit| !limit.stable) {
-            lines.push(format!("  the step lies beyond the stability limit {}", engineering(limit.limit, "s")));
+            text.line(format!("  the step lies beyond the stability limit {}", engineering(limit.limit, "s")));
         }
         let Cost { steps, rejected_steps, force_evaluations } = flight.cost;
-        lines.push(format!(
+        text.line(format!(
             "  cost     {steps} steps, {rejected_steps} rejected, {force_evaluations} force evaluations"
         ));
         if self.explain {
-            lines.extend([String::new(), "  skipped".to_owned()]);
-            lines.extend(data.skipped.iter().map(|note| wrapped("  - ", note)));
+            text.gap();
+            text.line("  skipped");
+            data.skipped.iter().for_each(|note| text.wrapped("  - ", note));
         }
-        lines.push(data.sensitivities.as_ref().map_or_else(String::new, SensitivitiesJson::text));
-        lines.join("\n")
+        if let Some(sensitivities) = &data.sensitivities {
+            sensitivities.add_to(&mut text);
+        }
+        text.finish()
     }
 }
 
@@ -264,32 +266,37 @@ impl GroupsJson {
 }
 
 impl SolveJson {
-    /// The end of the solution beside the exact one.
-    fn beside_exact(&self) -> Vec<String> {
+    /// Adds the end of the solution beside the exact one.
+    fn add_exact(&self, text: &mut Text) {
         let Some(exact) = &self.closed_form else {
-            return vec!["  no closed form for these stages: compare methods, or refine with `converge`".to_owned()];
+            return text.line("  no closed form for these stages: compare methods, or refine with `converge`");
         };
-        let mut rows = table(&["at the end", self.method.name, "closed form", "error"]);
         let errors = self.relative_error.as_ref();
-        for (name, unit, get, error) in [
+        let rows = [
             ("depth", "m", (|s| s.depth) as fn(&State) -> f64, errors.and_then(|e| e.depth)),
             ("time", "s", |s| s.time, errors.and_then(|e| e.time)),
             ("velocity", "m/s", |s| s.velocity, errors.and_then(|e| e.velocity)),
-        ] {
+        ];
+        let rows = rows.map(|(name, unit, get, error)| {
             let of = |state| engineering(get(state), unit);
-            rows.add_row([name.to_owned(), of(&self.end), of(&exact.end), error_text(error)]);
-        }
-        let differs = errors.is_none().then(|| format!("  the closed form says {}", exact.outcome));
-        table_lines(&rows).into_iter().chain(differs).collect()
+            [name.to_owned(), of(&self.end), of(&exact.end), error_text(error)]
+        });
+        text.table(&["at the end", self.method.name, "closed form", "error"], rows);
+        text.lines(errors.is_none().then(|| format!("  the closed form says {}", exact.outcome)));
     }
 }
 
-/// `time_s,depth_m,velocity_m_s,force_n,stage`, one row a step and one an event.
-fn trajectory_csv(flight: &Flight) -> String {
-    let row = |sample: &Sample| {
-        let State { time, depth, velocity } = sample.state;
-        let [time, depth, velocity, force] = [time, depth, velocity, sample.force].map(Shown);
-        format!("{time},{depth},{velocity},{force},{}\n", sample.stage)
-    };
-    "time_s,depth_m,velocity_m_s,force_n,stage\n".to_owned() + &flight.trajectory.iter().map(row).collect::<String>()
+/// The columns of a trajectory: a row for each step and each event.
+const TRAJECTORY: [(&str, Kind); 5] = [
+    ("time_s", Kind::Number),
+    ("depth_m", Kind::Number),
+    ("velocity_m_s", Kind::Number),
+    ("force_n", Kind::Number),
+    ("stage", Kind::Count),
+];
+
+fn trajectory_row(sample: &Sample) -> Vec<Value<'static>> {
+    let State { time, depth, velocity } = sample.state;
+    let numbers = [time, depth, velocity, sample.force].map(|number| Value::Number(Some(number)));
+    numbers.into_iter().chain([Value::Count(sample.stage as u64)]).collect()
 }

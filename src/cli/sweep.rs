@@ -3,34 +3,30 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use comfy_table::ContentArrangement;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{
-    WIDTH, check_format, check_outputs, escape_terminal, is_standard, print_json, print_text, significant, table,
-    table_lines, takes_standard_output, tell, wrapped, write_all,
+    Text, WIDTH, check_format, check_table, figure_paths, is_parquet, significant, table, table_lines, tell,
+    write_table,
 };
-use super::{CliError, Exit, read_scene};
-#[cfg(feature = "parquet")]
-use crate::exchange::tables::{Cells, Kind, parquet::ParquetWriter};
-use crate::exchange::tables::{name_of, push_line, read_bytes};
+use super::{Answer, Ask, CliError, Exit, read_scene};
+use crate::exchange::tables::{self, Kind, name_of, read_bytes};
 use crate::integrators::Method;
+use crate::physics::semi_empirical::NDRC_END;
 use crate::physics::{Criterion, Outcome, Parameter};
 use crate::report::sweep_figures;
 use crate::studies::sweep::{Axis, COLUMNS, POINTS, Plan, Row, explanation, read_points};
+use crate::text::or_dash;
 
 /// Rows of the table for people; all rows are in the CSV and the JSON.
 const ROWS_SHOWN: usize = 24;
 
 /// Arguments of `sweep`.
 #[derive(Args, Debug)]
-#[command(after_help = "PATH: projectile.mass, projectile.diameter, projectile.nose.factor, target.strength, \
-    target.density, target.thickness, resistance.S, resistance.B, resistance.k, resistance.crater_stiffness, \
-    impact.velocity, target.layer.0.strength and its like, stage.0.drag and its like; or a group: H/d moves the \
-    thickness, I the velocity, N the density. A and B may have units: target.strength=20MPa:60MPa:5.\n\n\
-    Where S follows Eq. 14 it is computed anew for each strength. Without impact velocity only V_c is computed.\n\n\
-    Files: --out F.csv writes the table and, beside it, F.svg (along H/d: Figure 4) and F-difference.svg (Figure 5).")]
+#[command(after_help = include_str!("help/sweep.txt"))]
 pub struct SweepArgs {
     /// Scene file (TOML), or - for standard input.
     pub scene: String,
@@ -46,28 +42,25 @@ pub struct SweepArgs {
     /// Write the table to this file (.csv or .parquet) and the figures beside it; - for standard output, without figures.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// What `sweep --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct SweepJson<'a> {
+pub struct SweepJson {
     /// `penetrode/sweep/1`.
     pub schema: &'static str,
     /// Title of the scene.
-    pub title: Option<&'a str>,
+    pub title: Option<String>,
     /// Method of solution.
     pub method: MethodJson,
     /// Criterion of `critical_velocity_m_s` and `dimensionless_energy`: `full-depth` or `ndrc`.
     pub criterion: &'static str,
     /// What was varied, in the order of `values`.
-    pub axes: &'a [Axis],
+    pub axes: Vec<Axis>,
     /// Whether S was computed anew from each strength (Eq. 14).
     pub static_factor_follows_strength: bool,
     /// The points; the last axis runs fastest.
-    pub rows: &'a [Row],
+    pub rows: Vec<Row>,
     /// Measured points beside the curves at the same H/d.
     pub data: Vec<MeasuredPoint>,
     /// Why the curves along H/d differ; empty along anything else.
@@ -88,12 +81,14 @@ pub struct MeasuredPoint {
     pub eq15_printed: Option<f64>,
 }
 
-impl SweepArgs {
-    /// Runs the sweep, writes its files, and prints it.
-    ///
-    /// # Errors
-    /// A scene, axes, data or options that cannot be used (exit 2), a file that cannot be written (exit 1).
-    pub fn run(&self) -> Result<Exit, CliError> {
+impl Ask for SweepArgs {
+    type Answer = SweepJson;
+
+    fn table(&self) -> Option<&Path> {
+        self.out.as_deref()
+    }
+
+    fn ask(&self) -> Result<Answer<SweepJson>, CliError> {
         if let Some(path) = &self.out {
             check_format(path)?;
         }
@@ -103,37 +98,35 @@ impl SweepArgs {
             return Err(CliError::usage("--vary may be given once or twice", "sweep the third number in another run"));
         }
         let plan = Plan::new(scene, &axes)?;
-        let is_table_printed = takes_standard_output(self.out.as_deref(), self.json)?;
-        self.check_outputs(&plan)?;
+        // Table and figures replace neither the scene nor the measured points, nor one another.
+        let mut inputs = vec![("the scene", Path::new(&self.scene))];
+        inputs.extend(self.data.as_deref().map(|path| ("the measured points", path)));
+        check_table(&inputs, self.table(), endings(&plan))?;
         let method = self.method.build()?;
         let points = self.points(&plan)?;
         let rows = plan.run(method.integrator());
-        let data = beside(&plan, &points, &method)?;
-        let report = self.report(&plan, &rows, data)?;
+        let data = SweepJson {
+            schema: "penetrode/sweep/1",
+            title: plan.scene().title.clone(),
+            method: MethodJson::new(self.method.method, &self.method.options()?, None, None),
+            criterion: plan.scene().criterion.into(),
+            axes,
+            static_factor_follows_strength: plan.moves_static_factor(),
+            data: beside(&plan, &points, &method)?,
+            explanation: explanation(&plan, &rows),
+            bad_rows: rows.iter().filter(|row| !row.error.is_empty()).count(),
+            rows,
+        };
         if let Some(path) = &self.out {
-            write_files(path, &plan, &rows, &points)?;
+            write_files(path, &plan, &data.rows, &points)?;
         }
-        if !is_table_printed {
-            if self.json { print_json(&report) } else { print_text(&self.text(&plan, &rows, &report)) }
-                .map_err(CliError::stdout)?;
-        }
-        for (head, note) in notes(&plan, &rows) {
-            tell(head, &note);
-        }
-        Ok(if report.bad_rows > 0 { Exit::Criterion } else { Exit::Success })
+        tell_notes(&plan, &data);
+        let exit = if data.bad_rows > 0 { Exit::Criterion } else { Exit::Success };
+        Ok(Answer { text: self.text(&plan, &data), data: Some(data), exit })
     }
+}
 
-    /// Table and figures replace neither the scene nor the measured points, nor one another.
-    fn check_outputs(&self, plan: &Plan) -> Result<(), CliError> {
-        let Some(out) = &self.out else { return Ok(()) };
-        let mut inputs = vec![("the scene", Path::new(&self.scene))];
-        inputs.extend(self.data.as_deref().map(|path| ("the measured points", path)));
-        let figures = figure_paths(out, plan);
-        let mut outputs = vec![("the table", out.as_path())];
-        outputs.extend(figures.iter().map(|path| ("the figure", path.as_path())));
-        check_outputs(&inputs, &outputs)
-    }
-
+impl SweepArgs {
     fn points(&self, plan: &Plan) -> Result<Vec<(f64, f64)>, CliError> {
         let Some(path) = &self.data else { return Ok(Vec::new()) };
         if !plan.is_along_thickness() {
@@ -145,85 +138,49 @@ impl SweepArgs {
         read_data(path)
     }
 
-    fn report<'a>(&self, plan: &'a Plan, rows: &'a [Row], data: Vec<MeasuredPoint>) -> Result<SweepJson<'a>, CliError> {
-        Ok(SweepJson {
-            schema: "penetrode/sweep/1",
-            title: plan.scene().title.as_deref(),
-            method: MethodJson::new(self.method.method, &self.method.options()?, None, None),
-            criterion: match plan.scene().criterion {
-                Criterion::FullDepth => "full-depth",
-                Criterion::Ndrc => "ndrc",
-            },
-            axes: plan.axes(),
-            static_factor_follows_strength: plan.moves_static_factor(),
-            rows,
-            data,
-            explanation: explanation(plan, rows),
-            bad_rows: rows.iter().filter(|row| !row.error.is_empty()).count(),
-        })
-    }
-
-    fn text(&self, plan: &Plan, rows: &[Row], report: &SweepJson<'_>) -> String {
-        let mut lines = Vec::new();
-        if let Some(title) = &report.title {
-            lines.push(escape_terminal(title));
+    fn text(&self, plan: &Plan, data: &SweepJson) -> String {
+        let mut text = Text::titled(data.title.as_deref());
+        let (rows, paths) = (&data.rows, plan.paths());
+        text.wrapped(
+            "  ",
+            &format!("{} points over {}, criterion {}", rows.len(), paths.join(" and "), data.criterion),
+        );
+        if data.static_factor_follows_strength {
+            text.line("  S follows the strength by Eq. 14");
         }
-        let paths: Vec<_> = report.axes.iter().map(|axis| axis.parameter.to_string()).collect();
-        let over = format!("{} points over {}, criterion {}", rows.len(), paths.join(" and "), report.criterion);
-        lines.push(wrapped("  ", &over));
-        if report.static_factor_follows_strength {
-            lines.push("  S follows the strength by Eq. 14".to_owned());
-        }
-        lines.push("  V_c and V in m/s, X in m, E_c over d³ fc; `over it` is E_c over Eq. 15".to_owned());
-        lines.push(String::new());
+        text.line("  V_c and V in m/s, X in m, E_c over d³ fc; `over it` is E_c over Eq. 15");
+        text.gap();
         // Evenly, first and last among them.
         let count = rows.len().min(ROWS_SHOWN);
         let shown: Vec<&Row> =
             (0..count).map(|i| &rows[if count < 2 { 0 } else { i * (rows.len() - 1) / (count - 1) }]).collect();
-        // A number broken in two lines reads as another number: columns that do not fit are left out.
-        let fitting = (1..=TEXT_COLUMNS.len()).rev().map(|count| points_table(&paths, &shown, count));
-        let is_within = |(lines, _): &(Vec<String>, _)| lines.iter().all(|line| line.chars().count() <= WIDTH);
-        let mut tables = fitting.map(|(table, left_out)| (table_lines(&table), left_out));
-        let narrowest = || points_table(&paths, &shown, 1);
-        let (points, left_out) = tables.find(is_within).unwrap_or_else(|| {
-            let (mut table, left_out) = narrowest();
-            table.set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
-            (table_lines(&table), left_out)
-        });
-        lines.extend(points);
+        let (points, left_out) = points_table(&paths, &shown);
+        text.lines(points);
         if !left_out.is_empty() {
-            lines.push(format!("  no room for {}; --out and --json give all", left_out.join(", ")));
+            text.line(format!("  no room for {}; --out and --json give all", left_out.join(", ")));
         }
         if count < rows.len() {
-            lines.push(format!("  {count} of {} points shown; --out and --json give all", rows.len()));
+            text.line(format!("  {count} of {} points shown; --out and --json give all", rows.len()));
         }
-        if !report.data.is_empty() {
-            let mut measured = table(&["measured at H/d", "E_c/(d³ fc)", "full depth", "ndrc", "Eq. 15"]);
-            let dash = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-            for point in &report.data {
-                measured.add_row([
-                    significant(point.thickness_ratio),
-                    significant(point.measured),
-                    dash(point.energy_full_depth),
-                    dash(point.energy_ndrc),
-                    dash(point.eq15_printed),
-                ]);
-            }
-            lines.push(String::new());
-            lines.extend(table_lines(&measured));
+        if !data.data.is_empty() {
+            text.gap();
+            let point = |p: &MeasuredPoint| {
+                let curves = [p.energy_full_depth, p.energy_ndrc, p.eq15_printed].map(|e| or_dash(e, significant));
+                [significant(p.thickness_ratio), significant(p.measured)].into_iter().chain(curves).collect::<Vec<_>>()
+            };
+            let header = ["measured at H/d", "E_c/(d³ fc)", "full depth", "ndrc", "Eq. 15"];
+            text.table(&header, data.data.iter().map(point));
         }
-        if !report.explanation.is_empty() {
-            lines.push(String::new());
-            lines.push(wrapped("  ", &report.explanation));
+        if !data.explanation.is_empty() {
+            text.gap();
+            text.wrapped("  ", &data.explanation);
         }
         if let Some(path) = &self.out {
-            lines.push(String::new());
-            let mut names = vec![path.display().to_string()];
-            names.extend(figure_paths(path, plan).iter().map(|p| p.display().to_string()));
-            lines.push(wrapped("  written: ", &names.join(", ")));
+            text.gap();
+            let files = [path.clone()].into_iter().chain(figure_paths(path, endings(plan)));
+            text.wrapped("  written: ", &files.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "));
         }
-        lines.push(String::new());
-        lines.join("\n")
+        text.finish()
     }
 }
 
@@ -246,27 +203,36 @@ const TEXT_COLUMNS: [Column; 7] = [
     ("V", |row| row.velocity.map(significant)),
 ];
 
-/// The rows for people, with the first `count` columns behind the varied numbers, and the names of the others; a column
-/// that no row fills is no column, nor is Eq. 15 where two numbers vary.
-fn points_table(paths: &[String], rows: &[&Row], count: usize) -> (comfy_table::Table, Vec<&'static str>) {
+/// The lines of the table of `rows`, and the columns behind the varied numbers for which there is no room: a number
+/// broken in two lines reads as another number.
+///
+/// A column that no row fills is no column, nor is Eq. 15 where two numbers vary.
+fn points_table(paths: &[String], rows: &[&Row]) -> (Vec<String>, Vec<&'static str>) {
     let is_shown =
         |(name, cell): &&Column| rows.iter().any(|row| cell(row).is_some()) && !(*name == "Eq. 15" && paths.len() > 1);
-    let mut columns: Vec<&Column> = TEXT_COLUMNS.iter().filter(is_shown).collect();
-    let left_out = columns.split_off(count.min(columns.len())).iter().map(|(name, _)| *name).collect();
-    let mut header: Vec<&str> = paths.iter().map(|path| path.rsplit('.').next().unwrap_or(path)).collect();
-    header.extend(columns.iter().map(|(name, _)| *name));
-    let mut shown = table(&header);
-    shown.set_content_arrangement(comfy_table::ContentArrangement::Disabled);
-    for row in rows {
-        let mut cells: Vec<String> = row.values.iter().map(|value| significant(*value)).collect();
-        if row.error.is_empty() {
-            cells.extend(columns.iter().map(|(_, cell)| cell(row).unwrap_or_else(|| "-".to_owned())));
-        } else {
-            cells.push("no answer".to_owned());
+    let columns: Vec<&Column> = TEXT_COLUMNS.iter().filter(is_shown).collect();
+    let names: Vec<_> = columns.iter().map(|(name, _)| *name).collect();
+    let lines_of = |count: usize, arrangement| {
+        let keys = paths.iter().map(|path| path.rsplit('.').next().unwrap_or(path));
+        let mut shown = table(&keys.chain(names[..count].iter().copied()).collect::<Vec<_>>());
+        shown.set_content_arrangement(arrangement);
+        for row in rows {
+            let cells = columns[..count].iter().map(|(_, cell)| cell(row).unwrap_or_else(|| "-".to_owned()));
+            let error = (!row.error.is_empty()).then(|| "no answer".to_owned());
+            let cells = cells.filter(|_| row.error.is_empty()).chain(error);
+            shown.add_row(row.values.iter().copied().map(significant).chain(cells));
         }
-        shown.add_row(cells);
+        table_lines(&shown)
+    };
+    let is_within = |lines: &Vec<String>| lines.iter().all(|line| line.chars().count() <= WIDTH);
+    for count in (1..=columns.len()).rev() {
+        let lines = lines_of(count, ContentArrangement::Disabled);
+        if is_within(&lines) {
+            return (lines, names[count..].to_vec());
+        }
     }
-    (shown, left_out)
+    let least = columns.len().min(1);
+    (lines_of(least, ContentArrangement::Dynamic), names[least..].to_vec())
 }
 
 /// The curves at the measured points, computed there and not interpolated.
@@ -287,17 +253,9 @@ fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<Mea
     Ok(data)
 }
 
-/// Where the figures go, beside the table at `path`.
-fn figure_paths(path: &Path, plan: &Plan) -> Vec<PathBuf> {
-    if is_standard(path) {
-        return Vec::new();
-    }
-    let mut paths = vec![path.with_extension("svg")];
-    if draws_eq15(plan) {
-        let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        paths.push(path.with_file_name(format!("{stem}-difference.svg")));
-    }
-    paths
+/// How the names of the figures beside the table end.
+fn endings(plan: &Plan) -> &'static [&'static str] {
+    if draws_eq15(plan) { &["", "-difference"] } else { &[""] }
 }
 
 /// Whether the figures are the paper's: along the thickness of one concrete.
@@ -312,67 +270,28 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
     } else {
         vec![sweep_figures::critical_velocity(plan, rows)]
     };
-    #[cfg(feature = "parquet")]
-    let bytes = if super::output::is_parquet(path) { parquet_of(plan, rows) } else { Ok(csv_of(plan, rows)) };
-    #[cfg(not(feature = "parquet"))]
-    let bytes = Ok(csv_of(plan, rows));
-    let mut files = vec![(path.to_owned(), bytes.map_err(|cause| CliError::write(path, cause))?)];
-    for (figure_path, figure) in figure_paths(path, plan).into_iter().zip(figures) {
-        match figure {
-            Some(figure) => files.push((figure_path, figure.file().into_bytes())),
-            // A sweep of bad rows has a table, and nothing to draw.
-            None => tell("warning: ", &format!("{} not written: no point in its range", figure_path.display())),
-        }
-    }
-    write_all(&files)
-}
-
-fn csv_of(plan: &Plan, rows: &[Row]) -> Vec<u8> {
-    let axes = plan.axes().iter().map(|axis| axis.parameter.to_string());
-    let names: Vec<_> = axes.chain(COLUMNS.map(|(name, ..)| name.to_owned())).collect();
-    let mut csv = names.join(",") + "\n";
-    for row in rows {
-        push_line(&mut csv, &row.cells());
-    }
-    csv.into_bytes()
-}
-
-#[cfg(feature = "parquet")]
-fn parquet_of(plan: &Plan, rows: &[Row]) -> std::io::Result<Vec<u8>> {
-    let paths: Vec<_> = plan.axes().iter().map(|axis| axis.parameter.to_string()).collect();
+    let paths = plan.paths();
     let axes = paths.iter().map(|path| (path.as_str(), Kind::Number));
     let columns: Vec<_> = axes.chain(COLUMNS.map(|(name, kind, _)| (name, kind))).collect();
-    let mut cells: Vec<_> = columns.iter().map(|(_, kind)| Cells::empty(*kind)).collect();
-    for row in rows {
-        cells.iter_mut().zip(row.cells()).for_each(|(column, cell)| column.push(cell));
-    }
-    let mut table = ParquetWriter::new(Vec::new(), &columns)?;
-    table.push(cells)?;
-    table.finish()
+    let table = tables::table_of(&columns, is_parquet(path), rows.iter().map(Row::cells));
+    write_table(path, table, endings(plan), figures)
 }
 
-/// What a reader of standard error should know: bad and undecided rows, and H/d beyond the relation.
-fn notes(plan: &Plan, rows: &[Row]) -> Vec<(&'static str, String)> {
-    let mut notes = Vec::new();
-    let bad = rows.iter().filter(|row| !row.error.is_empty()).count();
-    if bad > 0 {
-        notes.push((
-            "warning: ",
-            format!(
-                "{bad} of {} points have no answer; `error` in --json, and in the table of --out, says why",
-                rows.len()
-            ),
-        ));
+/// Says on standard error what a reader should know: bad and undecided rows, and H/d beyond the relation.
+fn tell_notes(plan: &Plan, data: &SweepJson) {
+    let (rows, count) = (&data.rows, data.rows.len());
+    if data.bad_rows > 0 {
+        let why = "have no answer; `error` in --json, and in the table of --out, says why";
+        tell("warning: ", &format!("{} of {count} points {why}", data.bad_rows));
     }
     let undecided = rows.iter().filter(|row| row.outcome == Some(Outcome::Undecided)).count();
     if undecided > 0 {
-        notes.push(("note: ", format!("{undecided} of {} outcomes are undecided", rows.len())));
+        tell("note: ", &format!("{undecided} of {count} outcomes are undecided"));
     }
-    let end = crate::physics::semi_empirical::NDRC_END;
+    let end = NDRC_END;
     let beyond = rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > end)).count();
     if beyond > 0 && (plan.scene().criterion == Criterion::Ndrc || plan.is_along_thickness()) {
-        let text = format!("{beyond} points lie beyond the end of the perforation relation, H/d = {end}");
-        notes.push(("warning: ", text));
+        let what = "points lie beyond the end of the perforation relation";
+        tell("warning: ", &format!("{beyond} {what}, H/d = {end}"));
     }
-    notes
 }

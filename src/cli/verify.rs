@@ -1,14 +1,14 @@
 //! `penetrode verify`: the verification suite and its report.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
-use super::output::{escape_terminal, print_json, print_text, tell, tell_line, wrapped};
+use super::output::{Text, escape_terminal, progress, tell, tell_line};
 use super::sweep::read_data;
-use super::{CliError, Exit};
+use super::{Answer, Ask, CliError};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
@@ -16,9 +16,7 @@ use crate::suite::{Check, Counts, Judged, LOOSENESS_MAX, Suite, Verdict, loosene
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
-#[command(after_help = "The report shows the claims with their figures: orders, events, other programs, the paper's \
-    curve, the range of Eq. 11-12, measured depths, layers, stability and rounding. The cases at the edges have a \
-    report of their own: penetrode stress --out DIR.")]
+#[command(after_help = include_str!("help/verify.txt"))]
 pub struct VerifyArgs {
     /// Suite file (TOML) [default: the suite that ships].
     pub suite: Option<String>,
@@ -40,18 +38,12 @@ pub struct VerifyArgs {
     /// Measured points to show with the paper's curve: a CSV with the columns `H/d` and `E_c/(d3 fc)`.
     #[arg(long, value_name = "POINTS.csv")]
     pub data: Option<PathBuf>,
-    /// Print JSON.
-    #[arg(long)]
-    pub json: bool,
 }
 
-impl VerifyArgs {
-    /// Runs the suite, writes the report and prints the summary.
-    ///
-    /// # Errors
-    /// A suite, a scene or a folder that cannot be used (exit 2); a report that cannot be written (exit 1); a peer
-    /// that cannot be started (exit 5).
-    pub fn run(&self) -> Result<Exit, CliError> {
+impl Ask for VerifyArgs {
+    type Answer = VerifyJson;
+
+    fn ask(&self) -> Result<Answer<VerifyJson>, CliError> {
         folder::check(&self.out)?;
         let mut suite = match &self.suite {
             Some(path) => Suite::read(path)?,
@@ -83,7 +75,6 @@ impl VerifyArgs {
             random: None,
         };
         folder::write(folder::files(&run), &self.out)?;
-        let report = VerifyJson::new(&run);
         if !suite.is_embedded {
             for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX)
             {
@@ -91,22 +82,28 @@ impl VerifyArgs {
                 tell("warning: ", &text);
             }
         }
-        if self.json { print_json(&report) } else { print_text(&self.text(&judged)) }.map_err(CliError::stdout)?;
-        Ok(report.verdict.into())
+        let mut text = Text::default();
+        add_not_passed(&mut text, &judged);
+        text.line(counts_text(&judged));
+        text.line(report_line(&self.out));
+        let data = VerifyJson::new(&run);
+        Ok(Answer { text: text.finish(), exit: data.verdict.into(), data: Some(data) })
     }
+}
 
+impl VerifyArgs {
     fn peers(&self) -> Result<PeerAnswers, CliError> {
         let mut peers = PeerAnswers::recorded().map_err(|error| {
             let help = "remake it with `python3 verification/references/record.py`";
             CliError::failed(format!("a recorded answer cannot be read: {error}"), help)
         })?;
-        let start = |peers: &mut PeerAnswers, name: &str, command: &str| match peers.start(name, command) {
+        let mut start = |name: &str, command: &str| match peers.start(name, command) {
             // It started and then failed: its claims fail, and the others are judged all the same.
             Err(PeerStartError::Greeting(failure)) => {
                 peers.fail(name, failure.to_string());
                 Ok(())
             }
-            started => started.map_err(|error| not_started(&error)),
+            started => started,
         };
         if self.live_peers {
             for (name, peer) in [
@@ -115,13 +112,11 @@ impl VerifyArgs {
                 ("sundae-ida", BundledPeer::SundaeIda),
                 ("heyoka-taylor", BundledPeer::Heyoka),
             ] {
-                let environment = PeerEnvironment::ensure(peer, &mut |line| tell_line(line))
-                    .map_err(|error| CliError::peer_missing(error.to_string()))?;
-                start(&mut peers, name, &environment.command(peer))?;
+                start(name, &PeerEnvironment::ensure(peer, &mut |line| tell_line(line))?.command(peer))?;
             }
         }
         if let Some(command) = &self.peer {
-            start(&mut peers, USER, command)?;
+            start(USER, command)?;
         }
         Ok(peers)
     }
@@ -139,29 +134,22 @@ impl VerifyArgs {
         words.extend(self.peer.as_deref().map(|command| format!("--peer {}", quoted(command))));
         words.join(" ")
     }
-
-    fn text(&self, judged: &[Judged]) -> String {
-        let report = self.out.join("report.html");
-        format!("{}{}report: {}\n", not_passed_text(judged), counts_text(judged), report.display())
-    }
 }
 
-/// Every failed or undecided claim, with its statement and what was seen.
-pub(super) fn not_passed_text(judged: &[Judged]) -> String {
-    let mut text = String::new();
-    for judged in judged.iter().filter(|j| j.is_open()) {
-        let Judged { claim, verdict, measured, remark, .. } = judged;
+/// Where the report is.
+pub(super) fn report_line(folder: &Path) -> String {
+    format!("report: {}", folder.join("report.html").display())
+}
+
+/// Adds every failed or undecided claim, with its statement and what was seen.
+pub(super) fn add_not_passed(text: &mut Text, judged: &[Judged]) {
+    for Judged { claim, verdict, measured, remark, .. } in judged.iter().filter(|judged| judged.is_open()) {
         let measured = measured
             .map_or("nothing measured".to_owned(), |m| format!("{m:.3e}, limit {:.1e} {}", claim.limit, claim.unit));
-        text.push_str(&format!(
-            "{:<9} {}\n{}\n{}\n",
-            verdict.name(),
-            escape_terminal(&claim.id),
-            wrapped("          ", &escape_terminal(&claim.statement)),
-            wrapped("          ", &format!("{measured}; {}", escape_terminal(remark)))
-        ));
+        text.line(format!("{:<9} {}", verdict.name(), escape_terminal(&claim.id)));
+        text.wrapped("          ", &escape_terminal(&claim.statement));
+        text.wrapped("          ", &format!("{measured}; {}", escape_terminal(remark)));
     }
-    text
 }
 
 /// The verdict and how many claims came to it, as one line.
@@ -169,7 +157,7 @@ pub(super) fn counts_text(judged: &[Judged]) -> String {
     let counts = Counts::of_claims(judged);
     let Counts { passed, failed, undecided, skipped } = counts;
     let verdict = counts.verdict().name();
-    format!("{verdict}: {passed} passed, {failed} failed, {undecided} undecided, {skipped} skipped\n")
+    format!("{verdict}: {passed} passed, {failed} failed, {undecided} undecided, {skipped} skipped")
 }
 
 /// Judges every claim of `suite` behind a progress bar that counts `what`.
@@ -191,21 +179,7 @@ pub(super) fn quoted(text: &str) -> String {
     shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned)
 }
 
-/// Why a program given as a peer cannot be asked.
-pub(super) fn not_started(error: &PeerStartError) -> CliError {
-    if error.is_usage() {
-        CliError::usage(error.to_string(), "give a program and its arguments, quoted as for a shell")
-    } else {
-        CliError::peer_missing(error.to_string())
-    }
-}
-
-/// A bar with the time left, on a terminal only.
+/// A bar that counts `what`.
 pub(super) fn progress_bar(length: u64, what: &str) -> ProgressBar {
-    let bar = ProgressBar::new(length);
-    let template = format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left {{msg}}");
-    if let Ok(style) = ProgressStyle::with_template(&template) {
-        bar.set_style(style);
-    }
-    bar
+    progress(length, &format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left {{msg}}"))
 }

@@ -15,9 +15,8 @@ pub mod lines;
 pub mod parquet;
 
 use std::borrow::Cow;
-use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use ::csv::ByteRecord;
@@ -422,8 +421,7 @@ pub fn push_line(line: &mut String, values: &[Value<'_>]) {
             line.push(',');
         }
         match value {
-            // Writing to a string cannot fail.
-            Value::Count(count) => write!(line, "{count}").unwrap_or_default(),
+            Value::Count(count) => line.push_str(&count.to_string()),
             Value::Number(Some(number)) => push_number(line, *number),
             Value::Number(None) => {}
             Value::Text(text) => push_text(line, text),
@@ -522,6 +520,104 @@ impl Cells {
             (cells, value) => unreachable!("{value:?} in {cells:?}"),
         }
     }
+}
+
+/// Name and kind of each column of a table that goes out.
+pub type Columns<'a> = [(&'a str, Kind)];
+
+/// Rows of a table that goes out, made apart from it: on another thread, say.
+#[derive(Debug)]
+pub enum Block {
+    /// Lines of CSV.
+    Lines(String),
+    /// Columns of a Parquet table.
+    Columns(Vec<Cells>),
+}
+
+impl Block {
+    /// No row of a table with `columns`.
+    pub fn empty(columns: &Columns<'_>, is_parquet: bool) -> Self {
+        if is_parquet {
+            Self::Columns(columns.iter().map(|(_, kind)| Cells::empty(*kind)).collect())
+        } else {
+            Self::Lines(String::new())
+        }
+    }
+
+    /// Adds a row, one value a column.
+    pub fn push(&mut self, row: &[Value<'_>]) {
+        match self {
+            Self::Lines(lines) => push_line(lines, row),
+            Self::Columns(columns) => columns.iter_mut().zip(row).for_each(|(cells, value)| cells.push(*value)),
+        }
+    }
+}
+
+/// A table that is being written, as CSV or as Parquet.
+pub enum TableWriter<W: Write + Send> {
+    /// Lines, the first with the names of the columns.
+    Csv(W),
+    /// Row groups.
+    #[cfg(feature = "parquet")]
+    Parquet(Box<parquet::ParquetWriter<W>>),
+}
+
+impl<W: Write + Send> TableWriter<W> {
+    /// A table with `columns`; `is_parquet` is false in a build that does without.
+    ///
+    /// # Errors
+    /// When `output` cannot be written.
+    pub fn new(mut output: W, columns: &Columns<'_>, is_parquet: bool) -> io::Result<Self> {
+        #[cfg(feature = "parquet")]
+        if is_parquet {
+            return Ok(Self::Parquet(Box::new(parquet::ParquetWriter::new(output, columns)?)));
+        }
+        debug_assert!(!is_parquet, "this build writes CSV only");
+        let names: Vec<_> = columns.iter().map(|(name, _)| *name).collect();
+        writeln!(output, "{}", names.join(","))?;
+        Ok(Self::Csv(output))
+    }
+
+    /// Adds the rows of `block`, which is of the format of the table.
+    ///
+    /// # Errors
+    /// When the output cannot be written.
+    pub fn push(&mut self, block: Block) -> io::Result<()> {
+        match (self, block) {
+            (Self::Csv(output), Block::Lines(lines)) => output.write_all(lines.as_bytes()),
+            #[cfg(feature = "parquet")]
+            (Self::Parquet(table), Block::Columns(columns)) => table.push(columns),
+            _ => unreachable!("a block of another format"),
+        }
+    }
+
+    /// Writes what is left to write, and gives the output back.
+    ///
+    /// # Errors
+    /// When the output cannot be written.
+    pub fn finish(self) -> io::Result<W> {
+        match self {
+            Self::Csv(output) => Ok(output),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(table) => table.finish(),
+        }
+    }
+}
+
+/// The bytes of a table of these `rows`.
+///
+/// # Errors
+/// When there is no memory for it.
+pub fn table_of<'a>(
+    columns: &Columns<'_>,
+    is_parquet: bool,
+    rows: impl IntoIterator<Item = Vec<Value<'a>>>,
+) -> io::Result<Vec<u8>> {
+    let mut block = Block::empty(columns, is_parquet);
+    rows.into_iter().for_each(|row| block.push(&row));
+    let mut table = TableWriter::new(Vec::new(), columns, is_parquet)?;
+    table.push(block)?;
+    table.finish()
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use super::problem::State;
 /// An error that knows what to do about it.
 ///
 /// The program shows the help below the message and ends with the exit code that follows (`docs/reference.md`, "Exit
-/// codes"): 2 for a request at fault, 4 for an answer inside its own error bound, 1 for a computation without an answer.
+/// codes"): 5 for a missing program, 4 for an answer inside its own error bound, 2 for a request at fault, 1 for a
+/// computation without an answer.
 pub trait Advice: std::error::Error {
     /// The error that this one passes on as it is: its advice applies.
     fn inner(&self) -> Option<&dyn Advice> {
@@ -20,6 +21,11 @@ pub trait Advice: std::error::Error {
     /// Whether the answer lies inside its own error bound.
     fn is_undecided(&self) -> bool {
         self.inner().is_some_and(Advice::is_undecided)
+    }
+
+    /// Whether a program that is required is missing.
+    fn is_missing(&self) -> bool {
+        self.inner().is_some_and(Advice::is_missing)
     }
 
     /// What to change, for a person. Empty when the message says it all.

@@ -72,8 +72,9 @@ pub struct Layer {
 }
 
 /// When the target counts as perforated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, strum::EnumString, strum::IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Criterion {
     /// x = H, the paper's.
     #[default]

@@ -169,7 +169,7 @@ pub(super) fn files_of(numbers: &impl Serialize, page: String, figures: &[Figure
     for figure in figures {
         let name = &figure.name;
         files.push((format!("figures/{name}.svg"), figure.file().into_bytes()));
-        files.push((format!("tables/{name}.csv"), figure.table().to_csv().map_err(io::Error::other)?));
+        files.push((format!("tables/{name}.csv"), figure.table().to_csv()?));
     }
     Ok(files)
 }

@@ -9,24 +9,24 @@ use crate::suite::{Counts, Judged, Verdict};
 
 /// A judged suite.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct VerifyJson<'a> {
+pub struct VerifyJson {
     /// `penetrode/verify/1`.
     pub schema: &'static str,
     /// Title of the suite.
-    pub title: &'a str,
+    pub title: String,
     /// Verdict of the whole.
     pub verdict: Verdict,
     /// How many claims came to what.
     pub counts: Counts,
     /// The claims, in the suite's order.
-    pub claims: &'a [Judged],
+    pub claims: Vec<Judged>,
     /// Where it ran and what remakes it.
-    pub environment: &'a Environment,
+    pub environment: Environment,
 }
 
 /// What `stress --json` prints, and `report.json` of its folder.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct StressJson<'a> {
+pub struct StressJson {
     /// `penetrode/stress/1`.
     pub schema: &'static str,
     /// Verdict of the whole.
@@ -34,19 +34,19 @@ pub struct StressJson<'a> {
     /// How many cases came to what.
     pub counts: Counts,
     /// The cases, in the order of reports; last the random scenes as one.
-    pub claims: &'a [Judged],
+    pub claims: Vec<Judged>,
     /// What the random scenes showed; `null` where none were asked for.
-    pub random_scenes: Option<RandomScenesJson<'a>>,
+    pub random_scenes: Option<RandomScenesJson>,
     /// Where it ran and what remakes it.
-    pub environment: &'a Environment,
+    pub environment: Environment,
 }
 
 /// What many random scenes showed.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct RandomScenesJson<'a> {
+pub struct RandomScenesJson {
     /// Scenes, critical velocities and defects, counted.
     #[serde(flatten)]
-    pub summary: &'a Summary,
+    pub summary: Summary,
     /// Outcomes by method.
     pub methods: Vec<TallyJson>,
     /// Worst errors by method and quantity.
@@ -80,34 +80,40 @@ pub struct WorstJson {
     pub text: Option<String>,
 }
 
-impl<'a> VerifyJson<'a> {
+impl VerifyJson {
     /// The run as data.
-    pub fn new(run: &'a Run<'_>) -> Self {
+    pub fn new(run: &Run<'_>) -> Self {
         let counts = Counts::of_claims(run.judged);
-        let (schema, title) = ("penetrode/verify/1", run.suite.title.as_str());
-        Self { schema, title, verdict: counts.verdict(), counts, claims: run.judged, environment: &run.environment }
+        Self {
+            schema: "penetrode/verify/1",
+            title: run.suite.title.clone(),
+            verdict: counts.verdict(),
+            counts,
+            claims: run.judged.to_vec(),
+            environment: run.environment.clone(),
+        }
     }
 }
 
-impl<'a> StressJson<'a> {
+impl StressJson {
     /// The run as data.
-    pub fn new(run: &'a Run<'_>) -> Self {
+    pub fn new(run: &Run<'_>) -> Self {
         let counts = Counts::of_claims(run.judged);
         Self {
             schema: "penetrode/stress/1",
             verdict: counts.verdict(),
             counts,
-            claims: run.judged,
+            claims: run.judged.to_vec(),
             random_scenes: run
                 .random
                 .map(|(summary, wall_ms)| RandomScenesJson::new(summary, run.environment.seed, wall_ms)),
-            environment: &run.environment,
+            environment: run.environment.clone(),
         }
     }
 }
 
-impl<'a> RandomScenesJson<'a> {
-    fn new(summary: &'a Summary, seed: u64, wall_ms: f64) -> Self {
+impl RandomScenesJson {
+    fn new(summary: &Summary, seed: u64, wall_ms: f64) -> Self {
         let text = |index: u64| {
             let title = format!("random scene {index} of seed {seed}");
             extreme_scenes::scene_text(&extreme_scenes::scene(seed, index), &title)
@@ -120,6 +126,6 @@ impl<'a> RandomScenesJson<'a> {
             scene: worst.index,
             text: text(worst.index),
         });
-        Self { summary, methods: methods.collect(), worst: worst.collect(), wall_ms }
+        Self { summary: summary.clone(), methods: methods.collect(), worst: worst.collect(), wall_ms }
     }
 }

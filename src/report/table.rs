@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
+use std::io;
 
 /// A table: names of the columns, and rows of the same length.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,13 +40,13 @@ impl Table {
     ///
     /// # Errors
     /// Only if memory for it cannot be had.
-    pub fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+    pub fn to_csv(&self) -> io::Result<Vec<u8>> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(&self.header)?;
         for row in &self.rows {
             writer.write_record(row.iter().map(|value| cell(value).into_owned()))?;
         }
-        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+        writer.into_inner().map_err(csv::IntoInnerError::into_error)
     }
 }
 

@@ -16,6 +16,7 @@ use super::grid_convergence::{
 };
 use super::order::{Class, Exclusion, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
 use super::quantity::Quantity;
+use super::verdict::Verdict;
 use crate::exchange::tables::{self, At, Column, Fault, Format, Need, Place, Row, TableError};
 use crate::physics::{Advice, Shown};
 
@@ -371,19 +372,6 @@ pub struct Expectation {
     pub exact: Option<ExactValues>,
 }
 
-/// A judgement. The order of the variants is the order of severity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Converging, and as expected where something was expected.
-    Passed,
-    /// Neither can be shown.
-    Undecided,
-    /// A criterion failed.
-    Failed,
-}
-
 /// One row of one column.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
@@ -456,17 +444,6 @@ pub struct Audit {
     pub findings: Vec<Finding>,
     /// One per column, in the order of the table.
     pub quantities: Vec<QuantityAudit>,
-}
-
-impl Audit {
-    /// Exit code (docs/reference.md, "Exit codes"): 0 passed, 3 failed, 4 undecided.
-    pub fn exit_code(&self) -> u8 {
-        match self.verdict {
-            Verdict::Passed => 0,
-            Verdict::Failed => 3,
-            Verdict::Undecided => 4,
-        }
-    }
 }
 
 /// Judges a table.
@@ -779,13 +756,18 @@ mod tests {
                 });
                 for exact in [None, Some(5.0)] {
                     let audit = judge_text(&text, Some(order), exact);
-                    assert_eq!(audit.exit_code(), 0, "{rows} rows, order {order}, {exact:?}: {:?}", audit.findings);
+                    assert_eq!(
+                        audit.verdict,
+                        Verdict::Passed,
+                        "{rows} rows, order {order}, {exact:?}: {:?}",
+                        audit.findings
+                    );
                     assert_ne!(
-                        judge_text(&text, Some(3.0 - order), exact).exit_code(),
-                        0,
+                        judge_text(&text, Some(3.0 - order), exact).verdict,
+                        Verdict::Passed,
                         "{rows} rows, order {order}"
                     );
-                    assert_eq!(judge_text(&text, None, exact).exit_code(), 0);
+                    assert_eq!(judge_text(&text, None, exact).verdict, Verdict::Passed);
                 }
             }
         }
@@ -800,9 +782,9 @@ mod tests {
                 let text = table(12, |h, i| 0.17 + 0.01 * h.powf(order) * deviations[i as usize]);
                 for exact in [None, Some(0.17)] {
                     let audit = judge_text(&text, Some(order), exact);
-                    assert_eq!(audit.exit_code(), 0, "order {order}, {exact:?}: {:?}", audit.findings);
+                    assert_eq!(audit.verdict, Verdict::Passed, "order {order}, {exact:?}: {:?}", audit.findings);
                     let missed = judge_text(&text, Some(3.0 - order), exact);
-                    assert_eq!(missed.exit_code(), 3);
+                    assert_eq!(missed.verdict, Verdict::Failed);
                     assert_eq!(kinds(&missed), [FindingKind::OrderMissed]);
                 }
             }
@@ -811,11 +793,11 @@ mod tests {
 
     #[test]
     fn a_diverging_table_fails_where_its_reverse_passes() {
-        assert_eq!(judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None).exit_code(), 0);
+        assert_eq!(judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None).verdict, Verdict::Passed);
         let text = "dt_s,depth_m\n8e-6,1.01\n4e-6,1.04\n2e-6,1.16\n1e-6,1.64\n";
         for (order, exact) in [(None, None), (Some(2.0), None), (None, Some(1.0)), (Some(2.0), Some(1.0))] {
             let audit = judge_text(text, order, exact);
-            assert_eq!((audit.exit_code(), audit.quantities[0].class), (3, Class::Diverging));
+            assert_eq!((audit.verdict, audit.quantities[0].class), (Verdict::Failed, Class::Diverging));
             assert_eq!(kinds(&audit), [FindingKind::Diverging]);
             assert!(audit.quantities[0].error_bands.is_empty(), "no error bar for what diverges");
         }
@@ -827,7 +809,7 @@ mod tests {
             let text = table(6, |h, i| 1.0 + 0.1 * h.powf(decay) * f64::from(1 - 2 * (i % 2)));
             for exact in [None, Some(1.0)] {
                 let audit = judge_text(&text, None, exact);
-                assert_eq!(audit.exit_code(), 3, "decay {decay}, {exact:?}: {:?}", audit.findings);
+                assert_eq!(audit.verdict, Verdict::Failed, "decay {decay}, {exact:?}: {:?}", audit.findings);
                 assert!(matches!(kinds(&audit)[0], FindingKind::Oscillating | FindingKind::Diverging));
             }
         }
@@ -837,11 +819,11 @@ mod tests {
     fn constants_and_zero_errors_are_undecided() {
         let text = table(6, |_, _| 0.173);
         let audit = judge_text(&text, Some(2.0), None);
-        assert_eq!((audit.exit_code(), kinds(&audit)), (4, vec![FindingKind::Constant]));
+        assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Undecided, vec![FindingKind::Constant]));
         let audit = judge_text(&text, Some(2.0), Some(0.173));
-        assert_eq!((audit.exit_code(), kinds(&audit)), (4, vec![FindingKind::ZeroError]));
+        assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Undecided, vec![FindingKind::ZeroError]));
         let audit = judge_text(&text, Some(2.0), Some(0.2));
-        assert_eq!((audit.exit_code(), kinds(&audit)), (4, vec![FindingKind::Constant]));
+        assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Undecided, vec![FindingKind::Constant]));
     }
 
     #[test]
@@ -857,7 +839,7 @@ mod tests {
                 let text = table(rows, |_, i| values[i as usize]);
                 let cases = [(Some(1.0), None), (Some(2.0), None), (Some(2.0), Some(5.0)), (None, None)];
                 for (case, (order, exact)) in cases.into_iter().enumerate() {
-                    passed[size][case] += usize::from(judge_text(&text, order, exact).exit_code() == 0);
+                    passed[size][case] += usize::from(judge_text(&text, order, exact).verdict == Verdict::Passed);
                 }
             }
         }
@@ -871,9 +853,9 @@ mod tests {
     #[test]
     fn convergence_to_something_else_than_the_exact_value_fails() {
         let text = table(7, |h, _| 1.01 + 0.1 * h * h);
-        assert_eq!(judge_text(&text, Some(2.0), None).exit_code(), 0);
+        assert_eq!(judge_text(&text, Some(2.0), None).verdict, Verdict::Passed);
         let audit = judge_text(&text, None, Some(1.0));
-        assert_eq!(audit.exit_code(), 3);
+        assert_eq!(audit.verdict, Verdict::Failed);
         assert!(kinds(&audit).contains(&FindingKind::WrongLimit), "{:?}", audit.findings);
     }
 
@@ -881,7 +863,7 @@ mod tests {
     fn rows_that_differ_from_the_exact_value_by_their_printed_digits_only_are_left_out() {
         let text = table(9, |h, _| ((0.173_214_1 + 0.02 * h * h) * 1e6).round() / 1e6);
         let audit = judge_text(&text, Some(2.0), Some(0.173_214_1));
-        assert_eq!(audit.exit_code(), 0, "{:?}", audit.findings);
+        assert_eq!(audit.verdict, Verdict::Passed, "{:?}", audit.findings);
         let finest = audit.quantities[0].points[0];
         assert_eq!((finest.used, finest.excluded), (false, Some(Exclusion::RoundOffFloor)));
     }
@@ -890,10 +872,10 @@ mod tests {
     fn not_finite_values_fail_in_every_spelling() {
         for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
             let audit = judge_text(&format!("dt_s,depth_m\n{BASE}16e-6,{cell}\n"), Some(2.0), Some(1.0));
-            assert_eq!((audit.exit_code(), kinds(&audit)), (3, vec![FindingKind::NotFinite]), "{cell}");
+            assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Failed, vec![FindingKind::NotFinite]), "{cell}");
         }
         let audit = judge_text(&format!("dt_s,depth_m\n{BASE}nan,2\n"), None, None);
-        assert_eq!((audit.exit_code(), kinds(&audit)), (3, vec![FindingKind::NotFinite]));
+        assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Failed, vec![FindingKind::NotFinite]));
         let text = audit.quantities[0].reason.clone();
         assert!(text.starts_with("run.csv:6: "), "{text}");
     }
@@ -902,7 +884,7 @@ mod tests {
     fn a_bad_column_fails_the_table_and_leaves_the_good_one_judged() {
         let text = "dt_s,depth_m,time_s\n1e-6,1.01,1\n2e-6,1.04,nan\n4e-6,1.16,1\n8e-6,1.64,1\n";
         let audit = judge_text(text, Some(2.0), None);
-        assert_eq!(audit.exit_code(), 3);
+        assert_eq!(audit.verdict, Verdict::Failed);
         assert_eq!(audit.quantities[0].verdict, Verdict::Passed);
     }
 
@@ -910,7 +892,10 @@ mod tests {
     fn rows_out_of_order_and_twice_the_same_are_put_right_and_mentioned() {
         let text = "dt_s,depth_m\n4e-6,1.16\n1e-6,1.01\n8e-6,1.64\n2e-6,1.04\n1e-6,1.01\n";
         let audit = judge_text(text, Some(2.0), None);
-        assert_eq!((audit.exit_code(), kinds(&audit)), (0, vec![FindingKind::Unsorted, FindingKind::DuplicateRows]));
+        assert_eq!(
+            (audit.verdict, kinds(&audit)),
+            (Verdict::Passed, vec![FindingKind::Unsorted, FindingKind::DuplicateRows])
+        );
         let straight = judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None);
         assert_eq!(audit.quantities, straight.quantities);
     }
@@ -934,7 +919,7 @@ mod tests {
     fn an_empty_column_of_a_template_is_left_out_and_mentioned() {
         let text = "dt_s,depth_m,velocity_m_s\n1e-6,1.01,\n2e-6,1.04,\n4e-6,1.16,\n8e-6,1.64,\n";
         let audit = judge_text(text, Some(2.0), None);
-        assert_eq!((audit.exit_code(), kinds(&audit)), (0, vec![FindingKind::EmptyColumn]));
+        assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Passed, vec![FindingKind::EmptyColumn]));
     }
 
     #[test]

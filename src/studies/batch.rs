@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::critical_velocity::{self, CriticalError};
 use super::random_scenes::Generator;
-use crate::exchange::tables::{Cells, Column, Format, Kind, Need, Place, Row, Rows, TableError, Value, push_line};
+use crate::exchange::tables::{Block, Column, Format, Kind, Need, Place, Row, Rows, TableError, Value};
 use crate::integrators::lanes::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, Taylor};
 use crate::physics::parameter::{Absence, Parameter};
@@ -104,9 +104,8 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
         }),
         thickness: row.optional(5)?,
         criterion: match row.text(11)? {
-            "" | "full-depth" => Criterion::FullDepth,
-            "ndrc" => Criterion::Ndrc,
-            other => return Err(row.refuse_cell(11, other, "not full-depth or ndrc").into()),
+            "" => Criterion::default(),
+            name => name.parse().map_err(|_| row.refuse_cell(11, name, "not full-depth or ndrc"))?,
         },
         velocity: Some(row.number(10)?),
     })
@@ -172,42 +171,19 @@ impl Scenes {
         }
     }
 
-    /// The row of results of scene `index`, whose number is `row`: `write` gets its cells in the order of
-    /// [`RESULT_COLUMNS`].
-    fn result<T>(
-        &self,
-        index: usize,
-        row: u64,
-        answer: &Result<Answer, RowError>,
-        write: impl FnOnce(&[Value<'_>]) -> T,
-    ) -> T {
-        let message = self.message(index, answer);
-        let (outcome, numbers) = match answer {
-            Ok(answer) => (answer.solution.outcome.name(), answer.numbers()),
-            Err(_) => ("", [None; 7]),
-        };
-        let [a, b, c, d, e, f, g] = numbers.map(Value::Number);
-        write(&[Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, Value::Text(&message)])
-    }
-
-    /// Lines of results for `answers`, which begin with scene `from`; their numbers in the table begin with `first`.
-    pub fn result_lines(&self, from: usize, first: u64, answers: &[Result<Answer, RowError>]) -> String {
-        let mut lines = String::with_capacity(160 * answers.len());
+    /// The rows of results of `answers`, which begin with scene `from`; their numbers in the table begin with `first`.
+    pub fn results(&self, from: usize, first: u64, answers: &[Result<Answer, RowError>], is_parquet: bool) -> Block {
+        let mut block = Block::empty(&RESULT_COLUMNS, is_parquet);
         for ((index, row), answer) in (from..).zip(first..).zip(answers) {
-            self.result(index, row, answer, |cells| push_line(&mut lines, cells));
+            let message = self.message(index, answer);
+            let (outcome, numbers) = match answer {
+                Ok(answer) => (answer.solution.outcome.name(), answer.numbers()),
+                Err(_) => ("", [None; 7]),
+            };
+            let [a, b, c, d, e, f, g] = numbers.map(Value::Number);
+            block.push(&[Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, Value::Text(&message)]);
         }
-        lines
-    }
-
-    /// The same column by column.
-    pub fn result_columns(&self, from: usize, first: u64, answers: &[Result<Answer, RowError>]) -> Vec<Cells> {
-        let mut columns = RESULT_COLUMNS.map(|(_, kind)| Cells::empty(kind));
-        for ((index, row), answer) in (from..).zip(first..).zip(answers) {
-            self.result(index, row, answer, |cells| {
-                columns.iter_mut().zip(cells).for_each(|(column, cell)| column.push(*cell));
-            });
-        }
-        columns.into()
+        block
     }
 }
 
@@ -371,7 +347,8 @@ mod tests {
             "7,,,,,,,,,\"line 2: the strength fc [Pa] = -36000000 is not admissible: it must be a number > 0\"\n",
             "8,,,,,,,,,\"line 3, column 12: `a \"\"b\"\"\u{fffd}` in `criterion` is not full-depth or ndrc\"\n",
         ];
-        assert_eq!(scenes.result_lines(0, 7, &found), lines.concat());
+        let Block::Lines(text) = scenes.results(0, 7, &found, false) else { unreachable!("not CSV") };
+        assert_eq!(text, lines.concat());
         assert_eq!((Tally::of(&found).rows, Tally::of(&found).bad), (2, 2));
     }
 

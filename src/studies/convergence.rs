@@ -10,9 +10,10 @@ use super::critical_velocity::{self, CriticalError};
 pub use super::error::Truth as Yardstick;
 use super::error::{Truth, flight_error, free_quantities, signed_error};
 use super::formal_order::{Path, formal_order};
-use super::order::{Class, FitError, OrderFit, OrderVerdict, StepError, fit};
+use super::order::{Class, FitError, OrderFit, StepError, fit};
 use super::quantity::Quantity;
 use super::random::Random;
+use super::verdict::Verdict;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{CentralDifference, Detail, Flight, IntegrationError};
 use crate::physics::{Advice, Problem, ResolveError, Scene};
@@ -72,11 +73,11 @@ impl QuantityStudy {
     /// Whether the fit confirms the order expected.
     ///
     /// Over tolerances the class decides: a controller holds the error of a step, not of the flight.
-    pub fn verdict(&self) -> OrderVerdict {
+    pub fn verdict(&self) -> Verdict {
         match (&self.fit, self.formal) {
-            (Ok(fit), _) if !self.evaluations.is_empty() && fit.class == Class::Converging => OrderVerdict::Pass,
+            (Ok(fit), _) if !self.evaluations.is_empty() && fit.class == Class::Converging => Verdict::Passed,
             (Ok(fit), Some(formal)) => fit.verdict(formal),
-            _ => OrderVerdict::Undecided,
+            _ => Verdict::Undecided,
         }
     }
 }

@@ -21,6 +21,8 @@ pub mod rounding;
 pub mod sensitivity;
 pub mod stability;
 pub mod sweep;
+pub mod verdict;
 
 pub use formal_order::{Path, Stretch, formal_order};
 pub use quantity::Quantity;
+pub use verdict::Verdict;

@@ -26,6 +26,8 @@ use nalgebra::{DVector, Matrix3, Vector3};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::verdict::Verdict;
+
 use crate::physics::Shown;
 
 /// Two-sided level of the band behind a verdict: the chance that a right order falls outside.
@@ -167,18 +169,6 @@ pub struct PowerLaw {
     pub residual_scatter: f64,
 }
 
-/// Whether a fit confirms an order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OrderVerdict {
-    /// Converging, the order is in the band, and its integer neighbours are not.
-    Pass,
-    /// The order is outside the band, or the errors grow.
-    Fail,
-    /// Neither can be said.
-    Undecided,
-}
-
 /// The result of [`fit`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OrderFit {
@@ -253,16 +243,16 @@ impl OrderFit {
     }
 
     /// Whether the fit confirms the order `formal`.
-    pub fn verdict(&self, formal: f64) -> OrderVerdict {
-        let Some(line) = self.line else { return OrderVerdict::Undecided };
+    pub fn verdict(&self, formal: f64) -> Verdict {
+        let Some(line) = self.line else { return Verdict::Undecided };
         let [low, high] = line.verdict_band;
         let holds = |order: f64| low <= order && order <= high;
         match self.class {
-            Class::Diverging => OrderVerdict::Fail,
+            Class::Diverging => Verdict::Failed,
             // An error that does not fall misses every order that its band excludes, whatever else it does.
-            Class::Converging | Class::Undecided if !holds(formal) => OrderVerdict::Fail,
-            Class::Converging if !holds(formal - 1.0) && !holds(formal + 1.0) => OrderVerdict::Pass,
-            _ => OrderVerdict::Undecided,
+            Class::Converging | Class::Undecided if !holds(formal) => Verdict::Failed,
+            Class::Converging if !holds(formal - 1.0) && !holds(formal + 1.0) => Verdict::Passed,
+            _ => Verdict::Undecided,
         }
     }
 }

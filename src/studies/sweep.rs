@@ -275,6 +275,11 @@ impl Plan {
         &self.axes
     }
 
+    /// Paths of the varied numbers.
+    pub fn paths(&self) -> Vec<String> {
+        self.axes.iter().map(|axis| axis.parameter.to_string()).collect()
+    }
+
     /// The scene before anything is varied.
     pub fn scene(&self) -> &Scene {
         &self.scene

@@ -1,40 +1,10 @@
-//! What a claim can come to, and how verdicts add up.
+//! How the verdicts of claims add up.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::claim::Judged;
-
-/// What became of a claim.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Measured within its limit.
-    Passed,
-    /// Does not apply to the scene; does not count.
-    Skipped,
-    /// The measurement cannot decide: noise, round-off floor, inside an error bar.
-    Undecided,
-    /// Beyond its limit, or not a number.
-    Failed,
-}
-
-impl Verdict {
-    /// Name in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::Skipped => "skipped",
-            Self::Undecided => "undecided",
-            Self::Failed => "failed",
-        }
-    }
-
-    /// `measured` against `limit`. What is not a number fails: it never passes.
-    pub fn of(measured: f64, limit: f64) -> Self {
-        if measured <= limit { Self::Passed } else { Self::Failed }
-    }
-}
+pub use crate::studies::Verdict;
 
 /// How many claims came to what.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -105,14 +75,6 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_is_not_a_number_never_passes() {
-        assert_eq!(Verdict::of(f64::NAN, 1.0), Verdict::Failed);
-        assert_eq!(Verdict::of(f64::INFINITY, 1.0), Verdict::Failed);
-        assert_eq!(Verdict::of(1.0, f64::NAN), Verdict::Failed);
-        assert_eq!(Verdict::of(1.0, 1.0), Verdict::Passed);
-    }
 
     #[test]
     fn an_empty_suite_has_shown_nothing() {

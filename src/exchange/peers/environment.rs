@@ -13,6 +13,8 @@ use std::{env, fs, io, thread};
 
 use thiserror::Error;
 
+use crate::physics::Advice;
+
 /// Environment variable that names the cache folder.
 pub const CACHE_VARIABLE: &str = "PENETRODE_CACHE";
 /// Environment variable that names the Python interpreter to start from; `python3` without it.
@@ -104,6 +106,12 @@ pub enum PeerSetupError {
         /// The system's reason.
         cause: String,
     },
+}
+
+impl Advice for PeerSetupError {
+    fn is_missing(&self) -> bool {
+        true
+    }
 }
 
 /// Scripts and an interpreter that has their packages.

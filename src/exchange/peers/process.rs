@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use super::wire::{PeerAnswer, PeerRequest};
-use crate::physics::Outcome;
+use crate::physics::{Advice, Outcome};
 
 /// Exit code by which a peer says, before its greeting, that a program it needs is missing.
 pub const EXIT_CODE_MISSING: i32 = 5;
@@ -138,15 +138,21 @@ pub enum PeerStartError {
     Greeting(#[from] PeerFailure),
 }
 
-impl PeerStartError {
-    /// Whether a required program is missing (exit code 5).
-    pub fn is_missing(&self) -> bool {
+impl Advice for PeerStartError {
+    fn is_missing(&self) -> bool {
         matches!(self, Self::Missing { .. })
     }
 
-    /// Whether the request was at fault (exit code 2).
-    pub fn is_usage(&self) -> bool {
+    fn is_usage(&self) -> bool {
         matches!(self, Self::Command { .. })
+    }
+
+    fn help(&self) -> String {
+        match self {
+            Self::Command { .. } => "give a program and its arguments, quoted as for a shell".to_owned(),
+            Self::Missing { .. } => String::new(),
+            Self::Greeting(_) => "see the peer protocol: verification/peers/README.md".to_owned(),
+        }
     }
 }
 

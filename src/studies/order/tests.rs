@@ -77,9 +77,9 @@ fn a_right_order_passes_and_one_off_by_one_fails_for_every_noise() {
             for _ in 0..300 {
                 let fit = fit(&power(&mut noise, 120, order, kind)).unwrap();
                 let line = fit.line.unwrap();
-                assert_eq!(fit.verdict(order), OrderVerdict::Pass, "{name}, order {order}: {line:?}");
+                assert_eq!(fit.verdict(order), Verdict::Passed, "{name}, order {order}: {line:?}");
                 for off in [-1.0, 1.0] {
-                    assert_eq!(fit.verdict(order + off), OrderVerdict::Fail, "{name}, order {order}: {line:?}");
+                    assert_eq!(fit.verdict(order + off), Verdict::Failed, "{name}, order {order}: {line:?}");
                 }
             }
         }
@@ -92,7 +92,7 @@ fn an_order_off_by_a_half_fails_with_120_points() {
     for (name, kind) in KINDS {
         let trials = 400;
         let caught = (0..trials)
-            .filter(|_| fit(&power(&mut noise, 120, 1.5, kind)).unwrap().verdict(2.0) == OrderVerdict::Fail)
+            .filter(|_| fit(&power(&mut noise, 120, 1.5, kind)).unwrap().verdict(2.0) == Verdict::Failed)
             .count();
         assert!(caught * 100 >= trials * 99, "{name}: {caught} of {trials}");
     }
@@ -110,7 +110,7 @@ fn smooth_errors_give_the_order_to_the_next_term() {
         let fit = fit(&points).unwrap();
         let line = fit.line.unwrap();
         assert!((line.order - order).abs() < 0.01, "{line:?}");
-        assert_eq!(fit.verdict(order), OrderVerdict::Pass);
+        assert_eq!(fit.verdict(order), Verdict::Passed);
     }
 }
 
@@ -124,7 +124,7 @@ fn a_round_off_floor_is_excluded_and_marked() {
             .map(|h| StepError::new(h, h * h * (0.1 + noise.uniform()) + 1e-14 * noise.normal()))
             .collect();
         let fit = fit(&points).unwrap();
-        assert_eq!(fit.verdict(2.0), OrderVerdict::Pass, "{:?}", fit.line);
+        assert_eq!(fit.verdict(2.0), Verdict::Passed, "{:?}", fit.line);
         assert!(fit.points[0].excluded == Some(Exclusion::RoundOffFloor) && !fit.points[0].used);
         assert!(fit.points.iter().filter(|p| p.used).all(|p| p.step > 1e-7), "floor in the fit");
     }
@@ -141,7 +141,7 @@ fn a_few_points_bent_by_round_off_do_not_decide_over_the_many_above() {
             .map(|h| StepError::new(h, 0.1 * h * h + 1e-12 * noise.normal()))
             .collect();
         let fit = fit(&points).unwrap();
-        assert_eq!(fit.verdict(2.0), OrderVerdict::Pass, "{seed}: {:?}", fit.line);
+        assert_eq!(fit.verdict(2.0), Verdict::Passed, "{seed}: {:?}", fit.line);
         assert!(fit.used() >= 30, "{seed}: {} of 60", fit.used());
     }
 }
@@ -158,7 +158,7 @@ fn one_finest_error_a_third_off_by_round_off_does_not_bend_the_line() {
             .map(|h| StepError::new(h, 7.5e-6 * h * h * if h == finest { 1.31 } else { 1.0 + 3e-3 * noise.normal() }))
             .collect();
         let fit = fit(&points).unwrap();
-        assert_eq!(fit.verdict(2.0), OrderVerdict::Pass, "{seed}: {:?}", fit.line);
+        assert_eq!(fit.verdict(2.0), Verdict::Passed, "{seed}: {:?}", fit.line);
         assert!(fit.used() >= 30, "{seed}: {} of 60", fit.used());
     }
 }
@@ -169,7 +169,7 @@ fn an_error_that_levels_off_above_round_off_is_no_floor_and_fails() {
     let mut noise = Noise(6);
     let points: Vec<_> = noise.steps(60, 1e-1, 4.0).into_iter().map(|h| StepError::new(h, h * h + 1e-6)).collect();
     let fit = fit(&points).unwrap();
-    assert_eq!(fit.verdict(2.0), OrderVerdict::Fail, "{:?} {}", fit.line, fit.reason);
+    assert_eq!(fit.verdict(2.0), Verdict::Failed, "{:?} {}", fit.line, fit.reason);
     assert!(fit.points.iter().all(|point| point.excluded != Some(Exclusion::RoundOffFloor)));
 }
 
@@ -182,7 +182,7 @@ fn the_fine_end_decides_between_two_orders() {
         .map(|h| StepError::new(h, (h * h + 1e-3 * h) * (0.5 + noise.uniform())))
         .collect();
     let fit = fit(&points).unwrap();
-    assert_eq!(fit.verdict(1.0), OrderVerdict::Pass, "{:?}", fit.line);
+    assert_eq!(fit.verdict(1.0), Verdict::Passed, "{:?}", fit.line);
     assert_eq!(fit.points.last().unwrap().excluded, Some(Exclusion::PreAsymptotic));
 }
 
@@ -195,7 +195,7 @@ fn pure_round_off_and_zeros_are_at_the_floor_and_never_pass() {
     for points in [round_off, zeros] {
         let fit = fit(&points).unwrap();
         assert_eq!(fit.class, Class::AtFloor, "{}", fit.reason);
-        assert_eq!(fit.verdict(2.0), OrderVerdict::Undecided);
+        assert_eq!(fit.verdict(2.0), Verdict::Undecided);
     }
 }
 
@@ -206,13 +206,13 @@ fn diverging_constant_and_alternating_errors_never_pass() {
     let with =
         |f: &dyn Fn(f64) -> f64| fit(&steps.iter().map(|&h| StepError::new(h, f(h))).collect::<Vec<_>>()).unwrap();
     let diverging = with(&|h| 1e-4 / h);
-    assert_eq!((diverging.class, diverging.verdict(1.0)), (Class::Diverging, OrderVerdict::Fail));
+    assert_eq!((diverging.class, diverging.verdict(1.0)), (Class::Diverging, Verdict::Failed));
     let constant = with(&|_| 1e-4);
-    assert_eq!((constant.class, constant.verdict(2.0)), (Class::Undecided, OrderVerdict::Fail));
+    assert_eq!((constant.class, constant.verdict(2.0)), (Class::Undecided, Verdict::Failed));
     let alternating: Vec<_> =
         (0..12).map(|i| StepError::new(0.5_f64.powi(i), 0.1 * 0.25_f64.powi(i) * f64::from(1 - 2 * (i % 2)))).collect();
     let alternating = fit(&alternating).unwrap();
-    assert_eq!((alternating.class, alternating.verdict(2.0)), (Class::Oscillating, OrderVerdict::Undecided));
+    assert_eq!((alternating.class, alternating.verdict(2.0)), (Class::Oscillating, Verdict::Undecided));
 }
 
 #[test]
@@ -298,21 +298,21 @@ fn an_order_passes_only_where_its_band_holds_neither_neighbour() {
         OrderFit { line, class, reason: String::new(), points: Vec::new() }.verdict(2.0)
     };
     for (band, expected) in [
-        ([1.5, 2.5], OrderVerdict::Pass),
-        ([2.0, 2.9], OrderVerdict::Pass),
-        ([1.1, 2.0], OrderVerdict::Pass),
-        ([1.0, 2.1], OrderVerdict::Undecided),
-        ([1.9, 3.0], OrderVerdict::Undecided),
-        ([0.5, 3.5], OrderVerdict::Undecided),
-        ([2.1, 2.9], OrderVerdict::Fail),
-        ([1.1, 1.9], OrderVerdict::Fail),
+        ([1.5, 2.5], Verdict::Passed),
+        ([2.0, 2.9], Verdict::Passed),
+        ([1.1, 2.0], Verdict::Passed),
+        ([1.0, 2.1], Verdict::Undecided),
+        ([1.9, 3.0], Verdict::Undecided),
+        ([0.5, 3.5], Verdict::Undecided),
+        ([2.1, 2.9], Verdict::Failed),
+        ([1.1, 1.9], Verdict::Failed),
     ] {
         assert_eq!(verdict(Class::Converging, band), expected, "{band:?}");
-        let undecided = if expected == OrderVerdict::Fail { expected } else { OrderVerdict::Undecided };
+        let undecided = if expected == Verdict::Failed { expected } else { Verdict::Undecided };
         assert_eq!(verdict(Class::Undecided, band), undecided, "{band:?}");
-        assert_eq!(verdict(Class::Diverging, band), OrderVerdict::Fail);
+        assert_eq!(verdict(Class::Diverging, band), Verdict::Failed);
         for class in [Class::Oscillating, Class::AtFloor] {
-            assert_eq!(verdict(class, band), OrderVerdict::Undecided);
+            assert_eq!(verdict(class, band), Verdict::Undecided);
         }
     }
 }
@@ -405,7 +405,7 @@ fn what_is_left_of_too_few_points_says_so() {
     let of = |errors: &[f64]| {
         let point = |(i, &error): (usize, &f64)| StepError { step: 1.0 + i as f64, error, round_off: Some(1.0) };
         let fit = fit(&errors.iter().enumerate().map(point).collect::<Vec<_>>()).unwrap();
-        assert_eq!((fit.line, fit.used(), fit.verdict(1.0)), (None, 0, OrderVerdict::Undecided));
+        assert_eq!((fit.line, fit.used(), fit.verdict(1.0)), (None, 0, Verdict::Undecided));
         (fit.class, fit.reason)
     };
     // Three zeros and two errors of the size of their round-off.

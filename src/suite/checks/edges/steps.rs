@@ -9,7 +9,7 @@ use crate::integrators::{
 };
 use crate::physics::{Outcome, Problem, Stage};
 use crate::studies::error::flight_error;
-use crate::studies::order::{OrderFit, OrderVerdict, StepError, fit};
+use crate::studies::order::{OrderFit, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 use crate::studies::random_scenes::closed_form_errors_at_inputs;
@@ -196,7 +196,7 @@ fn orders_by_rule(subject: &Subject<'_>) -> Found {
                     // Over 1,002 seeds these 90 steps confirmed each order.
                     let sizes = random_steps(subject.random("S7"), &problem, 3e-3, 90)?;
                     let (order, fit) = fitted(&problem, (velocity, boundaries), quantity, &sizes)?;
-                    seen.expect(fit.verdict(formal) == OrderVerdict::Pass, || {
+                    seen.expect(fit.verdict(formal) == Verdict::Passed, || {
                         format!("{velocity}, {boundaries}, {quantity}: {order:.2} of {formal}, {}", fit.reason)
                     });
                 }
