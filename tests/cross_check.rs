@@ -3,21 +3,21 @@
 //! Where Python 3 or the network for its packages is missing, the tests say so in one line and count as ignored; with
 //! `CI=true` they fail, so that a build server cannot quietly check nothing.
 
-use std::env;
-use std::error::Error;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::Arguments;
 use penetrode::exchange::peers::{
     BundledPeer, Environment, Peer, PeerRequest, PeerSetupError, RecordedFlight, Recording, recordings,
 };
 use penetrode::integrators::{ClosedForm, Detail, Integrator, Taylor};
-use penetrode::physics::{Outcome, Problem, Stage, Target};
+use penetrode::physics::{Outcome, Problem, Stage};
 use serde_json::{Value, json};
 
-/// What makes a test fail; every error of ours chains into it.
-type Check = Result<(), Box<dyn Error>>;
+use self::trials::{Check, Failure, ensure, required, trial};
+
+#[path = "it/trials.rs"]
+mod trials;
 
 /// A claim, the program that it needs, and how it is checked.
 type Claim = (&'static str, BundledPeer, fn(BundledPeer, &Environment) -> Check);
@@ -42,34 +42,29 @@ fn main() {
         let hit = |pattern: &String| if arguments.exact { name == pattern } else { name.contains(pattern.as_str()) };
         arguments.filter.as_ref().is_none_or(hit) && !arguments.skip.iter().any(hit)
     };
-    let required = env::var("CI").is_ok_and(|value| value == "true");
     let mut said = Vec::new();
     let mut trials = Vec::new();
     for (name, peer, check) in CLAIMS {
         // Neither a list nor tests that were not asked for are worth a download.
         if arguments.list || !wanted(name) {
-            trials.push(Trial::test(name, || Ok(())));
+            trials.push(trial(name, || Ok(())));
             continue;
         }
-        let trial = match Environment::ensure(peer, &mut |line| eprintln!("{line}")) {
-            Ok(environment) => {
-                Trial::test(name, move || check(peer, &environment).map_err(|error| Failed::from(error.to_string())))
-            }
+        trials.push(match Environment::ensure(peer, &mut |line| eprintln!("{line}")) {
+            Ok(environment) => trial(name, move || check(peer, &environment)),
             Err(error) => {
                 let reason = error.to_string();
-                if !required && !said.contains(&reason) {
+                if !required() && !said.contains(&reason) {
                     eprintln!("cross-check ignored: {reason}");
                     said.push(reason.clone());
                 }
                 // Asked for all the same (`--ignored`), it fails: it cannot pass without having checked.
-                Trial::test(name, move || Err(Failed::from(reason))).with_ignored_flag(!required)
+                trial(name, move || Err(reason.into())).with_ignored_flag(!required())
             }
-        };
-        trials.push(trial);
+        });
     }
-    trials.push(Trial::test("without_a_network_the_set_up_says_so_in_one_line_and_leaves_nothing", || {
-        says_that_the_network_is_missing().map_err(|error| Failed::from(error.to_string()))
-    }));
+    let name = "without_a_network_the_set_up_says_so_in_one_line_and_leaves_nothing";
+    trials.push(trial(name, says_that_the_network_is_missing));
     libtest_mimic::run(&arguments, trials).exit();
 }
 
@@ -78,21 +73,25 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
     let recording = recording_of(peer)?;
     let mut live = Peer::start(&environment.command(peer))?;
     let identity = live.identity();
-    if (&identity.name, &identity.version) != (&recording.program, &recording.version) {
-        return Err(format!("{identity} is not the program of the recording, {}", recording.version).into());
-    }
+    ensure!(
+        !((&identity.name, &identity.version) != (&recording.program, &recording.version)),
+        "{identity} is not the program of the recording, {}",
+        recording.version
+    );
     for flight in &recording.flights {
         let answer = live.ask(&flight.request)?;
         let differences = answer
             .differences_from(&flight.answer.flight(&flight.problem()), &flight.problem())
             .ok_or_else(|| format!("{}: {} was {}", flight.scene, answer.outcome, flight.answer.outcome))?;
-        if answer.events.len() != flight.answer.events.len() {
-            return Err(format!("{}: {:?} were {:?}", flight.scene, answer.events, flight.answer.events).into());
-        }
+        ensure!(
+            answer.events.len() == flight.answer.events.len(),
+            "{}: {:?} were {:?}",
+            flight.scene,
+            answer.events,
+            flight.answer.events
+        );
         for difference in differences {
-            if difference.relative > 1e-10 * difference.conditioning {
-                return Err(format!("{}: {difference:?}", flight.scene).into());
-            }
+            ensure!(difference.relative <= 1e-10 * difference.conditioning, "{}: {difference:?}", flight.scene);
         }
         // And ours: two unlike methods agree within what the program is trusted to.
         let ours = Taylor::default().solve(&flight.problem(), Detail::Events)?;
@@ -100,9 +99,11 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
             .differences_from(&ours, &flight.problem())
             .ok_or_else(|| format!("{}: {} is {} by the Taylor series", flight.scene, answer.outcome, ours.outcome))?;
         for difference in differences {
-            if difference.relative > recording.trusted_to() * difference.conditioning {
-                return Err(format!("{} against the Taylor series: {difference:?}", flight.scene).into());
-            }
+            ensure!(
+                difference.relative <= recording.trusted_to() * difference.conditioning,
+                "{} against the Taylor series: {difference:?}",
+                flight.scene
+            );
         }
     }
     Ok(())
@@ -114,15 +115,17 @@ fn times_itself(peer: BundledPeer, environment: &Environment) -> Check {
     for options in if peer == BundledPeer::Heyoka { &["", " --lanes 4"][..] } else { &[""] } {
         let mut live = Peer::start(&format!("{}{options}", environment.command(peer)))?;
         let (plain, timed) = (live.ask(&request)?, live.ask(&request.clone().timed(20))?);
-        if (plain.depth_m, plain.time_s, plain.velocity_m_s) != (timed.depth_m, timed.time_s, timed.velocity_m_s) {
-            return Err(format!("{timed:?} is not {plain:?}").into());
-        }
+        ensure!(
+            !((plain.depth_m, plain.time_s, plain.velocity_m_s) != (timed.depth_m, timed.time_s, timed.velocity_m_s)),
+            "{timed:?} is not {plain:?}"
+        );
         let (Some(median), Some([low, high])) = (timed.wall_ns, timed.wall_ns_quartiles) else {
             return Err(format!("no time or no spread: {timed:?}").into());
         };
-        if !(0.0 < low && low <= median && median <= high) || plain.wall_ns_quartiles.is_some() {
-            return Err(format!("{low} .. {median} .. {high} ns").into());
-        }
+        ensure!(
+            !(!(0.0 < low && low <= median && median <= high) || plain.wall_ns_quartiles.is_some()),
+            "{low} .. {median} .. {high} ns"
+        );
     }
     Ok(())
 }
@@ -154,21 +157,17 @@ fn survives_coincidence(peer: BundledPeer, environment: &Environment) -> Check {
 fn misses_a_perforation(peer: BundledPeer, environment: &Environment) -> Check {
     // The tunnel scene without drag: a constant force, integrated exactly, so that error estimates vanish.
     let force = 848_230.0;
-    let problem = Problem {
-        mass: 2.0,
-        impact_speed: 300.0,
-        exit_depth: 0.128,
-        stages: [Stage::crater(force / 0.1, 0.1), Stage::tunnel(force, 0.0)].into_iter().collect(),
-        crater: Some(0),
-        target: Target::CraterAndTunnel,
-    };
+    let crater = Some(Stage::crater(force / 0.1, 0.1));
+    let problem = Problem::crater_and_tunnel(2.0, 300.0, crater, Stage::tunnel(force, 0.0)).with_exit(0.128);
     let exact = ClosedForm.solve(&problem, Detail::Events)?;
     let mut live = Peer::start(&environment.command(peer))?;
     let missed = live.ask(&PeerRequest::from_problem(&problem, 1e-12))?;
-    if missed.outcome.is_stop() && missed.depth_m > 1.1 * exact.end.depth && exact.outcome == Outcome::Perforated {
-        return Ok(());
-    }
-    Err(format!("it is expected to call a stop beyond the exit depth, and answers {missed:?}").into())
+    let is_missed = missed.outcome.is_stop() && missed.depth_m > 1.1 * exact.end.depth;
+    ensure!(
+        is_missed && exact.outcome == Outcome::Perforated,
+        "it is expected to call a stop beyond the exit depth, and answers {missed:?}"
+    );
+    Ok(())
 }
 
 /// The peers are asked over the same protocol by other people's tools, which make mistakes.
@@ -208,18 +207,22 @@ fn survives_hostile_lines(peer: BundledPeer, environment: &Environment) -> Check
     let output = child.wait_with_output()?;
     let answers = output.stdout.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
     let answers = answers.map(serde_json::from_slice).collect::<Result<Vec<Value>, _>>()?;
-    if answers.len() != asked.len() || !output.status.success() {
-        return Err(format!("{} answers to {} lines, {}", answers.len(), asked.len(), output.status).into());
-    }
+    ensure!(
+        !(answers.len() != asked.len() || !output.status.success()),
+        "{} answers to {} lines, {}",
+        answers.len(),
+        asked.len(),
+        output.status
+    );
     for (line, answer) in hostile.iter().zip(&answers) {
-        if answer["error"].as_str().is_none_or(str::is_empty) {
-            return Err(format!("{line:.200} is answered with {answer}").into());
-        }
+        let is_refused = answer["error"].as_str().is_some_and(|cause| !cause.is_empty());
+        ensure!(is_refused, "{line:.200} is answered with {answer}");
     }
     let last = &answers[hostile.len()];
-    if last["id"] != json!(7) || !last["depth_m"].is_f64() || !last["wall_ns"].is_number() {
-        return Err(format!("the request after them is answered with {last}").into());
-    }
+    ensure!(
+        !(last["id"] != json!(7) || !last["depth_m"].is_f64() || !last["wall_ns"].is_number()),
+        "the request after them is answered with {last}"
+    );
     Ok(())
 }
 
@@ -231,9 +234,10 @@ fn says_that_the_network_is_missing() -> Check {
         Err(error @ PeerSetupError::NoPackages { .. }) => {
             let left: Vec<_> = std::fs::read_dir(cache.path())?.filter_map(Result::ok).map(|e| e.file_name()).collect();
             let message = error.to_string();
-            if message.contains('\n') || left.iter().any(|name| !name.to_string_lossy().starts_with("scripts-")) {
-                return Err(format!("{message:?} and {left:?}").into());
-            }
+            ensure!(
+                !(message.contains('\n') || left.iter().any(|name| !name.to_string_lossy().starts_with("scripts-"))),
+                "{message:?} and {left:?}"
+            );
             Ok(())
         }
         // Without Python there is nothing to install from; the other tests say so.
@@ -242,13 +246,13 @@ fn says_that_the_network_is_missing() -> Check {
     }
 }
 
-fn recording_of(peer: BundledPeer) -> Result<Recording, Box<dyn Error>> {
+fn recording_of(peer: BundledPeer) -> Result<Recording, Failure> {
     let command = format!("python3 verification/peers/{}", peer.arguments().join(" "));
     let found = recordings()?.into_iter().find(|recording| recording.command == command);
     found.ok_or_else(|| format!("no recording of `{command}`").into())
 }
 
-fn flight(scene: &str) -> Result<RecordedFlight, Box<dyn Error>> {
+fn flight(scene: &str) -> Result<RecordedFlight, Failure> {
     let recording = recording_of(BundledPeer::SundaeAdams)?;
     let found = recording.flights.into_iter().find(|flight| flight.scene == scene);
     found.ok_or_else(|| format!("no scene `{scene}`").into())

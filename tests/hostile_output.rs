@@ -7,98 +7,78 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Output, Stdio};
+use std::process::{Command, ExitCode, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use libtest_mimic::{Arguments, Trial};
 
-fn program(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_penetrode"));
-    command.args(arguments).current_dir(folder);
-    command
-}
+use self::program::{names, program, run_in, scene};
 
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    program(folder, arguments).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// Names of what is in `folder`.
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
+#[path = "it/program.rs"]
+mod program;
 
 /// A folder with a scene, a table of scenes, a table of measured points and one of shots.
 fn workplace() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification");
-    fs::copy(shipped.join("scenes/paper-slab.toml"), folder.path().join("slab.toml")).unwrap();
-    fs::copy(shipped.join("experiments/huang2011_penetration.csv"), folder.path().join("shots.csv")).unwrap();
-    fs::write(folder.path().join("points.svg"), "H/d,E_c/(d3 fc)\n3,10.5\n").unwrap();
+    let place = |name: &str| folder.path().join(name);
+    fs::copy(scene("paper-slab"), place("slab.toml")).unwrap();
+    fs::copy("verification/experiments/huang2011_penetration.csv", place("shots.csv")).unwrap();
+    fs::write(place("points.svg"), "H/d,E_c/(d3 fc)\n3,10.5\n").unwrap();
     let rows = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,velocity_m_s\n2,0.05,0.72,36e6,2300,300\n";
-    fs::write(folder.path().join("rows.csv"), rows).unwrap();
+    fs::write(place("rows.csv"), rows).unwrap();
     folder
 }
 
-const VARY: [&str; 2] = ["--vary", "H/d=1:5:3"];
+const SWEEP: &str = "sweep slab.toml --vary H/d=1:5:3";
 
 /// Commands that write a table, without the name of it.
-fn table_commands() -> Vec<Vec<&'static str>> {
-    vec![
-        vec!["solve", "slab.toml", "--trajectory"],
-        vec!["batch", "rows.csv", "--out"],
-        vec!["sweep", "slab.toml", VARY[0], VARY[1], "--out"],
-        vec!["map", "--out"],
-        vec!["experiments", "shots.csv", "--out"],
-    ]
-}
+const TABLES: [&str; 5] = [
+    "solve slab.toml --trajectory",
+    "batch rows.csv --out",
+    "sweep slab.toml --vary H/d=1:5:3 --out",
+    "map --out",
+    "experiments shots.csv --out",
+];
 
 fn an_input_is_never_replaced() {
     let folder = workplace();
-    let before: Vec<_> = names(folder.path()).iter().map(|n| fs::read(folder.path().join(n)).unwrap()).collect();
+    let contents = || -> Vec<_> {
+        names(folder.path()).into_iter().map(|name| (fs::read(folder.path().join(&name)).unwrap(), name)).collect()
+    };
+    let before = contents();
     #[cfg(unix)]
     std::os::unix::fs::symlink("slab.toml", folder.path().join("link.csv")).unwrap();
-    let sweep = |more: &[&'static str]| [&["sweep", "slab.toml", VARY[0], VARY[1]], more].concat();
-    for arguments in [
-        vec!["solve", "slab.toml", "--trajectory", "slab.toml"],
-        vec!["solve", "slab.toml", "--trajectory", "./slab.toml"],
-        vec!["solve", "slab.toml", "--trajectory", "link.csv"],
-        vec!["batch", "rows.csv", "--out", "rows.csv"],
-        sweep(&["--out", "slab.toml"]),
-        sweep(&["--out", "link.csv"]),
-        sweep(&["--data", "points.svg", "--out", "points.svg"]),
+    for line in [
+        "solve slab.toml --trajectory slab.toml",
+        "solve slab.toml --trajectory ./slab.toml",
+        "solve slab.toml --trajectory link.csv",
+        "batch rows.csv --out rows.csv",
+        &format!("{SWEEP} --out slab.toml"),
+        &format!("{SWEEP} --out link.csv"),
+        &format!("{SWEEP} --data points.svg --out points.svg"),
         // The figure would land on the points.
-        sweep(&["--data", "points.svg", "--out", "points.csv"]),
+        &format!("{SWEEP} --data points.svg --out points.csv"),
         // The figure would land on the table.
-        sweep(&["--out", "new.svg"]),
-        vec!["map", "--out", "new.svg"],
-        vec!["experiments", "shots.csv", "--out", "shots.csv"],
-        vec!["experiments", "shots.csv", "--out", "new.svg"],
+        &format!("{SWEEP} --out new.svg"),
+        "map --out new.svg",
+        "experiments shots.csv --out shots.csv",
+        "experiments shots.csv --out new.svg",
     ] {
-        let output = run(folder.path(), &arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
-        assert!(output.stdout.is_empty());
-        assert!(said(&output).contains("would replace") && said(&output).contains(" help: name "), "{}", said(&output));
+        let refused = run_in(folder.path(), line).refused();
+        assert!(refused.contains("would replace") && refused.contains(" help: name "), "{line}: {refused}");
     }
     fs::remove_file(folder.path().join("link.csv")).unwrap();
-    let after: Vec<_> = names(folder.path()).iter().map(|n| fs::read(folder.path().join(n)).unwrap()).collect();
-    assert!(before == after, "{:?}", names(folder.path()));
+    assert!(contents() == before, "{:?}", names(folder.path()));
 }
 
 fn what_cannot_be_written_says_why_and_leaves_nothing() {
-    for command in table_commands() {
+    for command in TABLES {
         let folder = workplace();
         fs::create_dir(folder.path().join("folder")).unwrap();
         // A figure's place is taken by a folder: then there is no table either.
         fs::create_dir(folder.path().join("taken.svg")).unwrap();
-        let has_figure = !["solve", "batch"].contains(&command[0]);
+        let has_figure = !command.starts_with("solve") && !command.starts_with("batch");
         let before = names(folder.path());
         for (path, remedy, code) in [
             ("missing/out.csv", "there is no folder missing help: make the folder first", 2),
@@ -110,12 +90,9 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
             if path == "taken.csv" && !has_figure {
                 continue;
             }
-            let output = run(folder.path(), &[&command[..], &[path]].concat());
-            let text = said(&output);
-            assert_eq!(output.status.code(), Some(code), "{command:?} {path}: {text}");
-            let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-            assert!(words.contains("cannot") && words.contains(remedy), "{command:?} {path}: {text}");
-            assert!(!text.contains(".penetrode-"), "the name of a temporary file: {text}");
+            let said = run_in(folder.path(), &format!("{command} {path}")).expect(code);
+            assert!(said.words().contains("cannot") && said.words().contains(remedy), "{command} {path}: {said:?}");
+            assert!(!said.err.contains(".penetrode-"), "the name of a temporary file: {said:?}");
             assert_eq!(names(folder.path()), before, "{command:?} {path}");
         }
     }
@@ -128,11 +105,10 @@ fn a_pipe_and_a_broken_link_are_no_files_and_a_link_stays() {
     let place = |name: &str| folder.path().join(name);
     assert!(Command::new("mkfifo").arg(place("pipe.csv")).status().unwrap().success());
     symlink("nowhere.csv", place("broken.csv")).unwrap();
-    for command in table_commands() {
+    for command in TABLES {
         for name in ["pipe.csv", "broken.csv"] {
-            let output = run(folder.path(), &[&command[..], &[name]].concat());
-            assert_eq!(output.status.code(), Some(2), "{command:?} {name}");
-            assert!(said(&output).contains("it is a device, a pipe"), "{}", said(&output));
+            let said = run_in(folder.path(), &format!("{command} {name}")).expect(2);
+            assert!(said.err.contains("it is a device, a pipe"), "{said:?}");
         }
     }
     assert!(fs::symlink_metadata(place("pipe.csv")).unwrap().file_type().is_fifo());
@@ -140,7 +116,7 @@ fn a_pipe_and_a_broken_link_are_no_files_and_a_link_stays() {
 
     fs::write(place("real.csv"), "old").unwrap();
     symlink("real.csv", place("link.csv")).unwrap();
-    assert!(run(folder.path(), &["batch", "rows.csv", "--out", "link.csv"]).status.success());
+    run_in(folder.path(), "batch rows.csv --out link.csv").expect(0);
     assert!(fs::symlink_metadata(place("link.csv")).unwrap().is_symlink());
     assert!(fs::read_to_string(place("real.csv")).unwrap().starts_with("row,outcome"));
 }
@@ -148,20 +124,19 @@ fn a_pipe_and_a_broken_link_are_no_files_and_a_link_stays() {
 #[cfg(target_os = "linux")]
 fn a_standard_error_that_cannot_be_written_changes_no_exit_code() {
     let folder = workplace();
-    for (arguments, code) in [(&["solve", "missing.toml"][..], 2), (&["batch", "rows.csv", "--out", "t.csv"], 0)] {
+    for (line, code) in [("solve missing.toml", 2), ("batch rows.csv --out t.csv", 0)] {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let status = program(folder.path(), arguments).stdout(Stdio::null()).stderr(full).status().unwrap();
-        assert_eq!(status.code(), Some(code), "{arguments:?}");
+        let status = program(folder.path(), line).stdout(Stdio::null()).stderr(full).status().unwrap();
+        assert_eq!(status.code(), Some(code), "{line}");
     }
 }
 
 fn a_report_goes_into_a_new_an_empty_or_its_own_folder_alone() {
     let folder = workplace();
-    let verify = |out: &str| run(folder.path(), &["verify", "--only", "eq15", "--out", out]);
+    let verify = |out: &str| run_in(folder.path(), &format!("verify --only eq15 --out {out}"));
     fs::create_dir(folder.path().join("empty")).unwrap();
     for out in ["new", "empty", "new", "deep/down"] {
-        let output = verify(out);
-        assert_eq!(output.status.code(), Some(0), "{out}: {}", said(&output));
+        verify(out).expect(0);
         assert!(folder.path().join(out).join("report.html").exists());
     }
     fs::write(folder.path().join("new/notes.txt"), "years of work").unwrap();
@@ -172,31 +147,26 @@ fn a_report_goes_into_a_new_an_empty_or_its_own_folder_alone() {
         ("thesis", "is not a report of penetrode"),
         ("slab.toml", "is a file, and a report is a folder"),
     ] {
-        let output = verify(out);
-        assert_eq!(output.status.code(), Some(2), "{out}: {}", said(&output));
-        let words = said(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+        let words = verify(out).refused();
         assert!(words.contains(why) && words.contains("help: name another folder with --out"), "{words}");
-        assert!(output.stdout.is_empty());
     }
     assert_eq!(fs::read_to_string(folder.path().join("new/notes.txt")).unwrap(), "years of work");
-    let output = verify("/proc/report");
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(!said(&output).contains(".penetrode-"), "{}", said(&output));
+    assert_eq!(names(&folder.path().join("thesis")), ["thesis.txt"]);
+    let said = verify("/proc/report").expect(1);
+    assert!(!said.err.contains(".penetrode-"), "{said:?}");
     assert!(!names(folder.path()).iter().any(|name| name.starts_with('.')), "{:?}", names(folder.path()));
 }
 
 fn a_table_may_go_to_standard_output() {
     let folder = workplace();
     let before = names(folder.path());
-    for command in table_commands() {
-        let output = run(folder.path(), &[&command[..], &["-"]].concat());
-        assert_eq!(output.status.code(), Some(0), "{command:?}: {}", said(&output));
-        let mut table = csv::Reader::from_reader(&output.stdout[..]);
+    for command in TABLES {
+        let said = run_in(folder.path(), &format!("{command} -")).expect(0);
+        let mut table = csv::Reader::from_reader(said.out.as_bytes());
         let width = table.headers().unwrap().len();
-        assert!(width > 2 && table.records().map(Result::unwrap).count() > 0, "{command:?}");
-        if command[0] != "batch" {
-            let both = run(folder.path(), &[&command[..], &["-", "--json"]].concat());
-            assert_eq!(both.status.code(), Some(2), "{command:?}");
+        assert!(width > 2 && table.records().map(Result::unwrap).count() > 0, "{command}");
+        if !command.starts_with("batch") {
+            run_in(folder.path(), &format!("{command} - --json")).expect(2);
         }
     }
     assert_eq!(names(folder.path()), before);
@@ -204,17 +174,12 @@ fn a_table_may_go_to_standard_output() {
 
 fn a_reader_that_goes_away_is_no_error() {
     let folder = workplace();
-    for command in ["solve slab.toml", "batch random:200000 --out -", "sweep slab.toml --vary H/d=1:18:2000 --out -"] {
-        let mut arguments: Vec<_> = command.split(' ').collect();
-        let mut child = program(folder.path(), &std::mem::take(&mut arguments))
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+    for line in ["solve slab.toml", "batch random:200000 --out -", "sweep slab.toml --vary H/d=1:18:2000 --out -"] {
+        let mut command = program(folder.path(), line);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
-        let output = child.wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(0), "{command}: {}", said(&output));
-        assert!(!said(&output).contains("error"), "{command}: {}", said(&output));
+        let said = program::Said::from(child.wait_with_output().unwrap()).expect(0);
+        assert!(!said.err.contains("error"), "{line}: {said:?}");
     }
 }
 
@@ -236,22 +201,22 @@ fn assert_whole_or_none(folder: &Path, when: Duration) {
 fn an_interrupted_run_leaves_the_old_results_or_none() {
     let folder = workplace();
     let report = folder.path().join("report");
-    let verify = ["verify", "--only", "closed-form", "--out", "report"];
+    let verify = "verify --only closed-form --out report";
     let table = folder.path().join("out.csv");
-    let batch = ["batch", "random:60000", "--out", "out.csv"];
+    let batch = "batch random:60000 --out out.csv";
     let started = Instant::now();
-    assert!([0, 3, 4].contains(&run(folder.path(), &verify).status.code().unwrap()));
+    assert!([0, 3, 4].contains(&run_in(folder.path(), verify).code));
     let verify_takes = started.elapsed();
     let started = Instant::now();
-    assert_eq!(run(folder.path(), &batch).status.code(), Some(0));
+    run_in(folder.path(), batch).expect(0);
     let batch_takes = started.elapsed();
     let old = fs::read(&table).unwrap();
     for signal in ["INT", "KILL"] {
         for part in 1..=6 {
-            for (arguments, takes) in [(&verify[..], verify_takes), (&batch[..], batch_takes)] {
+            for (line, takes) in [(verify, verify_takes), (batch, batch_takes)] {
                 let when = takes * part / 5;
-                let mut child =
-                    program(folder.path(), arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+                let mut command = program(folder.path(), line);
+                let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
                 thread::sleep(when);
                 // It may have ended before.
                 let _ =
@@ -263,7 +228,7 @@ fn an_interrupted_run_leaves_the_old_results_or_none() {
         }
     }
     // And what was left behind does not stand in the way of the next run.
-    assert!([0, 3, 4].contains(&run(folder.path(), &verify).status.code().unwrap()));
+    assert!([0, 3, 4].contains(&run_in(folder.path(), verify).code));
     assert_whole_or_none(&report, Duration::ZERO);
     assert!(report.exists());
 }
@@ -297,36 +262,34 @@ fn a_full_disk_leaves_the_old_results() {
     let out = |name: &str| disk.0.join(name).display().to_string();
     let (csv, report) = (out("out.csv"), out("report"));
     // Small results fit, and are the old ones.
-    let small = ["sweep", "slab.toml", VARY[0], VARY[1], "--out", &csv];
-    assert_eq!(run(place.path(), &small).status.code(), Some(0));
-    assert_eq!(run(place.path(), &["verify", "--only", "eq15", "--out", &report]).status.code(), Some(0));
+    run_in(place.path(), &format!("{SWEEP} --out {csv}")).expect(0);
+    run_in(place.path(), &format!("verify --only eq15 --out {report}")).expect(0);
     let old = fs::read(&csv).unwrap();
     let before = names(&disk.0);
     let contents = names(&disk.0.join("report"));
-    for arguments in [
-        &["batch", "random:20000", "--out", &csv][..],
-        &["sweep", "slab.toml", "--vary", "H/d=1:18:4000", "--out", &csv],
-        &["solve", "slab.toml", "--method", "central-difference", "--dt", "10 ns", "--trajectory", &csv],
-        &["verify", "--only", "e", "--out", &report],
+    for line in [
+        format!("batch random:20000 --out {csv}"),
+        format!("sweep slab.toml --vary H/d=1:18:4000 --out {csv}"),
+        format!("solve slab.toml --method central-difference --dt '10 ns' --trajectory {csv}"),
+        format!("verify --only e --out {report}"),
     ] {
-        let output = run(place.path(), arguments);
-        let text = said(&output);
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
-        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(
-            ["no storage space", "No space left"].iter().any(|cause| words.contains(cause))
-                && words.contains("make room on the disk"),
-            "{text}"
-        );
-        assert!(!text.contains(".penetrode-"), "{text}");
-        assert!(fs::read(&csv).unwrap() == old, "{arguments:?}: the old table is gone");
-        assert_eq!(names(&disk.0), before, "{arguments:?}");
-        assert_eq!(names(&disk.0.join("report")), contents, "{arguments:?}");
+        let said = run_in(place.path(), &line).expect(1);
+        let is_named = ["no storage space", "No space left"].iter().any(|cause| said.words().contains(cause));
+        assert!(is_named && said.words().contains("make room on the disk"), "{said:?}");
+        assert!(!said.err.contains(".penetrode-"), "{said:?}");
+        assert!(fs::read(&csv).unwrap() == old, "{line}: the old table is gone");
+        assert_eq!(names(&disk.0), before, "{line}");
+        assert_eq!(names(&disk.0.join("report")), contents, "{line}");
         assert_whole_or_none(&disk.0.join("report"), Duration::ZERO);
     }
 }
 
 const HOSTILE: &str = "<script>alert(1)</script> ]]> & \\u001b[31m \\u0007 =1+1 \\u202e \\\" ' `x`";
+
+/// Whether a terminal would obey `text`.
+fn steers(text: &str) -> bool {
+    text.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}')
+}
 
 fn texts_of_a_scene_steer_no_terminal() {
     let folder = workplace();
@@ -334,28 +297,24 @@ fn texts_of_a_scene_steer_no_terminal() {
     let (_, rest) = scene.split_once("title").unwrap();
     let (_, rest) = rest.split_once('\n').unwrap();
     fs::write(folder.path().join("hostile.toml"), format!("title = \"{HOSTILE}\"\n{rest}")).unwrap();
-    for arguments in [
-        vec!["solve", "hostile.toml", "--explain", "--sensitivities"],
-        vec!["critical", "hostile.toml"],
-        vec!["converge", "hostile.toml", "--points", "8"],
-        vec!["sweep", "hostile.toml", VARY[0], VARY[1], "--out", "out.csv"],
-        vec!["solve", "\u{1b}[31m.toml"],
-        vec!["batch", "\u{1b}[31m.csv", "--out", "out.csv"],
-        vec!["audit", "\u{1b}[31m.csv"],
-        vec!["experiments", "\u{1b}[31m.csv"],
-        vec!["verify", "\u{1b}[31m.toml"],
-        vec!["solve", "slab.toml", "--trajectory", "\u{1b}[31m/out.csv"],
-        vec!["sweep", "slab.toml", "--vary", "\u{1b}[31m=1:2:3"],
+    for line in [
+        "solve hostile.toml --explain --sensitivities",
+        "critical hostile.toml",
+        "converge hostile.toml --points 8",
+        "sweep hostile.toml --vary H/d=1:5:3 --out out.csv",
+        "solve \u{1b}[31m.toml",
+        "batch \u{1b}[31m.csv --out out.csv",
+        "audit \u{1b}[31m.csv",
+        "experiments \u{1b}[31m.csv",
+        "verify \u{1b}[31m.toml",
+        "solve slab.toml --trajectory \u{1b}[31m/out.csv",
+        "sweep slab.toml --vary \u{1b}[31m=1:2:3",
     ] {
-        let output = run(folder.path(), &arguments);
-        for stream in [&output.stdout, &output.stderr] {
-            let text = String::from_utf8(stream.clone()).unwrap();
-            assert!(!text.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}'), "{arguments:?}: {text:?}");
-        }
+        let said = run_in(folder.path(), line);
+        assert!(!steers(&said.out) && !steers(&said.err), "{said:?}");
     }
     // JSON keeps the title as it is, its control characters written as escapes.
-    let json = run(folder.path(), &["solve", "hostile.toml", "--json"]);
-    let answer: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    let answer = run_in(folder.path(), "solve hostile.toml --json").json();
     assert!(answer["scene"]["title"].as_str().unwrap().contains("\u{1b}[31m"));
 }
 
@@ -367,10 +326,8 @@ fn texts_of_a_suite_are_text_in_every_file_of_the_report() {
          limit = 1e-300\nreason = \"{HOSTILE}\"\n"
     );
     fs::write(folder.path().join("suite.toml"), suite).unwrap();
-    let output = run(folder.path(), &["verify", "suite.toml", "--out", "report"]);
-    assert!([0, 3, 4].contains(&output.status.code().unwrap()), "{}", said(&output));
-    let text = String::from_utf8(output.stdout.clone()).unwrap();
-    assert!(!text.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}'), "{text:?}");
+    let said = run_in(folder.path(), "verify suite.toml --out report");
+    assert!([0, 3, 4].contains(&said.code) && !steers(&said.out), "{said:?}");
     let report = folder.path().join("report");
     for name in fs::read_to_string(report.join("contents.txt")).unwrap().lines() {
         let text = fs::read_to_string(report.join(name)).unwrap();
@@ -392,40 +349,30 @@ fn texts_of_a_suite_are_text_in_every_file_of_the_report() {
 
 fn main() -> ExitCode {
     let can_mount = SmallDisk::new().is_some();
-    let trial = |name: &str, claim: fn()| {
-        Trial::test(name, move || {
-            claim();
-            Ok(())
-        })
-    };
+    macro_rules! trial {
+        ($claim:ident) => {
+            Trial::test(stringify!($claim), || {
+                $claim();
+                Ok(())
+            })
+        };
+    }
     #[cfg_attr(not(target_os = "linux"), expect(unused_mut, reason = "two more trials on Linux"))]
     let mut trials = vec![
-        trial("an_input_is_never_replaced", an_input_is_never_replaced),
-        trial("what_cannot_be_written_says_why_and_leaves_nothing", what_cannot_be_written_says_why_and_leaves_nothing),
-        trial(
-            "a_report_goes_into_a_new_an_empty_or_its_own_folder_alone",
-            a_report_goes_into_a_new_an_empty_or_its_own_folder_alone,
-        ),
-        trial("a_table_may_go_to_standard_output", a_table_may_go_to_standard_output),
-        trial("a_reader_that_goes_away_is_no_error", a_reader_that_goes_away_is_no_error),
-        trial("an_interrupted_run_leaves_the_old_results_or_none", an_interrupted_run_leaves_the_old_results_or_none),
-        trial("a_full_disk_leaves_the_old_results", a_full_disk_leaves_the_old_results).with_ignored_flag(!can_mount),
-        trial("texts_of_a_scene_steer_no_terminal", texts_of_a_scene_steer_no_terminal),
-        trial(
-            "texts_of_a_suite_are_text_in_every_file_of_the_report",
-            texts_of_a_suite_are_text_in_every_file_of_the_report,
-        ),
+        trial!(an_input_is_never_replaced),
+        trial!(what_cannot_be_written_says_why_and_leaves_nothing),
+        trial!(a_report_goes_into_a_new_an_empty_or_its_own_folder_alone),
+        trial!(a_table_may_go_to_standard_output),
+        trial!(a_reader_that_goes_away_is_no_error),
+        trial!(an_interrupted_run_leaves_the_old_results_or_none),
+        trial!(a_full_disk_leaves_the_old_results).with_ignored_flag(!can_mount),
+        trial!(texts_of_a_scene_steer_no_terminal),
+        trial!(texts_of_a_suite_are_text_in_every_file_of_the_report),
     ];
     #[cfg(target_os = "linux")]
     trials.extend([
-        trial(
-            "a_pipe_and_a_broken_link_are_no_files_and_a_link_stays",
-            a_pipe_and_a_broken_link_are_no_files_and_a_link_stays,
-        ),
-        trial(
-            "a_standard_error_that_cannot_be_written_changes_no_exit_code",
-            a_standard_error_that_cannot_be_written_changes_no_exit_code,
-        ),
+        trial!(a_pipe_and_a_broken_link_are_no_files_and_a_link_stays),
+        trial!(a_standard_error_that_cannot_be_written_changes_no_exit_code),
     ]);
     libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
 }

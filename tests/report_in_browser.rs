@@ -4,7 +4,6 @@
 //! build server cannot quietly check nothing.
 
 use std::env;
-use std::error::Error;
 use std::fs;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -15,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::Arguments;
 use penetrode::report::stress::files;
 use penetrode::report::{Environment, Run, folder};
 use penetrode::studies::extreme_scenes;
@@ -23,11 +22,18 @@ use penetrode::suite::Suite;
 use penetrode::suite::checks::PeerAnswers;
 use serde_json::Value;
 
-/// What makes a test fail; every error of ours chains into it.
-type Check = Result<(), Box<dyn Error>>;
+use self::trials::{Check, Failure, ensure};
+
+#[path = "it/trials.rs"]
+mod trials;
 
 /// Time that one page may take.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// What every run of the browser is given.
+const FLAGS: &str = "--headless --no-sandbox --disable-gpu --disable-background-networking --disable-component-update \
+                     --disable-default-apps --disable-extensions --disable-sync --no-first-run --no-pings \
+                     --hide-scrollbars --virtual-time-budget=10000";
 
 /// Folders of the pages: the report of the suite, and that of the stress cases.
 const PAGES: [&str; 2] = ["report", "stress"];
@@ -70,31 +76,22 @@ const CLAIMS: [Claim; 8] = [
 
 fn main() {
     let arguments = Arguments::from_args();
-    let required = env::var("CI").is_ok_and(|value| value == "true");
-    let stage = if arguments.list { Err("only listed".into()) } else { Stage::new() };
-    let mut trials = Vec::new();
-    match stage {
-        Ok(stage) => {
-            let stage = Arc::new(stage);
-            for (name, check) in CLAIMS {
-                let stage = Arc::clone(&stage);
-                trials.push(Trial::test(name, move || check(&stage).map_err(|error| Failed::from(error.to_string()))));
-            }
-        }
-        Err(error) => {
-            let reason = error.to_string();
-            if !required && !arguments.list {
-                eprintln!("report in a browser ignored: {reason}");
-            }
-            for (name, _) in CLAIMS {
-                let reason = reason.clone();
-                // Asked for all the same (`--ignored`), it fails: it cannot pass without having checked.
-                let trial = Trial::test(name, move || Err(Failed::from(reason)));
-                trials.push(trial.with_ignored_flag(!required && !arguments.list));
-            }
-        }
+    let stage =
+        if arguments.list { Err("only listed".into()) } else { Stage::new().map_err(|error| error.to_string()) };
+    if let Err(reason) = &stage
+        && !trials::required()
+        && !arguments.list
+    {
+        eprintln!("report in a browser ignored: {reason}");
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    let stage = Arc::new(stage);
+    let trial = |(name, check): Claim| {
+        let shown = Arc::clone(&stage);
+        // Asked for all the same (`--ignored`), it fails: it cannot pass without having checked.
+        let ignored = stage.is_err() && !trials::required() && !arguments.list;
+        trials::trial(name, move || check(shown.as_ref().as_ref().map_err(String::as_str)?)).with_ignored_flag(ignored)
+    };
+    libtest_mimic::run(&arguments, CLAIMS.map(trial).into()).exit();
 }
 
 /// A report, and the browser that shows it.
@@ -104,31 +101,13 @@ struct Stage {
 }
 
 impl Stage {
-    fn new() -> Result<Self, Box<dyn Error>> {
+    fn new() -> Result<Self, Failure> {
         let browser = browser().ok_or("Chromium is not installed")?;
         let mut suite = Suite::embedded()?;
         // Every kind of section and figure; the whole suite would add length, not kinds.
-        suite.claims.retain(|claim| {
-            [
-                "order/drag",
-                "order/jump",
-                "small-impact",
-                "invariant",
-                "peer",
-                "closed-form",
-                "self",
-                "events",
-                "stab",
-                "rounding",
-                "sweep",
-                "map",
-                "measured",
-                "layers",
-                "sensitivities",
-            ]
-            .iter()
-            .any(|start| claim.id.starts_with(start))
-        });
+        let starts = "order/drag order/jump small-impact invariant peer closed-form self events stab rounding sweep map measured \
+                      layers sensitivities";
+        suite.claims.retain(|claim| starts.split(' ').any(|start| claim.id.starts_with(start)));
         let judged = suite.run(1, &PeerAnswers::recorded()?, &|_| ());
         let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
         let folder = tempfile::tempdir()?;
@@ -149,7 +128,7 @@ impl Stage {
     }
 
     /// A copy of the page in `folder`, without its policy and with `inserted` before its end.
-    fn altered(&self, folder: &str, name: &str, inserted: &str) -> Result<PathBuf, Box<dyn Error>> {
+    fn altered(&self, folder: &str, name: &str, inserted: &str) -> Result<PathBuf, Failure> {
         let page = fs::read_to_string(self.page(folder))?;
         let start = page.find("<meta http-equiv=\"Content-Security-Policy\"").ok_or("the page has no policy")?;
         let end = start + page[start..].find('>').ok_or("the policy has no end")? + 1;
@@ -160,23 +139,10 @@ impl Stage {
     }
 
     /// Runs the browser on `page`; ends it when it takes too long.
-    fn show(&self, page: &Path, arguments: &[&str]) -> Result<Output, Box<dyn Error>> {
+    fn show(&self, page: &Path, arguments: &[&str]) -> Result<Output, Failure> {
         let profile = tempfile::tempdir()?;
         let mut child = Command::new(&self.browser)
-            .args([
-                "--headless",
-                "--no-sandbox",
-                "--disable-gpu",
-                "--disable-background-networking",
-                "--disable-component-update",
-                "--disable-default-apps",
-                "--disable-extensions",
-                "--disable-sync",
-                "--no-first-run",
-                "--no-pings",
-                "--hide-scrollbars",
-                "--virtual-time-budget=10000",
-            ])
+            .args(FLAGS.split(' '))
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .args(arguments)
             .arg(format!("file://{}", page.display()))
@@ -185,15 +151,8 @@ impl Stage {
             .stderr(Stdio::piped())
             .spawn()?;
         // Both pipes are emptied while it runs, or a long page would fill them and wait for ever.
-        let mut pipes = (child.stdout.take().ok_or("no pipe")?, child.stderr.take().ok_or("no pipe")?);
-        let stdout = thread::spawn(move || {
-            let mut text = Vec::new();
-            pipes.0.read_to_end(&mut text).map(|_| text)
-        });
-        let stderr = thread::spawn(move || {
-            let mut text = Vec::new();
-            pipes.1.read_to_end(&mut text).map(|_| text)
-        });
+        let stdout = all_of(child.stdout.take().ok_or("no pipe")?);
+        let stderr = all_of(child.stderr.take().ok_or("no pipe")?);
         let started = Instant::now();
         let status = loop {
             if let Some(status) = child.try_wait()? {
@@ -206,16 +165,18 @@ impl Stage {
             }
             thread::sleep(Duration::from_millis(20));
         };
-        let text = |reader: thread::JoinHandle<std::io::Result<Vec<u8>>>| reader.join().map_err(|_| "reader died");
-        Ok(Output { status, stdout: text(stdout)??, stderr: text(stderr)?? })
+        let [stdout, stderr] = [stdout, stderr].map(|reader| reader.join().map_err(|_| "reader died"));
+        Ok(Output { status, stdout: stdout??, stderr: stderr?? })
     }
 
     /// What the console said.
-    fn console(&self, page: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+    fn console(&self, page: &Path) -> Result<Vec<String>, Failure> {
         let output = self.show(page, &["--enable-logging=stderr", "--dump-dom"])?;
-        if !output.status.success() || !String::from_utf8_lossy(&output.stdout).contains("</html>") {
-            return Err(format!("the browser failed: {}", String::from_utf8_lossy(&output.stderr)).into());
-        }
+        ensure!(
+            !(!output.status.success() || !String::from_utf8_lossy(&output.stdout).contains("</html>")),
+            "the browser failed: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let stderr = String::from_utf8_lossy(&output.stderr);
         Ok(stderr.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect())
     }
@@ -223,7 +184,7 @@ impl Stage {
     /// What was asked for over the network: all of it goes to a proxy that listens here and gives nothing.
     ///
     /// What the browser asks its maker of its own accord, whatever the page, is left out.
-    fn requests(&self, page: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+    fn requests(&self, page: &Path) -> Result<Vec<String>, Failure> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let proxy = format!("--proxy-server=http://{}", listener.local_addr()?);
         let done = Arc::new(AtomicBool::new(false));
@@ -256,7 +217,7 @@ impl Stage {
     }
 
     /// What [`MEASURE`] finds in the page when it is `width` wide.
-    fn measure(&self, folder: &str, width: u32, dark: bool) -> Result<Value, Box<dyn Error>> {
+    fn measure(&self, folder: &str, width: u32, dark: bool) -> Result<Value, Failure> {
         let inner = self.altered(folder, &format!("measured-{width}-{dark}.html"), MEASURE)?;
         let name = inner.file_name().ok_or("no name")?.to_string_lossy().into_owned();
         // A window cannot be as narrow as a phone; a frame can.
@@ -280,43 +241,15 @@ impl Stage {
 }
 
 /// Measures the page that it stands in, everything unfolded, and tells its frame.
-const MEASURE: &str = r#"<script>addEventListener('load',()=>{
-const name=e=>e.tagName+(e.id?'#'+e.id:'')+' '+(e.textContent||'').trim().slice(0,40);
-const folded=document.documentElement.scrollWidth;
-document.querySelectorAll('details').forEach(d=>d.open=true);
-const width=document.documentElement.clientWidth, beyond=[];
-document.querySelectorAll('body *').forEach(e=>{
-  if(e.closest('.scroll')&&!e.classList.contains('scroll'))return;
-  if(e.closest('svg')&&e.tagName!='svg')return;
-  const r=e.getBoundingClientRect();
-  if(r.right>width+0.5&&r.width>0&&getComputedStyle(e).position!='absolute')beyond.push(name(e)+' '+r.right);
-});
-const texts=[];
-document.querySelectorAll('svg text').forEach(t=>{
-  const r=t.getBoundingClientRect(), s=t.closest('svg').getBoundingClientRect();
-  if(r.left<s.left-1||r.right>s.right+1||r.top<s.top-1||r.bottom>s.bottom+1)texts.push(name(t));
-});
-const rgb=c=>(c.match(/[\d.]+/g)||[]).map(Number);
-const lum=c=>{const[r,g,b]=c.map(v=>{v/=255;return v<=0.04045?v/12.92:((v+0.055)/1.055)**2.4});return 0.2126*r+0.7152*g+0.0722*b};
-const back=e=>{for(;e;e=e.parentElement){const c=rgb(getComputedStyle(e).backgroundColor);if(c.length==3||c[3]==1)return c.slice(0,3)}return[255,255,255]};
-const faint=[];
-document.querySelectorAll('body *').forEach(e=>{
-  if(![...e.childNodes].some(n=>n.nodeType==3&&n.textContent.trim()))return;
-  if(['TITLE','DESC','SCRIPT','STYLE'].includes(e.tagName.toUpperCase()))return;
-  const style=getComputedStyle(e), ink=rgb(e.closest('svg')?style.fill:style.color).slice(0,3);
-  const[a,b]=[lum(ink),lum(back(e))].sort((x,y)=>y-x), ratio=(a+0.05)/(b+0.05);
-  if(!(ratio>=4.5))faint.push(name(e)+' '+ratio.toFixed(2));
-});
-let level=0; const headings=[];
-document.querySelectorAll('h1,h2,h3,h4').forEach(h=>{const l=+h.tagName[1];if(l>level+1)headings.push(name(h));level=l});
-const ids=[...document.querySelectorAll('[id]')].map(e=>e.id), twice=ids.filter((id,i)=>ids.indexOf(id)!=i);
-const unnamed=[...document.querySelectorAll('svg')].filter(s=>s.getAttribute('role')!='img'||
-  !s.getAttribute('aria-labelledby').split(' ').every(id=>document.getElementById(id)?.textContent)).map(name);
-const dead=[...document.querySelectorAll('a[href^="\#"]')].filter(a=>!document.getElementById(a.getAttribute('href').slice(1))).map(name);
-parent.postMessage(JSON.stringify({width,folded,unfolded:document.documentElement.scrollWidth,beyond,texts,faint,
-  headings,twice,unnamed,dead,h1:document.querySelectorAll('h1').length,figures:document.querySelectorAll('figure').length,
-  svgs:document.querySelectorAll('svg').length,background:getComputedStyle(document.body).backgroundColor}),'*');
-})</script>"#;
+const MEASURE: &str = include_str!("browser/measure.html");
+
+/// Reads a pipe to its end, on a thread of its own.
+fn all_of(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<std::io::Result<Vec<u8>>> {
+    thread::spawn(move || {
+        let mut text = Vec::new();
+        pipe.read_to_end(&mut text).map(|_| text)
+    })
+}
 
 /// First line of a request, which is refused.
 fn refuse(mut stream: TcpStream) -> Option<String> {
@@ -343,9 +276,7 @@ fn browser() -> Option<PathBuf> {
 fn is_silent(stage: &Stage) -> Check {
     for folder in PAGES {
         let said = stage.console(&stage.page(folder))?;
-        if !said.is_empty() {
-            return Err(format!("{folder}: {}", said.join("\n")).into());
-        }
+        ensure!(said.is_empty(), "{folder}: {}", said.join("\n"));
     }
     Ok(())
 }
@@ -354,23 +285,20 @@ fn is_silent(stage: &Stage) -> Check {
 fn hears_a_planted_error(stage: &Stage) -> Check {
     let page = stage.altered(PAGES[0], "errs.html", "<script>console.error('planted')</script>")?;
     let said = stage.console(&page)?;
-    if said.iter().any(|line| line.contains("planted")) { Ok(()) } else { Err(format!("heard only {said:?}").into()) }
+    ensure!(said.iter().any(|line| line.contains("planted")), "heard only {said:?}");
+    Ok(())
 }
 
 fn asks_for_nothing(stage: &Stage) -> Check {
     for folder in PAGES {
         let asked = stage.requests(&stage.page(folder))?;
-        if !asked.is_empty() {
-            return Err(format!("{folder}: {}", asked.join("\n")).into());
-        }
+        ensure!(asked.is_empty(), "{folder}: {}", asked.join("\n"));
         // And there is nothing in it that could ask, whatever the policy says.
         let page = fs::read_to_string(stage.page(folder))?;
         for word in
             ["<script", "<img", "<link rel=\"stylesheet", " src=", "url(", "@import", "href=\"http", "href=\"//"]
         {
-            if page.contains(word) {
-                return Err(format!("{folder}: the page contains {word}").into());
-            }
+            ensure!(!page.contains(word), "{folder}: the page contains {word}");
         }
     }
     Ok(())
@@ -379,33 +307,32 @@ fn asks_for_nothing(stage: &Stage) -> Check {
 fn catches_a_planted_request(stage: &Stage) -> Check {
     let page = stage.altered(PAGES[0], "asks.html", "<img src=\"http://planted.invalid/picture\" alt=\"\">")?;
     let asked = stage.requests(&page)?;
-    if asked.iter().any(|line| line.contains("planted.invalid")) {
-        return Ok(());
-    }
-    Err(format!("caught only {asked:?}").into())
+    ensure!(asked.iter().any(|line| line.contains("planted.invalid")), "caught only {asked:?}");
+    Ok(())
 }
 
 fn fits(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
         for width in [375, 1440] {
             let found = stage.measure(folder, width, false)?;
-            if found["width"] != width {
-                return Err(format!("measured at {} and not at {width}", found["width"]).into());
-            }
+            ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
             for key in ["folded", "unfolded"] {
-                if found[key].as_u64().is_none_or(|extent| extent > u64::from(width)) {
-                    return Err(format!("{folder}, {width} px: {key} the page is {} px wide", found[key]).into());
-                }
+                ensure!(
+                    !(found[key].as_u64().is_none_or(|extent| extent > u64::from(width))),
+                    "{folder}, {width} px: {key} the page is {} px wide",
+                    found[key]
+                );
             }
             for key in ["beyond", "texts"] {
-                if found[key] != Value::Array(Vec::new()) {
-                    return Err(format!("{folder}, {width} px: {key}: {}", found[key]).into());
-                }
+                ensure!(found[key] == Value::Array(Vec::new()), "{folder}, {width} px: {key}: {}", found[key]);
             }
             let enough = found["figures"].as_u64() >= Some(figures.len() as u64);
-            if !enough || found["svgs"].as_u64() < found["figures"].as_u64() {
-                return Err(format!("{folder}: {} figures of {} drawings", found["figures"], found["svgs"]).into());
-            }
+            ensure!(
+                !(!enough || found["svgs"].as_u64() < found["figures"].as_u64()),
+                "{folder}: {} figures of {} drawings",
+                found["figures"],
+                found["svgs"]
+            );
         }
     }
     Ok(())
@@ -417,18 +344,12 @@ fn is_accessible(stage: &Stage) -> Check {
         for dark in [false, true] {
             let found = stage.measure(folder, 1440, dark)?;
             for key in ["faint", "headings", "twice", "unnamed", "dead"] {
-                if found[key] != Value::Array(Vec::new()) {
-                    return Err(format!("{folder}, dark {dark}: {key}: {}", found[key]).into());
-                }
+                ensure!(found[key] == Value::Array(Vec::new()), "{folder}, dark {dark}: {key}: {}", found[key]);
             }
-            if found["h1"] != 1 {
-                return Err(format!("{folder}: {} main headings", found["h1"]).into());
-            }
+            ensure!(found["h1"] == 1, "{folder}: {} main headings", found["h1"]);
             backgrounds.push(found["background"].to_string());
         }
-        if backgrounds[0] == backgrounds[1] {
-            return Err(format!("{folder}: {backgrounds:?}: nothing was dark").into());
-        }
+        ensure!(backgrounds[0] != backgrounds[1], "{folder}: {backgrounds:?}: nothing was dark");
     }
     Ok(())
 }
@@ -446,9 +367,10 @@ fn has_its_figures(stage: &Stage) -> Check {
             let name = part.split('"').next().unwrap_or_default();
             for file in [format!("tables/{name}.csv"), format!("figures/{name}.svg")] {
                 let linked = part.contains(&format!("href=\"{file}\""));
-                if !linked || !stage.folder.path().join(folder).join(&file).is_file() {
-                    return Err(format!("{folder}: {file} is not there").into());
-                }
+                ensure!(
+                    !(!linked || !stage.folder.path().join(folder).join(&file).is_file()),
+                    "{folder}: {file} is not there"
+                );
             }
         }
     }
@@ -462,9 +384,7 @@ fn has_its_figures(stage: &Stage) -> Check {
         "Through 3 layers the force jumps",
         "Elasticities beside those of the closed form",
     ] {
-        if !page.contains(words) {
-            return Err(format!("the report does not say: {words}").into());
-        }
+        ensure!(page.contains(words), "the report does not say: {words}");
     }
     Ok(())
 }
@@ -474,9 +394,7 @@ fn prints(stage: &Stage) -> Check {
         let file = stage.folder.path().join(format!("{folder}.pdf"));
         stage.show(&stage.page(folder), &[&format!("--print-to-pdf={}", file.display()), "--no-pdf-header-footer"])?;
         let bytes = fs::read(&file)?;
-        if !bytes.starts_with(b"%PDF") || bytes.len() < 50_000 {
-            return Err(format!("{folder}: {} bytes of PDF", bytes.len()).into());
-        }
+        ensure!(bytes.starts_with(b"%PDF") && bytes.len() >= 50_000, "{folder}: {} bytes of PDF", bytes.len());
     }
     Ok(())
 }

@@ -6,13 +6,14 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use std::process::Output;
 
-use assert_cmd::Command;
 use penetrode::integrators::lanes::Summary;
 use penetrode::physics::reference::Source;
 use penetrode::physics::{CraterStiffness, Outcome, Scene, State};
+use penetrode::studies::critical_velocity;
 use penetrode::studies::random_scenes::{Generator, errors_of};
+
+use crate::program::{Said, names, run_in, run_with};
 
 const HEADER: &str = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,thickness_m,S,B,k,crater_stiffness_n_m,\
                       velocity_m_s";
@@ -54,18 +55,16 @@ fn random_scenes(count: usize) -> Vec<Scene> {
     (0..count).map(|_| generator.next_scene()).collect()
 }
 
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::cargo_bin("penetrode").unwrap().current_dir(folder).arg("batch").args(arguments).output().unwrap()
+/// `batch scenes.csv` with `options` in `folder`, the table being `scenes`.
+fn run(folder: &Path, scenes: &str, options: &str) -> Said {
+    fs::write(folder.join("scenes.csv"), scenes).unwrap();
+    run_in(folder, &format!("batch scenes.csv {options}"))
 }
 
-/// Results of the table `scenes` with more `arguments`.
-fn results(scenes: &str, arguments: &[&str]) -> String {
+/// Results of the table `scenes` with `options`.
+fn results(scenes: &str, options: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
-    let mut all = vec!["scenes.csv", "--out", "results.csv"];
-    all.extend(arguments);
-    let output = run(folder.path(), &all);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    run(folder.path(), scenes, &format!("--out results.csv {options}")).expect(0);
     fs::read_to_string(folder.path().join("results.csv")).unwrap()
 }
 
@@ -99,7 +98,7 @@ fn flight(line: &str) -> (Summary, Option<f64>) {
 fn a_thousand_random_scenes_agree_with_50_digits_in_every_outcome_and_number() {
     let scenes = random_scenes(1000);
     let rows: Vec<String> = scenes.iter().map(row).collect();
-    let text = results(&table(&rows), &[]);
+    let text = results(&table(&rows), "");
     let lines: Vec<&str> = text.lines().skip(1).collect();
     assert_eq!(lines.len(), scenes.len());
     let (mut worst, mut undecided) = (0.0_f64, 0);
@@ -120,9 +119,9 @@ fn a_thousand_random_scenes_agree_with_50_digits_in_every_outcome_and_number() {
 #[test]
 fn threads_and_neighbours_change_no_bit() {
     let mut rows: Vec<String> = random_scenes(3000).iter().map(row).collect();
-    let one = results(&table(&rows), &["--threads", "1"]);
-    assert_eq!(one, results(&table(&rows), &["--threads", "2"]));
-    assert_eq!(one, results(&table(&rows), &["--threads", "7"]));
+    let one = results(&table(&rows), "--threads 1");
+    assert_eq!(one, results(&table(&rows), "--threads 2"));
+    assert_eq!(one, results(&table(&rows), "--threads 7"));
     // Row i moves to place 7 i mod 3001 - 1, so that everybody has other neighbours and another lane.
     let answer_of = |text: &str| -> Vec<String> {
         text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect()
@@ -133,7 +132,7 @@ fn threads_and_neighbours_change_no_bit() {
     for (row, place) in rows.drain(..).zip(&places) {
         moved[*place] = row;
     }
-    let shuffled = answer_of(&results(&table(&moved), &[]));
+    let shuffled = answer_of(&results(&table(&moved), ""));
     for (answer, place) in answers.iter().zip(&places) {
         assert_eq!(*answer, shuffled[*place]);
     }
@@ -142,9 +141,9 @@ fn threads_and_neighbours_change_no_bit() {
 #[test]
 fn lanes_and_the_scalar_method_tell_the_same() {
     let rows: Vec<String> = random_scenes(300).iter().map(row).collect();
-    let lanes = results(&table(&rows), &[]);
+    let lanes = results(&table(&rows), "");
     // The least tolerance is that of the default, and is solved row by row.
-    let scalar = results(&table(&rows), &["--rtol", "1e-15"]);
+    let scalar = results(&table(&rows), "--rtol 1e-15");
     assert_ne!(lanes, scalar);
     for (a, b) in lanes.lines().zip(scalar.lines()).skip(1) {
         let ((a, _), (b, _)) = (flight(a), flight(b));
@@ -158,12 +157,12 @@ fn critical_velocities_are_those_of_the_closed_form() {
     let scenes = random_scenes(60);
     let rows: Vec<String> = scenes.iter().map(row).collect();
     for method in ["taylor", "energy"] {
-        let text = results(&table(&rows), &["--critical", "--method", method]);
+        let text = results(&table(&rows), &format!("--critical --method {method}"));
         for (line, scene) in text.lines().skip(1).zip(&scenes) {
             let (_, critical) = flight(line);
             assert_eq!(critical.is_some(), scene.thickness.is_some(), "{line}");
             if let Some(critical) = critical {
-                let exact = penetrode::studies::critical_velocity::exact(scene).unwrap();
+                let exact = critical_velocity::exact(scene).unwrap();
                 assert!((critical / exact - 1.0).abs() < 1e-12, "{method}: {critical} {exact}");
             }
         }
@@ -171,16 +170,11 @@ fn critical_velocities_are_those_of_the_closed_form() {
 }
 
 #[test]
-fn any_method_flies_a_table_and_refuses_options_that_it_does_not_use() {
+fn any_method_solves_a_table() {
     let rows = vec![row(&random_scenes(1)[0])];
     for method in ["taylor", "energy", "central-difference", "closed-form"] {
-        assert_eq!(results(&table(&rows), &["--method", method]).lines().count(), 2, "{method}");
+        assert_eq!(results(&table(&rows), &format!("--method {method}")).lines().count(), 2, "{method}");
     }
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scenes.csv"), table(&rows)).unwrap();
-    let output = run(folder.path(), &["scenes.csv", "--out", "r.csv", "--dt", "1us"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(!folder.path().join("r.csv").exists());
 }
 
 #[test]
@@ -189,11 +183,8 @@ fn a_bad_row_says_what_is_wrong_and_the_others_are_answered() {
     let bad = "2,0.05,1.72,36e6,2300,,,,,,300";
     let folder = tempfile::tempdir().unwrap();
     let scenes = format!("{HEADER}\n{good}\n{bad}\n2,0.05\n{good}\n\"2 kg\",0.05,0.72,36e6,2300,,,,,,300\n");
-    fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
-    let output = run(folder.path(), &["scenes.csv", "--out", "results.csv"]);
-    assert_eq!(output.status.code(), Some(3));
-    assert_eq!(String::from_utf8_lossy(&output.stderr), "5 rows: 3 bad, 0 undecided\n");
-    assert!(output.stdout.is_empty());
+    let said = run(folder.path(), &scenes, "--out results.csv").expect(3);
+    assert_eq!((said.out.as_str(), said.err.as_str()), ("", "5 rows: 3 bad, 0 undecided\n"));
     let text = fs::read_to_string(folder.path().join("results.csv")).unwrap();
     let lines: Vec<&str> = text.lines().skip(1).collect();
     assert_eq!(lines[0][1..], lines[3][1..]);
@@ -213,11 +204,9 @@ fn a_flight_stays_where_its_critical_velocity_fails_or_is_undecided() {
     for (thickness, bad, undecided, cause) in [("2000", 1, 0, "no critical velocity"), ("40", 0, 1, "V_c is undecided")]
     {
         let scenes = format!("{HEADER}\n{}\n{}\n", of_thickness(""), of_thickness(thickness));
-        fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
-        let output = run(folder.path(), &["scenes.csv", "--out", "r.csv", "--critical", "--method", "closed-form"]);
-        let said = format!("2 rows: {bad} bad, {undecided} undecided\n");
-        assert_eq!(String::from_utf8_lossy(&output.stderr), said);
-        assert_eq!(output.status.code(), Some(if bad > 0 { 3 } else { 0 }));
+        let said = run(folder.path(), &scenes, "--out r.csv --critical --method closed-form");
+        let expected = (if bad > 0 { 3 } else { 0 }, format!("2 rows: {bad} bad, {undecided} undecided\n"));
+        assert_eq!((said.code, said.err), expected);
         let text = fs::read_to_string(folder.path().join("r.csv")).unwrap();
         let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.splitn(10, ',').collect()).collect();
         // The flight of the thick slab ends in it as in the semi-infinite target.
@@ -228,53 +217,34 @@ fn a_flight_stays_where_its_critical_velocity_fails_or_is_undecided() {
 }
 
 #[test]
-fn a_table_without_rows_has_results_without_rows() {
-    assert_eq!(results(&format!("{HEADER}\n"), &[]).lines().count(), 1);
+fn a_table_without_rows_has_results_without_rows_and_says_so() {
+    let said = run_with(&format!("{HEADER}\n"), "batch - --out -").expect(0);
+    assert_eq!(said.out.lines().count(), 1);
+    assert!(said.err.contains("0 rows"), "{said:?}");
 }
 
 #[test]
 fn results_that_would_replace_the_scenes_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    let refusal = |scenes: &[u8], out: &str| {
-        fs::write(folder.path().join("scenes.csv"), scenes).unwrap();
-        let output = run(folder.path(), &["scenes.csv", "--out", out]);
-        assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
-        assert!(output.stdout.is_empty());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "something was left behind");
-        String::from_utf8(output.stderr).unwrap()
-    };
-    assert!(refusal(table(&[]).as_bytes(), "scenes.csv").contains("would replace the scenes"));
-    assert!(refusal(table(&[]).as_bytes(), "./scenes.csv").contains("would replace the scenes"));
-    if !cfg!(feature = "parquet") {
-        let said = refusal(table(&[]).as_bytes(), "r.parquet");
-        assert!(said.contains("CSV only") && said.contains("build with `--features parquet`"), "{said}");
+    for out in ["scenes.csv", "./scenes.csv"] {
+        let refused = run(folder.path(), &table(&[]), &format!("--out {out}")).refused();
+        assert!(refused.contains("would replace the scenes"), "{refused}");
+        assert_eq!(names(folder.path()), ["scenes.csv"]);
     }
 }
 
 #[test]
 fn a_table_may_come_from_a_pipe_and_go_into_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let output = Command::cargo_bin("penetrode")
-        .unwrap()
-        .current_dir(folder.path())
-        .args(["batch", "-", "--out", "-"])
-        .write_stdin(format!("{HEADER}\n2,0.05,0.72,36e6,2300,,,,,,300\n"))
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(0));
-    assert!(String::from_utf8(output.stdout).unwrap().contains("\n1,stopped-in-tunnel,0.1448"));
+    let said = run_with(&format!("{HEADER}\n2,0.05,0.72,36e6,2300,,,,,,300\n"), "batch - --out -").expect(0);
+    assert!(said.out.contains("\n1,stopped-in-tunnel,0.1448"));
 }
 
 #[test]
 fn random_tables_are_fixed_by_their_seed() {
     let folder = tempfile::tempdir().unwrap();
-    let make = |scenes: &str, out: &str| {
-        assert_eq!(run(folder.path(), &[scenes, "--out", out]).status.code(), Some(0));
-        fs::read_to_string(folder.path().join(out)).unwrap()
-    };
-    let long = make("random:2000:7", "a.csv");
-    let short = make("random:1500:7", "b.csv");
+    let make = |scenes: &str| run_in(folder.path(), &format!("batch {scenes} --out -")).expect(0).out;
+    let (long, short) = (make("random:2000:7"), make("random:1500:7"));
     assert_eq!(short.lines().count(), 1501);
     assert!(long.starts_with(&short));
-    assert_ne!(short, make("random:1500:8", "c.csv"));
+    assert_ne!(short, make("random:1500:8"));
 }

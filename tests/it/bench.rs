@@ -3,27 +3,13 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
 
 use std::fs;
-use std::path::Path;
-use std::process::Output;
 
-use assert_cmd::Command;
 use serde_json::Value;
 
-/// Path of a shipped scene.
-fn scene(name: &str) -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes").join(format!("{name}.toml")).display().to_string()
-}
+use crate::program::{conforms, json, run, run_in, scene};
 
-fn run(arguments: &[&str]) -> Output {
-    Command::cargo_bin("penetrode").unwrap().args(arguments).output().unwrap()
-}
-
-fn bench(arguments: &[&str]) -> Value {
-    let mut all = vec!["bench", "--repeats", "1", "--json"];
-    all.extend(arguments);
-    let output = run(&all);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}"))
+fn bench(options: &str) -> Value {
+    run(&format!("bench --repeats 1 --json {options}")).expect(0).json()
 }
 
 fn runs<'a>(report: &'a Value, scene: &str, method: &str) -> Vec<&'a Value> {
@@ -33,7 +19,7 @@ fn runs<'a>(report: &'a Value, scene: &str, method: &str) -> Vec<&'a Value> {
 
 #[test]
 fn errors_fall_with_the_tolerance_and_the_fastest_keep_their_level() {
-    let report = bench(&[&scene("tunnel"), "--varied", "10", "--parts", "work-precision"]);
+    let report = bench("@tunnel --varied 10 --parts work-precision");
     for case in ["tunnel", "varied"] {
         let taylor = runs(&report, case, "taylor");
         let error = |setting: &str| {
@@ -63,7 +49,7 @@ fn errors_fall_with_the_tolerance_and_the_fastest_keep_their_level() {
 
 #[test]
 fn runs_that_are_wrong_refused_or_undecided_are_shown_and_count_at_no_accuracy() {
-    let report = bench(&[&scene("graze"), &scene("stiff"), "--parts", "work-precision"]);
+    let report = bench("@graze @stiff --parts work-precision");
     let state = |run: &Value| run["state"].as_str().unwrap().to_owned();
     // The paper's scheme overlooks the millionth that is left to the far side, and says stopped.
     let paper = runs(&report, "graze", "lagged/step-end");
@@ -84,31 +70,21 @@ fn runs_that_are_wrong_refused_or_undecided_are_shown_and_count_at_no_accuracy()
         assert!(fastest["time_ns"].is_null());
     }
     let folder = tempfile::tempdir().unwrap();
-    let target = folder.path().join("report");
-    let output = run(&[
-        "bench",
-        &scene("stiff"),
-        "--repeats",
-        "1",
-        "--parts",
-        "work-precision",
-        "--out",
-        target.to_str().unwrap(),
-    ]);
+    let said = run_in(folder.path(), "bench @stiff --repeats 1 --parts work-precision --out report");
     // The numbers of the report have them, and the page says how many there are.
-    let numbers: Value = serde_json::from_str(&fs::read_to_string(target.join("report.json")).unwrap()).unwrap();
+    let text_of = |name: &str| fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+    let numbers: Value = serde_json::from_str(&text_of("report.json")).unwrap();
     let refused = runs(&numbers, "stiff", "energy").into_iter().filter(|run| state(run) == "failed").count();
     assert_eq!(refused, 15, "{numbers}");
-    let table = fs::read_to_string(target.join("tables/cost-stiff.csv")).unwrap();
+    let table = text_of("tables/cost-stiff.csv");
     assert!(table.contains("force evaluations of a solution") && table.lines().count() > 30, "{table}");
-    assert!(fs::read_to_string(target.join("report.html")).unwrap().contains("15 of 15"));
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("failed: energy at every setting") && text.contains("viscosity"), "{text}");
+    assert!(text_of("report.html").contains("15 of 15"));
+    assert!(said.out.contains("failed: energy at every setting") && said.out.contains("viscosity"), "{said:?}");
 }
 
 #[test]
 fn the_largest_steps_follow_the_error_constants_and_the_orders() {
-    let report = bench(&[&scene("tunnel"), "--parts", "step-size"]);
+    let report = bench("@tunnel --parts step-size");
     let studies = report["step_size"].as_array().unwrap();
     let names: Vec<_> = studies.iter().map(|study| study["quantity"].as_str().unwrap()).collect();
     assert_eq!(names, ["depth", "time"]);
@@ -127,25 +103,14 @@ fn the_largest_steps_follow_the_error_constants_and_the_orders() {
     }
     // The step and the error of `converge` at it: held to within the width of the search.
     let step = held(&studies[0], "lagged/landed")[3];
-    let report = run(&[
-        "solve",
-        &scene("tunnel"),
-        "--method",
-        "central-difference",
-        "--events",
-        "landed",
-        "--dt",
-        &step.to_string(),
-        "--json",
-    ]);
-    let flight: Value = serde_json::from_slice(&report.stdout).unwrap();
+    let flight = json(&format!("solve @tunnel --method central-difference --events landed --dt {step}"));
     let error = flight["relative_error"]["depth"].as_f64().unwrap();
     assert!((0.99e-5..=1e-5).contains(&error), "{error}");
 }
 
 #[test]
 fn a_perforation_has_steps_for_time_residual_and_critical_velocity() {
-    let report = bench(&[&scene("perforate"), "--parts", "step-size"]);
+    let report = bench("@perforate --parts step-size");
     let studies = report["step_size"].as_array().unwrap();
     let names: Vec<_> = studies.iter().map(|study| study["quantity"].as_str().unwrap()).collect();
     assert_eq!(names, ["time", "velocity", "critical_velocity"]);
@@ -165,15 +130,9 @@ fn a_perforation_has_steps_for_time_residual_and_critical_velocity() {
 fn what_bench_prints_is_what_its_schema_says_and_its_folder_holds_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("report");
-    let all = "work-precision,step-size,scaling";
-    let arguments =
-        [&scene("tunnel"), "--parts", all, "--varied", "5", "--most", "100", "--out", target.to_str().unwrap()];
-    let report = bench(&arguments);
-    let schema: Value = serde_json::from_slice(&run(&["schema", "bench"]).stdout).unwrap();
-    let faults: Vec<_> =
-        jsonschema::validator_for(&schema).unwrap().iter_errors(&report).map(|e| e.to_string()).collect();
-    assert!(faults.is_empty(), "{faults:?}");
-    assert_eq!(report["schema"], "penetrode/bench/1");
+    let parts = "work-precision,step-size,scaling --varied 5 --most 100";
+    let report = bench(&format!("@tunnel --out {} --parts {parts}", target.display()));
+    conforms("bench", &report);
     let written: Value = serde_json::from_slice(&fs::read(target.join("report.json")).unwrap()).unwrap();
     assert_eq!(written, report);
     let growth = report["growth"].as_array().unwrap();
@@ -189,19 +148,11 @@ fn what_bench_prints_is_what_its_schema_says_and_its_folder_holds_the_same() {
     }
     assert_eq!(fs::read_dir(target.join("figures")).unwrap().count(), page.matches("<figure").count());
     // A second run replaces its own report, and nobody's else.
-    let again = bench(&["--parts", "scaling", "--most", "1", "--out", target.to_str().unwrap()]);
+    let again = bench(&format!("--parts scaling --most 1 --out {}", target.display()));
     let written: Value = serde_json::from_slice(&fs::read(target.join("report.json")).unwrap()).unwrap();
     assert_eq!(written, again);
     fs::write(target.join("report.json"), "{}").unwrap();
-    assert_eq!(run(&["bench", &scene("tunnel"), "--out", target.to_str().unwrap()]).status.code(), Some(2));
-}
-
-#[test]
-fn text_fits_80_columns() {
-    let output = run(&["bench", &scene("perforate"), &scene("stiff"), "--repeats", "1", "--varied", "20"]);
-    let text = String::from_utf8(output.stdout).unwrap();
-    let widest = text.lines().max_by_key(|line| line.chars().count()).unwrap();
-    assert!(widest.chars().count() <= 80, "{widest}");
+    run(&format!("bench @tunnel --out {}", target.display())).refused();
 }
 
 #[test]
@@ -209,7 +160,7 @@ fn two_scenes_of_one_name_are_two_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let other = folder.path().join("tunnel.toml");
     fs::copy(scene("tunnel"), &other).unwrap();
-    let report = bench(&[&scene("tunnel"), other.to_str().unwrap(), "--parts", "work-precision"]);
+    let report = bench(&format!("@tunnel {} --parts work-precision", other.display()));
     let names: Vec<_> =
         report["scenes"].as_array().unwrap().iter().map(|case| case["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["tunnel", "tunnel-2"]);
@@ -217,42 +168,33 @@ fn two_scenes_of_one_name_are_two_scenes() {
 }
 
 #[test]
-fn a_scene_or_a_request_that_cannot_be_used_is_refused_before_anything_is_measured() {
-    let code = |arguments: &[&str]| {
-        let output = run(arguments);
-        assert!(output.stdout.is_empty());
-        output.status.code()
-    };
-    assert_eq!(code(&["bench", "no-such-scene.toml"]), Some(2));
-    assert_eq!(code(&["bench", &scene("tunnel"), "--parts", "everything"]), Some(2));
-    assert_eq!(code(&["bench", &scene("tunnel"), "--repeats", "0"]), Some(2));
-    assert_eq!(code(&["bench", &scene("tunnel"), "--peer", "no-such-program"]), Some(5));
-    assert_eq!(code(&["bench", &scene("tunnel"), "--peer", ""]), Some(2));
-}
-
-/// A peer in the shell that greets and answers each question with `answer`, where `$n` is its number.
-#[cfg(unix)]
-fn peer(answer: &str) -> String {
-    let script = format!(
-        "read q; echo '{{\"name\": \"fake\"}}'; n=0; while read q; do n=$((n+1)); printf '%s\\n' \"{}\"; done",
-        answer.replace('"', "\\\"")
-    );
-    format!("sh -c {}", shlex::try_quote(&script).unwrap())
+fn a_peer_that_cannot_be_started_is_missing() {
+    assert!(run("bench @tunnel --peer no-such-program").expect(5).out.is_empty());
 }
 
 #[test]
 #[cfg(unix)]
 fn a_peer_is_timed_by_its_own_clock_and_judged_like_any_method() {
-    let exact = run(&["solve", &scene("tunnel"), "--method", "closed-form", "--json"]);
-    let exact: Value = serde_json::from_slice(&exact.stdout).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    // Programs in the shell. The first two greet and answer each question, `$n` being its number.
+    let peer = |name: &str, script: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, script).unwrap();
+        format!("--peer 'sh {}'", path.display())
+    };
+    let answering = |name: &str, answer: &str| {
+        let answer = answer.replace('"', "\\\"");
+        let greeting = "read q; echo '{\"name\": \"fake\"}'";
+        peer(name, &format!("{greeting}; n=0; while read q; do n=$((n+1)); printf '%s\\n' \"{answer}\"; done"))
+    };
+    let exact = json("solve @tunnel --method closed-form");
     let (depth, time) = (exact["depth_m"].as_f64().unwrap(), exact["time_s"].as_f64().unwrap());
     let numbers = format!("\"depth_m\": {}, \"time_s\": {time:e}, \"velocity_m_s\": 0", depth * (1.0 + 1e-7));
     let clock = "\"wall_ns\": 5000, \"wall_ns_quartiles\": [4000, 7000]";
-    let right = peer(&format!("{{\"id\": $n, {numbers}, {clock}}}"));
-    let wrong = peer(&format!("{{\"id\": $n, \"outcome\": \"perforated\", {numbers}, {clock}}}"));
-    let dies = "sh -c 'read q; echo \"{\\\"name\\\": \\\"mortal\\\"}\"; read q'";
-    let report =
-        bench(&[&scene("tunnel"), "--parts", "work-precision", "--peer", &right, "--peer", &wrong, "--peer", dies]);
+    let right = answering("right", &format!("{{\"id\": $n, {numbers}, {clock}}}"));
+    let wrong = answering("wrong", &format!("{{\"id\": $n, \"outcome\": \"perforated\", {numbers}, {clock}}}"));
+    let dies = peer("dies", "read q; echo '{\"name\": \"mortal\"}'; read q");
+    let report = bench(&format!("@tunnel --parts work-precision {right} {wrong} {dies}"));
     let right = runs(&report, "tunnel", "fake");
     assert_eq!(right.len(), 12);
     for run in right {

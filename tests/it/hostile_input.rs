@@ -9,11 +9,11 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use insta::assert_snapshot;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_penetrode");
+use crate::program::{Said, names, program, scene};
 
 /// Address space of the program [KiB]: threads reserve some hundred MiB and use little of it.
 const MEMORY_KIB: u32 = 1 << 20;
@@ -26,44 +26,39 @@ fn corpus() -> PathBuf {
 }
 
 /// Runs the program in `folder` under the limits of memory and time.
-fn run(folder: &Path, arguments: &[&str]) -> Output {
+fn run(folder: &Path, line: &str) -> Said {
+    let limited = program(folder, line);
     let mut command = Command::new("sh");
     command.arg("-c").arg(format!("ulimit -v {MEMORY_KIB}; ulimit -t {SECONDS}; exec \"$0\" \"$@\""));
-    command.arg(PROGRAM).args(arguments).current_dir(folder).output().unwrap()
+    command.arg(limited.get_program()).args(limited.get_args()).current_dir(folder).output().unwrap().into()
 }
 
-/// Names of what is in `folder`.
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
-/// What the program says of `bytes` in a file `name`, `{}` in `arguments` being the file; nothing else happens.
-fn refusal_of(name: &str, bytes: &[u8], arguments: &[&str]) -> String {
+/// A folder with a scene in it, for what its command needs besides.
+fn workplace() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
+    fs::copy(scene("paper-slab"), folder.path().join("slab.toml")).unwrap();
+    folder
+}
+
+/// What the program says of `bytes` in a file `name`, `{}` in `line` being the file; nothing else happens.
+fn refusal_of(name: &str, bytes: &[u8], line: &str) -> String {
+    let folder = workplace();
     fs::write(folder.path().join(name), bytes).unwrap();
-    // Beside each file lies what its command needs besides.
-    fs::copy(corpus().join("../../verification/scenes/paper-slab.toml"), folder.path().join("slab.toml")).unwrap();
     let before = names(folder.path());
-    let arguments: Vec<_> = arguments.iter().map(|argument| argument.replace("{}", name)).collect();
-    let output = run(folder.path(), &arguments.iter().map(String::as_str).collect::<Vec<_>>());
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{name}: {:?}: {said}", output.status);
-    assert!(output.stdout.is_empty(), "{name}: something is on standard output");
+    let said = run(folder.path(), &line.replace("{}", name));
+    said.refused();
     assert_eq!(names(folder.path()), before, "{name}: something was written");
-    assert!(!said.chars().any(|c| c.is_control() && c != '\n'), "{name}: {said:?}");
-    assert!(said.len() < 4000, "{name}: {} bytes of message", said.len());
-    said
+    assert!(!said.err.chars().any(|c| c.is_control() && c != '\n'), "{name}: {said:?}");
+    assert!(said.err.len() < 4000, "{name}: {} bytes of message", said.err.len());
+    said.err
 }
 
 /// The refusals of all files of `kind`, by name.
-fn refusals(kind: &str, arguments: &[&str]) -> String {
+fn refusals(kind: &str, line: &str) -> String {
     let folder = corpus().join(kind);
     let mut all = String::new();
     for name in names(&folder) {
-        let said = refusal_of(&name, &fs::read(folder.join(&name)).unwrap(), arguments);
+        let said = refusal_of(&name, &fs::read(folder.join(&name)).unwrap(), line);
         writeln!(all, "== {name}\n{said}").unwrap();
     }
     all
@@ -77,36 +72,36 @@ fn the_corpus_is_of_eighty_files_and_more() {
 
 #[test]
 fn a_bad_scene_is_refused_at_its_place() {
-    assert_snapshot!("scenes", refusals("scene", &["solve", "{}", "--trajectory", "out.csv"]));
+    assert_snapshot!("scenes", refusals("scene", "solve {} --trajectory out.csv"));
 }
 
 #[test]
 fn a_bad_suite_is_refused_at_its_place() {
-    assert_snapshot!("suites", refusals("suite", &["verify", "{}", "--out", "report"]));
+    assert_snapshot!("suites", refusals("suite", "verify {} --out report"));
 }
 
 #[test]
 fn a_bad_table_of_scenes_is_refused_at_its_place() {
-    let said = refusals("batch", &["batch", "{}", "--out", "out.csv"]);
+    let said = refusals("batch", "batch {} --out out.csv");
     // Nothing is on standard output either, not even the names of the columns.
-    assert!(refusals("batch", &["batch", "{}", "--out", "-"]) == said);
+    assert!(refusals("batch", "batch {} --out -") == said);
     assert_snapshot!("batch_tables", said);
 }
 
 #[test]
 fn a_bad_table_of_step_sizes_is_refused_at_its_place() {
-    assert_snapshot!("audit_tables", refusals("audit", &["audit", "{}"]));
+    assert_snapshot!("audit_tables", refusals("audit", "audit {}"));
 }
 
 #[test]
 fn a_bad_table_of_measured_points_is_refused_at_its_place() {
-    let sweep = ["sweep", "slab.toml", "--vary", "H/d=1:5:3", "--data", "{}", "--out", "out.csv"];
-    assert_snapshot!("measured_points", refusals("points", &sweep));
+    let sweep = "sweep slab.toml --vary H/d=1:5:3 --data {} --out out.csv";
+    assert_snapshot!("measured_points", refusals("points", sweep));
 }
 
 #[test]
 fn a_bad_table_of_experiments_is_refused_at_its_place() {
-    assert_snapshot!("experiments", refusals("experiments", &["experiments", "{}", "--out", "out.csv"]));
+    assert_snapshot!("experiments", refusals("experiments", "experiments {} --out out.csv"));
 }
 
 /// The results say what is wrong with a row that is no scene, and the others are solved: exit code 3.
@@ -117,9 +112,7 @@ fn a_bad_row_is_reported_in_its_own_line_of_the_results() {
     for name in names(&kind) {
         let folder = tempfile::tempdir().unwrap();
         fs::copy(kind.join(&name), folder.path().join(&name)).unwrap();
-        let output = run(folder.path(), &["batch", &name, "--out", "out.csv"]);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(3), "{name}: {said}");
+        let said = run(folder.path(), &format!("batch {name} --out out.csv")).expect(3).err;
         let results = fs::read_to_string(folder.path().join("out.csv")).unwrap();
         assert!(!results.chars().any(|c| c.is_control() && c != '\n'), "{name}: {results:?}");
         write!(all, "== {name}\n{said}").unwrap();
@@ -145,46 +138,39 @@ fn a_hundred_megabytes_are_refused_and_not_read() {
     // Lines without end would have to be read: the whole of it fits in no megabyte.
     fs::write(folder.path().join("long.csv"), format!("dt_s,depth_m\n{}", "9".repeat(8 << 20))).unwrap();
     let mut all = String::new();
-    for arguments in [
-        &["solve", "big.toml"][..],
-        &["critical", "big.toml"],
-        &["verify", "big.toml", "--out", "report"],
-        &["audit", "big.csv"],
-        &["batch", "big.csv", "--out", "out.csv"],
-        &["batch", "long.csv", "--out", "out.csv"],
-        &["sweep", "big.toml", "--vary", "H/d=1:5:3"],
-        &["experiments", "big.csv"],
+    for line in [
+        "solve big.toml",
+        "critical big.toml",
+        "verify big.toml --out report",
+        "audit big.csv",
+        "batch big.csv --out out.csv",
+        "batch long.csv --out out.csv",
+        "sweep big.toml --vary H/d=1:5:3",
+        "experiments big.csv",
+        "sweep @paper-slab --vary H/d=1:5:3 --data big.csv",
     ] {
-        let output = run(folder.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-        assert!(output.stdout.is_empty());
-        writeln!(all, "== {}\n{}", arguments.join(" "), String::from_utf8(output.stderr).unwrap()).unwrap();
+        let said = run(folder.path(), line);
+        said.refused();
+        let shown = if line.contains("--data") { "sweep --data big.csv" } else { line };
+        writeln!(all, "== {shown}\n{}", said.err).unwrap();
     }
-    let slab = corpus().join("../../verification/scenes/paper-slab.toml");
-    let output = run(folder.path(), &["sweep", slab.to_str().unwrap(), "--vary", "H/d=1:5:3", "--data", "big.csv"]);
-    assert_eq!(output.status.code(), Some(2));
-    writeln!(all, "== sweep --data big.csv\n{}", String::from_utf8(output.stderr).unwrap()).unwrap();
     assert_eq!(names(folder.path()), ["big.csv", "big.toml", "long.csv"]);
     assert_snapshot!("large_files", all);
 }
 
 #[test]
 fn what_is_no_file_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     fs::create_dir(folder.path().join("folder")).unwrap();
-    fs::copy(corpus().join("../../verification/scenes/paper-slab.toml"), folder.path().join("slab.toml")).unwrap();
     let mut all = String::new();
-    let points = ["sweep", "slab.toml", "--vary", "H/d=1:5:3", "--data"];
-    for command in [&["solve"][..], &["verify"], &["audit"], &["batch", "--out", "out.csv"], &points, &["experiments"]]
-    {
+    let points = "sweep slab.toml --vary H/d=1:5:3 --data";
+    for command in ["solve", "verify", "audit", "batch --out out.csv", points, "experiments"] {
         // The last is a file that the system refuses to read, also to root.
         for path in ["missing", "folder", "/proc/self/mem"] {
-            let arguments: Vec<_> = command.iter().copied().chain([path]).collect();
-            let output = run(folder.path(), &arguments);
-            let said = String::from_utf8(output.stderr).unwrap();
-            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-            assert!(output.stdout.is_empty());
-            writeln!(all, "== {} {path}\n{said}", command[0]).unwrap();
+            let said = run(folder.path(), &format!("{command} {path}"));
+            said.refused();
+            let command = command.split(' ').next().unwrap();
+            writeln!(all, "== {command} {path}\n{}", said.err).unwrap();
         }
     }
     assert_eq!(names(folder.path()), ["folder", "slab.toml"]);

@@ -4,18 +4,18 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use std::fs;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
+use crate::program::{Said, names, run_in};
 
 const GREETING: &str = r#"echo '{"name": "mean", "version": "1", "method": "none"}'"#;
 
 /// A right answer but for what a case puts in.
 const ANSWER: &str = r#"{"id": 1, "outcome": "stopped-in-tunnel", "depth_m": 0.1, "time_s": 1e-3, "velocity_m_s": 0}"#;
 
-/// Runs the claim on the user's program, a shell script, and gives what was said, judged and how long it took.
-fn judge(script: &str) -> (Output, Value, Duration) {
+/// Runs the claim on the user's program, a shell script, and gives what was said and how long it took.
+fn judge(script: &str) -> (Said, Duration) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("peer.sh"), script).unwrap();
     let started = Instant::now();
@@ -24,19 +24,16 @@ fn judge(script: &str) -> (Output, Value, Duration) {
         .args(["-c", "ulimit -v 2097152; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_penetrode")])
         .args(["verify", "--only", "peer/user", "--out", "report", "--json", "--peer", "sh peer.sh"])
         .current_dir(folder.path())
-        .output()
-        .unwrap();
-    let taken = started.elapsed();
-    let report = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        .output();
+    let (said, taken) = (Said::from(output.unwrap()), started.elapsed());
     let is_whole = folder.path().join("report/report.html").exists() && folder.path().join("report/junit.xml").exists();
-    assert!(is_whole, "no report: {}", String::from_utf8_lossy(&output.stderr));
-    (output, report, taken)
+    assert!(is_whole, "no report: {said:?}");
+    (said.expect(3), taken)
 }
 
 /// The claim fails, and each remark holds `reason`.
 fn fails_with(script: &str, reason: &str) {
-    let (output, report, _) = judge(script);
-    assert_eq!(output.status.code(), Some(3), "{script}: {}", String::from_utf8_lossy(&output.stderr));
+    let report = judge(script).0.json();
     let claims = report["claims"].as_array().unwrap();
     assert!(!claims.is_empty());
     for claim in claims {
@@ -68,8 +65,8 @@ fn a_peer_that_hangs_is_given_thirty_seconds() {
             [at_a_question("sleep 1000"), "sleep 1000".to_owned(), at_a_question("printf '{\"id\": '; sleep 1000")]
         {
             scope.spawn(move || {
-                let (output, report, taken) = judge(&script);
-                assert_eq!(output.status.code(), Some(3), "{script}");
+                let (said, taken) = judge(&script);
+                let report = said.json();
                 assert!(report["claims"][0]["remark"].as_str().unwrap().contains("silent for 30 s"), "{report}");
                 assert!((29..90).contains(&taken.as_secs()), "{script}: {taken:?}");
             });
@@ -97,26 +94,25 @@ fn a_peer_that_answers_nonsense_fails_its_claim() {
     fails_with("echo 'Welcome to Solver 7'; sleep 60", "nonsense");
 }
 
+/// An answer with `from` replaced by `to`.
+fn answers_with(from: &str, to: &str) {
+    assert!(ANSWER.contains(from), "{from}");
+    fails_with(&at_a_question(&format!("echo '{}'", ANSWER.replace(from, to))), "nonsense");
+}
+
 #[test]
 fn a_peer_with_a_wrong_id_fails_its_claim() {
     for id in ["99", "\"1\"", "1.5", "-1", "1e400", "null"] {
-        fails_with(
-            &at_a_question(&format!("echo '{}'", ANSWER.replace("\"id\": 1", &format!("\"id\": {id}")))),
-            "nonsense",
-        );
+        answers_with("\"id\": 1", &format!("\"id\": {id}"));
     }
 }
 
 #[test]
-fn a_number_that_is_none_fails_its_claim() {
+fn a_number_or_an_outcome_that_is_none_fails_its_claim() {
     for value in ["NaN", "Infinity", "1e999", "null", "\"0.1\"", "[0.1]"] {
-        let answer = ANSWER.replace("\"depth_m\": 0.1", &format!("\"depth_m\": {value}"));
-        fails_with(&at_a_question(&format!("echo '{answer}'")), "nonsense");
+        answers_with("\"depth_m\": 0.1", &format!("\"depth_m\": {value}"));
     }
-    fails_with(
-        &at_a_question(&format!("echo '{}'", ANSWER.replace("stopped-in-tunnel", "landed on the moon"))),
-        "nonsense",
-    );
+    answers_with("stopped-in-tunnel", "landed on the moon");
 }
 
 #[test]
@@ -133,22 +129,16 @@ fn a_wrong_answer_in_right_form_fails_its_claim() {
     // The id is counted up as the questions come.
     let answer = ANSWER.replace("\"id\": 1", "\"id\": '$n'");
     let script = format!("read hello\n{GREETING}\nn=0\nwhile read question; do n=$((n + 1)); echo '{answer}'; done\n");
-    let (output, report, _) = judge(&script);
-    assert_eq!(output.status.code(), Some(3));
+    let report = judge(&script).0.json();
     assert!(report["claims"].as_array().unwrap().iter().all(|claim| claim["verdict"] == "failed"), "{report}");
 }
 
 #[test]
 fn a_peer_that_cannot_be_started_is_missing_and_no_command_is_usage() {
     let folder = tempfile::tempdir().unwrap();
-    for (command, code) in [("no-such-program-anywhere", 5), ("/", 5), ("", 2), ("sh 'open quote", 2)] {
-        let output = Command::new(env!("CARGO_BIN_EXE_penetrode"))
-            .args(["verify", "--only", "peer/user", "--out", "report", "--peer", command])
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(code), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-        assert!(output.stdout.is_empty());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "{command}: something was written");
+    for (command, code) in [("no-such-program-anywhere", 5), ("/", 5), ("", 2), ("sh \"open quote", 2)] {
+        let said = run_in(folder.path(), &format!("verify --only peer/user --out report --peer '{command}'"));
+        assert!(said.expect(code).out.is_empty(), "{command}");
+        assert_eq!(names(folder.path()), [""; 0], "{command}: something was written");
     }
 }

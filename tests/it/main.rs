@@ -14,6 +14,7 @@ mod hostile_peers;
 mod layers;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod program;
 mod properties;
 mod stress;
 mod suite;

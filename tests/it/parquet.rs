@@ -5,10 +5,8 @@
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::Output;
 use std::sync::Arc;
 
-use assert_cmd::Command;
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::file::properties::WriterProperties;
@@ -17,17 +15,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::record::Field;
 use parquet::schema::parser::parse_message_type;
 
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::cargo_bin("penetrode").unwrap().current_dir(folder).args(arguments).output().unwrap()
-}
-
-fn batch(folder: &Path, arguments: &[&str]) -> Output {
-    run(folder, &[&["batch"], arguments].concat())
-}
-
-fn standard_error(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
+use crate::program::{names, run_in};
 
 /// A cell: absent, the bits of a number, or text.
 #[derive(Debug, PartialEq)]
@@ -114,8 +102,7 @@ fn results_have_the_bits_of_csv_over_several_row_groups() {
     // 70,000 rows are more than one row group, and more than one chunk of the program.
     let folder = tempfile::tempdir().unwrap();
     for out in ["r.csv", "r.parquet"] {
-        let output = batch(folder.path(), &["random:70000:3", "--out", out]);
-        assert_eq!(output.status.code(), Some(0), "{}", standard_error(&output));
+        run_in(folder.path(), &format!("batch random:70000:3 --out {out}")).expect(0);
     }
     let path = folder.path().join("r.parquet");
     let found = columns(&path);
@@ -139,11 +126,10 @@ fn scenes_are_those_of_the_same_csv_whatever_the_compression() {
         text += &format!("{speed},2,0.05,0.72,36e6,2300,{cell}\n");
     }
     fs::write(folder.path().join("s.csv"), text).unwrap();
-    assert_eq!(batch(folder.path(), &["s.csv", "--out", "r.csv", "--critical"]).status.code(), Some(0));
+    run_in(folder.path(), "batch s.csv --out r.csv --critical").expect(0);
     for (compression, scenes) in [(Compression::UNCOMPRESSED, "s.parquet"), (Compression::SNAPPY, "s.PARQUET")] {
         write_numbers(&folder.path().join(scenes), &names, &rows, compression);
-        let output = batch(folder.path(), &[scenes, "--out", "r.parquet", "--critical"]);
-        assert_eq!(output.status.code(), Some(0), "{}", standard_error(&output));
+        run_in(folder.path(), &format!("batch {scenes} --out r.parquet --critical")).expect(0);
         assert_eq!(columns(&folder.path().join("r.parquet")), csv_columns(&folder.path().join("r.csv")));
     }
 }
@@ -174,8 +160,7 @@ fn integers_and_text_are_read_as_what_they_say() {
     }
     group.close().unwrap();
     writer.close().unwrap();
-    let output = batch(folder.path(), &["s.parquet", "--out", "r.csv"]);
-    assert_eq!(output.status.code(), Some(3), "{}", standard_error(&output));
+    run_in(folder.path(), "batch s.parquet --out r.csv").expect(3);
     let text = fs::read_to_string(folder.path().join("r.csv")).unwrap();
     let lines: Vec<&str> = text.lines().skip(1).collect();
     assert!(lines[0].starts_with("1,perforated,"), "{text}");
@@ -191,9 +176,8 @@ fn a_bad_row_says_what_is_wrong_and_the_others_are_answered() {
     rows[2][5] = Some(f64::NAN);
     rows[3][2] = Some(1.5);
     write_numbers(&folder.path().join("s.parquet"), &NEEDED, &rows, Compression::UNCOMPRESSED);
-    let output = batch(folder.path(), &["s.parquet", "--out", "r.parquet"]);
-    assert_eq!(output.status.code(), Some(3));
-    assert_eq!(standard_error(&output), "5 rows: 3 bad, 0 undecided\n");
+    let said = run_in(folder.path(), "batch s.parquet --out r.parquet").expect(3);
+    assert_eq!(said.err, "5 rows: 3 bad, 0 undecided\n");
     let found = columns(&folder.path().join("r.parquet"));
     let Cell::Text(outside) = &found["error"][3] else { unreachable!("{:?}", found["error"]) };
     assert!(outside.contains("nose factor"), "{outside}");
@@ -208,12 +192,9 @@ fn a_table_that_cannot_be_used_is_refused_and_writes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let scenes = folder.path().join("s.parquet");
     let refusal = || {
-        let output = batch(folder.path(), &["s.parquet", "--out", "r.parquet"]);
-        assert_eq!(output.status.code(), Some(2), "{}", standard_error(&output));
-        assert!(output.stdout.is_empty());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "something was left behind");
-        // Messages are broken at 80 columns.
-        standard_error(&output).split_whitespace().collect::<Vec<_>>().join(" ")
+        let refused = run_in(folder.path(), "batch s.parquet --out r.parquet").refused();
+        assert_eq!(names(folder.path()), ["s.parquet"]);
+        refused
     };
     write_numbers(&scenes, &NEEDED[..5], &[vec![Some(1.0); 5]], Compression::UNCOMPRESSED);
     assert!(refusal().starts_with("error: s.parquet: the column `velocity_m_s` is missing "));
@@ -257,10 +238,9 @@ fn a_damaged_table_is_refused_or_read_but_never_a_crash() {
         let mut damaged = whole.clone();
         damaged[place] ^= 0x55;
         fs::write(&scenes, damaged).unwrap();
-        let output = batch(folder.path(), &["s.parquet", "--out", "r.csv"]);
-        let code = output.status.code();
-        assert!(matches!(code, Some(0 | 2 | 3)), "byte {place}: {code:?} {}", standard_error(&output));
-        assert_eq!(folder.path().join("r.csv").exists(), code != Some(2), "byte {place}");
+        let said = run_in(folder.path(), "batch s.parquet --out r.csv");
+        assert!([0, 2, 3].contains(&said.code), "byte {place}: {said:?}");
+        assert_eq!(folder.path().join("r.csv").exists(), said.code != 2, "byte {place}");
         let _ = fs::remove_file(folder.path().join("r.csv"));
     }
 }
@@ -269,7 +249,7 @@ fn a_damaged_table_is_refused_or_read_but_never_a_crash() {
 fn a_table_without_rows_has_results_without_rows() {
     let folder = tempfile::tempdir().unwrap();
     write_numbers(&folder.path().join("s.parquet"), &NEEDED, &[], Compression::UNCOMPRESSED);
-    assert_eq!(batch(folder.path(), &["s.parquet", "--out", "r.parquet"]).status.code(), Some(0));
+    run_in(folder.path(), "batch s.parquet --out r.parquet").expect(0);
     let reader = SerializedFileReader::new(File::open(folder.path().join("r.parquet")).unwrap()).unwrap();
     assert_eq!(reader.metadata().file_metadata().num_rows(), 0);
     assert_eq!(reader.metadata().file_metadata().schema_descr().num_columns(), 10);
@@ -278,11 +258,9 @@ fn a_table_without_rows_has_results_without_rows() {
 #[test]
 fn a_sweep_writes_the_bits_of_its_csv() {
     let folder = tempfile::tempdir().unwrap();
-    let slab = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes/paper-slab.toml");
     for out in ["t.csv", "t.parquet"] {
-        let vary = ["--vary", "H/d=0.5:18:9", "--vary", "projectile.mass=-1kg:10kg:3", "--out", out];
-        let output = run(folder.path(), &[&["sweep", slab.to_str().unwrap()][..], &vary].concat());
-        assert_eq!(output.status.code(), Some(3), "{}", standard_error(&output));
+        let vary = "--vary H/d=0.5:18:9 --vary projectile.mass=-1kg:10kg:3";
+        run_in(folder.path(), &format!("sweep @paper-slab {vary} --out {out}")).expect(3);
     }
     let found = columns(&folder.path().join("t.parquet"));
     assert_eq!(found, csv_columns(&folder.path().join("t.csv")));

@@ -4,11 +4,13 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use penetrode::physics::Scene;
 use penetrode::studies::extreme_scenes::{self, MethodVerdict};
 use penetrode::suite::checks::PeerAnswers;
 use penetrode::suite::{Judged, Suite, Verdict};
+use serde_json::Value;
+
+use crate::program::{conforms, run_in};
 
 #[test]
 fn every_stress_case_passes_for_every_method_that_this_build_has() {
@@ -32,21 +34,13 @@ fn every_stress_case_passes_for_every_method_that_this_build_has() {
 fn the_command_writes_every_case_as_a_report() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("report");
-    let run = |arguments: &[&str]| {
-        let output = Command::cargo_bin("penetrode").unwrap().args(arguments).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
-    };
-    let (code, text, err) = run(&["stress", "--cases", "100", "--out", out.to_str().unwrap()]);
-    assert_eq!(code, 0, "{text}{err}");
+    let text = run_in(folder.path(), "stress --cases 100 --out report").expect(0).out;
     assert!(text.contains("E17") && text.contains("random scenes: 100"), "{text}");
     for line in text.lines().filter(|line| !line.starts_with("report: ")) {
         assert!(line.chars().count() <= 80, "{line}");
     }
-    let report = fs::read_to_string(out.join("report.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    let schema: serde_json::Value = serde_json::from_str(&run(&["schema", "stress"]).1).unwrap();
-    assert!(jsonschema::validator_for(&schema).unwrap().is_valid(&report));
+    let report: Value = serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
+    conforms("stress", &report);
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     for claim in Suite::edges().unwrap().claims {
         assert!(page.contains(&format!("<code>{}</code>", claim.table)), "{}", claim.id);
@@ -58,8 +52,8 @@ fn the_command_writes_every_case_as_a_report() {
     let strange = folder.path().join("strange");
     fs::create_dir(&strange).unwrap();
     fs::write(strange.join("mine.txt"), "mine").unwrap();
-    let (code, said, err) = run(&["stress", "--out", strange.to_str().unwrap()]);
-    assert!(code == 2 && said.is_empty() && err.contains("is not a report of penetrode"), "{err}");
+    let refused = run_in(folder.path(), "stress --out strange").refused();
+    assert!(refused.contains("is not a report of penetrode"), "{refused}");
     assert_eq!(fs::read_to_string(strange.join("mine.txt")).unwrap(), "mine");
 }
 

@@ -1,5 +1,4 @@
 use approx::assert_relative_eq;
-use insta::assert_snapshot;
 
 use super::super::diagnostic::{Place, printable, text_of};
 use super::*;
@@ -59,9 +58,12 @@ fn in_stages(from: &str, to: &str) -> String {
     STAGES.replace(from, to)
 }
 
+fn text_of_shipped(name: &str) -> &'static str {
+    SHIPPED.iter().find(|(shipped, _)| *shipped == name).unwrap().1
+}
+
 fn shipped(name: &str) -> Problem {
-    let (name, text) = SHIPPED.iter().find(|(shipped, _)| *shipped == name).unwrap();
-    Scene::from_toml(text, name).unwrap().problem().unwrap()
+    crate::testing::shipped(name).problem().unwrap()
 }
 
 #[test]
@@ -71,11 +73,8 @@ fn every_key_is_read() {
         nose_factor: 0.72,
         strength: 36e6,
         density: 2300.0,
-        static_factor: 12.0,
-        inertia_factor: 1.0,
-        crater_ratio: 2.0,
         crater_stiffness: CraterStiffness::Given(8.48e6),
-        layers: Vec::new(),
+        ..crate::testing::concrete()
     };
     let scene = Scene {
         title: Some("tunnel stop, blunt nose".to_owned()),
@@ -151,7 +150,7 @@ fn layers_sum_up_and_the_one_beyond_the_crater_stands_for_the_target() {
     assert_eq!((problem.target, problem.crater), (Target::Stages, Some(0)));
     assert_eq!(problem.stages.iter().map(|stage| stage.end).collect::<Vec<_>>(), [0.1, 0.12, 0.2, f64::INFINITY]);
     assert_relative_eq!(problem.exit_depth, 0.4, max_relative = 1e-15);
-    let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
+    let text = text_of_shipped("layered");
     let gap = text.replace("25 MPa", "0 MPa").replace("thickness = \"200 mm\"\n", "S = 10\nviscosity = 5\n");
     let scene = read(&gap.replace("velocity = \"250 m/s\"", "velocity = 1"));
     let concrete = scene.concrete().unwrap();
@@ -202,205 +201,37 @@ fn a_byte_order_mark_and_windows_line_ends_are_no_fault() {
     assert_eq!(refuse(&first_line).place.unwrap().span, 0..1);
 }
 
-/// Each refusal as a person sees it.
+/// Edits of `FULL` or `STAGES`, each with the place and the message of its refusal. How they look to a person is kept
+/// in `tests/it/snapshots`.
 #[test]
-#[expect(clippy::too_many_lines, reason = "the lines are what a person sees")]
-fn refusals_underline_the_fault_and_say_what_to_do() {
-    let rendered = |text: String| refuse(&text).render(false);
-    assert_snapshot!(rendered(with("\"2 kg\"", "\"2 m\"")), @r#"
-    Error: `mass` takes a mass; `m` is a unit of length
-       ╭─[ scene.toml:3:11 ]
-       │
-     3 │ mass = "2 m"
-       │           ┬
-       │           ╰── a mass, in kg, g, t, mg, lb, oz and others
-       │
-       │ Help: give it in kg
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("50 mm", "50 furlong")), @r#"
-    Error: `furlong` is no unit that is known
-       ╭─[ scene.toml:4:16 ]
-       │
-     4 │ diameter = "50 furlong"
-       │                ───┬───
-       │                   ╰───── a length, in m, mm, cm, µm, km, in, ft and others
-       │
-       │ Help: give it in m
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("36 MPa", "36 MPA")), @r#"
-    Error: `MPA` is no unit that is known
-       ╭─[ scene.toml:7:16 ]
-       │
-     7 │ strength = "36 MPA"
-       │                ─┬─
-       │                 ╰─── a pressure, in Pa, kPa, MPa, GPa, bar, psi, ksi and others
-       │
-       │ Help: did you mean `MPa`?
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("diameter", "diametr")), @r#"
-    Error: unknown key `diametr` in [projectile]
-       ╭─[ scene.toml:4:1 ]
-       │
-     4 │ diametr = "50 mm"
-       │ ───┬───
-       │    ╰───── known keys: mass, diameter, nose
-       │
-       │ Help: did you mean `diameter`?
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("mass = \"2 kg\"\n", "")), @r#"
-    Error: [projectile] has no `mass`
-       ╭─[ scene.toml:2:1 ]
-       │
-     2 │ [projectile]
-       │ ──────┬─────
-       │       ╰─────── `mass` is required here
-       │
-       │ Help: add mass = "2 kg"
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("B = 1.0", "S = 1.0")), @r#"
-    Error: `S` is given twice
-        ╭─[ scene.toml:12:1 ]
-        │
-     12 │ S = 1.0
-        │ ┬
-        │ ╰── each key and table once
-        │
-        │ Help: remove one of the two
-    ────╯
-    "#);
-    assert_snapshot!(rendered(with("k = 2.0", "k = \"2.0\"")), @r#"
-    Error: `k` is a string
-        ╭─[ scene.toml:13:5 ]
-        │
-     13 │ k = "2.0"
-        │     ──┬──
-        │       ╰──── must be a number >= 0, without unit or quotes
-        │
-        │ Help: write for instance k = 2.0
-    ────╯
-    "#);
-    assert_snapshot!(rendered(with("\"300 m/s\"", "inf")), @r#"
-    Error: `velocity`: the number is not finite in 64 bits
-        ╭─[ scene.toml:16:12 ]
-        │
-     16 │ velocity = inf
-        │            ─┬─
-        │             ╰─── a number >= 0
-        │
-        │ Help: correct the number
-    ────╯
-    "#);
-    assert_snapshot!(rendered(with("180 mm", "-180 mm")), @r#"
-    Error: `thickness = "-180 mm"` is out of range
-       ╭─[ scene.toml:9:13 ]
-       │
-     9 │ thickness = "-180 mm"
-       │             ────┬────
-       │                 ╰────── a number >= 0
-       │
-       │ Help: correct `thickness`; it is read in m as -0.18
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("{ factor = 0.72 }", "{ factor = 0.72, shape = \"flat\" }")), @r#"
-    Error: the nose has both a `factor` and a `shape`
-       ╭─[ scene.toml:5:25 ]
-       │
-     5 │ nose = { factor = 0.72, shape = "flat" }
-       │                         ──┬──
-       │                           ╰──── exactly one of `factor` and `shape`
-       │
-       │ Help: remove one of the two
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("{ factor = 0.72 }", "{ shape = \"ogive\", length_ratio = 3.0 }")), @r#"
-    Error: `length_ratio` has no place in the nose here
-       ╭─[ scene.toml:5:27 ]
-       │
-     5 │ nose = { shape = "ogive", length_ratio = 3.0 }
-       │                           ──────┬─────
-       │                                 ╰─────── the shape `ogive` takes `caliber_radius_head`
-       │
-       │ Help: remove `length_ratio`
-    ───╯
-    "#);
-    assert_snapshot!(rendered(with("\"ndrc\"", "\"ndcr\"")), @r#"
-    Error: unknown word `ndcr` in `criterion`
-        ╭─[ scene.toml:18:13 ]
-        │
-     18 │ criterion = "ndcr"
-        │             ───┬──
-        │                ╰──── known words: full-depth, ndrc
-        │
-        │ Help: did you mean `ndrc`?
-    ────╯
-    "#);
-    assert_snapshot!(rendered(in_stages("mass = 2", "mass = 2\ndiameter = \"50 mm\"")), @r#"
-    Error: `diameter` has no place in [projectile] here
-       ╭─[ scene.toml:3:1 ]
-       │
-     3 │ diameter = "50 mm"
-       │ ────┬───
-       │     ╰───── with [[stage]], [projectile] has only `mass`
-       │
-       │ Help: remove `diameter`
-    ───╯
-    "#);
-    assert_snapshot!(rendered(in_stages("drag", "end = \"9 cm\"\ndrag")), @r#"
-    Error: this stage ends at 0.09 m, in front of where it begins
-       ╭─[ scene.toml:9:7 ]
-       │
-     9 │ end = "9 cm"
-       │       ───┬──
-       │          ╰──── an end at 0.1 m or beyond
-       │
-       │ Help: give the ends in order, each from the impact face
-    ───╯
-    "#);
-    assert_snapshot!(rendered(in_stages("end = \"0.1 m\"\n", "")), @r#"
-    Error: this stage has no `end`, and another follows
-       ╭─[ scene.toml:3:1 ]
-       │
-     3 │ [[stage]]
-       │ ────┬────
-       │     ╰────── only the last stage goes without an `end`
-       │
-       │ Help: give it an `end`, or remove the stages behind it
-    ───╯
-    "#);
-    assert_snapshot!(rendered(FULL.replace("]\nvelocity", "\nvelocity")), @r#"
-    Error: this is not TOML: unclosed table, expected `]`
-        ╭─[ scene.toml:15:8 ]
-        │
-     15 │ [impact
-        │        │
-        │        ╰─ TOML text
-        │
-        │ Help: correct the syntax; strings need quotes
-    ────╯
-    "#);
-    assert_snapshot!(rendered(String::new()), @r#"
-    Error: the scene has no [projectile]
-       ╭─[ scene.toml:1:1 ]
-       │
-     1 │
-       │ │
-       │ ╰─ [projectile] is required
-       │
-       │ Help: add [projectile] with mass, diameter and nose
-    ───╯
-    "#);
-}
-
-/// Edits of `FULL` or `STAGES`, each with the place and the message of its refusal.
-#[test]
-fn every_other_refusal_names_its_place_and_cause() {
+fn every_refusal_names_its_place_and_cause() {
     let nose = "{ factor = 0.72 }";
     for (text, place, message) in [
+        (with("\"2 kg\"", "\"2 m\""), "3:11", "`mass` takes a mass; `m` is a unit of length"),
+        (with("50 mm", "50 furlong"), "4:16", "`furlong` is no unit that is known"),
+        (with("36 MPa", "36 MPA"), "7:16", "`MPA` is no unit that is known"),
+        (with("diameter", "diametr"), "4:1", "unknown key `diametr` in [projectile]"),
+        (with("mass = \"2 kg\"\n", ""), "2:1", "[projectile] has no `mass`"),
+        (with("B = 1.0", "S = 1.0"), "12:1", "`S` is given twice"),
+        (with("k = 2.0", "k = \"2.0\""), "13:5", "`k` is a string"),
+        (with("\"300 m/s\"", "inf"), "16:12", "`velocity`: the number is not finite in 64 bits"),
+        (with("180 mm", "-180 mm"), "9:13", "`thickness = \"-180 mm\"` is out of range"),
+        (with(nose, "{ factor = 0.72, shape = \"flat\" }"), "5:25", "the nose has both a `factor` and a `shape`"),
+        (
+            with(nose, "{ shape = \"ogive\", length_ratio = 3.0 }"),
+            "5:27",
+            "`length_ratio` has no place in the nose here",
+        ),
+        (with("\"ndrc\"", "\"ndcr\""), "18:13", "unknown word `ndcr` in `criterion`"),
+        (
+            in_stages("mass = 2", "mass = 2\ndiameter = \"50 mm\""),
+            "3:1",
+            "`diameter` has no place in [projectile] here",
+        ),
+        (in_stages("drag", "end = \"9 cm\"\ndrag"), "9:7", "this stage ends at 0.09 m, in front of where it begins"),
+        (in_stages("end = \"0.1 m\"\n", ""), "3:1", "this stage has no `end`, and another follows"),
+        (FULL.replace("]\nvelocity", "\nvelocity"), "15:8", "this is not TOML: unclosed table, expected `]`"),
+        (String::new(), "1:1", "the scene has no [projectile]"),
         (with("\"2 kg\"", "\"2\""), "3:8", "`mass` has no unit"),
         (with("\"2 kg\"", "\"kg\""), "3:8", "`mass` is no quantity: there is no number in front of the unit"),
         (with("\"2 kg\"", "true"), "3:8", "`mass` is a truth value"),
@@ -522,7 +353,7 @@ fn admissible_ranges_are_those_of_the_table() {
 
 #[test]
 fn only_the_last_layer_goes_without_a_thickness_and_the_sum_is_finite() {
-    let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
+    let text = text_of_shipped("layered");
     let error = refuse(&text.replace("thickness = \"80 mm\"\n", ""));
     assert_eq!(error.message, "[[target.layer]] has no `thickness`");
     assert_eq!(error.place.unwrap().line, 16);
@@ -532,7 +363,7 @@ fn only_the_last_layer_goes_without_a_thickness_and_the_sum_is_finite() {
 
 #[test]
 fn a_static_factor_of_the_scene_holds_for_layers_without_their_own() {
-    let (_, text) = SHIPPED.iter().find(|(name, _)| *name == "layered").unwrap();
+    let text = text_of_shipped("layered");
     let scene = read(&text.replace("k = 2.0", "k = 2.0\nS = 9.0").replacen("density", "S = 7.0\ndensity", 1));
     let factors: Vec<_> = scene.concrete().unwrap().layers.iter().map(|layer| layer.static_factor).collect();
     assert_eq!(factors, [7.0, 9.0, 9.0]);
@@ -565,17 +396,6 @@ fn bytes_that_are_not_utf_8_are_refused_at_their_place() {
     let error = text_of(b"title = \"\xc3\xa4\"\nx = \"\xff\xfe\"".to_vec(), "scene.toml").unwrap_err();
     assert_eq!(error.location(), "scene.toml:2:6");
     assert_eq!(error.message, "the byte 0xff is not UTF-8");
-    assert_snapshot!(error.render(false), @r#"
-    Error: the byte 0xff is not UTF-8
-       ╭─[ scene.toml:2:6 ]
-       │
-     2 │ x = "��"
-       │      ┬
-       │      ╰── UTF-8 text
-       │
-       │ Help: save the file in UTF-8
-    ───╯
-    "#);
 }
 
 #[test]

@@ -1,80 +1,7 @@
 use super::*;
-use crate::physics::Advice;
-use crate::physics::Outcome;
-use crate::physics::exit_energy::propagate;
-use crate::testing::stage;
-
-/// Numbers in [0, 1) from a seed (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-}
-
-fn of_stages(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
-    Problem::of_stages(mass, impact_speed, stages.iter().copied()).with_exit(exit_depth)
-}
-
-/// Crater with the continuous constant c, and tunnel (docs/theory.md, section 1).
-fn concrete(mass: f64, p: f64, q: f64, kd: f64, speed: f64, exit_depth: f64) -> Problem {
-    Problem::continuous(mass, speed, kd, Stage::tunnel(p, q)).with_exit(exit_depth)
-}
-
-/// The scene `tunnel` of the comparison of solvers: stops at X = 0.14482620011221707, T = 8.2919669482493341e-4.
-fn tunnel_scene(exit_depth: f64) -> Problem {
-    concrete(2.0, 848_230.016_469_244_3, 3.251_548_396_465_436, 0.1, 300.0, exit_depth)
-}
-
-/// Margin by the exact energy law; for r = 0.
-fn exact_margin(problem: &Problem) -> f64 {
-    let mut w = problem.impact_speed * problem.impact_speed;
-    let (mut from, mut least) = (0.0, f64::INFINITY);
-    for (index, law) in problem.stages.iter().enumerate() {
-        let to = problem.limit_of(index).max(from);
-        w = propagate(law, problem.mass, w, from, to);
-        least = least.min(w);
-        from = to;
-        if law.end >= problem.exit_depth {
-            break;
-        }
-    }
-    least / (problem.impact_speed * problem.impact_speed)
-}
-
-fn random_concrete(random: &mut Random) -> Problem {
-    let d: f64 = random.log_between(0.01, 0.1);
-    let p = random.log_between(1e7, 1e9) * d * d;
-    let q = if random.unit() < 0.2 { 0.0 } else { random.log_between(1.0, 3000.0) * d * d };
-    let mass = random.log_between(0.1, 1000.0) * 4000.0 * d * d * d;
-    let kd = random.between(0.5, 3.0) * d;
-    let i = random.log_between(0.05, 300.0);
-    let speed = (i * p * d / mass).sqrt();
-    let reach = concrete(mass, p, q, kd, speed, f64::INFINITY);
-    // The exit near the depth of rest, in all degrees of nearness and on both sides.
-    let w1 = propagate(&reach.stages[0], mass, speed * speed, 0.0, kd);
-    let x = if w1 > 0.0 {
-        kd + if q > 0.0 { mass / (2.0 * q) * (q * w1 / p).ln_1p() } else { mass * w1 / (2.0 * p) }
-    } else {
-        speed * (mass / reach.stages[0].stiffness).sqrt()
-    };
-    let side = if random.unit() < 0.5 { 1.0 } else { -1.0 };
-    let exit = x * (1.0 + side * random.log_between(1e-12, 0.9));
-    concrete(mass, p, q, kd, speed, exit)
-}
+use crate::integrators::Energy;
+use crate::physics::{Advice, Outcome};
+use crate::testing::{Random, of_stages, random_concrete, stage, tunnel};
 
 #[test]
 fn boundary_crossed_twice_within_a_step_is_found_at_its_first_crossing() {
@@ -197,10 +124,10 @@ fn pure_drag_reaches_every_depth() {
 fn rest_that_an_explicit_step_hides_in_its_middle_is_found() {
     // Past rest the law would creep back at p/r, far below the tolerance: at the stability limit of the method u is
     // then positive at every step's end while xi falls for ever.
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for _ in 0..300 {
-        let viscosity = random.log_between(3.0, 300.0);
-        let law = stage(viscosity * random.log_between(1e-6, 1e-2), 0.0, viscosity, 0.0, f64::INFINITY);
+        let viscosity = random.log_uniform(3.0, 300.0);
+        let law = stage(viscosity * random.log_uniform(1e-6, 1e-2), 0.0, viscosity, 0.0, f64::INFINITY);
         let method = Diffsol { max_steps: 1000, ..Diffsol::new(Scheme::Tsit45, 1e-3) };
         let flight = method.solve(&of_stages(1.0, 1.0, 1.0, &[law]), Detail::Events).unwrap();
         assert!(matches!(flight.outcome, Outcome::Stopped | Outcome::Undecided), "{law:?}: {flight:?}");
@@ -237,7 +164,7 @@ fn overdamped_spring_that_only_resists_comes_to_rest_at_any_tolerance() {
 #[test]
 fn step_budget_is_kept_and_reported() {
     let method = Diffsol { max_steps: 5, ..Diffsol::new(Scheme::Bdf, 1e-10) };
-    let error = method.solve(&tunnel_scene(f64::INFINITY), Detail::Events).unwrap_err();
+    let error = method.solve(&tunnel(f64::INFINITY), Detail::Events).unwrap_err();
     let IntegrationError::StepBudgetSpent { max_steps, last } = error else { panic!("{error}") };
     assert_eq!(max_steps, 5);
     assert!(last.depth > 0.0 && last.velocity > 0.0, "{last}");
@@ -247,8 +174,8 @@ fn step_budget_is_kept_and_reported() {
 fn tolerances_at_the_end_of_the_range_give_a_flight() {
     for scheme in Scheme::ALL {
         for rtol in [0.1, 1e-13, scheme.rtol_min()] {
-            let flight = Diffsol::new(scheme, rtol).solve(&tunnel_scene(0.14), Detail::Events).unwrap();
-            let error = (flight.exit_margin.unwrap() - exact_margin(&tunnel_scene(0.14))).abs();
+            let flight = Diffsol::new(scheme, rtol).solve(&tunnel(0.14), Detail::Events).unwrap();
+            let error = (flight.exit_margin.unwrap() - exact_margin(&tunnel(0.14))).abs();
             assert!(error < flight.exit_margin_error.unwrap(), "{scheme:?} {rtol}: {flight:?}");
             assert_eq!(flight.outcome == Outcome::Perforated, rtol < 1e-3, "{scheme:?} {rtol}");
         }
@@ -259,13 +186,18 @@ fn tolerances_at_the_end_of_the_range_give_a_flight() {
 fn tolerance_outside_its_range_is_refused() {
     for scheme in Scheme::ALL {
         for rtol in [0.0, -1e-6, 0.9 * scheme.rtol_min(), 0.11, f64::NAN, f64::INFINITY] {
-            let error = Diffsol::new(scheme, rtol).solve(&tunnel_scene(0.1), Detail::End).unwrap_err();
+            let error = Diffsol::new(scheme, rtol).solve(&tunnel(0.1), Detail::End).unwrap_err();
             assert!(error.is_usage(), "{rtol}: {error}");
         }
     }
 }
 
 const INF: f64 = f64::INFINITY;
+
+/// By the energy, which is exact to round-off.
+fn exact_margin(problem: &Problem) -> f64 {
+    Energy::new().exit_margin_in(problem).unwrap().unwrap().0
+}
 
 fn law(p: f64, s: f64, r: f64, q: f64) -> Law {
     Law { p, s, r, q }
@@ -396,12 +328,12 @@ fn speed_is_lost_below_ten_tolerances_of_the_greatest() {
 
 #[test]
 fn the_bar_holds_the_rounding_of_a_depth_that_is_long_beside_what_is_left() {
-    let mut random = Random(23);
+    let mut random = Random::new(23);
     let mut stops = 0;
     for _ in 0..100 {
         // What is left after 0.1 MN over a tenth of a metre, taken within about a nanometre: 4e7 spacings of depth.
         let exit_depth: f64 = 0.1 + 1e-9;
-        let force = 0.98e6 / (2.0 * (exit_depth - 0.1)) * random.between(0.9, 1.5);
+        let force = 0.98e6 / (2.0 * (exit_depth - 0.1)) * random.uniform(0.9, 1.5);
         let stages = [stage(0.1e6, 0.0, 0.0, 0.0, 0.1), stage(force, 0.0, 0.0, 0.0, INF)];
         let problem = of_stages(1.0, 1e3, exit_depth, &stages);
         let margin = exact_margin(&problem);
@@ -433,7 +365,7 @@ fn a_leg_adds_to_the_bar_by_the_energy_that_is_left_at_its_start() {
 
 #[test]
 fn an_explicit_flight_evaluates_the_force_once_a_leg_and_six_times_a_step_taken_or_not() {
-    let mut random = Random(31);
+    let mut random = Random::new(31);
     let mut rejected = 0;
     for _ in 0..100 {
         let problem = random_concrete(&mut random);

@@ -8,57 +8,55 @@ use crate::integrators::{ClosedForm, Taylor};
 use crate::physics::Advice;
 use crate::physics::Outcome;
 use crate::physics::exit_energy;
+use crate::testing::{Random, of_stages};
 
 fn concrete(mass: f64, v0: f64, exit: f64, kd: f64, p: f64, q: f64, c: Option<f64>) -> Problem {
-    let c = c.unwrap_or(mass * (p + q * v0 * v0) / (kd * (mass + kd * q)));
-    Problem::crater_and_tunnel(mass, v0, Some(Stage::crater(c, kd)), Stage::tunnel(p, q)).with_exit(exit)
+    let tunnel = Stage::tunnel(p, q);
+    let crater = c.map_or_else(|| Stage::continuous_crater(kd, &tunnel, mass, v0), |c| Stage::crater(c, kd));
+    Problem::crater_and_tunnel(mass, v0, Some(crater), tunnel).with_exit(exit)
 }
 
-fn staged(mass: f64, v0: f64, exit: f64, stages: &[Stage]) -> Problem {
-    Problem::of_stages(mass, v0, stages.iter().copied()).with_exit(exit)
+fn slab(v0: f64, exit: f64) -> Problem {
+    concrete(2.0, v0, exit, 0.1, 848_230.0, 3.25, None)
 }
 
 fn stage(p: f64, s: f64, q: f64, end: f64) -> Stage {
-    Stage { static_force: p, stiffness: s, viscosity: 0.0, drag: q, end }
+    crate::testing::stage(p, s, 0.0, q, end)
 }
 
-/// Numbers in [0, 1) from a seed (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low * (high / low).powf(self.unit())
-    }
-
-    /// Concrete of 15 to 135 megapascals, 1 to 10 cm, 30 to 1500 m/s; a quarter each without drag and with a given c.
-    fn scene(&mut self, with_exit: bool) -> Problem {
-        let d = self.between(0.01, 0.1);
-        let mass = self.between(200.0, 1e5) * d * d * d;
-        let fc = self.between(15e6, 135e6);
-        let area = PI * d * d / 4.0;
-        let p = area * 72.0 / (fc / 1e6).sqrt() * fc;
-        let q = if self.unit() < 0.25 { 0.0 } else { area * self.between(0.02, 1.0) * 2400.0 };
-        let kd = d * self.between(0.5, 3.0);
-        let c = if self.unit() < 0.25 { Some(p / kd * self.between(0.5, 2.0)) } else { None };
-        let exit = if with_exit { d * self.between(0.3, 20.0) } else { f64::INFINITY };
-        concrete(mass, self.between(30.0, 1500.0), exit, kd, p, q, c)
-    }
+/// Concrete of 15 to 135 megapascals, 1 to 10 cm, 30 to 1500 m/s; a quarter each without drag and with a given c.
+fn random_slab(random: &mut Random) -> Problem {
+    let d = random.log_uniform(0.01, 0.1);
+    let mass = random.log_uniform(200.0, 1e5) * d * d * d;
+    let fc = random.log_uniform(15e6, 135e6);
+    let area = PI * d * d / 4.0;
+    let p = area * 72.0 / (fc / 1e6).sqrt() * fc;
+    let q = if random.chance(0.25) { 0.0 } else { area * random.log_uniform(0.02, 1.0) * 2400.0 };
+    let kd = d * random.log_uniform(0.5, 3.0);
+    let c = if random.chance(0.25) { Some(p / kd * random.log_uniform(0.5, 2.0)) } else { None };
+    let exit = d * random.log_uniform(0.3, 20.0);
+    concrete(mass, random.log_uniform(30.0, 1500.0), exit, kd, p, q, c)
 }
 
 #[test]
-fn a_margin_out_of_range_is_an_error_with_the_last_speed() {
-    let endless = [stage(0.0, 1e300, 0.0, f64::INFINITY)];
-    let error = Energy::new().exit_margin_in(&staged(1.0, 3.0, 1e10, &endless)).unwrap_err();
-    assert!(matches!(error, IntegrationError::NotFinite { what: "V²", .. }), "{error}");
-    assert_eq!(error.last().map(|last| (last.depth, last.velocity)), Some((0.0, 3.0)));
+fn a_margin_a_bound_or_a_time_beyond_all_numbers_is_an_error_with_the_last_speed() {
+    let margin = |problem: &Problem| Energy::new().exit_margin_in(problem).map(drop).unwrap_err();
+    let solve = |problem: &Problem| Energy::new().solve(problem, Detail::End).map(drop).unwrap_err();
+    let nearly_stopped = stage(0.5 * (1.0 - 1e-10), 0.0, 0.0, 1.0);
+    for (error, quantity) in [
+        (margin(&of_stages(1.0, 3.0, 1e10, &[stage(0.0, 1e300, 0.0, f64::INFINITY)])), "V²"),
+        // w = 1 + 0.6e308 behind a drive of 1.2e308 that fades; the sum of the magnitudes is beyond f64.
+        (margin(&of_stages(2.0, 1.0, 1.0, &[stage(-1.2e308, 1.2e308, 0.0, f64::INFINITY)])), "V²"),
+        // 1e305 m at 1e-5 m/s.
+        (solve(&of_stages(1.0, 1.0, 1e305, &[nearly_stopped, stage(0.0, 0.0, 0.0, f64::INFINITY)])), "time or speed"),
+    ] {
+        let IntegrationError::NotFinite { what, last } = error else { panic!("{error}") };
+        assert_eq!(what, quantity);
+        assert!(quantity != "V²" || (last.depth, last.velocity.max(3.0)) == (0.0, 3.0), "{last}");
+    }
+    // A drive that fades over 1e9 drag lengths, followed step by step: bounded, not hung.
+    let error = solve(&of_stages(1.0, 1.0, 1e9, &[stage(-1.0, 1e-10, 1.0, f64::INFINITY)]));
+    assert!(matches!(error, IntegrationError::StepBudgetSpent { .. }), "{error}");
 }
 
 #[test]
@@ -69,12 +67,12 @@ fn the_root_of_nothing_has_no_infinite_derivative() {
 /// A barrier that cancels six digits of w, then drag alone, over which the error left by the barrier fades with w.
 #[test]
 fn bar_of_the_margin_fades_with_drag_as_the_error_does() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for case in 0..500 {
-        let length = random.between(0.9, 1.0);
+        let length = random.log_uniform(0.9, 1.0);
         let left = 1e-6 * (1.0 + random.unit());
         let barrier = stage(0.5 * (1.0 - left) / length, 0.0, 0.0, length);
-        let problem = staged(1.0, 1.0, 6.0, &[barrier, stage(0.0, 0.0, 0.5, f64::INFINITY)]);
+        let problem = of_stages(1.0, 1.0, 6.0, &[barrier, stage(0.0, 0.0, 0.5, f64::INFINITY)]);
         let (value, error, _) = Energy::new().exit_margin_in(&problem).unwrap().unwrap();
         let (exact, ..) = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>()).unwrap().unwrap();
         let true_error = (exact - TwoFloat::from(value)).value().abs();
@@ -84,17 +82,7 @@ fn bar_of_the_margin_fades_with_drag_as_the_error_does() {
 }
 
 #[test]
-fn tolerance_is_obeyed_and_saves_work() {
-    let problem = concrete(2.0, 900.0, 0.4, 0.1, 848_230.0, 3.25, None);
-    let exact = Energy::new().solve(&problem, Detail::Events).unwrap();
-    let mut evaluations = exact.cost.force_evaluations;
-    for rtol in [1e-12, 1e-9, 1e-6, 1e-3] {
-        let flight = Energy::with_rtol(rtol).unwrap().solve(&problem, Detail::Events).unwrap();
-        assert!((flight.end.velocity / exact.end.velocity - 1.0).abs() < 10.0 * rtol);
-        assert!((flight.end.time / exact.end.time - 1.0).abs() < 10.0 * rtol);
-        assert!(flight.cost.force_evaluations < evaluations, "rtol {rtol:e}");
-        evaluations = flight.cost.force_evaluations;
-    }
+fn a_tolerance_outside_its_range_is_refused() {
     for bad in [0.0, -1e-6, 0.5, f64::NAN] {
         assert!(Energy::with_rtol(bad).unwrap_err().is_usage(), "rtol {bad}");
     }
@@ -103,9 +91,9 @@ fn tolerance_is_obeyed_and_saves_work() {
 /// `exit_energy::propagate` is the closed form of the same quantity, from the depth of rest.
 #[test]
 fn margin_is_the_one_that_the_outcome_implies() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     for case in 0..1000 {
-        let problem = random.scene(true);
+        let problem = random_slab(&mut random);
         let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
         let implied =
             exit_energy::exit_margin(&problem, flight.outcome, flight.stage, flight.end, &flight.events).unwrap();
@@ -118,7 +106,7 @@ fn margin_is_the_one_that_the_outcome_implies() {
 
 #[test]
 fn margin_is_affine_in_the_square_of_the_impact_speed() {
-    let w = |v0: f64| exit_energy_of(&concrete(2.0, v0, 0.4, 0.1, 848_230.0, 3.25, None)).unwrap().unwrap();
+    let w = |v0: f64| exit_energy_of(&slab(v0, 0.4)).unwrap().unwrap();
     let (low, middle, high) = (w(100.0), w(500.0), w(900.0));
     let line = low + (high - low) * (500.0_f64.powi(2) - 100.0_f64.powi(2)) / (900.0_f64.powi(2) - 100.0_f64.powi(2));
     assert!(low < 0.0 && high > 0.0);
@@ -136,65 +124,14 @@ fn viscous_stage_is_refused_unless_it_lies_beyond_the_exit() {
     assert!(Energy::new().solve(&problem, Detail::Events).is_ok());
 }
 
-#[test]
-fn numbers_out_of_range_are_errors_with_the_state_reached() {
-    let problem = staged(1e-300, 1e-5, 1.0, &[stage(1e300, 0.0, 0.0, f64::INFINITY)]);
-    let error = Energy::new().solve(&problem, Detail::Events).unwrap_err();
-    assert!(matches!(error, IntegrationError::NotFinite { .. }), "{error}");
-    // A drive that fades over 1e9 drag lengths, followed step by step: bounded, not hung.
-    let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 1e-10, 1.0, f64::INFINITY)]);
-    let error = Energy::new().solve(&problem, Detail::Events).unwrap_err();
-    assert!(matches!(error, IntegrationError::StepBudgetSpent { .. }), "{error}");
-}
-
-/// A terminal speed is the same however long it is kept.
-#[test]
-fn terminal_speed_over_a_billion_drag_lengths_takes_one_step() {
-    let problem = staged(1.0, 1.0, 1e9, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
-    let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
-    assert_eq!((flight.end.time, flight.end.velocity), (1e9, 1.0));
-    assert!(flight.cost.steps < 5 && flight.exit_margin_error.unwrap() > 0.0);
-}
-
-/// A gap, a jump and a coast: each piece has an elementary time.
-#[test]
-fn uniform_motion_and_parabola_are_exact() {
-    let problem = staged(2.0, 8.0, 5.0, &[stage(0.0, 0.0, 0.0, 1.0), stage(16.0, 0.0, 0.0, f64::INFINITY)]);
-    let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
-    // 1/8 s at 8 m/s, then a = -8 m/s²: rest after 1 s and 4 m, which is the exit: touched, at rest.
-    assert_eq!((flight.end.depth, flight.end.time, flight.end.velocity), (5.0, 1.125, 0.0));
-    let names: Vec<_> = flight.events.iter().map(|e| e.kind.name()).collect();
-    assert_eq!(names, ["stage-end", "exit", "rest"]);
-    assert_eq!(flight.outcome, Outcome::Undecided);
-    assert_eq!(flight.exit_margin, Some(0.0));
-}
-
-/// `p < 0, s > 0`: docs/theory.md, section 2: `p, s` with u0 = p/s. The speed first rises, then falls to rest.
-#[test]
-fn driven_flight_through_its_fastest_point_agrees_with_the_closed_form() {
-    let mut random = Random(4);
-    for _ in 0..300 {
-        let (m, s, p, v0) = (1.0, random.between(1.0, 1e4), -random.between(0.1, 1e4), random.between(1e-3, 1e3));
-        let (w, u0) = ((s / m).sqrt(), p / s);
-        // Below zero u0 the closed form of the depth cancels; this is the same root, added.
-        let depth = (v0 / w).hypot(u0) - u0;
-        let time = v0.atan2(w * u0) / w;
-        let flight =
-            Energy::new().solve(&staged(m, v0, f64::INFINITY, &[stage(p, s, 0.0, f64::INFINITY)]), Detail::Events);
-        let end = flight.unwrap().end;
-        assert!((end.depth / depth - 1.0).abs() < 2e-14, "s {s} p {p} v0 {v0}: {:e} {depth:e}", end.depth);
-        assert!((end.time / time - 1.0).abs() < 2e-13, "s {s} p {p} v0 {v0}: {:e} {time:e}", end.time);
-    }
-}
-
 /// `p, s, q`: the general stage, against its closed form.
 #[test]
 fn velocity_behind_a_general_stage_agrees_with_the_closed_form() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for _ in 0..300 {
         let (p, s, q) = (random.unit() * 20.0 - 5.0, random.unit() * 50.0, random.unit() * 20.0);
         let law = stage(p, s, q, f64::INFINITY);
-        let problem = staged(2.0, 10.0, 0.7, &[stage(0.0, 0.0, 0.0, 0.2), law]);
+        let problem = of_stages(2.0, 10.0, 0.7, &[stage(0.0, 0.0, 0.0, 0.2), law]);
         let w = exit_energy::propagate(&law, 2.0, 100.0, 0.2, 0.7);
         let found = exit_energy_of(&problem).unwrap().unwrap();
         assert!((found - w).abs() < 4e-14 * 100.0, "{found:e} {w:e}");
@@ -208,7 +145,7 @@ fn time_is_regular_when_the_speed_almost_vanishes_at_a_boundary() {
     let first = stage(0.5 * (1.0 - tiny), 0.0, 0.0, 1.0);
     let v1 = tiny.sqrt();
     for p in [-0.5_f64, 0.5, 0.0] {
-        let problem = staged(1.0, 1.0, 1.0 + tiny, &[first, stage(p, 0.0, 0.0, f64::INFINITY)]);
+        let problem = of_stages(1.0, 1.0, 1.0 + tiny, &[first, stage(p, 0.0, 0.0, f64::INFINITY)]);
         let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
         let t1 = 2.0 / (1.0 + v1);
         assert!((flight.events[0].state.time / t1 - 1.0).abs() < 1e-14);
@@ -257,7 +194,7 @@ fn double_double_reaches_beyond_f64() {
 /// Independent of any known digits: loosening the tolerance changes no more than it says.
 #[test]
 fn tolerance_is_obeyed_below_the_round_off_of_f64() {
-    let problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, 848_230.0, 3.25, None).cast::<TwoFloat>();
+    let problem = slab(300.0, f64::INFINITY).cast::<TwoFloat>();
     let fine = Energy::new().solve_in(&problem, Detail::End).unwrap();
     let coarse = Energy::with_rtol(1e-25).unwrap().solve_in(&problem, Detail::End).unwrap();
     let depth = ((fine.end.depth - coarse.end.depth).over(fine.end.depth)).value().abs();
@@ -267,7 +204,7 @@ fn tolerance_is_obeyed_below_the_round_off_of_f64() {
 
 #[test]
 fn trajectory_ascends_and_keeps_the_energy_balance() {
-    let problem = concrete(2.0, 300.0, f64::INFINITY, 0.1, 848_230.0, 3.25, None);
+    let problem = slab(300.0, f64::INFINITY);
     let flight = Energy::new().solve(&problem, Detail::Trajectory).unwrap();
     let rows = &flight.trajectory;
     assert!(rows.len() > 8);
@@ -291,22 +228,15 @@ fn work_without_times_is_two_terms_a_stage_when_there_is_no_drag() {
     assert_eq!(cost, Cost { steps: 2, rejected_steps: 0, force_evaluations: 4 });
 }
 
-#[test]
-fn flight_with_its_events_holds_no_heap_memory() {
-    let problem = concrete(2.0, 900.0, 0.3, 0.1, 848_230.0, 3.25, None);
-    let flight = Energy::new().solve(&problem, Detail::Events).unwrap();
-    assert!(flight.events.len() == 2 && !flight.events.spilled());
-    assert_eq!((flight.trajectory.capacity(), flight.notes.capacity()), (0, 0));
-}
-
 /// Stages of either sign in any order over twelve decades of scale. Double-double takes other steps, and other
 /// variables in them, so it tells whether the times depend on the way they were computed.
 #[test]
 fn any_stages_at_any_scale_give_ascending_events_and_the_times_of_double_double() {
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     let (mut flights, mut worst) = (0, 0.0_f64);
     for case in 0..3000 {
-        let (m, v0, unit) = (random.between(1e-6, 1e6), random.between(1e-6, 1e6), random.between(1e-6, 1e6));
+        let (m, v0, unit) =
+            (random.log_uniform(1e-6, 1e6), random.log_uniform(1e-6, 1e6), random.log_uniform(1e-6, 1e6));
         let energy = m * v0 * v0;
         let mut stages = Vec::new();
         let mut end = 0.0;
@@ -318,7 +248,7 @@ fn any_stages_at_any_scale_give_ascending_events_and_the_times_of_double_double(
         }
         let last = stages.len() - 1;
         stages[last].end = f64::INFINITY;
-        let problem = staged(m, v0, if case % 2 == 0 { f64::INFINITY } else { end }, &stages);
+        let problem = of_stages(m, v0, if case % 2 == 0 { f64::INFINITY } else { end }, &stages);
         let flight = match Energy::new().solve(&problem, Detail::Trajectory) {
             Ok(flight) => flight,
             Err(IntegrationError::NeverEnds { .. }) => continue,
@@ -351,15 +281,15 @@ fn loss(steady: f64, growing: f64, drag: f64) -> Loss<f64> {
 
 /// Two stages of any kind, driven ones among them, of a few drag lengths at most; M = 1.
 fn general(random: &mut Random) -> Problem {
-    let v0 = random.between(0.5, 2.0);
+    let v0 = random.log_uniform(0.5, 2.0);
     let mut law = |end: f64| {
         let force = v0 * v0 * (4.0 * random.unit() - 2.0);
-        let stiffness = if random.unit() < 0.6 { v0 * v0 * random.between(0.1, 10.0) } else { 0.0 };
-        let drag = if random.unit() < 0.7 { random.between(0.05, 5.0) } else { 0.0 };
+        let stiffness = if random.unit() < 0.6 { v0 * v0 * random.log_uniform(0.1, 10.0) } else { 0.0 };
+        let drag = if random.unit() < 0.7 { random.log_uniform(0.05, 5.0) } else { 0.0 };
         stage(force, stiffness, drag, end)
     };
     let stages = [law(0.3), law(f64::INFINITY)];
-    staged(1.0, v0, 0.3 + random.between(0.05, 1.0), &stages)
+    of_stages(1.0, v0, 0.3 + random.log_uniform(0.05, 1.0), &stages)
 }
 
 #[test]
@@ -367,10 +297,10 @@ fn what_a_flight_costs_is_counted() {
     let cost = |problem: &Problem| Energy::new().solve(problem, Detail::End).unwrap().cost;
     let counted = |steps, force_evaluations| Cost { steps, rejected_steps: 0, force_evaluations };
     // A gap: one step of two terms for w, one of 24 for the time.
-    assert_eq!(cost(&staged(1.0, 2.0, 1.0, &[stage(0.0, 0.0, 0.0, f64::INFINITY)])), counted(2, 26));
+    assert_eq!(cost(&of_stages(1.0, 2.0, 1.0, &[stage(0.0, 0.0, 0.0, f64::INFINITY)])), counted(2, 26));
     // Constant forces, w = 1/4 behind the first, rest in the second: two steps each, and one trial of two terms.
     let stages = [stage(0.75, 0.0, 0.0, 1.0), stage(0.5, 0.0, 0.0, f64::INFINITY)];
-    assert_eq!(cost(&staged(2.0, 1.0, f64::INFINITY, &stages)), counted(4, 54));
+    assert_eq!(cost(&of_stages(2.0, 1.0, f64::INFINITY, &stages)), counted(4, 54));
     assert_eq!(Energy::new().name(), "energy");
 }
 
@@ -413,40 +343,10 @@ fn the_static_reach_is_the_way_on_which_the_static_force_takes_all() {
     }
 }
 
-/// Powers of two as units of length and speed: no number rounds differently, and no trial is taken more.
-#[test]
-fn units_are_free_to_the_bit() {
-    let mut random = Random(8);
-    for case in 0..200 {
-        let mut problem = general(&mut random);
-        if case % 2 == 0 {
-            problem.exit_depth = f64::INFINITY;
-        }
-        let Ok(flight) = Energy::new().solve(&problem, Detail::Events) else { continue };
-        for (length, speed) in [(67, 0), (-67, 0), (3, 40), (-2, -40)] {
-            let (l, v) = (2_f64.powi(length), 2_f64.powi(speed));
-            let mut scaled = problem.clone();
-            scaled.impact_speed *= v;
-            scaled.exit_depth *= l;
-            for law in &mut scaled.stages {
-                law.static_force *= v * v / l;
-                law.stiffness *= v * v / l / l;
-                law.drag /= l;
-                law.end *= l;
-            }
-            let other = Energy::new().solve(&scaled, Detail::Events).unwrap();
-            let end =
-                State { time: flight.end.time / v * l, depth: flight.end.depth * l, velocity: flight.end.velocity * v };
-            assert_eq!((other.end, other.cost), (end, flight.cost), "case {case}, 2^{length} m, 2^{speed} m/s");
-            assert_eq!(other.exit_margin_error, flight.exit_margin_error, "case {case}");
-        }
-    }
-}
-
 /// Two methods that share neither a variable nor a line.
 #[test]
 fn times_of_driven_and_resisted_flights_are_those_of_the_equation_in_time() {
-    let mut random = Random(9);
+    let mut random = Random::new(9);
     let (mut flights, mut worst) = (0, 0.0_f64);
     for case in 0..600 {
         let problem = general(&mut random);
@@ -466,7 +366,7 @@ fn times_of_driven_and_resisted_flights_are_those_of_the_equation_in_time() {
     assert!(flights > 550, "{flights}");
     // Out past the fastest point, half as fast again as at impact: -dw/dx = -10 + 5 x + w. A step of a loose tolerance
     // could take the speed at the end for the same on the way up.
-    let problem = staged(1.0, 1.0, 2.2, &[stage(-5.0, 2.5, 0.5, f64::INFINITY)]);
+    let problem = of_stages(1.0, 1.0, 2.2, &[stage(-5.0, 2.5, 0.5, f64::INFINITY)]);
     let exact = Taylor::default().solve(&problem, Detail::End).unwrap().end.time;
     for (method, limit) in [(Energy::new(), 2e-14), (Energy::with_rtol(1e-3).unwrap(), 1e-3)] {
         let off = method.solve(&problem, Detail::End).unwrap().end.time / exact - 1.0;
@@ -477,9 +377,14 @@ fn times_of_driven_and_resisted_flights_are_those_of_the_equation_in_time() {
 /// `V' = 1 - V²`: V = coth or tanh of t + c, `x = ln sinh(t + c)` or `ln cosh(t + c)` less the same at c.
 #[test]
 fn a_speed_that_comes_to_its_limit_is_kept_at_no_cost() {
+    // At its limit from the start it takes one step, however long it is kept.
+    let at_once = Energy::new().solve(&of_stages(1.0, 1.0, 1e9, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]), Detail::End);
+    let at_once = at_once.unwrap();
+    assert_eq!((at_once.end.time, at_once.end.velocity), (1e9, 1.0));
+    assert!(at_once.cost.steps < 5 && at_once.exit_margin_error.unwrap() > 0.0);
     for (v0, ahead) in [(2.0, (2.0_f64 / 3.0).ln()), (0.5, (4.0_f64 / 3.0).ln())] {
         for depth in [40.0, 1e3, 1e9] {
-            let problem = staged(1.0, v0, depth, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
+            let problem = of_stages(1.0, v0, depth, &[stage(-1.0, 0.0, 1.0, f64::INFINITY)]);
             let flight = Energy::new().solve(&problem, Detail::End).unwrap();
             let time = depth + ahead;
             assert!((flight.end.time / time - 1.0).abs() < 1e-13, "{v0}, {depth:e}: {:e}", flight.end.time - time);
@@ -494,7 +399,7 @@ fn a_speed_that_comes_to_its_limit_is_kept_at_no_cost() {
 fn a_rest_that_rounds_onto_a_boundary_has_its_time_beyond_it() {
     let left = 2.0_f64.powi(-53);
     let stages = [stage(0.5 * (1.0 - left), 0.0, 0.0, 1.0), stage(0.5, 0.0, 0.0, f64::INFINITY)];
-    let flight = Energy::new().solve(&staged(1.0, 1.0, f64::INFINITY, &stages), Detail::Events).unwrap();
+    let flight = Energy::new().solve(&of_stages(1.0, 1.0, f64::INFINITY, &stages), Detail::Events).unwrap();
     let v1 = left.sqrt();
     assert_eq!((flight.end.depth, flight.outcome), (1.0, Outcome::Stopped));
     let (before, after) = (flight.events[0].state.time, flight.end.time - flight.events[0].state.time);
@@ -511,13 +416,13 @@ fn the_depth_of_rest_moves_with_the_impact_speed() {
         Energy::new().solve_in(&dual, Detail::End).unwrap().end.depth
     };
     for (p, s, q) in [(2.0, 30.0, 0.7), (0.0, 30.0, 0.0), (-3.0, 30.0, 0.4), (5.0, 0.0, 0.6)] {
-        let depth = derived(staged(1.0, 5.0, f64::INFINITY, &[stage(p, s, q, f64::INFINITY)]));
+        let depth = derived(of_stages(1.0, 5.0, f64::INFINITY, &[stage(p, s, q, f64::INFINITY)]));
         let exact = 5.0 * (-2.0 * q * depth.re).exp() / (p + s * depth.re);
         assert!((depth.eps / exact - 1.0).abs() < 1e-13, "{p}, {s}, {q}: {:e} {exact:e}", depth.eps);
     }
     // As above, nearer to the boundary than depths can tell apart.
     let first = stage(0.5 * (1.0 - 2.0_f64.powi(-53)), 0.0, 0.0, 1.0);
-    let depth = derived(staged(1.0, 1.0, f64::INFINITY, &[first, stage(500.0, 0.0, 0.0, f64::INFINITY)]));
+    let depth = derived(of_stages(1.0, 1.0, f64::INFINITY, &[first, stage(500.0, 0.0, 0.0, f64::INFINITY)]));
     assert!(depth.re == 1.0 && (depth.eps * 500.0 - 1.0).abs() < 1e-13, "{depth:?}");
 }
 
@@ -529,21 +434,9 @@ fn the_root_of_w_is_found_in_few_trials() {
     let root = walk.root(&loss(1.0, 0.0, 1.0), 0.0, 3.0, 4.0, 1e-18);
     assert!((root / 4.0_f64.ln() - 1.0).abs() < 1e-15, "{root}");
     assert!(walk.cost.force_evaluations <= 150, "{:?}", walk.cost);
-    let problem = staged(1.0, 5.0, f64::INFINITY, &[stage(2.0, 30.0, 0.7, f64::INFINITY)]);
+    let problem = of_stages(1.0, 5.0, f64::INFINITY, &[stage(2.0, 30.0, 0.7, f64::INFINITY)]);
     let cost = Energy::new().solve(&problem, Detail::End).unwrap().cost;
     assert!(cost.force_evaluations <= 210, "{cost:?}");
-}
-
-#[test]
-fn a_bar_or_a_time_beyond_all_numbers_is_an_error() {
-    // w = 1 + 0.6e308 behind a drive of 1.2e308 that fades; the sum of the magnitudes is beyond f64.
-    let problem = staged(2.0, 1.0, 1.0, &[stage(-1.2e308, 1.2e308, 0.0, f64::INFINITY)]);
-    let error = Energy::new().exit_margin_in(&problem).unwrap_err();
-    assert!(matches!(error, IntegrationError::NotFinite { what: "V²", .. }), "{error}");
-    // 1e305 m at 1e-5 m/s.
-    let stages = [stage(0.5 * (1.0 - 1e-10), 0.0, 0.0, 1.0), stage(0.0, 0.0, 0.0, f64::INFINITY)];
-    let error = Energy::new().solve(&staged(1.0, 1.0, 1e305, &stages), Detail::End).unwrap_err();
-    assert!(matches!(error, IntegrationError::NotFinite { what: "time or speed", .. }), "{error}");
 }
 
 /// `tolerance^(1/n)` of the radius, n the last order of which a coefficient is left.
@@ -571,7 +464,7 @@ fn a_step_in_time_follows_the_last_two_coefficients() {
 /// flown at it.
 #[test]
 fn a_clock_that_comes_to_its_end_too_early_goes_on_at_the_last_speed() {
-    let problem = staged(1.0, 1.0, 3.0, &[stage(0.5, 0.0, 0.0, f64::INFINITY)]);
+    let problem = of_stages(1.0, 1.0, 3.0, &[stage(0.5, 0.0, 0.0, f64::INFINITY)]);
     let elapse = |steady, depth, velocity| {
         let clock = Clock { loss: loss(steady, 0.0, 0.0), tolerance: f64::EPSILON };
         let now = State { time: 2.0, depth: 1.0, velocity: 0.5 };
@@ -587,11 +480,11 @@ fn a_clock_that_comes_to_its_end_too_early_goes_on_at_the_last_speed() {
 /// these.
 #[test]
 fn the_variable_of_time_is_the_one_that_takes_less_steps() {
-    let mut random = Random(10);
+    let mut random = Random::new(10);
     let (mut concrete, mut any) = (Cost::default(), Cost::default());
     for _ in 0..300 {
-        concrete += Energy::new().solve(&random.scene(true), Detail::End).unwrap().cost;
+        concrete += Energy::new().solve(&random_slab(&mut random), Detail::End).unwrap().cost;
         any += Energy::new().solve(&general(&mut random), Detail::End).unwrap().cost;
     }
-    assert!(concrete.steps <= 3450 && any.steps <= 2472, "{concrete:?}, {any:?}");
+    assert!(concrete.steps <= 3897 && any.steps <= 2378, "{concrete:?}, {any:?}");
 }

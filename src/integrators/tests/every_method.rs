@@ -8,7 +8,8 @@ use twofloat::TwoFloat;
 use super::*;
 use crate::physics::closed_form::critical_of_stages;
 use crate::physics::{Advice, EventKind, Outcome, Problem, Stage, State, Target};
-use crate::testing::{Random, kinds, stage};
+use crate::studies::relations::{Units, in_units};
+use crate::testing::{Random, continuous, kinds, of_stages, random_concrete, stage, tunnel};
 
 const INF: f64 = f64::INFINITY;
 
@@ -38,36 +39,20 @@ fn flights(problem: &Problem) -> Vec<(MethodName, Flight)> {
     methods(1e-10).into_iter().filter_map(solve).collect()
 }
 
+/// The flights by fixed steps, of which the target takes some sixty, boundaries being located within a step.
+fn located_by_steps(problem: &Problem) -> impl Iterator<Item = (MethodName, Flight)> {
+    let step = problem.exit_depth / problem.impact_speed / 64.3;
+    let solve = move |boundaries: Boundaries, velocity| {
+        let scheme = CentralDifference::uniform(step, velocity, boundaries);
+        (MethodName::CentralDifference, scheme.solve(problem, Detail::Events).unwrap())
+    };
+    [Boundaries::Interpolated, Boundaries::Landed]
+        .into_iter()
+        .flat_map(move |boundaries| VelocityAt::ALL.map(|velocity| solve(boundaries, velocity)))
+}
+
 fn constant(static_force: f64, end: f64) -> Stage {
     stage(static_force, 0.0, 0.0, 0.0, end)
-}
-
-fn of_stages(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
-    Problem::of_stages(mass, impact_speed, stages.iter().copied()).with_exit(exit_depth)
-}
-
-/// Crater with the continuous constant c, and tunnel (docs/theory.md, section 1).
-fn concrete(mass: f64, p: f64, q: f64, kd: f64, speed: f64, exit_depth: f64) -> Problem {
-    Problem::continuous(mass, speed, kd, Stage::tunnel(p, q)).with_exit(exit_depth)
-}
-
-/// The scene `tunnel` of the comparison of solvers.
-fn tunnel(exit_depth: f64) -> Problem {
-    concrete(2.0, 848_230.016_469_244_3, 3.251_548_396_465_436, 0.1, 300.0, exit_depth)
-}
-
-/// Crater and tunnel, stopping in either or perforating, with the exit in all degrees of nearness to the place of rest.
-fn random_concrete(random: &mut Random) -> Problem {
-    let d: f64 = random.log_uniform(0.01, 0.1);
-    let p = random.log_uniform(1e7, 1e9) * d * d;
-    let q = if random.chance(0.2) { 0.0 } else { random.log_uniform(1.0, 3000.0) * d * d };
-    let mass = random.log_uniform(0.1, 1000.0) * 4000.0 * d * d * d;
-    let kd = random.uniform(0.5, 3.0) * d;
-    let speed = (random.log_uniform(0.05, 300.0) * p * d / mass).sqrt();
-    let endless = concrete(mass, p, q, kd, speed, INF);
-    let rest = ClosedForm.solve(&endless, Detail::End).unwrap().end.depth;
-    let side = if random.chance(0.5) { 1.0 } else { -1.0 };
-    Problem { exit_depth: rest * (1.0 + side * random.log_uniform(1e-12, 0.9)), ..endless }
 }
 
 /// Up to five stages with jumps, gaps, springs, thin layers and drives.
@@ -156,6 +141,102 @@ fn random_flights_end_where_when_and_as_fast_as_the_closed_form_says() {
     }
 }
 
+/// One stage of each family, resisting and driving, to rest and through an exit: the closed form has 50 digits to be
+/// compared with, and is compared with them in its own tests.
+#[test]
+fn a_stage_of_each_family_ends_where_when_and_as_fast_as_its_closed_form_says() {
+    for (law, speed, exit_depth, limit) in [
+        (stage(7.0, 0.0, 3.0, 0.0, INF), 5.0, INF, 2e-15),
+        (stage(7.0, 11.0, 0.0, 0.0, INF), 5.0, INF, 1e-15),
+        (stage(-7.0, 11.0, 0.0, 0.0, INF), 5.0, INF, 1e-15),
+        (stage(-1e4, 2.0, 0.0, 0.0, INF), 0.5, INF, 1e-14),
+        (stage(-0.1, 1e4, 0.0, 0.0, INF), 1e3, INF, 1e-14),
+        // Underdamped and driven: it swings through the balance at 10 m, on to rest.
+        (stage(-1000.0, 100.0, 15.0, 0.0, INF), 0.1, INF, 1e-14),
+        (stage(0.0, 0.0, 2.0, 0.0, INF), 10.0, 4.0, 1e-14),
+        (stage(0.0, 0.0, 0.0, 2.0, INF), 10.0, 4.0, 1e-14),
+        (stage(-40.0, 0.0, 0.0, 0.5, INF), 20.0, 0.25, 1e-14),
+        (stage(0.0, 0.0, 0.0, 0.0, INF), 10.0, 4.0, f64::MIN_POSITIVE),
+    ] {
+        let problem = of_stages(1.0, speed, exit_depth, &[law]);
+        let exact = ClosedForm.solve(&problem, Detail::End).unwrap();
+        for (name, flight) in flights(&problem) {
+            assert_eq!(flight.outcome, exact.outcome, "{name}, {law:?}");
+            let limit = if is_library(name) { 1e-6 } else { limit };
+            let scale = if is_library(name) || flight.outcome.is_stop() { speed } else { exact.end.velocity };
+            let errors = [
+                flight.end.depth / exact.end.depth - 1.0,
+                flight.end.time / exact.end.time - 1.0,
+                (flight.end.velocity - exact.end.velocity) / scale,
+            ];
+            assert!(errors.iter().all(|error| error.abs() < limit), "{name}, {law:?}: {errors:?}");
+        }
+    }
+}
+
+/// V1² = 0 at V0 = sqrt(k d P/M), approached from both sides down to one spacing.
+#[test]
+fn rest_near_the_crater_end_is_continuous_and_cheap() {
+    let law = tunnel(INF);
+    let touching = (law.stages[0].end * law.stages[1].static_force / law.mass).sqrt();
+    for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_library(*name)) {
+        for (power, sign) in (1..=17).flat_map(|power| [1.0, -1.0].map(|sign| (power, sign))) {
+            let speed = touching * (1.0 + sign * 10.0_f64.powi(-power));
+            let problem = Problem::continuous(law.mass, speed, law.stages[0].end, law.stages[1]);
+            let exact = ClosedForm.solve(&problem, Detail::End).unwrap().end;
+            let flight = method.integrator().solve(&problem, Detail::End).unwrap();
+            let off = [flight.end.depth / exact.depth - 1.0, flight.end.time / exact.time - 1.0];
+            assert!(off[0].abs() < 5e-15 && off[1].abs() < 1e-14, "{name}, 1e-{power}: {off:?}");
+            assert!(flight.cost.steps <= 4 || name != MethodName::Taylor, "{name}: {:?}", flight.cost);
+            assert!(power >= 14 || (flight.outcome == Outcome::StoppedInTunnel) == (sign > 0.0), "{name}, 1e-{power}");
+        }
+    }
+}
+
+#[test]
+fn a_looser_tolerance_is_kept_at_less_work() {
+    let mut random = Random::new(5);
+    let problems: Vec<_> = (0..200).map(|_| random_concrete(&mut random).with_exit(INF)).collect();
+    for name in [MethodName::Taylor, MethodName::Energy] {
+        let mut work = Vec::new();
+        for rtol in [Some(1e-3), Some(1e-6), Some(1e-9), Some(1e-12), None] {
+            let method = Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() }).unwrap();
+            let mut evaluations = 0;
+            for problem in &problems {
+                let exact = ClosedForm.solve(problem, Detail::End).unwrap().end;
+                let flight = method.integrator().solve(problem, Detail::End).unwrap();
+                let off = [flight.end.depth / exact.depth - 1.0, flight.end.time / exact.time - 1.0];
+                let rtol = rtol.unwrap_or(0.0);
+                assert!(off[0].abs() < rtol.max(5e-15) && off[1].abs() < rtol.max(1e-13), "{name}, {rtol:e}: {off:?}");
+                evaluations += flight.cost.force_evaluations;
+            }
+            work.push(evaluations);
+        }
+        assert!(work.windows(2).all(|w| w[0] < w[1]), "{name}: {work:?}");
+    }
+}
+
+/// Powers of two as units of length and time: no number rounds differently, and no step is taken more.
+#[test]
+fn units_are_free_to_the_bit() {
+    let mut random = Random::new(8);
+    for _ in 0..200 {
+        let problem = random_stages(&mut random, true);
+        for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_library(*name)) {
+            let Some(Ok(flight)) = answer(&method, &problem, Detail::Events) else { continue };
+            for (length, time) in [(67, 67), (-67, -67), (3, -37), (-2, 38)] {
+                let (length, time) = (2_f64.powi(length), 2_f64.powi(time));
+                let scaled = in_units(&problem, Units { length, mass: 4.0, time });
+                let other = method.integrator().solve(&scaled, Detail::Events).unwrap();
+                let State { time: t, depth, velocity } = flight.end;
+                let end = State { time: t * time, depth: depth * length, velocity: velocity / time * length };
+                assert_eq!((other.end, other.cost), (end, flight.cost), "{name}: {length} m, {time} s, {problem:?}");
+                assert_eq!(other.exit_margin_error, flight.exit_margin_error, "{name}");
+            }
+        }
+    }
+}
+
 /// Exact margins: `energy` in double-double from the same coefficients; behind viscosity the series at round-off.
 #[test]
 fn the_error_bound_of_the_margin_holds_and_is_not_idle() {
@@ -208,7 +289,7 @@ fn near_the_critical_velocity_the_outcome_is_right_or_undecided() {
     let mut problems = vec![
         tunnel(0.14),
         tunnel(0.05),
-        concrete(0.9, 245_000.0, 0.0, 0.0538, 390.0, 0.2),
+        continuous(0.9, 245_000.0, 0.0, 0.0538, 390.0, 0.2),
         // A barrier, then a drive: the least W is that behind the barrier.
         of_stages(1.0, 4.0, 3.0, &[constant(8.0, 1.0), constant(-100.0, INF)]),
         // What is left of a slab behind a jump of the force is a millionth of the depth before it.
@@ -266,7 +347,7 @@ fn an_approach_that_the_error_bound_cannot_tell_from_arrival_is_undecided() {
 
 #[test]
 fn events_at_one_place_are_listed_in_order() {
-    let (end, exit) = (EventKind::StageEnd, EventKind::Exit);
+    let (end, crater, exit) = (EventKind::StageEnd, EventKind::CraterEnd, EventKind::Exit);
     let no_length = [constant(1.0, 0.0), constant(1.0, 0.5), constant(9.0, 0.5), constant(1.0, INF)];
     let many: Vec<_> = [0.01, 0.02, 0.02, 0.02, 0.03, 0.03_f64.next_up(), 0.05, 0.1, 0.1, 0.1_f64.next_up(), 0.14]
         .map(|end| constant(1.0, end))
@@ -274,16 +355,17 @@ fn events_at_one_place_are_listed_in_order() {
         .chain([constant(1.0, INF)])
         .collect();
     for (problem, expected, stage) in [
-        (tunnel(0.1), vec![EventKind::CraterEnd, exit], 0),
-        (tunnel(0.1_f64.next_up()), vec![EventKind::CraterEnd, exit], 1),
+        (tunnel(0.1), vec![crater, exit], 0),
+        (tunnel(0.1_f64.next_up()), vec![crater, exit], 1),
         (tunnel(0.05), vec![exit], 0),
         (tunnel(1e-9), vec![exit], 0),
         (of_stages(1.0, 2.0, 1.0, &no_length), vec![end(0), end(1), end(2), exit], 3),
         // Stages without length behind the one that ends at the exit are listed before it.
         (of_stages(1.0, 2.0, 0.5, &no_length), vec![end(0), end(1), end(2), exit], 1),
         (of_stages(1.0, 2.0, 0.14, &many), (0..11).map(end).chain([exit]).collect(), 10),
+        (Problem { crater: Some(1), ..of_stages(1.0, 2.0, 0.5, &no_length) }, vec![end(0), crater, end(2), exit], 1),
     ] {
-        for (name, flight) in flights(&problem) {
+        for (name, flight) in flights(&problem).into_iter().chain(located_by_steps(&problem)) {
             assert_eq!((kinds(&flight.events), flight.stage), (expected.clone(), stage), "{name}");
             assert_eq!((flight.outcome, flight.end.depth), (Outcome::Perforated, problem.exit_depth), "{name}");
             assert!(flight.events.windows(2).all(|e| e[0].state.time <= e[1].state.time), "{name}");
@@ -296,16 +378,23 @@ fn events_at_one_place_are_listed_in_order() {
 #[test]
 fn a_place_that_is_touched_is_reached() {
     let wall = |end| constant(8.0, end);
-    let at_exit = of_stages(1.0, 4.0, 1.0, &[wall(1.0), wall(1.0), wall(INF)]);
+    // Behind a gap that takes 1/8 s.
+    let at_exit = of_stages(1.0, 4.0, 1.5, &[constant(0.0, 0.5), wall(1.5), wall(1.5), wall(INF)]);
+    // A drive behind the place does not start what has come to rest; any more speed would get through.
+    let before_a_drive = of_stages(1.0, 4.0, 2.0, &[wall(1.0), constant(-100.0, INF)]);
     let mut at_crater_end = of_stages(1.0, 4.0, INF, &[wall(1.0), wall(INF)]);
     (at_crater_end.crater, at_crater_end.target) = (Some(0), Target::CraterAndTunnel);
     for (name, flight) in flights(&at_exit) {
-        assert_eq!((flight.outcome, flight.stage), (Outcome::Undecided, 0), "{name}");
+        assert_eq!((flight.outcome, flight.stage), (Outcome::Undecided, 1), "{name}");
         if !is_library(name) {
-            let both = [EventKind::StageEnd(0), EventKind::StageEnd(1), EventKind::Exit, EventKind::Rest];
-            assert_eq!((kinds(&flight.events), flight.exit_margin), (both.to_vec(), Some(0.0)), "{name}");
-            assert_eq!(flight.end, State { time: 0.5, depth: 1.0, velocity: 0.0 }, "{name}");
+            let all = [0, 1, 2].map(EventKind::StageEnd).into_iter().chain([EventKind::Exit, EventKind::Rest]);
+            assert_eq!((kinds(&flight.events), flight.exit_margin), (all.collect(), Some(0.0)), "{name}");
+            assert_eq!(flight.end, State { time: 0.625, depth: 1.5, velocity: 0.0 }, "{name}");
         }
+    }
+    for (name, flight) in flights(&before_a_drive) {
+        assert_eq!(flight.outcome, Outcome::Undecided, "{name}");
+        assert!(is_library(name) || (flight.exit_margin, flight.end.depth) == (Some(0.0), 1.0), "{name}");
     }
     for (name, flight) in flights(&at_crater_end).into_iter().filter(|(name, _)| !is_library(*name)) {
         assert_eq!((flight.outcome, flight.stage), (Outcome::StoppedInCrater, 0), "{name}");
