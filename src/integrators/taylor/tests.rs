@@ -19,8 +19,7 @@ fn peer_scene(impact_speed: f64, exit_depth: f64) -> Problem {
 fn random_stages(random: &mut Random) -> Problem {
     let count = 1 + random.below(4);
     let mut end = 0.0;
-    let term =
-        |random: &mut Random, low, high| if random.chance(0.5) { random.log_uniform(low, high) } else { 0.0 };
+    let term = |random: &mut Random, low, high| if random.chance(0.5) { random.log_uniform(low, high) } else { 0.0 };
     let stages: Vec<Stage> = (0..count)
         .map(|index| {
             end += if random.chance(0.1) { 0.0 } else { random.uniform(0.01, 0.5) };
