@@ -4,12 +4,12 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::ops;
 use std::path::Path;
 
 use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
 use serde::Deserialize;
 use thiserror::Error;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::physics::units::QuantityError;
@@ -24,11 +24,14 @@ const LINE_WIDTH_MAX: usize = 240;
 /// Longest piece of a file that is quoted within a message, in characters.
 const QUOTE_LENGTH_MAX: usize = 60;
 
+/// Bytes of a text.
+pub(super) type Span = std::ops::Range<usize>;
+
 /// Where in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Bytes of the offending text, counted behind a byte order mark.
-    pub span: ops::Range<usize>,
+    pub span: Span,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
@@ -128,7 +131,7 @@ pub(crate) fn quoted(text: &str) -> String {
 /// What is wrong with a text, before it is known which file it is from.
 #[derive(Debug)]
 pub(crate) struct Fault {
-    span: ops::Range<usize>,
+    span: Span,
     message: String,
     allowed: String,
     help: String,
@@ -137,7 +140,7 @@ pub(crate) struct Fault {
 impl Fault {
     /// Refuses the bytes `span`: what is wrong, what is allowed, what to do.
     pub(crate) fn new(
-        span: ops::Range<usize>,
+        span: Span,
         message: impl Into<String>,
         allowed: impl Into<String>,
         help: impl Into<String>,
@@ -266,10 +269,44 @@ impl Dialect {
         if path.is_empty() { self.root.to_owned() } else { (self.table)(path) }
     }
 
+    /// Refuses the `word` at `path`, which is none of the `known` ones.
+    fn unknown(&self, what: &str, path: &str, place: &str, span: Span, word: &str, known: &[&str]) -> Fault {
+        /// Longest list of words in one line (bytes).
+        const KNOWN_MAX: usize = 160;
+        let help = nearest(word, known).map_or_else(|| (self.unknown)(path, word), did_you_mean);
+        let mut known = known.join(", ");
+        if known.len() > KNOWN_MAX {
+            "those that docs/reference.md lists".clone_into(&mut known);
+        }
+        let message = format!("unknown {what} {} in {place}", quoted(word));
+        Fault::new(span, message, format!("known {what}s: {known}"), help)
+    }
+
+    /// Refuses the key `word` of the table at `path`, which has the `known` keys.
+    pub(super) fn unknown_key(&self, path: &str, span: Span, word: &str, known: &[&str]) -> Fault {
+        self.unknown("key", path, &self.name_of(path), span, word, known)
+    }
+
+    /// Refuses the value `word` at `path`, which may have the `known` values.
+    pub(super) fn unknown_word(&self, path: &str, span: Span, word: &str, known: &[&str]) -> Fault {
+        self.unknown("word", path, &format!("`{}`", key_of(path)), span, word, known)
+    }
+
+    /// Refuses the value at `path`, which is `found` and must be `wanted`.
+    pub(super) fn mistyped(&self, path: &str, span: Span, found: &str, wanted: &str) -> Fault {
+        let message = format!("`{}` is {found}", key_of(path));
+        Fault::new(span, message, format!("must be {wanted}"), (self.remedy)(path))
+    }
+
     /// Refuses `table` for the lack of `key`, of which `example` is one.
-    pub(crate) fn missing(&self, table: &str, span: ops::Range<usize>, key: &str, help: String) -> Fault {
+    pub(crate) fn missing(&self, table: &str, span: Span, key: &str, help: String) -> Fault {
         Fault::new(span, format!("{} has no `{key}`", self.name_of(table)), format!("`{key}` is required here"), help)
     }
+}
+
+/// The tables that the TOML `text` describes.
+pub(super) fn parse(text: &str) -> Result<Spanned<DeTable<'_>>, Fault> {
+    DeTable::parse(text).map_err(|error| not_toml(text, &error))
 }
 
 /// The `T` that the TOML `text` describes.
@@ -277,38 +314,25 @@ impl Dialect {
 /// # Errors
 /// [`Fault`]: the text is not TOML, or its tables, keys and types are not those of `T`.
 pub(crate) fn decode<'t, T: Deserialize<'t>>(text: &'t str, dialect: &Dialect) -> Result<T, Fault> {
-    let document = DeTable::parse(text).map_err(|error| not_toml(text, &error))?;
-    T::deserialize(toml::Deserializer::from(document)).map_err(|error| misplaced(text, &error, dialect))
+    T::deserialize(toml::Deserializer::from(parse(text)?)).map_err(|error| misplaced(text, &error, dialect))
 }
 
 /// Fault of a TOML text that is no `T`, by the `error` of its reader.
 fn misplaced(text: &str, error: &toml::de::Error, dialect: &Dialect) -> Fault {
-    /// Longest list of words in one line (bytes).
-    const KNOWN_MAX: usize = 160;
     let span = error.span().unwrap_or(0..0);
     let at = text.get(span.clone()).unwrap_or_default();
     let (message, shown) = (error.message(), error.to_string());
     let path = shown.trim_end().rsplit_once("\nin `").map_or("", |(_, path)| path.trim_end_matches('`'));
-    let key = path.rsplit('.').next().unwrap_or(path);
-    let unknown = |what: &str, place: String, known: &[&str]| {
-        let word = at.trim_matches('"');
-        let help = nearest(word, known).map_or_else(|| (dialect.unknown)(path, word), did_you_mean);
-        let mut known = known.join(", ");
-        if known.len() > KNOWN_MAX {
-            "those that docs/reference.md lists".clone_into(&mut known);
-        }
-        let message = format!("unknown {what} {} in {place}", quoted(word));
-        Fault::new(span.clone(), message, format!("known {what}s: {known}"), help)
-    };
     let expected = message.rsplit_once("expected ").map_or("", |(_, expected)| expected);
     // The reader quotes the names that it expected.
     let known: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+    let word = at.trim_matches('"');
     if message.starts_with("unknown field") {
-        unknown("key", dialect.name_of(path), &known)
+        dialect.unknown_key(path, span, word, &known)
     } else if message.starts_with("unknown variant") {
-        unknown("word", format!("`{key}`"), &known)
+        dialect.unknown_word(path, span, word, &known)
     } else if let Some((_, known)) = message.split_once(", available keys: ") {
-        unknown("key", dialect.name_of(path), &known.split(", ").collect::<Vec<_>>())
+        dialect.unknown_key(path, span, word, &known.split(", ").collect::<Vec<_>>())
     } else if let Some(name) = message.strip_prefix("missing field `") {
         dialect.missing(path, span, name.trim_end_matches('`'), (dialect.remedy)(path))
     } else if message.starts_with("invalid type") {
@@ -318,19 +342,25 @@ fn misplaced(text: &str, error: &toml::de::Error, dialect: &Dialect) -> Fault {
             "f64" => "a number",
             other => other,
         };
-        Fault::new(span, format!("`{key}` is {}", type_at(at)), format!("must be {wanted}"), (dialect.remedy)(path))
+        // A header and a dotted key are no values; what they begin is a table.
+        let found = DeValue::parse(at).map_or("a table", |value| type_of(value.get_ref()));
+        dialect.mistyped(path, span, found, wanted)
     } else if message.ends_with("number overflowed") {
-        let message = format!("`{key}`: {}", QuantityError::NotFinite);
+        let message = format!("`{}`: {}", key_of(path), QuantityError::NotFinite);
         Fault::new(span, message, "a finite number", "correct the number")
     } else {
         Fault::new(span, printable(message), format!("what {} takes", dialect.name_of(path)), (dialect.remedy)(path))
     }
 }
 
-/// Type of the value that `text` is, with its article.
-pub(super) fn type_at(text: &str) -> &'static str {
-    // A header and a dotted key are no values; what they begin is a table.
-    DeValue::parse(text).map_or("a table", |value| match value.get_ref() {
+/// Last word of a path.
+fn key_of(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+/// Type of `value`, with its article.
+pub(super) fn type_of(value: &DeValue<'_>) -> &'static str {
+    match value {
         DeValue::String(_) => "a string",
         DeValue::Integer(_) => "an integer",
         DeValue::Float(_) => "a number",
@@ -338,21 +368,7 @@ pub(super) fn type_at(text: &str) -> &'static str {
         DeValue::Datetime(_) => "a date or time",
         DeValue::Array(_) => "an array",
         DeValue::Table(_) => "a table",
-    })
-}
-
-/// Span of `key` where its value is at `value`: in front of it, or within it if it is the header of a table.
-pub(super) fn key_span(text: &str, key: &str, value: ops::Range<usize>) -> ops::Range<usize> {
-    let line_start = text[..value.start].rfind('\n').map_or(0, |end| end + 1);
-    let found = if value.is_empty() {
-        // Dotted keys alone make a table that stands nowhere.
-        text.find(key)
-    } else if text[line_start..value.start].trim().is_empty() {
-        text[value.clone()].find(key).map(|offset| value.start + offset)
-    } else {
-        text[..value.start].rfind(key)
-    };
-    found.map_or(value, |start| start..start + key.len())
+    }
 }
 
 fn not_toml(text: &str, error: &toml::de::Error) -> Fault {

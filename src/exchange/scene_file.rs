@@ -2,19 +2,16 @@
 //!
 //! Every refusal is a [`SceneError`]: it underlines the offending text and says what is allowed and what to do.
 //! Nothing is skipped or guessed: an unknown key is refused, so a misspelt optional one cannot be silently ignored.
-//! Tables, keys and types are those of the serde types below; dimension, range and default of a number are those of
+//! Tables and keys are the [`paths`] of the numbers of a scene; dimension, range and default of a number are those of
 //! [`Parameter::entry`].
 
 use std::path::Path;
 
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use strum::VariantNames;
 use toml::Spanned;
-use toml::de::DeValue;
+use toml::de::{DeTable, DeValue};
 
-use super::diagnostic::{
-    Dialect, Fault, SceneError, decode, did_you_mean, key_span, nearest, quoted, read_text, type_at,
-};
+use super::diagnostic::{Dialect, Fault, SceneError, Span, did_you_mean, nearest, parse, quoted, read_text, type_of};
 use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, LayerNumber, Parameter, StageNumber};
 use crate::physics::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene, layer_beyond};
@@ -104,110 +101,41 @@ impl SceneFile {
     /// # Errors
     /// As [`Scene::from_toml`].
     pub fn from_toml(text: &str, file: &str) -> Result<Self, Box<SceneError>> {
-        let mut reader = Reader { text, given: Vec::new() };
-        let read = decode(text, &DIALECT).and_then(|tables| reader.scene(tables));
-        read.map(|scene| Self { scene, given: reader.given }).map_err(|fault| fault.in_file(file, text))
+        let read = parse(text).and_then(|root| {
+            let mut reader = Reader { text, root, given: Vec::new() };
+            reader.check(reader.root.get_ref(), "")?;
+            Ok(Self { scene: reader.scene()?, given: reader.given })
+        });
+        read.map_err(|fault| fault.in_file(file, text))
     }
 }
 
-/// Place of a number. What stands there is read from the text, so that its digits stay.
-type Number = Spanned<IgnoredAny>;
+/// Paths of texts.
+const WORDS: [&str; 3] = ["projectile.nose.shape", "perforation.criterion", "title"];
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SceneTable {
-    title: Option<String>,
-    projectile: Option<Spanned<ProjectileTable>>,
-    target: Option<Spanned<TargetTable>>,
-    resistance: Option<Spanned<ResistanceTable>>,
-    impact: Option<Spanned<ImpactTable>>,
-    perforation: Option<PerforationTable>,
-    stage: Option<Spanned<Vec<Spanned<StageTable>>>>,
+/// Paths of numbers that shape a nose, and are none of the scene itself.
+const RATIOS: [&str; 3] =
+    ["projectile.nose.caliber_radius_head", "projectile.nose.length_ratio", "projectile.nose.radius_ratio"];
+
+/// Paths of all that a scene file may hold; `*` stands for an index.
+fn paths() -> impl Iterator<Item = &'static str> {
+    let plain = Parameter::PLAIN.into_iter().filter(|number| number.moves() == *number);
+    let layer = LayerNumber::ALL.map(|which| Parameter::Layer(0, which));
+    let stage = StageNumber::ALL.map(|which| Parameter::Stage(0, which));
+    plain.chain(layer).chain(stage).map(|number| number.entry().path).chain(WORDS).chain(RATIOS)
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ProjectileTable {
-    mass: Option<Number>,
-    diameter: Option<Number>,
-    nose: Option<Spanned<NoseTable>>,
+/// What stands behind `home` and a dot in the paths.
+fn below(home: &str) -> impl Iterator<Item = &'static str> {
+    let home = if home.is_empty() { String::new() } else { format!("{home}.") };
+    paths().filter_map(move |path| path.strip_prefix(&home))
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoseTable {
-    factor: Option<Number>,
-    shape: Option<Spanned<String>>,
-    caliber_radius_head: Option<Number>,
-    length_ratio: Option<Number>,
-    radius_ratio: Option<Number>,
+/// `path` without the indices of entries.
+fn general(path: &str) -> String {
+    let is_word = |word: &&str| *word != "*" && word.parse::<usize>().is_err();
+    path.split('.').filter(is_word).collect::<Vec<_>>().join(".")
 }
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TargetTable {
-    strength: Option<Number>,
-    density: Option<Number>,
-    thickness: Option<Number>,
-    layer: Option<Spanned<Vec<Spanned<LayerTable>>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct LayerTable {
-    thickness: Option<Number>,
-    strength: Option<Number>,
-    density: Option<Number>,
-    #[serde(rename = "S")]
-    static_factor: Option<Number>,
-    viscosity: Option<Number>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ResistanceTable {
-    #[serde(rename = "S")]
-    static_factor: Option<Number>,
-    #[serde(rename = "B")]
-    inertia_factor: Option<Number>,
-    #[serde(rename = "k")]
-    crater_ratio: Option<Number>,
-    crater_stiffness: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ImpactTable {
-    velocity: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PerforationTable {
-    criterion: Option<Spanned<Criterion>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StageTable {
-    static_force: Option<Number>,
-    stiffness: Option<Number>,
-    viscosity: Option<Number>,
-    drag: Option<Number>,
-    end: Option<Number>,
-}
-
-/// Paths of what is no number of a scene, to tell where a misplaced key belongs.
-const OTHER_PATHS: [&str; 8] = [
-    "projectile.nose",
-    "projectile.nose.shape",
-    "projectile.nose.caliber_radius_head",
-    "projectile.nose.length_ratio",
-    "projectile.nose.radius_ratio",
-    "target.layer",
-    "perforation.criterion",
-    "title",
-];
 
 const DIALECT: Dialect = Dialect {
     root: "the scene",
@@ -228,52 +156,107 @@ const DIALECT: Dialect = Dialect {
         if path == "perforation.criterion" {
             return (DIALECT.remedy)(path);
         }
-        let listed = LayerNumber::ALL.map(|which| Parameter::Layer(0, which)).into_iter();
-        let numbers = Parameter::PLAIN.into_iter().chain(listed);
-        let numbers = numbers.chain(StageNumber::ALL.map(|which| Parameter::Stage(0, which)));
-        let paths = numbers.map(|number| number.entry().path.replace(".*", ""));
-        let mut homes = paths.chain(OTHER_PATHS.map(str::to_owned)).filter_map(|path| {
-            let (home, key) = path.rsplit_once('.')?;
-            (key == word).then(|| format!("`{word}` belongs to {}", (DIALECT.table)(home)))
-        });
-        homes.next().unwrap_or_else(|| "remove it".to_owned())
+        let mut homes = paths().filter_map(|path| path.rsplit_once('.')).filter(|(_, key)| *key == word);
+        let home = |(home, _): (&str, _)| format!("`{word}` belongs to {}", (DIALECT.table)(&general(home)));
+        homes.next().map_or_else(|| "remove it".to_owned(), home)
     },
 };
 
-type Span = std::ops::Range<usize>;
-
-/// Reads the numbers of a file.
+/// A file as it stands, and the numbers read from it.
 struct Reader<'t> {
     text: &'t str,
+    root: Spanned<DeTable<'t>>,
     given: Vec<(Parameter, Quantity)>,
 }
 
-impl Reader<'_> {
-    /// The header or the braces of a table, the key `key` where dotted keys alone make it.
-    fn place<T>(&self, key: &str, table: &Spanned<T>) -> Span {
-        let span = table.span();
-        if span.is_empty() { key_span(self.text, key, span) } else { span }
+type Value<'t> = Spanned<DeValue<'t>>;
+
+impl<'t> Reader<'t> {
+    /// Refuses a key of `table`, at `home` in the file, that no scene has, and a value of another type than its key takes.
+    fn check(&self, table: &DeTable<'t>, home: &str) -> Result<(), Fault> {
+        for (key, value) in table {
+            let path = if home.is_empty() { key.get_ref().to_string() } else { format!("{home}.{}", key.get_ref()) };
+            let mistyped = |value: &Value<'t>, wanted| {
+                Err(DIALECT.mistyped(&general(&path), value.span(), type_of(value.get_ref()), wanted))
+            };
+            match (below(&path).next(), value.get_ref()) {
+                (Some(keys), DeValue::Array(entries)) if keys.starts_with("*.") => {
+                    for entry in entries.iter() {
+                        let Some(table) = entry.get_ref().as_table() else { return mistyped(entry, "a table") };
+                        self.check(table, &format!("{path}.*"))?;
+                    }
+                }
+                (Some(keys), _) if keys.starts_with("*.") => return mistyped(value, "an array"),
+                (Some(_), DeValue::Table(table)) => self.check(table, &path)?,
+                (Some(_), _) => return mistyped(value, "a table"),
+                (None, found) if WORDS.contains(&path.as_str()) => {
+                    if !found.is_str() {
+                        return mistyped(value, "a string");
+                    }
+                }
+                (None, _) if paths().any(|known| known == path) => {}
+                (None, _) => {
+                    let mut known = Vec::new();
+                    for word in below(home).filter_map(|rest| rest.split('.').next()) {
+                        if !known.contains(&word) {
+                            known.push(word);
+                        }
+                    }
+                    return Err(DIALECT.unknown_key(&general(home), key.span(), key.get_ref(), &known));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The place of the key at `path` and the value there.
+    fn at(&self, path: &str) -> Option<(Span, &Value<'t>)> {
+        fn entry<'a, 't>(table: &'a DeTable<'t>, key: &str) -> Option<(Span, &'a Value<'t>)> {
+            table.get_key_value(key).map(|(key, value)| (key.span(), value))
+        }
+        let mut words = path.split('.');
+        let first = entry(self.root.get_ref(), words.next()?)?;
+        words.try_fold(first, |(_, value), word| match value.get_ref() {
+            DeValue::Table(table) => entry(table, word),
+            other => other.get(word.parse::<usize>().ok()?).map(|value| (value.span(), value)),
+        })
+    }
+
+    /// The place of what is at `path`: of a table its header or braces, or the key where dotted keys alone make it.
+    fn place(&self, path: &str) -> Span {
+        let place = |(key, value): (Span, &Value<'t>)| if value.span().is_empty() { key } else { value.span() };
+        self.at(path).map_or(0..0, place)
+    }
+
+    /// The text at `path`, and its place.
+    fn word(&self, path: &str) -> Option<(String, Span)> {
+        self.at(path).and_then(|(_, value)| Some((value.get_ref().as_str()?.to_owned(), value.span())))
     }
 
     /// The number `parameter`; `None` when absent.
-    fn number(&mut self, parameter: Parameter, number: Option<&Number>) -> Result<Option<f64>, Fault> {
-        let (entry, Some(number)) = (parameter.entry(), number) else { return Ok(None) };
+    fn number(&mut self, parameter: Parameter) -> Result<Option<f64>, Fault> {
+        let Some((_, number)) = self.at(&parameter.to_string()) else { return Ok(None) };
+        let entry = parameter.entry();
         let quantity = self.quantity(parameter.key(), entry.dimension, entry.range, number)?;
         let value = quantity.value;
         self.given.push((parameter, quantity));
         Ok(Some(value))
     }
 
-    /// The number `parameter` or its default; `table` is the place of its table.
-    fn value(&mut self, parameter: Parameter, number: Option<&Number>, table: &Span) -> Result<f64, Fault> {
-        let entry = parameter.entry();
-        match (self.number(parameter, number)?, entry.absence) {
+    /// The number `parameter` or its default.
+    fn value(&mut self, parameter: Parameter) -> Result<f64, Fault> {
+        match (self.number(parameter)?, parameter.entry().absence) {
             (Some(value), _) | (None, Absence::Is(value)) => Ok(value),
             (None, Absence::Refused(example) | Absence::Means(example)) => {
-                let path = entry.path.rsplit_once('.').map_or("", |(table, _)| table).replace(".*", "");
-                Err(missing(&path, table, parameter.key(), example))
+                Err(self.missing(&parameter.to_string(), example))
             }
         }
+    }
+
+    /// Refuses the lack of the key at `path`, of which `example` is a value.
+    fn missing(&self, path: &str, example: &str) -> Fault {
+        let (table, key) = path.rsplit_once('.').unwrap_or(("", path));
+        DIALECT.missing(&general(table), self.place(table), key, format!("add {key} = {example}"))
     }
 
     /// A quantity, `"number unit"` or a bare number in SI units; without a dimension a plain number.
@@ -282,14 +265,14 @@ impl Reader<'_> {
         key: &str,
         dimension: Option<Dimension>,
         range: Range,
-        number: &Number,
+        number: &Value<'t>,
     ) -> Result<Quantity, Fault> {
         let span = number.span();
         let raw = self.text.get(span.clone()).unwrap_or_default();
-        let value = DeValue::parse(raw).ok().map(Spanned::into_inner);
-        let read = match (&value, value.as_ref().and_then(bare), dimension) {
+        let value = number.get_ref();
+        let read = match (value.as_str(), bare(value), dimension) {
             (_, Some(bare), _) => bare,
-            (Some(DeValue::String(text)), None, Some(dimension)) => Quantity::with_unit(text, dimension),
+            (Some(text), None, Some(dimension)) => Quantity::with_unit(text, dimension),
             _ => {
                 let (wanted, example) = match dimension.map(|dimension| (dimension.noun(), dimension.units()[0])) {
                     Some((noun, si)) => {
@@ -297,13 +280,13 @@ impl Reader<'_> {
                     }
                     None => (format!("{}, without unit or quotes", range.description()), range.example().to_owned()),
                 };
-                let message = format!("`{key}` is {}", type_at(raw));
+                let message = format!("`{key}` is {}", type_of(value));
                 let help = format!("write for instance {key} = {example}");
                 return Err(Fault::new(span, message, format!("must be {wanted}"), help));
             }
         };
-        let read = read.map_err(|error| match (&value, dimension) {
-            (Some(DeValue::String(text)), Some(dimension)) => self.bad_quantity(key, number, text, dimension, &error),
+        let read = read.map_err(|error| match (value.as_str(), dimension) {
+            (Some(text), Some(dimension)) => self.bad_quantity(key, number, text, dimension, &error),
             _ => Fault::new(span.clone(), format!("`{key}`: {error}"), range.description(), "correct the number"),
         })?;
         if range.contains(read.value) {
@@ -319,7 +302,7 @@ impl Reader<'_> {
     fn bad_quantity(
         &self,
         key: &str,
-        number: &Number,
+        number: &Value<'t>,
         text: &str,
         dimension: Dimension,
         error: &QuantityError,
@@ -361,7 +344,7 @@ impl Reader<'_> {
     }
 
     /// Span of `part` within the string `number`; of the whole value where escapes moved the text.
-    fn part(&self, number: &Number, text: &str, part: &str) -> Span {
+    fn part(&self, number: &Value<'t>, text: &str, part: &str) -> Span {
         let whole = number.span();
         let raw = self.text.get(whole.clone()).unwrap_or_default();
         match (raw.find(text), text.rfind(part)) {
@@ -373,105 +356,84 @@ impl Reader<'_> {
         }
     }
 
-    /// Refuses the first of the `keys` in `section` that is given, `why` being what is allowed.
-    fn without(&self, section: &str, keys: &[(&str, Option<Span>)], why: &str) -> Result<(), Fault> {
-        let given = keys.iter().filter_map(|(key, value)| Some((key, key_span(self.text, key, value.clone()?))));
+    /// Refuses the first of the `paths` in `section` that is given, `why` being what is allowed.
+    fn without(&self, section: &str, paths: &[&str], why: &str) -> Result<(), Fault> {
+        let given = paths.iter().filter_map(|path| Some((*path, self.at(path)?.0)));
         match given.min_by_key(|(_, span)| span.start) {
             None => Ok(()),
-            Some((key, span)) => {
+            Some((path, span)) => {
+                let key = path.rsplit('.').next().unwrap_or(path);
                 let message = format!("`{key}` has no place in {section} here");
                 Err(Fault::new(span, message, why, format!("remove `{key}`")))
             }
         }
     }
 
-    fn scene(&mut self, file: SceneTable) -> Result<Scene, Fault> {
+    fn scene(&mut self) -> Result<Scene, Fault> {
+        let velocity = self.at("impact").is_some().then(|| self.value(Parameter::Velocity)).transpose()?;
+        let criterion = self.criterion()?;
         let missing = |header: &str, help: &str| {
             let message = format!("the scene has no {header}");
-            Fault::new(0..0, message, format!("{header} is required"), format!("add {help}"))
+            Err(Fault::new(0..0, message, format!("{header} is required"), format!("add {help}")))
         };
-        let velocity = match &file.impact {
-            None => None,
-            Some(impact) => {
-                let section = self.place("impact", impact);
-                Some(self.value(Parameter::Velocity, impact.get_ref().velocity.as_ref(), &section)?)
-            }
+        if self.at("projectile").is_none() {
+            return missing("[projectile]", "[projectile] with mass, diameter and nose");
+        }
+        let mass = self.value(Parameter::Mass)?;
+        let (resistance, thickness) = if self.at("stage").is_some() {
+            let paths = ["projectile.diameter", "projectile.nose"];
+            self.without("[projectile]", &paths, "with [[stage]], [projectile] has only `mass`")?;
+            self.without("the scene", &["resistance"], "with [[stage]] there is no [resistance]")?;
+            self.stages()?
+        } else if self.at("target").is_some() {
+            self.concrete()?
+        } else {
+            return missing("[target]", "[target] with strength and density, or stages");
         };
-        let criterion = file.perforation.and_then(|perforation| perforation.criterion);
-        if let (Some(criterion), Some(_)) = (&criterion, &file.stage)
-            && *criterion.get_ref() == Criterion::Ndrc
-        {
-            return Err(Fault::new(
-                criterion.span(),
+        let title = self.word("title").map(|(title, _)| title);
+        Ok(Scene { title, mass, resistance, thickness, criterion, velocity })
+    }
+
+    fn criterion(&self) -> Result<Criterion, Fault> {
+        const PATH: &str = "perforation.criterion";
+        let Some((name, span)) = self.word(PATH) else { return Ok(Criterion::default()) };
+        match name.parse() {
+            Ok(Criterion::Ndrc) if self.at("stage").is_some() => Err(Fault::new(
+                span,
                 "`ndrc` needs a projectile diameter, and a scene of stages has none",
                 "`full-depth` in a scene of stages",
-                (DIALECT.remedy)("perforation.criterion"),
-            ));
+                (DIALECT.remedy)(PATH),
+            )),
+            Ok(criterion) => Ok(criterion),
+            Err(_) => Err(DIALECT.unknown_word(PATH, span, &name, Criterion::VARIANTS)),
         }
-        let criterion = criterion.map(Spanned::into_inner).unwrap_or_default();
-        let projectile =
-            file.projectile.ok_or_else(|| missing("[projectile]", "[projectile] with mass, diameter and nose"))?;
-        let section = self.place("projectile", &projectile);
-        let projectile = projectile.into_inner();
-        let mass = self.value(Parameter::Mass, projectile.mass.as_ref(), &section)?;
-        let (resistance, thickness) = if let Some(stages) = file.stage {
-            self.without(
-                "[projectile]",
-                &[("diameter", span(projectile.diameter.as_ref())), ("nose", span(projectile.nose.as_ref()))],
-                "with [[stage]], [projectile] has only `mass`",
-            )?;
-            let resistance = [("resistance", span(file.resistance.as_ref()))];
-            self.without("the scene", &resistance, "with [[stage]] there is no [resistance]")?;
-            let target = file.target.as_ref().map(Spanned::get_ref);
-            self.stages(&stages, target)?
-        } else {
-            let target =
-                file.target.ok_or_else(|| missing("[target]", "[target] with strength and density, or stages"))?;
-            let resistance = file.resistance.map(Spanned::into_inner).unwrap_or_default();
-            self.concrete(&projectile, &section, &target, &resistance)?
-        };
-        Ok(Scene { title: file.title, mass, resistance, thickness, criterion, velocity })
     }
 
     /// The resistance of stages given outright, and the thickness of the target.
-    fn stages(
-        &mut self,
-        tables: &Spanned<Vec<Spanned<StageTable>>>,
-        target: Option<&TargetTable>,
-    ) -> Result<(Resistance, Option<f64>), Fault> {
-        let count = self.at_least_one("stage", tables)?;
-        let mut thickness = None;
-        if let Some(target) = target {
-            let keys = [
-                ("strength", span(target.strength.as_ref())),
-                ("density", span(target.density.as_ref())),
-                ("layer", span(target.layer.as_ref())),
-            ];
-            self.without("[target]", &keys, "with [[stage]], [target] has only `thickness`")?;
-            thickness = self.number(Parameter::Thickness, target.thickness.as_ref())?;
-        }
+    fn stages(&mut self) -> Result<(Resistance, Option<f64>), Fault> {
+        let count = self.at_least_one("stage")?;
+        let keys = ["target.strength", "target.density", "target.layer"];
+        self.without("[target]", &keys, "with [[stage]], [target] has only `thickness`")?;
+        let thickness = self.number(Parameter::Thickness)?;
         let mut stages: Vec<Stage> = Vec::with_capacity(count);
-        for (index, table) in tables.get_ref().iter().enumerate() {
-            let section = self.place("stage", table);
-            let table = table.get_ref();
-            let mut value =
-                |which, number: &Option<Number>| self.value(Parameter::Stage(index, which), number.as_ref(), &section);
+        for index in 0..count {
+            let mut value = |which| self.value(Parameter::Stage(index, which));
             let stage = Stage {
-                static_force: value(StageNumber::StaticForce, &table.static_force)?,
-                stiffness: value(StageNumber::Stiffness, &table.stiffness)?,
-                viscosity: value(StageNumber::Viscosity, &table.viscosity)?,
-                drag: value(StageNumber::Drag, &table.drag)?,
-                end: value(StageNumber::End, &table.end)?,
+                static_force: value(StageNumber::StaticForce)?,
+                stiffness: value(StageNumber::Stiffness)?,
+                viscosity: value(StageNumber::Viscosity)?,
+                drag: value(StageNumber::Drag)?,
+                end: value(StageNumber::End)?,
             };
             if stage.end.is_infinite() && index + 1 < count {
                 return Err(Fault::new(
-                    section,
+                    self.place(&format!("stage.{index}")),
                     "this stage has no `end`, and another follows",
                     "only the last stage goes without an `end`",
                     "give it an `end`, or remove the stages behind it",
                 ));
             }
-            let end = span(table.end.as_ref()).unwrap_or_default();
+            let end = self.place(&format!("stage.{index}.end"));
             let previous = stages.last().map_or(0.0, |previous| previous.end);
             if stage.end < previous {
                 return Err(Fault::new(
@@ -495,45 +457,30 @@ impl Reader<'_> {
     }
 
     /// How many tables the array at `path` has.
-    fn at_least_one<T>(&self, path: &'static str, tables: &Spanned<Vec<T>>) -> Result<usize, Fault> {
-        let key = path.rsplit('.').next().unwrap_or(path);
-        match tables.get_ref().len() {
-            0 => Err(Fault::new(
-                self.place(key, tables),
-                format!("`{key}` is empty"),
-                "at least one table",
-                (DIALECT.remedy)(path),
-            )),
-            count => Ok(count),
+    fn at_least_one(&self, path: &str) -> Result<usize, Fault> {
+        let count = self.at(path).and_then(|(_, value)| value.get_ref().as_array()).map_or(0, |array| array.len());
+        if count > 0 {
+            return Ok(count);
         }
+        let key = path.rsplit('.').next().unwrap_or(path);
+        let message = format!("`{key}` is empty");
+        Err(Fault::new(self.place(path), message, "at least one table", (DIALECT.remedy)(path)))
     }
 
     /// The resistance of Eq. 4-5, and the thickness of the target.
-    fn concrete(
-        &mut self,
-        projectile: &ProjectileTable,
-        section: &Span,
-        target: &Spanned<TargetTable>,
-        resistance: &ResistanceTable,
-    ) -> Result<(Resistance, Option<f64>), Fault> {
-        let diameter = self.value(Parameter::Diameter, projectile.diameter.as_ref(), section)?;
-        let nose =
-            projectile.nose.as_ref().ok_or_else(|| missing("projectile", section, "nose", "{ shape = \"flat\" }"))?;
-        let nose_factor = self.nose_factor(nose)?;
-        let static_factor = self.number(Parameter::StaticFactor, resistance.static_factor.as_ref())?;
-        let inertia_factor = self.value(Parameter::InertiaFactor, resistance.inertia_factor.as_ref(), section)?;
-        let crater_ratio = self.value(Parameter::CraterRatio, resistance.crater_ratio.as_ref(), section)?;
-        let crater_stiffness = self.crater_stiffness(resistance.crater_stiffness.as_ref())?;
-        let section = self.place("target", target);
-        let target = target.get_ref();
-        let layers =
-            target.layer.as_ref().map_or(Ok(Vec::new()), |layers| self.layers(target, layers, static_factor))?;
+    fn concrete(&mut self) -> Result<(Resistance, Option<f64>), Fault> {
+        let diameter = self.value(Parameter::Diameter)?;
+        let nose_factor = self.nose_factor()?;
+        let static_factor = self.number(Parameter::StaticFactor)?;
+        let inertia_factor = self.value(Parameter::InertiaFactor)?;
+        let crater_ratio = self.value(Parameter::CraterRatio)?;
+        let crater_stiffness = self.crater_stiffness()?;
+        let layers = if self.at("target.layer").is_some() { self.layers(static_factor)? } else { Vec::new() };
         let (medium, thickness) = if let Some(index) = layer_beyond(&layers, crater_ratio * diameter) {
-            (layers[index], self.total_thickness(target, &layers)?)
+            (layers[index], self.total_thickness(&layers)?)
         } else {
-            let thickness = self.number(Parameter::Thickness, target.thickness.as_ref())?;
-            let strength = self.value(Parameter::Strength, target.strength.as_ref(), &section)?;
-            let density = self.value(Parameter::Density, target.density.as_ref(), &section)?;
+            let thickness = self.number(Parameter::Thickness)?;
+            let (strength, density) = (self.value(Parameter::Strength)?, self.value(Parameter::Density)?);
             (medium(strength, density, static_factor), thickness)
         };
         let concrete = Concrete {
@@ -551,136 +498,116 @@ impl Reader<'_> {
     }
 
     /// The layers from the impact face on.
-    fn layers(
-        &mut self,
-        target: &TargetTable,
-        tables: &Spanned<Vec<Spanned<LayerTable>>>,
-        static_factor: Option<f64>,
-    ) -> Result<Vec<Layer>, Fault> {
-        let count = self.at_least_one("target.layer", tables)?;
-        let keys = [
-            ("strength", span(target.strength.as_ref())),
-            ("density", span(target.density.as_ref())),
-            ("thickness", span(target.thickness.as_ref())),
-        ];
+    fn layers(&mut self, static_factor: Option<f64>) -> Result<Vec<Layer>, Fault> {
+        let count = self.at_least_one("target.layer")?;
+        let keys = ["target.strength", "target.density", "target.thickness"];
         self.without("[target]", &keys, "with [[target.layer]], each layer has its own")?;
         let mut layers = Vec::with_capacity(count);
-        for (index, table) in tables.get_ref().iter().enumerate() {
-            let section = self.place("layer", table);
-            let table = table.get_ref();
+        for index in 0..count {
             let layer = |which| Parameter::Layer(index, which);
-            let thickness = match &table.thickness {
+            let thickness = match self.number(layer(LayerNumber::Thickness))? {
                 None if index + 1 == count => f64::INFINITY,
-                thickness => self.value(layer(LayerNumber::Thickness), thickness.as_ref(), &section)?,
+                Some(thickness) => thickness,
+                None => self.value(layer(LayerNumber::Thickness))?,
             };
-            let own_factor = match &table.static_factor {
+            let own_factor = layer(LayerNumber::StaticFactor);
+            if let Some((_, number)) = self.at(&own_factor.to_string()) {
                 // A number given is positive; zero is for what Eq. 14 leaves to an air gap.
-                Some(number) => {
-                    self.quantity("S", None, Parameter::StaticFactor.entry().range, number)?;
-                    self.number(layer(LayerNumber::StaticFactor), Some(number))?
-                }
-                None => static_factor,
-            };
-            let viscosity = self.value(layer(LayerNumber::Viscosity), table.viscosity.as_ref(), &section)?;
-            let strength = self.value(layer(LayerNumber::Strength), table.strength.as_ref(), &section)?;
-            let density = self.value(layer(LayerNumber::Density), table.density.as_ref(), &section)?;
+                self.quantity("S", None, Parameter::StaticFactor.entry().range, number)?;
+            }
+            let own_factor = self.number(own_factor)?.or(static_factor);
+            let viscosity = self.value(layer(LayerNumber::Viscosity))?;
+            let strength = self.value(layer(LayerNumber::Strength))?;
+            let density = self.value(layer(LayerNumber::Density))?;
             layers.push(Layer { thickness, viscosity, ..medium(strength, density, own_factor) });
         }
         Ok(layers)
     }
 
     /// H of a layered target; `None` when the last layer has no end.
-    fn total_thickness(&self, target: &TargetTable, layers: &[Layer]) -> Result<Option<f64>, Fault> {
+    fn total_thickness(&self, layers: &[Layer]) -> Result<Option<f64>, Fault> {
         // Summed from the face on, as the ends of the layers are.
         let sum = layers.iter().fold(0.0, |sum, layer| sum + layer.thickness);
         let open = layers.last().is_some_and(|last| last.thickness.is_infinite());
         if !open && sum.is_infinite() {
-            let place = key_span(self.text, "layer", span(target.layer.as_ref()).unwrap_or_default());
+            let place = self.at("target.layer").map_or(0..0, |(key, _)| key);
             let message = "the layers sum up to no finite thickness";
             return Err(Fault::new(place, message, "a finite sum", "correct the thicknesses"));
         }
         Ok(Some(sum).filter(|_| !open))
     }
 
-    fn crater_stiffness(&mut self, number: Option<&Number>) -> Result<CraterStiffness, Fault> {
-        let span = number.map_or(0..0, Spanned::span);
-        let value = DeValue::parse(self.text.get(span.clone()).unwrap_or_default());
-        if let Some(text) = value.as_ref().ok().and_then(|value| value.get_ref().as_str()) {
+    fn crater_stiffness(&mut self) -> Result<CraterStiffness, Fault> {
+        if let Some((text, span)) = self.word("resistance.crater_stiffness") {
             if text.trim() == "continuous" {
                 return Ok(CraterStiffness::Continuous);
             }
             if units::split(text.trim()).0.is_empty() {
                 return Err(Fault::new(
                     span,
-                    format!("unknown crater stiffness {}", quoted(text)),
+                    format!("unknown crater stiffness {}", quoted(&text)),
                     "`continuous`, or a stiffness such as \"8.48e6 N/m\"",
-                    nearest(text, &["continuous"]).map_or_else(|| "write \"continuous\"".to_owned(), did_you_mean),
+                    nearest(&text, &["continuous"]).map_or_else(|| "write \"continuous\"".to_owned(), did_you_mean),
                 ));
             }
         }
-        let given = self.number(Parameter::CraterStiffness, number)?;
+        let given = self.number(Parameter::CraterStiffness)?;
         Ok(given.map_or(CraterStiffness::Continuous, CraterStiffness::Given))
     }
 
     /// N* of the nose, given as such or by a shape.
-    fn nose_factor(&mut self, nose: &Spanned<NoseTable>) -> Result<f64, Fault> {
+    fn nose_factor(&mut self) -> Result<f64, Fault> {
         type Shape = (&'static str, Range, fn(f64) -> NoseShape);
+        // In the order of the ratios that they take.
         const SHAPES: [Shape; 3] = [
             ("ogive", Range::AtLeastHalf, |psi| NoseShape::Ogive { caliber_radius_head: psi }),
             ("cone", Range::Positive, |psi| NoseShape::Cone { length_ratio: psi }),
             ("spherical", Range::AtLeastHalf, |psi| NoseShape::Spherical { radius_ratio: psi }),
         ];
-        let place = self.place("nose", nose);
-        let nose = nose.get_ref();
-        let numbers = [&nose.caliber_radius_head, &nose.length_ratio, &nose.radius_ratio];
-        let ratios = ["caliber_radius_head", "length_ratio", "radius_ratio"];
+        const NOSE: &str = "projectile.nose";
+        if self.at(NOSE).is_none() {
+            return Err(self.missing(NOSE, "{ shape = \"flat\" }"));
+        }
         let without = |taken: Option<usize>, why: &str| {
-            let others: Vec<_> =
-                (0..3).filter(|i| Some(*i) != taken).map(|i| (ratios[i], span(numbers[i].as_ref()))).collect();
+            let others: Vec<_> = (0..3).filter(|i| Some(*i) != taken).map(|i| RATIOS[i]).collect();
             self.without("the nose", &others, why)
         };
         let one_of_two = |span, fault: &str, help: &str| {
             Err(Fault::new(span, format!("the nose has {fault}"), "exactly one of `factor` and `shape`", help))
         };
-        let (name, span) = match (&nose.factor, &nose.shape) {
-            (None, Some(shape)) => (shape.get_ref().as_str(), shape.span()),
-            (Some(factor), None) => {
+        let (factor, shape) = (self.at("projectile.nose.factor"), self.at("projectile.nose.shape"));
+        match (factor, shape) {
+            (None, Some(_)) => {}
+            (Some(_), None) => {
                 without(None, "a `factor` takes no parameter of a shape")?;
-                return self.value(Parameter::NoseFactor, Some(factor), &place);
+                return self.value(Parameter::NoseFactor);
             }
-            (Some(_), Some(shape)) => {
-                let shape = key_span(self.text, "shape", shape.span());
-                return one_of_two(shape, "both a `factor` and a `shape`", "remove one of the two");
+            (Some(_), Some((key, _))) => {
+                return one_of_two(key, "both a `factor` and a `shape`", "remove one of the two");
             }
             (None, None) => {
                 let help = "write { factor = 0.72 } or { shape = \"flat\" }";
-                return one_of_two(place, "neither a `factor` nor a `shape`", help);
+                return one_of_two(self.place(NOSE), "neither a `factor` nor a `shape`", help);
             }
-        };
+        }
+        let (name, span) = self.word("projectile.nose.shape").unwrap_or_default();
         if name == "flat" {
             without(None, "the shape `flat` takes no parameter")?;
             return Ok(NoseShape::Flat.factor());
         }
         let Some(index) = SHAPES.iter().position(|(shape, ..)| *shape == name) else {
             let known = ["flat", "ogive", "cone", "spherical"];
-            let help = nearest(name, &known)
+            let help = nearest(&name, &known)
                 .map_or_else(|| "give the nose factor: { factor = 0.72 }".to_owned(), did_you_mean);
-            let message = format!("unknown nose shape {}", quoted(name));
+            let message = format!("unknown nose shape {}", quoted(&name));
             return Err(Fault::new(span, message, format!("one of {}", known.join(", ")), help));
         };
-        let ((_, range, of), key) = (SHAPES[index], ratios[index]);
+        let ((_, range, of), path) = (SHAPES[index], RATIOS[index]);
+        let key = path.rsplit('.').next().unwrap_or(path);
         without(Some(index), &format!("the shape `{name}` takes `{key}`"))?;
-        let number = numbers[index].as_ref().ok_or_else(|| missing("projectile.nose", &place, key, "3.0"))?;
+        let (_, number) = self.at(path).ok_or_else(|| self.missing(path, "3.0"))?;
         Ok(of(self.quantity(key, None, range, number)?.value).factor())
     }
-}
-
-fn missing(path: &str, table: &Span, key: &str, example: &str) -> Fault {
-    DIALECT.missing(path, table.clone(), key, format!("add {key} = {example}"))
-}
-
-fn span<T>(value: Option<&Spanned<T>>) -> Option<Span> {
-    value.map(Spanned::span)
 }
 
 /// The decimal of a TOML number; `None` for anything else.

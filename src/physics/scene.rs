@@ -5,7 +5,6 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use serde::Deserialize;
 use thiserror::Error;
 
 use super::advice::Advice;
@@ -72,8 +71,9 @@ pub struct Layer {
 }
 
 /// When the target counts as perforated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, strum::EnumString, strum::IntoStaticStr)]
-#[serde(rename_all = "kebab-case")]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, strum::EnumString, strum::IntoStaticStr, strum::VariantNames,
+)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Criterion {
     /// x = H, the paper's.
