@@ -23,7 +23,7 @@ pub(crate) fn shipped(name: &str) -> Scene {
     Scene::from_toml(SHIPPED.iter().find(|(shipped, _)| *shipped == name).unwrap().1, name).unwrap()
 }
 
-/// The target of Forrestal 1994, shot 14 (Li & Chen 2003, table 2).
+/// The target of Forrestal 1994, experiment 14 (Li & Chen 2003, table 2).
 pub(crate) fn concrete() -> Concrete {
     Concrete {
         diameter: 0.0269,
@@ -38,7 +38,7 @@ pub(crate) fn concrete() -> Concrete {
     }
 }
 
-/// Forrestal 1994, shot 14, into a semi-infinite target.
+/// Forrestal 1994, experiment 14, into a semi-infinite target.
 pub(crate) fn scene() -> Scene {
     Scene::of_concrete(0.906, concrete()).with_velocity(277.0)
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::method_args::{MethodArgs, MethodJson, time_option};
 use super::output::{Text, interval_text};
 use super::{Answer, Ask, CliError, problem_of, read_scene};
-use crate::integrators::{CentralDifference, Method, MethodName, Steps};
+use crate::integrators::{MethodName, MethodOptions};
 use crate::physics::Shown;
 use crate::studies::convergence::{
     Ladder, POINTS_DEFAULT, QuantityStudy, STEPS_OVER_TIME, TOLERANCES, of_fixed_steps, of_tolerances,
@@ -106,7 +106,7 @@ impl Ask for ConvergeArgs {
         if self.method == MethodName::ClosedForm {
             return Err(CliError::usage("the closed form has no order of convergence", "choose an integrator"));
         }
-        let built = method.build()?;
+        method.build()?;
         let fixed = self.method == MethodName::CentralDifference;
         if self.dt.is_some() && !fixed {
             return Err(CliError::usage("only central-difference has a fixed step", "leave out --dt"));
@@ -121,12 +121,12 @@ impl Ask for ConvergeArgs {
         }
         let [from, to] = if fixed { self.steps(truth.flight.end.time)? } else { TOLERANCES };
         let ladder = Ladder { from, to, points: usize::from(self.points), seed: self.seed };
-        let study = match built {
-            Method::CentralDifference(scheme) => {
-                let with_step = |size| CentralDifference { steps: Steps::Uniform(size), ..scheme.clone() };
-                of_fixed_steps(&scene, &problem, &truth.flight, &with_step, ladder, true)?
-            }
-            _ => of_tolerances(&problem, &truth.flight, self.method, ladder)?,
+        let options = method.options()?;
+        let study = if fixed {
+            let with_step = |size| MethodOptions { dt: Some(size), ..options.clone() }.central_difference();
+            of_fixed_steps(&scene, &problem, &truth.flight, &with_step, ladder, true)?
+        } else {
+            of_tolerances(&problem, &truth.flight, self.method, ladder)?
         };
         // Failed if a quantity diverges or misses its formal order, else undecided if one is.
         let verdicts = study.quantities.iter().map(QuantityStudy::verdict);
@@ -135,7 +135,7 @@ impl Ask for ConvergeArgs {
         let data = ConvergeJson {
             schema: "penetrode/converge/1",
             title: scene.title,
-            method: MethodJson::new(self.method, &method.options()?, None, None),
+            method: MethodJson::new(self.method, &options, None, None),
             seed: self.seed,
             reference: if truth.is_closed_form { "closed-form" } else { "taylor" },
             verdict: verdict,

@@ -46,7 +46,7 @@ impl SensitivitiesJson {
     /// Sensitivities of `scene` at its impact velocity.
     ///
     /// # Errors
-    /// [`SensitivityError`](crate::studies::sensitivity::SensitivityError): the scene does not resolve, or has no solution.
+    /// [`StudyError`](crate::studies::error::StudyError): the scene does not resolve, or has no solution.
     pub fn new(scene: &Scene) -> Result<Self, CliError> {
         let integrated = by_taylor(scene)?;
         let exact = by_closed_form(scene)?;

@@ -16,10 +16,10 @@
 //! Z counts the relaxation times left in the stage once the transient is over, at the least: the drive fades and the
 //! projectile slows. An explicit method of order 5 takes one step of six evaluations for every three of them.
 
-use super::diffsol::{MAX_STEPS, Reusing, Scheme, Solver, check_rtol};
+use super::diffsol::Scheme;
 use super::flight::Course;
-use super::outcome::{Detail, Flight, IntegrationError, Integrator};
-use crate::physics::{Problem, Stage, State};
+use super::outcome::Detail;
+use crate::physics::{Problem, Stage};
 
 /// Stiffness Z above which a stage is solved by the implicit method.
 ///
@@ -29,19 +29,10 @@ use crate::physics::{Problem, Stage, State};
 pub const STIFFNESS_LIMIT: f64 = 200.0;
 
 /// The explicit method.
-const EXPLICIT: Scheme = Scheme::Tsit45;
+pub(super) const EXPLICIT: Scheme = Scheme::Tsit45;
 
 /// The implicit method: of the three, the one with the fewest force evaluations at every tolerance below 1e-4.
-const IMPLICIT: Scheme = Scheme::Bdf;
-
-/// Chooses between `tsit45` and `bdf` in every stage.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Adaptive {
-    /// Relative tolerance of each step, 1e-14 to 0.1, with absolute ones as for [`super::Diffsol`].
-    pub rtol: f64,
-    /// Largest number of steps of one flight.
-    pub max_steps: u64,
-}
+pub(super) const IMPLICIT: Scheme = Scheme::Bdf;
 
 /// The method chosen for a stage, and what it was chosen by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +54,15 @@ impl Choice {
             Some(z) if z > STIFFNESS_LIMIT => Self { scheme: IMPLICIT, stiffness: Some(z) },
             z => Self { scheme: EXPLICIT, stiffness: z },
         }
+    }
+
+    /// The method for the present stage of `course`, which notes the reason.
+    pub(super) fn note(course: &mut Course<'_>) -> Scheme {
+        let choice = Self::of(course.problem, course.stage, course.state.depth, course.state.velocity);
+        if course.detail >= Detail::Events {
+            course.notes.push(choice.explain(course.stage));
+        }
+        choice.scheme
     }
 
     /// The choice as a sentence about stage `stage`.
@@ -97,45 +97,11 @@ fn stiffness(law: &Stage, mass: f64, depth: f64, velocity: f64, distance: f64) -
     Some(((rate * distance - velocity) / terminal).max(0.0))
 }
 
-impl Adaptive {
-    /// At relative tolerance `rtol`, with [`MAX_STEPS`].
-    pub fn new(rtol: f64) -> Self {
-        Self { rtol, max_steps: MAX_STEPS }
-    }
-
-    fn solver(&self) -> Result<Reusing<impl Fn(&mut Course<'_>) -> usize + use<>>, IntegrationError> {
-        check_rtol(IMPLICIT, self.rtol)?;
-        let solvers = vec![Solver::of(EXPLICIT, self.rtol)?, Solver::of(IMPLICIT, self.rtol)?];
-        Ok(Reusing::new(self, self.max_steps, solvers, |course: &mut Course<'_>| {
-            let State { depth, velocity, .. } = course.state;
-            let choice = Choice::of(course.problem, course.stage, depth, velocity);
-            if course.detail >= Detail::Events {
-                course.notes.push(choice.explain(course.stage));
-            }
-            usize::from(choice.scheme.is_implicit())
-        }))
-    }
-}
-
-impl Integrator for Adaptive {
-    fn name(&self) -> &'static str {
-        "adaptive"
-    }
-
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
-        self.solver()?.solve(problem, detail)
-    }
-
-    fn reusing(&self) -> Option<Box<dyn Integrator>> {
-        self.solver().ok().map(|solver| Box::new(solver) as Box<dyn Integrator>)
-    }
-}
-
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
-    use crate::integrators::Diffsol;
+    use crate::integrators::{Diffsol, Integrator};
     use crate::physics::Outcome;
     use crate::testing::stage;
 
@@ -168,7 +134,7 @@ mod tests {
                         flight.end
                     );
                 }
-                let flight = Adaptive::new(rtol).solve(&problem, Detail::Events).unwrap();
+                let flight = Diffsol::adaptive(rtol).solve(&problem, Detail::Events).unwrap();
                 println!(
                     "{name} {rtol:e} adaptive  {:?} {} {:?} {:?}",
                     flight.cost, flight.outcome, flight.end, flight.notes
@@ -192,7 +158,7 @@ mod tests {
     #[test]
     fn a_stiff_stage_costs_a_tenth_of_the_explicit_evaluations_at_most() {
         let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
-        let adaptive = Adaptive::new(1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
+        let adaptive = Diffsol::adaptive(1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
         assert!(
             10 * adaptive.cost.force_evaluations <= explicit.cost.force_evaluations,
             "{:?} against {:?}",
@@ -212,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_stage_that_only_resists_stays_explicit_however_viscous() {
-        let flight = Adaptive::new(1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
+        let flight = Diffsol::adaptive(1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
         let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
         assert_eq!(flight.cost, explicit.cost);
         assert_eq!(flight.end, explicit.end);
@@ -233,7 +199,7 @@ mod tests {
                 stage(1e-4, 0.0, 0.0, 0.0, f64::INFINITY),
             ],
         );
-        let flight = Adaptive::new(1e-8).solve(&problem, Detail::Events).unwrap();
+        let flight = Diffsol::adaptive(1e-8).solve(&problem, Detail::Events).unwrap();
         let named: Vec<_> = flight.notes.iter().filter_map(|note| note.split(' ').nth(3)).collect();
         assert_eq!(named, ["tsit45:", "bdf:", "tsit45:"]);
         let all_explicit = Diffsol::new(Scheme::Tsit45, 1e-8).solve(&problem, Detail::Events).unwrap();

@@ -29,6 +29,7 @@ pub(crate) mod tests;
 
 use serde::Deserialize;
 
+use super::flight::at_once;
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use crate::physics::{Problem, Scalar, State};
 use boundaries::Run;
@@ -197,10 +198,10 @@ impl CentralDifference {
     ///   without a force at rest.
     pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Result<Flight<S>, IntegrationError> {
         self.check::<S>()?;
-        if let Some(flight) = Flight::<f64>::at_once(problem) {
-            return Ok(flight);
+        match at_once(problem, detail) {
+            Some(flight) => Ok(flight),
+            None => Run::solve(self, problem, detail),
         }
-        Run::solve(self, problem, detail)
     }
 
     /// The first `count` states of the scheme in the first stage, with all events off: the stage has no end, and the
@@ -232,28 +233,28 @@ impl CentralDifference {
     ) -> Result<Vec<State<S>>, IntegrationError> {
         self.check::<S>()?;
         if ends.is_empty() || ends.len() > problem.stages.len() {
-            let (option, value, allowed) = ("ends", format!("{} times", ends.len()), "one for each stage");
-            return Err(IntegrationError::BadOption { option, value, allowed });
+            let value = format!("{} times", ends.len());
+            return Err(IntegrationError::bad_option("ends", &value, "one for each stage"));
         }
         Stepper::new(self, problem).forced(source, ends)
     }
 
     /// Refuses options outside their domain, as numbers of type `S`.
     fn check<S: Scalar>(&self) -> Result<(), IntegrationError> {
-        let bad = |option, value: String, allowed| Err(IntegrationError::BadOption { option, value, allowed });
+        let bad = |option, value: &str, allowed| Err(IntegrationError::bad_option(option, value, allowed));
         let is_bad = |size: &&f64| {
             let size = S::from_f64(**size).value();
             !(size > 0.0 && size.is_finite())
         };
         if self.max_steps == 0 {
-            return bad("max_steps", "0".to_owned(), "at least 1");
+            return bad("max_steps", "0", "at least 1");
         }
         let (sizes, option, allowed) = match &self.steps {
             Steps::Default => return Ok(()),
             Steps::Uniform(size) => (std::slice::from_ref(size), "--dt", "a positive, finite time"),
-            Steps::Given(sizes) if sizes.is_empty() => return bad("steps", "[]".to_owned(), "at least one time step"),
+            Steps::Given(sizes) if sizes.is_empty() => return bad("steps", "[]", "at least one time step"),
             Steps::Given(sizes) => (sizes.as_slice(), "steps", "positive, finite times"),
         };
-        sizes.iter().find(is_bad).map_or(Ok(()), |size| bad(option, format!("{size} s"), allowed))
+        sizes.iter().find(is_bad).map_or(Ok(()), |size| bad(option, &format!("{size} s"), allowed))
     }
 }

@@ -48,6 +48,11 @@ impl Integrator for ClosedForm {
         }
         Ok(flight)
     }
+
+    fn explain(&self, _problem: &Problem, flight: &Flight) -> Vec<String> {
+        // A flight that is over at impact has said so.
+        if flight.notes.is_empty() { vec!["no integration: the closed form".to_owned()] } else { Vec::new() }
+    }
 }
 
 /// Solves crater and tunnel whose crater constant was chosen by `stiffness`.
@@ -112,7 +117,7 @@ impl StageSolver<f64> for Exact {
                 return Ok(StageEnd::Approach(entry, why));
             }
         };
-        if !(state.time.is_finite() && state.depth.is_finite() && state.velocity.is_finite()) {
+        if !state.is_finite() {
             return Err(IntegrationError::NotFinite { what: "the closed form", last: entry });
         }
         Ok(if rests { StageEnd::Rest(state) } else { StageEnd::Limit(state) })

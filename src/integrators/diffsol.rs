@@ -35,6 +35,7 @@ use diffsol::{
 };
 use self_cell::self_cell;
 
+use super::adaptive::{Choice, EXPLICIT, IMPLICIT};
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator};
 use crate::physics::{Problem, Stage, State};
@@ -122,21 +123,16 @@ impl Scheme {
     /// Share of the fastest time in a stage that the first step takes: the local error of a step of that length is
     /// about the tolerance.
     fn first_step_share(self, rtol: f64) -> f64 {
-        let order = match self {
-            Self::Tsit45 => 5.0,
-            Self::Bdf => 1.0,
-            Self::Esdirk34 => 3.0,
-            Self::TrBdf2 => 2.0,
-        };
-        0.5 * self.library_rtol(rtol).powf(1.0 / (order + 1.0))
+        // A method of variable order starts with the first.
+        0.5 * self.library_rtol(rtol).powf(1.0 / (f64::from(self.order().unwrap_or(1)) + 1.0))
     }
 }
 
 /// A library method at a tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Diffsol {
-    /// The method.
-    pub scheme: Scheme,
+    /// The method; `None` chooses one for each stage ([`super::adaptive`]).
+    pub scheme: Option<Scheme>,
     /// Relative tolerance of each step, 1e-15 (`tsit45`) or 1e-14 to 0.1; the absolute ones are `rtol` times the first boundary in x
     /// (else the exit depth) and times V0.
     pub rtol: f64,
@@ -147,21 +143,37 @@ pub struct Diffsol {
 impl Diffsol {
     /// `scheme` at relative tolerance `rtol`, with [`MAX_STEPS`].
     pub fn new(scheme: Scheme, rtol: f64) -> Self {
-        Self { scheme, rtol, max_steps: MAX_STEPS }
+        Self { scheme: Some(scheme), rtol, max_steps: MAX_STEPS }
+    }
+
+    /// The method `adaptive` at relative tolerance `rtol`, with [`MAX_STEPS`].
+    pub fn adaptive(rtol: f64) -> Self {
+        Self { scheme: None, rtol, max_steps: MAX_STEPS }
+    }
+
+    fn solver(&self) -> Result<Reusing, IntegrationError> {
+        check_rtol(self.scheme.unwrap_or(IMPLICIT), self.rtol)?;
+        let schemes = self.scheme.map_or(vec![EXPLICIT, IMPLICIT], |scheme| vec![scheme]);
+        let solvers = schemes.into_iter().map(|scheme| Solver::of(scheme, self.rtol)).collect::<Result<_, _>>()?;
+        Ok(Reusing { of: *self, solvers: RefCell::new(solvers) })
     }
 }
 
 impl Integrator for Diffsol {
     fn name(&self) -> &'static str {
-        self.scheme.name()
+        self.scheme.map_or("adaptive", Scheme::name)
     }
 
     fn order(&self) -> Option<u32> {
-        self.scheme.order()
+        self.scheme.and_then(Scheme::order)
     }
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
         self.solver()?.solve(problem, detail)
+    }
+
+    fn has_jacobian(&self) -> bool {
+        self.scheme.is_none_or(Scheme::is_implicit)
     }
 
     fn reusing(&self) -> Option<Box<dyn Integrator>> {
@@ -169,40 +181,23 @@ impl Integrator for Diffsol {
     }
 }
 
-impl Diffsol {
-    fn solver(&self) -> Result<Reusing<impl Fn(&mut Course<'_>) -> usize + use<>>, IntegrationError> {
-        check_rtol(self.scheme, self.rtol)?;
-        let solvers = vec![Solver::of(self.scheme, self.rtol)?];
-        Ok(Reusing::new(self, self.max_steps, solvers, |_: &mut Course<'_>| 0))
-    }
-}
-
 /// A method with its library solvers, which are reused from stage to stage and from flight to flight.
 ///
 /// A flight does not depend on the flights before it, save that its cost lacks the evaluations that making a solver
 /// takes.
-pub(super) struct Reusing<Choose> {
-    name: &'static str,
-    order: Option<u32>,
-    max_steps: u64,
+struct Reusing {
+    of: Diffsol,
+    /// One for the scheme; where it is chosen, the explicit and the implicit one.
     solvers: RefCell<Vec<Solver>>,
-    /// Index of the solver for the present stage; where there is a choice, it is noted.
-    choose: Choose,
 }
 
-impl<Choose: Fn(&mut Course<'_>) -> usize> Reusing<Choose> {
-    pub(super) fn new(of: &dyn Integrator, max_steps: u64, solvers: Vec<Solver>, choose: Choose) -> Self {
-        Self { name: of.name(), order: of.order(), max_steps, solvers: RefCell::new(solvers), choose }
-    }
-}
-
-impl<Choose: Fn(&mut Course<'_>) -> usize> Integrator for Reusing<Choose> {
+impl Integrator for Reusing {
     fn name(&self) -> &'static str {
-        self.name
+        self.of.name()
     }
 
     fn order(&self) -> Option<u32> {
-        self.order
+        self.of.order()
     }
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
@@ -211,17 +206,17 @@ impl<Choose: Fn(&mut Course<'_>) -> usize> Integrator for Reusing<Choose> {
 }
 
 /// A method as the loop sees it.
-struct Stages<'m, Choose> {
-    method: &'m Reusing<Choose>,
+struct Stages<'m> {
+    method: &'m Reusing,
     units: Units,
 }
 
-impl<Choose: Fn(&mut Course<'_>) -> usize> StageSolver<f64> for Stages<'_, Choose> {
+impl StageSolver<f64> for Stages<'_> {
     fn solve_stage(&mut self, course: &mut Course<'_>) -> Result<StageEnd, IntegrationError> {
-        let Reusing { name, max_steps, solvers, choose, .. } = self.method;
+        let Reusing { of, solvers } = self.method;
         let stage = Reduced::of(course, self.units)?;
-        let index = choose(course);
-        solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, name, *max_steps, course))
+        let index = if of.scheme.is_some() { 0 } else { usize::from(Choice::note(course).is_implicit()) };
+        solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, of.name(), of.max_steps, course))
     }
 
     fn margin(&mut self, course: &mut Course<'_>) -> Result<Bounded, IntegrationError> {
@@ -235,12 +230,12 @@ impl<Choose: Fn(&mut Course<'_>) -> usize> StageSolver<f64> for Stages<'_, Choos
 }
 
 /// Refuses a tolerance outside the range of `scheme`, NaN included.
-pub(super) fn check_rtol(scheme: Scheme, rtol: f64) -> Result<(), IntegrationError> {
+fn check_rtol(scheme: Scheme, rtol: f64) -> Result<(), IntegrationError> {
     if (scheme.rtol_min()..=0.1).contains(&rtol) {
         return Ok(());
     }
     let allowed = if scheme.is_implicit() { "1e-14 to 0.1" } else { "1e-15 to 0.1" };
-    Err(IntegrationError::BadOption { option: "rtol", value: format!("{rtol:e}"), allowed })
+    Err(IntegrationError::bad_option("rtol", &format!("{rtol:e}"), allowed))
 }
 
 /// The law of a stage in its own units: `du/dtau = -(p + s xi + r u + q u²)`.
@@ -293,9 +288,9 @@ impl Law {
     /// How far the projectile can still creep [L] where the static force does not stop it.
     fn reach(&self, at: Node) -> f64 {
         if self.p < 0.0 {
-            if self.s > 0.0 { (-self.p / self.s - at.xi).max(0.0) } else { f64::INFINITY }
+            if self.s > 0.0 { (-self.p / self.s - at.depth).max(0.0) } else { f64::INFINITY }
         } else if self.r > 0.0 {
-            at.u / self.r
+            at.velocity / self.r
         } else {
             f64::INFINITY
         }
@@ -308,13 +303,13 @@ impl Law {
     /// If not, the place is approached for ever.
     fn meaning_of_standstill(&self, at: Node, distance: f64, noise: f64) -> (Found, Node) {
         let resists = self.p > 0.0 || (self.p == 0.0 && self.s > 0.0);
-        let least_brake = if self.may_hang() { noise * (self.p.abs() + self.s * at.xi.abs()) } else { 0.0 };
-        if resists || self.p + self.s * at.xi > least_brake {
-            return (Found::Rest, Node { xi: at.xi.max(0.0), u: 0.0, ..at });
+        let least_brake = if self.may_hang() { noise * (self.p.abs() + self.s * at.depth.abs()) } else { 0.0 };
+        if resists || self.p + self.s * at.depth > least_brake {
+            return (Found::Rest, Node { depth: at.depth.max(0.0), velocity: 0.0, ..at });
         }
-        let in_reach = distance - at.xi <= self.reach(at) + noise * (1.0 + at.xi.abs());
+        let in_reach = distance - at.depth <= self.reach(at) + noise * (1.0 + at.depth.abs());
         if in_reach && distance.is_finite() {
-            return (Found::Boundary, Node { xi: distance, u: 0.0, ..at });
+            return (Found::Boundary, Node { depth: distance, velocity: 0.0, ..at });
         }
         (Found::Approach, at)
     }
@@ -369,8 +364,8 @@ impl Units {
     fn state(&self, start: State, node: Node) -> State {
         State {
             time: start.time + node.time * (self.length / self.speed),
-            depth: start.depth + node.xi * self.length,
-            velocity: node.u * self.speed,
+            depth: start.depth + node.depth * self.length,
+            velocity: node.velocity * self.speed,
         }
     }
 }
@@ -457,7 +452,7 @@ trait LibraryProblem {
 
 self_cell! {
     /// The library's problem together with its solver.
-    pub(super) struct Solver {
+    struct Solver {
         owner: Box<dyn LibraryProblem>,
         #[not_covariant]
         dependent: SolveStage,
@@ -466,7 +461,7 @@ self_cell! {
 
 impl Solver {
     /// A solver by `scheme`, for tolerance `rtol`.
-    pub(super) fn of(scheme: Scheme, rtol: f64) -> Result<Self, IntegrationError> {
+    fn of(scheme: Scheme, rtol: f64) -> Result<Self, IntegrationError> {
         let force = Rc::new(Force::default());
         let [of_rate, of_jacobian, of_start] = [&force, &force, &force].map(Rc::clone);
         let tolerance = scheme.library_rtol(rtol);
@@ -598,7 +593,7 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
         let first_step = self.scheme.first_step_share(self.rtol) * law.shortest_time(stage.speed, stage.distance);
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
-        let mut before = Node { time: 0.0, xi: 0.0, u: stage.speed };
+        let mut before = Node { time: 0.0, depth: 0.0, velocity: stage.speed };
         let mut epoch = 0.0;
         let mut h = first_step;
         let mut retries = 0;
@@ -620,12 +615,12 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             // The stop reason says nothing here: there is neither a root function nor a stop time.
             let _ = solver.step().map_err(|e| failure(e, epoch, before))?;
             let state = solver.state();
-            let after = Node { time: state.t, xi: state.y[0], u: state.y[1] };
+            let after = Node { time: state.t, depth: state.y[0], velocity: state.y[1] };
             let next_step = state.h;
             // Backwards with u > 0 at both ends: u was negative in between. Where it was lost in the tolerance already
             // (an explicit method at its stability limit), that is the rest; elsewhere the step was too long.
-            let backwards = after.xi < before.xi && after.u > 0.0;
-            if backwards && is_lost(before.u, self.rtol, energy_max) {
+            let backwards = after.depth < before.depth && after.velocity > 0.0;
+            if backwards && is_lost(before.velocity, self.rtol, energy_max) {
                 cost.steps += 1;
                 break (Found::Rest, before);
             }
@@ -639,22 +634,22 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
                 h *= 0.1;
                 epoch += before.time;
                 before.time = 0.0;
-                solver = self.solver_at(before.xi, before.u, h).map_err(|e| failure(e, epoch, before))?;
+                solver = self.solver_at(before.depth, before.velocity, h).map_err(|e| failure(e, epoch, before))?;
                 rejected_before = rejected_by(&solver);
                 cost.rejected_steps += 1;
                 continue;
             }
             cost.steps += 1;
-            if after.u <= 0.0 || after.xi >= stage.distance {
+            if after.velocity <= 0.0 || after.depth >= stage.distance {
                 let scratch = &mut self.scratch;
                 let (end, place) = locate(&law, before, after, stage.distance, |t| {
                     solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]))
                 })
                 .map_err(|e| failure(e, epoch, before))?;
-                energy_max = energy_max.max(place.u * place.u);
+                energy_max = energy_max.max(place.velocity * place.velocity);
                 break (end, place);
             }
-            energy_max = energy_max.max(after.u * after.u);
+            energy_max = energy_max.max(after.velocity * after.velocity);
             before = after;
             course.sample(state_at(epoch, after));
             h = next_step;
@@ -674,7 +669,7 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             reached => (reached, place),
         };
         let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
-        course.cost += cost;
+        course.cost = course.cost + cost;
         course.error_bound += (noise + round_off) * energy_max;
         let reached = state_at(epoch, place);
         Ok(match end {
@@ -690,19 +685,8 @@ fn is_lost(u: f64, rtol: f64, energy_max: f64) -> bool {
     u <= 10.0 * rtol * energy_max.sqrt()
 }
 
-/// A step's end in the units of the stage.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    time: f64,
-    xi: f64,
-    u: f64,
-}
-
-impl Node {
-    fn is_finite(self) -> bool {
-        self.time.is_finite() && self.xi.is_finite() && self.u.is_finite()
-    }
-}
+/// A step's end in the units of the stage: time, xi and u.
+type Node = State;
 
 /// Steps that the library threw away in the life of `solver`: error tests failed and Newton iterations without end.
 fn rejected_by<'a, Eqn: OdeEquations + 'a, S: OdeSolverMethod<'a, Eqn>>(solver: &S) -> u64 {
@@ -720,17 +704,23 @@ fn locate(
     distance: f64,
     mut at: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
 ) -> Result<(Found, Node), DiffsolError> {
-    let mut node_at = |time| at(time).map(|(xi, u)| Node { time, xi, u });
+    let mut node_at = |time| at(time).map(|(xi, u)| Node { time, depth: xi, velocity: u });
     let mut last = after;
-    if after.u <= 0.0 {
-        let rest = bracketed_root(before, after, before.u, |node| (node.u, law.rate(node.xi, node.u)), &mut node_at)?;
-        last = Node { u: 0.0, ..rest };
+    if after.velocity <= 0.0 {
+        let rest = bracketed_root(
+            before,
+            after,
+            before.velocity,
+            |node| (node.velocity, law.rate(node.depth, node.velocity)),
+            &mut node_at,
+        )?;
+        last = Node { velocity: 0.0, ..rest };
     }
-    if last.xi < distance {
+    if last.depth < distance {
         return Ok((Found::Rest, last));
     }
-    let boundary = bracketed_root(before, last, distance, |node| (node.xi - distance, node.u), &mut node_at)?;
-    Ok((Found::Boundary, Node { xi: distance, u: boundary.u.max(0.0), ..boundary }))
+    let boundary = bracketed_root(before, last, distance, |node| (node.depth - distance, node.velocity), &mut node_at)?;
+    Ok((Found::Boundary, Node { depth: distance, velocity: boundary.velocity.max(0.0), ..boundary }))
 }
 
 /// Largest number of evaluations of [`bracketed_root`]; from half of them on the bracket is halved each time.

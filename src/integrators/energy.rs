@@ -80,11 +80,7 @@ impl Energy {
         if rtol > 0.0 && rtol <= 0.01 {
             Ok(Self { rtol })
         } else {
-            Err(IntegrationError::BadOption {
-                option: "rtol",
-                value: rtol.to_string(),
-                allowed: "a number above 0 and at most 0.01",
-            })
+            Err(IntegrationError::bad_option("rtol", &rtol, "a number above 0 and at most 0.01"))
         }
     }
 
@@ -122,9 +118,9 @@ impl Energy {
             return Ok(None);
         }
         let mut walk = Walk::from_impact(self.tolerance::<S>());
-        walk.reach_exit(problem, 0).map_err(|(fault, from)| {
-            let last = State { time: f64::NAN, depth: from.depth.value(), velocity: root_of(from.w).value() };
-            fault.error(State { velocity: last.velocity * problem.impact_speed.value(), ..last })
+        walk.reach_exit(problem, 0, |from| {
+            let velocity = root_of(from.w).value() * problem.impact_speed.value();
+            State { time: f64::NAN, depth: from.depth.value(), velocity }
         })?;
         Ok(Some((walk.least, walk.least_error, walk.cost)))
     }
@@ -143,18 +139,6 @@ impl Integrator for Energy {
         let margin = self.exit_margin_in(problem)?;
         Ok(margin.map(|(value, error, cost)| Margin { value, error: Some(error), cost }))
     }
-}
-
-/// Signed exit energy W(exit) (m²/s²) of `problem` at round-off, negative for a stop; `None` as
-/// [`Energy::exit_margin_in`].
-///
-/// The least W over the stage ends where a target also drives ([`crate::physics::exit_energy`]).
-///
-/// # Errors
-/// As [`Energy::exit_margin_in`].
-pub fn exit_energy_of<S: Scalar>(problem: &Problem<S>) -> Result<Option<S>, IntegrationError> {
-    let margin = Energy::new().exit_margin_in(problem)?;
-    Ok(margin.map(|(value, ..)| value * problem.impact_speed * problem.impact_speed))
 }
 
 /// Refuses a problem with viscosity before its exit.
@@ -195,7 +179,7 @@ struct Loss<S> {
 
 impl<S: Scalar> Loss<S> {
     /// The loss of `stage` in `problem`, whose impact speed is the unit of speed.
-    fn of(stage: &Stage<S>, problem: &Problem<S>) -> Result<Self, Fault> {
+    fn of(stage: &Stage<S>, problem: &Problem<S>, last: impl Fn() -> State) -> Result<Self, IntegrationError> {
         // Quotients throughout: neither 1/M nor the square of a speed may leave the range of the number type where the
         // result does not.
         let two = S::from_f64(2.0);
@@ -209,7 +193,7 @@ impl<S: Scalar> Loss<S> {
         if [loss.steady, loss.growing, loss.drag].iter().all(|c| c.value().is_finite()) {
             Ok(loss)
         } else {
-            Err(Fault::NotFinite("force over M V0²"))
+            Err(IntegrationError::NotFinite { what: "force over M V0²", last: last() })
         }
     }
 
@@ -256,22 +240,6 @@ impl<S: Scalar> Loss<S> {
     }
 }
 
-/// Why a walk or a clock broke off.
-#[derive(Clone, Copy, Debug)]
-enum Fault {
-    Budget,
-    NotFinite(&'static str),
-}
-
-impl Fault {
-    fn error(self, last: State) -> IntegrationError {
-        match self {
-            Self::Budget => IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last },
-            Self::NotFinite(what) => IntegrationError::NotFinite { what, last },
-        }
-    }
-}
-
 /// w over depth, on the path through the target.
 #[derive(Clone, Copy, Debug)]
 struct Walk<S> {
@@ -293,12 +261,18 @@ impl<S: Scalar> Walk<S> {
         Self { depth: S::zero(), w, error: 0.0, least, least_error: 0.0, tolerance, cost: Cost::default() }
     }
 
-    /// Propagates w from the start of stage `first` to the exit. An error comes with the state at the start of its stage.
-    fn reach_exit(&mut self, problem: &Problem<S>, first: usize) -> Result<(), (Fault, Self)> {
+    /// Propagates w from the start of stage `first` to the exit. An error names the state that `last` makes of the walk
+    /// at the start of its stage.
+    fn reach_exit(
+        &mut self,
+        problem: &Problem<S>,
+        first: usize,
+        last: impl Fn(&Self) -> State,
+    ) -> Result<(), IntegrationError> {
         for (index, stage) in problem.stages.iter().enumerate().skip(first) {
             let from = *self;
-            let loss = Loss::of(stage, problem).map_err(|fault| (fault, from))?;
-            self.cross(&loss, problem.limit_of(index), false).map_err(|fault| (fault, from))?;
+            let loss = Loss::of(stage, problem, || last(&from))?;
+            self.cross(&loss, problem.limit_of(index), false, || last(&from))?;
             if stage.end.value() >= problem.exit_depth.value() {
                 break;
             }
@@ -317,12 +291,18 @@ impl<S: Scalar> Walk<S> {
     ///
     /// A finite limit is reached beyond rest, too; without one the path ends at rest. A w of exactly zero at the
     /// limit is an arrival, not a rest before it.
-    fn cross(&mut self, loss: &Loss<S>, limit: S, seek_rest: bool) -> Result<Option<S>, Fault> {
+    fn cross(
+        &mut self,
+        loss: &Loss<S>,
+        limit: S,
+        seek_rest: bool,
+        last_state: impl Fn() -> State,
+    ) -> Result<Option<S>, IntegrationError> {
         let longest = DRAG_LENGTHS_MAX / loss.drag.value().abs();
         let mut rest = None;
         while self.depth.value() < limit.value() {
             if self.cost.steps >= STEPS_MAX {
-                return Err(Fault::Budget);
+                return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: last_state() });
             }
             let (x, w) = (self.depth, self.w);
             if limit.value().is_finite() && loss.is_settled(x, w) {
@@ -359,7 +339,7 @@ impl<S: Scalar> Walk<S> {
             self.error = self.error * (-drag * h.value()).exp()
                 + (self.tolerance.max(S::EPSILON) + ROUNDINGS_PER_STEP * S::EPSILON) * size;
             if !self.w.value().is_finite() || !self.error.is_finite() {
-                return Err(Fault::NotFinite("V²"));
+                return Err(IntegrationError::NotFinite { what: "V²", last: last_state() });
             }
             let falls = self.w.value() < 0.0 || (self.w.value() == 0.0 && !last);
             if seek_rest && rest.is_none() && falls {
@@ -435,9 +415,9 @@ impl<S: Scalar> StageSolver<S> for Stages<S> {
     fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError> {
         let problem = course.problem;
         let here = course.state.values();
-        let loss = Loss::of(&problem.stages[course.stage], problem).map_err(|fault| fault.error(here))?;
+        let loss = Loss::of(&problem.stages[course.stage], problem, || here)?;
         let limit = course.limit()?;
-        let rest = self.walk.cross(&loss, limit, true).map_err(|fault| fault.error(here))?;
+        let rest = self.walk.cross(&loss, limit, true, || here)?;
         let (depth, velocity) = rest.map_or_else(|| (limit, root_of(self.walk.w)), |depth| (depth, S::zero()));
         let clock = Clock { loss, tolerance: self.walk.tolerance };
         self.now = clock.elapse(self.now, depth, velocity, &mut self.clock, course)?;
@@ -450,7 +430,7 @@ impl<S: Scalar> StageSolver<S> for Stages<S> {
     fn margin(&mut self, course: &mut Course<'_, S>) -> Result<Bounded, IntegrationError> {
         let (problem, last) = (course.problem, course.state.values());
         if !course.is_through && problem.stages[course.stage].end.value() < problem.exit_depth.value() {
-            self.walk.reach_exit(problem, course.stage + 1).map_err(|(fault, _)| fault.error(last))?;
+            self.walk.reach_exit(problem, course.stage + 1, |_| last)?;
             course.cost = self.walk.cost + self.clock;
         }
         Ok(Bounded { value: self.walk.least.value(), bound: self.walk.least_error })
@@ -506,7 +486,8 @@ impl<S: Scalar> Clock<S> {
             cost.steps += 1;
             cost.force_evaluations += TIME_ORDER as u64;
             if !now.time.value().is_finite() || !now.velocity.value().is_finite() {
-                return Err(Fault::NotFinite("time or speed").error(si(course.problem, from).values()));
+                let last = si(course.problem, from).values();
+                return Err(IntegrationError::NotFinite { what: "time or speed", last });
             }
             if done {
                 break;
@@ -517,7 +498,8 @@ impl<S: Scalar> Clock<S> {
             }
             course.sample(si(course.problem, now));
             if cost.steps >= STEPS_MAX {
-                return Err(Fault::Budget.error(si(course.problem, now).values()));
+                let last = si(course.problem, now).values();
+                return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last });
             }
         }
         Ok(State { time: now.time, depth, velocity })

@@ -140,18 +140,19 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[inline(always)]
     pub(crate) fn sample(&mut self, state: State<S>) {
         if self.detail >= Detail::Trajectory {
-            self.push_sample(state);
+            self.push_sample(state, self.problem.stages[self.stage].force(state.depth, state.velocity));
         }
     }
 
+    /// As [`Course::sample`], with the force (N) that the method itself has there.
     #[cold]
-    fn push_sample(&mut self, state: State<S>) {
-        let force = self.problem.stages[self.stage].force(state.depth, state.velocity).value();
-        self.trajectory.push(Sample { state: state.values(), force, stage: self.stage });
+    pub(crate) fn push_sample(&mut self, state: State<S>, force: S) {
+        self.trajectory.push(Sample { state: state.values(), force: force.value(), stage: self.stage });
     }
 
+    /// Lists the event `kind` at the present state, if events are wanted.
     #[inline(always)]
-    fn event(&mut self, kind: EventKind) {
+    pub(crate) fn event(&mut self, kind: EventKind) {
         if self.detail >= Detail::Events {
             self.events.push(Event { kind, state: self.state });
             self.sample(self.state);
@@ -171,9 +172,26 @@ impl<'a, S: Scalar> Course<'a, S> {
         while let Some(law) = self.problem.stages.get(self.stage)
             && law.end.value() <= self.state.depth.value()
         {
-            self.event(EventKind::boundary(self.problem, self.stage));
-            self.least_at_ends = self.least_at_ends.min(self.energy());
-            self.stage += 1;
+            self.pass_end();
+        }
+    }
+
+    /// Lists the end of the present stage at the present state and enters the next stage.
+    #[inline(always)]
+    pub(crate) fn pass_end(&mut self) {
+        self.event(EventKind::boundary(self.problem, self.stage));
+        self.least_at_ends = self.least_at_ends.min(self.energy());
+        self.stage += 1;
+    }
+
+    /// Lists the exit, if it is reached, and the rest, if there is no velocity left.
+    #[inline(always)]
+    pub(crate) fn end(&mut self) {
+        if self.is_through {
+            self.event(EventKind::Exit);
+        }
+        if self.state.velocity.value() <= 0.0 {
+            self.event(EventKind::Rest);
         }
     }
 
@@ -214,8 +232,9 @@ impl<'a, S: Scalar> Course<'a, S> {
         Ok(State { time: at.time + S::from_f64(time), depth: limit, velocity: S::zero() })
     }
 
+    /// The flight that ends at the present state, with its exit margin.
     #[inline(always)]
-    fn finish(self, margin: Option<Bounded>) -> Flight<S> {
+    pub(crate) fn finish(self, margin: Option<Bounded>) -> Flight<S> {
         let outcome = if margin.is_some_and(|margin| !margin.is_decided()) {
             Outcome::Undecided
         } else if self.is_through {
@@ -244,6 +263,28 @@ fn stops_far_out<S: Scalar>(law: &Stage<S>) -> bool {
     law.stiffness.value() > 0.0 || law.static_force.value() > 0.0
 }
 
+/// A flight that never starts: at rest on the face (`V0 = 0`), or no target at all (exit depth 0).
+///
+/// `None` for every other problem. Methods ask this first, so that none has to treat a vanishing scale.
+#[inline(always)]
+pub(crate) fn at_once<S: Scalar>(problem: &Problem<S>, detail: Detail) -> Option<Flight<S>> {
+    let moves = problem.impact_speed.value() > 0.0;
+    let is_through = problem.exit_depth.value() <= 0.0;
+    if moves && !is_through { None } else { Some(never_starts(problem, detail, moves, is_through)) }
+}
+
+#[cold]
+fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is_through: bool) -> Flight<S> {
+    let mut course = Course::new(problem, detail.min(Detail::Events));
+    // Ends at the face itself (k d = 0 leaves no crater, but a user's stage may end at 0) are reached at once.
+    course.pass_ends();
+    course.stage = course.stage.min(problem.stages.len() - 1);
+    course.is_through = is_through;
+    course.notes.push("no integration: the flight ends at impact".to_owned());
+    course.end();
+    course.finish((is_through && moves).then_some(Bounded { value: 1.0, bound: 0.0 }))
+}
+
 /// Solves `problem` stage by stage with `method`.
 ///
 /// A stage end or an exit that is reached without speed counts as reached. A stage without length is passed where it
@@ -257,10 +298,7 @@ pub(crate) fn solve<S: Scalar>(
     detail: Detail,
     method: &mut impl StageSolver<S>,
 ) -> Result<Flight<S>, IntegrationError> {
-    if let Some(mut flight) = Flight::at_once(problem) {
-        if detail == Detail::End {
-            flight.events.clear();
-        }
+    if let Some(flight) = at_once(problem, detail) {
         return Ok(flight);
     }
     let mut course = Course::new(problem, detail);
@@ -292,15 +330,9 @@ pub(crate) fn solve<S: Scalar>(
             course.pass_ends();
             course.is_through = course.state.depth.value() >= problem.exit_depth.value();
         }
-        let stopped = course.state.velocity.value() <= 0.0;
-        if course.is_through || stopped {
+        if course.is_through || course.state.velocity.value() <= 0.0 {
             course.stage = entered;
-            if course.is_through {
-                course.event(EventKind::Exit);
-            }
-            if stopped {
-                course.event(EventKind::Rest);
-            }
+            course.end();
             let margin = if problem.has_exit() { Some(method.margin(&mut course)?) } else { None };
             return Ok(course.finish(margin));
         }

@@ -6,6 +6,8 @@ use strum::VariantArray;
 
 use super::central_difference::{Boundaries, CentralDifference, Steps, VelocityAt};
 use super::closed_form::ClosedForm;
+#[cfg(feature = "diffsol")]
+use super::diffsol::{Diffsol, Scheme};
 use super::energy::Energy;
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
@@ -105,22 +107,10 @@ pub const RTOL_DEFAULT: f64 = 1e-10;
 const RTOL_ALLOWED: std::ops::RangeInclusive<f64> = 1e-15..=0.1;
 
 /// A method with its options, ready to solve.
-#[derive(Clone, Debug)]
-pub enum Method {
-    /// See [`Taylor`].
-    Taylor(Taylor),
-    /// See [`super::diffsol::Diffsol`].
-    #[cfg(feature = "diffsol")]
-    Diffsol(super::diffsol::Diffsol),
-    /// See [`super::adaptive::Adaptive`].
-    #[cfg(feature = "diffsol")]
-    Adaptive(super::adaptive::Adaptive),
-    /// See [`Energy`].
-    Energy(Energy),
-    /// See [`CentralDifference`].
-    CentralDifference(CentralDifference),
-    /// See [`ClosedForm`].
-    ClosedForm(ClosedForm),
+pub struct Method {
+    name: MethodName,
+    options: MethodOptions,
+    integrator: Box<dyn Integrator + Sync>,
 }
 
 impl Method {
@@ -130,68 +120,29 @@ impl Method {
     /// [`IntegrationError::BadOption`] for an option that the method does not use or that is out of range,
     /// [`IntegrationError::Refused`] for a method that this build lacks.
     pub fn new(name: MethodName, options: &MethodOptions) -> Result<Self, IntegrationError> {
+        let &MethodOptions { rtol, dt, velocity, events } = options;
         let is_fixed_step = name == MethodName::CentralDifference;
-        refuse_unless(is_fixed_step, "--dt", options.dt.map(Shown), "only central-difference has a fixed step")?;
-        refuse_unless(is_fixed_step, "--velocity", options.velocity, "only central-difference has this choice")?;
-        refuse_unless(is_fixed_step, "--events", options.events, "only central-difference has this choice")?;
+        refuse_unless(is_fixed_step, "--dt", dt.map(Shown), "only central-difference has a fixed step")?;
+        refuse_unless(is_fixed_step, "--velocity", velocity, "only central-difference has this choice")?;
+        refuse_unless(is_fixed_step, "--events", events, "only central-difference has this choice")?;
         let has_tolerance = !matches!(name, MethodName::CentralDifference | MethodName::ClosedForm);
-        refuse_unless(has_tolerance, "--rtol", options.rtol.map(Shown), "only adaptive methods have a tolerance")?;
-        if let Some(rtol) = options.rtol
-            && !RTOL_ALLOWED.contains(&rtol)
-        {
-            return Err(IntegrationError::BadOption {
-                option: "--rtol",
-                value: Shown(rtol).to_string(),
-                allowed: "a number from 1e-15 to 0.1",
-            });
-        }
-        if let Some(dt) = options.dt
-            && !(dt.is_finite() && dt > 0.0)
-        {
-            return Err(IntegrationError::BadOption {
-                option: "--dt",
-                value: Shown(dt).to_string(),
-                allowed: "a time above zero, such as 1us or 1e-6",
-            });
-        }
-        Ok(match name {
-            MethodName::Taylor => Self::Taylor(options.rtol.map_or_else(|| Ok(Taylor::default()), Taylor::with_rtol)?),
-            MethodName::Energy => Self::Energy(options.rtol.map_or_else(|| Ok(Energy::default()), Energy::with_rtol)?),
-            MethodName::ClosedForm => Self::ClosedForm(ClosedForm),
-            MethodName::CentralDifference => Self::CentralDifference(options.central_difference()),
-            #[cfg(feature = "diffsol")]
-            MethodName::Adaptive => {
-                Self::Adaptive(super::adaptive::Adaptive::new(options.rtol.unwrap_or(RTOL_DEFAULT)))
-            }
-            #[cfg(feature = "diffsol")]
-            MethodName::Tsit45 | MethodName::Bdf | MethodName::Esdirk34 | MethodName::TrBdf2 => {
-                use super::diffsol::{Diffsol, Scheme};
-                let scheme = match name {
-                    MethodName::Tsit45 => Scheme::Tsit45,
-                    MethodName::Bdf => Scheme::Bdf,
-                    MethodName::Esdirk34 => Scheme::Esdirk34,
-                    _ => Scheme::TrBdf2,
-                };
-                Self::Diffsol(Diffsol::new(scheme, options.rtol.unwrap_or(RTOL_DEFAULT)))
-            }
-            #[cfg(not(feature = "diffsol"))]
-            _ => {
-                return Err(IntegrationError::Refused {
-                    method: name.name(),
-                    why: "this build leaves out the diffsol library; build with `--features diffsol`".to_owned(),
-                });
-            }
-        })
+        refuse_unless(has_tolerance, "--rtol", rtol.map(Shown), "only adaptive methods have a tolerance")?;
+        let is_tolerance = rtol.is_none_or(|rtol| RTOL_ALLOWED.contains(&rtol));
+        refuse_unless(is_tolerance, "--rtol", rtol.map(Shown), "a number from 1e-15 to 0.1")?;
+        let is_time = dt.is_none_or(|dt| dt.is_finite() && dt > 0.0);
+        refuse_unless(is_time, "--dt", dt.map(Shown), "a time above zero, such as 1us or 1e-6")?;
+        Ok(Self { name, options: options.clone(), integrator: integrator(name, options)? })
+    }
+
+    /// Whether it is the method `name` with no option set.
+    pub fn is_plain(&self, name: MethodName) -> bool {
+        self.name == name && self.options == MethodOptions::default()
     }
 
     /// What `problem` let this method skip on `flight`, and why.
     pub fn explain(&self, problem: &Problem, flight: &Flight, detail: Detail) -> Vec<String> {
         let mut notes = flight.notes.clone();
-        match self {
-            Self::Taylor(_) => notes.extend(Taylor::explain(problem, flight)),
-            Self::ClosedForm(_) if flight.notes.is_empty() => notes.push("no integration: the closed form".to_owned()),
-            _ => {}
-        }
+        notes.extend(self.integrator.explain(problem, flight));
         for index in flight.stage + 1..problem.stages.len() {
             notes.push(format!(
                 "stage {index} was not built: the flight ended in stage {} at x = {} m, before {} m",
@@ -208,14 +159,7 @@ impl Method {
         if detail < Detail::Trajectory {
             notes.push("trajectory not kept: not asked for".to_owned());
         }
-        let jacobian = match self {
-            #[cfg(feature = "diffsol")]
-            Self::Diffsol(m) => !m.scheme.is_implicit(),
-            #[cfg(feature = "diffsol")]
-            Self::Adaptive(_) => false,
-            _ => true,
-        };
-        if jacobian {
+        if !self.integrator.has_jacobian() {
             notes.push("Jacobian not built: the method is explicit or needs none".to_owned());
         }
         notes.push("sensitivities not computed: not asked for".to_owned());
@@ -224,17 +168,38 @@ impl Method {
 
     /// The integrator inside.
     pub fn integrator(&self) -> &(dyn Integrator + Sync) {
-        match self {
-            Self::Taylor(m) => m,
-            #[cfg(feature = "diffsol")]
-            Self::Diffsol(m) => m,
-            #[cfg(feature = "diffsol")]
-            Self::Adaptive(m) => m,
-            Self::Energy(m) => m,
-            Self::CentralDifference(m) => m,
-            Self::ClosedForm(m) => m,
-        }
+        &*self.integrator
     }
+}
+
+/// The table of methods: the integrator of each name.
+fn integrator(name: MethodName, options: &MethodOptions) -> Result<Box<dyn Integrator + Sync>, IntegrationError> {
+    #[cfg(feature = "diffsol")]
+    let library = |scheme| {
+        let method = Diffsol::adaptive(options.rtol.unwrap_or(RTOL_DEFAULT));
+        Box::new(Diffsol { scheme, ..method })
+    };
+    Ok(match name {
+        MethodName::Taylor => Box::new(options.rtol.map_or_else(|| Ok(Taylor::default()), Taylor::with_rtol)?),
+        MethodName::Energy => Box::new(options.rtol.map_or_else(|| Ok(Energy::default()), Energy::with_rtol)?),
+        MethodName::ClosedForm => Box::new(ClosedForm),
+        MethodName::CentralDifference => Box::new(options.central_difference()),
+        #[cfg(feature = "diffsol")]
+        MethodName::Adaptive => library(None),
+        #[cfg(feature = "diffsol")]
+        MethodName::Tsit45 => library(Some(Scheme::Tsit45)),
+        #[cfg(feature = "diffsol")]
+        MethodName::Bdf => library(Some(Scheme::Bdf)),
+        #[cfg(feature = "diffsol")]
+        MethodName::Esdirk34 => library(Some(Scheme::Esdirk34)),
+        #[cfg(feature = "diffsol")]
+        MethodName::TrBdf2 => library(Some(Scheme::TrBdf2)),
+        #[cfg(not(feature = "diffsol"))]
+        _ => {
+            let why = "this build leaves out the diffsol library; build with `--features diffsol`".to_owned();
+            return Err(IntegrationError::Refused { method: name.name(), why });
+        }
+    })
 }
 
 fn refuse_unless<T: fmt::Display>(
@@ -244,7 +209,7 @@ fn refuse_unless<T: fmt::Display>(
     allowed: &'static str,
 ) -> Result<(), IntegrationError> {
     match value {
-        Some(value) if !used => Err(IntegrationError::BadOption { option, value: value.to_string(), allowed }),
+        Some(value) if !used => Err(IntegrationError::bad_option(option, &value, allowed)),
         _ => Ok(()),
     }
 }

@@ -22,8 +22,6 @@ pub mod method;
 pub mod outcome;
 pub mod taylor;
 
-#[cfg(feature = "diffsol")]
-pub use adaptive::Adaptive;
 pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use closed_form::ClosedForm;
 #[cfg(feature = "diffsol")]

@@ -33,17 +33,12 @@ pub struct Cost {
 impl std::ops::Add for Cost {
     type Output = Self;
 
-    fn add(mut self, other: Self) -> Self {
-        self += other;
-        self
-    }
-}
-
-impl std::ops::AddAssign for Cost {
-    fn add_assign(&mut self, other: Self) {
-        self.steps += other.steps;
-        self.rejected_steps += other.rejected_steps;
-        self.force_evaluations += other.force_evaluations;
+    fn add(self, other: Self) -> Self {
+        Self {
+            steps: self.steps + other.steps,
+            rejected_steps: self.rejected_steps + other.rejected_steps,
+            force_evaluations: self.force_evaluations + other.force_evaluations,
+        }
     }
 }
 
@@ -125,46 +120,6 @@ impl<S: Scalar> Flight<S> {
     }
 }
 
-impl Flight {
-    /// A flight that never starts: at rest on the face (`V0 = 0`), or no target at all (exit depth 0).
-    ///
-    /// `None` for every other problem; integrators ask this first, so that none has to treat a vanishing scale.
-    pub fn at_once<S: Scalar>(problem: &Problem<S>) -> Option<Flight<S>> {
-        let start = State::at_impact(problem);
-        let through = problem.exit_depth.value() <= 0.0;
-        if !through && problem.impact_speed.value() > 0.0 {
-            return None;
-        }
-        let mut events = Events::new();
-        // Ends at the face itself (k d = 0 leaves no crater, but a user's stage may end at 0) are reached at once.
-        for (index, stage) in problem.stages.iter().enumerate() {
-            if stage.end.value() > 0.0 {
-                break;
-            }
-            events.push(Event { kind: EventKind::boundary(problem, index), state: start });
-        }
-        let stage = events.len().min(problem.stages.len() - 1);
-        if through {
-            events.push(Event { kind: EventKind::Exit, state: start });
-        }
-        if problem.impact_speed.value() <= 0.0 {
-            events.push(Event { kind: EventKind::Rest, state: start });
-        }
-        Some(Flight {
-            outcome: if through { Outcome::Perforated } else { problem.stop_in(stage) },
-            stage,
-            end: start,
-            events,
-            exit_margin: (through && problem.impact_speed.value() > 0.0).then_some(1.0),
-            exit_margin_error: (through && problem.impact_speed.value() > 0.0).then_some(0.0),
-            cost: Cost::default(),
-            trajectory: Vec::new(),
-            step_limit: None,
-            notes: vec!["no integration: the flight ends at impact".to_owned()],
-        })
-    }
-}
-
 /// Why an integration stopped without an answer.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -221,6 +176,13 @@ pub enum IntegrationError {
         /// Last accepted state.
         last: State,
     },
+}
+
+impl IntegrationError {
+    /// [`IntegrationError::BadOption`].
+    pub(crate) fn bad_option(option: &'static str, value: &(impl ToString + ?Sized), allowed: &'static str) -> Self {
+        Self::BadOption { option, value: value.to_string(), allowed }
+    }
 }
 
 impl Advice for IntegrationError {
@@ -291,6 +253,16 @@ pub trait Integrator {
         Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }))
     }
 
+    /// How the stages of `flight` were treated, one sentence each, for people.
+    fn explain(&self, _problem: &Problem, _flight: &Flight) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Whether the method builds the Jacobian of the force.
+    fn has_jacobian(&self) -> bool {
+        false
+    }
+
     /// The same method, reusing its solver between calls, for many problems; `None` where a method has no such state.
     ///
     /// The answers are the same. Also `None` for a method that cannot start: each of its solutions says why.
@@ -303,6 +275,7 @@ pub trait Integrator {
 #[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
+    use crate::integrators::flight::at_once;
     use crate::physics::{Stage, Target};
 
     fn problem(ends: &[f64], impact_speed: f64, exit_depth: f64) -> Problem {
@@ -312,7 +285,7 @@ mod tests {
 
     #[test]
     fn a_flight_that_never_starts_lists_what_lies_at_the_face() {
-        let flight = |ends: &[f64], speed, exit| Flight::at_once(&problem(ends, speed, exit)).unwrap();
+        let flight = |ends: &[f64], speed, exit| at_once(&problem(ends, speed, exit), Detail::Events).unwrap();
         let kinds = |flight: &Flight| flight.events.iter().map(|e| e.kind).collect::<Vec<_>>();
         let still = flight(&[0.0, 1.0, f64::INFINITY], 0.0, 2.0);
         assert_eq!((still.outcome, still.stage, still.exit_margin), (Outcome::Stopped, 1, None));
@@ -328,7 +301,7 @@ mod tests {
         assert_eq!((neither.outcome, neither.exit_margin), (Outcome::Perforated, None));
         assert_eq!(neither.exit_margin_error, None);
         assert_eq!(kinds(&neither), [EventKind::Exit, EventKind::Rest]);
-        assert_eq!(Flight::at_once(&problem(&[f64::INFINITY], 3.0, 2.0)), None);
+        assert_eq!(at_once(&problem(&[f64::INFINITY], 3.0, 2.0), Detail::Events), None);
         // A list whose last stage ends breaks an invariant; the stage named is one of the list all the same.
         assert_eq!(flight(&[0.0], 0.0, 2.0).stage, 0);
     }
@@ -340,9 +313,9 @@ mod tests {
 
     #[test]
     fn costs_add_up_kind_by_kind() {
-        let mut cost = Cost { steps: 2, rejected_steps: 3, force_evaluations: 5 };
-        cost += Cost { steps: 7, rejected_steps: 11, force_evaluations: 13 };
-        assert_eq!(cost, Cost { steps: 9, rejected_steps: 14, force_evaluations: 18 });
+        let cost = Cost { steps: 2, rejected_steps: 3, force_evaluations: 5 };
+        let sum = cost + Cost { steps: 7, rejected_steps: 11, force_evaluations: 13 };
+        assert_eq!(sum, Cost { steps: 9, rejected_steps: 14, force_evaluations: 18 });
     }
 
     #[test]

@@ -82,14 +82,11 @@ impl Taylor {
     /// # Errors
     /// [`IntegrationError::BadOption`] unless `rtol` lies in 0 (round-off) to 0.1.
     pub fn with_rtol(rtol: f64) -> Result<Self, IntegrationError> {
-        if !(0.0..=0.1).contains(&rtol) {
-            return Err(IntegrationError::BadOption {
-                option: "rtol",
-                value: rtol.to_string(),
-                allowed: "a number from 0 (round-off) to 0.1",
-            });
+        if (0.0..=0.1).contains(&rtol) {
+            Ok(Self { tolerance: Some(rtol) })
+        } else {
+            Err(IntegrationError::bad_option("rtol", &rtol, "a number from 0 (round-off) to 0.1"))
         }
-        Ok(Self { tolerance: Some(rtol) })
     }
 
     /// Truncation error of one step relative to the velocity, in the number type `S`.
@@ -123,19 +120,6 @@ impl Taylor {
             flight::solve(problem, detail, &mut Orders::<40, 48>::new(tolerance))
         }
     }
-
-    /// How each stage of `flight` was treated: one sentence each, for people.
-    pub fn explain(problem: &Problem, flight: &Flight) -> Vec<String> {
-        let treatment = |law: &Stage| match Shape::of(law) {
-            Shape::Constant => "constant force: the series ends, one step serves",
-            Shape::Spring => "a spring alone: recurrence of one term, no convolution",
-            Shape::Linear => "no drag: recurrence of two terms, no convolution",
-            Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
-            Shape::General => "stiffness and drag: earliest root isolated on every step",
-        };
-        let solved = problem.stages.iter().take(flight.stage + 1);
-        solved.enumerate().map(|(index, law)| format!("stage {index}: {}", treatment(law))).collect()
-    }
 }
 
 impl Integrator for Taylor {
@@ -145,6 +129,18 @@ impl Integrator for Taylor {
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
         self.solve_in(problem, detail)
+    }
+
+    fn explain(&self, problem: &Problem, flight: &Flight) -> Vec<String> {
+        let treatment = |law: &Stage| match Shape::of(law) {
+            Shape::Constant => "constant force: the series ends, one step serves",
+            Shape::Spring => "a spring alone: recurrence of one term, no convolution",
+            Shape::Linear => "no drag: recurrence of two terms, no convolution",
+            Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
+            Shape::General => "stiffness and drag: earliest root isolated on every step",
+        };
+        let solved = problem.stages.iter().take(flight.stage + 1);
+        solved.enumerate().map(|(index, law)| format!("stage {index}: {}", treatment(law))).collect()
     }
 }
 
@@ -374,10 +370,7 @@ impl<const K: usize, const L: usize> Orders<K, L> {
         let problem = course.problem;
         let stage = &problem.stages[course.stage];
         // Coefficients per unit mass, once a stage.
-        let static_force = stage.static_force.over(problem.mass);
-        let stiffness = stage.stiffness.over(problem.mass);
-        let viscosity = stage.viscosity.over(problem.mass);
-        let drag = stage.drag.over(problem.mass);
+        let Stage { static_force, stiffness, viscosity, drag, .. } = stage.per_mass(problem.mass);
         let frequency = if SPRING { stiffness.value().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
@@ -426,7 +419,7 @@ impl<const K: usize, const L: usize> Orders<K, L> {
                 depth: if at_limit { limit } else { reached },
                 velocity: local.velocity * S::from_f64(unit_velocity),
             };
-            if !(next.time.value().is_finite() && next.depth.value().is_finite() && next.velocity.value().is_finite()) {
+            if !next.is_finite() {
                 return Err(IntegrationError::NotFinite { what: "the state", last: course.state.values() });
             }
             self.widen_bound(course, &law, &start, &local, unit_velocity, next.depth.value() / unit_depth);

@@ -9,7 +9,7 @@
 //! at a stage end, because inside a stage with `s >= 0` the velocity may have a maximum but no minimum. The margin is
 //! therefore the least W over the stage ends ahead and the exit; for a target that only resists, that is W(exit).
 
-use super::problem::{Event, EventKind, Outcome, Problem, Stage, State};
+use super::problem::{Problem, Stage, State};
 use super::scalar::{Differentiable, Scalar};
 
 /// `E(z) = expm1(z)/z`, 1 at zero.
@@ -56,27 +56,6 @@ pub fn propagate<S: Differentiable>(stage: &Stage<S>, mass: S, w: S, from: S, to
     let static_at_start = stage.static_force + stage.stiffness * from;
     w * (-y).exp()
         - two * xi / mass * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
-}
-
-/// The margin `min W / V0²` over the stage ends ahead and the exit; `None` without an exit or an impact speed.
-///
-/// - perforated: from the velocities at `events` (stage ends) and at the exit;
-/// - stopped at `end` in stage `stage`: W = 0 there, continued to the exit.
-pub fn exit_margin(problem: &Problem, outcome: Outcome, stage: usize, end: State, events: &[Event]) -> Option<f64> {
-    if !problem.has_exit() || problem.impact_speed <= 0.0 {
-        return None;
-    }
-    let scale = problem.impact_speed;
-    if outcome == Outcome::Perforated {
-        let mut least = end.velocity / scale;
-        for event in events {
-            if matches!(event.kind, EventKind::StageEnd(_) | EventKind::CraterEnd) {
-                least = least.min(event.state.velocity / scale);
-            }
-        }
-        return Some(least * least);
-    }
-    Some(energy_beyond_stop(problem, stage, end.depth) / scale / scale)
 }
 
 /// Least W (m²/s²) over the stage ends ahead and the exit, continued from rest at `depth` in stage `stage`.

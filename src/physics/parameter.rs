@@ -379,11 +379,6 @@ impl Parameter {
         Ok(())
     }
 
-    /// True for the viscosity of a layer or a stage.
-    pub fn is_viscosity(self) -> bool {
-        matches!(self, Self::Layer(_, LayerNumber::Viscosity) | Self::Stage(_, StageNumber::Viscosity))
-    }
-
     /// True if setting it in `scene` changes an S that follows Eq. 14.
     pub fn moves_static_factor(self, scene: &Scene) -> bool {
         let Some(concrete) = scene.concrete() else { return false };

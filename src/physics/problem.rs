@@ -84,15 +84,28 @@ impl<S: Scalar> Stage<S> {
         (to - from) * (self.static_force + half * self.stiffness * (to + from))
     }
 
+    /// `to` of each of its numbers.
+    #[inline(always)]
+    pub fn map<T>(&self, to: impl Fn(S) -> T) -> Stage<T> {
+        Stage {
+            static_force: to(self.static_force),
+            stiffness: to(self.stiffness),
+            viscosity: to(self.viscosity),
+            drag: to(self.drag),
+            end: to(self.end),
+        }
+    }
+
     /// Values as `f64`.
     pub fn values(&self) -> Stage {
-        Stage {
-            static_force: self.static_force.value(),
-            stiffness: self.stiffness.value(),
-            viscosity: self.viscosity.value(),
-            drag: self.drag.value(),
-            end: self.end.value(),
-        }
+        self.map(S::value)
+    }
+
+    /// The law divided by `mass`: its [`Stage::force`] is the deceleration (m/s²).
+    #[inline(always)]
+    #[must_use]
+    pub fn per_mass(&self, mass: S) -> Self {
+        Self { end: self.end, ..self.map(|coefficient| coefficient.over(mass)) }
     }
 
     /// Whether the stage can only slow the projectile (`p >= 0`); such a stage is never stiff.
@@ -219,17 +232,7 @@ impl<S: Scalar> Problem<S> {
             mass: to(self.mass),
             impact_speed: to(self.impact_speed),
             exit_depth: to(self.exit_depth),
-            stages: self
-                .stages
-                .iter()
-                .map(|s| Stage {
-                    static_force: to(s.static_force),
-                    stiffness: to(s.stiffness),
-                    viscosity: to(s.viscosity),
-                    drag: to(s.drag),
-                    end: to(s.end),
-                })
-                .collect(),
+            stages: self.stages.iter().map(|stage| stage.map(to)).collect(),
             crater: self.crater,
             target: self.target,
         }
@@ -257,6 +260,12 @@ impl<S: Scalar> State<S> {
         Self { time: S::zero(), depth: S::zero(), velocity: problem.impact_speed }
     }
 
+    /// Whether all three are numbers.
+    #[inline(always)]
+    pub fn is_finite(&self) -> bool {
+        self.time.value().is_finite() && self.depth.value().is_finite() && self.velocity.value().is_finite()
+    }
+
     /// Values as `f64`.
     pub fn values(&self) -> State {
         State { time: self.time.value(), depth: self.depth.value(), velocity: self.velocity.value() }
@@ -271,7 +280,8 @@ impl std::fmt::Display for State {
 }
 
 /// What happened at a place. The order of the variants is the order of events at one place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum EventKind {
     /// End of stage `.0` (index from 0) that is not the crater's.
     StageEnd(usize),
@@ -291,12 +301,7 @@ impl EventKind {
 
     /// Name in every output (docs/reference.md, "JSON"): `crater-end`, `stage-end`, `exit`, `rest`.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::StageEnd(_) => "stage-end",
-            Self::CraterEnd => "crater-end",
-            Self::Exit => "exit",
-            Self::Rest => "rest",
-        }
+        self.into()
     }
 }
 
@@ -310,9 +315,10 @@ pub struct Event<S = f64> {
 }
 
 /// How a solution ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, strum::Display, strum::IntoStaticStr)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Outcome {
     /// Rest at x <= k d.
     StoppedInCrater,
@@ -329,13 +335,7 @@ pub enum Outcome {
 impl Outcome {
     /// Name in every output (docs/reference.md, "JSON").
     pub fn name(self) -> &'static str {
-        match self {
-            Self::StoppedInCrater => "stopped-in-crater",
-            Self::StoppedInTunnel => "stopped-in-tunnel",
-            Self::Stopped => "stopped",
-            Self::Perforated => "perforated",
-            Self::Undecided => "undecided",
-        }
+        self.into()
     }
 
     /// Whether the projectile came to rest inside the target.
@@ -346,12 +346,6 @@ impl Outcome {
     /// True for equal outcomes and for two stops: near k d, round-off decides the stage of a stop.
     pub fn agrees_with(self, other: Self) -> bool {
         self == other || (self.is_stop() && other.is_stop())
-    }
-}
-
-impl std::fmt::Display for Outcome {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
     }
 }
 

@@ -177,7 +177,7 @@ pub enum ReferenceError {
         /// What it lacks.
         why: &'static str,
     },
-    /// Two precisions never agreed: a tie finer than the numbers can tell.
+    /// Two precisions never agreed: a tie finer than the numbers resolve.
     #[error("{bits} bits do not settle the answer")]
     Unsettled {
         /// Bits of the last attempt.
@@ -384,7 +384,7 @@ fn atan2(y: &Big, x: &Big, bits: usize) -> Big {
     if is_zero(y) { twice(right) } else { right - atan(&(x / y)) }
 }
 
-/// Whether `value`, a difference of terms of magnitude `size`, is zero as far as `bits` can tell: half of them.
+/// Whether `value`, a difference of terms of magnitude `size`, is zero as far as `bits` resolve it: half of them.
 fn vanishes(value: &Big, size: &Big, bits: usize) -> bool {
     (magnitude(value.clone()) << (bits / 2).cast_signed()) <= *size
 }

@@ -477,7 +477,7 @@ impl Scene {
 
     /// As [`Scene::resolve`], in the number type into which `number` lifts each number of the scene.
     ///
-    /// With dual numbers, `number` says which of them carries a derivative.
+    /// With dual numbers, `number` says which of them has a derivative.
     ///
     /// # Errors
     /// As [`Scene::resolve`].

@@ -36,9 +36,6 @@ impl Validity {
 /// Crater depth in diameters that Eq. 15 assumes.
 pub const CRATER_RATIO_OF_EQ15: f64 = 2.0;
 
-/// Largest y = `x_p/d` of the first branch of the ACE/NDRC relation.
-pub const NDRC_FIRST_BRANCH_DEPTH: f64 = 1.35;
-
 /// H/d at the end of the first branch, `3.19 · 1.35 - 0.718 · 1.35²`, exact in decimals.
 ///
 /// The second branch begins lower, at 2.994: in between two depths fit, and the smaller one is taken.
@@ -66,7 +63,7 @@ pub fn static_factor(strength: f64) -> f64 {
     72.0 / (strength / 1e6).sqrt()
 }
 
-/// Range of the shots to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
+/// Range of the experiments to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
 pub fn static_factor_validity(strength: f64) -> Validity {
     Validity::new(
         (13.5e6..=96.7e6).contains(&strength),
@@ -102,34 +99,7 @@ pub fn model_difference(impact: f64, geometry: f64, crater_ratio: f64) -> f64 {
     }
 }
 
-/// Range of Eq. 11-12: "N >> I and N >> 1", taken as a first-order difference from the equation of motion within 5 %.
-///
-/// `geometry` is `None` without drag (N infinite), where Eq. 11-12 is exact.
-pub fn depth_validity(impact: f64, geometry: Option<f64>, crater_ratio: f64) -> Validity {
-    let Some(geometry) = geometry else {
-        return Validity::new(true, "without drag Eq. 11-12 is the exact solution");
-    };
-    let difference = model_difference(impact, geometry, crater_ratio);
-    Validity::new(
-        difference.abs() <= 0.05,
-        format!(
-            "Eq. 11-12 is the limit N >> I, N >> 1; at I = {impact:.4}, N = {geometry:.4} the depth of the equation of \
-             motion differs from it by about {:+.2} % (first order in 1/N)",
-            100.0 * difference
-        ),
-    )
-}
-
-/// Thickness H/d that the penetration y = `x_p/d` perforates by the ACE/NDRC relation.
-///
-/// Drops from 2.997945 to 2.994 at y = 1.35, as the relation does.
-pub fn perforated_thickness_ratio(depth_ratio: f64) -> f64 {
-    let (y, [a, b], [c, d]) = (depth_ratio, NDRC_PARABOLA, NDRC_LINE);
-    if y <= NDRC_FIRST_BRANCH_DEPTH { y * (a - b * y) } else { c + d * y }
-}
-
-/// Penetration y = `x_p/d` at which a target of thickness H/d counts as perforated: the inverse of
-/// [`perforated_thickness_ratio`].
+/// Penetration y = `x_p/d` at which a target of thickness H/d counts as perforated: the ACE/NDRC relation, inverted.
 ///
 /// ```text
 /// H/d <= 2.997945: y = (H/d / 0.718)/(a + sqrt(a² - H/d / 0.718)),  a = 3.19/1.436;   else (H/d - 1.32)/1.24
@@ -284,19 +254,16 @@ mod tests {
     }
 
     #[test]
-    fn eq_11_12_is_valid_for_heavy_shots_and_not_for_light_flat_ones() {
-        assert!(depth_validity(10.0, None, 2.0).valid);
-        assert!(depth_validity(8.455, Some(125.9), 2.0).valid);
-        let light = depth_validity(10.0, Some(5.0), 2.0);
-        assert!(!light.valid && light.note.contains("-84"), "{}", light.note);
-    }
-
-    #[test]
     fn static_factor_is_eq_14_in_megapascals() {
         assert_eq!(static_factor(36e6), 12.0);
         assert_relative_eq!(static_factor(35.2e6), 12.135_597_524_338_4, max_relative = 1e-14);
         assert!(static_factor_validity(36e6).valid);
         assert!(!static_factor_validity(150e6).valid && !static_factor_validity(10e6).valid);
+    }
+
+    /// The relation as it is printed: H/d that the penetration y perforates.
+    fn perforated_thickness_ratio(y: f64) -> f64 {
+        if y <= 1.35 { y * (3.19 - 0.718 * y) } else { 1.32 + 1.24 * y }
     }
 
     #[test]

@@ -9,11 +9,12 @@
 
 use std::str::FromStr;
 
+use strum::VariantArray;
 use thiserror::Error;
 use uom::si::f64 as si;
 
 /// What a quantity of a scene is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::VariantArray)]
 pub enum Dimension {
     /// Mass (kg).
     Mass,
@@ -71,21 +72,6 @@ const EXACT: &[(Dimension, &[&str], f64)] = &[
 ];
 
 impl Dimension {
-    /// Every dimension, those of scenes first.
-    pub const ALL: [Self; 11] = [
-        Self::Mass,
-        Self::Length,
-        Self::Pressure,
-        Self::Density,
-        Self::Velocity,
-        Self::Force,
-        Self::Stiffness,
-        Self::Viscosity,
-        Self::Drag,
-        Self::Time,
-        Self::Energy,
-    ];
-
     /// Name for messages, and common units, the SI unit first.
     fn about(self) -> (&'static str, &'static [&'static str]) {
         match self {
@@ -145,7 +131,7 @@ impl Dimension {
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|dimension| dimension.coefficient(unit).is_some())
+        Self::VARIANTS.iter().copied().find(|dimension| dimension.coefficient(unit).is_some())
     }
 }
 
@@ -345,7 +331,7 @@ mod tests {
 
     #[test]
     fn every_common_unit_of_every_dimension_is_known_and_of_that_dimension_alone() {
-        for dimension in Dimension::ALL {
+        for &dimension in Dimension::VARIANTS {
             assert_eq!(dimension.coefficient(dimension.units()[0]), Some(1.0), "{dimension:?}");
             for unit in dimension.units() {
                 assert!(quantity(&format!("1 {unit}"), dimension).is_ok(), "{unit}");

@@ -11,7 +11,7 @@ use super::critical_velocity::{self, CriticalError};
 use super::random_scenes::Generator;
 use crate::exchange::tables::{Block, Column, Format, Kind, Need, Place, Row, Rows, TableError, Value};
 use crate::integrators::lanes::{Batch, Summary};
-use crate::integrators::{Detail, IntegrationError, Method, Taylor};
+use crate::integrators::{Detail, IntegrationError, Method, MethodName};
 use crate::physics::parameter::{Absence, Parameter};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, ResolveError, Scene};
 
@@ -199,7 +199,7 @@ pub struct Answer {
     /// The solution.
     pub solution: Summary,
     /// Critical velocity (m/s), where it was asked for and the target has a thickness, or why there is none.
-    pub critical: Option<Result<f64, Box<CriticalError<ResolveError>>>>,
+    pub critical: Option<Result<f64, Box<CriticalError>>>,
     /// True if a fixed step stayed within its stability limit, and for every other method.
     pub stable: bool,
 }
@@ -240,19 +240,16 @@ pub fn answers(
         })
         .collect();
     let answer = |solution, stable| Answer { solution, critical: None, stable };
-    let solved: Vec<Result<Answer, IntegrationError>> = match method {
-        Method::Taylor(taylor) if *taylor == Taylor::default() => {
-            Batch::new().solve(&problems).into_iter().map(|solution| Ok(answer(solution?, true))).collect()
-        }
-        _ => {
-            let reused = method.integrator().reusing();
-            let integrator = reused.as_deref().unwrap_or(method.integrator());
-            let solve = |problem: &Problem| {
-                let flight = integrator.solve(problem, Detail::Events)?;
-                Ok(answer(Summary::from(&flight), flight.step_limit.is_none_or(|limit| limit.stable)))
-            };
-            problems.iter().map(solve).collect()
-        }
+    let solved: Vec<Result<Answer, IntegrationError>> = if method.is_plain(MethodName::Taylor) {
+        Batch::new().solve(&problems).into_iter().map(|solution| Ok(answer(solution?, true))).collect()
+    } else {
+        let reused = method.integrator().reusing();
+        let integrator = reused.as_deref().unwrap_or(method.integrator());
+        let solve = |problem: &Problem| {
+            let flight = integrator.solve(problem, Detail::Events)?;
+            Ok(answer(Summary::from(&flight), flight.step_limit.is_none_or(|limit| limit.stable)))
+        };
+        problems.iter().map(solve).collect()
     };
     let mut solved = solved.into_iter();
     let answers = scenes.into_iter().map(|scene| {
@@ -317,6 +314,11 @@ impl std::ops::AddAssign for Tally {
 mod tests {
     use super::*;
     use crate::exchange::tables::CsvTable;
+    use crate::integrators::MethodOptions;
+
+    fn taylor() -> Method {
+        Method::new(MethodName::Taylor, &MethodOptions::default()).unwrap()
+    }
 
     /// Scenes with these cells below the names of all columns.
     fn table(lines: &str) -> Scenes {
@@ -332,7 +334,7 @@ mod tests {
         let concrete = scene.concrete().unwrap();
         // Eq. 14: 72/sqrt(36).
         assert_eq!((concrete.static_factor, concrete.inertia_factor, concrete.crater_ratio), (12.0, 1.0, 2.0));
-        let answer = answers(vec![Ok(scene)], &Method::Taylor(Taylor::default()), true).remove(0).unwrap();
+        let answer = answers(vec![Ok(scene)], &taylor(), true).remove(0).unwrap();
         assert!((answer.solution.end.depth - 0.144_826_200_112_217_07).abs() < 1e-15);
         assert_eq!(answer.critical, None);
     }
@@ -342,7 +344,7 @@ mod tests {
         // S would follow from the strength: no scene with a NaN.
         let scenes =
             table("2,0.05,0.72,-36e6,2300,,,,,,300,\n2,0.05,0.72,36e6,2300,,,,,,300,\"a \"\"b\"\"\u{202e}\"\n");
-        let found = answers(scenes.scenes(0..2), &Method::Taylor(Taylor::default()), false);
+        let found = answers(scenes.scenes(0..2), &taylor(), false);
         let lines = [
             "7,,,,,,,,,\"line 2: the strength fc [Pa] = -36000000 is not admissible: it must be a number > 0\"\n",
             "8,,,,,,,,,\"line 3, column 12: `a \"\"b\"\"\u{fffd}` in `criterion` is not full-depth or ndrc\"\n",

@@ -4,19 +4,17 @@
 //! (slope 1 is proportional) and over 1/evaluations (slope is the order). The fit and its verdict are
 //! [`super::order`]; what order to expect is [`super::formal_order`](mod@super::formal_order).
 
-use thiserror::Error;
-
-use super::critical_velocity::{self, CriticalError};
+use super::critical_velocity;
 pub use super::error::Truth as Yardstick;
-use super::error::{Truth, flight_error, free_quantities, signed_error};
+use super::error::{StudyError, Truth, flight_error, free_quantities, signed_error};
 use super::formal_order::{Path, formal_order};
 use super::order::{Class, FitError, OrderFit, StepError, fit};
 use super::quantity::Quantity;
 use super::random::Random;
 use super::verdict::Verdict;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
-use crate::integrators::{CentralDifference, Detail, Flight, IntegrationError};
-use crate::physics::{Advice, Problem, ResolveError, Scene};
+use crate::integrators::{CentralDifference, Detail, Flight};
+use crate::physics::{Problem, Scene};
 
 /// Fewest sizes of a study, so that single unlucky ones do not decide.
 pub const POINTS_DEFAULT: u16 = 60;
@@ -82,30 +80,6 @@ impl QuantityStudy {
     }
 }
 
-/// Why there is no study.
-#[derive(Clone, Debug, Error)]
-pub enum ConvergenceError {
-    /// The scene does not resolve.
-    #[error(transparent)]
-    Resolve(#[from] ResolveError),
-    /// A flight has no answer.
-    #[error(transparent)]
-    Integration(#[from] IntegrationError),
-    /// A critical velocity has no answer.
-    #[error(transparent)]
-    Critical(#[from] CriticalError<ResolveError>),
-}
-
-impl Advice for ConvergenceError {
-    fn inner(&self) -> Option<&dyn Advice> {
-        Some(match self {
-            Self::Resolve(error) => error,
-            Self::Integration(error) => error,
-            Self::Critical(error) => error,
-        })
-    }
-}
-
 /// Studies of the quantities of one scene.
 #[derive(Clone, Debug)]
 pub struct Convergence {
@@ -121,7 +95,7 @@ pub struct Convergence {
 /// studied where `with_critical` asks for it and the scene has a thickness.
 ///
 /// # Errors
-/// [`ConvergenceError`].
+/// [`StudyError`].
 pub fn of_fixed_steps(
     scene: &Scene,
     problem: &Problem,
@@ -129,7 +103,7 @@ pub fn of_fixed_steps(
     scheme: &dyn Fn(f64) -> CentralDifference,
     ladder: Ladder,
     with_critical: bool,
-) -> Result<Convergence, ConvergenceError> {
+) -> Result<Convergence, StudyError> {
     let sizes = ladder.sizes();
     let CentralDifference { velocity, boundaries, .. } = scheme(ladder.to);
     let study = |quantity, path: &Path, points: &[StepError]| QuantityStudy {
@@ -164,7 +138,7 @@ pub fn of_fixed_steps(
     }
     let critical = scene.resolve(exact)?;
     let path = Path::of(&critical, &Truth::of(&critical)?.flight);
-    let error = |size| -> Result<StepError, ConvergenceError> {
+    let error = |size| -> Result<StepError, StudyError> {
         let velocity = critical_velocity::of_scene(scene, &scheme(size))?.velocity;
         Ok(StepError::new(size, signed_error(quantity, velocity, exact, 1.0)))
     };
@@ -176,13 +150,13 @@ pub fn of_fixed_steps(
 /// Convergence of an adaptive method with its tolerance and with its work, against `exact`.
 ///
 /// # Errors
-/// [`ConvergenceError`].
+/// [`StudyError`].
 pub fn of_tolerances(
     problem: &Problem,
     exact: &Flight,
     method: MethodName,
     ladder: Ladder,
-) -> Result<Convergence, ConvergenceError> {
+) -> Result<Convergence, StudyError> {
     let mut flights = Vec::new();
     let mut order = None;
     for rtol in ladder.sizes() {

@@ -8,16 +8,16 @@
 //! `BrentRoot` itself cannot be left alone with an objective. It takes an end value of zero and a product of end
 //! values that underflows for a bracket, a NaN for convergence, and its tolerance for an absolute one. So the bracket
 //! is found and its signs are checked here, u is measured in units of the predicted root, and the value at the root it
-//! returns is compared with the error bar of the flight that gave it.
+//! returns is compared with the error bound of the flight that gave it.
 
 use std::cell::{OnceCell, RefCell};
-use std::fmt::{Debug, Display};
 
 use argmin::core::{CostFunction, Executor, IterState, State as _, TerminationReason, TerminationStatus};
 use argmin::solver::brent::BrentRoot;
 use smallvec::SmallVec;
 use thiserror::Error;
 
+use super::error::StudyError;
 use crate::integrators::{Cost, IntegrationError, Integrator, Margin, Taylor};
 use crate::physics::{
     Advice, Concrete, CraterStiffness, Problem, ResolveError, Scene, Shown, Stage, closed_form, exit_energy,
@@ -39,36 +39,25 @@ const EXPANSIONS_MAX: u32 = 12;
 /// Smallest impact speed tried, relative to the first: a target perforated at that has no critical velocity but 0.
 const SLOWEST: f64 = 1e-14;
 
-/// Jump of W over u tolerated where a method states no error bar. A scheme that sees the exit at the end of its step
+/// Jump of W over u tolerated where a method states no error bound. A scheme that sees the exit at the end of its step
 /// leaves far less at any sensible step; an outcome in place of a margin leaves one.
 const JUMP_MAX: f64 = 0.1;
 
-/// Share of `V_c` at which its error bar leaves no digit of it.
+/// Share of `V_c` at which its error bound leaves no digit of it.
 const UNDECIDED: f64 = 0.5;
 
-/// Where to stop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// Relative tolerance in `V_c`; zero asks for round-off.
-    ///
-    /// A method that states an error bar is never asked for more than that allows.
-    pub rtol: f64,
-    /// Most flights before the search counts as failed.
-    pub flights_max: u32,
-}
+/// Why a search ends without a root that takes [`FLIGHTS_MAX`].
+const SPENT: &str = "the flights allowed are spent";
 
-impl Default for Options {
-    fn default() -> Self {
-        Self { rtol: 0.0, flights_max: 200 }
-    }
-}
+/// Most flights before the search counts as failed.
+const FLIGHTS_MAX: u32 = 200;
 
 /// A critical velocity and how it was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CriticalVelocity {
     /// `V_c` (m/s).
     pub velocity: f64,
-    /// Half-width of its error bar [m/s]: that of W at `V_c` over dW/dV0. `None` where the method states none.
+    /// Half-width of its error bound [m/s]: that of W at `V_c` over dW/dV0. `None` where the method states none.
     pub error_bar: Option<f64>,
     /// Critical impact energy `E_c` = M `V_c²`/2 (J).
     pub energy: f64,
@@ -82,45 +71,44 @@ pub struct CriticalVelocity {
     pub note: &'static str,
 }
 
-/// Impact speed (m/s) and the exit energy W (m²/s²) found there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct End {
-    /// Impact speed (m/s).
-    pub velocity: f64,
-    /// Signed exit energy W (m²/s²).
-    pub exit_energy: f64,
+/// The result of one flight: `u = V0²`, `W(exit)`, and the error bound of W (m²/s²).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// Square of the impact speed.
+    pub u: f64,
+    /// Signed exit energy.
+    pub w: f64,
+    /// Error bound of `w`, where the method states one.
+    pub bar: Option<f64>,
 }
 
-impl Display for End {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "W = {} m²/s² at {} m/s", Shown(self.exit_energy), Shown(self.velocity))
+impl Point {
+    /// Impact speed (m/s).
+    pub fn velocity(self) -> f64 {
+        self.u.sqrt()
     }
 }
 
-/// Why there is no critical velocity. `E` is the error of the scene that could not be resolved.
+impl std::fmt::Display for Point {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "W = {} m²/s² at {} m/s", Shown(self.w), Shown(self.velocity()))
+    }
+}
+
+/// Why there is no critical velocity.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-pub enum CriticalError<E: Display> {
+pub enum CriticalError {
     /// The target has no far side: a mistake of the caller, exit code 2.
     #[error("a semi-infinite target has no critical velocity: give it a thickness")]
     NoExit,
-    /// The search was asked for something impossible: a mistake of the caller, exit code 2.
-    #[error("{option} = {} is not allowed: {allowed}", Shown(*.value))]
-    BadOption {
-        /// Field of [`Options`].
-        option: &'static str,
-        /// Value given.
-        value: f64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
     /// The scene has no stages at this impact speed.
     #[error("the scene cannot be resolved at {} m/s: {cause}", Shown(*.velocity))]
     Scene {
         /// Impact speed (m/s).
         velocity: f64,
         /// What the scene says.
-        cause: E,
+        cause: ResolveError,
     },
     /// A flight failed.
     #[error("the flight at {} m/s failed: {cause}", Shown(*.velocity))]
@@ -139,12 +127,12 @@ pub enum CriticalError<E: Display> {
         exit_energy: f64,
     },
     /// W has the same sign, or is zero, at all speeds up to the largest tried.
-    #[error("no critical velocity up to {} m/s: {low}, and still {high}", Shown(.high.velocity))]
+    #[error("no critical velocity up to {} m/s: {low}, and still {high}", Shown(.high.velocity()))]
     NoBracket {
         /// The slowest flight.
-        low: End,
+        low: Point,
         /// The fastest flight.
-        high: End,
+        high: Point,
     },
     /// W changes sign without a root: it jumps, or is flat on one side.
     #[error(
@@ -153,13 +141,13 @@ pub enum CriticalError<E: Display> {
     )]
     Jump {
         /// Where the search ended.
-        at: End,
+        at: Point,
         /// Lower end of the bracket.
-        low: End,
+        low: Point,
         /// Upper end of the bracket.
-        high: End,
+        high: Point,
     },
-    /// The error bar leaves no digit of `V_c`: exit code 4.
+    /// The error bound leaves no digit of `V_c`: exit code 4.
     #[error(
         "V_c is undecided: {} m/s with an error bar of {} m/s, the exit energy lost in the error bar of the method",
         Shown(*.velocity), Shown(*.error_bar)
@@ -167,7 +155,7 @@ pub enum CriticalError<E: Display> {
     Undecided {
         /// Where the search ended (m/s).
         velocity: f64,
-        /// Half-width of the error bar there (m/s).
+        /// Half-width of the error bound there (m/s).
         error_bar: f64,
     },
     /// The tolerance was not reached.
@@ -178,24 +166,20 @@ pub enum CriticalError<E: Display> {
         /// What the root finder said.
         reason: String,
         /// Lower end of the bracket.
-        low: End,
+        low: Point,
         /// Upper end of the bracket.
-        high: End,
+        high: Point,
     },
 }
 
-impl<E: Display + Debug> Advice for CriticalError<E> {
+impl Advice for CriticalError {
     fn inner(&self) -> Option<&dyn Advice> {
         if let Self::Flight { cause, .. } = self { Some(cause) } else { None }
     }
 
     /// A scene that cannot be resolved counts as such.
     fn is_usage(&self) -> bool {
-        match self {
-            Self::NoExit | Self::BadOption { .. } | Self::Scene { .. } => true,
-            Self::Flight { cause, .. } => cause.is_usage(),
-            _ => false,
-        }
+        matches!(self, Self::NoExit | Self::Scene { .. }) || self.inner().is_some_and(Advice::is_usage)
     }
 
     fn is_undecided(&self) -> bool {
@@ -204,17 +188,16 @@ impl<E: Display + Debug> Advice for CriticalError<E> {
 
     fn help(&self) -> String {
         match self {
-            Self::Flight { cause, .. } => return cause.help(),
             Self::Undecided { .. } => {
-                "--method taylor or energy, or a tighter --rtol, resolves more of what is left of V0²"
+                "--method taylor or energy, or a tighter --rtol, resolves more of what is left of V0²".to_owned()
             }
             Self::NoBracket { .. } => {
                 "drag takes all speed over the thickness: check the thickness, the density and the mass; with a fixed \
                  step, shorten --dt"
+                    .to_owned()
             }
-            _ => "",
+            _ => self.inner().map_or_else(String::new, Advice::help),
         }
-        .to_owned()
     }
 }
 
@@ -224,7 +207,7 @@ impl<E: Display + Debug> Advice for CriticalError<E> {
 /// must not.
 ///
 /// # Returns
-/// The root of W(exit) over V0², to the round-off of W or the error bar of the integrator. An exit depth of zero, and a
+/// The root of W(exit) over V0², to the round-off of W or the error bound of the integrator. An exit depth of zero, and a
 /// target that is perforated at any speed (it only drives or drags), give `V_c = 0` with a note.
 ///
 /// Flights: four as a rule where W is affine in V0², about twelve where viscosity bends it, up to fifty where the
@@ -232,18 +215,19 @@ impl<E: Display + Debug> Advice for CriticalError<E> {
 ///
 /// # Errors
 /// [`CriticalError`]. Each that ends a search shows both ends of the bracket.
-pub fn critical_velocity<E: Display>(
-    resolve: impl Fn(f64) -> Result<Problem, E>,
+pub fn critical_velocity(
+    resolve: impl Fn(f64) -> Result<Problem, ResolveError>,
     integrator: &dyn Integrator,
-    options: Options,
-) -> Result<CriticalVelocity, CriticalError<E>> {
-    if !(options.rtol >= 0.0 && options.rtol < 0.1) {
-        return Err(CriticalError::BadOption {
-            option: "rtol",
-            value: options.rtol,
-            allowed: "zero for round-off, or a number below 0.1",
-        });
-    }
+) -> Result<CriticalVelocity, CriticalError> {
+    within(FLIGHTS_MAX, resolve, integrator)
+}
+
+/// As [`critical_velocity`], in at most `flights_max` flights.
+fn within(
+    flights_max: u32,
+    resolve: impl Fn(f64) -> Result<Problem, ResolveError>,
+    integrator: &dyn Integrator,
+) -> Result<CriticalVelocity, CriticalError> {
     let probe = resolve(PROBE_SPEED).map_err(|cause| CriticalError::Scene { velocity: PROBE_SPEED, cause })?;
     if !probe.has_exit() {
         return Err(CriticalError::NoExit);
@@ -252,30 +236,30 @@ pub fn critical_velocity<E: Display>(
         return Ok(at_any_speed(0.0, Tally::default(), "the target has no thickness"));
     }
 
-    let search = Search { resolve, integrator, flights_max: options.flights_max, tally: RefCell::default() };
+    let search = Search { resolve, integrator, flights_max, tally: RefCell::default() };
     let Some(bracket) = search.bracket(&probe)? else {
         let slowest = search.tally.borrow().last.velocity();
         return Ok(at_any_speed(slowest, search.tally.take(), "the target is perforated at any speed"));
     };
-    // The secant of any bracket of an affine W is the root, and one more flight confirms it. Where the error bars hide
+    // The secant of any bracket of an affine W is the root, and one more flight confirms it. Where the error bounds hide
     // the root, the method of Brent halves the bracket; so the bracket is narrowed first.
     let affine = probe.stages.iter().all(|stage| stage.viscosity == 0.0);
-    let at_once = if affine { search.refine(bracket, options.rtol, AT_ONCE_MAX)? } else { None };
+    let at_once = if affine { search.refine(bracket, AT_ONCE_MAX)? } else { None };
     let (bracket, (root, slope)) = if let Some(found) = at_once {
         (bracket, found)
     } else {
         let bracket = search.narrow(bracket, affine)?;
-        let found = search.refine(bracket, options.rtol, options.flights_max)?;
-        (bracket, found.ok_or_else(|| search.not_converged("the flights allowed are spent".to_owned(), bracket))?)
+        let found = search.refine(bracket, flights_max)?;
+        (bracket, found.ok_or_else(|| search.not_converged(SPENT.to_owned(), bracket))?)
     };
-    let resolution = bracket.resolution(options.rtol);
+    let resolution = bracket.resolution();
 
     let is_root = match root.bar {
         Some(bar) => slope > 0.0 && root.w.abs() <= 2.0 * (bar + slope * resolution),
         None => root.w.abs() <= JUMP_MAX * root.u,
     };
     if !is_root {
-        return Err(CriticalError::Jump { at: root.end(), low: bracket.low.end(), high: bracket.high.end() });
+        return Err(CriticalError::Jump { at: root, low: bracket.low, high: bracket.high });
     }
     let velocity = root.velocity();
     // dV = du / 2V.
@@ -308,25 +292,25 @@ fn at_any_speed(error_bar: f64, tally: Tally, note: &'static str) -> CriticalVel
     }
 }
 
-/// Critical velocity of `scene` through `integrator`, to round-off or the integrator's error bar.
+/// Critical velocity of `scene` through `integrator`, to round-off or the integrator's error bound.
 ///
 /// # Errors
 /// [`CriticalError`].
-pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError<ResolveError>> {
+pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError> {
     let first = OnceCell::new();
     let resolve = |speed| match first.get() {
         Some(problem) => scene.resolve_from(problem, speed),
         None => scene.resolve(speed).inspect(|problem| first.set(problem.clone()).unwrap_or(())),
     };
     let reused = integrator.reusing();
-    critical_velocity(resolve, reused.as_deref().unwrap_or(integrator), Options::default())
+    critical_velocity(resolve, reused.as_deref().unwrap_or(integrator))
 }
 
 /// Exact critical velocity of `scene` (m/s), where it has a closed form.
 ///
 /// # Errors
-/// [`closed_form::CriticalError`]: no far side, a viscous stage, or out of range.
-pub fn exact(scene: &Scene) -> Result<f64, ExactError> {
+/// [`StudyError::NoClosedForm`]: no far side, a viscous stage, or out of range.
+pub fn exact(scene: &Scene) -> Result<f64, StudyError> {
     let problem = scene.resolve(PROBE_SPEED)?;
     let critical = match scene.concrete() {
         Some(concrete) if concrete.layers.is_empty() => closed_form::critical(&problem, concrete.crater_stiffness)?,
@@ -343,7 +327,7 @@ pub fn exact(scene: &Scene) -> Result<f64, ExactError> {
 /// H <= k d : as in one concrete, that of the layer just beyond k d
 /// H >  k d : V1c² backwards from the exit,  V_c² = (V1c² (M + k d Q) + k d P)/M
 /// ```
-fn of_layers(mut problem: Problem) -> Result<f64, ExactError> {
+fn of_layers(mut problem: Problem) -> Result<f64, StudyError> {
     let Some(crater) = problem.crater else { return Ok(closed_form::critical_of_stages(&problem)?.velocity) };
     let (crater_depth, Stage { static_force, drag, .. }) = problem.crater_depth_and_tunnel();
     if problem.exit_depth <= crater_depth {
@@ -360,40 +344,10 @@ fn of_layers(mut problem: Problem) -> Result<f64, ExactError> {
 ///
 /// # Errors
 /// [`CriticalError`].
-pub fn exact_or_refined(scene: &Scene) -> Result<f64, CriticalError<ResolveError>> {
+pub fn exact_or_refined(scene: &Scene) -> Result<f64, CriticalError> {
     match exact(scene) {
         Ok(velocity) => Ok(velocity),
         Err(_) => of_scene(scene, &Taylor::default()).map(|found| found.velocity),
-    }
-}
-
-/// Why a scene has no exact critical velocity.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ExactError {
-    /// The scene does not resolve.
-    #[error(transparent)]
-    Resolve(#[from] ResolveError),
-    /// The stages have none.
-    #[error(transparent)]
-    Closed(#[from] closed_form::CriticalError),
-}
-
-/// The result of one flight: `u = V0²`, `W(exit)`, and the error bar of W (m²/s²).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Point {
-    u: f64,
-    w: f64,
-    bar: Option<f64>,
-}
-
-impl Point {
-    fn velocity(self) -> f64 {
-        self.u.sqrt()
-    }
-
-    fn end(self) -> End {
-        End { velocity: self.velocity(), exit_energy: self.w }
     }
 }
 
@@ -426,16 +380,16 @@ impl Bracket {
         }
     }
 
-    /// Half-width in u to which the root is sought: round-off, what was asked for, or a quarter of the error bar.
+    /// Half-width in u to which the root is sought: round-off, or a quarter of the error bound.
     ///
-    /// The error bar at the root lies between those at the ends as the root does: it has a part that grows with u and one
+    /// The error bound at the root lies between those at the ends as the root does: it has a part that grows with u and one
     /// that does not, as W has.
-    fn resolution(&self, rtol: f64) -> f64 {
+    fn resolution(&self) -> f64 {
         let root = self.secant_root();
         let share = (root - self.low.u) / (self.high.u - self.low.u);
         let (low, high) = (self.low.bar.unwrap_or(0.0), self.high.bar.unwrap_or(0.0));
         let bar = low + (high - low) * share;
-        (2.0 * rtol * root).max(0.25 * bar / self.slope()).max(4.0 * f64::EPSILON * root)
+        (0.25 * bar / self.slope()).max(4.0 * f64::EPSILON * root)
     }
 }
 
@@ -455,23 +409,14 @@ struct Search<'a, F> {
     tally: RefCell<Tally>,
 }
 
-impl<F, E> Search<'_, F>
-where
-    F: Fn(f64) -> Result<Problem, E>,
-    E: Display,
-{
+impl<F: Fn(f64) -> Result<Problem, ResolveError>> Search<'_, F> {
     /// W(exit) at `V0² = u`, a finite number.
-    fn at(&self, u: f64) -> Result<Point, CriticalError<E>> {
+    fn at(&self, u: f64) -> Result<Point, CriticalError> {
         let velocity = u.sqrt();
         let mut tally = self.tally.borrow_mut();
         if tally.flights >= self.flights_max {
-            let end = tally.last.end();
-            return Err(CriticalError::NotConverged {
-                flights: tally.flights,
-                reason: "the flights allowed are spent".to_owned(),
-                low: end,
-                high: end,
-            });
+            let (flights, end) = (tally.flights, tally.last);
+            return Err(CriticalError::NotConverged { flights, reason: SPENT.to_owned(), low: end, high: end });
         }
         let problem = (self.resolve)(velocity).map_err(|cause| CriticalError::Scene { velocity, cause })?;
         let margin = match self.integrator.exit_margin(&problem) {
@@ -490,7 +435,7 @@ where
         let Some(margin) = margin else {
             return Err(CriticalError::NotFinite { velocity, exit_energy: f64::NAN });
         };
-        tally.cost += margin.cost;
+        tally.cost = tally.cost + margin.cost;
         let point = Point { u, w: margin.value * u, bar: margin.error.map(|error| error * u) };
         if !(u.is_finite() && point.w.is_finite() && point.bar.unwrap_or(0.0).is_finite()) {
             return Err(CriticalError::NotFinite { velocity, exit_energy: point.w });
@@ -500,7 +445,7 @@ where
     }
 
     /// Two flights with strictly opposite signs; `None` when the target is perforated however slow the projectile.
-    fn bracket(&self, probe: &Problem) -> Result<Option<Bracket>, CriticalError<E>> {
+    fn bracket(&self, probe: &Problem) -> Result<Option<Bracket>, CriticalError> {
         let first = self.at(lower_bound(probe))?;
         let (mut low, mut high) = (first, first);
         let mut factor = 4.0_f64;
@@ -524,7 +469,7 @@ where
                 let line = if expansion == 0 { f64::NAN } else { Bracket { low, high }.secant_root() };
                 let next = if line > high.u && line < 1e12 * high.u { 2.0 * line - high.u } else { high.u * factor };
                 if expansion == EXPANSIONS_MAX || !next.is_finite() {
-                    return Err(CriticalError::NoBracket { low: first.end(), high: high.end() });
+                    return Err(CriticalError::NoBracket { low: first, high: high });
                 }
                 high = self.at(next)?;
                 if high.w > 0.0 {
@@ -538,18 +483,18 @@ where
         if low.w < 0.0 && high.w > 0.0 {
             Ok(Some(Bracket { low, high }))
         } else {
-            Err(CriticalError::NoBracket { low: low.end(), high: high.end() })
+            Err(CriticalError::NoBracket { low: low, high: high })
         }
     }
 
     /// A bracket close around the root that the secant predicts, where W is affine enough for that to hold.
-    fn narrow(&self, wide: Bracket, affine: bool) -> Result<Bracket, CriticalError<E>> {
+    fn narrow(&self, wide: Bracket, affine: bool) -> Result<Bracket, CriticalError> {
         if !affine {
             return Ok(wide);
         }
         let root = wide.secant_root();
-        // The bracket must be wide against the error bars at its ends, else their signs mean nothing.
-        let bar = 64.0 * wide.resolution(0.0) / root;
+        // The bracket must be wide against the error bounds at its ends, else their signs mean nothing.
+        let bar = 64.0 * wide.resolution() / root;
         let width = PREDICTION_WIDTH.max(bar);
         if width > 0.1 {
             return Ok(wide);
@@ -562,15 +507,15 @@ where
         Ok(narrower.with(self.at(root * (1.0 - width))?))
     }
 
-    fn not_converged(&self, reason: String, bracket: Bracket) -> CriticalError<E> {
+    fn not_converged(&self, reason: String, bracket: Bracket) -> CriticalError {
         let flights = self.tally.borrow().flights;
-        CriticalError::NotConverged { flights, reason, low: bracket.low.end(), high: bracket.high.end() }
+        CriticalError::NotConverged { flights, reason, low: bracket.low, high: bracket.high }
     }
 
     /// The point at the root within a bracket, by the method of Brent, and dW/du there; `None` if `flights_max` more
     /// flights do not find it.
-    fn refine(&self, bracket: Bracket, rtol: f64, flights_max: u32) -> Result<Option<(Point, f64)>, CriticalError<E>> {
-        let resolution = bracket.resolution(rtol);
+    fn refine(&self, bracket: Bracket, flights_max: u32) -> Result<Option<(Point, f64)>, CriticalError> {
+        let resolution = bracket.resolution();
         let unit = bracket.secant_root();
         let objective = Objective {
             search: self,
@@ -612,7 +557,7 @@ where
         let Some(&point) = points.iter().find(|point| point.u == root * unit) else {
             return Err(failed(format!("{root} was never tried")));
         };
-        // The secant to the nearest flight that is far against the error bar: local against every curvature.
+        // The secant to the nearest flight that is far against the error bound: local against every curvature.
         let far = (256.0 * resolution).max(0.25 * PREDICTION_WIDTH * point.u);
         let mut slope = bracket.slope();
         let mut nearest = f64::INFINITY;
@@ -631,21 +576,17 @@ where
 const FLIGHTS_INLINE: usize = 16;
 
 /// W over u as argmin sees it: both in units near one.
-struct Objective<'a, 'b, F, E: Display> {
+struct Objective<'a, 'b, F> {
     search: &'a Search<'b, F>,
     unit: f64,
     scale: f64,
     /// The ends, known already.
     known: [Point; 2],
     points: RefCell<SmallVec<[Point; FLIGHTS_INLINE]>>,
-    failure: RefCell<Option<CriticalError<E>>>,
+    failure: RefCell<Option<CriticalError>>,
 }
 
-impl<F, E> CostFunction for &Objective<'_, '_, F, E>
-where
-    F: Fn(f64) -> Result<Problem, E>,
-    E: Display,
-{
+impl<F: Fn(f64) -> Result<Problem, ResolveError>> CostFunction for &Objective<'_, '_, F> {
     type Param = f64;
     type Output = f64;
 

@@ -5,12 +5,75 @@
 use std::cmp::Ordering;
 
 use num_dual::Dual64;
+use thiserror::Error;
 use twofloat::TwoFloat;
 
+use super::critical_velocity::CriticalError;
 use super::quantity::Quantity;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
-use crate::physics::reference::{Conditions, ExactFlight};
-use crate::physics::{Problem, Scalar, State};
+use crate::physics::parameter::{Parameter, ParameterError};
+use crate::physics::reference::{Conditions, ExactFlight, ReferenceError};
+use crate::physics::{Advice, Outcome, Problem, ResolveError, Scalar, State, closed_form};
+
+/// Why a scene cannot be studied.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum StudyError {
+    /// It does not resolve.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+    /// A problem has no solution.
+    #[error(transparent)]
+    Integration(#[from] IntegrationError),
+    /// The search for its critical velocity failed.
+    #[error(transparent)]
+    Critical(#[from] CriticalError),
+    /// Its critical velocity has no closed form.
+    #[error(transparent)]
+    NoClosedForm(#[from] closed_form::CriticalError),
+    /// It has no critical velocity.
+    #[error("there is no critical velocity: {0}")]
+    NoCritical(String),
+    /// One of its numbers.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// A spread of the impact velocity, on which V_c does not depend.
+    #[error("V_c does not depend on `{}`", Parameter::Velocity)]
+    NoInput,
+    /// It has no reference in 50 digits.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The outcomes differ, and not within the error bar.
+    #[error("outcome {found}, in 50 digits {exact}")]
+    Outcome {
+        /// Outcome found.
+        found: Outcome,
+        /// Outcome of the reference.
+        exact: Outcome,
+    },
+}
+
+impl Advice for StudyError {
+    fn inner(&self) -> Option<&dyn Advice> {
+        match self {
+            Self::Resolve(error) => Some(error),
+            Self::Integration(error) => Some(error),
+            Self::Critical(error) => Some(error),
+            Self::Parameter(error) => Some(error),
+            _ => None,
+        }
+    }
+
+    fn is_usage(&self) -> bool {
+        self.inner().map_or(*self == Self::NoInput, Advice::is_usage)
+    }
+
+    fn help(&self) -> String {
+        match self {
+            Self::NoInput => "leave its spread out: V_c is sought whatever the impact velocity".to_owned(),
+            _ => self.inner().map_or_else(String::new, Advice::help),
+        }
+    }
+}
 
 /// The true solution of a problem, or a refined one where no closed form exists.
 #[derive(Clone, Debug)]

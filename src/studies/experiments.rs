@@ -15,13 +15,14 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::applicability::model_error;
-use super::sensitivity::{SensitivityError, Spread, by_closed_form};
+use super::error::StudyError;
+use super::sensitivity::{Spread, by_closed_form};
 use crate::exchange::tables::{self, Column, Format, Need, Row, TableError};
-use crate::integrators::{ClosedForm, Detail, IntegrationError, Integrator};
+use crate::integrators::{ClosedForm, Detail, Integrator};
 use crate::physics::Parameter;
 use crate::physics::groups::Groups;
 use crate::physics::nose::NoseShape;
-use crate::physics::{Advice, Concrete, CraterStiffness, Range, ResolveError, Scene, semi_empirical};
+use crate::physics::{Advice, Concrete, CraterStiffness, Range, Scene, semi_empirical};
 
 /// The measured data that ship: file name and content.
 pub const SHIPPED: [(&str, &str); 5] = [
@@ -254,28 +255,13 @@ pub struct PredictionError {
     /// Its line.
     pub line: u64,
     /// What happened.
-    pub cause: PredictionCause,
-}
-
-/// What happened to a prediction.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum PredictionCause {
-    /// The scene does not resolve.
-    #[error(transparent)]
-    Resolve(#[from] ResolveError),
-    /// The integration failed.
-    #[error(transparent)]
-    Flight(#[from] IntegrationError),
-    /// The derivatives failed.
-    #[error(transparent)]
-    Sensitivity(#[from] SensitivityError),
+    pub cause: StudyError,
 }
 
 impl Advice for PredictionError {
     fn inner(&self) -> Option<&dyn Advice> {
         match &self.cause {
-            PredictionCause::Flight(cause) if !cause.is_usage() => Some(cause),
+            StudyError::Integration(cause) if !cause.is_usage() => Some(cause),
             _ => None,
         }
     }
@@ -310,7 +296,7 @@ fn predict(
     crater_ratio: Option<f64>,
     spreads: &[Spread],
     integrator: &dyn Integrator,
-) -> Result<Comparison, PredictionCause> {
+) -> Result<Comparison, StudyError> {
     let scene = experiment.scene(crater_ratio);
     let problem = scene.problem()?;
     let predicted = integrator.solve(&problem, Detail::End)?.end.depth;

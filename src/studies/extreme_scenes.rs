@@ -6,11 +6,11 @@
 //! ([`crate::physics::reference`]) judge again. The limits:
 //!
 //! - **outcome**: that of the double-double margin, or `undecided`;
-//! - **error bar**: the margin differs from the double-double one by no more than its error bar, and 16 roundings of
+//! - **error bound**: the margin differs from the double-double one by no more than its error bound, and 16 roundings of
 //!   its own where it is large;
 //! - **end and crater end**: [`ULPS_MAX`] units of round-off times the condition number of the quantity, which is the
 //!   sum over all inputs p of `|p df/dp|/|f|`, from dual numbers;
-//! - **critical velocity**: the closed form and the search through the energy formulation, within the error bar of the
+//! - **critical velocity**: the closed form and the search through the energy formulation, within the error bound of the
 //!   latter and the same units; one that leaves the range of 64-bit numbers must be refused with that cause.
 
 use std::collections::BTreeMap;
@@ -180,19 +180,6 @@ fn round_numbers(scene: &mut Scene, random: &mut Random) {
     }
 }
 
-/// What one method made of one scene.
-#[derive(Clone, Debug, PartialEq)]
-pub enum MethodVerdict {
-    /// The right outcome.
-    Right,
-    /// Inside its own error bar.
-    Undecided,
-    /// No answer, with the cause.
-    Refused(String),
-    /// An outcome that is not so.
-    Wrong(Outcome),
-}
-
 /// An answer that misses its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
@@ -205,75 +192,58 @@ pub struct Defect {
     pub what: String,
 }
 
-/// What one scene showed.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Examination {
-    /// MethodVerdict of each method, in the order of [`METHODS`]; empty for a scene that does not resolve.
-    pub verdicts: Vec<MethodVerdict>,
-    /// Error of each quantity a method gave, in units of round-off times condition.
-    pub errors: Vec<(MethodName, Quantity, f64)>,
-    /// Limits missed.
-    pub defects: Vec<String>,
-    /// Whether the 50-digit reference was asked.
-    pub asked_reference: bool,
-    /// Why the scene has no problem, if it has none.
-    pub unresolved: Option<String>,
-    /// Whether a critical velocity was found, and if not, why; `None` without a far side.
-    pub critical: Option<Result<(), String>>,
-}
-
-/// Solves `scene` by every method and judges each.
+/// Solves `scene`, number `index`, by every method and judges each.
 ///
 /// A panic anywhere is a defect of the scene, not the end of the study.
-pub fn examine(scene: &Scene) -> Examination {
-    catch_unwind(AssertUnwindSafe(|| examine_unguarded(scene))).unwrap_or_else(|cause| {
+pub fn examine(index: u64, scene: &Scene) -> Summary {
+    catch_unwind(AssertUnwindSafe(|| examine_unguarded(index, scene))).unwrap_or_else(|cause| {
         let text = cause
             .downcast_ref::<String>()
             .cloned()
             .or_else(|| cause.downcast_ref::<&str>().map(|s| (*s).to_owned()))
             .unwrap_or_default();
-        Examination { defects: vec![format!("panic: {text}")], ..Examination::default() }
+        let mut seen = Summary { scenes: 1, ..Summary::default() };
+        seen.defect(index, format!("panic: {text}"));
+        seen
     })
 }
 
-fn examine_unguarded(scene: &Scene) -> Examination {
-    let mut seen = Examination::default();
-    let problem = match scene.problem() {
-        Ok(problem) => problem,
+fn examine_unguarded(index: u64, scene: &Scene) -> Summary {
+    let mut seen = Summary { scenes: 1, ..Summary::default() };
+    match scene.problem() {
+        Ok(problem) => {
+            examine_problem(index, &problem, &mut seen);
+            examine_critical(index, scene, &mut seen);
+        }
         Err(error) => {
             if error.is_usage() {
-                seen.defects.push(format!("an admissible scene is refused: {error}"));
+                seen.defect(index, format!("an admissible scene is refused: {error}"));
             }
-            seen.unresolved = Some(error.to_string());
-            return seen;
+            seen.unresolved = 1;
         }
-    };
-    examine_problem(&problem, &mut seen);
-    examine_critical(scene, &mut seen);
+    }
     seen
 }
 
-fn examine_problem(problem: &Problem, seen: &mut Examination) {
+fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) {
     let fine = problem.cast::<TwoFloat>();
     let exact = match Taylor::default().solve_in(&fine, Detail::Events) {
         Ok(exact) => exact,
         Err(error) => {
-            seen.defects.push(format!("no flight in double-double: {error}"));
-            return;
+            return seen.defect(index, format!("no flight in double-double: {error}"));
         }
     };
     let margin = match Energy::new().exit_margin_in(&fine) {
         Ok(margin) => margin.map(|(value, error, _)| (value, error)),
         Err(error) => {
-            seen.defects.push(format!("no margin in double-double: {error}"));
-            return;
+            return seen.defect(index, format!("no margin in double-double: {error}"));
         }
     };
     let perforates = match margin {
         Some((value, error)) if value.value().abs() > error => value.value() > 0.0,
         // A tie finer than double-double, or no far side.
         Some(_) => {
-            seen.asked_reference = true;
+            seen.asked_reference = 1;
             match reference::flight(Source::Problem(problem)) {
                 Ok(flight) => flight.outcome == Outcome::Perforated,
                 Err(_) => exact.outcome == Outcome::Perforated,
@@ -289,33 +259,34 @@ fn examine_problem(problem: &Problem, seen: &mut Examination) {
             MethodName::Taylor => Taylor::default().solve(problem, Detail::Events),
             _ => Energy::new().solve(problem, Detail::Events),
         };
+        let tally = seen.tallies.entry(method).or_default();
         let flight = match solved {
             Ok(flight) => flight,
             Err(error) => {
-                seen.defects.push(format!("{method} gives up where others solve: {error}"));
-                seen.verdicts.push(MethodVerdict::Refused(error.to_string()));
+                tally.refused += 1;
+                seen.defect(index, format!("{method} gives up where others solve: {error}"));
                 continue;
             }
         };
-        let verdict = match flight.outcome {
-            Outcome::Undecided => MethodVerdict::Undecided,
-            outcome if (outcome == Outcome::Perforated) == perforates => MethodVerdict::Right,
-            outcome => MethodVerdict::Wrong(outcome),
-        };
-        if let MethodVerdict::Wrong(outcome) = verdict {
-            seen.defects.push(format!("{method} says {outcome} at a margin of {:?}", margin.map(|(m, _)| m.value())));
+        let is_right = flight.outcome != Outcome::Undecided && (flight.outcome == Outcome::Perforated) == perforates;
+        if is_right {
+            tally.right += 1;
+        } else if flight.outcome == Outcome::Undecided {
+            tally.undecided += 1;
+        } else {
+            tally.wrong += 1;
+            let margin = margin.map(|(margin, _)| margin.value());
+            seen.defect(index, format!("{method} says {} at a margin of {margin:?}", flight.outcome));
         }
         if let (Some((exact, _)), Some(found), Some(bound)) = (margin, flight.exit_margin, flight.exit_margin_error) {
             let off = (TwoFloat::from(found) - exact).value().abs();
             // The error bound is there to decide the sign: far from zero, the rounding of the margin exceeds it.
             if exceeds(off, bound + FAR_MARGIN_ROUNDING * exact.value().abs()) {
-                seen.defects
-                    .push(format!("{method}: margin {found:e} is off by {off:.2e}, beyond its error bar {bound:.2e}"));
+                let what = format!("{method}: margin {found:e} is off by {off:.2e}, beyond its error bar {bound:.2e}");
+                seen.defect(index, what);
             }
         }
-        let decided = verdict == MethodVerdict::Right;
-        seen.verdicts.push(verdict);
-        if !decided || !exact.outcome.agrees_with(flight.outcome) {
+        if !is_right || !exact.outcome.agrees_with(flight.outcome) {
             continue;
         }
         let mut errors = excused(Errors::in_double_double(&flight, &exact, problem.impact_speed), jump);
@@ -327,18 +298,18 @@ fn examine_problem(problem: &Problem, seen: &mut Examination) {
                 errors = errors.over(conditions);
             }
             if errors.exceed(ULPS_MAX) {
-                seen.asked_reference = true;
+                seen.asked_reference = 1;
                 match errors_of(Source::Problem(problem), &flight) {
                     Ok(again) => errors = excused(again, jump),
-                    Err(why) => seen.defects.push(format!("{method}: {why}")),
+                    Err(why) => seen.defect(index, format!("{method}: {why}")),
                 }
             }
         }
         for (units, quantity) in errors.0 {
             if exceeds(units, ULPS_MAX) {
-                seen.defects.push(format!("{method}: {quantity} is off by {units:.1} ulp x condition"));
+                seen.defect(index, format!("{method}: {quantity} is off by {units:.1} ulp x condition"));
             }
-            seen.errors.push((method, quantity, units));
+            seen.admit((method, quantity), Worst { units, index });
         }
     }
 }
@@ -364,7 +335,7 @@ fn excused(mut errors: Errors, jump: Option<f64>) -> Errors {
     errors
 }
 
-fn examine_critical(scene: &Scene, seen: &mut Examination) {
+fn examine_critical(index: u64, scene: &Scene, seen: &mut Summary) {
     if scene.thickness.is_none() {
         return;
     }
@@ -372,24 +343,23 @@ fn examine_critical(scene: &Scene, seen: &mut Examination) {
     let found = critical_velocity::of_scene(scene, &Energy::new());
     let (exact, found) = match (exact, found) {
         (Ok(exact), Ok(found)) => (exact, found),
-        (Err(exact), Err(_)) => {
-            seen.critical = Some(Err(exact.to_string()));
+        (Err(_), Err(_)) => {
+            seen.critical_refused = 1;
             return;
         }
-        (Ok(exact), Err(error)) if exact > SEARCHED_MAX => {
-            seen.critical = Some(Err(error.to_string()));
+        (Ok(exact), Err(_)) if exact > SEARCHED_MAX => {
+            seen.critical_refused = 1;
             return;
         }
         (Ok(exact), Err(error)) => {
-            seen.defects.push(format!("V_c = {exact:e} by the closed form, but the search says: {error}"));
-            return;
+            return seen.defect(index, format!("V_c = {exact:e} by the closed form, but the search says: {error}"));
         }
         (Err(error), Ok(found)) => {
-            seen.defects.push(format!("V_c = {:e} by search, but the closed form says: {error}", found.velocity));
-            return;
+            let velocity = found.velocity;
+            return seen.defect(index, format!("V_c = {velocity:e} by search, but the closed form says: {error}"));
         }
     };
-    seen.critical = Some(Ok(()));
+    seen.critical_found = 1;
     // The drag over the thickness stands in an exponent, whose digits it takes.
     let condition = match (scene.drag(), scene.thickness) {
         (Some(drag), Some(thickness)) => 2.0 + 2.0 * drag * thickness / scene.mass,
@@ -399,7 +369,7 @@ fn examine_critical(scene: &Scene, seen: &mut Examination) {
     let units = (off / exact / f64::EPSILON / condition).min(off / bar * ULPS_MAX);
     let mut units = if off == 0.0 { 0.0 } else { units };
     if exceeds(units, ULPS_MAX) {
-        seen.asked_reference = true;
+        seen.asked_reference = 1;
         let source = Source::Scene(scene, 1.0);
         match (reference::critical(source), reference::critical_condition(source)) {
             (Ok(reference), Ok(condition)) => {
@@ -407,17 +377,18 @@ fn examine_critical(scene: &Scene, seen: &mut Examination) {
                 let searched = reference.velocity.relative_error(found.velocity) / f64::EPSILON / condition.max(1.0);
                 units = closed.max(searched);
                 if exceeds(units, ULPS_MAX) {
-                    seen.defects.push(format!(
+                    let what = format!(
                         "V_c: closed form {exact:e} off by {closed:.1}, search {:e} ± {bar:.1e} off by {searched:.1} \
                          ulp x condition",
                         found.velocity
-                    ));
+                    );
+                    seen.defect(index, what);
                 }
             }
-            (Err(error), _) | (_, Err(error)) => seen.defects.push(format!("V_c has no reference: {error}")),
+            (Err(error), _) | (_, Err(error)) => seen.defect(index, format!("V_c has no reference: {error}")),
         }
     }
-    seen.errors.push((MethodName::Energy, Quantity::CriticalVelocity, units));
+    seen.admit((MethodName::Energy, Quantity::CriticalVelocity), Worst { units, index });
 }
 
 /// The worst error of a method in a quantity, and the scene that makes it.
@@ -470,31 +441,9 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of scene `index` alone.
-    pub fn of(index: u64, seen: Examination) -> Self {
-        let mut summary = Self {
-            scenes: 1,
-            unresolved: u64::from(seen.unresolved.is_some()),
-            asked_reference: u64::from(seen.asked_reference),
-            critical_found: u64::from(matches!(seen.critical, Some(Ok(())))),
-            critical_refused: u64::from(matches!(seen.critical, Some(Err(_)))),
-            defect_count: seen.defects.len() as u64,
-            defects: seen.defects.into_iter().map(|what| Defect { index, what }).collect(),
-            ..Self::default()
-        };
-        for (method, verdict) in METHODS.into_iter().zip(&seen.verdicts) {
-            let tally = summary.tallies.entry(method).or_default();
-            *match verdict {
-                MethodVerdict::Right => &mut tally.right,
-                MethodVerdict::Undecided => &mut tally.undecided,
-                MethodVerdict::Refused(_) => &mut tally.refused,
-                MethodVerdict::Wrong(_) => &mut tally.wrong,
-            } += 1;
-        }
-        for (method, quantity, units) in seen.errors {
-            summary.admit((method, quantity), Worst { units, index });
-        }
-        summary
+    fn defect(&mut self, index: u64, what: String) {
+        self.defect_count += 1;
+        self.defects.push(Defect { index, what });
     }
 
     fn admit(&mut self, key: (MethodName, Quantity), worst: Worst) {
@@ -538,7 +487,7 @@ pub fn run(cases: u64, seed: u64, done: &(dyn Fn() + Sync)) -> Summary {
     (0..cases)
         .into_par_iter()
         .map(|index| {
-            let summary = Summary::of(index, examine(&scene(seed, index)));
+            let summary = examine(index, &scene(seed, index));
             done();
             summary
         })
@@ -594,7 +543,7 @@ mod tests {
 
     #[test]
     fn a_summary_does_not_depend_on_how_the_scenes_are_shared_out() {
-        let one_by_one = (0..60).map(|i| Summary::of(i, examine(&scene(3, i)))).reduce(Summary::merged).unwrap();
+        let one_by_one = (0..60).map(|i| examine(i, &scene(3, i))).reduce(Summary::merged).unwrap();
         assert_eq!(run(60, 3, &|| {}), one_by_one);
     }
 

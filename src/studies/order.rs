@@ -97,9 +97,10 @@ impl StepError {
 }
 
 /// What the errors do as the step shrinks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, strum::IntoStaticStr)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Class {
     /// They vanish.
     Converging,
@@ -116,13 +117,7 @@ pub enum Class {
 impl Class {
     /// Name in reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Converging => "converging",
-            Self::Diverging => "diverging",
-            Self::Oscillating => "oscillating",
-            Self::AtFloor => "at-floor",
-            Self::Undecided => "undecided",
-        }
+        self.into()
     }
 }
 

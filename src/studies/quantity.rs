@@ -1,9 +1,23 @@
 //! The quantities whose error is studied, and their names (`docs/reference.md`, "Words").
 
 /// A number that a flight, or a search over flights, gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    serde::Serialize,
+    serde::Deserialize,
+    strum::Display,
+    strum::IntoStaticStr,
+)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Quantity {
     /// Depth at the end of the flight (m).
     Depth,
@@ -40,19 +54,6 @@ impl Quantity {
 
     /// Name in JSON and in suites.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Depth => "depth",
-            Self::Time => "time",
-            Self::Velocity => "velocity",
-            Self::CraterEndTime => "crater_end_time",
-            Self::CraterEndVelocity => "crater_end_velocity",
-            Self::CriticalVelocity => "critical_velocity",
-        }
-    }
-}
-
-impl std::fmt::Display for Quantity {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
+        self.into()
     }
 }

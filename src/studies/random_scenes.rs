@@ -1,14 +1,12 @@
 //! Random scenes from a seed, and how the closed form fares on a scene.
 
-use thiserror::Error;
-
-use super::error::Errors;
 pub use super::error::condition_of;
+use super::error::{Errors, StudyError};
 use super::random::Random;
 use crate::integrators::closed_form::solve_crater_and_tunnel;
-use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator};
-use crate::physics::reference::{self, ReferenceError, Source};
-use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, ResolveError, Scene, groups};
+use crate::integrators::{ClosedForm, Detail, Flight, Integrator};
+use crate::physics::reference::{self, Source};
+use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Scene, groups};
 
 /// Draws scenes that cover the groups log-uniformly.
 ///
@@ -55,28 +53,6 @@ impl Generator {
     }
 }
 
-/// Why a scene has no comparison.
-#[derive(Clone, Debug, Error)]
-pub enum ComparisonError {
-    /// It does not resolve.
-    #[error(transparent)]
-    Resolve(#[from] ResolveError),
-    /// It has no closed form.
-    #[error(transparent)]
-    Integration(#[from] IntegrationError),
-    /// It has no reference.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-    /// The outcomes differ, and not within the error bar.
-    #[error("outcome {found}, in 50 digits {exact}")]
-    Outcome {
-        /// Outcome found.
-        found: Outcome,
-        /// Outcome of the reference.
-        exact: Outcome,
-    },
-}
-
 /// The closed form of `scene`, of its stages and of its numbers, against 50 digits of its numbers, in ulp over max(1,
 /// condition number).
 ///
@@ -84,8 +60,8 @@ pub enum ComparisonError {
 /// `sqrt(1 + k d Q/M)/4` ulp of V0: for k/N far above 100 only [`closed_form_errors_at_inputs`] distinguishes rounding from a fault.
 ///
 /// # Errors
-/// [`ComparisonError`].
-pub fn closed_form_errors(scene: &Scene) -> Result<Errors, ComparisonError> {
+/// [`StudyError`].
+pub fn closed_form_errors(scene: &Scene) -> Result<Errors, StudyError> {
     let problem = scene.problem()?;
     let flight = ClosedForm.solve(&problem, Detail::Events)?;
     let mut errors = errors_of(Source::Scene(scene, problem.impact_speed), &flight)?;
@@ -96,8 +72,8 @@ pub fn closed_form_errors(scene: &Scene) -> Result<Errors, ComparisonError> {
 /// As [`closed_form_errors`], the closed form of the stages against 50 digits of the same stages.
 ///
 /// # Errors
-/// [`ComparisonError`].
-pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<Errors, ComparisonError> {
+/// [`StudyError`].
+pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<Errors, StudyError> {
     let problem = scene.problem()?;
     let flight = ClosedForm.solve(&problem, Detail::Events)?;
     let mut errors = errors_of(Source::Problem(&problem), &flight)?;
@@ -106,7 +82,7 @@ pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<Errors, ComparisonE
 }
 
 /// As [`closed_form_errors`] for one crater and one tunnel, with the speed in the crater computed without c.
-fn errors_without_stiffness(scene: &Scene, problem: &Problem) -> Result<Errors, ComparisonError> {
+fn errors_without_stiffness(scene: &Scene, problem: &Problem) -> Result<Errors, StudyError> {
     let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) else {
         return Ok(Errors::default());
     };
@@ -119,14 +95,14 @@ fn errors_without_stiffness(scene: &Scene, problem: &Problem) -> Result<Errors, 
 /// An undecided flight has no errors.
 ///
 /// # Errors
-/// [`ComparisonError`].
-pub fn errors_of(source: Source<'_>, flight: &Flight) -> Result<Errors, ComparisonError> {
+/// [`StudyError`].
+pub fn errors_of(source: Source<'_>, flight: &Flight) -> Result<Errors, StudyError> {
     let exact = reference::flight(source)?;
     if flight.outcome == Outcome::Undecided {
         return Ok(Errors::default());
     }
     if !flight.outcome.agrees_with(exact.outcome) {
-        return Err(ComparisonError::Outcome { found: flight.outcome, exact: exact.outcome });
+        return Err(StudyError::Outcome { found: flight.outcome, exact: exact.outcome });
     }
     Ok(Errors::in_50_digits(flight, &exact, &reference::conditions(source)?))
 }

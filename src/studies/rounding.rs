@@ -109,10 +109,6 @@ pub struct Errors {
 /// # Errors
 /// [`IntegrationError`] of a flight.
 pub fn floor(problem: &Problem, from: u32, split: u32, to: u32) -> Result<Vec<Floor>, IntegrationError> {
-    let scheme = |dt, summation| CentralDifference {
-        summation,
-        ..CentralDifference::uniform(dt, VelocityAt::Centred, Boundaries::Landed)
-    };
     let single = problem.cast::<f32>();
     let (exact, wide) = (exact_end(problem)?, problem.cast::<TwoFloat>());
     let (single_exact, single_wide) = (exact_end(&single.cast())?, single.cast::<TwoFloat>());
@@ -121,20 +117,15 @@ pub fn floor(problem: &Problem, from: u32, split: u32, to: u32) -> Result<Vec<Fl
             let steps = 2f64.powi(power.cast_signed());
             let dt = exact.time.value() / steps;
             let single_dt = f64::from(dt as f32);
-            let by_double_double = |problem: &Problem<TwoFloat>, dt| -> Result<Option<TwoFloat>, IntegrationError> {
-                if power > split {
-                    return Ok(None);
-                }
-                Ok(Some(scheme(dt, Summation::Plain).solve_in(problem, Detail::End)?.end.depth))
-            };
+            let by_double_double =
+                |problem, dt| (power <= split).then(|| depth_after(problem, dt, Summation::Plain)).transpose();
             let (fine, single_fine) = (by_double_double(&wide, dt)?, by_double_double(&single_wide, single_dt)?);
             let in_double = |summation| -> Result<Errors, IntegrationError> {
-                let found = scheme(dt, summation).solve_in(problem, Detail::End)?.end.depth;
-                Ok(Errors::of(TwoFloat::from(found), fine, exact.depth))
+                Ok(Errors::of(depth_after(problem, dt, summation)?.into(), fine, exact.depth))
             };
             let in_single = |summation| -> Result<Errors, IntegrationError> {
-                let found = scheme(single_dt, summation).solve_in(&single, Detail::End)?.end.depth;
-                Ok(Errors::of(TwoFloat::from(f64::from(found)), single_fine, single_exact.depth))
+                let found = f64::from(depth_after(&single, single_dt, summation)?);
+                Ok(Errors::of(found.into(), single_fine, single_exact.depth))
             };
             Ok(Floor {
                 steps,
@@ -147,6 +138,12 @@ pub fn floor(problem: &Problem, from: u32, split: u32, to: u32) -> Result<Vec<Fl
             })
         })
         .collect()
+}
+
+/// Depth (m) at the end of `problem` by steps of `dt` (s), centred and landed.
+fn depth_after<S: Scalar>(problem: &Problem<S>, dt: f64, summation: Summation) -> Result<S, IntegrationError> {
+    let scheme = CentralDifference::uniform(dt, VelocityAt::Centred, Boundaries::Landed);
+    Ok(CentralDifference { summation, ..scheme }.solve_in(problem, Detail::End)?.end.depth)
 }
 
 impl Errors {

@@ -22,10 +22,11 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::critical_velocity;
+use super::error::{StudyError, Truth};
 use super::random::Random;
 #[cfg(feature = "diffsol")]
 use crate::integrators::diffsol_sensitivity;
-use crate::integrators::{ClosedForm, Detail, Energy, Flight, IntegrationError, Integrator, Taylor};
+use crate::integrators::{Detail, Energy, IntegrationError, Taylor};
 #[cfg(feature = "diffsol")]
 use crate::physics::EventKind;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError};
@@ -74,49 +75,6 @@ pub fn elasticity(derivative: Option<f64>, quantity: Option<f64>, value: f64) ->
     (quantity != 0.0).then(|| derivative * value / quantity)
 }
 
-/// Why there are no sensitivities.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum SensitivityError {
-    /// The scene does not resolve.
-    #[error(transparent)]
-    Resolve(#[from] ResolveError),
-    /// The integration failed.
-    #[error(transparent)]
-    Flight(#[from] IntegrationError),
-    /// A number of the scene.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-    /// No critical velocity.
-    #[error("there is no critical velocity: {0}")]
-    NoCritical(String),
-    /// A spread of the impact velocity, on which V_c does not depend.
-    #[error("V_c does not depend on `{}`", Parameter::Velocity)]
-    NoInput,
-}
-
-impl Advice for SensitivityError {
-    fn inner(&self) -> Option<&dyn Advice> {
-        match self {
-            Self::Resolve(error) => Some(error),
-            Self::Flight(error) => Some(error),
-            Self::Parameter(error) => Some(error),
-            Self::NoCritical(_) | Self::NoInput => None,
-        }
-    }
-
-    fn is_usage(&self) -> bool {
-        self.inner().map_or(!matches!(self, Self::NoCritical(_)), Advice::is_usage)
-    }
-
-    fn help(&self) -> String {
-        match self {
-            Self::NoInput => "leave its spread out: V_c is sought whatever the impact velocity".to_owned(),
-            _ => self.inner().map_or_else(String::new, Advice::help),
-        }
-    }
-}
-
 /// The problem of `scene` at `speed` (m/s) with the derivative in `parameter`.
 fn dual_problem(scene: &Scene, speed: f64, parameter: Parameter) -> Result<Problem<Dual64>, ResolveError> {
     scene.resolve_in(speed, |number, value| Dual64::new(value, slope(scene, number, value, parameter)))
@@ -138,16 +96,11 @@ fn slope(scene: &Scene, number: Parameter, value: f64, parameter: Parameter) -> 
     }
 }
 
-/// Where the projectile ends, exactly if there is a closed form.
-fn located(problem: &Problem) -> Result<Flight, IntegrationError> {
-    ClosedForm.solve(problem, Detail::End).or_else(|_| Taylor::default().solve(problem, Detail::End))
-}
-
 /// The quantities of `scene` that have derivatives; `notes` says why one has none.
-fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Result<Quantities, SensitivityError> {
+fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Result<Quantities, StudyError> {
     let mut quantities = Quantities::default();
     if let Some(speed) = scene.velocity {
-        let flight = located(&scene.resolve(speed)?)?;
+        let flight = Truth::of(&scene.resolve(speed)?)?.flight;
         match flight.outcome {
             Outcome::Undecided => {
                 notes.push("the flight is undecided: X and V_r have no derivative at the critical velocity".to_owned());
@@ -181,10 +134,10 @@ fn differentiate(
     scene: &Scene,
     end: impl Fn(&Problem<Dual64>, Quantities) -> Result<[Option<f64>; 2], IntegrationError>,
     excess: impl Fn(Problem<Dual64>) -> Result<Option<f64>, IntegrationError>,
-) -> Result<Sensitivities, SensitivityError> {
+) -> Result<Sensitivities, StudyError> {
     let mut notes = Vec::new();
     let quantities = quantities(scene, &mut notes)?;
-    let at_critical = |parameter| -> Result<Option<f64>, SensitivityError> {
+    let at_critical = |parameter| -> Result<Option<f64>, StudyError> {
         let Some(critical) = quantities.critical_velocity else { return Ok(None) };
         Ok(excess(dual_problem(scene, critical, parameter)?)?)
     };
@@ -214,8 +167,8 @@ fn squared_speed(problem: &Problem<Dual64>, depth: Dual64) -> Option<Dual64> {
 /// Quantities beyond a viscous stage, and derivatives with respect to a viscosity, are left out.
 ///
 /// # Errors
-/// [`SensitivityError`]: the scene does not resolve, or the projectile neither rests nor leaves.
-pub fn by_closed_form(scene: &Scene) -> Result<Sensitivities, SensitivityError> {
+/// [`StudyError`]: the scene does not resolve, or the projectile neither rests nor leaves.
+pub fn by_closed_form(scene: &Scene) -> Result<Sensitivities, StudyError> {
     let end = |problem: &Problem<Dual64>, quantities: Quantities| {
         let half_slope = |depth: Dual64| squared_speed(problem, depth).map(|w| 0.5 * w.eps);
         let depth = quantities.depth.and_then(|depth| {
@@ -231,8 +184,8 @@ pub fn by_closed_form(scene: &Scene) -> Result<Sensitivities, SensitivityError> 
 /// Sensitivities by the Taylor series in dual numbers.
 ///
 /// # Errors
-/// [`SensitivityError`].
-pub fn by_taylor(scene: &Scene) -> Result<Sensitivities, SensitivityError> {
+/// [`StudyError`].
+pub fn by_taylor(scene: &Scene) -> Result<Sensitivities, StudyError> {
     by_integration(scene, |problem| Ok(Taylor::default().solve_in(&with_every_term(problem), Detail::End)?.end))
 }
 
@@ -267,7 +220,7 @@ fn with_every_term(problem: &Problem<Dual64>) -> Problem<Dual64> {
 fn by_integration(
     scene: &Scene,
     solve: impl Fn(&Problem<Dual64>) -> Result<State<Dual64>, IntegrationError>,
-) -> Result<Sensitivities, SensitivityError> {
+) -> Result<Sensitivities, StudyError> {
     let end = |problem: &Problem<Dual64>, quantities: Quantities| {
         let State { depth, velocity, .. } = solve(problem)?;
         let residual = quantities.velocity.filter(|v| *v > 0.0);
@@ -285,7 +238,7 @@ fn by_integration(
 /// then the movement of the event with the parameter is added, `d tau = (d xi_end - d xi)/u`.
 #[cfg(feature = "diffsol")]
 fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Result<State<Dual64>, IntegrationError> {
-    let flight = Taylor::default().solve(&problem.cast::<f64>(), Detail::Events)?;
+    let flight = Taylor::default().solve_in(&problem.cast::<f64>(), Detail::Events)?;
     let unit_velocity = problem.impact_speed.re;
     let mut entry = State::at_impact(problem);
     for event in &flight.events {
@@ -331,9 +284,9 @@ fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Result<State<Dual64
 /// Sensitivities by the forward sensitivities of the library `diffsol` (Tsitouras 5(4)) at tolerance `rtol`.
 ///
 /// # Errors
-/// [`SensitivityError`].
+/// [`StudyError`].
 #[cfg(feature = "diffsol")]
-pub fn by_diffsol(scene: &Scene, rtol: f64) -> Result<Sensitivities, SensitivityError> {
+pub fn by_diffsol(scene: &Scene, rtol: f64) -> Result<Sensitivities, StudyError> {
     by_integration(scene, |problem| solve_by_diffsol(problem, rtol))
 }
 
@@ -476,16 +429,11 @@ const CHUNK: usize = 4096;
 /// method. The same seed gives the same numbers on any number of threads.
 ///
 /// # Errors
-/// [`SensitivityError`]: no critical velocity, a number that the scene lacks or that V_c does not depend on, or no
+/// [`StudyError`]: no critical velocity, a number that the scene lacks or that V_c does not depend on, or no
 /// admissible sample at all.
-pub fn uncertainty(
-    scene: &Scene,
-    spreads: &[Spread],
-    samples: usize,
-    seed: u64,
-) -> Result<Uncertainty, SensitivityError> {
+pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64) -> Result<Uncertainty, StudyError> {
     if spreads.iter().any(|spread| spread.parameter == Parameter::Velocity) {
-        return Err(SensitivityError::NoInput);
+        return Err(StudyError::NoInput);
     }
     // V_c depends on neither; a clone without a title allocates nothing.
     let base = Scene { title: None, velocity: None, ..scene.clone() };
@@ -495,10 +443,8 @@ pub fn uncertainty(
         full if full.entries.iter().any(|e| e.critical_velocity.is_some()) => full,
         _ => by_taylor(&base)?,
     };
-    let critical = derivatives
-        .quantities
-        .critical_velocity
-        .ok_or_else(|| SensitivityError::NoCritical(derivatives.notes.join("; ")))?;
+    let critical =
+        derivatives.quantities.critical_velocity.ok_or_else(|| StudyError::NoCritical(derivatives.notes.join("; ")))?;
     let mut shares = vec![0.0; spreads.len()];
     for (place, spread) in &spreads {
         spread.parameter.get(&base)?;
@@ -524,7 +470,7 @@ pub fn uncertainty(
         .collect();
     let mut velocities: Vec<f64> = drawn.iter().copied().flatten().collect();
     if velocities.is_empty() {
-        return Err(SensitivityError::NoCritical("no random scene was admissible".to_owned()));
+        return Err(StudyError::NoCritical("no random scene was admissible".to_owned()));
     }
     velocities.par_sort_unstable_by(f64::total_cmp);
     let count = velocities.len() as f64;
@@ -608,7 +554,7 @@ mod tests {
             }
             let exact = match by_closed_form(&scene) {
                 // Drag over a thick slab may ask for more energy than there are numbers.
-                Err(SensitivityError::Resolve(_)) => continue,
+                Err(StudyError::Resolve(_)) => continue,
                 other => other.unwrap(),
             };
             let integrated = by_taylor(&scene).unwrap();
@@ -654,7 +600,7 @@ mod tests {
                 let at = |factor: f64| {
                     let mut moved = scene.clone();
                     e.parameter.set(&mut moved, e.value * factor).unwrap();
-                    let flight = located(&moved.problem().unwrap()).unwrap();
+                    let flight = Truth::of(&moved.problem().unwrap()).unwrap().flight;
                     (flight.end.depth, flight.end.velocity, critical_velocity::exact(&moved).ok())
                 };
                 let step = 1e-4;
@@ -719,7 +665,7 @@ mod tests {
         let twice = texts(&["target.strength=2%", "projectile.mass=1%", "target.strength=0.02"]);
         assert_eq!(twice, Err(SpreadError::Twice(Parameter::Strength)));
         let two = texts(&["target.strength=2%", "impact.velocity=1%"]).unwrap();
-        assert_eq!(uncertainty(&shipped("paper-slab"), &two, 10, 1), Err(SensitivityError::NoInput));
+        assert_eq!(uncertainty(&shipped("paper-slab"), &two, 10, 1), Err(StudyError::NoInput));
         assert!(uncertainty(&shipped("paper-slab"), &two[..1], 10, 1).is_ok());
     }
 

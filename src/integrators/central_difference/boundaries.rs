@@ -3,9 +3,9 @@
 use super::scheme::{Node, Pause, Stepper, Sum};
 use super::stability::cannot_end;
 use super::{Boundaries, CentralDifference, Steps};
-use crate::integrators::outcome::{Detail, Events, Flight, IntegrationError, Sample};
-use crate::physics::exit_energy::exit_margin;
-use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, State};
+use crate::integrators::flight::Course;
+use crate::integrators::outcome::{Detail, Flight, IntegrationError};
+use crate::physics::{Problem, Scalar, State};
 
 /// Steps without any change of x and V after which the scheme counts as stuck for ever.
 const STUCK_STEPS: u64 = 1 << 20;
@@ -67,12 +67,10 @@ impl<S: Scalar> Step<S> {
     }
 }
 
-/// One solution in the making: the scheme, and the events and samples so far.
+/// One solution in the making: the scheme, and what has happened so far.
 pub(super) struct Run<'a, S> {
     stepper: Stepper<'a, S>,
-    detail: Detail,
-    events: Events<S>,
-    trajectory: Vec<Sample>,
+    course: Course<'a, S>,
 }
 
 impl<'a, S: Scalar> Run<'a, S> {
@@ -82,10 +80,9 @@ impl<'a, S: Scalar> Run<'a, S> {
         problem: &'a Problem<S>,
         detail: Detail,
     ) -> Result<Flight<S>, IntegrationError> {
-        let stepper = Stepper::new(options, problem);
-        let mut run = Self { stepper, detail, events: Events::new(), trajectory: Vec::new() };
+        let mut run = Self { stepper: Stepper::new(options, problem), course: Course::new(problem, detail) };
         // Ends at the face are reached at once; `Stepper::new` has passed them.
-        run.push_boundaries(0..run.stepper.stage, State::at_impact(problem));
+        run.pass_ends(0..run.stepper.stage, State::at_impact(problem));
         run.record_node();
         run.run_to_end()
     }
@@ -103,7 +100,7 @@ impl<'a, S: Scalar> Run<'a, S> {
             if left == 0 || is_hopeless && steps >= STUCK_STEPS {
                 return Err(IntegrationError::StepBudgetSpent { max_steps, last: before.values() });
             }
-            let allowance = if self.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
+            let allowance = if self.course.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
             let limit = problem.limit_of(self.stepper.stage).value();
             let has_ended = match self.stepper.cruise(limit, allowance) {
                 Pause::Allowance => false,
@@ -210,7 +207,7 @@ impl<'a, S: Scalar> Run<'a, S> {
         self.stepper.clock.tick_part(part);
         let landing = State { time: self.stepper.clock.now(), depth: end, velocity: next.v };
         self.stepper.enter_stage_at(end);
-        self.push_boundaries(first..self.stepper.stage, landing);
+        self.pass_ends(first..self.stepper.stage, landing);
         self.stepper.start(landing);
         Ok(false)
     }
@@ -243,50 +240,41 @@ impl<'a, S: Scalar> Run<'a, S> {
             }
             let Some(state) = passed(end) else { break };
             deepest = end;
-            self.push(EventKind::boundary(problem, index), state, index);
+            self.pass_ends(index..index + 1, state);
         }
-        if problem.has_exit()
-            && let Some(state) = passed(problem.exit_depth)
-        {
-            self.push(EventKind::Exit, state, self.stepper.stage);
-            // A projectile without velocity rests there.
-            if state.velocity.value() <= 0.0 {
-                self.push(EventKind::Rest, state, self.stepper.stage);
+        let exit = if problem.has_exit() { passed(problem.exit_depth) } else { None };
+        self.course.is_through = exit.is_some();
+        self.course.state = match (exit, step.rest()) {
+            (Some(state), _) => state,
+            (None, None) => return false,
+            (None, Some(tau)) if is_located => {
+                let depth = step.depth(tau);
+                let depth = if depth.value() > deepest.value() { depth } else { deepest };
+                State { time: step.from.time + tau, depth, velocity: S::zero() }
             }
-            return true;
-        }
-        let Some(tau) = step.rest() else { return false };
-        let rest = if is_located {
-            let depth = step.depth(tau);
-            let depth = if depth.value() > deepest.value() { depth } else { deepest };
-            State { time: step.from.time + tau, depth, velocity: S::zero() }
-        } else {
-            let turned_back = step.from.depth.value() > arrival.depth.value();
-            State { depth: if turned_back { step.from.depth } else { step.to.depth }, ..arrival }
+            (None, Some(_)) => {
+                let turned_back = step.from.depth.value() > arrival.depth.value();
+                State { depth: if turned_back { step.from.depth } else { step.to.depth }, ..arrival }
+            }
         };
-        self.push(EventKind::Rest, rest, self.stepper.stage);
+        self.course.stage = self.stepper.stage;
+        self.course.end();
         true
     }
 
-    fn push_boundaries(&mut self, stages: std::ops::Range<usize>, state: State<S>) {
+    fn pass_ends(&mut self, stages: std::ops::Range<usize>, state: State<S>) {
+        self.course.state = state;
         for index in stages {
-            self.push(EventKind::boundary(self.stepper.problem, index), state, index);
+            self.course.stage = index;
+            self.course.pass_end();
         }
     }
 
-    fn push(&mut self, kind: EventKind, state: State<S>, stage: usize) {
-        self.events.push(Event { kind, state });
-        // An evaluation for the table, not work of the scheme: it is not counted.
-        self.record(state, self.stepper.problem.stages[stage].force(state.depth, state.velocity), stage);
-    }
-
     fn record_node(&mut self) {
-        self.record(self.stepper.state(), self.stepper.node.d * self.stepper.problem.mass, self.stepper.stage);
-    }
-
-    fn record(&mut self, state: State<S>, force: S, stage: usize) {
-        if self.detail == Detail::Trajectory {
-            self.trajectory.push(Sample { state: state.values(), force: force.value(), stage });
+        if self.course.detail == Detail::Trajectory {
+            self.course.stage = self.stepper.stage;
+            let force = self.stepper.node.d * self.stepper.problem.mass;
+            self.course.push_sample(self.stepper.state(), force);
         }
     }
 
@@ -294,33 +282,15 @@ impl<'a, S: Scalar> Run<'a, S> {
     fn finish(mut self) -> Flight<S> {
         let problem = self.stepper.problem;
         self.stepper.leave_stage();
-        let perforated = self.events.iter().any(|event| event.kind == EventKind::Exit);
-        let end = self.events.last().map_or_else(|| self.stepper.state(), |event| event.state);
         // A place at a stage end belongs to the stage that ends there.
-        let place = if perforated { problem.exit_depth } else { end.depth };
-        let stage = problem.stages.iter().take_while(|stage| stage.end.value() < place.value()).count();
-        let outcome = if perforated { Outcome::Perforated } else { problem.stop_in(stage) };
-        let mut flight = Flight {
-            outcome,
-            stage,
-            end,
-            events: self.events,
-            exit_margin: None,
-            exit_margin_error: None,
-            cost: self.stepper.cost,
-            trajectory: self.trajectory,
-            step_limit: Some(self.stepper.step_limit),
-            notes: Vec::new(),
-        };
-        let events: Vec<Event> =
-            flight.events.iter().map(|e| Event { kind: e.kind, state: e.state.values() }).collect();
-        flight.exit_margin = exit_margin(&problem.cast(), outcome, stage, end.values(), &events);
-        if self.detail == Detail::End {
-            flight.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest));
-        } else {
+        let place = if self.course.is_through { problem.exit_depth } else { self.course.state.depth };
+        self.course.stage = problem.stages.iter().take_while(|stage| stage.end.value() < place.value()).count();
+        let exit_margin = problem.has_exit().then(|| self.course.margin().value);
+        if self.course.detail >= Detail::Events {
             let note = "error bar of the exit margin not given: a fixed step has no error estimate";
-            flight.notes.push(note.to_owned());
+            self.course.notes.push(note.to_owned());
         }
-        flight
+        let (cost, step_limit) = (self.stepper.cost, Some(self.stepper.step_limit));
+        Flight { exit_margin, cost, step_limit, ..self.course.finish(None) }
     }
 }

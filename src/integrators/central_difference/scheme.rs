@@ -180,7 +180,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             _ => Clock::Equal { size: S::from_f64(options.time_step(problem)), since: S::zero(), count: 0 },
         };
         let stage = stage_at(problem, 0, impact.depth);
-        let law = per_mass(problem, stage);
+        let law = problem.stages[stage].per_mass(problem.mass);
         Self {
             options,
             problem,
@@ -211,7 +211,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if stage != self.stage {
             self.leave_stage();
             self.stage = stage;
-            self.law = per_mass(self.problem, stage);
+            self.law = self.problem.stages[stage].per_mass(self.problem.mass);
         }
     }
 
@@ -320,7 +320,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let problem = self.problem;
         let mut states = vec![self.state()];
         for (stage, &end) in ends.iter().enumerate() {
-            let law = per_mass(problem, stage);
+            let law = problem.stages[stage].per_mass(problem.mass);
             // At a given time the outer force is one more static force, whatever the velocity rule makes of the rest.
             let law_at =
                 |time| Stage { static_force: law.static_force - source(stage, time).over(problem.mass), ..law };
@@ -359,16 +359,4 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 fn stage_at<S: Scalar>(problem: &Problem<S>, from: usize, x: S) -> usize {
     let is_behind = |end: f64| end <= x.value() && end < problem.exit_depth.value();
     from + problem.stages[from..].iter().take_while(|stage| is_behind(stage.end.value())).count()
-}
-
-/// The force rule of stage `index`, divided by the mass: [`Stage::force`] of it is the deceleration (m/s²).
-fn per_mass<S: Scalar>(problem: &Problem<S>, index: usize) -> Stage<S> {
-    let (law, mass) = (&problem.stages[index], problem.mass);
-    Stage {
-        static_force: law.static_force.over(mass),
-        stiffness: law.stiffness.over(mass),
-        viscosity: law.viscosity.over(mass),
-        drag: law.drag.over(mass),
-        end: law.end,
-    }
 }

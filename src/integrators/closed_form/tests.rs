@@ -136,7 +136,7 @@ fn compare(seed: u64, count: u32) -> (Worst, f64) {
             (solution.exit_margin, solution.exit_margin_error, &exact.exit_margin)
         {
             let off = (margin - exact.to_f64()).abs();
-            // The bar is that of the problem; resolving the scene adds the errors of its coefficients.
+            // The error bound is that of the problem; resolving the scene adds the errors of its coefficients.
             assert!(off <= 2.0 * bar, "case {case}: margin {margin:e} is off by {off:e}, bar {bar:e}\n{scene:?}");
             if margin.abs() <= bar {
                 undecidable += 1;
@@ -144,7 +144,7 @@ fn compare(seed: u64, count: u32) -> (Worst, f64) {
             }
         }
         assert!(solution.outcome.agrees_with(exact.outcome), "case {case}: {solution:?}\n{exact:?}\n{scene:?}");
-        // Rest within round-off of k d may name its stage either way.
+        // Rest within round-off of k d may name either stage.
         if solution.outcome == exact.outcome {
             let errors = errors(&solution, &exact, || reference::conditions(source).unwrap());
             assert!(!errors.exceed(ROUNDINGS_MAX), "case {case}: {errors:?}\n{solution:?}\n{scene:?} V0 = {speed:e}");
@@ -457,7 +457,7 @@ fn an_endless_flight_and_a_stage_without_a_form_are_named() {
         let error = solve(&problem(&[stage], 1.0, speed, exit_depth)).unwrap_err();
         assert!(matches!(error, IntegrationError::NeverEnds { .. }), "{error}");
     }
-    // At the exit and not before: there without speed, and the margin within its bar.
+    // At the exit and not before: there without speed, and the margin within its error bound.
     for exit_depth in [10.0, 10.0 + 4e-15] {
         let within = solve(&problem(&[lost], 1.0, 10.0, exit_depth)).unwrap();
         assert_eq!((within.end.depth, within.exit_margin), (exit_depth, Some(0.0)));
@@ -466,7 +466,7 @@ fn an_endless_flight_and_a_stage_without_a_form_are_named() {
     let (gap, slowing) = (Stage { end: 1.0, ..Stage::tunnel(0.0, 0.0) }, Stage { viscosity: 4.0, ..lost });
     let within = solve(&problem(&[gap, slowing], 2.0, 10.0, 6.0)).unwrap().end;
     assert!((within.time / (0.1 + 0.5 * 36.043_653_389_117_15) - 1.0).abs() < 1e-15, "{within}");
-    // It stands in the way only of a flight that gets there.
+    // It matters only to a flight that gets there.
     assert!(solve(&problem(&[Stage::crater(1e3, 1.0), both], 1.0, 10.0, 3.0)).is_ok());
 }
 

@@ -8,23 +8,23 @@ fn boundary_crossed_twice_within_a_step_is_found_at_its_first_crossing() {
     // xi = 2 t - t², u = 2 - 2 t: past 0.75 at t = 0.5, at rest past it at t = 1, back before it at t = 1.5.
     let law = Law { p: 2.0, ..Law::default() };
     let at = |t: f64| Ok((2.0 * t - t * t, 2.0 - 2.0 * t));
-    let before = Node { time: 0.0, xi: 0.0, u: 2.0 };
-    let after = Node { time: 1.9, xi: 0.19, u: -1.8 };
+    let before = Node { time: 0.0, depth: 0.0, velocity: 2.0 };
+    let after = Node { time: 1.9, depth: 0.19, velocity: -1.8 };
     let (end, place) = locate(&law, before, after, 0.75, at).unwrap();
-    assert_eq!((end, place.xi), (Found::Boundary, 0.75));
-    assert!((place.time - 0.5).abs() < 1e-15 && (place.u - 1.0).abs() < 1e-15, "{place:?}");
+    assert_eq!((end, place.depth), (Found::Boundary, 0.75));
+    assert!((place.time - 0.5).abs() < 1e-15 && (place.velocity - 1.0).abs() < 1e-15, "{place:?}");
     let (end, place) = locate(&law, before, after, 1.25, at).unwrap();
-    assert_eq!((end, place.u), (Found::Rest, 0.0));
-    assert!((place.time - 1.0).abs() < 1e-15 && (place.xi - 1.0).abs() < 1e-15, "{place:?}");
+    assert_eq!((end, place.velocity), (Found::Rest, 0.0));
+    assert!((place.time - 1.0).abs() < 1e-15 && (place.depth - 1.0).abs() < 1e-15, "{place:?}");
     // Touching counts as reached.
     let (end, place) = locate(&law, before, after, 1.0, at).unwrap();
     assert_eq!(end, Found::Boundary);
-    assert!(place.u.abs() < 1e-7, "{place:?}");
+    assert!(place.velocity.abs() < 1e-7, "{place:?}");
 }
 
 #[test]
 fn bracketed_root_is_exact_for_flat_and_steep_functions_whatever_the_slopes() {
-    let node = |time| Node { time, xi: 0.0, u: 0.0 };
+    let node = |time| Node { time, depth: 0.0, velocity: 0.0 };
     // A time of a millionth has its digits too: no absolute width ends the search.
     let f = |node: Node| (node.time - 3e-7, 0.0);
     let root = bracketed_root(node(0.0), node(1e-6), 0.0, f, |t| Ok(node(t))).unwrap();
@@ -55,7 +55,7 @@ fn an_event_takes_few_evaluations_of_the_interpolant() {
     let u = |t: f64| (speed - root * t).tan() / root;
     let xi = |t: f64| 2.0 * ((speed - root * t).cos() / speed.cos()).ln();
     let rest = speed / root;
-    let node = |share: f64| Node { time: share * rest, xi: xi(share * rest), u: u(share * rest) };
+    let node = |share: f64| Node { time: share * rest, depth: xi(share * rest), velocity: u(share * rest) };
     // Rest, a boundary well before it, and one that it has all but reached.
     for (after, distance, most) in [(1.05, 1.0, 3), (0.95, xi(0.9 * rest), 3), (1.05, 0.999 * xi(rest), 12)] {
         let mut evaluations = 0;
@@ -140,7 +140,7 @@ fn rest_that_an_explicit_step_hides_in_its_middle_is_found() {
 
 #[test]
 fn drive_whose_speed_is_lost_in_the_tolerance_is_undecided_and_no_stop() {
-    // It leaves at the terminal velocity 1e-7 V0, which rtol 1e-3 cannot tell from rest.
+    // It leaves at the terminal velocity 1e-7 V0, which rtol 1e-3 cannot distinguish from rest.
     let problem = of_stages(1.0, 1.0, 0.02, &[stage(-1e-5, 0.0, 100.0, 0.0, f64::INFINITY)]);
     for scheme in Scheme::ALL {
         let flight = Diffsol::new(scheme, 1e-3).solve(&problem, Detail::Events).unwrap();
@@ -222,7 +222,7 @@ fn speed_hangs_where_no_static_force_is_left_and_a_creep_ends_where_the_drive_do
     for ends in [law(-1.0, 4.0, 3.0, 0.0), law(-1.0, 0.0, 1.0, 0.0), law(1.0, 4.0, 9.0, 0.0)] {
         assert!(!ends.may_hang(), "{ends:?}");
     }
-    let at = |xi: f64, u: f64| Node { time: 0.0, xi, u };
+    let at = |xi: f64, u: f64| Node { time: 0.0, depth: xi, velocity: u };
     for (law, at, reach) in [
         (law(-8.0, 2.0, 1.0, 0.0), at(1.0, 3.0), 3.0),
         (law(-8.0, 2.0, 1.0, 0.0), at(5.0, 3.0), 0.0),
@@ -280,13 +280,13 @@ fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
     let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
     assert!((Units::of(&light).length - 1.0).abs() < 1e-15);
     let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
-    let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, xi: 5.0, u: 6.0 });
+    let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, depth: 5.0, velocity: 6.0 });
     assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
 }
 
 #[test]
 fn standstill_is_a_rest_where_a_force_above_the_noise_holds_it() {
-    let at = |xi: f64| Node { time: 1.0, xi, u: -1e-9 };
+    let at = |xi: f64| Node { time: 1.0, depth: xi, velocity: -1e-9 };
     let (rest, boundary, approach) = (Found::Rest, Found::Boundary, Found::Approach);
     let noise = 0.01;
     for (law, xi, distance, end) in [
@@ -316,7 +316,7 @@ fn standstill_is_a_rest_where_a_force_above_the_noise_holds_it() {
             Found::Rest => (xi, 0.0),
             Found::Approach => (xi, -1e-9),
         };
-        assert_eq!((place.xi, place.u), (depth, speed));
+        assert_eq!((place.depth, place.velocity), (depth, speed));
     }
 }
 
@@ -372,17 +372,17 @@ fn an_explicit_flight_evaluates_the_force_once_a_leg_and_six_times_a_step_taken_
         for rtol in [1e-2, 1e-5, 1e-9] {
             let flight = Diffsol::new(Scheme::Tsit45, rtol).solve(&problem, Detail::Trajectory).unwrap();
             let Cost { steps, rejected_steps, force_evaluations } = flight.cost;
-            let legs = 1 + flight.stage as u64;
-            // One at the start of each leg, and one in which the library makes the first solver.
-            assert_eq!(force_evaluations, 1 + legs + 6 * (steps + rejected_steps), "{:?}", flight.cost);
-            // Impact, every step but the last of each leg, which ends in its event, and the events.
-            let samples = 1 + steps - legs + flight.events.len() as u64;
+            let stages = 1 + flight.stage as u64;
+            // One at the start of each stage, and one in which the library makes the first solver.
+            assert_eq!(force_evaluations, 1 + stages + 6 * (steps + rejected_steps), "{:?}", flight.cost);
+            // Impact, every step but the last of each stage, which ends in its event, and the events.
+            let samples = 1 + steps - stages + flight.events.len() as u64;
             assert_eq!(flight.trajectory.len() as u64, samples, "{:?}", flight.events);
             rejected += rejected_steps;
         }
     }
     assert!(rejected > 0, "no step was rejected");
-    // Speed that is lost in the tolerance ends a leg in a step that counts too.
+    // Speed that is lost in the tolerance ends a stage in a step that counts too.
     let problem = of_stages(1.0, 1.0, 1.0, &[stage(5.9e-7, 0.0, 1360.0, 0.0, INF)]);
     let flight = Diffsol::new(Scheme::Tsit45, 0.1).solve(&problem, Detail::Trajectory).unwrap();
     assert_eq!(flight.trajectory.len() as u64, flight.cost.steps + 1, "{:?}", flight.cost);

@@ -183,7 +183,7 @@ fn one_correction_is_of_fourth_order_and_states_its_error() {
         let (order, bound) = ((to.time - rest) / rest.powi(4), to.error / at(to.time).velocity.abs());
         assert!(near(order, constant) && near(bound, stated), "{velocity}: {order}, {bound}");
     }
-    // The same for a part of the way to rest, over t⁵.
+    // The same for a part of the step to rest, over t⁵.
     for (velocity, part, constant, stated) in [
         (0.3, 0.9, -0.742, 9.75),
         (0.3, 0.5, 0.301, 4.19),

@@ -119,7 +119,7 @@ fn only_stages_entered_cost_anything() {
     assert_eq!(flight.outcome, Outcome::StoppedInCrater);
     assert_eq!(flight.cost, Cost { steps: 1, rejected_steps: 0, force_evaluations: 23 });
     assert!(flight.trajectory.is_empty() && flight.notes.is_empty());
-    let lines = Taylor::explain(&peer_scene(60.0, f64::INFINITY), &flight);
+    let lines = Taylor::default().explain(&peer_scene(60.0, f64::INFINITY), &flight);
     assert_eq!(lines, ["stage 0: a spring alone: recurrence of one term, no convolution"]);
     // The end alone is the same end.
     let end = Taylor::default().solve(&peer_scene(60.0, 1.0), Detail::End).unwrap();
@@ -206,7 +206,7 @@ fn coefficients_keep_the_digits_of_double_double() {
     }
 }
 
-/// Every term of the bar with its own factor, in numbers that can be followed by hand.
+/// Every term of the error bound with its own factor, in numbers that can be followed by hand.
 #[test]
 fn a_step_adds_its_roundings_to_a_bar_that_fades() {
     let problem = alone(Stage::tunnel(1.0, 0.0), f64::INFINITY);
@@ -283,7 +283,7 @@ fn every_kind_of_stage_is_explained() {
     ];
     let problem = Problem::of_stages(1.0, 10.0, stages).with_exit(0.5);
     assert_eq!(
-        Taylor::explain(&problem, &solve(&problem)),
+        Taylor::default().explain(&problem, &solve(&problem)),
         [
             "stage 0: constant force: the series ends, one step serves",
             "stage 1: a spring alone: recurrence of one term, no convolution",
@@ -361,7 +361,7 @@ fn an_exit_is_at_its_own_depth_where_the_way_to_it_is_rounded() {
     assert_eq!((flight.end.depth, flight.cost.steps), (exit, 2));
 }
 
-/// F = 1, M = 1, V0 = 1: W/V0² = 1 - 2 H. Eight roundings of it are allowed, and a few of 1 for the way to rest.
+/// F = 1, M = 1, V0 = 1: W/V0² = 1 - 2 H. Eight roundings of it are allowed, and a few of 1 for the distance to rest.
 #[test]
 fn the_bar_of_a_deep_stop_is_that_of_the_way_it_lacks() {
     let flight = solve(&one_stage(Stage::tunnel(1.0, 0.0), 1.0, 1000.0));

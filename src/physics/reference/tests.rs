@@ -260,7 +260,7 @@ fn kinds(flight: &ExactFlight) -> Vec<EventKind> {
 }
 
 /// Depth and velocity a time `t` after `from` under `law`: the power series of the equation of motion, sixty terms
-/// in each of 64 legs. It knows no solution.
+/// in each of 64 parts. It knows no solution.
 fn carried(law: &Stage, mass: f64, from: &ExactState, t: &Big) -> (Big, Big) {
     let [p, s, r, q, mass] =
         [law.static_force, law.stiffness, law.viscosity, law.drag, mass].map(|value| big(value, 256));
@@ -316,7 +316,7 @@ fn flights_solve_the_equation_of_motion_from_event_to_event() {
     let cases: [(&[Stage], f64, f64, Outcome); 6] = [
         // Spring and drag together, from a depth of their own.
         (&[stage(0.0, 0.0, 0.0, 0.0, 1.0), stage(2.0, 2.0, 0.0, 0.25, none)], 1.0, none, Outcome::Stopped),
-        // Critically damped: at rest, and on the way to it.
+        // Critically damped: at rest, and before it.
         (&[stage(100.0, 8.0, 8.0, 0.0, none)], 10.0, none, Outcome::Stopped),
         (&[stage(100.0, 8.0, 8.0, 0.0, none)], 10.0, 0.25, Outcome::Perforated),
         // All kinds in a row, each from where the one before leaves off.
@@ -513,7 +513,7 @@ fn agreement_is_52_digits_and_more_bits_are_tried_until_it_is_reached() {
     assert!(!agree(&(&one + (one.clone() >> 173)), &one));
     assert!(!agree(&int(2, 256), &one) && !agree(&one, &int(2, 256)));
     assert!(agree(&Big::ZERO, &Big::ZERO) && !agree(&one, &Big::ZERO));
-    // Half of the bits tell a difference from zero.
+    // Half of the bits distinguish a difference from zero.
     assert!(vanishes(&(one.clone() >> 128), &one, 256) && !vanishes(&(one >> 127), &int(1, 256), 256));
     assert_eq!(settled(Ok, |_, _| true), Ok((384, 384)));
     assert_eq!(settled(Ok, |a, _| *a > 500), Ok((864, 864)));

@@ -12,7 +12,6 @@ use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::exchange::tables::push_line;
 use crate::studies::batch::{PART, SCENES, cells_of, random_rows};
@@ -52,30 +51,6 @@ pub enum Source {
     Generator,
 }
 
-/// Why there is no growth to show.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum GrowthError {
-    /// The table of scenes cannot be written, or the program cannot be run.
-    #[error("{what}: {cause}")]
-    System {
-        /// What was being done.
-        what: String,
-        /// What the system said.
-        cause: io::Error,
-    },
-    /// `batch` failed.
-    #[error("batch of {scenes} scenes ended with {status}: {said}")]
-    Batch {
-        /// Scenes.
-        scenes: u64,
-        /// Exit status in words.
-        status: String,
-        /// The end of its standard error.
-        said: String,
-    },
-}
-
 /// Counts of scenes: the powers of ten up to `most`.
 pub fn counts(most: u64) -> Vec<u64> {
     std::iter::successors(Some(1_u64), |count| count.checked_mul(10)).take_while(|count| *count <= most).collect()
@@ -86,21 +61,15 @@ pub fn counts(most: u64) -> Vec<u64> {
 /// Tables are written in a temporary folder and removed; a million scenes take some 150 MB, and their results as much.
 ///
 /// # Errors
-/// [`GrowthError`].
-pub fn measure(
-    program: &Path,
-    counts: &[u64],
-    threads: &[u16],
-    seed: u64,
-    done: &dyn Fn(),
-) -> Result<Vec<Growth>, GrowthError> {
-    let folder = tempfile::tempdir().map_err(|cause| system("a temporary folder", cause))?;
+/// Where the table of scenes cannot be written, or the program cannot be run or fails.
+pub fn measure(program: &Path, counts: &[u64], threads: &[u16], seed: u64, done: &dyn Fn()) -> io::Result<Vec<Growth>> {
+    let folder = tempfile::tempdir().map_err(|cause| during("a temporary folder", cause))?;
     let mut growths = Vec::new();
     for &scenes in counts {
         let table = folder.path().join("scenes.csv");
         let source = if scenes <= FILE_MAX { Source::File } else { Source::Generator };
         if source == Source::File {
-            write_scenes(&table, scenes, seed).map_err(|cause| system("the table of scenes", cause))?;
+            write_scenes(&table, scenes, seed).map_err(|cause| during("the table of scenes", cause))?;
         }
         for &threads in threads {
             growths.push(repeated(program, &table, (scenes, threads), source, seed)?);
@@ -110,8 +79,9 @@ pub fn measure(
     Ok(growths)
 }
 
-fn system(what: &str, cause: io::Error) -> GrowthError {
-    GrowthError::System { what: what.to_owned(), cause }
+/// What was being done when `cause` came.
+fn during(what: &str, cause: io::Error) -> io::Error {
+    io::Error::new(cause.kind(), format!("{what}: {cause}"))
 }
 
 /// The shortest of some runs: what disturbs a process only ever makes it longer.
@@ -121,7 +91,7 @@ fn repeated(
     (scenes, threads): (u64, u16),
     source: Source,
     seed: u64,
-) -> Result<Growth, GrowthError> {
+) -> io::Result<Growth> {
     let runs: usize = if scenes <= 100_000 { 5 } else { 1 };
     let mut growth =
         Growth { scenes, threads, source, seconds: f64::INFINITY, ns_a_scene: 0.0, peak_bytes: None, runs };
@@ -141,8 +111,8 @@ fn repeated(
 }
 
 /// Runs `command` to its end: time (s) and peak memory (bytes).
-fn run(command: &mut Command, scenes: u64) -> Result<(f64, Option<u64>), GrowthError> {
-    let failed = |cause| system("penetrode batch", cause);
+fn run(command: &mut Command, scenes: u64) -> io::Result<(f64, Option<u64>)> {
+    let failed = |cause| during("penetrode batch", cause);
     let mut complaints = tempfile::tempfile().map_err(failed)?;
     let started = Instant::now();
     let mut child = command
@@ -167,8 +137,8 @@ fn run(command: &mut Command, scenes: u64) -> Result<(f64, Option<u64>), GrowthE
     let mut said = String::new();
     // Without its words the status says what there is to say.
     let _ = io::Seek::rewind(&mut complaints).and_then(|()| io::Read::read_to_string(&mut complaints, &mut said));
-    let said = said.lines().last().unwrap_or("").chars().take(200).collect();
-    Err(GrowthError::Batch { scenes, status: status.to_string(), said })
+    let said: String = said.lines().last().unwrap_or("").chars().take(200).collect();
+    Err(io::Error::other(format!("batch of {scenes} scenes ended with {status}: {said}")))
 }
 
 /// High-water mark of the resident memory of process `id` (bytes), where the system has one to read.

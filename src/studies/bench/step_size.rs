@@ -10,14 +10,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::timing::{Effort, Timing};
-use super::work_precision::{CaseError, variant_name};
-use crate::integrators::{
-    Boundaries, CentralDifference, Cost, Detail, Flight, IntegrationError, Integrator, Method, MethodName,
-    MethodOptions, VelocityAt,
-};
+use super::work_precision::variant_name;
+use crate::integrators::{Boundaries, Cost, Detail, Flight, Integrator, Method, MethodName, MethodOptions, VelocityAt};
 use crate::physics::{Problem, Scene};
 use crate::studies::critical_velocity;
-use crate::studies::error::{Truth, flight_error, is_fixed, signed_error};
+use crate::studies::error::{StudyError, Truth, flight_error, is_fixed, signed_error};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
@@ -224,12 +221,12 @@ impl Question<'_> {
     fn curve(
         &self,
         method: String,
-        adaptive: bool,
+        name: MethodName,
         walk: Walk,
         effort: Effort,
-        with_size: &dyn Fn(f64) -> Result<Method, IntegrationError>,
+        with_size: &dyn Fn(f64) -> MethodOptions,
     ) -> Curve {
-        let build = |size: f64| with_size(size).ok();
+        let build = |size: f64| Method::new(name, &with_size(size)).ok();
         let answer = |size: f64| self.answer(build(size)?.integrator());
         let time = |size: f64, effort: Effort| {
             let method = build(size)?;
@@ -259,17 +256,18 @@ impl Question<'_> {
                 }
             })
             .collect();
-        Curve { method, adaptive, points, held }
+        Curve { method, adaptive: name != MethodName::CentralDifference, points, held }
     }
 }
 
 /// The studies of `scene`, one for each free quantity of [`QUANTITIES`].
 ///
 /// # Errors
-/// [`CaseError`]: the scene does not resolve, or has nothing to measure by.
-pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<Vec<StepStudy>, CaseError> {
+/// [`StudyError`]: the scene does not resolve, or has nothing to measure by.
+pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<Vec<StepStudy>, StudyError> {
     let problem = scene.problem()?;
     let exact = Truth::of(&problem)?.flight;
+    let plain = MethodOptions::default();
     let mut studies = Vec::new();
     for quantity in questions(scene, &problem, &exact) {
         let critical = match quantity {
@@ -287,15 +285,16 @@ pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<
         let mut curves = Vec::new();
         for velocity in VELOCITIES {
             for boundaries in BOUNDARIES {
-                let with_size =
-                    |dt| Ok(Method::CentralDifference(CentralDifference::uniform(dt, velocity, boundaries)));
-                curves.push(question.curve(variant_name(velocity, boundaries), false, steps, effort, &with_size));
+                let options = MethodOptions { velocity: Some(velocity), events: Some(boundaries), ..plain.clone() };
+                let with_size = |dt| MethodOptions { dt: Some(dt), ..options.clone() };
+                let name = variant_name(velocity, boundaries);
+                curves.push(question.curve(name, MethodName::CentralDifference, steps, effort, &with_size));
             }
         }
         let tolerances = Walk { from: TOLERANCES[1], to: TOLERANCES[0], per_decade: 4, probes: 8, seed };
         for name in ADAPTIVE.into_iter().filter(|name| name.is_built()) {
-            let with_size = |rtol| Method::new(name, &MethodOptions { rtol: Some(rtol), ..MethodOptions::default() });
-            curves.push(question.curve(name.to_string(), true, tolerances, effort, &with_size));
+            let with_size = |rtol| MethodOptions { rtol: Some(rtol), ..plain.clone() };
+            curves.push(question.curve(name.to_string(), name, tolerances, effort, &with_size));
         }
         studies.push(StepStudy { scene: name.to_owned(), quantity, flight_time_s: time, curves });
     }

@@ -17,8 +17,8 @@ use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Method, MethodName, MethodOptions, VelocityAt,
 };
 use crate::physics::reference::{self, Conditions, ExactFlight, Source};
-use crate::physics::{Advice, Outcome, Problem, ResolveError, Scene};
-use crate::studies::error::{Errors, Truth, flight_error, free_quantities};
+use crate::physics::{Outcome, Problem, Scene};
+use crate::studies::error::{Errors, StudyError, Truth, flight_error, free_quantities};
 use crate::studies::quantity::Quantity;
 use crate::studies::random_scenes::Generator;
 
@@ -55,9 +55,7 @@ pub enum Judgement {
     Right(f64, Quantity),
     /// The method cannot decide the outcome.
     Undecided,
-    /// Another outcome than the exact one, an event too few or too many, or not a number.
-    Wrong(String),
-    /// No answer.
+    /// No answer, another outcome than the exact one, an event too few or too many, or not a number.
     Failed(String),
 }
 
@@ -90,7 +88,7 @@ impl Known {
             Reference::Refined(refined) => refined.outcome,
         };
         if !flight.outcome.agrees_with(exact) {
-            return Judgement::Wrong(format!("{} in place of {exact}", flight.outcome));
+            return Judgement::Failed(format!("{} in place of {exact}", flight.outcome));
         }
         let mut worst = (0.0, Quantity::Depth);
         for (error, quantity) in self.errors(flight) {
@@ -98,7 +96,7 @@ impl Known {
                 continue;
             }
             if !error.is_finite() {
-                return Judgement::Wrong(if quantity.is_at_crater_end() {
+                return Judgement::Failed(if quantity.is_at_crater_end() {
                     "x = k d is an event too few or too many".to_owned()
                 } else {
                     format!("{quantity} is not a number")
@@ -139,32 +137,12 @@ pub struct Case {
     pub problems: Vec<Known>,
 }
 
-/// Why a scene cannot be measured.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum CaseError {
-    /// It does not resolve.
-    #[error(transparent)]
-    Resolve(#[from] ResolveError),
-    /// It has no answer to measure by.
-    #[error(transparent)]
-    Integration(#[from] IntegrationError),
-}
-
-impl Advice for CaseError {
-    fn inner(&self) -> Option<&dyn Advice> {
-        Some(match self {
-            Self::Resolve(error) => error,
-            Self::Integration(error) => error,
-        })
-    }
-}
-
 impl Case {
     /// The case of one scene.
     ///
     /// # Errors
-    /// [`CaseError`].
-    pub fn of_scene(name: &str, scene: &Scene) -> Result<Self, CaseError> {
+    /// [`StudyError`].
+    pub fn of_scene(name: &str, scene: &Scene) -> Result<Self, StudyError> {
         let problems = vec![Known::new(scene.problem()?)?];
         Ok(Self { name: name.to_owned(), title: scene.title.clone(), problems })
     }
@@ -172,12 +150,12 @@ impl Case {
     /// `count` varied scenes from a seed: repeating one scene flatters a method whose branches the processor learns.
     ///
     /// # Errors
-    /// [`CaseError`].
-    pub fn varied(count: usize, seed: u64) -> Result<Self, CaseError> {
+    /// [`StudyError`].
+    pub fn varied(count: usize, seed: u64) -> Result<Self, StudyError> {
         let mut generator = Generator::new(seed, "bench");
         let scenes: Vec<Scene> = (0..count).map(|_| generator.next_scene()).collect();
         let problems =
-            scenes.par_iter().map(|scene| Ok(Known::new(scene.problem()?)?)).collect::<Result<_, CaseError>>()?;
+            scenes.par_iter().map(|scene| Ok(Known::new(scene.problem()?)?)).collect::<Result<_, StudyError>>()?;
         let title = Some(format!("{count} scenes from seed {seed}, worst error and mean time"));
         Ok(Self { name: "varied".to_owned(), title, problems })
     }
@@ -380,7 +358,7 @@ impl Tally {
                 run.state = run.state.max(RunState::Undecided);
                 Some("inside its error bar".to_owned())
             }
-            Judgement::Wrong(why) | Judgement::Failed(why) => {
+            Judgement::Failed(why) => {
                 run.failed += 1;
                 // A failure says more than an undecided solution before it.
                 if run.state < RunState::Failed {
@@ -556,7 +534,7 @@ mod tests {
     fn only_runs_that_are_right_throughout_count_as_fast_however_fast_the_others_are() {
         let right = Judgement::Right(1e-7, Quantity::Depth);
         let runs = [
-            run_of(&[right.clone(), Judgement::Wrong("lost".into())], Setting::Tolerance(1e-2), 1.0),
+            run_of(&[right.clone(), Judgement::Failed("lost".into())], Setting::Tolerance(1e-2), 1.0),
             run_of(&[right.clone(), Judgement::Undecided], Setting::Tolerance(1e-3), 2.0),
             run_of(&[Judgement::Failed("no end".into())], Setting::Tolerance(1e-4), 3.0),
             run_of(&[right.clone(), Judgement::Right(1e-4, Quantity::Time)], Setting::Tolerance(1e-5), 4.0),
@@ -583,15 +561,17 @@ mod tests {
         // Over the condition number of the depth, a few units.
         assert!(matches!(known.judge(&off, true), Judgement::Right(error, Quantity::Depth) if error > 1e-4));
         let perforated = Flight { outcome: Outcome::Perforated, ..right.clone() };
-        assert!(matches!(known.judge(&perforated, true), Judgement::Wrong(_)));
+        assert!(matches!(known.judge(&perforated, true), Judgement::Failed(_)));
         let undecided = Flight { outcome: Outcome::Undecided, ..right.clone() };
         assert_eq!(known.judge(&undecided, true), Judgement::Undecided);
         let mut silent = right.clone();
         silent.events.clear();
-        assert!(matches!(known.judge(&silent, true), Judgement::Wrong(_)));
+        // An event that only the exact solution has counts with W there.
+        let with_crater_end = known.judge(&silent, true);
+        assert!(matches!(with_crater_end, Judgement::Right(w, Quantity::CraterEndVelocity) if w > 1e-3));
         assert!(matches!(known.judge(&silent, false), Judgement::Right(..)), "a peer need not list events");
         let mut lost = right;
         lost.end.time = f64::NAN;
-        assert!(matches!(known.judge(&lost, true), Judgement::Wrong(_)));
+        assert!(matches!(known.judge(&lost, true), Judgement::Failed(_)));
     }
 }

@@ -1,5 +1,3 @@
-use std::convert::Infallible;
-
 use super::*;
 use crate::integrators::{Detail, Energy, Flight, Margin};
 use crate::physics::exit_energy::expm1_over;
@@ -20,7 +18,7 @@ const SLAB: Slab = Slab { mass: 2.0, kd: 0.1, p: 848_230.0, q: 3.25, c: None, h:
 
 impl Slab {
     #[expect(clippy::unnecessary_wraps, reason = "it stands for a scene, which may refuse")]
-    fn at(self, v0: f64) -> Result<Problem, Infallible> {
+    fn at(self, v0: f64) -> Result<Problem, ResolveError> {
         let Self { mass, kd, p, q, c, h } = self;
         let c = c.unwrap_or(mass * (p + q * v0 * v0) / (kd * (mass + kd * q)));
         let crater = Stage::crater(c, kd);
@@ -46,7 +44,7 @@ impl Slab {
     }
 }
 
-fn stages_at(stages: &[Stage], exit: f64) -> impl Fn(f64) -> Result<Problem, Infallible> {
+fn stages_at(stages: &[Stage], exit: f64) -> impl Fn(f64) -> Result<Problem, ResolveError> {
     move |v0| Ok(Problem::of_stages(1.0, v0, stages.iter().copied()).with_exit(exit))
 }
 
@@ -72,8 +70,8 @@ impl<F: Fn(&Problem) -> (f64, Option<f64>)> Integrator for Oracle<F> {
     }
 }
 
-fn search(slab: Slab, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError<Infallible>> {
-    critical_velocity(|v0| slab.at(v0), integrator, Options::default())
+fn search(slab: Slab, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError> {
+    critical_velocity(|v0| slab.at(v0), integrator)
 }
 
 /// True margin of the slab, affine in V0².
@@ -136,7 +134,7 @@ fn a_slab_that_takes_nearly_all_of_v0_is_searched_in_time_or_over_depth() {
 
 #[test]
 fn an_error_bar_that_leaves_no_digit_is_undecided_and_not_a_number() {
-    // A bar of some ulp of V0², where the drag takes 1e17 of that.
+    // An error bound of some ulp of V0², where the drag takes 1e17 of that.
     let slab = Slab { h: 12.0, ..SLAB };
     let coarse = Oracle(|problem: &Problem| (true_margin(problem), Some(1e-15)));
     let refusal = search(slab, &coarse).unwrap_err();
@@ -157,10 +155,10 @@ fn layers_that_only_slow_have_a_critical_velocity_though_slower_flights_never_en
         let at = |impact_speed| {
             let stages = Stages::from_slice(&stages);
             let target = Target::Stages;
-            Ok::<_, Infallible>(Problem { mass: 1.0, impact_speed, exit_depth: 1.0, stages, crater: None, target })
+            Ok::<_, ResolveError>(Problem { mass: 1.0, impact_speed, exit_depth: 1.0, stages, crater: None, target })
         };
         for integrator in [&Taylor::default() as &dyn Integrator, &crate::integrators::ClosedForm] {
-            let found = critical_velocity(at, integrator, Options::default()).unwrap();
+            let found = critical_velocity(at, integrator).unwrap();
             let (error, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap());
             assert!(error <= bar && error < 1e-14, "{} {stages:?}: {found:?} and not {exact}", integrator.name());
         }
@@ -176,7 +174,7 @@ fn usual_slab_takes_four_flights() {
     assert!(found.cost.force_evaluations > 0);
 }
 
-/// A looser method has a wider bar, which holds, and takes no more flights than the bar is worth.
+/// A looser method has a wider error bound, which holds, and takes no more flights than that bound needs.
 #[test]
 fn bar_of_a_loose_method_holds() {
     let exact = SLAB.critical();
@@ -201,18 +199,11 @@ fn tolerance_asked_for_is_kept_and_saves_flights() {
     let viscous = |v0| {
         let mut problem = SLAB.at(v0)?;
         problem.stages[1].viscosity = 1.0;
-        Ok::<_, Infallible>(problem)
+        Ok::<_, ResolveError>(problem)
     };
-    let fine = critical_velocity(viscous, &bent, Options::default()).unwrap();
+    let fine = critical_velocity(viscous, &bent).unwrap();
     assert!((fine.velocity / exact - 1.0).abs() < 1e-15, "{fine:?}");
     assert!(fine.evaluations <= 15, "{}", fine.evaluations);
-    let coarse = critical_velocity(viscous, &bent, Options { rtol: 1e-4, ..Options::default() }).unwrap();
-    assert!((coarse.velocity - exact).abs() <= coarse.error_bar.unwrap());
-    assert!((coarse.velocity / exact - 1.0).abs() < 1e-4 && coarse.evaluations < fine.evaluations);
-    for rtol in [-1.0, f64::NAN, 1.0] {
-        let refusal = critical_velocity(viscous, &bent, Options { rtol, ..Options::default() }).unwrap_err();
-        assert!(refusal.is_usage(), "{refusal}");
-    }
 }
 
 /// Findings 4 and 5 of the survey: these objectives made `BrentRoot` "converge" at an end of its bracket.
@@ -232,7 +223,7 @@ fn depth_capped_at_the_exit_as_objective_is_refused() {
         let capped = Oracle(|problem: &Problem| (true_margin(problem).min(0.0), bar));
         let refusal = search(SLAB, &capped).unwrap_err();
         let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
-        assert!(low.exit_energy < 0.0 && high.exit_energy == 0.0);
+        assert!(low.w < 0.0 && high.w == 0.0);
         assert!(refusal.to_string().contains(&low.to_string()) && refusal.to_string().contains(&high.to_string()));
     }
 }
@@ -244,11 +235,11 @@ fn residual_energy_without_a_sign_as_objective_is_refused() {
         let residual = Oracle(|problem: &Problem| (true_margin(problem).max(0.0), bar));
         let refusal = search(SLAB, &residual).unwrap_err();
         let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
-        assert!(low.exit_energy == 0.0 && high.exit_energy > 0.0);
+        assert!(low.w == 0.0 && high.w > 0.0);
     }
 }
 
-/// Noise within the bar, different at every speed, as adaptive steps make it.
+/// Noise within the error bound, different at every speed, as adaptive steps make it.
 #[test]
 fn noise_within_the_bar_costs_neither_flights_nor_truth() {
     for noise in [1e-12, 1e-9, 1e-6, 1e-3] {
@@ -276,7 +267,7 @@ fn root_of_a_margin_with_an_infinite_slope_is_found() {
 }
 
 /// A scheme that sees the exit at a step's end: W is a staircase over V0. Its sign change is still located, and no
-/// bar is invented.
+/// error bound is invented.
 #[test]
 fn sign_change_of_a_staircase_is_located() {
     let staircase = Oracle(|problem: &Problem| {
@@ -309,7 +300,7 @@ fn margin_of_one_sign_shows_both_ends() {
     let never = Oracle(|_: &Problem| (-0.5, None));
     let refusal = search(SLAB, &never).unwrap_err();
     let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
-    assert!(low.velocity < high.velocity && low.exit_energy < 0.0 && high.exit_energy < 0.0);
+    assert!(low.velocity() < high.velocity() && low.w < 0.0 && high.w < 0.0);
     // The slab of a kilometre: e^y leaves the range of the numbers.
     let refusal = search(Slab { h: 1000.0, ..SLAB }, &Energy::new()).unwrap_err();
     assert!(!refusal.is_usage() && refusal.to_string().contains("no critical velocity up to"), "{refusal}");
@@ -317,8 +308,7 @@ fn margin_of_one_sign_shows_both_ends() {
 
 #[test]
 fn flights_are_bounded() {
-    let options = Options { flights_max: 3, ..Options::default() };
-    let refusal = critical_velocity(|v0| SLAB.at(v0), &Energy::new(), options).unwrap_err();
+    let refusal = within(3, |v0| SLAB.at(v0), &Energy::new()).unwrap_err();
     assert!(matches!(refusal, CriticalError::NotConverged { flights: 3, .. }), "{refusal}");
 }
 
@@ -338,14 +328,14 @@ fn target_without_thickness_takes_no_flight() {
 
 #[test]
 fn errors_of_scene_and_flight_come_through() {
-    let refusal = critical_velocity(|_| Err("no such scene"), &Energy::new(), Options::default()).unwrap_err();
-    assert!(refusal.is_usage() && refusal.to_string().contains("no such scene"), "{refusal}");
+    let refusal = critical_velocity(|_| Err(ResolveError::NoStage), &Energy::new()).unwrap_err();
+    assert!(refusal.is_usage() && refusal.to_string().contains("the scene has no stage"), "{refusal}");
     let viscous = |v0| {
         let mut problem = SLAB.at(v0)?;
         problem.stages[1].viscosity = 1.0;
-        Ok::<_, Infallible>(problem)
+        Ok::<_, ResolveError>(problem)
     };
-    let refusal = critical_velocity(viscous, &Energy::new(), Options::default()).unwrap_err();
+    let refusal = critical_velocity(viscous, &Energy::new()).unwrap_err();
     assert!(refusal.is_usage() && matches!(refusal, CriticalError::Flight { .. }), "{refusal}");
 }
 
@@ -353,7 +343,7 @@ fn errors_of_scene_and_flight_come_through() {
 fn target_that_only_drives_or_drags_is_perforated_at_any_speed() {
     let end = f64::INFINITY;
     for stages in [vec![constant(-10.0, 0.0, end)], vec![constant(-10.0, 2.0, end)], vec![constant(0.0, 2.0, end)]] {
-        let found = critical_velocity(stages_at(&stages, 2.0), &Energy::new(), Options::default()).unwrap();
+        let found = critical_velocity(stages_at(&stages, 2.0), &Energy::new()).unwrap();
         assert_eq!((found.velocity, found.energy), (0.0, 0.0), "{stages:?}");
         assert!(found.error_bar.unwrap() < 1e-12 && !found.note.is_empty(), "{found:?}");
     }
@@ -362,7 +352,7 @@ fn target_that_only_drives_or_drags_is_perforated_at_any_speed() {
 /// A drive before a barrier lowers `V_c`, a drive behind it does not; one that outdoes the barrier leaves none.
 #[test]
 fn barrier_decides_the_critical_velocity_of_a_driven_target() {
-    let search = |stages: &[Stage]| critical_velocity(stages_at(stages, 3.0), &Energy::new(), Options::default());
+    let search = |stages: &[Stage]| critical_velocity(stages_at(stages, 3.0), &Energy::new());
     let (drive, barrier) = (constant(-4.0, 0.0, 1.0), constant(10.0, 0.0, 2.0));
     let found = search(&[drive, barrier, constant(-100.0, 0.0, f64::INFINITY)]).unwrap();
     assert!((found.velocity - 12.0_f64.sqrt()).abs() < 1e-14, "{found:?}");

@@ -411,7 +411,7 @@ fn what_is_left_of_too_few_points_says_so() {
     // Three zeros and two errors of the size of their round-off.
     let floor = (Class::AtFloor, "5 of 8 errors are zero or round-off".to_owned());
     assert_eq!(of(&[0.0, 1.0, 0.0, -1.0, 0.0, 1e6, 2e6, 3e6]), floor);
-    // Of five points below a bend two give way to the law above it, and three make no line.
+    // Of five points below a bend two are left to the law above it, and three make no line.
     let bend = fit(&bent([5, 5], 0.1, [1.0, 1.5], |_| 1e6)).unwrap();
     assert_eq!((bend.line, bend.class), (None, Class::Undecided));
     assert_eq!(bend.reason, "3 points are too few");

@@ -9,7 +9,7 @@ use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
 };
 use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
-use crate::studies::critical_velocity::{self, Options};
+use crate::studies::critical_velocity;
 use crate::studies::relations::way_back;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 
@@ -298,8 +298,7 @@ fn approached_for_ever(subject: &Subject<'_>) -> Found {
             seen.expect(right, || format!("{sign}e-{power}: {:?}", said.map(|flight| flight.outcome)));
         }
     }
-    let resolve = |speed| Ok::<_, std::convert::Infallible>(at(speed));
-    let found = critical_velocity::critical_velocity(resolve, method.integrator(), Options::default())?;
+    let found = critical_velocity::critical_velocity(|speed| Ok(at(speed)), method.integrator())?;
     seen.expect((found.velocity - critical).abs() <= found.error_bar.unwrap_or(0.0), || {
         format!("V_c {} +- {:?}", found.velocity, found.error_bar)
     });
