@@ -66,7 +66,7 @@ impl Ask for ExperimentsArgs {
         let comparisons = experiments::compare(&experiments, self.k, &spreads, method.integrator())?;
         if let Some(path) = &self.out {
             let figure = sweep_figures::measured_depths(&comparisons, &[]);
-            write_table(path, sweep_figures::measured_table(&comparisons).to_csv(), &[""], [figure])?;
+            write_table(path, Ok(sweep_figures::measured_table(&comparisons).into_bytes()), &[""], [figure])?;
         }
         let data = ExperimentsJson {
             schema: "penetrode/experiments/1",

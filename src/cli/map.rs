@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use super::output::{Text, check_table, significant, write_table};
 use super::{Answer, Ask, CliError, Exit};
+use crate::exchange::tables::{Value, push_line};
 use crate::physics::Shown;
 use crate::report::sweep_figures;
-use crate::report::table::Table;
 use crate::studies::applicability::{self, LEVELS, Line};
 use crate::studies::experiments::{self, MarkedScene};
 
@@ -54,12 +54,13 @@ impl Ask for MapArgs {
         let scenes = experiments::marked(&experiments::shipped()?);
         let map = MapJson { schema: "penetrode/map/1", k: self.k, lines: applicability::lines(self.k), scenes };
         if let Some(path) = &self.out {
-            let mut lines = Table::new("level,I,N");
+            let mut csv = "level,I,N\n".to_owned();
             for line in &map.lines {
-                line.points.iter().for_each(|(i, n)| lines.push([&line.level, i, n]));
+                let cells = |(i, n): &(f64, f64)| [line.level, *i, *n].map(|number| Value::Number(Some(number)));
+                line.points.iter().for_each(|point| push_line(&mut csv, &cells(point)));
             }
             let figure = sweep_figures::applicability(self.k, &map.lines, &map.scenes, &[]);
-            write_table(path, lines.to_csv(), &[""], [figure])?;
+            write_table(path, Ok(csv.into_bytes()), &[""], [figure])?;
         }
         Ok(Answer { text: map.text(), data: Some(map), exit: Exit::Success })
     }

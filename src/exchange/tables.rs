@@ -438,7 +438,13 @@ pub fn push_number(text: &mut String, value: f64) {
 }
 
 /// A text as one CSV cell of one line, quoted unless it is a word.
+///
+/// One that begins like a formula has a `'` in front, as spreadsheets have it; the text of a number keeps its sign.
 fn push_text(line: &mut String, text: &str) {
+    let is_formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
+    if is_formula {
+        return push_text(line, &format!("'{text}"));
+    }
     if text.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_') {
         line.push_str(text);
         return;
@@ -624,6 +630,23 @@ pub fn table_of<'a>(
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_text_is_one_cell_of_one_line_and_no_formula() {
+        for (text, cell) in [
+            ("=1+1", "\"'=1+1\""),
+            ("@SUM(A1)", "\"'@SUM(A1)\""),
+            ("+cmd", "\"'+cmd\""),
+            ("-1.5e-3", "\"-1.5e-3\""),
+            ("a,\"b\"\n", "\"a,\"\"b\"\" \""),
+            ("\u{1b}[31mred", "\" [31mred\""),
+            ("word", "word"),
+        ] {
+            let mut line = String::new();
+            push_text(&mut line, text);
+            assert_eq!(line, cell);
+        }
+    }
 
     #[test]
     fn numbers_read_back_to_the_same_number() {

@@ -25,6 +25,7 @@ use crate::physics::{Problem, Shown};
     Ord,
     Hash,
     serde::Deserialize,
+    serde::Serialize,
     strum::Display,
     strum::EnumString,
     strum::IntoStaticStr,

@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::table::Table;
 use super::text::{number, one_line, power_of_ten};
+use crate::exchange::tables::{Value, push_line};
 
 /// Width of a panel: it fits a phone of 375 px.
 pub const WIDTH: f64 = 344.0;
@@ -280,7 +280,8 @@ impl Span {
 }
 
 /// Where a text stands against its place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Anchor {
     /// To the right of it.
     Start,
@@ -313,7 +314,6 @@ struct Reference {
 pub struct Panel {
     /// What sets it apart from its neighbours.
     pub title: String,
-    sentence: String,
     x: Axis,
     y: Axis,
     series: Vec<Series>,
@@ -327,11 +327,6 @@ impl Panel {
     /// A panel without data. A `y` without a title is not drawn.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self { title: title.into(), x, y, height: HEIGHT, ..Self::default() }
-    }
-
-    /// Says what is seen, for those who cannot see it. Axes, ranges and names of series are added to it.
-    pub fn described(self, sentence: impl Into<String>) -> Self {
-        Self { sentence: sentence.into(), ..self }
     }
 
     /// Sets the height of the diagram.
@@ -357,7 +352,7 @@ impl Panel {
         self.series(name, Style::area(ink), [(x[0], y[0]), (x[0], y[1]), (x[1], y[1]), (x[1], y[0])])
     }
 
-    /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands where there is room.
+    /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands at its left end.
     pub fn slope(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
         self.references.push(Reference { name: name.into(), slope, through, is_shaded: false });
         self
@@ -406,11 +401,13 @@ impl Panel {
         series.points.iter().filter(has_place).map(|(x, y)| (self.x.drawn(*x), self.y.drawn(*y)))
     }
 
-    /// A row for each point of each series.
-    pub(super) fn tabulate(&self, table: &mut Table) {
+    /// Appends a line of CSV for each point of each series.
+    pub(super) fn push_lines(&self, csv: &mut String) {
         for Series { name, points, .. } in &self.series {
             for (x, y) in points {
-                table.push([&self.title, name, &self.x.label, x, &self.y.label, y]);
+                let [title, name, x_axis, y_axis] =
+                    [&self.title, name, &self.x.label, &self.y.label].map(|t| Value::Text(t));
+                push_line(csv, &[title, name, x_axis, Value::Number(Some(*x)), y_axis, Value::Number(Some(*y))]);
             }
         }
     }
@@ -473,7 +470,7 @@ impl Panel {
         let axes = if self.y.label.is_empty() { x } else { format!("{} over {x}", ends(&self.y, frame.y)) };
         let names: Vec<_> = self.legend().into_iter().map(|(.., series)| series.name.as_str()).collect();
         let names = if names.is_empty() { String::new() } else { format!(" Series: {}.", names.join("; ")) };
-        format!("{} {axes}.{names}", self.sentence).trim_start().to_owned()
+        format!("{axes}.{names}")
     }
 
     /// The panel as SVG elements, the legend in `legend_rows` rows.
@@ -499,7 +496,12 @@ impl Panel {
                 @for (index, (name, x)) in self.uprights.iter().enumerate() {
                     (frame.upright_name(name, *x, index % self.upright_rows()))
                 }
-                (self.names_of(&lines, &frame))
+                @for line in lines {
+                    @if let Some(ends) = line.ends(&frame) {
+                        @let (x, y) = frame.inside(ends[0]);
+                        (text((x + 5.0, y - 5.0), &line.name, Ink::Muted, Anchor::Start))
+                    }
+                }
                 @for (at, label, anchor) in &self.labels {
                     @let (x, y) = frame.at(*at);
                     (text((x, y + 4.0), label, Ink::Text, *anchor))
@@ -539,42 +541,6 @@ impl Panel {
             @for (v, label) in &rows {
                 @let (x, y) = frame.inside((0.0, *v));
                 (text((x - 6.0, y + 4.0), label, Ink::Muted, Anchor::End))
-            }
-        }
-    }
-
-    /// The names of `lines`, each beside its line where no point and no other line is.
-    fn names_of(&self, lines: &[&Reference], frame: &Frame) -> Markup {
-        let along =
-            |[from, to]: [Point; 2], share: f64| (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share);
-        let points: Vec<Point> = self.points().map(|p| frame.shares(p)).collect();
-        let mut names = Vec::new();
-        for (index, line) in lines.iter().enumerate() {
-            let Some(ends) = line.ends(frame) else { continue };
-            let others = lines.iter().enumerate().filter(|(other, _)| *other != index);
-            let others = others.filter_map(|(_, other)| other.ends(frame));
-            let mut obstacles: Vec<Point> =
-                others.flat_map(|ends| (0..100).map(move |i| along(ends, f64::from(i) / 99.0))).collect();
-            obstacles.extend(&points);
-            let [width, height] = [width_of(&line.name) / frame.width, LINE / frame.height];
-            let rises = ends[1].1 >= ends[0].1;
-            // Lower left corner of the name: above the line on the side where it is lower, or below on the other.
-            let corner = |share: f64, is_above: bool| {
-                let (u, v) = along(ends, share);
-                (if is_above == rises { u - width } else { u }, if is_above { v } else { v - height })
-            };
-            let crowd = |(u, v): &Point| {
-                let hit = |(x, y): &&Point| u - 0.02 < *x && *x < u + width + 0.02 && v - 0.02 < *y && *y < v + height;
-                let is_inside = *u >= 0.0 && u + width <= 1.0 && *v >= 0.0 && v + height <= 1.0;
-                if is_inside { obstacles.iter().filter(hit).count() } else { usize::MAX }
-            };
-            let places = (1..20).flat_map(|i| [true, false].map(|above| corner(0.05 * f64::from(i), above)));
-            names.extend(places.min_by_key(crowd).map(|place| (place, &line.name)));
-        }
-        html! {
-            @for (place, name) in names {
-                @let (x, y) = frame.inside(place);
-                (text((x, y - 5.0), name, Ink::Muted, Anchor::Start))
             }
         }
     }
@@ -634,12 +600,9 @@ impl Frame {
     /// The name of an upright line, on the side where there is more room.
     fn upright_name(&self, name: &str, x: f64, row: usize) -> Markup {
         let (x, y) = self.inside((self.x.share(x), 1.0));
-        let y = y + 11.0 + 12.0 * row as f64;
-        if x > self.left + 0.5 * self.width {
-            text((x - 5.0, y), name, Ink::Muted, Anchor::End)
-        } else {
-            text((x + 5.0, y), name, Ink::Muted, Anchor::Start)
-        }
+        let is_right = x > self.left + 0.5 * self.width;
+        let (beside, anchor) = if is_right { (x - 5.0, Anchor::End) } else { (x + 5.0, Anchor::Start) };
+        text((beside, y + 11.0 + 12.0 * row as f64), name, Ink::Muted, anchor)
     }
 }
 
@@ -655,14 +618,9 @@ fn width_of(text: &str) -> f64 {
 }
 
 fn text((x, y): Point, text: &str, ink: Ink, anchor: Anchor) -> Markup {
-    let anchor = match anchor {
-        Anchor::Start => "start",
-        Anchor::End => "end",
-        Anchor::Middle => "middle",
-    };
     let [x, y] = [x, y].map(|length| format!("{length:.1}"));
     html! {
-        text x=(x) y=(y) text-anchor=(anchor) fill=(ink.light()) class={ "f-" (ink.name()) } { (one_line(text)) }
+        text x=(x) y=(y) text-anchor=(<&str>::from(anchor)) fill=(ink.light()) class={ "f-" (ink.name()) } { (one_line(text)) }
         (PreEscaped("\n"))
     }
 }

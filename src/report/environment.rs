@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use chrono::Utc;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -63,10 +64,7 @@ impl Environment {
             rustc: env!("PENETRODE_RUSTC"),
             target: env!("PENETRODE_TARGET"),
             profile: env!("PENETRODE_PROFILE"),
-            features: [("diffsol", cfg!(feature = "diffsol"))]
-                .into_iter()
-                .filter_map(|(name, on)| on.then_some(name))
-                .collect(),
+            features: if cfg!(feature = "diffsol") { vec!["diffsol"] } else { Vec::new() },
             lock_file_hash: hash(LOCK_FILE),
             suite_hash: None,
             scenes_hash: hash(scenes),
@@ -76,7 +74,7 @@ impl Environment {
             seed,
             command,
             peers,
-            date: utc_now(),
+            date: Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
         }
     }
 }
@@ -88,15 +86,9 @@ pub fn hash(text: &str) -> String {
 
 /// Name of the processor, where the system states it.
 fn cpu() -> String {
-    fs::read_to_string("/proc/cpuinfo")
-        .ok()
-        .and_then(|text| {
-            text.lines()
-                .find(|line| line.starts_with("model name"))
-                .and_then(|line| line.split_once(':'))
-                .map(|(_, name)| name.trim().to_owned())
-        })
-        .unwrap_or_else(|| std::env::consts::ARCH.to_owned())
+    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find(|line| line.starts_with("model name")).and_then(|line| line.split_once(':'));
+    model.map_or(std::env::consts::ARCH, |(_, name)| name.trim()).to_owned()
 }
 
 /// What the arithmetic does, found by trying.
@@ -112,39 +104,4 @@ fn floating_point() -> String {
         if subnormal { "kept" } else { "FLUSHED" },
         if fused { "used" } else { "not used" },
     )
-}
-
-/// Date and time of day in UTC, `YYYY-MM-DDThh:mm:ssZ`.
-fn utc_now() -> String {
-    let seconds =
-        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
-    utc(seconds)
-}
-
-/// Seconds since 1970 as `YYYY-MM-DDThh:mm:ssZ`, proleptic Gregorian (Fliegel and Van Flandern 1968).
-fn utc(seconds: u64) -> String {
-    let (days, rest) = ((seconds / 86_400).cast_signed(), seconds % 86_400);
-    let l = days + 2_440_588 + 68_569;
-    let n = 4 * l / 146_097;
-    let l = l - (146_097 * n + 3) / 4;
-    let i = 4000 * (l + 1) / 1_461_001;
-    let l = l - 1461 * i / 4 + 31;
-    let j = 80 * l / 2447;
-    let day = l - 2447 * j / 80;
-    let l = j / 11;
-    let month = j + 2 - 12 * l;
-    let year = 100 * (n - 49) + i + l;
-    format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", rest / 3600, rest / 60 % 60, rest % 60)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dates_of_known_instants() {
-        assert_eq!(utc(0), "1970-01-01T00:00:00Z");
-        assert_eq!(utc(951_782_400), "2000-02-29T00:00:00Z");
-        assert_eq!(utc(1_709_251_199), "2024-02-29T23:59:59Z");
-    }
 }

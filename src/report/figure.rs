@@ -17,9 +17,8 @@ use serde::de::IntoDeserializer;
 use serde::de::value::Error;
 
 use super::chart::{Ink, Panel, WIDTH};
-use super::table::Table;
 use super::text::{count, one_line, wrapped};
-use crate::suite::{Judged, Section, Verdict};
+use crate::suite::{Judged, Section, Verdict, grouped};
 
 /// Panels beside each other in a file.
 const COLUMNS: usize = 3;
@@ -98,13 +97,11 @@ impl Figure {
         (!figure.panels.is_empty()).then_some(figure)
     }
 
-    /// Every number in it: one row a point.
-    pub fn table(&self) -> Table {
-        let mut table = Table::new("panel,series,x_axis,x,y_axis,y");
-        for panel in &self.panels {
-            panel.tabulate(&mut table);
-        }
-        table
+    /// Every number in it as CSV: one row a point.
+    pub fn table(&self) -> String {
+        let mut csv = "panel,series,x_axis,x,y_axis,y\n".to_owned();
+        self.panels.iter().for_each(|panel| panel.push_lines(&mut csv));
+        csv
     }
 
     /// The same with equal ranges in all panels.
@@ -170,22 +167,6 @@ impl Figure {
         }
         .into_string()
     }
-}
-
-/// `items` by `key`, groups in the order in which they first appear.
-pub(super) fn grouped<T: Copy, K: PartialEq>(
-    items: impl IntoIterator<Item = T>,
-    key: impl Fn(&T) -> K,
-) -> Vec<(K, Vec<T>)> {
-    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
-    for item in items {
-        let key = key(&item);
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, members)) => members.push(item),
-            None => groups.push((key, vec![item])),
-        }
-    }
-    groups
 }
 
 /// Name of the files of the figure `kind` of `of`: letters, digits and hyphens.

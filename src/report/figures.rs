@@ -8,7 +8,7 @@ use std::fmt::Display;
 
 use super::Run;
 use super::chart::{Anchor, Axis, Ink, Panel, Point, Style};
-use super::figure::{Figure, grouped};
+use super::figure::Figure;
 use super::text::{count, number};
 use super::{stability_figures, sweep_figures};
 use crate::integrators::closed_form::path;
@@ -18,7 +18,7 @@ use crate::physics::{EventKind, Outcome, Problem};
 use crate::studies::Quantity;
 use crate::studies::order::{Exclusion, OrderFit};
 use crate::suite::checks::{ApproachOrder, Order, Peer, StepPattern};
-use crate::suite::{Check, Evidence, Judged, Verdict};
+use crate::suite::{Check, Evidence, Judged, Verdict, grouped};
 
 /// Scenes whose paths are shown at most, and scenes whose errors are.
 const SCENES_MAX: usize = 2;
@@ -61,7 +61,7 @@ fn of_evidence(run: &Run<'_>, judged: &Judged) -> Vec<Figure> {
             vec![sweep_figures::applicability(*crater_ratio, lines, scenes, &[judged])]
         }
         Some(Evidence::Depths(comparisons)) => vec![sweep_figures::measured_depths(comparisons, &[judged])],
-        Some(Evidence::Fit { .. } | Evidence::Series { .. }) | None => Vec::new(),
+        Some(Evidence::Fit { .. } | Evidence::Series(_)) | None => Vec::new(),
     };
     drawn.into_iter().flatten().collect()
 }
@@ -69,7 +69,7 @@ fn of_evidence(run: &Run<'_>, judged: &Judged) -> Vec<Figure> {
 /// The fit behind a claim, with the order expected.
 pub fn fit_of(judged: &Judged) -> Option<(f64, &OrderFit)> {
     match &judged.evidence {
-        Some(Evidence::Fit { formal, fit, .. }) => Some((*formal, fit)),
+        Some(Evidence::Fit { formal, fit }) => Some((*formal, fit)),
         _ => None,
     }
 }
@@ -77,7 +77,7 @@ pub fn fit_of(judged: &Judged) -> Option<(f64, &OrderFit)> {
 /// The claims whose check is one of `checks`, with their series.
 fn series_of<'a>(run: &Run<'a>, checks: fn(&Check) -> bool) -> Vec<(&'a Judged, &'a [Point])> {
     let series = |judged: &'a Judged| match &judged.evidence {
-        Some(Evidence::Series { points, .. }) => Some((judged, points.as_slice())),
+        Some(Evidence::Series(points)) => Some((judged, points.as_slice())),
         _ => None,
     };
     run.judged.iter().filter(|judged| checks(&judged.claim.check)).filter_map(series).collect()
@@ -161,7 +161,6 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
     let panel = |velocity: VelocityAt| {
         let y = Axis::log("relative error", "").over([low, largest * 6.0]);
         let mut panel = Panel::new(format!("{velocity} velocity in the drag"), Axis::log("step", "s"), y)
-            .described(format!("Error of the {}. Numbers are observed orders.", words_for(quantity)))
             // The estimate of the round-off: `eps` times the number of steps.
             .floor("round-off", -1.0, (coarsest, f64::EPSILON))
             .slope("slope 1", 1.0, (coarsest, largest * 3.0))
@@ -395,10 +394,11 @@ fn path_panels(name: &str, problem: &Problem) -> Option<(Vec<Panel>, Flight)> {
     ];
     let panel = |(title, unit, value): Curve| {
         let y = Axis::linear(title, unit).including([0.0]);
-        let panel = Panel::new(format!("{name}: {title}"), Axis::linear("time", "ms"), y)
-            .described(format!("The projectile {}.", words_for_outcome(flight.outcome)))
-            .tall(148.0)
-            .unlisted(title, Style::line(0), samples.iter().map(|s| (s.state.time * 1e3, value(s))));
+        let panel = Panel::new(format!("{name}: {title}"), Axis::linear("time", "ms"), y).tall(148.0).unlisted(
+            title,
+            Style::line(0),
+            samples.iter().map(|s| (s.state.time * 1e3, value(s))),
+        );
         flight
             .events
             .iter()

@@ -31,6 +31,12 @@ pub enum FolderError {
     },
 }
 
+impl FolderError {
+    fn write(path: &Path, cause: io::Error) -> Self {
+        Self::Write { path: path.display().to_string(), cause: without_temporary_name(cause) }
+    }
+}
+
 /// Name of the folder where none is given.
 pub const DEFAULT: &str = "penetrode-report";
 
@@ -40,16 +46,16 @@ pub const DEFAULT: &str = "penetrode-report";
 /// [`FolderError::NotOurs`].
 pub fn check(folder: &Path) -> Result<(), FolderError> {
     let refuse = |why: String| Err(FolderError::NotOurs { path: folder.display().to_string(), why });
+    let failed = |cause| FolderError::write(folder, cause);
     // Reading would follow a link, and writing would replace it: it is refused like any other foreign entry.
     match fs::symlink_metadata(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(cause) => return Err(FolderError::Write { path: folder.display().to_string(), cause }),
+        Err(cause) => return Err(failed(cause)),
         Ok(metadata) if metadata.is_symlink() => return refuse("is a link, which a report would replace".to_owned()),
         Ok(metadata) if !metadata.is_dir() => return refuse("is a file, and a report is a folder".to_owned()),
         Ok(_) => {}
     }
-    let contents =
-        contents(folder).map_err(|cause| FolderError::Write { path: folder.display().to_string(), cause })?;
+    let contents = contents(folder).map_err(failed)?;
     if contents.is_empty() {
         return Ok(());
     }
@@ -101,24 +107,16 @@ const MANIFEST: &str = "contents.txt";
 /// # Errors
 /// [`FolderError`]; the old report then stands untouched.
 pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError> {
-    let mut files = files.map_err(|cause| FolderError::Write { path: folder.display().to_string(), cause })?;
+    let mut files = files.map_err(|cause| FolderError::write(folder, cause))?;
     check(folder)?;
     let list: String =
         files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
     files.push((MANIFEST.to_owned(), list.into_bytes()));
-    let failed = |path: &Path, cause: io::Error| FolderError::Write {
-        path: path.display().to_string(),
-        cause: without_temporary_name(cause),
-    };
-    let parent = match folder.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
-    fs::create_dir_all(&parent).map_err(|cause| failed(&parent, cause))?;
-    let stage = tempfile::Builder::new()
-        .prefix(&format!("{TEMPORARY}report-"))
-        .tempdir_in(&parent)
-        .map_err(|cause| failed(&parent, cause))?;
+    let failed = FolderError::write;
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(parent).map_err(|cause| failed(parent, cause))?;
+    let prefix = format!("{TEMPORARY}report-");
+    let stage = tempfile::Builder::new().prefix(&prefix).tempdir_in(parent).map_err(|cause| failed(parent, cause))?;
     for (name, bytes) in files {
         let path = stage.path().join(&name);
         if let Some(part) = path.parent() {
@@ -169,7 +167,7 @@ pub(super) fn files_of(numbers: &impl Serialize, page: String, figures: &[Figure
     for figure in figures {
         let name = &figure.name;
         files.push((format!("figures/{name}.svg"), figure.file().into_bytes()));
-        files.push((format!("tables/{name}.csv"), figure.table().to_csv()?));
+        files.push((format!("tables/{name}.csv"), figure.table().into_bytes()));
     }
     Ok(files)
 }

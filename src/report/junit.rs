@@ -33,12 +33,6 @@ pub fn to_xml(run: &Run<'_>) -> Result<String, SerializeError> {
 
 fn case(judged: &Judged, group: &str) -> TestCase {
     let claim = &judged.claim;
-    let mut status = match judged.verdict {
-        Verdict::Passed => TestCaseStatus::success(),
-        Verdict::Skipped => TestCaseStatus::skipped(),
-        Verdict::Undecided => TestCaseStatus::non_success(NonSuccessKind::Error),
-        Verdict::Failed => TestCaseStatus::non_success(NonSuccessKind::Failure),
-    };
     let measured = judged.measured.map_or_else(|| "nothing".to_owned(), |m| format!("{m:e}"));
     let numbers = format!("measured {measured}, limit {:e} {}", claim.limit, claim.unit);
     let text = format!(
@@ -47,14 +41,19 @@ fn case(judged: &Judged, group: &str) -> TestCase {
         one_line(&claim.reason),
         one_line(&judged.remark)
     );
-    match judged.verdict {
-        Verdict::Passed => {}
-        Verdict::Skipped => {
-            status.set_message(one_line(&judged.remark));
-        }
-        Verdict::Undecided | Verdict::Failed => {
-            status.set_type(judged.verdict.name()).set_message(numbers.clone()).set_description(text.clone());
-        }
+    let open = |kind| {
+        let mut status = TestCaseStatus::non_success(kind);
+        status.set_type(judged.verdict.name()).set_message(&*numbers).set_description(&*text);
+        status
+    };
+    let mut status = match judged.verdict {
+        Verdict::Passed => TestCaseStatus::success(),
+        Verdict::Skipped => TestCaseStatus::skipped(),
+        Verdict::Undecided => open(NonSuccessKind::Error),
+        Verdict::Failed => open(NonSuccessKind::Failure),
+    };
+    if judged.verdict == Verdict::Skipped {
+        status.set_message(one_line(&judged.remark));
     }
     let mut case = TestCase::new(one_line(&claim.id), status);
     case.set_classname(format!("penetrode.{}", one_line(group))).set_time(duration(judged.wall_ms));

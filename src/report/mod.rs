@@ -13,7 +13,6 @@ pub mod stability_figures;
 pub mod stress;
 pub mod summary;
 pub mod sweep_figures;
-pub mod table;
 mod verify_page;
 pub use crate::text;
 

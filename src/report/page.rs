@@ -364,6 +364,7 @@ fn every_claim(judged: &[Judged]) -> Markup {
 /// A figure with its message, how to read it, the claims that judge it and the command that remakes them, and its files.
 pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
     const NAMED: usize = 3;
+    let is_whole = command.starts_with("penetrode verify") && !command.contains("--only");
     html! {
         figure id={ "figure-" (figure.name) } {
             figcaption {
@@ -377,23 +378,14 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
                             code { (one_line(id)) }
                         }
                         @if figure.claims.len() > NAMED { " and " (figure.claims.len() - NAMED) " more" }
-                        "; remade by " code { (one_line(&only(command, first))) } ". "
+                        "; remade by " code { (one_line(command)) @if is_whole { " --only " (one_line(first)) } } ". "
                     }
-                    a href={ "tables/" (figure.name) ".csv" } { (count(figure.table().len(), "row")) " as CSV" } ", "
+                    a href={ "tables/" (figure.name) ".csv" } { (count(figure.table().lines().count() - 1, "row")) " as CSV" } ", "
                     a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
                 }
             }
             div.panels { @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) } }
         }
-    }
-}
-
-/// `command`, restricted to the claims of the table `id` where it can be.
-fn only(command: &str, id: &str) -> String {
-    if command.starts_with("penetrode verify") && !command.contains("--only") {
-        format!("{command} --only {id}")
-    } else {
-        command.to_owned()
     }
 }
 

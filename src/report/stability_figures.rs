@@ -1,11 +1,11 @@
 //! The figures of stability and rounding, for the reports of the suite and of the stress cases.
 
 use super::chart::{Axis, Ink, Panel, Style};
-use super::figure::{Figure, grouped};
+use super::figure::Figure;
 use super::text::number;
 use crate::studies::rounding::{Errors, Floor};
 use crate::studies::stability::BoundaryPoint;
-use crate::suite::Judged;
+use crate::suite::{Judged, grouped};
 
 /// Where amplitudes begin to grow: measured points on the lines of theory, over the drag group.
 ///
@@ -14,8 +14,7 @@ pub fn boundary(points: &[BoundaryPoint], judged: &[&Judged]) -> Option<Figure> 
     let off = points.iter().map(|p| (p.measured / p.theory - 1.0).abs()).reduce(f64::max)?;
     let off = number(100.0 * off, 2);
     let origin = |title| Axis::linear(title, "").including([0.0]);
-    let mut panel = Panel::new("onset of growth, w dt over Q V dt/M", origin("Q V dt/M"), origin("w dt"))
-        .described(format!("Measured and in theory, at most {off} % apart."));
+    let mut panel = Panel::new("onset of growth, w dt over Q V dt/M", origin("Q V dt/M"), origin("w dt"));
     for (index, (rule, members)) in grouped(points, |p| p.velocity).into_iter().enumerate() {
         let style = Style::marks(index);
         panel = panel
@@ -53,11 +52,12 @@ pub fn rounding(rows: &[Floor], judged: &[&Judged]) -> Option<Figure> {
     };
     let truncation = rows.iter().filter_map(|row| Some((row.dt, row.truncation?)));
     let panels = vec![
-        panel("error of the depth", |errors| Some(errors.total))
-            .described(format!("Errors fall with dt² to a floor of {floors}."))
-            .series("double-double: truncation", Style::line(0).ink(Ink::Muted), truncation),
-        panel("rounding in it", |errors| errors.rounding)
-            .described(format!("Rounding grows with the number of steps. Compensated sums leave {gain} times less.")),
+        panel("error of the depth", |errors| Some(errors.total)).series(
+            "double-double: truncation",
+            Style::line(0).ink(Ink::Muted),
+            truncation,
+        ),
+        panel("rounding in it", |errors| errors.rounding),
     ];
     Some(Figure::new("rounding-floor", "", judged, &[&floors, &last.steps, &gain], panels)?.sharing_axes())
 }

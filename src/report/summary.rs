@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 
 use super::Run;
+use super::page::{sign, tally};
 use super::text::{number, one_line};
-use crate::suite::{Counts, Verdict, tables, worst};
+use crate::suite::{Counts, tables, worst};
 
 /// Claims listed one by one at most; the others are in `report.html`.
 const LISTED_MAX: usize = 30;
@@ -14,7 +15,7 @@ pub fn to_markdown(run: &Run<'_>) -> String {
     let counts = Counts::of_claims(run.judged);
     let verdict = counts.verdict();
     let mut text =
-        format!("## {} {}: {}\n\n{}\n\n", mark(verdict), escape(&run.suite.title), verdict.name(), counts_text(counts));
+        format!("## {} {}: {}\n\n**{}**\n\n", sign(verdict), escape(&run.suite.title), verdict.name(), tally(counts));
     let open: Vec<_> = run.judged.iter().filter(|j| j.is_open()).collect();
     if !open.is_empty() {
         text.push_str("| | claim | measured | limit | what was seen |\n|---|---|---|---|---|\n");
@@ -23,7 +24,7 @@ pub fn to_markdown(run: &Run<'_>) -> String {
             let _ = writeln!(
                 text,
                 "| {} {} | {}<br>{} | {} | {} {} | {} |",
-                mark(judged.verdict),
+                sign(judged.verdict),
                 judged.verdict.name(),
                 code(&claim.id),
                 escape(&claim.statement),
@@ -44,7 +45,7 @@ pub fn to_markdown(run: &Run<'_>) -> String {
         let _ = writeln!(
             text,
             "| {} | {} ({})<br>{} | {} | {} {} |",
-            mark(Counts::of_claims(claims).of_group()),
+            sign(Counts::of_claims(claims).of_group()),
             code(&claim.table),
             claims.len(),
             escape(&claim.statement),
@@ -64,22 +65,6 @@ pub fn to_markdown(run: &Run<'_>) -> String {
         escape(&environment.date)
     );
     text
-}
-
-fn counts_text(counts: Counts) -> String {
-    format!(
-        "**{} passed, {} failed, {} undecided**, {} skipped as not applicable",
-        counts.passed, counts.failed, counts.undecided, counts.skipped
-    )
-}
-
-fn mark(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Passed => "✅",
-        Verdict::Failed => "❌",
-        Verdict::Undecided => "❔",
-        Verdict::Skipped => "➖",
-    }
 }
 
 /// `text` in which nothing is Markdown, HTML, a mention or a reference.

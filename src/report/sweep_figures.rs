@@ -5,13 +5,13 @@
 use std::fmt::Display;
 
 use super::chart::{Anchor, Axis, Ink, Panel, Point, Style};
-use super::figure::{Figure, grouped};
-use super::table::{Table, or_empty};
+use super::figure::Figure;
 use super::text::{count, number};
+use crate::exchange::tables::{Value, push_line};
 use crate::studies::applicability::{ERROR_ALLOWED, Line};
 use crate::studies::experiments::{BAND, Comparison, MarkedScene, summaries};
 use crate::studies::sweep::{self, Plan, Row};
-use crate::suite::Judged;
+use crate::suite::{Judged, grouped};
 
 /// Least H/d at which differences are drawn: for thinner slabs they run to thousands of percent and hide the rest.
 const THICK: f64 = 1.0;
@@ -52,18 +52,9 @@ fn difference(rows: &[Row], energy: impl Fn(&Row) -> Option<f64>, formula: impl 
 pub fn critical_energy(rows: &[Row], points: &[Point], judged: &[&Judged]) -> Option<Figure> {
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_unrounded);
     let ndrc = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
-    let gap = match (extremes(&full), extremes(&ndrc)) {
-        (Some([low, high]), Some(other)) => format!(
-            "the simulation through the whole thickness lies {}, that with its criterion within {} %",
-            if low >= 0.0 {
-                format!("{} to {} % above Eq. 15", number(low, 3), number(high, 3))
-            } else {
-                format!("{} to {} % off Eq. 15", signed(low), signed(high))
-            },
-            number(other[0].abs().max(other[1].abs()), 2),
-        ),
-        _ => "the simulation by both criteria, and Eq. 15".to_owned(),
-    };
+    let range =
+        |points: &[Point]| extremes(points).map_or_else(|| "—".to_owned(), |ends| ends.map(signed).join(" to "));
+    let (full, ndrc) = (range(&full), range(&ndrc));
     let energies = along(rows, |row| row.energy_full_depth);
     extremes(&energies)?;
     let origin = |title| Axis::linear(title, "").including([0.0]);
@@ -75,7 +66,7 @@ pub fn critical_energy(rows: &[Row], points: &[Point], judged: &[&Judged]) -> Op
         .tall(TALL);
     let measured = Style::marks(0).ink(Ink::Red);
     let panel = if points.is_empty() { panel } else { panel.series("measured", measured, points.iter().copied()) };
-    Figure::new("critical-energy", "", judged, &[&gap], vec![panel])
+    Figure::new("critical-energy", "", judged, &[&full, &ndrc], vec![panel])
 }
 
 /// The paper's Figure 5: simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria.
@@ -85,25 +76,25 @@ pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Fi
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_printed);
     let printed = difference(rows, |row| row.energy_ndrc, |row| row.eq15_printed);
     let unrounded = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
-    let first = *full.first()?;
-    let least = full.iter().fold(first, |least, point| if point.1 < least.1 { *point } else { least });
+    let [least, _] = extremes(&full)?;
     let [low, high] = extremes(&unrounded).unwrap_or([0.0, 0.0]);
     let geometry =
         rows.iter().find(|row| row.thickness_ratio.is_some()).and_then(|row| row.geometry).unwrap_or(f64::INFINITY);
     let panel = |title| Panel::new(title, Axis::linear("H/d", ""), Axis::linear("difference", "%").including([0.0]));
     let limit: Vec<Point> = full.iter().map(|(ratio, _)| (*ratio, 24.0)).collect();
     let panels = vec![
-        panel("full depth")
-            .described(format!("Least at H/d = {}.", number(least.0, 3)))
-            .series("+24 %: limit for N, H/d infinite", Style::REFERENCE, limit)
-            .series("x = H over Eq. 15, printed", Style::line(0), full),
+        panel("full depth").series("+24 %: limit for N, H/d infinite", Style::REFERENCE, limit).series(
+            "x = H over Eq. 15, printed",
+            Style::line(0),
+            full,
+        ),
         panel("criterion ndrc").series("x = x_p(H) over Eq. 15, printed", Style::line(1), printed).series(
             "the same over Eq. 15, unrounded",
             Style::line(2),
             unrounded,
         ),
     ];
-    let values = [&number(geometry, 3) as &dyn Display, &signed(least.1), &signed(low), &signed(high)];
+    let values = [&number(geometry, 3) as &dyn Display, &signed(least), &signed(low), &signed(high)];
     Figure::new("critical-energy-difference", "", judged, &values, panels)
 }
 
@@ -181,30 +172,18 @@ pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option
     Figure::new("measured-depths", "", judged, &values, vec![panel])
 }
 
-/// The comparison of measured depths, one row a test.
-pub fn measured_table(comparisons: &[Comparison]) -> Table {
-    let mut table = Table::new(
-        "test_set,line,velocity_m_s,measured_depth_m,predicted_depth_m,ratio,I,N,k,comparison_error_m,numerical_uncertainty_m,input_uncertainty_m,data_uncertainty_m,validation_uncertainty_m",
-    );
+/// The comparison of measured depths as CSV, one row a test.
+pub fn measured_table(comparisons: &[Comparison]) -> String {
+    let mut csv = "test_set,line,velocity_m_s,measured_depth_m,predicted_depth_m,ratio,I,N,k,comparison_error_m,numerical_uncertainty_m,input_uncertainty_m,data_uncertainty_m,validation_uncertainty_m\n".to_owned();
     for c in comparisons {
-        table.push([
-            &c.experiment.set,
-            &c.experiment.line,
-            &c.experiment.velocity,
-            &c.experiment.depth,
-            &c.predicted,
-            &c.ratio,
-            &c.impact,
-            &or_empty(c.geometry),
-            &c.crater_ratio,
-            &c.comparison_error,
-            &c.numerical_uncertainty,
-            &or_empty(c.input_uncertainty),
-            &or_empty(c.experiment.depth_uncertainty),
-            &or_empty(c.validation_uncertainty),
-        ]);
+        let measured = [c.experiment.velocity, c.experiment.depth, c.predicted, c.ratio, c.impact].map(Some);
+        let computed = [c.geometry, Some(c.crater_ratio), Some(c.comparison_error), Some(c.numerical_uncertainty)];
+        let uncertain = [c.input_uncertainty, c.experiment.depth_uncertainty, c.validation_uncertainty];
+        let mut row = vec![Value::Text(&c.experiment.set), Value::Count(c.experiment.line)];
+        row.extend(measured.into_iter().chain(computed).chain(uncertain).map(Value::Number));
+        push_line(&mut csv, &row);
     }
-    table
+    csv
 }
 
 #[cfg(test)]
@@ -251,7 +230,7 @@ mod tests {
     #[test]
     fn the_message_gives_the_gap_and_what_is_left_of_it() {
         let figure = critical_energy(&[row(1.0, 2.0), row(2.0, 9.0)], &[], &[]).unwrap();
-        assert!(figure.message.contains("100 to 100 % above Eq. 15"), "{}", figure.message);
+        assert!(figure.message.contains("+100 to +100 % off Eq. 15"), "{}", figure.message);
         let figure = critical_energy_difference(&[row(1.0, 2.0), row(2.0, 9.0)], &[]).unwrap();
         assert!(figure.message.contains("+100 % at the least"), "{}", figure.message);
     }
@@ -265,6 +244,6 @@ mod tests {
             assert!(file.contains(words), "{words}");
         }
         assert_eq!(scenes.len(), 107);
-        assert!(figure.table().len() > 107);
+        assert!(figure.table().lines().count() > 107);
     }
 }

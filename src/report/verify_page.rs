@@ -2,7 +2,7 @@
 
 use maud::{Markup, Render, html};
 
-use super::figure::{Figure, grouped};
+use super::figure::Figure;
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
 use super::text::{count, number, one_line};
@@ -13,7 +13,7 @@ use crate::studies::experiments::{self, Comparison};
 use crate::studies::sweep::{WHY, explanation};
 use crate::studies::{Path, Quantity, Stretch, formal_order};
 use crate::suite::checks::{Order, StepPattern};
-use crate::suite::{Check, Counts, Evidence, Judged, LOOSENESS_MAX, looseness, skipped, tables};
+use crate::suite::{Check, Counts, Evidence, Judged, LOOSENESS_MAX, grouped, looseness, skipped};
 
 /// The page of `run` with its figures.
 pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
@@ -47,8 +47,8 @@ fn build(e: &Environment) -> Markup {
 }
 
 fn why_above_eq15(run: &Run<'_>) -> Markup {
-    let why = evidence(run, |evidence| match evidence {
-        Evidence::Sweep { plan, rows } => Some(explanation(plan, rows)),
+    let why = run.judged.iter().find_map(|judged| match &judged.evidence {
+        Some(Evidence::Sweep { plan, rows }) => Some(explanation(plan, rows)),
         _ => None,
     });
     html! { @if let Some(why) = why {
@@ -59,25 +59,18 @@ fn why_above_eq15(run: &Run<'_>) -> Markup {
 
 /// The tables of the suite that claim something of layered scenes.
 fn layered_claims(run: &Run<'_>) -> Markup {
-    let layered = |judged: &&Judged| {
+    let layered = run.judged.iter().filter(|judged| {
         let scene = judged.claim.scene.as_deref().and_then(|name| run.suite.scenes.get(name));
         scene.and_then(|scene| scene.concrete()).is_some_and(|concrete| !concrete.layers.is_empty())
-    };
-    let all = Counts::of_claims(run.judged.iter().filter(layered));
-    let groups = tables(run.judged).filter(|claims| claims.iter().any(|judged| layered(&judged)));
-    let table = Table::cards("", ["claims", "verdict"]).rows(groups, |claims| {
-        let counts = Counts::of_claims(claims.iter().filter(layered));
-        [html! { code { (one_line(&claims[0].claim.table)) } }, counts_cell(counts)]
     });
+    let all = Counts::of_claims(layered.clone());
+    let groups = grouped(layered, |judged| judged.claim.table.as_str());
+    let table = Table::cards("", ["claims", "verdict"])
+        .rows(groups, |(name, claims)| [html! { code { (one_line(name)) } }, counts_cell(Counts::of_claims(claims))]);
     html! {
         @if all == Counts::default() { p { "This suite claims nothing of this kind." } }
         @else { (folded(html! { "What is claimed of layered scenes, all over this report: " (tally(all)) }, false, table)) }
     }
-}
-
-/// The first evidence of a kind.
-fn evidence<'a, T>(run: &Run<'a>, pick: impl Fn(&'a Evidence) -> Option<T>) -> Option<T> {
-    run.judged.iter().find_map(|judged| judged.evidence.as_ref().and_then(&pick))
 }
 
 fn scenes(run: &Run<'_>) -> Markup {
@@ -188,8 +181,8 @@ fn order_cell(judged: &Judged) -> Markup {
 
 /// Median and spread of each set of experiments, and the terms of ASME V&V 20.
 fn sets(run: &Run<'_>) -> Markup {
-    let comparisons = evidence(run, |evidence| match evidence {
-        Evidence::Depths(comparisons) => Some(comparisons.as_slice()),
+    let comparisons = run.judged.iter().find_map(|judged| match &judged.evidence {
+        Some(Evidence::Depths(comparisons)) => Some(comparisons.as_slice()),
         _ => None,
     });
     let Some(comparisons) = comparisons else { return html! {} };
@@ -224,8 +217,6 @@ fn sets(run: &Run<'_>) -> Markup {
             ("u_input, inputs", cell(given(|c| c.input_uncertainty))),
             ("u_D, data", html! { (given(|c| c.experiment.depth_uncertainty)) " by the sources" }),
         ]))
-        p { "The validation uncertainty u_val² = u_num² + u_input² + u_D² can only be stated where all three are. Where it is
-            not given, E alone is: whether it lies within the uncertainty cannot be said." }
     }
 }
 

@@ -115,7 +115,6 @@ pub struct Claim {
     /// Scene, where the claim has one.
     pub scene: Option<String>,
     /// Method, where the claim has one.
-    #[serde(serialize_with = "by_name")]
     #[schemars(with = "Option<String>")]
     pub method: Option<MethodName>,
     /// Quantity, where the claim has one.
@@ -140,11 +139,6 @@ impl Claim {
     pub fn group(&self) -> &str {
         self.id.split('/').next().unwrap_or(&self.id)
     }
-}
-
-#[expect(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "serde passes the field by reference")]
-fn by_name<S: serde::Serializer>(method: &Option<MethodName>, to: S) -> Result<S::Ok, S::Error> {
-    method.map(MethodName::name).serialize(to)
 }
 
 impl ClaimSpec {
@@ -202,7 +196,8 @@ fn varied<T>(claims: &[Claim], values: &[T], name: impl Fn(&T) -> String, set: i
 pub struct Measurement {
     /// Measured value in the unit of the check.
     pub value: f64,
-    /// Half-width of what the measurement can resolve; a limit is loose relative to the larger of the two.
+    /// Half-width of what the measurement can resolve, one ulp at least; a limit is loose relative to the larger of the
+    /// two, and none is to a count, which resolves nothing.
     pub resolution: f64,
     /// The verdict, where it is not simply `value <= limit`.
     pub verdict: Option<Verdict>,
@@ -215,7 +210,17 @@ pub struct Measurement {
 impl Measurement {
     /// A plain measurement.
     pub fn new(value: f64) -> Self {
-        Self { value, resolution: 0.0, verdict: None, remark: String::new(), evidence: None }
+        Self { value, resolution: f64::EPSILON, verdict: None, remark: String::new(), evidence: None }
+    }
+
+    /// A number of things, to which no limit is loose.
+    pub fn count(number: usize) -> Self {
+        Self::new(number as f64).resolving(f64::INFINITY)
+    }
+
+    /// With what it can resolve.
+    pub fn resolving(self, resolution: f64) -> Self {
+        Self { resolution: resolution.max(f64::EPSILON), ..self }
     }
 
     /// With words for the report.
@@ -268,22 +273,13 @@ impl<E: std::error::Error> From<E> for NotMeasured {
 pub enum Evidence {
     /// A fitted power law.
     Fit {
-        /// What the abscissa is: `dt_s`, `rtol`, `1/evaluations`, `1/N`.
-        abscissa: &'static str,
         /// Order expected.
         formal: f64,
         /// The fit with every point.
         fit: Box<OrderFit>,
     },
     /// Values over an abscissa.
-    Series {
-        /// Name of the abscissa with its unit.
-        abscissa: &'static str,
-        /// Name of the ordinate with its unit.
-        ordinate: &'static str,
-        /// Points.
-        points: Vec<(f64, f64)>,
-    },
+    Series(Vec<(f64, f64)>),
     /// A sweep of H/d.
     Sweep {
         /// Scene and axis.
@@ -353,11 +349,8 @@ impl Judged {
     ///
     /// `None` where nothing was measured, and for counts and limits of zero.
     pub fn looseness(&self) -> Option<f64> {
-        if self.claim.limit == 0.0 || self.claim.check.is_count() {
-            return None;
-        }
-        let floor = self.resolution.max(self.claim.check.resolution());
-        self.measured.map(|m| self.claim.limit / m.max(floor))
+        let is_decisive = self.claim.limit > 0.0 && self.resolution.is_finite();
+        self.measured.filter(|_| is_decisive).map(|measured| self.claim.limit / measured.max(self.resolution))
     }
 }
 
@@ -371,14 +364,22 @@ pub fn tables(judged: &[Judged]) -> impl Iterator<Item = &[Judged]> {
 
 /// Why claims were skipped, each reason once with the number of claims.
 pub fn skipped(judged: &[Judged]) -> Vec<(&str, usize)> {
-    let mut reasons: Vec<(&str, usize)> = Vec::new();
-    for judged in judged.iter().filter(|j| j.verdict == Verdict::Skipped) {
-        match reasons.iter_mut().find(|(known, _)| *known == judged.remark) {
-            Some((_, number)) => *number += 1,
-            None => reasons.push((&judged.remark, 1)),
+    let skipped = judged.iter().filter(|j| j.verdict == Verdict::Skipped);
+    let groups = grouped(skipped, |judged| judged.remark.as_str()).into_iter();
+    groups.map(|(reason, claims)| (reason, claims.len())).collect()
+}
+
+/// `items` by `key`, groups in the order in which they first appear.
+pub fn grouped<T: Copy, K: PartialEq>(items: impl IntoIterator<Item = T>, key: impl Fn(&T) -> K) -> Vec<(K, Vec<T>)> {
+    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
+    for item in items {
+        let key = key(&item);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, members)) => members.push(item),
+            None => groups.push((key, vec![item])),
         }
     }
-    reasons
+    groups
 }
 
 /// The largest measured value.

@@ -5,12 +5,13 @@ use std::fmt::Display;
 use super::BenchJson;
 use crate::integrators::{Boundaries, MethodName, VelocityAt};
 use crate::report::chart::{Axis, Panel, Point, Style};
-use crate::report::figure::{Figure, grouped};
+use crate::report::figure::Figure;
 use crate::report::figures::words_for;
 use crate::report::text::{count, one_line};
 use crate::studies::bench::growth::Growth;
 use crate::studies::bench::step_size::StepStudy;
 use crate::studies::bench::work_precision::{Contender, Run, RunState, variant_name};
+use crate::suite::grouped;
 
 /// Series in one panel at most, besides the one that stands in all: more cannot be distinguished.
 const SERIES_MAX: usize = 7;
@@ -35,27 +36,12 @@ pub(super) fn all(report: &BenchJson) -> Vec<Figure> {
     figures
 }
 
-/// What an accuracy costs, in one unit.
-struct Cost {
-    title: &'static str,
-    unit: &'static str,
-    words: &'static str,
-    of: fn(&Run) -> Option<f64>,
-}
+/// What an accuracy costs: in words, its unit, and of one run.
+type Cost = (&'static str, &'static str, fn(&Run) -> Option<f64>);
 
 const COSTS: [Cost; 2] = [
-    Cost {
-        title: "time of a solution",
-        unit: "µs",
-        words: "time",
-        of: |run| run.time.map(|time| 1e-3 * time.median_ns).filter(|time| *time > 0.0),
-    },
-    Cost {
-        title: "force evaluations of a solution",
-        unit: "",
-        words: "force evaluations",
-        of: |run| run.force_evaluations.filter(|count| *count > 0.0),
-    },
+    ("time", "µs", |run| run.time.map(|time| 1e-3 * time.median_ns).filter(|time| *time > 0.0)),
+    ("force evaluations", "", |run| run.force_evaluations.filter(|count| *count > 0.0)),
 ];
 
 /// What sets the figure of `study` apart from others of its kind.
@@ -92,17 +78,17 @@ fn groups<'a>(methods: &[&'a str]) -> Vec<(&'static str, Vec<&'a str>)> {
     groups
 }
 
-fn panel(runs: &[&Run], (title, methods): &(&str, Vec<&str>), cost: &Cost) -> Panel {
+fn panel(runs: &[&Run], (title, methods): &(&str, Vec<&str>), (words, unit, cost): &Cost) -> Panel {
     // The same range in all panels of a unit, whatever methods they show.
-    let costs = Axis::log(cost.title, cost.unit).including(runs.iter().filter_map(|run| (cost.of)(run)));
+    let costs = Axis::log(&format!("{words} of a solution"), unit).including(runs.iter().filter_map(|run| cost(run)));
     let errors = Axis::log("relative error", "").from(LEAST).over([LEAST / 2.0, 3.0 * FAILED_AT]);
-    let mut panel = Panel::new(format!("{title}, {}", cost.words), costs, errors);
+    let mut panel = Panel::new(format!("{title}, {words}"), costs, errors);
     for (series, method) in methods.iter().enumerate() {
         let points = |is_right: bool| {
             let mine =
                 runs.iter().filter(move |run| run.method == *method && (run.state == RunState::Right) == is_right);
             let error = move |run: &Run| if is_right { run.error.unwrap_or(0.0) } else { FAILED_AT };
-            mine.filter_map(move |run| Some(((cost.of)(run)?, error(run)))).collect::<Vec<Point>>()
+            mine.filter_map(move |run| Some((cost(run)?, error(run)))).collect::<Vec<Point>>()
         };
         panel = panel.series(one_line(method), Style::marked_line(series), points(true)).unlisted(
             format!("{method}, not right"),

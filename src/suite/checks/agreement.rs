@@ -65,7 +65,7 @@ fn reference(&Reference { random }: &Reference, subject: &Subject<'_>) -> Found 
             worst.take(error, || format!("in the {quantity} of random scene {index}"));
         }
     }
-    Ok(worst.measurement())
+    Ok(worst.measurement().resolving(1.0))
 }
 
 fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
@@ -143,7 +143,7 @@ fn margin(&Margin { points }: &Margin, subject: &Subject<'_>) -> Found {
 fn outcome(Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::End)?;
     let right = flight.outcome.name() == is || flight.outcome == physics::Outcome::Undecided;
-    Ok(Measurement::new(if right { 0.0 } else { 1.0 })
+    Ok(Measurement::count(usize::from(!right))
         .remark(format!("{}, margin {:?} +- {:?}", flight.outcome, flight.exit_margin, flight.exit_margin_error)))
 }
 
@@ -156,7 +156,10 @@ fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
     applies!(!is_fixed(quantity, &other), "{FIXED}");
     let error = flight_error(quantity, &one, &other, problem.impact_speed)
         .ok_or_else(|| NotMeasured::broken(format!("{} against {}", one.outcome, other.outcome)))?;
-    Ok(Measurement::new(error.abs() / tolerance).remark(format!("difference {:.1e} from {with}", error.abs())))
+    let resolution = f64::EPSILON / tolerance;
+    Ok(Measurement::new(error.abs() / tolerance)
+        .resolving(resolution)
+        .remark(format!("difference {:.1e} from {with}", error.abs())))
 }
 
 fn event_order(subject: &Subject<'_>) -> Found {
@@ -164,7 +167,7 @@ fn event_order(subject: &Subject<'_>) -> Found {
     let faults = faults(subject.problem()?, &flight);
     let names = flight.events.iter().map(|e| e.kind.name()).collect::<Vec<_>>();
     let remark = if faults.is_empty() { names.join(", ") } else { faults.join("; ") };
-    Ok(Measurement::new(faults.len() as f64).remark(remark))
+    Ok(Measurement::count(faults.len()).remark(remark))
 }
 
 /// Violations of order, place and number among the events of `flight`.

@@ -86,19 +86,24 @@ impl Eq15Form {
 /// Diameter, mass, strength and S of the formulas' scenes: any will do, the groups alone matter.
 const MASS: f64 = 2.0;
 
-/// A concrete scene of given N (`None`: Q = 0), continuous c and k = 2.
-fn scene(geometry: Option<f64>) -> (Scene, Concrete) {
-    let mut concrete = Concrete {
-        diameter: 0.05,
-        nose_factor: 1.0,
+/// Concrete of 36 MPa with S = 12, continuous c and k = 2.
+pub(super) fn concrete(diameter: f64, nose_factor: f64, density: f64) -> Concrete {
+    Concrete {
+        diameter,
+        nose_factor,
         strength: 36e6,
-        density: 0.0,
+        density,
         static_factor: 12.0,
         inertia_factor: 1.0,
         crater_ratio: 2.0,
         crater_stiffness: CraterStiffness::Continuous,
         layers: Vec::new(),
-    };
+    }
+}
+
+/// A scene of given N (`None`: Q = 0).
+fn scene(geometry: Option<f64>) -> (Scene, Concrete) {
+    let mut concrete = concrete(0.05, 1.0, 0.0);
     if let Some(n) = geometry {
         concrete.density = groups::density_for(n, MASS, &concrete);
     }
@@ -186,12 +191,10 @@ fn approach(subject: &Subject<'_>, impact: f64) -> Result<Vec<StepError>, NotMea
 fn approach_order(&ApproachOrder { impact }: &ApproachOrder, subject: &Subject<'_>) -> Found {
     let fit = fit(&approach(subject, impact)?)?;
     let line = fit.line.ok_or_else(|| NotMeasured::undecided(&fit.reason))?;
-    Ok(Measurement {
-        resolution: half_width(&line),
-        ..Measurement::new((line.order - 1.0).abs())
-            .remark(format!("order {:.5} in 1/N at I = {impact}", line.order))
-            .evidence(Evidence::Fit { abscissa: "1/N", formal: 1.0, fit: Box::new(fit) })
-    })
+    Ok(Measurement::new((line.order - 1.0).abs())
+        .resolving(half_width(&line))
+        .remark(format!("order {:.5} in 1/N at I = {impact}", line.order))
+        .evidence(Evidence::Fit { formal: 1.0, fit: Box::new(fit) }))
 }
 
 fn approach_constant(&ApproachConstant { impact }: &ApproachConstant, subject: &Subject<'_>) -> Found {

@@ -54,8 +54,8 @@ fn energy_balance(subject: &Subject<'_>) -> Found {
         residual = worse(residual, (kinetic - spent).abs() / scale);
         points.push((b.state.depth, (kinetic - spent) / scale));
     }
-    let evidence = Evidence::Series { abscissa: "depth_m", ordinate: "residual_over_initial_energy", points };
-    Ok(Measurement::new(residual).remark(format!("{} rows of the path", flight.trajectory.len())).evidence(evidence))
+    let remark = format!("{} rows of the path", flight.trajectory.len());
+    Ok(Measurement::new(residual).remark(remark).evidence(Evidence::Series(points)))
 }
 
 /// Index of the stage that holds `depth`.

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use super::super::claim::{Found, NotMeasured};
 use super::{Subject, orders};
 use crate::integrators::CentralDifference;
-use crate::physics::{Problem, Stage, State, Target};
+use crate::physics::{Problem, Stage, State};
 use crate::studies::convergence::{Ladder, STEPS_OVER_TIME};
 use crate::studies::order::{StepError, fit};
 
@@ -92,14 +92,7 @@ impl ManufacturedPath {
 
 fn order(&Manufactured { path, order: expected }: &Manufactured, subject: &Subject<'_>) -> Found {
     let (_, impact_speed, _) = path.at(0, 0.0);
-    let problem = Problem {
-        mass: MASS,
-        impact_speed,
-        exit_depth: f64::INFINITY,
-        stages: [FIRST, SECOND].into_iter().collect(),
-        crater: None,
-        target: Target::Stages,
-    };
+    let problem = Problem::of_stages(MASS, impact_speed, [FIRST, SECOND]);
     let ends = path.ends();
     let (amplitude, ..) = path.at(ends.len() - 1, END);
     let error =
@@ -117,7 +110,7 @@ fn order(&Manufactured { path, order: expected }: &Manufactured, subject: &Subje
     let [from, to] = STEPS_OVER_TIME.map(|share| share * END);
     let sizes = Ladder { from, to, points: POINTS, seed: subject.context.seed }.sizes();
     let errors: Vec<StepError> = sizes.into_par_iter().map(error).collect::<Result<_, _>>()?;
-    orders::judge(fit(&errors), 0, expected, "dt_s")
+    orders::judge(fit(&errors), 0, expected)
 }
 
 #[cfg(test)]
@@ -126,14 +119,7 @@ mod tests {
 
     #[test]
     fn the_source_is_the_one_derived_by_hand() {
-        let problem = Problem {
-            mass: MASS,
-            impact_speed: 1.6,
-            exit_depth: f64::INFINITY,
-            stages: [FIRST, SECOND].into_iter().collect(),
-            crater: None,
-            target: Target::Stages,
-        };
+        let problem = Problem::of_stages(MASS, 1.6, [FIRST, SECOND]);
         for (stage, t) in [(0, 0.0), (0, 0.3), (1, 0.9)] {
             let bend = if stage == 0 { 0.0 } else { 0.8 };
             let x = t + 0.2 * (3.0 * t).sin() + bend * (t - KINK) * (t - KINK);

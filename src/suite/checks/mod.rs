@@ -128,22 +128,6 @@ every_check! {
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
 }
 
-impl Check {
-    /// One ulp in the unit of the check: no measurement is believed to be finer.
-    pub fn resolution(&self) -> f64 {
-        match self {
-            Self::Reference(_) => 1.0,
-            Self::Pair(Pair { tolerance, .. }) | Self::Peer(Peer { tolerance, .. }) => f64::EPSILON / tolerance,
-            _ => f64::EPSILON,
-        }
-    }
-
-    /// Whether the measured value is a number of things, to which no limit is loose.
-    pub fn is_count(&self) -> bool {
-        matches!(self, Self::Outcome(_) | Self::EventOrder(_))
-    }
-}
-
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.
 #[derive(Debug, Default)]
 pub struct Memo(Mutex<HashMap<String, Arc<OnceLock<Studied>>>>);

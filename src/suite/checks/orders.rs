@@ -84,12 +84,12 @@ fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subjec
     let formal = study.formal;
     let agree = formal == Some(expected);
     holds!(agree, "the claim expects order {expected}, the formal order is {formal:?}: one of them is wrong");
-    judge(study.fit, study.lost, expected, "dt_s")
+    judge(study.fit, study.lost, expected)
 }
 
 fn proportionality(&Proportionality { from, to }: &Proportionality, subject: &Subject<'_>) -> Found {
     let study = tolerance_study(subject, from, to)?;
-    judge(study.fit, study.lost, 1.0, "rtol")
+    judge(study.fit, study.lost, 1.0)
 }
 
 fn work_order(&WorkOrder { from, to }: &WorkOrder, subject: &Subject<'_>) -> Found {
@@ -100,7 +100,7 @@ fn work_order(&WorkOrder { from, to }: &WorkOrder, subject: &Subject<'_>) -> Fou
         .ok_or_else(|| NotMeasured::skip("a method of variable order has no order against work"))?;
     let study = tolerance_study(subject, from, to)?;
     let work = study.work.ok_or_else(|| NotMeasured::broken("no work was counted"))?;
-    judge(work, study.lost, f64::from(order), "1/evaluations")
+    judge(work, study.lost, f64::from(order))
 }
 
 /// Values of `quantity` by the claim's scheme at the steps `sizes`.
@@ -211,7 +211,7 @@ fn steps(pattern: StepPattern, size: f64, seed: u64) -> Steps {
 const LOST_SHARE_MAX: f64 = 0.2;
 
 /// Distance of a fitted order from the one expected; `lost` runs gave no error to fit.
-pub(super) fn judge(fit: Result<OrderFit, FitError>, lost: usize, expected: f64, abscissa: &'static str) -> Found {
+pub(super) fn judge(fit: Result<OrderFit, FitError>, lost: usize, expected: f64) -> Found {
     let total = lost + fit.as_ref().map_or(0, |fit| fit.points.len());
     let fit = fit.map_err(|error| match error {
         FitError::TooFewSteps { .. } => NotMeasured::undecided(error.to_string()),
@@ -233,8 +233,9 @@ pub(super) fn judge(fit: Result<OrderFit, FitError>, lost: usize, expected: f64,
     } else {
         (None, seen)
     };
-    let evidence = Some(Evidence::Fit { abscissa, formal: expected, fit: Box::new(fit) });
-    Ok(Measurement { value: (line.order - expected).abs(), resolution: half_width(&line), verdict, remark, evidence })
+    let evidence = Some(Evidence::Fit { formal: expected, fit: Box::new(fit) });
+    let measured = Measurement::new((line.order - expected).abs()).resolving(half_width(&line));
+    Ok(Measurement { verdict, remark, evidence, ..measured })
 }
 
 /// Half of the 95 % interval of a fitted order.

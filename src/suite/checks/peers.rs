@@ -171,5 +171,8 @@ fn agreement(Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {
     for difference in &differences {
         worst.take(difference.relative / difference.conditioning, || difference.quantity.clone());
     }
-    Ok(Measurement::new(worst.value / tolerance).remark(format!("largest in {}: {:.1e}", worst.place, worst.value)))
+    let resolution = f64::EPSILON / tolerance;
+    Ok(Measurement::new(worst.value / tolerance)
+        .resolving(resolution)
+        .remark(format!("largest in {}: {:.1e}", worst.place, worst.value)))
 }

@@ -47,15 +47,21 @@ check! {
     } in Stability, "compensated/plain", by rounding_floor;
 }
 
-/// Solution by the claim's scheme at equal steps of `dt` (s).
-fn at_step(subject: &Subject<'_>, dt: f64) -> Result<Flight, NotMeasured> {
-    let scheme = CentralDifference::uniform(dt, subject.claim.velocity, subject.claim.boundaries);
+/// Solution by the claim's velocity rule and `boundaries` at equal steps of `dt` (s).
+fn at_step(subject: &Subject<'_>, boundaries: Boundaries, dt: f64) -> Result<Flight, NotMeasured> {
+    let scheme = CentralDifference::uniform(dt, subject.claim.velocity, boundaries);
     Ok(scheme.solve(subject.problem()?, Detail::Events)?)
 }
 
 /// First `steps` nodes of the claim's scheme at equal steps of `dt` (s), boundaries ignored.
 fn free_states(subject: &Subject<'_>, problem: &Problem, dt: f64, steps: usize) -> Result<Vec<State>, NotMeasured> {
     Ok(CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd).free_states(problem, steps)?)
+}
+
+/// Mean of `of` over `places`.
+fn mean(places: [f64; 6], of: impl Fn(f64) -> Result<f64, NotMeasured>) -> Result<f64, NotMeasured> {
+    let sum = places.into_iter().try_fold(0.0, |sum, place| Ok::<_, NotMeasured>(sum + of(place)?))?;
+    Ok(sum / places.len() as f64)
 }
 
 /// The exact solution of a motion that comes to rest in the crater, and the frequency w (1/s) there.
@@ -124,7 +130,7 @@ fn crater_constant(subject: &Subject<'_>) -> Found {
     applies!(is_located, "step ends leave a depth error anywhere between 0 and (w dt)²/8");
     // Richardson over two steps removes the next even power; what remains is (w dt)^4.
     let ratio = |w_dt: f64| -> Result<f64, NotMeasured> {
-        let flight = at_step(subject, w_dt / w)?;
+        let flight = at_step(subject, subject.claim.boundaries, w_dt / w)?;
         Ok(match subject.quantity()? {
             Quantity::Depth => (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0,
             Quantity::Time => (flight.end.time / exact.end.time - 1.0) / (w_dt * w_dt) * -24.0,
@@ -132,12 +138,7 @@ fn crater_constant(subject: &Subject<'_>) -> Found {
         })
     };
     // Rest falls at its own place in each step; the mean over several steps is what has the limit.
-    let steps = [0.010_3, 0.009_1, 0.008_7, 0.007_9, 0.007_1, 0.006_7];
-    let mut sum = 0.0;
-    for step in steps {
-        sum += ratio(step)?;
-    }
-    let mean = sum / steps.len() as f64;
+    let mean = mean([0.010_3, 0.009_1, 0.008_7, 0.007_9, 0.007_1, 0.006_7], ratio)?;
     Ok(Measurement::new((mean - 1.0).abs()).remark(format!("measured/predicted {mean:.6}")))
 }
 
@@ -151,8 +152,7 @@ fn crater_band(subject: &Subject<'_>) -> Found {
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for _ in 0..STEPS {
         let w_dt = random.log_uniform(1e-3, 1e-2);
-        let scheme = CentralDifference::uniform(w_dt / w, subject.claim.velocity, Boundaries::StepEnd);
-        let flight = scheme.solve(subject.problem()?, Detail::Events)?;
+        let flight = at_step(subject, Boundaries::StepEnd, w_dt / w)?;
         let share = (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0;
         holds!(!share.is_nan(), "no depth at w dt = {w_dt}");
         (least, most) = (least.min(share), most.max(share));
@@ -202,7 +202,7 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
     // error(dt)/dt = C + C' dt: extrapolated from a step and twice the step, averaged over steps without common ratio.
     let error = |steps: f64| -> Result<f64, NotMeasured> {
         let dt = end.time / steps;
-        let flight = at_step(subject, dt)?;
+        let flight = at_step(subject, claim.boundaries, dt)?;
         holds!(flight.outcome.agrees_with(exact.outcome), "the scheme has another outcome at this step");
         let difference = match claim.quantity {
             Some(Quantity::Depth) => flight.end.depth - end.depth,
@@ -212,11 +212,7 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
         Ok(difference / dt)
     };
     let steps = [20_011.3, 23_003.7, 27_017.1, 31_019.9, 36_007.3, 41_011.7];
-    let mut sum = 0.0;
-    for count in steps {
-        sum += 2.0 * error(count)? - error(0.5 * count)?;
-    }
-    let measured = sum / steps.len() as f64;
+    let measured = mean(steps, |count| Ok(2.0 * error(count)? - error(0.5 * count)?))?;
     Ok(Measurement::new(off(measured, predicted)).remark(format!("error/dt {measured:.6e}, predicted {predicted:.6e}")))
 }
 
@@ -267,24 +263,20 @@ pub(super) fn rounding_of(problem: &Problem, from: u32, to: u32) -> Found {
     /// Steps at which the truncation of second order has sunk to the rounding of f64.
     const FLOOR: u32 = 22;
     let all = rounding::floor(problem, from, to, to.max(FLOOR))?;
-    let rows: Vec<_> = all
-        .iter()
-        .filter_map(|row| Some((row.steps, row.truncation?, row.plain.rounding?, row.compensated.rounding?)))
-        .collect();
-    let last = rows.last().ok_or_else(|| NotMeasured::broken("no row"))?;
-    let slope = |pick: fn(&(f64, f64, f64, f64)) -> f64| rounding::slope(rows.iter().map(|row| (row.0, pick(row))));
-    let truncation = slope(|row| row.1);
+    let errors =
+        |row: &rounding::Floor| Some((row.steps, [row.truncation?, row.plain.rounding?, row.compensated.rounding?]));
+    let rows: Vec<_> = all.iter().filter_map(errors).collect();
+    let (steps, [_, plain, compensated]) = rows.last().ok_or_else(|| NotMeasured::broken("no row"))?;
+    let slope = |index: usize| rounding::slope(rows.iter().map(|(steps, errors)| (*steps, errors[index])));
+    let slopes = [0, 1, 2].map(slope);
+    let [truncation, ..] = slopes;
     let remark = format!(
-        "slopes over the steps: truncation {truncation:.2}, plain rounding {:.2}, compensated {:.2}; at {} steps {:.1e} and {:.1e}",
-        slope(|row| row.2),
-        slope(|row| row.3),
-        last.0,
-        last.2,
-        last.3,
+        "slopes over the steps: truncation {truncation:.2}, plain rounding {:.2}, compensated {:.2}; at {steps} steps {plain:.1e} and {compensated:.1e}",
+        slopes[1], slopes[2],
     );
     // The largest over the last rows: a single one may hit the exact value.
-    let tail = |pick: fn(&(f64, f64, f64, f64)) -> f64| rows.iter().rev().take(4).map(pick).fold(0.0, f64::max);
-    let gain = tail(|row| row.3) / tail(|row| row.2);
+    let tail = |index: usize| rows.iter().rev().take(4).map(|(_, errors)| errors[index]).fold(0.0, f64::max);
+    let gain = tail(2) / tail(1);
     let value = if (truncation + 2.0).abs() < 0.05 { gain } else { f64::NAN };
     Ok(Measurement::new(value).remark(remark).evidence(Evidence::Rounding(all)))
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::super::{Subject, off, worse, worst_of};
-use super::{Violations, concrete, end_error, exact, exact_margin, is_right, slab, staged};
+use super::{Violations, concrete, end_error, exact, exact_margin, is_right, slab};
 use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
@@ -132,7 +132,7 @@ fn both_crossings(subject: &Subject<'_>) -> Found {
         for side in [-1.0, 1.0] {
             // X = M V0²/(2 P) = 0.5 m.
             let exit = 0.5 * (1.0 + side * 10f64.powi(-j));
-            let problem = staged(1.0, 10.0, exit, &[Stage::tunnel(100.0, 0.0)]);
+            let problem = Problem::of_stages(1.0, 10.0, [Stage::tunnel(100.0, 0.0)]).with_exit(exit);
             check_outcome(subject, &problem, &mut seen)?;
         }
     }
@@ -143,7 +143,7 @@ fn exactly_critical(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     // Sums and products of powers of two are exact: X = H to the last bit.
     for scale in [1.0, 2f64.powi(-20), 2f64.powi(20)] {
-        let problem = staged(2.0, 16.0 * scale, scale * scale, &[Stage::tunnel(256.0, 0.0)]);
+        let problem = Problem::of_stages(2.0, 16.0 * scale, [Stage::tunnel(256.0, 0.0)]).with_exit(scale * scale);
         let flight = subject.flight(&problem)?;
         let outcome = flight.outcome;
         seen.expect(matches!(outcome, Outcome::Perforated | Outcome::Undecided), || format!("{outcome}"));
@@ -176,7 +176,7 @@ fn triple_coincidence(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
     for offset in [-1e-6, -1e-12, 0.0, 1e-12, 1e-6] {
         // c = P/(k d), Q = 0: V0 = 1 comes to rest at 1 m = k d = H.
-        let problem = concrete(1.0, 1.0 + offset, 1.0, (1.0, 1.0), (1.0, 0.0));
+        let problem = concrete(1.0, 1.0 + offset, [1.0, 1.0], [1.0, 0.0]).with_exit(1.0);
         let flight = subject.flight(&problem)?;
         let found = kinds(&flight);
         check_order(&flight, &mut seen);
@@ -237,9 +237,9 @@ fn thin_targets(subject: &Subject<'_>) -> Found {
 
 fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
-    let ends = ends.iter().copied().chain([f64::INFINITY]);
-    let stages: Vec<Stage> = ends.map(|end| Stage { end, ..Stage::tunnel(20.0, 0.0) }).collect();
-    let problem = staged(1.0, 10.0, 1.0, &stages);
+    holds!(ends.is_sorted(), "the stages do not end one behind the other");
+    let stages = ends.iter().chain([&f64::INFINITY]).map(|end| Stage::tunnel(20.0, 0.0).until(*end));
+    let problem = Problem::of_stages(1.0, 10.0, stages).with_exit(1.0);
     let flight = subject.flight(&problem)?;
     let exact = exact(&problem)?.values();
     let (found, expected) = (kinds(&flight), kinds(&exact));
@@ -261,11 +261,11 @@ fn scaled_forces(subject: &Subject<'_>) -> Found {
     let mut worst = 0.0;
     for exit in [f64::INFINITY, 0.75] {
         // Powers of two throughout, so that no scaling rounds.
-        let plain = concrete(1.0, 2.0, exit, (8.0, 0.5), (4.0, 0.25));
+        let plain = concrete(1.0, 2.0, [8.0, 0.5], [4.0, 0.25]).with_exit(exit);
         let base = subject.flight(&plain)?;
         for power in [-1000, -560, -100, 100, 980] {
             let scale = |x: f64| x * 2f64.powi(power);
-            let problem = concrete(scale(1.0), 2.0, exit, (scale(8.0), 0.5), (scale(4.0), scale(0.25)));
+            let problem = concrete(scale(1.0), 2.0, [scale(8.0), 0.5], [4.0, 0.25].map(scale)).with_exit(exit);
             let flight = subject.flight(&problem)?;
             let is_same = flight.outcome.agrees_with(base.outcome) && kinds(&flight) == kinds(&base);
             holds!(is_same, "{} became {} at 2^{power}", base.outcome, flight.outcome);
@@ -281,9 +281,9 @@ fn scaled_forces(subject: &Subject<'_>) -> Found {
 /// A spring of 1 kN/m over half a metre, then 1 kg/s over another, 1 kg: V_c² = s (1/2)² + (r/2)².
 fn approached_for_ever(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
-    let spring = Stage { stiffness: 1e3, end: 0.5, ..Stage::tunnel(0.0, 0.0) };
-    let slowing = Stage { viscosity: 1.0, ..Stage::tunnel(0.0, 0.0) };
-    let at = |speed| staged(1.0, speed, 1.0, &[spring, slowing]);
+    let spring = Stage { stiffness: 1e3, end: 0.5, ..Stage::free() };
+    let slowing = Stage { viscosity: 1.0, ..Stage::free() };
+    let at = |speed| Problem::of_stages(1.0, speed, [spring, slowing]).with_exit(1.0);
     let critical = 250.25_f64.sqrt();
     let method = subject.method(None)?;
     for power in 1..=14 {
@@ -307,18 +307,18 @@ fn approached_for_ever(subject: &Subject<'_>) -> Found {
 
 fn plateau(subject: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
-    let gap = Stage { end: 1.0, ..Stage::tunnel(0.0, 0.0) };
-    let open = Stage::tunnel(0.0, 0.0);
-    let flight = subject.flight(&staged(1.0, 3.0, 2.0, &[gap, open]))?;
+    let gap = Stage::free().until(1.0);
+    let open = Stage::free();
+    let flight = subject.flight(&Problem::of_stages(1.0, 3.0, [gap, open]).with_exit(2.0))?;
     let error = worse((flight.end.time * 1.5 - 1.0).abs(), off(flight.end.velocity, 3.0));
     seen.expect(flight.outcome == Outcome::Perforated, || format!("{}", flight.outcome));
     seen.expect(error <= 1e3 * subject.promise(), || format!("off by {error:e}"));
     seen.expect(kinds(&flight) == [EventKind::StageEnd(0), EventKind::Exit], || format!("{:?}", kinds(&flight)));
-    let endless = staged(1.0, 3.0, f64::INFINITY, &[open]);
+    let endless = Problem::of_stages(1.0, 3.0, [open]);
     let said = subject.method(None)?.integrator().solve(&endless, Detail::Events);
     seen.expect(matches!(said, Err(IntegrationError::NeverEnds { .. })), || format!("{said:?}"));
     // Then a wall: nothing has been lost before it.
-    let flight = subject.flight(&staged(1.0, 3.0, f64::INFINITY, &[gap, Stage::tunnel(9.0, 0.0)]))?;
+    let flight = subject.flight(&Problem::of_stages(1.0, 3.0, [gap, Stage::tunnel(9.0, 0.0)]))?;
     let error = off(flight.end.depth, 1.5);
     seen.expect(error <= 1e3 * subject.promise(), || format!("stops off by {error:e}"));
     Ok(seen.measurement())
@@ -330,8 +330,8 @@ fn at_a_step_end(_: &Subject<'_>) -> Found {
     for velocity in VelocityAt::ALL {
         for boundaries in Boundaries::ALL {
             let scheme = CentralDifference::uniform(dt, velocity, boundaries);
-            let free = Stage { end: 0.25, ..Stage::tunnel(0.0, 0.0) };
-            let problem = staged(1.0, 1.0, 0.5, &[free, Stage::tunnel(0.0, 0.0)]);
+            let free = Stage::free().until(0.25);
+            let problem = Problem::of_stages(1.0, 1.0, [free, Stage::free()]).with_exit(0.5);
             let flight = scheme.solve(&problem, Detail::Trajectory)?;
             let name = format!("{velocity}, {boundaries}");
             seen.expect(kinds(&flight) == [EventKind::StageEnd(0), EventKind::Exit], || {
@@ -345,7 +345,7 @@ fn at_a_step_end(_: &Subject<'_>) -> Found {
             });
             seen.expect(rises, || format!("{name}: times fall"));
             // Rest exactly at a node: V = 1 - 2 t at t = 0.5, x = 0.25.
-            let stop = staged(1.0, 1.0, f64::INFINITY, &[Stage::tunnel(2.0, 0.0)]);
+            let stop = Problem::of_stages(1.0, 1.0, [Stage::tunnel(2.0, 0.0)]);
             let flight = scheme.solve(&stop, Detail::Events)?;
             seen.expect(kinds(&flight) == [EventKind::Rest], || format!("{name}: {:?}", kinds(&flight)));
             seen.expect((flight.end.time, flight.end.depth) == (0.5, 0.25), || format!("{name}: {}", flight.end));
@@ -374,7 +374,7 @@ fn small_times_and_far_starts(subject: &Subject<'_>) -> Found {
         ..base
     };
     let far =
-        staged(1.0, 300.0, 1e6 + 0.25, &[Stage { end: 1e6, ..Stage::tunnel(0.0, 0.0) }, Stage::tunnel(1.2e5, 0.5)]);
+        Problem::of_stages(1.0, 300.0, [Stage::free().until(1e6), Stage::tunnel(1.2e5, 0.5)]).with_exit(1e6 + 0.25);
     // An ulp of the depth counts 4e6 times in the quarter of a metre behind 1e6 m.
     for (problem, condition) in [(tiny, 1.0), (far, 4e6)] {
         let (flight, exact) = subject.beside_exact(&problem)?;
@@ -388,7 +388,7 @@ fn vanishing_speed(subject: &Subject<'_>) -> Found {
     let mut worst = 0.0;
     for power in [0, -3, -6, -9, -12, -20, -30] {
         let speed = 10f64.powi(power);
-        let flight = subject.flight(&staged(2.0, speed, f64::INFINITY, &[Stage::tunnel(1e5, 3.0)]))?;
+        let flight = subject.flight(&Problem::of_stages(2.0, speed, [Stage::tunnel(1e5, 3.0)]))?;
         let depth = off(flight.end.depth, speed * speed / 1e5);
         let time = off(flight.end.time, 2.0 * speed / 1e5);
         // The drag takes Q V0²/(2 P) of the depth, which counts at the first speeds.

@@ -9,10 +9,10 @@ mod steps;
 
 use twofloat::TwoFloat;
 
-use super::{Subject, off, solve, worst_of};
+use super::{Subject, formulas, off, solve, worst_of};
 use crate::integrators::method::{MethodName, RTOL_DEFAULT};
 use crate::integrators::{Detail, Energy, Flight, Taylor};
-use crate::physics::{Concrete, CraterStiffness, Outcome, Problem, Scene, Stage, Stages, Target};
+use crate::physics::{Outcome, Problem, Scene, Stage};
 use crate::suite::claim::{Measurement, NotMeasured};
 
 pub use self::{critical::*, events::*, steps::*};
@@ -47,7 +47,7 @@ impl Subject<'_> {
 struct Violations {
     checks: usize,
     count: usize,
-    first: String,
+    first: Option<String>,
     notes: Vec<String>,
 }
 
@@ -56,19 +56,14 @@ impl Violations {
         self.checks += 1;
         if !holds {
             self.count += 1;
-            if self.count == 1 {
-                self.first = what();
-            }
+            self.first.get_or_insert_with(what);
         }
     }
 
     fn measurement(self) -> Measurement {
         let mut remark = format!("{} checks", self.checks);
-        for note in self.notes {
+        for note in self.notes.into_iter().chain(self.first.map(|first| format!("first violation: {first}"))) {
             remark = format!("{remark}; {note}");
-        }
-        if self.count > 0 {
-            remark = format!("{remark}; first violation: {}", self.first);
         }
         // No check at all shows nothing.
         Measurement::new(if self.checks == 0 { f64::NAN } else { self.count as f64 }).remark(remark)
@@ -107,17 +102,7 @@ fn is_right(outcome: Outcome, margin: f64) -> bool {
 /// A scene of the paper's size for which other programs found a wrong critical velocity: 0.9 kg, 26.9 mm,
 /// 36 MPa, S 12, k 2, H 0.30 m; an ogive of N* 0.106 in 2370 kg/m³, or no drag.
 fn slab(drag: bool) -> Scene {
-    let concrete = Concrete {
-        diameter: 0.0269,
-        nose_factor: 0.106,
-        strength: 36e6,
-        density: if drag { 2370.0 } else { 0.0 },
-        static_factor: 12.0,
-        inertia_factor: 1.0,
-        crater_ratio: 2.0,
-        crater_stiffness: CraterStiffness::Continuous,
-        layers: Vec::new(),
-    };
+    let concrete = formulas::concrete(0.0269, 0.106, if drag { 2370.0 } else { 0.0 });
     Scene { thickness: Some(0.30), velocity: Some(400.0), ..Scene::of_concrete(0.9, concrete) }
 }
 
@@ -126,15 +111,10 @@ fn stop(drag: bool) -> Result<Problem, NotMeasured> {
     Ok(Scene { thickness: None, ..slab(drag) }.resolve(400.0)?)
 }
 
-/// A problem of stages: laws with their ends.
-fn staged(mass: f64, impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
-    Problem { mass, impact_speed, exit_depth, stages: Stages::from_slice(stages), crater: None, target: Target::Stages }
-}
-
-/// Crater and tunnel by their coefficients.
-fn concrete(mass: f64, impact_speed: f64, exit_depth: f64, crater: (f64, f64), tunnel: (f64, f64)) -> Problem {
-    let stages = [Stage::crater(crater.0, crater.1), Stage::tunnel(tunnel.0, tunnel.1)];
-    Problem { crater: Some(0), target: Target::CraterAndTunnel, ..staged(mass, impact_speed, exit_depth, &stages) }
+/// Crater (c, its end) and tunnel (P, Q) by their coefficients.
+fn concrete(mass: f64, impact_speed: f64, crater: [f64; 2], tunnel: [f64; 2]) -> Problem {
+    let (crater, tunnel) = (Stage::crater(crater[0], crater[1]), Stage::tunnel(tunnel[0], tunnel[1]));
+    Problem::crater_and_tunnel(mass, impact_speed, Some(crater), tunnel)
 }
 
 #[cfg(test)]
