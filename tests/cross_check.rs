@@ -136,7 +136,7 @@ fn survives_coincidence(peer: BundledPeer, environment: &Environment) -> Check {
     let tunnel = flight("tunnel")?;
     let mut request = tunnel.request;
     let (crater_end, stiffness) = (0.1, 1e7);
-    request.stages[0].stiffness_n_m = stiffness;
+    request.stages[0].stiffness = stiffness;
     request.exit_depth_m = Some(crater_end);
     let critical = crater_end * f64::sqrt(stiffness / request.mass_kg);
     let mut live = Peer::start(&environment.command(peer))?;

@@ -45,54 +45,51 @@ pub struct ConvergeArgs {
 
 /// What `converge --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field")]
 pub struct ConvergeJson {
-    pub schema: &'static str,
-    pub title: Option<String>,
-    pub method: MethodJson,
-    pub seed: u64,
+    schema: &'static str,
+    title: Option<String>,
+    method: MethodJson,
+    seed: u64,
     /// `closed-form`, or `taylor` where no closed form exists.
-    pub reference: &'static str,
-    pub verdict: Verdict,
-    pub quantities: Vec<QuantityJson>,
+    reference: &'static str,
+    verdict: Verdict,
+    quantities: Vec<QuantityJson>,
     /// What was not studied, and why.
-    pub skipped: Vec<String>,
+    skipped: Vec<String>,
 }
 
 /// The convergence of one quantity.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field")]
 pub struct QuantityJson {
-    pub quantity: Quantity,
-    pub formal_order: Option<f64>,
-    pub observed_order: Option<f64>,
-    pub interval: Option<[f64; 2]>,
-    pub error_constant: Option<f64>,
+    quantity: Quantity,
+    formal_order: Option<f64>,
+    observed_order: Option<f64>,
+    interval: Option<[f64; 2]>,
+    error_constant: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub work_order: Option<Option<f64>>,
-    pub class: Class,
-    pub verdict: Verdict,
+    work_order: Option<Option<f64>>,
+    class: Class,
+    verdict: Verdict,
     /// Why this class, or why there is no fit.
-    pub reason: String,
+    reason: String,
     /// Runs with another outcome than the exact one.
-    pub lost_runs: usize,
-    pub points: Vec<PointJson>,
+    lost_runs: usize,
+    points: Vec<PointJson>,
 }
 
 /// One run.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct PointJson {
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub dt_s: Option<f64>,
+    dt_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub rtol: Option<f64>,
+    rtol: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub force_evaluations: Option<u64>,
-    pub error: f64,
-    pub used: bool,
+    force_evaluations: Option<u64>,
+    error: f64,
+    used: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub excluded: Option<Exclusion>,
+    excluded: Option<Exclusion>,
 }
 
 impl Ask for ConvergeArgs {

@@ -35,41 +35,39 @@ pub struct CriticalArgs {
 
 /// What `critical --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct CriticalJson {
-    pub schema: &'static str,
-    pub scene: SceneJson,
-    pub method: MethodJson,
-    pub critical_velocity_m_s: f64,
-    pub error_bar_m_s: Option<f64>,
-    pub critical_energy_j: f64,
-    pub dimensionless_energy: Option<f64>,
-    pub evaluations: u32,
-    pub note: &'static str,
-    pub closed_form: Option<ClosedCriticalJson>,
-    pub relative_error: Option<f64>,
-    pub eq15: Option<Eq15Json>,
+    schema: &'static str,
+    scene: SceneJson,
+    method: MethodJson,
+    critical_velocity_m_s: f64,
+    error_bar_m_s: Option<f64>,
+    critical_energy_j: f64,
+    dimensionless_energy: Option<f64>,
+    evaluations: u32,
+    note: &'static str,
+    closed_form: Option<ClosedCriticalJson>,
+    relative_error: Option<f64>,
+    eq15: Option<Eq15Json>,
     /// Uncertainty of V_c from the spreads asked for; `null` without any.
-    pub uncertainty: Option<UncertaintyJson>,
+    uncertainty: Option<UncertaintyJson>,
     /// What was asked for and not computed, and why.
-    pub skipped: Vec<String>,
+    skipped: Vec<String>,
 }
 
 /// Uncertainty of V_c from stated input spreads.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "named as in the text, with its unit")]
 pub struct UncertaintyJson {
-    pub spreads: Vec<SpreadJson>,
+    spreads: Vec<SpreadJson>,
     /// To first order, by the derivatives of V_c.
-    pub first_order_m_s: f64,
-    pub samples: usize,
+    first_order_m_s: f64,
+    samples: usize,
     /// Random scenes that were not admissible, left out.
-    pub inadmissible: usize,
-    pub seed: u64,
-    pub mean_m_s: f64,
-    pub deviation_m_s: f64,
+    inadmissible: usize,
+    seed: u64,
+    mean_m_s: f64,
+    deviation_m_s: f64,
     /// Quantiles 2.5, 50 and 97.5 %.
-    pub quantiles_m_s: [f64; 3],
+    quantiles_m_s: [f64; 3],
 }
 
 /// One input's part in it.
@@ -85,11 +83,10 @@ pub struct SpreadJson {
 
 /// The exact critical velocity.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct ClosedCriticalJson {
-    pub critical_velocity_m_s: f64,
-    pub critical_energy_j: f64,
-    pub dimensionless_energy: Option<f64>,
+    critical_velocity_m_s: f64,
+    critical_energy_j: f64,
+    dimensionless_energy: Option<f64>,
 }
 
 /// Eq. 15 as E_c/(d³ fc), beside the simulation.

@@ -9,7 +9,7 @@ use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT};
 use crate::integrators::{Flight, IntegrationError, StepLimit};
 use crate::physics::Problem;
-use crate::physics::units::{Dimension, QuantityError, quantity};
+use crate::physics::units::{Dimension, quantity};
 use crate::text::engineering;
 
 /// Method and options.
@@ -66,11 +66,12 @@ impl MethodArgs {
 /// # Errors
 /// A text that is no time (exit 2), with `help`.
 pub fn time_option(text: &str, help: &str) -> Result<f64, CliError> {
-    parse_time(text).map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help))
+    let time = text.trim().parse().or_else(|_| quantity(text, Dimension::Time));
+    time.map_err(|cause| CliError::usage(format!("--dt {text}: {cause}"), help))
 }
 
 /// `method` in the JSON of a command.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct MethodJson {
     /// Name of the method.
     pub name: &'static str,
@@ -88,37 +89,19 @@ pub struct MethodJson {
     pub events: Option<&'static str>,
     /// Step limit of a fixed-step scheme.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub stability: Option<StabilityJson>,
-}
-
-/// Step limit of a fixed-step scheme (`docs/theory.md`, section 5).
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-pub struct StabilityJson {
-    /// Largest stable step (s); `null` without a limit.
-    pub limit_s: Option<f64>,
-    /// Whether no step exceeds it.
-    pub stable: bool,
-}
-
-impl From<StepLimit> for StabilityJson {
-    fn from(limit: StepLimit) -> Self {
-        Self { limit_s: limit.limit.is_finite().then_some(limit.limit), stable: limit.stable }
-    }
+    pub stability: Option<StepLimit>,
 }
 
 impl MethodJson {
     /// What was used for `problem`, and what `flight` says of its stability.
     pub fn new(name: MethodName, options: &MethodOptions, problem: Option<&Problem>, flight: Option<&Flight>) -> Self {
-        let mut json =
-            Self { name: name.name(), rtol: None, dt_s: None, velocity: None, events: None, stability: None };
+        let mut json = Self { name: name.name(), ..Self::default() };
         match name {
             MethodName::CentralDifference => {
-                let velocity = options.velocity.unwrap_or_default();
-                let events = options.events.unwrap_or_default();
                 json.dt_s = problem.map(|p| options.central_difference().time_step(p)).or(options.dt);
-                json.velocity = Some(velocity.name());
-                json.events = Some(events.name());
-                json.stability = flight.and_then(|f| f.step_limit).map(StabilityJson::from);
+                json.velocity = Some(options.velocity.unwrap_or_default().name());
+                json.events = Some(options.events.unwrap_or_default().name());
+                json.stability = flight.and_then(|f| f.step_limit);
             }
             MethodName::Taylor | MethodName::Energy => json.rtol = Some(options.rtol),
             MethodName::ClosedForm => {}
@@ -143,9 +126,4 @@ impl MethodJson {
         };
         format!("{}{tuning}{}", self.name, self.rules())
     }
-}
-
-/// A time (s) from "1 us" or a bare number of seconds.
-fn parse_time(text: &str) -> Result<f64, QuantityError> {
-    text.trim().parse().or_else(|_| quantity(text, Dimension::Time))
 }

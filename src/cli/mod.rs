@@ -250,7 +250,11 @@ pub struct Printing<A: Args> {
 
 impl<A: Ask> Run for Printing<A> {
     fn run(&self) -> Result<Exit, CliError> {
-        let is_table_printed = output::takes_standard_output(self.args.table(), self.json)?;
+        let is_table_printed = self.args.table().is_some_and(output::is_standard);
+        if is_table_printed && self.json {
+            let message = "the table and the JSON cannot both go to standard output";
+            return Err(CliError::usage(message, "name a file for one"));
+        }
         let answer = self.args.ask()?;
         match answer.data {
             _ if is_table_printed => Ok(()),

@@ -29,12 +29,7 @@ pub fn print_json<T: Serialize>(value: &T) -> io::Result<()> {
 /// # Errors
 /// When standard output cannot be written for another reason.
 pub fn print_text(text: &str) -> io::Result<()> {
-    print_bytes(text.as_bytes())
-}
-
-/// As [`print_text`].
-fn print_bytes(bytes: &[u8]) -> io::Result<()> {
-    unless_closed(io::stdout().lock().write_all(bytes).and_then(|()| io::stdout().flush()))
+    unless_closed(io::stdout().lock().write_all(text.as_bytes()).and_then(|()| io::stdout().flush()))
 }
 
 /// `result`, a reader of the pipe that has gone away being no error.
@@ -76,7 +71,7 @@ pub fn is_standard(path: &Path) -> bool {
 }
 
 /// Whether both paths are one file.
-pub fn is_same_file(a: &Path, b: &Path) -> bool {
+fn is_same_file(a: &Path, b: &Path) -> bool {
     !is_standard(a) && (a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b))
 }
 
@@ -122,18 +117,6 @@ fn obstacle(path: &Path) -> Option<(String, &'static str)> {
     } else {
         (format!("there is no folder {}", folder.display()), "make the folder first, or name another")
     })
-}
-
-/// Whether the table named `out` takes standard output, where nothing else is printed then.
-///
-/// # Errors
-/// When JSON is asked for in the same place (exit 2).
-pub fn takes_standard_output(out: Option<&Path>, json: bool) -> Result<bool, CliError> {
-    let takes = out.is_some_and(is_standard);
-    if takes && json {
-        return Err(CliError::usage("the table and the JSON cannot both go to standard output", "name a file for one"));
-    }
-    Ok(takes)
 }
 
 /// Where the figures beside the table at `path` go, one for each ending of its name; none beside standard output.
@@ -185,44 +168,20 @@ pub fn write_table(
 pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), CliError> {
     let mut written = Vec::with_capacity(files.len());
     for (path, bytes) in files {
-        if is_standard(path) {
-            print_bytes(bytes).map_err(CliError::stdout)?;
-            continue;
-        }
         let write = || {
-            let mut file = temporary_beside(path)?;
-            file.write_all(bytes)?;
+            let mut output = Destination::open(path)?;
             // What does not fit on the disk is known here, before the first file is replaced.
-            file.as_file().sync_all()?;
-            Ok(file)
+            unless_closed(output.write_all(bytes).and_then(|()| output.flush()))?;
+            Ok(output)
         };
         written.push((path, write().map_err(|cause| CliError::write(path, cause))?));
     }
-    for (path, file) in written {
-        persist(file, path).map_err(|cause| CliError::write(path, cause))?;
-    }
-    Ok(())
+    written.into_iter().try_for_each(|(path, output)| output.finish(path).map_err(|cause| CliError::write(path, cause)))
 }
 
 /// The file itself where `path` is a link to it, which stays.
 fn followed(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
-/// A temporary file in the folder of `path`, to be moved there by [`persist`].
-///
-/// # Errors
-/// When the folder cannot be written, or `path` names a folder.
-pub fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
-    if path.is_dir() {
-        return Err(io::ErrorKind::IsADirectory.into());
-    }
-    let path = followed(path);
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder)
 }
 
 /// Where a table goes: standard output, or a file that appears when it is whole.
@@ -238,20 +197,34 @@ impl Destination {
     /// The destination at `path`, `-` being standard output.
     ///
     /// # Errors
-    /// As [`temporary_beside`].
+    /// When the folder cannot be written, or `path` names a folder.
     pub fn open(path: &Path) -> io::Result<Self> {
-        Ok(if is_standard(path) { Self::Standard(io::stdout()) } else { Self::File(temporary_beside(path)?) })
+        if is_standard(path) {
+            return Ok(Self::Standard(io::stdout()));
+        }
+        if path.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        let path = followed(path);
+        let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder).map(Self::File)
     }
 
-    /// Lets the file appear at `path`.
+    /// Lets the file appear at `path`, with the permissions that an ordinary new file has.
     ///
     /// # Errors
-    /// As [`persist`]; a reader that has gone away is none.
-    pub fn finish(self, path: &Path) -> io::Result<()> {
-        match self {
-            Self::Standard(mut output) => unless_closed(output.flush()),
-            Self::File(file) => persist(file, path),
+    /// When the disk is full or the move fails; a reader that has gone away is no error.
+    pub fn finish(mut self, path: &Path) -> io::Result<()> {
+        unless_closed(self.flush())?;
+        let Self::File(file) = self else { return Ok(()) };
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // A temporary file is private; a result is for everybody whom the old one was for.
+            let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
+            fs::set_permissions(file.path(), fs::Permissions::from_mode(mode))?;
         }
+        file.persist(followed(path)).map(|_| ()).map_err(|e| e.error)
     }
 }
 
@@ -263,10 +236,11 @@ impl Write for Destination {
         }
     }
 
+    /// Also to the disk.
     fn flush(&mut self) -> io::Result<()> {
         match self {
             Self::Standard(output) => output.flush(),
-            Self::File(file) => file.flush(),
+            Self::File(file) => file.as_file().sync_all(),
         }
     }
 }
@@ -284,22 +258,6 @@ pub fn write_help(kind: io::ErrorKind) -> &'static str {
         StorageFull | QuotaExceeded => "make room on the disk, or name another; what was there is untouched",
         _ => "name another place; what was there is untouched",
     }
-}
-
-/// Moves a finished temporary file to `path`, with the permissions that an ordinary new file has.
-///
-/// # Errors
-/// When the disk is full or the move fails.
-pub fn persist(file: tempfile::NamedTempFile, path: &Path) -> io::Result<()> {
-    file.as_file().sync_all()?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // A temporary file is private; a result is for everybody whom the old one was for.
-        let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
-        fs::set_permissions(file.path(), fs::Permissions::from_mode(mode))?;
-    }
-    file.persist(followed(path)).map(|_| ()).map_err(|e| e.error)
 }
 
 /// Whether the table at `path` is a Parquet table, by its name.

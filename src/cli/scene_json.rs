@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::exchange::peers::StageJson;
-use crate::physics::{Concrete, CraterStiffness, Problem, Scene};
+use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Stage};
 
 /// The scene in SI units; what a scene of stages does not have is `null`.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -28,7 +27,7 @@ pub struct SceneJson {
     pub static_force_n: Option<f64>,
     pub drag_kg_m: Option<f64>,
     pub exit_depth_m: Option<f64>,
-    pub stages: Vec<StageJson>,
+    pub stages: Vec<Stage>,
 }
 
 impl SceneJson {
@@ -59,7 +58,7 @@ impl SceneJson {
             static_force_n: homogeneous.and(scene.static_force()),
             drag_kg_m: homogeneous.and(scene.drag()),
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
-            stages: problem.stages.iter().map(StageJson::from).collect(),
+            stages: problem.stages.to_vec(),
         }
     }
 }

@@ -24,13 +24,12 @@ pub struct SensitivitiesJson {
 
 /// Derivatives with respect to one number, SI, and elasticities d ln y/d ln p; `null` where there is no such quantity.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "named by quantity")]
 pub struct ParameterJson {
-    pub path: String,
-    pub value: f64,
-    pub depth: Option<DerivativeJson>,
-    pub velocity: Option<DerivativeJson>,
-    pub critical_velocity: Option<DerivativeJson>,
+    path: String,
+    value: f64,
+    depth: Option<DerivativeJson>,
+    velocity: Option<DerivativeJson>,
+    critical_velocity: Option<DerivativeJson>,
 }
 
 /// One derivative.

@@ -43,38 +43,36 @@ pub struct SolveArgs {
 
 /// What `solve --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct SolveJson {
-    pub schema: &'static str,
-    pub scene: SceneJson,
-    pub groups: GroupsJson,
-    pub method: MethodJson,
-    pub outcome: Outcome,
-    pub stage: usize,
+    schema: &'static str,
+    scene: SceneJson,
+    groups: GroupsJson,
+    method: MethodJson,
+    outcome: Outcome,
+    stage: usize,
     #[serde(flatten)]
-    pub end: State,
+    end: State,
     /// Least W = V² over V0² at the stage ends and the exit, below zero for a stop: the exit energy unless a stage drives.
-    pub exit_margin: Option<f64>,
+    exit_margin: Option<f64>,
     /// Half-width of its error bar.
-    pub exit_margin_error: Option<f64>,
-    pub events: Vec<EventJson>,
-    pub cost: CostJson,
-    pub closed_form: Option<ClosedFormJson>,
-    pub relative_error: Option<RelativeErrorJson>,
-    pub skipped: Vec<String>,
+    exit_margin_error: Option<f64>,
+    events: Vec<EventJson>,
+    cost: CostJson,
+    closed_form: Option<ClosedFormJson>,
+    relative_error: Option<RelativeErrorJson>,
+    skipped: Vec<String>,
     /// Asked for with `--sensitivities`; `null` otherwise.
-    pub sensitivities: Option<SensitivitiesJson>,
+    sensitivities: Option<SensitivitiesJson>,
 }
 
 /// The groups of Eq. 13; `null` where the scene has none.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field")]
 #[expect(non_snake_case, reason = "the groups are named as in the paper")]
 pub struct GroupsJson {
-    pub I: Option<f64>,
-    pub N: Option<f64>,
-    pub H_over_d: Option<f64>,
-    pub X_over_d: Option<f64>,
+    I: Option<f64>,
+    N: Option<f64>,
+    H_over_d: Option<f64>,
+    X_over_d: Option<f64>,
 }
 
 /// Work done.
@@ -89,24 +87,22 @@ pub struct CostJson {
 
 /// The exact answer.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct ClosedFormJson {
-    pub outcome: Outcome,
+    outcome: Outcome,
     #[serde(flatten)]
-    pub end: State,
-    pub crater_end_time_s: Option<f64>,
-    pub crater_end_velocity_m_s: Option<f64>,
+    end: State,
+    crater_end_time_s: Option<f64>,
+    crater_end_velocity_m_s: Option<f64>,
 }
 
 /// Errors against the exact answer: depth and times relative to it, velocities relative to V0.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "`docs/reference.md` names every field")]
 pub struct RelativeErrorJson {
-    pub depth: Option<f64>,
-    pub time: Option<f64>,
-    pub velocity: Option<f64>,
-    pub crater_end_time: Option<f64>,
-    pub crater_end_velocity: Option<f64>,
+    depth: Option<f64>,
+    time: Option<f64>,
+    velocity: Option<f64>,
+    crater_end_time: Option<f64>,
+    crater_end_velocity: Option<f64>,
 }
 
 impl RelativeErrorJson {

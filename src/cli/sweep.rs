@@ -71,14 +71,13 @@ pub struct SweepJson {
 
 /// A measured point and the curves there, all as `E_c/(d³ fc)`.
 #[derive(Debug, Serialize, JsonSchema)]
-#[expect(missing_docs, reason = "named as the columns and curves")]
 pub struct MeasuredPoint {
     #[serde(rename = "H_over_d")]
-    pub thickness_ratio: f64,
-    pub measured: f64,
-    pub energy_full_depth: Option<f64>,
-    pub energy_ndrc: Option<f64>,
-    pub eq15_printed: Option<f64>,
+    thickness_ratio: f64,
+    measured: f64,
+    energy_full_depth: Option<f64>,
+    energy_ndrc: Option<f64>,
+    eq15_printed: Option<f64>,
 }
 
 impl Ask for SweepArgs {

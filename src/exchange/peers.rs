@@ -21,4 +21,4 @@ pub mod wire;
 pub use environment::{BundledPeer, Environment, PeerSetupError};
 pub use process::{Peer, PeerFailure, PeerFault, PeerIdentity, PeerLimits, PeerStartError};
 pub use references::{RecordedFlight, Recording, recordings};
-pub use wire::{Difference, EventJson, PeerAnswer, PeerRequest, StageJson};
+pub use wire::{Difference, EventJson, PeerAnswer, PeerRequest};

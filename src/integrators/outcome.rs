@@ -54,9 +54,12 @@ pub struct Sample {
 }
 
 /// The step limit of a fixed-step scheme, and whether the step respected it (`docs/theory.md`, section 5).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct StepLimit {
-    /// Largest stable step (s); infinite where there is no limit.
+    /// Largest stable step (s); infinite, `null` in JSON, where there is no limit.
+    #[serde(rename = "limit_s")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<f64>"))]
     pub limit: f64,
     /// Whether every step was within it.
     pub stable: bool,

@@ -10,7 +10,7 @@
 //!
 //! How an integrator finds an event is described in [`crate::integrators::locate`].
 
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use smallvec::SmallVec;
 
 use super::scalar::Scalar;
@@ -19,18 +19,30 @@ use crate::text::Shown;
 /// Resistance `F = p + s x + r V + q V²` (N) until `x = end`; positive `F` slows the projectile.
 ///
 /// Depth `x` counts from the impact face in every stage, not from the stage's own start.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[serde(bound(deserialize = "S: Scalar + Deserialize<'de>"))]
 pub struct Stage<S = f64> {
     /// Static force p (N), of any sign; negative drives the projectile.
+    #[serde(rename = "static_force_n")]
     pub static_force: S,
     /// Stiffness s (N/m), not negative.
+    #[serde(rename = "stiffness_n_m")]
     pub stiffness: S,
     /// Viscosity r (kg/s), not negative.
+    #[serde(rename = "viscosity_kg_s")]
     pub viscosity: S,
     /// Drag q (kg/m), not negative.
+    #[serde(rename = "drag_kg_m")]
     pub drag: S,
-    /// Depth where the stage ends (m), from the impact face; infinite when it does not end.
+    /// Depth where the stage ends (m), from the impact face; infinite, `null` in JSON, when it does not end.
+    #[serde(rename = "end_m", deserialize_with = "infinite_if_null")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<S>"))]
     pub end: S,
+}
+
+fn infinite_if_null<'de, S: Scalar + Deserialize<'de>, D: Deserializer<'de>>(depth: D) -> Result<S, D::Error> {
+    Ok(Option::deserialize(depth)?.unwrap_or(S::from_f64(f64::INFINITY)))
 }
 
 impl<S: Scalar> Stage<S> {

@@ -11,8 +11,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::grid_convergence::{
-    Behaviour, EcaHoekstra, GridValue, ThreeGrids, Uncertainty, eca_hoekstra, roache, self_convergence, three_grids,
-    xing_stern,
+    Behaviour, EcaHoekstra, GridValue, SelfConvergence, ThreeGrids, Uncertainty, eca_hoekstra, roache,
+    self_convergence, three_grids, xing_stern,
 };
 use super::order::{Class, Exclusion, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
 use super::quantity::Quantity;
@@ -65,36 +65,6 @@ pub enum AuditError {
     /// A fault of the table itself.
     #[error(transparent)]
     Table(#[from] Box<TableError>),
-    /// Nothing but `dt_s`.
-    #[error("{place}: there is no column of results")]
-    NoResults {
-        /// Where the columns are named.
-        place: Place,
-    },
-    /// Two results for one step.
-    #[error("{place}: the step {} s has two values of `{name}`, {} here and {} in line {other}", Shown(*.step), Shown(*.second), Shown(*.first))]
-    TwoValues {
-        /// Where the second stands.
-        place: Place,
-        /// Step (s).
-        step: f64,
-        /// Column name.
-        name: &'static str,
-        /// Value in the earlier line.
-        first: f64,
-        /// Value here.
-        second: f64,
-        /// The earlier line.
-        other: u64,
-    },
-    /// Fewer than [`STEPS_MIN`] different steps.
-    #[error("{file}: {found} different steps, and an order needs {STEPS_MIN}")]
-    TooFewSteps {
-        /// File.
-        file: String,
-        /// Steps found.
-        found: usize,
-    },
     /// An order to compare with that no study of step sizes can show.
     #[error("the order {} is not allowed: a number from {ORDER_MIN} to {ORDER_MAX}", Shown(*.order))]
     BadOrder {
@@ -107,11 +77,6 @@ impl Advice for AuditError {
     fn help(&self) -> String {
         match self {
             Self::Table(error) => error.help(),
-            Self::NoResults { .. } => format!("add a column of results; allowed are the {}", RESULTS.allowed()),
-            Self::TwoValues { .. } => {
-                "keep one of them: a result that a step does not determine has no order".to_owned()
-            }
-            Self::TooFewSteps { .. } => "run the other code with more steps, best at ratios of 1.5 to 2".to_owned(),
             Self::BadOrder { .. } => "give the formal order of the other code's scheme, such as 1 or 2".to_owned(),
         }
     }
@@ -247,7 +212,8 @@ impl Table {
             table.columns.push(ResultColumn { quantity, number, rounding });
         }
         if table.columns.is_empty() {
-            return Err(AuditError::NoResults { place: Place { file: file.to_owned(), at: header, column: 0 } });
+            let place = Place { file: file.to_owned(), at: header, column: 0 };
+            return Err(TableError::new(place, Fault::NoResults, &RESULTS).into());
         }
         for (line, step, cells) in cells {
             let value = |column: &ResultColumn| cells[column.quantity as usize].map_or(f64::NAN, |(value, _)| value);
@@ -283,14 +249,9 @@ impl Table {
                 if first != second && !(first.is_nan() && second.is_nan()) {
                     let place = Place { file: self.file.clone(), at: At::Line(row.line), column: column.number };
                     let name = RESULTS.columns[column_of(column.quantity)].name;
-                    return Err(AuditError::TwoValues {
-                        place,
-                        step: row.step,
-                        name,
-                        first,
-                        second,
-                        other: before.line,
-                    });
+                    let (step, other) = (row.step, before.line);
+                    let fault = Fault::TwoValues { step, name, first, second, other };
+                    return Err(TableError::new(place, fault, &RESULTS).into());
                 }
             }
             merged.push(row.line.to_string());
@@ -301,7 +262,8 @@ impl Table {
         }
         let found = different.iter().filter(|row| row.step.is_finite()).count();
         if found < STEPS_MIN {
-            return Err(AuditError::TooFewSteps { file: self.file.clone(), found });
+            let place = Place { file: self.file.clone(), ..Place::default() };
+            return Err(TableError::new(place, Fault::TooFewSteps { found, needed: STEPS_MIN }, &RESULTS).into());
         }
         self.rows = different;
         Ok(())
@@ -469,12 +431,14 @@ pub fn audit(table: &Table, expectation: &Expectation) -> Result<Audit, AuditErr
     Ok(Audit { schema: "penetrode/audit/1", verdict, findings, quantities })
 }
 
-/// Order and class of a column, from whichever rule applies.
-struct Observed {
-    order: f64,
-    interval: [f64; 2],
-    band: [f64; 2],
-    constant: f64,
+impl QuantityAudit {
+    /// Takes the order found, its 95 % interval and its band, and the constant of the relative error.
+    fn observe(&mut self, order: f64, interval: [f64; 2], band: [f64; 2], constant: f64) {
+        self.observed_order = Some(order);
+        self.interval = Some(interval);
+        self.verdict_band = Some(band);
+        self.error_constant = Some(constant);
+    }
 }
 
 /// A column before anything is known of it: failed until shown otherwise.
@@ -541,10 +505,10 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
     }
     let exact = expectation.exact.and_then(|exact| exact.of(quantity));
     judged.exact = exact.map(|(value, _)| value);
-    let observed = match exact {
+    match exact {
         Some((exact, scale)) => against_exact(&mut judged, &grids, exact, scale),
         None => against_limit(&mut judged, &own),
-    };
+    }
     if let (Some(exact), true) = (judged.exact, converges) {
         let finest = grids[0];
         let bar = least_squares.uncertainty.map_or(0.0, |bar| bar.half_width) + finest.round_off;
@@ -562,7 +526,7 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
         judged.reason = own.reason;
     }
     let constant = own.behaviour == Behaviour::Constant;
-    let (verdict, finding) = verdict_of(&judged, constant, observed.as_ref());
+    let (verdict, finding) = verdict_of(&judged, constant);
     judged.verdict = verdict;
     if let Some((kind, message)) = finding {
         remark(kind, &message);
@@ -573,55 +537,44 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
         remark(FindingKind::WrongLimit, &text);
         judged.verdict = Verdict::Failed;
     }
-    if let Some(observed) = &observed {
-        judged.observed_order = Some(observed.order);
-        judged.interval = Some(observed.interval);
-        judged.verdict_band = Some(observed.band);
-        judged.error_constant = Some(observed.constant);
-    }
     add_bands(&mut judged, &grids, least_squares, expectation.order);
     (judged, findings)
 }
 
 /// The verdict that follows from the class and, for a converging column, from the order; and what to say about it.
-fn verdict_of(
-    judged: &QuantityAudit,
-    constant: bool,
-    observed: Option<&Observed>,
-) -> (Verdict, Option<(FindingKind, String)>) {
+fn verdict_of(judged: &QuantityAudit, constant: bool) -> (Verdict, Option<(FindingKind, String)>) {
     let with = |kind| Some((kind, judged.reason.clone()));
-    match (judged.class, observed) {
-        (Class::Diverging, _) => (Verdict::Failed, with(FindingKind::Diverging)),
-        (Class::Oscillating, _) => (Verdict::Failed, with(FindingKind::Oscillating)),
-        (Class::AtFloor, _) => (Verdict::Undecided, with(FindingKind::ZeroError)),
-        (Class::Undecided, _) if constant => (Verdict::Undecided, with(FindingKind::Constant)),
-        (Class::Undecided, _) | (Class::Converging, None) => (Verdict::Undecided, with(FindingKind::Noise)),
-        (Class::Converging, Some(observed)) => order_verdict(observed, judged.formal_order),
+    match judged.class {
+        Class::Diverging => (Verdict::Failed, with(FindingKind::Diverging)),
+        Class::Oscillating => (Verdict::Failed, with(FindingKind::Oscillating)),
+        Class::AtFloor => (Verdict::Undecided, with(FindingKind::ZeroError)),
+        Class::Undecided if constant => (Verdict::Undecided, with(FindingKind::Constant)),
+        Class::Undecided => (Verdict::Undecided, with(FindingKind::Noise)),
+        Class::Converging => order_verdict(judged).unwrap_or((Verdict::Undecided, with(FindingKind::Noise))),
     }
 }
 
-/// Fails an order outside the wide band; passes one that the 95 % interval separates from its neighbours one away.
+/// Fails an order outside the wide band; passes one that the 95 % interval distinguishes from its neighbours one away.
 ///
-/// Without an expected order the interval must still be narrower than one, or nothing is known of the order.
-fn order_verdict(observed: &Observed, formal: Option<f64>) -> (Verdict, Option<(FindingKind, String)>) {
-    let ([low, high], [least, most]) = (observed.interval, observed.band);
-    let text = format!("order {:.2}, 95 % interval {low:.2} to {high:.2}", observed.order);
-    let is_clear = match formal {
+/// Without an expected order the interval must still be narrower than one, or nothing is known of the order. `None`
+/// where no order was found.
+fn order_verdict(judged: &QuantityAudit) -> Option<(Verdict, Option<(FindingKind, String)>)> {
+    let (order, [low, high], [least, most]) = (judged.observed_order?, judged.interval?, judged.verdict_band?);
+    let text = format!("order {order:.2}, 95 % interval {low:.2} to {high:.2}");
+    let is_clear = match judged.formal_order {
         Some(formal) if formal < least || most < formal => {
-            return (Verdict::Failed, Some((FindingKind::OrderMissed, format!("{text}, where {formal} is expected"))));
+            let missed = format!("{text}, where {formal} is expected");
+            return Some((Verdict::Failed, Some((FindingKind::OrderMissed, missed))));
         }
         Some(formal) => formal - 1.0 < low && high < formal + 1.0,
         None => high - low < 1.0,
     };
-    if is_clear {
-        (Verdict::Passed, None)
-    } else {
-        (Verdict::Undecided, Some((FindingKind::OrderUnclear, format!("{text}: too few or too noisy rows to tell"))))
-    }
+    let unclear = || (FindingKind::OrderUnclear, format!("{text}: too few or too noisy rows to tell"));
+    Some(if is_clear { (Verdict::Passed, None) } else { (Verdict::Undecided, Some(unclear())) })
 }
 
 /// Fits the order of the errors against an exact value.
-fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, scale: f64) -> Option<Observed> {
+fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, scale: f64) {
     let points: Vec<StepError> = grids
         .iter()
         .map(|grid| {
@@ -638,7 +591,7 @@ fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, sc
         Ok(fit) => fit,
         Err(error) => {
             judged.reason = error.to_string();
-            return None;
+            return;
         }
     };
     for (point, fitted) in judged.points.iter_mut().zip(&fit.points) {
@@ -648,16 +601,13 @@ fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, sc
     }
     judged.class = fit.class;
     judged.reason.clone_from(&fit.reason);
-    fit.line.map(|line| Observed {
-        order: line.order,
-        interval: line.interval95,
-        band: line.verdict_band,
-        constant: line.error_constant,
-    })
+    if let Some(line) = fit.line {
+        judged.observe(line.order, line.interval95, line.verdict_band, line.error_constant);
+    }
 }
 
 /// Takes order and limit from the values themselves.
-fn against_limit(judged: &mut QuantityAudit, own: &super::grid_convergence::SelfConvergence) -> Option<Observed> {
+fn against_limit(judged: &mut QuantityAudit, own: &SelfConvergence) {
     judged.rule = own.rule;
     judged.class = own.behaviour.class();
     judged.reason.clone_from(&own.reason);
@@ -667,12 +617,9 @@ fn against_limit(judged: &mut QuantityAudit, own: &super::grid_convergence::Self
         point.used = own.behaviour != Behaviour::Constant;
         point.error = converges.then_some((point.value - own.limit).abs() / scale);
     }
-    (own.behaviour != Behaviour::Constant).then_some(Observed {
-        order: own.order,
-        interval: own.interval95,
-        band: own.verdict_band,
-        constant: own.error_constant.abs() / scale,
-    })
+    if own.behaviour != Behaviour::Constant {
+        judged.observe(own.order, own.interval95, own.verdict_band, own.error_constant.abs() / scale);
+    }
 }
 
 /// Adds the error bars of the finest value, for columns that converge only: a diverging one has none.

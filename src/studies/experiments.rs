@@ -37,12 +37,7 @@ pub const SHIPPED: [(&str, &str); 5] = [
 ];
 
 /// What the shipped data validate, and what not: for the terminal and the report.
-pub const MEANING: &str = "These data validate the depth of small projectiles in thick targets within the range to \
-    which S was fitted (fc 13.5-97 MPa, d < 76 mm, V0 < 1200 m/s), where +-20 % in depth is a fair tolerance. They say \
-    nothing of a critical velocity, of perforation or of Eq. 15, and a published series of 13 kg, 76 mm projectiles, not \
-    among them, fails the S law (predicted over measured 0.57 to 0.69). Flat noses want k = 0.707; with the paper's k = 2 \
-    the flat-nosed set is over-predicted by some 40 %. Below X/d = 0.5 the model over-predicts, and those experiments \
-    stand apart.";
+pub const MEANING: &str = include_str!("experiments/meaning.txt").trim_ascii_end();
 
 /// Relative depth X/d below which an experiment stands apart: the crater law does not apply (Li & Chen 2003, Eq. 27).
 pub const SHALLOW: f64 = 0.5;

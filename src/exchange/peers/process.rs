@@ -4,7 +4,7 @@
 //! every line and buffer a size. A peer that breaks the protocol is ended at once, named, and not asked again.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -85,23 +85,29 @@ pub enum PeerFault {
         silence: Duration,
     },
     /// A line that is no answer to the question.
-    #[error("answers nonsense: {why}")]
+    #[error("answers nonsense: {why}{}", quote("; it printed ", printed))]
     Nonsense {
-        /// What is wrong with it.
+        /// What is wrong with it, bounded: the reason may repeat what was printed.
         why: String,
+        /// What it printed in place of an answer, escaped and bounded; may be empty.
+        printed: String,
     },
+}
+
+impl PeerFault {
+    fn nonsense(why: &str, printed: &[u8]) -> Self {
+        Self::Nonsense { why: excerpt(why.as_bytes()), printed: excerpt(printed) }
+    }
 }
 
 /// A question without an answer, with everything a report needs.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("{peer} {fault}{}{}", quote("; it printed ", printed), quote("; on standard error ", &last_line(stderr)))]
+#[error("{peer} {fault}{}", quote("; on standard error ", &last_line(stderr)))]
 pub struct PeerFailure {
     /// Name of the peer, or its command before the greeting.
     pub peer: String,
     /// What happened.
     pub fault: PeerFault,
-    /// What it printed in place of an answer, escaped and bounded; may be empty.
-    pub printed: String,
     /// The end of its standard error, control characters replaced; may be empty.
     pub stderr: String,
 }
@@ -156,17 +162,6 @@ impl Advice for PeerStartError {
     }
 }
 
-/// What the reading thread heard on standard output.
-#[derive(Debug)]
-enum Heard {
-    /// A line, or what came before the end of the output.
-    Line(Vec<u8>),
-    /// The beginning of a line that went on beyond the limit.
-    TooLong(Vec<u8>),
-    /// The output ended.
-    End,
-}
-
 /// A running peer that has greeted. Dropped, it is killed.
 #[derive(Debug)]
 pub struct Peer {
@@ -183,7 +178,8 @@ struct Line {
     child: Child,
     /// Lines for its standard input.
     to_peer: Sender<Vec<u8>>,
-    from_peer: Receiver<Heard>,
+    /// Lines of its standard output, the last of them cut off if it is too long; disconnects when that has ended.
+    from_peer: Receiver<Vec<u8>>,
     stderr: Arc<Mutex<Vec<u8>>>,
     /// Disconnects when standard error has ended.
     stderr_ended: Receiver<()>,
@@ -212,9 +208,9 @@ impl Peer {
             .map_err(|error| missing(format!("cannot be started: {error}")))?;
         match line.exchange(&json!({"hello": 1})).and_then(|answer| greeting(&answer)) {
             Ok(identity) => Ok(Self { identity, command: command.to_owned(), line, questions_asked: 0, failure: None }),
-            Err(lapse) => {
+            Err(fault) => {
                 let code = line.end().and_then(|status| status.code());
-                let failure = lapse.into_failure(&format!("`{command}`"), &line);
+                let failure = PeerFailure { peer: format!("`{command}`"), fault, stderr: line.stderr_text() };
                 if code == Some(EXIT_CODE_MISSING) && matches!(failure.fault, PeerFault::Died { .. }) {
                     return Err(missing(format!("lacks what it needs: {}", last_line(&failure.stderr))));
                 }
@@ -251,13 +247,13 @@ impl Peer {
         let mut question = json!(request);
         question["id"] = json!(self.questions_asked);
         let answer = self.line.exchange(&question).and_then(|line| answer(&line, self.questions_asked, request));
-        answer.map_err(|lapse| {
-            let reported = matches!(lapse.fault, PeerFault::Reported { .. });
-            if !reported {
+        answer.map_err(|fault| {
+            let is_reported = matches!(fault, PeerFault::Reported { .. });
+            if !is_reported {
                 self.line.end();
             }
-            let failure = lapse.into_failure(&self.identity.to_string(), &self.line);
-            if !reported {
+            let failure = PeerFailure { peer: self.identity.to_string(), fault, stderr: self.stderr() };
+            if !is_reported {
                 self.failure = Some(failure.clone());
             }
             failure
@@ -265,56 +261,39 @@ impl Peer {
     }
 }
 
-/// A fault and what was printed, before it is known who and with which standard error.
-struct Lapse {
-    fault: PeerFault,
-    printed: String,
-}
-
-impl Lapse {
-    /// The reason may repeat what was printed, so it is bounded and escaped too.
-    fn nonsense(why: &str, printed: &[u8]) -> Self {
-        Self { fault: PeerFault::Nonsense { why: excerpt(why.as_bytes()) }, printed: excerpt(printed) }
-    }
-
-    fn into_failure(self, peer: &str, line: &Line) -> PeerFailure {
-        PeerFailure { peer: peer.to_owned(), fault: self.fault, printed: self.printed, stderr: line.stderr_text() }
-    }
-}
-
 impl Line {
     fn open(command: &mut Command, limits: PeerLimits) -> io::Result<Self> {
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (to_peer, questions) = channel();
+        let (to_peer, questions) = channel::<Vec<u8>>();
         // One line of look-ahead: a peer that floods its output waits in its own pipe.
         let (heard, from_peer) = sync_channel(1);
         let (alive, stderr_ended) = channel();
         let stderr = Arc::new(Mutex::new(Vec::new()));
         let line = Self { child, to_peer, from_peer, stderr: Arc::clone(&stderr), stderr_ended, limits };
-        let (Some(input), Some(output), Some(complaints)) = pipes else {
+        let (Some(mut input), Some(output), Some(complaints)) = pipes else {
             return Err(io::Error::other("a pipe to the peer is missing"));
         };
         // The threads are not joined: a grandchild may keep a pipe open for as long as it likes.
-        thread::Builder::new().spawn(move || write_lines(input, &questions))?;
+        thread::Builder::new().spawn(move || questions.iter().try_for_each(|question| input.write_all(&question)))?;
         thread::Builder::new().spawn(move || read_lines(output, &heard, limits.line_bytes))?;
         thread::Builder::new().spawn(move || store_tail(complaints, &stderr, limits.stderr_bytes, &alive))?;
         Ok(line)
     }
 
     /// Sends one object and waits for one line.
-    fn exchange(&mut self, question: &Value) -> Result<Vec<u8>, Lapse> {
+    fn exchange(&mut self, question: &Value) -> Result<Vec<u8>, PeerFault> {
         // A writer that is gone means a peer that is gone, which the reader reports.
         let _ = self.to_peer.send(format!("{question}\n").into_bytes());
-        let fault = match self.from_peer.recv_timeout(self.limits.silence) {
-            Ok(Heard::Line(line)) => return Ok(line),
-            Ok(Heard::TooLong(start)) => {
-                return Err(Lapse::nonsense(&format!("a line longer than {} bytes", self.limits.line_bytes), &start));
+        let PeerLimits { silence, line_bytes, .. } = self.limits;
+        match self.from_peer.recv_timeout(silence) {
+            Ok(line) if line.len() > line_bytes => {
+                Err(PeerFault::nonsense(&format!("a line longer than {line_bytes} bytes"), &line))
             }
-            Ok(Heard::End) | Err(RecvTimeoutError::Disconnected) => PeerFault::Died { status: self.status_in_words() },
-            Err(RecvTimeoutError::Timeout) => PeerFault::Silent { silence: self.limits.silence },
-        };
-        Err(Lapse { fault, printed: String::new() })
+            Ok(line) => Ok(line),
+            Err(RecvTimeoutError::Disconnected) => Err(PeerFault::Died { status: self.status_in_words() }),
+            Err(RecvTimeoutError::Timeout) => Err(PeerFault::Silent { silence }),
+        }
     }
 
     /// How a peer without output has ended.
@@ -352,27 +331,13 @@ impl Drop for Line {
     }
 }
 
-/// Writes questions until the asker or the peer is gone.
-fn write_lines(mut input: ChildStdin, questions: &Receiver<Vec<u8>>) {
-    for question in questions {
-        if input.write_all(&question).and_then(|()| input.flush()).is_err() {
-            return;
-        }
-    }
-}
-
 /// Passes lines on until the asker is gone, the output ends, or a line is too long.
-fn read_lines(output: ChildStdout, heard: &SyncSender<Heard>, line_bytes: usize) {
+fn read_lines(output: ChildStdout, lines: &SyncSender<Vec<u8>>, line_bytes: usize) {
     let mut output = BufReader::new(output);
-    loop {
-        let mut line = Vec::new();
-        let what = match output.by_ref().take(line_bytes as u64 + 1).read_until(b'\n', &mut line) {
-            Ok(0) | Err(_) => Heard::End,
-            Ok(_) if line.len() > line_bytes => Heard::TooLong(line),
-            Ok(_) => Heard::Line(line),
-        };
-        let last = !matches!(what, Heard::Line(_));
-        if heard.send(what).is_err() || last {
+    let mut line = Vec::new();
+    while let Ok(1..) = output.by_ref().take(line_bytes as u64 + 1).read_until(b'\n', &mut line) {
+        let is_too_long = line.len() > line_bytes;
+        if lines.send(std::mem::take(&mut line)).is_err() || is_too_long {
             return;
         }
     }
@@ -390,7 +355,7 @@ fn store_tail(mut complaints: ChildStderr, tail: &Mutex<Vec<u8>>, limit: usize, 
 }
 
 /// Reads the greeting.
-fn greeting(line: &[u8]) -> Result<PeerIdentity, Lapse> {
+fn greeting(line: &[u8]) -> Result<PeerIdentity, PeerFault> {
     #[derive(Deserialize)]
     struct Greeting {
         name: String,
@@ -400,9 +365,9 @@ fn greeting(line: &[u8]) -> Result<PeerIdentity, Lapse> {
         method: String,
     }
     let Greeting { name, version, method } =
-        serde_json::from_slice(line).map_err(|error| Lapse::nonsense(&format!("no greeting ({error})"), line))?;
+        serde_json::from_slice(line).map_err(|error| PeerFault::nonsense(&format!("no greeting ({error})"), line))?;
     if name.trim().is_empty() {
-        return Err(Lapse::nonsense("a greeting without a name", line));
+        return Err(PeerFault::nonsense("a greeting without a name", line));
     }
     let [name, version, method] =
         [name, version, method].map(|text| escaped(&text.chars().take(NAME_CHARS).collect::<String>()));
@@ -410,7 +375,7 @@ fn greeting(line: &[u8]) -> Result<PeerIdentity, Lapse> {
 }
 
 /// Reads the answer to question number `id`.
-fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Lapse> {
+fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, PeerFault> {
     #[derive(Deserialize)]
     struct Head {
         id: Value,
@@ -418,15 +383,15 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Lap
         outcome: Option<String>,
     }
     // NaN and Infinity are no tokens of JSON and 1e400 is no number of f64: both fail here.
-    let nonsense = |error: serde_json::Error| Lapse::nonsense(&error.to_string(), line);
+    let nonsense = |error: serde_json::Error| PeerFault::nonsense(&error.to_string(), line);
     let head: Head = serde_json::from_slice(line).map_err(nonsense)?;
     if head.id != json!(id) {
         let why = format!("it answers question {} and was asked question {id}", head.id);
-        return Err(Lapse::nonsense(&why, line));
+        return Err(PeerFault::nonsense(&why, line));
     }
     if let Some(message) = head.error {
         let message = excerpt(message.as_bytes());
-        return Err(Lapse { fault: PeerFault::Reported { message }, printed: String::new() });
+        return Err(PeerFault::Reported { message });
     }
     let mut answer: PeerAnswer = serde_json::from_slice(line).map_err(nonsense)?;
     if head.outcome.is_none() {

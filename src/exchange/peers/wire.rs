@@ -6,46 +6,6 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::integrators::{Cost, Flight};
 use crate::physics::{Event, EventKind, Outcome, Problem, Stage, State, Target};
 
-/// A stage as it is written in JSON: the force `F = p + s x + r V + q V²` until `x = end`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
-pub struct StageJson {
-    /// Static force p (N).
-    pub static_force_n: f64,
-    /// Stiffness s (N/m).
-    pub stiffness_n_m: f64,
-    /// Viscosity r (kg/s).
-    pub viscosity_kg_s: f64,
-    /// Drag q (kg/m).
-    pub drag_kg_m: f64,
-    /// Depth where the stage ends (m), from the impact face; `null` in the last.
-    pub end_m: Option<f64>,
-}
-
-impl From<&Stage> for StageJson {
-    fn from(stage: &Stage) -> Self {
-        Self {
-            static_force_n: stage.static_force,
-            stiffness_n_m: stage.stiffness,
-            viscosity_kg_s: stage.viscosity,
-            drag_kg_m: stage.drag,
-            end_m: finite(stage.end),
-        }
-    }
-}
-
-impl From<&StageJson> for Stage {
-    fn from(json: &StageJson) -> Self {
-        Self {
-            static_force: json.static_force_n,
-            stiffness: json.stiffness_n_m,
-            viscosity: json.viscosity_kg_s,
-            drag: json.drag_kg_m,
-            end: json.end_m.unwrap_or(f64::INFINITY),
-        }
-    }
-}
-
 /// JSON has no infinity: a depth that does not exist is `null`.
 fn finite(depth: f64) -> Option<f64> {
     depth.is_finite().then_some(depth)
@@ -125,7 +85,7 @@ pub struct PeerRequest {
     /// Flights to take the median time of; 1 unless time is measured.
     pub repeats: u32,
     /// The stages, in order.
-    pub stages: Vec<StageJson>,
+    pub stages: Vec<Stage>,
 }
 
 impl PeerRequest {
@@ -139,7 +99,7 @@ impl PeerRequest {
             rtol,
             atol: [rtol * depth_scale(problem), rtol * problem.impact_speed],
             repeats: 1,
-            stages: problem.stages.iter().map(StageJson::from).collect(),
+            stages: problem.stages.to_vec(),
         }
     }
 
@@ -154,7 +114,7 @@ impl PeerRequest {
     ///
     /// Takes the numbers as they are: meant for requests of ours, not for input from outside.
     pub fn problem(&self, crater: Option<usize>) -> Problem {
-        let problem = Problem::of_stages(self.mass_kg, self.velocity_m_s, self.stages.iter().map(Stage::from))
+        let problem = Problem::of_stages(self.mass_kg, self.velocity_m_s, self.stages.iter().copied())
             .with_exit(self.exit_depth_m.unwrap_or(f64::INFINITY));
         Problem { crater, target: if crater.is_some() { Target::CraterAndTunnel } else { Target::Stages }, ..problem }
     }

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::Format;
 use crate::physics::Advice;
-use crate::text::{count, shortened};
+use crate::text::{Shown, count, shortened};
 
 /// Line or row of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,7 +57,7 @@ impl fmt::Display for Place {
 }
 
 /// What is wrong with a table.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages say what each is")]
 pub enum Fault {
@@ -89,6 +89,12 @@ pub enum Fault {
     Ragged { found: usize, expected: usize },
     #[error("more than {0} rows")]
     TooManyRows(usize),
+    #[error("there is no column of results")]
+    NoResults,
+    #[error("the step {} s has two values of `{name}`, {} here and {} in line {other}", Shown(*.step), Shown(*.second), Shown(*.first))]
+    TwoValues { step: f64, name: &'static str, first: f64, second: f64, other: u64 },
+    #[error("{found} different steps, and an order needs {needed}")]
+    TooFewSteps { found: usize, needed: usize },
     #[error("the cell in `{0}` is empty")]
     EmptyCell(&'static str),
     #[error("`{}` in `{name}` is {reason}", shortened(.text))]
@@ -96,7 +102,7 @@ pub enum Fault {
 }
 
 /// Why a table, or a row of it, cannot be used: a mistake of the caller, exit code 2.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TableError {
     /// Where.
     pub place: Place,
@@ -152,6 +158,9 @@ impl Advice for TableError {
             }
             Fault::Cell { .. } => "correct the cell, or remove the row",
             Fault::ColumnTwice(_) => "remove one of the two",
+            Fault::TwoValues { .. } => "keep one of them: a result that a step does not determine has no order",
+            Fault::TooFewSteps { .. } => "run the other code with more steps, best at ratios of 1.5 to 2",
+            Fault::NoResults => return format!("add a column of results; allowed are the {}", self.allowed),
             Fault::UnknownColumn { .. } => {
                 return format!("rename the column, convert its unit, or remove it; allowed are the {}", self.allowed);
             }

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use super::*;
-use crate::exchange::peers::wire::StageJson;
+use crate::physics::Stage;
 
 const GREETING: &str = r#"read q; echo '{"name": "fake", "version": "1", "method": "none"}'"#;
 const ANSWER: &str = r#"{"id": 1, "outcome": "stopped", "depth_m": 0.5, "time_s": 2e-3, "velocity_m_s": 0}"#;
@@ -13,7 +13,6 @@ fn sh(script: &str) -> String {
 }
 
 fn request() -> PeerRequest {
-    let stage = StageJson { static_force_n: 1.0, stiffness_n_m: 0.0, viscosity_kg_s: 0.0, drag_kg_m: 0.0, end_m: None };
     PeerRequest {
         mass_kg: 1.0,
         velocity_m_s: 1.0,
@@ -21,7 +20,7 @@ fn request() -> PeerRequest {
         rtol: 1e-9,
         atol: [1e-9, 1e-9],
         repeats: 1,
-        stages: vec![stage],
+        stages: vec![Stage::tunnel(1.0, 0.0)],
     }
 }
 
@@ -41,7 +40,7 @@ fn failure_of_answer(line: &str) -> PeerFailure {
 
 fn nonsense_of_answer(line: &str) -> String {
     match failure_of_answer(line).fault {
-        PeerFault::Nonsense { why } => why,
+        PeerFault::Nonsense { why, .. } => why,
         fault => unreachable!("{fault}"),
     }
 }
@@ -162,15 +161,15 @@ fn an_unknown_outcome_is_nonsense() {
 #[test]
 fn megabytes_without_a_line_end_are_cut_off() {
     let failure = peer("read q; yes | tr -d '\\n'").ask(&request()).unwrap_err();
-    let PeerFault::Nonsense { why } = &failure.fault else { unreachable!("{failure}") };
+    let PeerFault::Nonsense { why, printed } = &failure.fault else { unreachable!("{failure}") };
     assert_eq!(why, "a line longer than 1048576 bytes");
-    assert_eq!(failure.printed.chars().count(), QUOTED_CHARS + 1);
+    assert_eq!(printed.chars().count(), QUOTED_CHARS + 1);
 }
 
 #[test]
 fn megabytes_of_lines_are_nonsense_at_the_first() {
     let failure = peer("read q; yes").ask(&request()).unwrap_err();
-    assert_eq!(failure.printed, "y");
+    assert!(matches!(failure.fault, PeerFault::Nonsense { printed, .. } if printed == "y"));
 }
 
 #[test]
