@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::output::{Text, escape_terminal, interval_text, is_standard, significant};
+use super::output::{Text, escape_terminal, interval_text, significant};
 use super::{Answer, Ask, CliError, problem_of, read_scene};
-use crate::exchange::tables::{name_of, read_bytes};
+use crate::exchange::input::{is_standard, name_of};
+use crate::exchange::tables::read_bytes;
 use crate::physics::Problem;
 use crate::studies::audit::{Audit, ExactValues, Expectation, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::convergence::Yardstick;

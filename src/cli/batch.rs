@@ -5,12 +5,13 @@ use std::io::{self, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use rayon::prelude::*;
 
 use super::method_args::MethodArgs;
-use super::output::{Destination, check_format, check_outputs, is_parquet, is_standard, tell};
+use super::output::{Destination, check_format, check_outputs, is_parquet, say, show_progress};
 use super::{CliError, Exit, Run};
+use crate::exchange::input::{is_standard, name_of};
 #[cfg(feature = "parquet")]
 use crate::exchange::tables::parquet::ParquetReader;
 use crate::exchange::tables::{self, Block, CsvTable, Rows, TableWriter};
@@ -71,7 +72,7 @@ impl Run for BatchArgs {
         let written = sink.finish().and_then(|output| Ok(output.into_inner()?));
         written.and_then(|output| output.finish(&self.out)).map_err(unwritable)?;
         progress.finish_and_clear();
-        tell("", &summary(&tally));
+        say("", &summary(&tally));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
 }
@@ -172,22 +173,22 @@ enum Source {
 impl Source {
     fn open(path: &Path, progress: &ProgressBar) -> Result<Self, CliError> {
         if let Some((count, seed)) = random_table(path)? {
-            bar(progress, count, ROWS_BAR);
+            show_progress(progress, count, ROWS_BAR);
             return Ok(Self::Random { seed, next: 0, end: count, progress: progress.clone() });
         }
-        let name = tables::name_of(path);
+        let name = name_of(path);
         let input: Box<dyn Read + Send> = match tables::open(path, &SCENES)? {
             None => Box::new(progress.wrap_read(io::stdin())),
             #[cfg(feature = "parquet")]
             Some(file) if is_parquet(path) => {
                 let table = ParquetReader::new(&name, file, &SCENES)?;
-                bar(progress, table.rows(), ROWS_BAR);
+                show_progress(progress, table.rows(), ROWS_BAR);
                 return Ok(Self::Parquet(Box::new(table), progress.clone()));
             }
             Some(file) => {
                 // A pipe or a device has no length.
                 if let Some(length) = file.metadata().ok().map(|metadata| metadata.len()).filter(|length| *length > 0) {
-                    bar(progress, length, "{bar:30} {bytes}/{total_bytes}, {eta} left");
+                    show_progress(progress, length, "{bar:30} {bytes}/{total_bytes}, {eta} left");
                 }
                 Box::new(progress.wrap_read(file))
             }
@@ -232,14 +233,6 @@ fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
             format!("random:{text}: not a number of scenes above zero and a seed"),
             "write random:1000000:7 for a million scenes of seed 7",
         )),
-    }
-}
-
-/// Gives `progress` a length and a look; it shows on a terminal only.
-fn bar(progress: &ProgressBar, length: u64, template: &str) {
-    progress.set_length(length);
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        progress.set_style(style);
     }
 }
 

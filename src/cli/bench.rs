@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
 
-use super::output::{Text, error_text, escape_terminal, progress, tell_line, wrapped};
+use super::output::{Text, error_text, escape_terminal, say_line, show_progress, wrapped};
 use super::verify::{quoted, report_line};
 use super::{Answer, Ask, CliError, Exit, read_scene};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
@@ -130,7 +130,7 @@ impl BenchArgs {
         let mut peers = Vec::new();
         if self.peers {
             for (name, bundled, options) in peers::BUNDLED {
-                let environment = PeerEnvironment::ensure(bundled, &mut |line| tell_line(line))?;
+                let environment = PeerEnvironment::ensure(bundled, &mut |line| say_line(line))?;
                 let command = format!("{} {options}", environment.command(bundled));
                 peers.push((name.to_owned(), Peer::start(&command)?));
             }
@@ -149,7 +149,8 @@ impl BenchArgs {
 
     fn measure(&self, scenes: &[(String, Scene)], peers: &mut [(String, Peer)]) -> Result<BenchJson, CliError> {
         let effort = Effort { samples: usize::from(self.repeats) };
-        let progress = progress(0, "{bar:30} {pos}/{len}, {eta} left {msg}");
+        let progress = ProgressBar::new(0);
+        show_progress(&progress, 0, "{bar:30} {pos}/{len}, {eta} left {msg}");
         let mut cases = Vec::new();
         if self.has(Part::WorkPrecision) {
             progress.set_message("exact answers");

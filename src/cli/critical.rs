@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{Text, engineering, error_text, significant, tell};
+use super::output::{Text, engineering, error_text, say, significant};
 use super::scene_json::SceneJson;
 use super::{Answer, Ask, CliError, Exit, read_scene};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
@@ -138,7 +138,7 @@ impl Ask for CriticalArgs {
         let problem = scene.resolve(found.velocity)?;
         let exit_depth_warning = scene.exit_depth_warning();
         for warning in exit_depth_warning.into_iter().chain(applicability::warnings(&scene, found.velocity)) {
-            tell("warning: ", &warning);
+            say("warning: ", &warning);
         }
         let is_zero = exact == Some(0.0) || found.velocity == 0.0;
         let uncertainty = match spreads.as_slice() {

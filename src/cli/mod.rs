@@ -28,6 +28,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::exchange::SceneError;
+use crate::exchange::input::{is_standard, name_of};
 use crate::physics::{Advice, Problem, Scene, State};
 use crate::report::folder::{FolderError, without_temporary_name};
 use crate::suite::Verdict;
@@ -133,7 +134,7 @@ impl CliError {
 
     /// A file that could not be written; `-` is standard output.
     pub fn write(path: &Path, cause: io::Error) -> Self {
-        let path = if output::is_standard(path) { "standard output".to_owned() } else { path.display().to_string() };
+        let path = if is_standard(path) { "standard output".to_owned() } else { path.display().to_string() };
         Self::Write { path, cause: without_temporary_name(cause) }
     }
 
@@ -146,7 +147,7 @@ impl CliError {
     #[must_use]
     pub fn in_file(mut self, path: &str) -> Self {
         if let Self::Stated { message, .. } = &mut self {
-            *message = format!("{}: {message}", if path == "-" { "standard input" } else { path });
+            *message = format!("{}: {message}", name_of(Path::new(path)));
         }
         self
     }
@@ -250,7 +251,7 @@ pub struct Printing<A: Args> {
 
 impl<A: Ask> Run for Printing<A> {
     fn run(&self) -> Result<Exit, CliError> {
-        let is_table_printed = self.args.table().is_some_and(output::is_standard);
+        let is_table_printed = self.args.table().is_some_and(is_standard);
         if is_table_printed && self.json {
             let message = "the table and the JSON cannot both go to standard output";
             return Err(CliError::usage(message, "name a file for one"));
@@ -355,7 +356,7 @@ impl Cli {
                 let _ = output::print_json(&error.json(name));
             }
             let color = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-            output::tell_line(error.render(color).trim_end_matches('\n'));
+            output::say_line(error.render(color).trim_end_matches('\n'));
             error.exit()
         })
     }

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::CliError;
+use crate::exchange::input::is_standard;
 use crate::report::figure::Figure;
 use crate::report::folder::TEMPORARY;
 pub use crate::text::{engineering, error_text, harmless as escape_terminal, significant};
@@ -56,18 +57,13 @@ pub fn wrapped(head: &str, text: &str) -> String {
 }
 
 /// Prints for a person on standard error, `head` (`warning: `) in front.
-pub fn tell(head: &str, text: &str) {
-    tell_line(&wrapped(head, text));
+pub fn say(head: &str, text: &str) {
+    say_line(&wrapped(head, text));
 }
 
 /// A line as it is on standard error. Where it is closed the work goes on.
-pub fn tell_line(line: &str) {
+pub fn say_line(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
-}
-
-/// Whether `path` stands for standard input or output.
-pub fn is_standard(path: &Path) -> bool {
-    path.as_os_str() == "-"
 }
 
 /// Whether both paths are one file.
@@ -153,7 +149,7 @@ pub fn write_table(
         match figure {
             Some(figure) => files.push((path, figure.file().into_bytes())),
             // A sweep of bad rows has a table, and nothing to draw.
-            None => tell("warning: ", &format!("{} not written: no point in its range", path.display())),
+            None => say("warning: ", &format!("{} not written: no point in its range", path.display())),
         }
     }
     write_all(&files)
@@ -354,11 +350,10 @@ pub fn table_lines(table: &comfy_table::Table) -> Vec<String> {
     table.to_string().lines().map(|line| format!(" {line}").trim_end().to_owned()).collect()
 }
 
-/// A bar with the time left, on a terminal only; `template` is that of [`ProgressStyle`].
-pub fn progress(length: u64, template: &str) -> ProgressBar {
-    let bar = ProgressBar::new(length);
+/// Gives `bar` a length and a look, by the `template` of a [`ProgressStyle`]; it shows on a terminal only.
+pub fn show_progress(bar: &ProgressBar, length: u64, template: &str) {
+    bar.set_length(length);
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
-    bar
 }

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{Text, check_outputs, engineering, error_text, significant, tell, write_table};
+use super::output::{Text, check_outputs, engineering, error_text, say, significant, write_table};
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
 use super::{Answer, Ask, CliError, Exit, problem_of, read_scene};
@@ -162,14 +162,14 @@ impl Ask for SolveArgs {
         let flight = method.integrator().solve(&problem, detail)?;
         let wall_ns = u64::try_from(started.elapsed().as_nanos()).unwrap_or(u64::MAX);
         if let Some(warning) = scene.exit_depth_warning() {
-            tell("warning: ", &warning);
+            say("warning: ", &warning);
         }
         if let Some(path) = &self.trajectory {
             let table = table_of(&TRAJECTORY, false, flight.trajectory.iter().map(trajectory_row));
             write_table(path, table, &[], [])?;
         }
         for warning in applicability::warnings(&scene, problem.impact_speed) {
-            tell("warning: ", &warning);
+            say("warning: ", &warning);
         }
         let sensitivities = self.sensitivities.then(|| SensitivitiesJson::new(&scene)).transpose()?;
         let mut skipped = method.explain(&problem, &flight, detail);

@@ -9,11 +9,11 @@ use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{
-    Text, WIDTH, check_format, check_table, figure_paths, is_parquet, significant, table, table_lines, tell,
-    write_table,
+    Text, WIDTH, check_format, check_table, figure_paths, is_parquet, say, significant, table, table_lines, write_table,
 };
 use super::{Answer, Ask, CliError, Exit, read_scene};
-use crate::exchange::tables::{self, Kind, name_of, read_bytes};
+use crate::exchange::input::name_of;
+use crate::exchange::tables::{self, Kind, read_bytes};
 use crate::integrators::Method;
 use crate::physics::semi_empirical::NDRC_END;
 use crate::physics::{Criterion, Outcome, Parameter};
@@ -119,7 +119,7 @@ impl Ask for SweepArgs {
         if let Some(path) = &self.out {
             write_files(path, &plan, &data.rows, &points)?;
         }
-        tell_notes(&plan, &data);
+        say_notes(&plan, &data);
         let exit = if data.bad_rows > 0 { Exit::Criterion } else { Exit::Success };
         Ok(Answer { text: self.text(&plan, &data), data: Some(data), exit })
     }
@@ -277,20 +277,20 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
 }
 
 /// Says on standard error what a reader should know: bad and undecided rows, and H/d beyond the relation.
-fn tell_notes(plan: &Plan, data: &SweepJson) {
+fn say_notes(plan: &Plan, data: &SweepJson) {
     let (rows, count) = (&data.rows, data.rows.len());
     if data.bad_rows > 0 {
         let why = "have no answer; `error` in --json, and in the table of --out, says why";
-        tell("warning: ", &format!("{} of {count} points {why}", data.bad_rows));
+        say("warning: ", &format!("{} of {count} points {why}", data.bad_rows));
     }
     let undecided = rows.iter().filter(|row| row.outcome == Some(Outcome::Undecided)).count();
     if undecided > 0 {
-        tell("note: ", &format!("{undecided} of {count} outcomes are undecided"));
+        say("note: ", &format!("{undecided} of {count} outcomes are undecided"));
     }
     let end = NDRC_END;
     let beyond = rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > end)).count();
     if beyond > 0 && (plan.scene().criterion == Criterion::Ndrc || plan.is_along_thickness()) {
         let what = "points lie beyond the end of the perforation relation";
-        tell("warning: ", &format!("{beyond} {what}, H/d = {end}"));
+        say("warning: ", &format!("{beyond} {what}, H/d = {end}"));
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::output::{Text, escape_terminal, progress, tell, tell_line};
+use super::output::{Text, escape_terminal, say, say_line, show_progress};
 use super::sweep::read_data;
 use super::{Answer, Ask, CliError};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
@@ -79,7 +79,7 @@ impl Ask for VerifyArgs {
             for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX)
             {
                 let text = format!("the limit of {table} is {looseness:.0} times what is measured: it guards nothing");
-                tell("warning: ", &text);
+                say("warning: ", &text);
             }
         }
         let mut text = Text::default();
@@ -112,7 +112,7 @@ impl VerifyArgs {
                 ("sundae-ida", BundledPeer::SundaeIda),
                 ("heyoka-taylor", BundledPeer::Heyoka),
             ] {
-                start(name, &PeerEnvironment::ensure(peer, &mut |line| tell_line(line))?.command(peer))?;
+                start(name, &PeerEnvironment::ensure(peer, &mut |line| say_line(line))?.command(peer))?;
             }
         }
         if let Some(command) = &self.peer {
@@ -181,5 +181,7 @@ pub(super) fn quoted(text: &str) -> String {
 
 /// A bar that counts `what`.
 pub(super) fn progress_bar(length: u64, what: &str) -> ProgressBar {
-    progress(length, &format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left {{msg}}"))
+    let bar = ProgressBar::new(length);
+    show_progress(&bar, length, &format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left {{msg}}"));
+    bar
 }

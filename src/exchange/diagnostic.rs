@@ -2,8 +2,6 @@
 //!
 //! [`decode`] reads a TOML text into serde types and puts the reader's errors into the words of the project.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
@@ -12,6 +10,7 @@ use thiserror::Error;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::input::{self, Unread};
 use crate::physics::units::QuantityError;
 use crate::text::steers;
 
@@ -175,45 +174,25 @@ impl Fault {
 /// # Errors
 /// [`SceneError`]: the file cannot be read, is larger than [`SIZE_MAX`], or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
-    let from_stdin = path.as_os_str() == "-";
-    let file = if from_stdin { "standard input".to_owned() } else { path.display().to_string() };
-    let unread = |message: &str, allowed: &str, help: &str| {
-        let [message, allowed, help] = [message, allowed, help].map(str::to_owned);
+    let file = input::name_of(path);
+    let bytes = input::read(path, SIZE_MAX).map_err(|cause| {
+        let (message, allowed, help) = match cause {
+            Unread::Folder => {
+                ("this is a directory".to_owned(), "a file, or `-` for standard input", "name a file in it")
+            }
+            Unread::TooLarge => {
+                let message = "the file is larger than 1 MiB, and was not read".to_owned();
+                (message, "a file of at most 1 MiB", "check that this is the file you mean")
+            }
+            Unread::System(error) => {
+                let message = format!("the file cannot be read: {error}");
+                (message, "a readable file, or `-` for standard input", "check the path")
+            }
+        };
+        let (allowed, help) = (allowed.to_owned(), help.to_owned());
         Box::new(SceneError { file: file.clone(), place: None, message, allowed, help, text: String::new() })
-    };
-    let unreadable = |error: std::io::Error| {
-        let message = format!("the file cannot be read: {error}");
-        unread(&message, "a readable file, or `-` for standard input", "check the path")
-    };
-    let too_large = || {
-        let message = "the file is larger than 1 MiB, and was not read";
-        unread(message, "a file of at most 1 MiB", "check that this is the file you mean")
-    };
-    let bytes = if from_stdin {
-        bounded(std::io::stdin().lock())
-    } else {
-        let metadata = std::fs::metadata(path).map_err(unreadable)?;
-        if metadata.is_dir() {
-            return Err(unread("this is a directory", "a file, or `-` for standard input", "name a file in it"));
-        }
-        if metadata.len() > SIZE_MAX {
-            return Err(too_large());
-        }
-        // A device or a pipe has no length beforehand.
-        File::open(path).and_then(bounded)
-    }
-    .map_err(unreadable)?;
-    if bytes.len() as u64 > SIZE_MAX {
-        return Err(too_large());
-    }
+    })?;
     text_of(bytes, &file).map(|text| (file, text))
-}
-
-/// What `source` holds, up to one byte more than is allowed.
-fn bounded(source: impl Read) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    source.take(SIZE_MAX + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// `bytes` as UTF-8, without a byte order mark.

@@ -1,6 +1,7 @@
 //! What crosses the border of the program: scene files, tables, and other people's solvers.
 
 pub mod diagnostic;
+pub mod input;
 pub mod peers;
 pub mod scene_file;
 pub mod tables;

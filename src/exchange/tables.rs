@@ -16,7 +16,7 @@ pub mod parquet;
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use ::csv::ByteRecord;
@@ -24,6 +24,7 @@ use ::csv::ByteRecord;
 pub use csv::CsvTable;
 pub use error::{At, Fault, Place, TableError};
 
+use super::input::{self, Unread, name_of};
 use crate::physics::Range;
 use crate::physics::units::{QuantityError, number};
 use crate::text::{Shown, shortened, steers};
@@ -337,26 +338,12 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Name of the table at `path` in messages; `-` is standard input.
-pub fn name_of(path: &Path) -> String {
-    if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() }
-}
-
 /// Opens the table at `path`; `None` for `-`, standard input.
 ///
 /// # Errors
 /// [`Fault::Unreadable`]: a folder, or what the system says.
 pub fn open(path: &Path, format: &Format) -> Result<Option<File>, Box<TableError>> {
-    let file = match path {
-        _ if path.as_os_str() == "-" => return Ok(None),
-        _ if path.is_dir() => Err("is a folder".to_owned()),
-        _ => File::open(path).map_err(|error| error.to_string()),
-    };
-    file.map(Some).map_err(|cause| unreadable(path, cause, format))
-}
-
-fn unreadable(path: &Path, cause: impl Into<String>, format: &Format) -> Box<TableError> {
-    TableError::new(Place { file: name_of(path), ..Place::default() }, Fault::Unreadable(cause.into()), format)
+    input::open(path).map_err(|cause| unreadable(path, &cause, format))
 }
 
 /// The table at `path` whole, `-` for standard input.
@@ -364,17 +351,15 @@ fn unreadable(path: &Path, cause: impl Into<String>, format: &Format) -> Box<Tab
 /// # Errors
 /// [`Fault::Unreadable`]: as [`open`], or a table of more than 64 MiB.
 pub fn read_bytes(path: &Path, format: &Format) -> Result<Vec<u8>, Box<TableError>> {
-    let too_large = || unreadable(path, "larger than 64 MiB, which no such table is", format);
-    let input: Box<dyn Read> = match open(path, format)? {
-        None => Box::new(io::stdin()),
-        Some(file) if file.metadata().is_ok_and(|metadata| metadata.len() > SIZE_MAX) => return Err(too_large()),
-        Some(file) => Box::new(file),
+    input::read(path, SIZE_MAX).map_err(|cause| unreadable(path, &cause, format))
+}
+
+fn unreadable(path: &Path, cause: &Unread, format: &Format) -> Box<TableError> {
+    let cause = match cause {
+        Unread::TooLarge => "larger than 64 MiB, which no such table is".to_owned(),
+        other => other.to_string(),
     };
-    let mut bytes = Vec::new();
-    // A pipe or a device has no length beforehand.
-    let length = input.take(SIZE_MAX + 1).read_to_end(&mut bytes);
-    let length = length.map_err(|error| unreadable(path, error.to_string(), format))?;
-    if length as u64 > SIZE_MAX { Err(too_large()) } else { Ok(bytes) }
+    TableError::new(Place { file: name_of(path), ..Place::default() }, Fault::Unreadable(cause), format)
 }
 
 /// What `each` makes of the rows of the CSV table `bytes`, some at a time; `file` is its name in messages.
