@@ -271,7 +271,9 @@ fn add_case(text: &mut Text, report: &BenchJson, case: &CaseJson) {
         [clipped(&runs[0].method, 16)].into_iter().chain(fastest).chain([least]).collect::<Vec<_>>()
     };
     text.table(&["method", "1e-3", "1e-6", "1e-9", "1e-12", "least"], methods.iter().map(row));
-    methods.iter().for_each(|runs| text.lines(notes_of(runs)));
+    for runs in methods {
+        text.lines(notes_of(runs));
+    }
 }
 
 /// What was not right, one paragraph for each reason of a method.

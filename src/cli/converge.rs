@@ -67,7 +67,8 @@ pub struct QuantityJson {
     interval: Option<[f64; 2]>,
     error_constant: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    work_order: Option<Option<f64>>,
+    /// Order against the force evaluations; absent for fixed steps, `null` where none was found.
+    pub work_order: Option<Option<f64>>,
     class: Class,
     verdict: Verdict,
     /// Why this class, or why there is no fit.
@@ -135,7 +136,7 @@ impl Ask for ConvergeArgs {
             method: MethodJson::new(self.method, &options, None, None),
             seed: self.seed,
             reference: if truth.is_closed_form { "closed-form" } else { "taylor" },
-            verdict: verdict,
+            verdict,
             quantities: study.quantities.into_iter().map(|study| QuantityJson::new(study, fixed)).collect(),
             skipped: study.no_critical_velocity.map(without).into_iter().collect(),
         };

@@ -79,10 +79,7 @@ impl StressArgs {
 
     fn text(&self, run: &Run<'_>) -> String {
         let mut text = Text::default();
-        text.table(
-            &["case", "passed", "skipped", "worst", "limit", "unit"],
-            tables(run.judged).into_iter().map(case_row),
-        );
+        text.table(&["case", "passed", "skipped", "worst", "limit", "unit"], tables(run.judged).map(case_row));
         add_not_passed(&mut text, run.judged);
         for (reason, count) in skipped(run.judged) {
             text.wrapped("  ", &format!("{count} skipped: {}", escape_terminal(reason)));

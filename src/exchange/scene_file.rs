@@ -102,8 +102,8 @@ impl SceneFile {
     /// As [`Scene::from_toml`].
     pub fn from_toml(text: &str, file: &str) -> Result<Self, Box<SceneError>> {
         let read = parse(text).and_then(|root| {
+            check(root.get_ref(), "")?;
             let mut reader = Reader { text, root, given: Vec::new() };
-            reader.check(reader.root.get_ref(), "")?;
             Ok(Self { scene: reader.scene()?, given: reader.given })
         });
         read.map_err(|fault| fault.in_file(file, text))
@@ -162,6 +162,43 @@ const DIALECT: Dialect = Dialect {
     },
 };
 
+/// Refuses a key of `table`, at `home` in the file, that no scene has, and a value of another type than its key takes.
+fn check(table: &DeTable<'_>, home: &str) -> Result<(), Fault> {
+    for (key, value) in table {
+        let path = if home.is_empty() { key.get_ref().to_string() } else { format!("{home}.{}", key.get_ref()) };
+        let mistyped = |value: &Value<'_>, wanted| {
+            Err(DIALECT.mistyped(&general(&path), value.span(), type_of(value.get_ref()), wanted))
+        };
+        match (below(&path).next(), value.get_ref()) {
+            (Some(keys), DeValue::Array(entries)) if keys.starts_with("*.") => {
+                for entry in entries {
+                    let Some(table) = entry.get_ref().as_table() else { return mistyped(entry, "a table") };
+                    check(table, &format!("{path}.*"))?;
+                }
+            }
+            (Some(keys), _) if keys.starts_with("*.") => return mistyped(value, "an array"),
+            (Some(_), DeValue::Table(table)) => check(table, &path)?,
+            (Some(_), _) => return mistyped(value, "a table"),
+            (None, found) if WORDS.contains(&path.as_str()) => {
+                if !found.is_str() {
+                    return mistyped(value, "a string");
+                }
+            }
+            (None, _) if paths().any(|known| known == path) => {}
+            (None, _) => {
+                let mut known = Vec::new();
+                for word in below(home).filter_map(|rest| rest.split('.').next()) {
+                    if !known.contains(&word) {
+                        known.push(word);
+                    }
+                }
+                return Err(DIALECT.unknown_key(&general(home), key.span(), key.get_ref(), &known));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// A file as it stands, and the numbers read from it.
 struct Reader<'t> {
     text: &'t str,
@@ -172,43 +209,6 @@ struct Reader<'t> {
 type Value<'t> = Spanned<DeValue<'t>>;
 
 impl<'t> Reader<'t> {
-    /// Refuses a key of `table`, at `home` in the file, that no scene has, and a value of another type than its key takes.
-    fn check(&self, table: &DeTable<'t>, home: &str) -> Result<(), Fault> {
-        for (key, value) in table {
-            let path = if home.is_empty() { key.get_ref().to_string() } else { format!("{home}.{}", key.get_ref()) };
-            let mistyped = |value: &Value<'t>, wanted| {
-                Err(DIALECT.mistyped(&general(&path), value.span(), type_of(value.get_ref()), wanted))
-            };
-            match (below(&path).next(), value.get_ref()) {
-                (Some(keys), DeValue::Array(entries)) if keys.starts_with("*.") => {
-                    for entry in entries.iter() {
-                        let Some(table) = entry.get_ref().as_table() else { return mistyped(entry, "a table") };
-                        self.check(table, &format!("{path}.*"))?;
-                    }
-                }
-                (Some(keys), _) if keys.starts_with("*.") => return mistyped(value, "an array"),
-                (Some(_), DeValue::Table(table)) => self.check(table, &path)?,
-                (Some(_), _) => return mistyped(value, "a table"),
-                (None, found) if WORDS.contains(&path.as_str()) => {
-                    if !found.is_str() {
-                        return mistyped(value, "a string");
-                    }
-                }
-                (None, _) if paths().any(|known| known == path) => {}
-                (None, _) => {
-                    let mut known = Vec::new();
-                    for word in below(home).filter_map(|rest| rest.split('.').next()) {
-                        if !known.contains(&word) {
-                            known.push(word);
-                        }
-                    }
-                    return Err(DIALECT.unknown_key(&general(home), key.span(), key.get_ref(), &known));
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// The place of the key at `path` and the value there.
     fn at(&self, path: &str) -> Option<(Span, &Value<'t>)> {
         fn entry<'a, 't>(table: &'a DeTable<'t>, key: &str) -> Option<(Span, &'a Value<'t>)> {

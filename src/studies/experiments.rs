@@ -250,12 +250,12 @@ pub struct PredictionError {
     /// Its line.
     pub line: u64,
     /// What happened.
-    pub cause: StudyError,
+    pub cause: Box<StudyError>,
 }
 
 impl Advice for PredictionError {
     fn inner(&self) -> Option<&dyn Advice> {
-        match &self.cause {
+        match &*self.cause {
             StudyError::Integration(cause) if !cause.is_usage() => Some(cause),
             _ => None,
         }
@@ -280,7 +280,7 @@ pub fn compare(
         predict(experiment, crater_ratio, spreads, integrator).map_err(|cause| PredictionError {
             set: experiment.set.clone(),
             line: experiment.line,
-            cause,
+            cause: Box::new(cause),
         })
     });
     predicted.collect()
