@@ -193,8 +193,7 @@ fn strips(title: impl Into<String>, x: Axis, strips: &[Strip<'_>]) -> Panel {
     const LABEL: f64 = 16.0;
     const LINE: f64 = 4.0;
     const GAP: f64 = 6.0;
-    let height_of = |strip: &Strip<'_>| LINE * strip.dots.len().max(2) as f64;
-    let total: f64 = strips.iter().map(|strip| LABEL + height_of(strip) + GAP).sum();
+    let total: f64 = strips.iter().map(|strip| LABEL + LINE * strip.dots.len().max(2) as f64 + GAP).sum();
     let mut panel = Panel::new(title, x, Axis::linear("", "").over([-total, 0.0])).tall(total);
     let mut top = 0.0;
     for Strip { label, allowed: [low, high], target, dots } in strips {

@@ -18,7 +18,7 @@ pub enum FolderError {
     NotOurs {
         /// The folder.
         path: String,
-        /// What stands in the way.
+        /// Why it is not replaced.
         why: String,
     },
     /// The system refused.

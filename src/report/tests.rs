@@ -46,11 +46,18 @@ fn judged() -> (Suite, Vec<Judged>) {
     (suite, judged)
 }
 
-fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
+fn run<'a>(suite: &'a Suite, judged: &'a [Judged]) -> Run<'a> {
     let environment = Environment::here(1, HOSTILE.to_owned(), suite, vec![(HOSTILE.to_owned(), HOSTILE.to_owned())]);
-    let run = Run { suite, judged, environment, points: &[(5.0, 30.0)], random: None };
-    let files = folder::files(&run).unwrap();
+    Run { suite, judged, environment, points: &[(5.0, 30.0)], random: None }
+}
+
+/// The files of a report as text.
+fn texts(files: folder::Files) -> Vec<(String, String)> {
     files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect()
+}
+
+fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
+    texts(folder::files(&run(suite, judged)).unwrap())
 }
 
 #[test]
@@ -91,7 +98,7 @@ fn reports_of_one_run_differ_in_times_alone() {
 fn without_times(text: &str) -> String {
     let mut lines = Vec::new();
     for line in text.lines() {
-        // Markdown writes the colons of a date in its own way.
+        // Markdown writes the colons of a date as entities.
         let mut line = line.replace("&#58;", ":");
         for (start, end) in [("\"wall_ms\": ", ""), (" time=\"", "\""), ("datetime=\"", "\"")] {
             while let Some(at) = line.find(start) {
@@ -136,10 +143,7 @@ fn stress_reports_of_one_run_differ_in_times_alone() {
     let written = |wall_ms: f64| {
         let mut cases = vec![of("E1/taylor", None, Verdict::Failed, wall_ms)];
         cases.extend(figures.iter().map(|figure| of("S1", Some(figure.clone()), Verdict::Passed, wall_ms)));
-        let environment = Environment::here(1, HOSTILE.to_owned(), &suite, Vec::new());
-        let run = Run { suite: &suite, judged: &cases, environment, points: &[], random: None };
-        let files = super::stress::files(&run).unwrap();
-        files.into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect::<Vec<_>>()
+        texts(super::stress::files(&run(&suite, &cases)).unwrap())
     };
     let (first, second) = (written(1.0), written(2.0));
     assert_eq!(first.len(), 2 + 2 * figures.len());
@@ -170,13 +174,7 @@ fn junit_says_what_became_of_each_claim() {
 #[test]
 fn an_interrupted_or_refused_run_leaves_what_was_there() {
     let (suite, judged) = judged();
-    let run = Run {
-        suite: &suite,
-        judged: &judged,
-        environment: Environment::here(1, String::new(), &suite, vec![]),
-        points: &[],
-        random: None,
-    };
+    let run = run(&suite, &judged);
     let place = tempfile::tempdir().unwrap();
     let strange = place.path().join("strange");
     std::fs::create_dir(&strange).unwrap();
@@ -200,8 +198,7 @@ fn an_interrupted_or_refused_run_leaves_what_was_there() {
 #[test]
 fn a_report_never_replaces_what_is_not_its_own() {
     let (suite, judged) = judged();
-    let environment = Environment::here(1, String::new(), &suite, vec![]);
-    let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: None };
+    let run = run(&suite, &judged);
     for foreign in ["notes.txt", "tables/mine.csv", "figures/deep/mine.svg", "mine", ".hidden"] {
         let place = tempfile::tempdir().unwrap();
         let report = place.path().join("report");
@@ -224,8 +221,7 @@ fn a_report_never_replaces_what_is_not_its_own() {
 #[test]
 fn an_empty_folder_is_filled() {
     let (suite, judged) = judged();
-    let environment = Environment::here(1, String::new(), &suite, vec![]);
-    let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: None };
+    let run = run(&suite, &judged);
     let place = tempfile::tempdir().unwrap();
     folder::write(folder::files(&run), place.path().join("empty").as_path()).unwrap();
     let empty = place.path().join("made by hand");

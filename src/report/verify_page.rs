@@ -107,27 +107,22 @@ const PATHS: [(&str, bool, Stretch); 4] = [
     ("tunnel with drag, force jumps at k d", true, Stretch { velocity_dependent: true, force_jumps: true }),
 ];
 
-type Orders = [Option<f64>; 6];
-
-/// Formal orders of one variant on one kind of path, for a stop and for an exit together.
-fn orders_of(velocity: VelocityAt, boundaries: Boundaries, leaves_crater: bool, to_end: Stretch) -> Orders {
-    let to_crater_end = leaves_crater.then(Stretch::default);
-    Quantity::ALL.map(|quantity| {
-        let perforates = matches!(quantity, Quantity::Velocity | Quantity::CriticalVelocity);
-        if perforates && !leaves_crater {
-            return None;
-        }
-        formal_order(velocity, boundaries, &Path { perforates, to_crater_end, to_end }, quantity)
-    })
-}
-
 fn formal_orders() -> Markup {
     let header = ["path", "velocity", "boundaries"].into_iter().chain(Quantity::ALL.map(words_for));
     let mut table = Table::grid("Formal orders of the central difference (Eq. 6-8) in the step", header).numbers(3..9);
     for (path, leaves_crater, to_end) in PATHS {
         for boundaries in Boundaries::ALL {
-            // One row for all velocity rules of the same orders.
-            let orders = |velocity: &VelocityAt| orders_of(*velocity, boundaries, leaves_crater, to_end);
+            // One row for all velocity rules of the same orders, for a stop and for an exit together.
+            let to_crater_end = leaves_crater.then(Stretch::default);
+            let orders = |velocity: &VelocityAt| {
+                Quantity::ALL.map(|quantity| {
+                    let perforates = matches!(quantity, Quantity::Velocity | Quantity::CriticalVelocity);
+                    let path = Path { perforates, to_crater_end, to_end };
+                    (leaves_crater || !perforates)
+                        .then(|| formal_order(*velocity, boundaries, &path, quantity))
+                        .flatten()
+                })
+            };
             for (orders, rules) in grouped(VelocityAt::ALL, orders) {
                 let names: Vec<_> = rules.iter().map(ToString::to_string).collect();
                 let velocities =

@@ -87,26 +87,18 @@ fn discrete_solution(&DiscreteSolution { step, steps }: &DiscreteSolution, subje
     let is_free_of_velocity = viscosity == 0.0 && drag == 0.0;
     applies!(is_free_of_velocity, "the exact discrete solution has no velocity in the force");
     let v0 = problem.impact_speed;
-    let exact: Box<dyn Fn(usize) -> f64>;
-    let (dt, amplitude);
-    if static_force == 0.0 && stiffness > 0.0 {
-        let w = (stiffness / problem.mass).sqrt();
-        dt = step / w;
-        let angle = 2.0 * (0.5 * step).asin();
-        // Within round-off of the limit the amplitude grows without bound; it is the scale of the error.
-        amplitude = v0 * dt / angle.sin();
-        exact = Box::new(move |i| amplitude * (i as f64 * angle).sin());
-    } else if stiffness == 0.0 && static_force > 0.0 {
-        let deceleration = static_force / problem.mass;
-        dt = step * v0 / deceleration;
-        amplitude = 0.5 * v0 * v0 / deceleration;
-        exact = Box::new(move |i| {
-            let t = i as f64 * dt;
-            t * (v0 - 0.5 * deceleration * t)
-        });
-    } else {
-        return Err(NotMeasured::skip("neither a crater nor a constant force comes first"));
-    }
+    let is_crater = static_force == 0.0 && stiffness > 0.0;
+    let is_constant = stiffness == 0.0 && static_force > 0.0;
+    applies!(is_crater || is_constant, "neither a crater nor a constant force comes first");
+    let deceleration = static_force / problem.mass;
+    let dt = if is_crater { step / (stiffness / problem.mass).sqrt() } else { step * v0 / deceleration };
+    let angle = 2.0 * (0.5 * step).asin();
+    // Within round-off of the limit the amplitude grows without bound; it is the scale of the error.
+    let amplitude = if is_crater { v0 * dt / angle.sin() } else { 0.5 * v0 * v0 / deceleration };
+    let exact = |i: usize| {
+        let t = i as f64 * dt;
+        if is_crater { amplitude * (i as f64 * angle).sin() } else { t * (v0 - 0.5 * deceleration * t) }
+    };
     let states = free_states(subject, problem, dt, steps)?;
     // The parabola turns back. The largest distance reached is the scale where it is larger.
     let scale = states.iter().map(|s| s.depth.abs()).fold(amplitude.abs(), f64::max);
