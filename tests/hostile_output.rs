@@ -54,6 +54,7 @@ fn an_input_is_never_replaced() {
         "solve slab.toml --trajectory ./slab.toml",
         "solve slab.toml --trajectory link.csv",
         "batch rows.csv --out rows.csv",
+        "batch rows.csv --out ./rows.csv",
         &format!("{SWEEP} --out slab.toml"),
         &format!("{SWEEP} --out link.csv"),
         &format!("{SWEEP} --data points.svg --out points.svg"),

@@ -122,25 +122,6 @@ mod tests {
     #[test]
     #[ignore = "prints the evaluations from which the limit is chosen"]
     fn measure_evaluations() {
-        for (name, problem) in [("stiff", stiff_scene()), ("viscous", viscous_scene())] {
-            for rtol in [1e-6, 1e-10] {
-                for scheme in Scheme::ALL {
-                    let flight = Diffsol::new(scheme, rtol).solve(&problem, Detail::Events).unwrap();
-                    println!(
-                        "{name} {rtol:e} {:9} {:?} {} {:?}",
-                        scheme.name(),
-                        flight.cost,
-                        flight.outcome,
-                        flight.end
-                    );
-                }
-                let flight = Diffsol::adaptive(rtol).solve(&problem, Detail::Events).unwrap();
-                println!(
-                    "{name} {rtol:e} adaptive  {:?} {} {:?} {:?}",
-                    flight.cost, flight.outcome, flight.end, flight.notes
-                );
-            }
-        }
         for rtol in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
             for viscosity in [10.0, 30.0, 100.0, 300.0] {
                 let problem =

@@ -665,16 +665,6 @@ mod tests {
     }
 
     #[test]
-    fn depth_of_forrestal_shot_14_by_the_closed_form_is_6_215430() {
-        let problem = scene().problem().unwrap();
-        let [crater, tunnel] = problem.stages[..] else { panic!("{problem:?}") };
-        let (m, p, q, kd) = (problem.mass, tunnel.static_force, tunnel.drag, crater.end);
-        let v1_squared = (m * 277.0 * 277.0 - kd * p) / (m + kd * q);
-        let depth = kd + m / (2.0 * q) * (q * v1_squared / p).ln_1p();
-        assert!((depth / 0.0269 - 6.215_430).abs() < 5e-7, "{}", depth / 0.0269);
-    }
-
-    #[test]
     fn continuous_crater_holds_for_a_stop_inside_it_and_depends_on_the_impact_speed() {
         // Li & Chen (2003), Eq. 15a at I -> 0: X/d = sqrt(4 k I/pi (1 + k pi/(4N))).
         let slow = scene().resolve(1e-6).unwrap();
@@ -685,44 +675,36 @@ mod tests {
     }
 
     #[test]
-    fn a_crater_of_no_depth_is_left_out() {
+    fn a_crater_of_no_depth_is_left_out_and_a_given_stiffness_is_taken_as_it_is() {
         let problem = scene_of(Concrete { crater_ratio: 0.0, ..concrete() }).problem().unwrap();
         assert_eq!((problem.stages.len(), problem.crater), (1, None));
-    }
-
-    #[test]
-    fn a_given_crater_stiffness_is_taken_as_it_is() {
         let crater_stiffness = CraterStiffness::Given(8.48e6);
         let problem = scene_of(Concrete { crater_stiffness, ..concrete() }).problem().unwrap();
         assert_eq!(problem.stages[0].stiffness, 8.48e6);
     }
 
     #[test]
-    fn layer_ends_before_the_crater_end_are_no_boundaries() {
-        // k d = 53.8 mm lies in the third layer, 40 to 140 mm.
+    fn layers_become_stages_from_the_one_that_holds_the_crater_end() {
+        let open = f64::INFINITY;
+        for (thicknesses, ends, exit_depth, strength) in [
+            // k d = 53.8 mm lies in the third layer, 40 to 140 mm: ends before it are no boundaries.
+            (&[0.01, 0.03, 0.1, 0.2][..], &[0.0538, 0.14, open][..], 0.34, 32e6),
+            // A layer that ends there does not hold it.
+            (&[0.0538, 0.1], &[0.0538, open], 0.1538, 31e6),
+            // A target thinner than the crater is continued by its last layer.
+            (&[0.01, 0.02], &[0.0538, open], 0.03, 31e6),
+        ] {
+            let problem = layered(thicknesses).problem().unwrap();
+            assert_eq!((problem.crater, problem.target), (Some(0), Target::Stages));
+            assert_eq!(problem.stages.iter().map(|s| s.end).collect::<Vec<_>>(), ends);
+            assert_relative_eq!(problem.exit_depth, exit_depth, max_relative = 1e-15);
+            assert_relative_eq!(problem.stages[1].static_force, layer_force(strength), max_relative = 1e-15);
+        }
         let problem = layered(&[0.01, 0.03, 0.1, 0.2]).problem().unwrap();
-        assert_eq!((problem.crater, problem.target), (Some(0), Target::Stages));
-        assert_eq!(problem.stages.iter().map(|s| s.end).collect::<Vec<_>>(), [0.0538, 0.14, f64::INFINITY]);
-        assert_relative_eq!(problem.exit_depth, 0.34, max_relative = 1e-15);
-        assert_relative_eq!(problem.stages[1].static_force, layer_force(32e6), max_relative = 1e-15);
         assert_eq!(problem.stages[1].viscosity, 2.0);
         let homogeneous = Concrete { strength: 32e6, density: 2200.0, ..concrete() };
         let stiffness = scene_of(homogeneous).problem().unwrap().stages[0].stiffness;
         assert_eq!(problem.stages[0].stiffness, stiffness);
-    }
-
-    #[test]
-    fn a_layer_that_ends_at_the_crater_end_does_not_hold_it() {
-        let problem = layered(&[0.0538, 0.1]).problem().unwrap();
-        assert_eq!(problem.stages.len(), 2);
-        assert_relative_eq!(problem.stages[1].static_force, layer_force(31e6), max_relative = 1e-15);
-    }
-
-    #[test]
-    fn a_layered_target_thinner_than_the_crater_is_continued_by_its_last_layer() {
-        let problem = layered(&[0.01, 0.02]).problem().unwrap();
-        assert_eq!((problem.stages.len(), problem.exit_depth), (2, 0.03));
-        assert_relative_eq!(problem.stages[1].static_force, layer_force(31e6), max_relative = 1e-15);
     }
 
     #[test]

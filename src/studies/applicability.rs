@@ -148,12 +148,11 @@ fn rounded(group: f64) -> String {
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
-    use crate::exchange::scene_file::SHIPPED;
     use crate::integrators::{ClosedForm, Detail, Integrator, Taylor};
     use crate::physics::Parameter;
 
     fn slab() -> Scene {
-        Scene::from_toml(SHIPPED.iter().find(|(name, _)| *name == "paper-slab").unwrap().1, "paper-slab").unwrap()
+        crate::testing::shipped("paper-slab")
     }
 
     /// (I, N, k -> X/d) of `docs/theory.md`, section 2.

@@ -458,12 +458,12 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
-    use crate::exchange::scene_file::SHIPPED;
-    use crate::integrators::{ClosedForm, Energy, Taylor};
+    use crate::integrators::{Energy, Taylor};
     use crate::physics::Resistance;
+    use crate::testing::shipped;
 
     fn slab() -> Scene {
-        Scene::from_toml(SHIPPED.iter().find(|(name, _)| *name == "paper-slab").unwrap().1, "paper-slab").unwrap()
+        shipped("paper-slab")
     }
 
     fn plan(axes: &[&str]) -> Plan {
@@ -508,39 +508,6 @@ mod tests {
         assert!(matches!(refused, Err(SweepError::Twice { .. })));
         let refused = Plan::new(slab(), &[axis("N=1:2:10000"), axis("I=1:2:10000")]);
         assert!(matches!(refused, Err(SweepError::TooMany { points: 100_000_000 })));
-    }
-
-    /// Unrounded Eq. 15 from the equation of motion, Q = 0, k = 2, continuous c: 1,000 thicknesses in (0, 18.06], the
-    /// ends of the branches and their neighbours among them. The criterion `ndrc` is the whole of the difference.
-    #[test]
-    fn eq_15_follows_from_the_equation_of_motion_to_round_off_at_every_thickness() {
-        let mut scene = slab();
-        let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
-        concrete.density = 0.0;
-        (scene.criterion, scene.velocity) = (Criterion::Ndrc, None);
-        let edges = [2.994, 2.997_945, 3.0, 3.8, 18.06];
-        let mut ratios: Vec<f64> = (1..=985).map(|i| 18.06 * f64::from(i) / 985.0).collect();
-        ratios.extend(edges.iter().flat_map(|edge: &f64| [edge.next_down(), *edge, edge.next_up().min(18.06)]));
-        assert_eq!(ratios.len(), 1000);
-        let methods: [&dyn Integrator; 3] = [&Taylor::default(), &Energy::new(), &ClosedForm];
-        let mut worst = 0.0_f64;
-        for method in methods {
-            for &ratio in &ratios {
-                Parameter::ThicknessRatio.set(&mut scene, ratio).unwrap();
-                let found = critical_velocity::of_scene(&scene, method).unwrap();
-                let concrete = scene.concrete().unwrap();
-                // The ratio that the scene has: H = (H/d) d is rounded, and at a jump that may change the branch.
-                let ratio = scene.thickness.unwrap() / concrete.diameter;
-                let expected = 12.0 * eq15_unrounded(ratio);
-                let error = (dimensionless_energy(found.energy, concrete) / expected - 1.0).abs();
-                assert!(error < 1e-13, "{} at H/d = {ratio}: {error:e}", method.name());
-                worst = worst.max(error);
-            }
-        }
-        assert!(worst > 0.0, "an error of exactly nothing at 1,000 points compares a thing with itself");
-        assert_eq!(scene.exit_depth_warning(), None);
-        Parameter::ThicknessRatio.set(&mut scene, 18.1).unwrap();
-        assert!(scene.exit_depth_warning().is_some());
     }
 
     #[test]

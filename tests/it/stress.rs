@@ -57,13 +57,6 @@ fn the_command_writes_every_case_as_a_report() {
     assert_eq!(fs::read_to_string(strange.join("mine.txt")).unwrap(), "mine");
 }
 
-#[test]
-fn random_scenes_over_the_whole_range_show_no_defect() {
-    let summary = extreme_scenes::run(4000, 7, &|| {});
-    assert_eq!(summary.defects, []);
-    assert_eq!(summary.scenes, 4000);
-}
-
 /// Each file says in its first line what it once showed.
 #[test]
 fn scenes_that_once_showed_a_defect_show_none() {

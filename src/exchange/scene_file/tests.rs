@@ -201,70 +201,25 @@ fn a_byte_order_mark_and_windows_line_ends_are_no_fault() {
     assert_eq!(refuse(&first_line).place.unwrap().span, 0..1);
 }
 
-/// Edits of `FULL` or `STAGES`, each with the place and the message of its refusal. How they look to a person is kept
-/// in `tests/it/snapshots`.
+/// Edits of `FULL` or `STAGES`, each with the place and the message of its refusal. The refusals of the corpus
+/// `tests/hostile/scene`, as a person sees them, are in `tests/it/snapshots`.
 #[test]
-fn every_refusal_names_its_place_and_cause() {
+fn every_other_refusal_names_its_place_and_cause() {
     let nose = "{ factor = 0.72 }";
     for (text, place, message) in [
-        (with("\"2 kg\"", "\"2 m\""), "3:11", "`mass` takes a mass; `m` is a unit of length"),
-        (with("50 mm", "50 furlong"), "4:16", "`furlong` is no unit that is known"),
-        (with("36 MPa", "36 MPA"), "7:16", "`MPA` is no unit that is known"),
-        (with("diameter", "diametr"), "4:1", "unknown key `diametr` in [projectile]"),
-        (with("mass = \"2 kg\"\n", ""), "2:1", "[projectile] has no `mass`"),
-        (with("B = 1.0", "S = 1.0"), "12:1", "`S` is given twice"),
-        (with("k = 2.0", "k = \"2.0\""), "13:5", "`k` is a string"),
-        (with("\"300 m/s\"", "inf"), "16:12", "`velocity`: the number is not finite in 64 bits"),
-        (with("180 mm", "-180 mm"), "9:13", "`thickness = \"-180 mm\"` is out of range"),
-        (with(nose, "{ factor = 0.72, shape = \"flat\" }"), "5:25", "the nose has both a `factor` and a `shape`"),
-        (
-            with(nose, "{ shape = \"ogive\", length_ratio = 3.0 }"),
-            "5:27",
-            "`length_ratio` has no place in the nose here",
-        ),
-        (with("\"ndrc\"", "\"ndcr\""), "18:13", "unknown word `ndcr` in `criterion`"),
-        (
-            in_stages("mass = 2", "mass = 2\ndiameter = \"50 mm\""),
-            "3:1",
-            "`diameter` has no place in [projectile] here",
-        ),
-        (in_stages("drag", "end = \"9 cm\"\ndrag"), "9:7", "this stage ends at 0.09 m, in front of where it begins"),
-        (in_stages("end = \"0.1 m\"\n", ""), "3:1", "this stage has no `end`, and another follows"),
-        (FULL.replace("]\nvelocity", "\nvelocity"), "15:8", "this is not TOML: unclosed table, expected `]`"),
-        (String::new(), "1:1", "the scene has no [projectile]"),
-        (with("\"2 kg\"", "\"2\""), "3:8", "`mass` has no unit"),
-        (with("\"2 kg\"", "\"kg\""), "3:8", "`mass` is no quantity: there is no number in front of the unit"),
-        (with("\"2 kg\"", "true"), "3:8", "`mass` is a truth value"),
-        (with("\"2 kg\"", "\"nan kg\""), "3:8", "`mass`: the number is not finite in 64 bits"),
-        (with("\"2 kg\"", "1e400"), "3:8", "`mass`: the number is not finite in 64 bits"),
-        (
-            with("\"2 kg\"", "1e-400"),
-            "3:8",
-            "`mass`: the number is too small for 64 bits: below 2.3e-308 its digits are lost",
-        ),
-        (with("\"2 kg\"", "1979-05-27"), "3:8", "`mass` is a date or time"),
-        (with("50 mm", "1,5 mm"), "4:14", "`,5 mm` is no unit that is known"),
-        (with("title = \"tunnel stop, blunt nose\"", "title = 3"), "1:9", "`title` is an integer"),
-        (with("mass", "zz = 1\nmass"), "3:1", "unknown key `zz` in [projectile]"),
-        (with("[target]", "[taget]"), "6:2", "unknown key `taget` in the scene"),
         (with("[target]\n", "[target]\nk = 2\n"), "7:1", "unknown key `k` in [target]"),
-        (with("[resistance]", "[target]"), "10:2", "`target` is given twice"),
         (with("strength = \"36 MPa\"\n", ""), "6:1", "[target] has no `strength`"),
         (with("density = \"2300 kg/m^3\"\n", ""), "6:1", "[target] has no `density`"),
         (with("diameter = \"50 mm\"\n", ""), "2:1", "[projectile] has no `diameter`"),
         (with("nose = { factor = 0.72 }\n", ""), "2:1", "[projectile] has no `nose`"),
         (with("velocity = \"300 m/s\"\n", ""), "15:1", "[impact] has no `velocity`"),
         (with(nose, "0.72"), "5:8", "`nose` is a number"),
-        (with(nose, "{}"), "5:8", "the nose has neither a `factor` nor a `shape`"),
-        (with(nose, "{ factor = 1.01 }"), "5:19", "`factor = 1.01` is out of range"),
-        (with(nose, "{ factor = \"0.7\" }"), "5:19", "`factor` is a string"),
         (with(nose, "{ factor = 0.7, length_ratio = 1.0 }"), "5:24", "`length_ratio` has no place in the nose here"),
         (
             with(nose, "{ shape = \"flat\", radius_ratio = 1.0 }"),
             "5:26",
             "`radius_ratio` has no place in the nose here",
         ),
-        (with(nose, "{ shape = \"ogiv\" }"), "5:18", "unknown nose shape `ogiv`"),
         (with(nose, "{ shape = 3 }"), "5:18", "`shape` is an integer"),
         (with(nose, "{ shape = \"cone\" }"), "5:8", "the nose has no `length_ratio`"),
         (with("8.48e6 N/m", "continous"), "14:20", "unknown crater stiffness `continous`"),

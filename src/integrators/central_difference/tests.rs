@@ -12,6 +12,8 @@ use crate::physics::Advice;
 use crate::physics::{EventKind, Outcome, Stage, Stages, Target};
 use crate::testing::{kinds, stage};
 
+const INF: f64 = f64::INFINITY;
+
 const VELOCITIES: [VelocityAt; 3] = VelocityAt::ALL;
 const BOUNDARIES: [Boundaries; 3] = Boundaries::ALL;
 
@@ -27,11 +29,17 @@ fn stages(list: Stages, speed: f64, exit_depth: f64) -> Problem {
     Problem::of_stages(MASS, speed, list).with_exit(exit_depth)
 }
 
+/// Stages without a far side, entered at [`SPEED`].
+fn endless(list: &[Stage]) -> Problem {
+    stages(list.iter().copied().collect(), SPEED, INF)
+}
+
 /// Crater and tunnel with drag `q`; the crater constant times `jump` of the continuous one.
 pub(crate) fn concrete(q: f64, jump: f64, speed: f64, exit_depth: f64) -> Problem {
-    let stiffness = jump * MASS * (STRENGTH + q * speed * speed) / (CRATER_DEPTH * (MASS + CRATER_DEPTH * q));
-    let crater = Stage::crater(stiffness, CRATER_DEPTH);
-    Problem::crater_and_tunnel(MASS, speed, Some(crater), Stage::tunnel(STRENGTH, q)).with_exit(exit_depth)
+    let tunnel = Stage::tunnel(STRENGTH, q);
+    let mut crater = Stage::continuous_crater(CRATER_DEPTH, &tunnel, MASS, speed);
+    crater.stiffness *= jump;
+    Problem::crater_and_tunnel(MASS, speed, Some(crater), tunnel).with_exit(exit_depth)
 }
 
 fn scheme(step: f64, velocity: VelocityAt, boundaries: Boundaries) -> CentralDifference {
@@ -55,7 +63,7 @@ fn combinations() -> impl Iterator<Item = (VelocityAt, Boundaries)> {
 
 /// A crater without end, with w = `w` (1/s).
 fn spring(w: f64) -> Problem {
-    stages(smallvec![stage(0.0, MASS * w * w, 0.0, 0.0, f64::INFINITY)], SPEED, f64::INFINITY)
+    endless(&[stage(0.0, MASS * w * w, 0.0, 0.0, INF)])
 }
 
 #[test]
@@ -103,8 +111,8 @@ fn the_stability_limit_separates_decay_from_growth() {
     for velocity in VELOCITIES {
         for ratio in [0.02, 0.2, 0.43, 0.45, 1.0, 5.0] {
             let w = 100.0;
-            let law = stage(0.0, MASS * w * w, MASS * w * ratio, 0.0, f64::INFINITY);
-            let problem = stages(smallvec![law], SPEED, f64::INFINITY);
+            let law = stage(0.0, MASS * w * w, MASS * w * ratio, 0.0, INF);
+            let problem = endless(&[law]);
             let limit = stability_limit(&law, MASS, SPEED, velocity);
             let last = |part: f64| {
                 let scheme = scheme(part * limit, velocity, Boundaries::StepEnd);
@@ -120,7 +128,7 @@ fn the_stability_limit_separates_decay_from_growth() {
     let lagged = stability_limit(&tunnel, MASS, SPEED, VelocityAt::LaggedHalfStep);
     approx::assert_relative_eq!(lagged, MASS / (DRAG * SPEED), max_relative = 1e-15);
     for velocity in VELOCITIES {
-        assert_eq!(stability_limit(&Stage::tunnel(STRENGTH, 0.0), MASS, SPEED, velocity), f64::INFINITY);
+        assert_eq!(stability_limit(&Stage::tunnel(STRENGTH, 0.0), MASS, SPEED, velocity), INF);
         approx::assert_relative_eq!(stability_limit(&Stage::crater(8.0, 1.0), 2.0, SPEED, velocity), 1.0);
     }
 }
@@ -128,8 +136,8 @@ fn the_stability_limit_separates_decay_from_growth() {
 #[test]
 fn a_constant_force_gives_the_exact_parabola_from_its_first_node_at_equal_and_unequal_steps() {
     let uneven: Vec<f64> = spread(37).map(|u| (0.1 + u) * 1e-5).collect();
-    let tunnel = stages(smallvec![Stage::tunnel(STRENGTH, 0.0)], SPEED, f64::INFINITY);
-    for problem in [tunnel, concrete(0.0, 1.0, SPEED, f64::INFINITY)] {
+    let tunnel = endless(&[Stage::tunnel(STRENGTH, 0.0)]);
+    for problem in [tunnel, concrete(0.0, 1.0, SPEED, INF)] {
         let rest = exact_end(&problem);
         for steps in [Steps::Uniform(7.3e-6), Steps::Given(vec![5e-6, 1e-6, 2e-6]), Steps::Given(uneven.clone())] {
             for (velocity, boundaries) in combinations() {
@@ -156,7 +164,7 @@ fn a_constant_force_gives_the_exact_parabola_from_its_first_node_at_equal_and_un
 #[test]
 fn rest_in_the_crater_misses_by_the_constants_of_the_discrete_solution() {
     // X(dt)/X - 1 -> (w dt)²/8, T(dt)/T - 1 -> -(w dt)²/24.
-    let problem = concrete(DRAG, 1.0, 100.0, f64::INFINITY);
+    let problem = concrete(DRAG, 1.0, 100.0, INF);
     let exact = exact_end(&problem);
     let w = (problem.stages[0].stiffness / MASS).sqrt();
     for u in spread(20) {
@@ -194,7 +202,7 @@ fn a_given_sequence_of_equal_steps_is_the_uniform_scheme() {
 
 #[test]
 fn a_landing_is_equation_6_with_the_force_of_its_own_side_in_each_half_step() {
-    let problem = concrete(DRAG, 0.6, SPEED, f64::INFINITY);
+    let problem = concrete(DRAG, 0.6, SPEED, INF);
     let step = 3.7e-6;
     let flight = scheme(step, VelocityAt::Centred, Boundaries::Landed).solve(&problem, Detail::Trajectory).unwrap();
     let rows = &flight.trajectory;
@@ -220,7 +228,7 @@ fn work_is_counted_exactly() {
     let ends = [0.02, 0.05, 0.050_000_1, 0.08];
     let mut list: Stages = ends.iter().map(|end| stage(STRENGTH, 0.0, 0.0, DRAG, *end)).collect();
     list.push(Stage::tunnel(STRENGTH, DRAG));
-    for problem in [stages(list.clone(), SPEED, f64::INFINITY), stages(list, SPEED, 0.09)] {
+    for problem in [stages(list.clone(), SPEED, INF), stages(list, SPEED, 0.09)] {
         for (velocity, boundaries) in combinations() {
             for step in [1e-7, 3.3e-6, 1e-4] {
                 let scheme = scheme(step, velocity, boundaries);
@@ -242,7 +250,7 @@ fn work_is_counted_exactly() {
         }
     }
     let flight = scheme(1e-6, VelocityAt::Centred, Boundaries::StepEnd)
-        .solve(&stages(smallvec![Stage::tunnel(1e5, 0.0)], 1.0, f64::INFINITY), Detail::End)
+        .solve(&stages(smallvec![Stage::tunnel(1e5, 0.0)], 1.0, INF), Detail::End)
         .unwrap();
     assert_eq!((flight.cost.steps, flight.cost.force_evaluations), (20, 21));
 }
@@ -313,7 +321,7 @@ fn the_force_of_the_far_side_holds_from_the_node_that_stands_on_the_end() {
     for (velocity, boundaries) in combinations() {
         let scheme = scheme(step, velocity, boundaries);
         let jump = smallvec![stage(64.0, 0.0, 0.0, 0.0, 0.75), Stage::tunnel(128.0, 0.0)];
-        let flight = scheme.solve(&binary(jump, f64::INFINITY), Detail::Trajectory).unwrap();
+        let flight = scheme.solve(&binary(jump, INF), Detail::Trajectory).unwrap();
         let node = flight.trajectory.iter().rfind(|row| row.state.depth == 0.75).unwrap();
         assert_eq!((node.state.time, node.stage, node.force), (0.125, 1, 128.0));
     }
@@ -326,7 +334,7 @@ fn a_stage_end_touched_on_the_way_back_to_rest_is_reached() {
     for velocity in VELOCITIES {
         for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
             let scheme = scheme(3.0 / 64.0, velocity, boundaries);
-            let flight = scheme.solve(&binary(list.clone(), f64::INFINITY), Detail::Events).unwrap();
+            let flight = scheme.solve(&binary(list.clone(), INF), Detail::Events).unwrap();
             assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest]);
             assert_eq!(flight.outcome, Outcome::StoppedInTunnel);
             approx::assert_relative_eq!(flight.end.depth, 1.0, max_relative = 1e-15);
@@ -342,7 +350,7 @@ fn rest_never_lies_above_a_place_already_reached() {
     // A coarse step through a viscous stage: the parabola has its vertex at x = 0.11, V on the chord falls to zero
     // later, where the parabola is back at 0.06.
     let viscous = |end| stage(64.0, 0.0, 64.0, 0.0, end);
-    let problem = stages(smallvec![viscous(0.1), viscous(f64::INFINITY)], 8.0, f64::INFINITY);
+    let problem = stages(smallvec![viscous(0.1), viscous(INF)], 8.0, INF);
     let flight = scheme(0.05, VelocityAt::LaggedHalfStep, Boundaries::Interpolated).solve(&problem, Detail::Events);
     let flight = flight.unwrap();
     assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest]);
@@ -352,7 +360,7 @@ fn rest_never_lies_above_a_place_already_reached() {
 #[test]
 fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
     for tunnel in [1.0, 64.0, 1e6] {
-        let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], f64::INFINITY);
+        let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], INF);
         for velocity in VELOCITIES {
             let flight = scheme(1.0 / 64.0, velocity, Boundaries::Landed).solve(&problem, Detail::Events).unwrap();
             assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest]);
@@ -365,9 +373,9 @@ fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
 fn a_step_far_beyond_rest_still_ends_the_flight() {
     // dt F/M exceeds V by up to 1e9: past rest P + Q V² keeps its sign, and a later test would see V run away.
     let cases = [
-        concrete(DRAG, 1.0, SPEED, f64::INFINITY),
+        concrete(DRAG, 1.0, SPEED, INF),
         concrete(DRAG, 1.0, SPEED, 0.2),
-        stages(smallvec![Stage::tunnel(STRENGTH, DRAG)], SPEED, f64::INFINITY),
+        endless(&[Stage::tunnel(STRENGTH, DRAG)]),
         stages(smallvec![Stage::tunnel(STRENGTH, DRAG)], SPEED, 1.0),
         stages(smallvec![Stage::tunnel(STRENGTH, 1e3)], SPEED, 1.0),
     ];
@@ -400,7 +408,7 @@ fn step_end_shows_whole_steps_and_the_largest_depth() {
     let step = 7e-6;
     for velocity in VELOCITIES {
         let scheme = scheme(step, velocity, Boundaries::StepEnd);
-        for problem in [concrete(DRAG, 1.0, SPEED, 0.13), concrete(DRAG, 1.0, SPEED, f64::INFINITY)] {
+        for problem in [concrete(DRAG, 1.0, SPEED, 0.13), concrete(DRAG, 1.0, SPEED, INF)] {
             let flight = scheme.solve(&problem, Detail::Trajectory).unwrap();
             for event in &flight.events {
                 let steps = (event.state.time / step).round();
@@ -417,7 +425,7 @@ fn step_end_shows_whole_steps_and_the_largest_depth() {
 
 #[test]
 fn the_step_limit_is_that_of_the_stages_crossed() {
-    let problem = concrete(DRAG, 1.0, SPEED, f64::INFINITY);
+    let problem = concrete(DRAG, 1.0, SPEED, INF);
     let w = (problem.stages[0].stiffness / MASS).sqrt();
     let limit_of = |step: f64, velocity, speed: f64| {
         let problem = Problem { impact_speed: speed, ..problem.clone() };
@@ -436,11 +444,7 @@ fn the_step_limit_is_that_of_the_stages_crossed() {
     assert!(!lagged(1.4e-5).step_limit.unwrap().stable);
     // Each stage is judged by its own speeds and steps.
     let drag = 100.0;
-    let slowed = stages(
-        smallvec![stage(4e5, 0.0, 0.0, 0.0, 0.2), stage(4e5, 1e9, 0.0, drag, f64::INFINITY)],
-        SPEED,
-        f64::INFINITY,
-    );
+    let slowed = stages(smallvec![stage(4e5, 0.0, 0.0, 0.0, 0.2), stage(4e5, 1e9, 0.0, drag, INF)], SPEED, INF);
     let scheme = CentralDifference {
         steps: Steps::Given([vec![5e-4], vec![2e-6; 10_000]].concat()),
         ..scheme(1.0, VelocityAt::LaggedHalfStep, Boundaries::Landed)
@@ -459,20 +463,20 @@ fn the_step_limit_is_that_of_the_stages_crossed() {
 #[test]
 fn the_default_step_is_stable_and_affordable() {
     let thin = |k: f64| {
-        let mut problem = concrete(DRAG, 1.0, SPEED, f64::INFINITY);
+        let mut problem = concrete(DRAG, 1.0, SPEED, INF);
         let depth = CRATER_DEPTH * k;
         problem.stages[0] =
             Stage::crater(MASS * (STRENGTH + DRAG * SPEED * SPEED) / (depth * (MASS + depth * DRAG)), depth);
         problem
     };
     for problem in [
-        concrete(DRAG, 1.0, SPEED, f64::INFINITY),
-        concrete(0.0, 1.0, 1e-3, f64::INFINITY),
+        concrete(DRAG, 1.0, SPEED, INF),
+        concrete(0.0, 1.0, 1e-3, INF),
         concrete(DRAG, 0.6, SPEED, 0.13),
-        concrete(1e3, 1.0, 1e4, f64::INFINITY),
+        concrete(1e3, 1.0, 1e4, INF),
         thin(1e-2),
         thin(1e-8),
-        stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], SPEED, 1.0),
+        stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, INF)], SPEED, 1.0),
     ] {
         for velocity in VELOCITIES {
             let scheme = CentralDifference { velocity, ..CentralDifference::default() };
@@ -488,13 +492,13 @@ fn the_default_step_is_stable_and_affordable() {
     let step = CentralDifference::default().time_step(&thinnest);
     let limit = stability_limit(&thinnest.stages[0], MASS, SPEED, VelocityAt::LaggedHalfStep);
     assert_eq!(step, PART_OF_LIMIT * limit);
-    let nothing = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 0.0, 0.0);
+    let nothing = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, INF)], 0.0, 0.0);
     assert_eq!(CentralDifference::default().solve(&nothing, Detail::End).unwrap().outcome, Outcome::Perforated);
 }
 
 #[test]
 fn a_step_that_no_budget_suffices_for_is_refused_after_the_first_steps() {
-    let semi_infinite = concrete(DRAG, 1.0, SPEED, f64::INFINITY);
+    let semi_infinite = concrete(DRAG, 1.0, SPEED, INF);
     for problem in [semi_infinite.clone(), Problem { exit_depth: 0.05, ..semi_infinite.clone() }] {
         // The flight lasts 8e-4 s, or 2e-4 s, and a hundred million such steps a ten-thousandth of it at most.
         for step in [1e-16, 1e-300, f64::from_bits(10)] {
@@ -517,7 +521,7 @@ fn a_step_that_no_budget_suffices_for_is_refused_after_the_first_steps() {
 
 #[test]
 fn a_spent_budget_and_an_overflow_are_errors_with_the_state_reached() {
-    let problem = concrete(DRAG, 1.0, SPEED, f64::INFINITY);
+    let problem = concrete(DRAG, 1.0, SPEED, INF);
     for detail in [Detail::End, Detail::Trajectory] {
         let scheme = CentralDifference { max_steps: 1000, ..scheme(1e-7, VelocityAt::Centred, Boundaries::Landed) };
         let error = scheme.solve(&problem, detail).unwrap_err();
@@ -530,7 +534,7 @@ fn a_spent_budget_and_an_overflow_are_errors_with_the_state_reached() {
         let scheme = CentralDifference { max_steps, ..scheme(1e-6, VelocityAt::Centred, Boundaries::Landed) };
         assert_eq!(scheme.solve(&problem, Detail::End).is_ok(), enough);
     }
-    let driven = stages(smallvec![stage(-1e300, 1e-300, 0.0, 0.0, f64::INFINITY)], SPEED, f64::INFINITY);
+    let driven = endless(&[stage(-1e300, 1e-300, 0.0, 0.0, INF)]);
     let error = scheme(1e6, VelocityAt::Centred, Boundaries::Landed).solve(&driven, Detail::End).unwrap_err();
     assert!(matches!(error, IntegrationError::NotFinite { what: "depth", .. }), "{error}");
     let rough = stages(smallvec![Stage::tunnel(STRENGTH, 1e300)], 1e10, 1.0);
@@ -544,12 +548,12 @@ fn a_spent_budget_and_an_overflow_are_errors_with_the_state_reached() {
 
 #[test]
 fn options_outside_their_domain_are_refused() {
-    let problem = concrete(DRAG, 1.0, SPEED, f64::INFINITY);
+    let problem = concrete(DRAG, 1.0, SPEED, INF);
     let steps = [
         Steps::Uniform(0.0),
         Steps::Uniform(-1e-6),
         Steps::Uniform(f64::NAN),
-        Steps::Uniform(f64::INFINITY),
+        Steps::Uniform(INF),
         Steps::Given(vec![]),
         Steps::Given(vec![1e-6, 0.0]),
         Steps::Given(vec![1e-6, f64::NAN]),
@@ -568,7 +572,7 @@ fn options_outside_their_domain_are_refused() {
 
 #[test]
 fn other_number_types_give_the_same_path() {
-    let problem = concrete(DRAG, 0.6, SPEED, f64::INFINITY);
+    let problem = concrete(DRAG, 0.6, SPEED, INF);
     for (velocity, boundaries) in combinations() {
         let scheme = scheme(3e-6, velocity, boundaries);
         let flight = scheme.solve(&problem, Detail::Events).unwrap();
@@ -597,12 +601,12 @@ fn other_number_types_give_the_same_path() {
 
 #[test]
 fn a_constant_source_is_a_smaller_static_force_and_an_end_in_time_changes_the_law() {
-    let law = stage(STRENGTH, 2e5, 30.0, DRAG, f64::INFINITY);
+    let law = stage(STRENGTH, 2e5, 30.0, DRAG, INF);
     let driven = Stage { static_force: STRENGTH - 4e5, ..law };
     for velocity in VELOCITIES {
         let scheme = scheme(1e-6, velocity, Boundaries::Landed);
-        let plain = scheme.free_states(&stages(smallvec![driven], SPEED, f64::INFINITY), 101).unwrap();
-        let forced = stages(smallvec![law, law], SPEED, f64::INFINITY);
+        let plain = scheme.free_states(&endless(&[driven]), 101).unwrap();
+        let forced = endless(&[law, law]);
         let pushed = scheme.forced_states(&forced, |_, _| 4e5, &[100.5e-6]).unwrap();
         assert_eq!(pushed.len(), 102);
         for (a, b) in plain.iter().zip(&pushed) {
@@ -611,14 +615,14 @@ fn a_constant_source_is_a_smaller_static_force_and_an_end_in_time_changes_the_la
         // 2e5 N for 50.5 µs, then none: the difference of the momenta is the impulse, whatever the steps.
         let [first, second] = [[2e5, 0.0], [0.0, 0.0]].map(|push| {
             let weightless = Stage { drag: 0.0, viscosity: 0.0, stiffness: 0.0, ..law };
-            let forced = stages(smallvec![weightless, weightless], SPEED, f64::INFINITY);
+            let forced = endless(&[weightless, weightless]);
             scheme.forced_states(&forced, |j, _| push[j], &[50.5e-6, 90e-6]).unwrap().pop().unwrap()
         });
         assert!((first.time - 90e-6).abs() < 1e-18);
         assert!((MASS * (first.velocity - second.velocity) / (2e5 * 50.5e-6) - 1.0).abs() < 1e-12);
     }
     let short = CentralDifference { max_steps: 10, ..scheme(1e-6, VelocityAt::Centred, Boundaries::Landed) };
-    let problem = stages(smallvec![law], SPEED, f64::INFINITY);
+    let problem = endless(&[law]);
     let spent = short.forced_states(&problem, |_, _| 0.0, &[1e-4]).unwrap_err();
     assert!(matches!(spent, IntegrationError::StepBudgetSpent { max_steps: 10, .. }), "{spent}");
     assert!(short.forced_states(&problem, |_, _| 0.0, &[1e-4, 2e-4]).unwrap_err().is_usage());
@@ -629,22 +633,21 @@ fn a_constant_source_is_a_smaller_static_force_and_an_end_in_time_changes_the_la
 fn each_scale_of_a_stage_sets_the_default_step_where_it_is_the_shortest() {
     // M = 2, all numbers chosen by hand so that one scale is the shortest, a power of two. In front of a stage
     // that starts deeper lies one without any force.
-    let none = f64::INFINITY;
     let free = |end| stage(0.0, 0.0, 0.0, 0.0, end);
     let cases: [(&[Stage], f64, f64, f64); 7] = [
         // The second of two stages is crossed in (5/4 - 1)/V0.
-        (&[free(1.0), free(none)], 4.0, 1.25, 1.0 / 16.0),
+        (&[free(1.0), free(INF)], 4.0, 1.25, 1.0 / 16.0),
         // sqrt(M/s), as the drive leaves no more than 256 N at either end.
-        (&[stage(-256.0, 8192.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 64.0),
+        (&[stage(-256.0, 8192.0, 0.0, 0.0, INF)], 4.0, INF, 1.0 / 64.0),
         // M V0/(p + s x) with 64 N where the spring is compressed most, at x = 4 + V0 sqrt(M/s) = 6.
-        (&[free(4.0), stage(16.0, 8.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 8.0),
+        (&[free(4.0), stage(16.0, 8.0, 0.0, 0.0, INF)], 4.0, INF, 1.0 / 8.0),
         // The same where it is compressed least, with -32 N at x = 4 and -16 N at x = 6.
-        (&[free(4.0), stage(-64.0, 8.0, 0.0, 0.0, none)], 4.0, none, 1.0 / 4.0),
+        (&[free(4.0), stage(-64.0, 8.0, 0.0, 0.0, INF)], 4.0, INF, 1.0 / 4.0),
         // M/r, and M/(q V0).
-        (&[stage(0.0, 0.0, 64.0, 0.0, none)], 4.0, none, 1.0 / 32.0),
-        (&[stage(0.0, 0.0, 0.0, 16.0, none)], 4.0, none, 1.0 / 32.0),
+        (&[stage(0.0, 0.0, 64.0, 0.0, INF)], 4.0, INF, 1.0 / 32.0),
+        (&[stage(0.0, 0.0, 0.0, 16.0, INF)], 4.0, INF, 1.0 / 32.0),
         // Without speed no time is needed to stop: M/r alone.
-        (&[stage(4.0, 0.0, 2.0, 1.0, none)], 0.0, none, 1.0),
+        (&[stage(4.0, 0.0, 2.0, 1.0, INF)], 0.0, INF, 1.0),
     ];
     for (list, speed, exit_depth, scale) in cases {
         let problem = stages(list.iter().copied().collect(), speed, exit_depth);
@@ -654,12 +657,12 @@ fn each_scale_of_a_stage_sets_the_default_step_where_it_is_the_shortest() {
     let film = free(2.0_f64.powi(-20));
     let cases: [(&[Stage], f64, f64); 3] = [
         // M V0/p, and M/sqrt(p q), which also is there without speed.
-        (&[film, stage(2.0, 0.0, 0.0, 0.0, none)], 4.0, 4.0),
-        (&[film, stage(2.0, 0.0, 0.0, 8.0, none)], 4.0, 0.5),
-        (&[stage(0.0, 0.0, 2.0_f64.powi(24), 0.0, 1.0), stage(4.0, 0.0, 0.0, 1.0, none)], 0.0, 1.0),
+        (&[film, stage(2.0, 0.0, 0.0, 0.0, INF)], 4.0, 4.0),
+        (&[film, stage(2.0, 0.0, 0.0, 8.0, INF)], 4.0, 0.5),
+        (&[stage(0.0, 0.0, 2.0_f64.powi(24), 0.0, 1.0), stage(4.0, 0.0, 0.0, 1.0, INF)], 0.0, 1.0),
     ];
     for (list, speed, scale) in cases {
-        let problem = stages(list.iter().copied().collect(), speed, none);
+        let problem = stages(list.iter().copied().collect(), speed, INF);
         assert_eq!(default_time_step(&problem, VelocityAt::Centred), scale / 1e6, "{list:?}");
     }
 }
@@ -674,13 +677,13 @@ fn the_limit_itself_is_unstable_and_a_stage_without_a_step_has_none() {
     assert_eq!((limit.limit, limit.stable), (2.0 / w, false));
     assert!(limit_of(&spring(w), (2.0 / w).next_down()).stable);
     let layer = stage(0.0, 1e12, 0.0, 0.0, 0.0);
-    let faced = stages(smallvec![layer, Stage::tunnel(STRENGTH, 0.0)], SPEED, f64::INFINITY);
-    assert_eq!(limit_of(&faced, 1e-5).limit, f64::INFINITY);
+    let faced = endless(&[layer, Stage::tunnel(STRENGTH, 0.0)]);
+    assert_eq!(limit_of(&faced, 1e-5).limit, INF);
 }
 
 #[test]
 fn what_lies_behind_the_exit_has_no_effect() {
-    let law = stage(STRENGTH, 1e7, 30.0, DRAG, f64::INFINITY);
+    let law = stage(STRENGTH, 1e7, 30.0, DRAG, INF);
     let exit_depth: f64 = 0.01;
     for (velocity, boundaries) in combinations() {
         let scheme = CentralDifference { max_steps: 1000, ..scheme(3.3e-6, velocity, boundaries) };
@@ -699,7 +702,7 @@ fn an_outer_force_that_grows_with_time_gives_the_exact_discrete_cubic() {
     // M x'' = 6 M k t: the second difference of t³ is 6 t dt² exactly, and V(1/2) = V0 asks for x = V0 dt after
     // the first step, so x(i) = V0 t + k t (t² - dt²).
     let (k, step) = (64.0, 1.0 / 64.0);
-    let free = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, f64::INFINITY)], 8.0, f64::INFINITY);
+    let free = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, INF)], 8.0, INF);
     for velocity in VELOCITIES {
         let scheme = scheme(step, velocity, Boundaries::Landed);
         let states = scheme.forced_states(&free, |_, t| 6.0 * MASS * k * t, &[0.25]).unwrap();
@@ -718,43 +721,43 @@ fn an_outer_force_that_grows_with_time_gives_the_exact_discrete_cubic() {
 
 #[test]
 fn a_flight_without_an_end_is_refused_where_it_becomes_one() {
-    let endless = |scheme: &CentralDifference, problem: &Problem| {
+    let refused = |scheme: &CentralDifference, problem: &Problem| {
         let error = scheme.solve(problem, Detail::End).unwrap_err();
         let IntegrationError::NeverEnds { last, .. } = error else { unreachable!("{error}") };
         last
     };
-    let dashpot = |viscosity| stage(0.0, 0.0, viscosity, 0.0, f64::INFINITY);
-    for last in [stage(0.0, 0.0, 1.0, 1.0, f64::INFINITY), stage(-5.0, 0.0, 1.0, 1.0, f64::INFINITY)] {
-        let alone = stages(smallvec![last], SPEED, f64::INFINITY);
-        let behind = stages(smallvec![stage(1e3, 0.0, 0.0, 0.0, 0.1), last], SPEED, f64::INFINITY);
+    let dashpot = |viscosity| stage(0.0, 0.0, viscosity, 0.0, INF);
+    for last in [stage(0.0, 0.0, 1.0, 1.0, INF), stage(-5.0, 0.0, 1.0, 1.0, INF)] {
+        let alone = endless(&[last]);
+        let behind = endless(&[stage(1e3, 0.0, 0.0, 0.0, 0.1), last]);
         for (velocity, boundaries) in combinations() {
             let short = CentralDifference { max_steps: 10, ..scheme(1e-6, velocity, boundaries) };
-            assert_eq!(endless(&short, &alone), State::at_impact(&alone));
-            assert!((endless(&scheme(1e-6, velocity, boundaries), &behind).depth - 0.1).abs() < 1e-3);
+            assert_eq!(refused(&short, &alone), State::at_impact(&alone));
+            assert!((refused(&scheme(1e-6, velocity, boundaries), &behind).depth - 0.1).abs() < 1e-3);
         }
     }
     // A stop before the endless stage is a stop.
-    let barrier = stages(smallvec![stage(1e9, 0.0, 0.0, 0.0, 0.1), dashpot(1.0)], SPEED, f64::INFINITY);
+    let barrier = endless(&[stage(1e9, 0.0, 0.0, 0.0, 0.1), dashpot(1.0)]);
     assert_eq!(CentralDifference::default().solve(&barrier, Detail::End).unwrap().outcome, Outcome::Stopped);
     // A driven, overdamped projectile creeps to x = 10, where no force is left.
-    let creep = stages(smallvec![stage(-1000.0, 100.0, 1000.0, 0.0, f64::INFINITY)], 1.0, f64::INFINITY);
+    let creep = stages(smallvec![stage(-1000.0, 100.0, 1000.0, 0.0, INF)], 1.0, INF);
     // A dashpot alone stops the projectile nowhere: V underflows to zero, which is not rest.
     let underflow = stages(smallvec![dashpot(200.0)], SPEED, 10.0);
     for velocity in VELOCITIES {
-        let last = endless(&scheme(1e-3, velocity, Boundaries::Interpolated), &creep);
+        let last = refused(&scheme(1e-3, velocity, Boundaries::Interpolated), &creep);
         approx::assert_relative_eq!(last.depth, 10.0, max_relative = 1e-9);
-        endless(&scheme(1e-3, velocity, Boundaries::Landed), &underflow);
+        refused(&scheme(1e-3, velocity, Boundaries::Landed), &underflow);
     }
     // A dashpot with r dt/M = 2 takes all of V in the first half step, and nothing would hold the projectile there.
     let at_once = stages(smallvec![dashpot(256.0)], 8.0, 10.0);
     let lagged = scheme(1.0 / 64.0, VelocityAt::LaggedHalfStep, Boundaries::StepEnd);
-    assert_eq!(endless(&lagged, &at_once), State::at_impact(&at_once));
+    assert_eq!(refused(&lagged, &at_once), State::at_impact(&at_once));
     // The slowest of all speeds moves nothing in a step of 1 ms: refused after 2^20 of them.
     let slowest = f64::from_bits(1);
     let creep = stages(smallvec![dashpot(0.0)], slowest, 1.0);
     let long =
         CentralDifference { max_steps: 3 << 20, ..scheme(1e-3, VelocityAt::LaggedHalfStep, Boundaries::StepEnd) };
-    assert_eq!(endless(&long, &creep), State { time: 1_048_576.0 * 1e-3, depth: 0.0, velocity: slowest });
+    assert_eq!(refused(&long, &creep), State { time: 1_048_576.0 * 1e-3, depth: 0.0, velocity: slowest });
     // As many steps that do move are no standstill: 3/2 2^20 of them to a place one metre away.
     let slow = Problem { impact_speed: 2.0_f64.powi(20) / 1.5, exit_depth: 1.0, ..creep };
     let flight =
@@ -766,7 +769,7 @@ fn a_flight_without_an_end_is_refused_where_it_becomes_one() {
 fn the_quadratic_of_the_centred_rule_has_a_finite_derivative_where_its_roots_meet() {
     // half q V² + V = u - half p with half = 1/2, p = 4, q = 1/2, u = 1: V = -2 twice. F = p + q V² = 6 there, and
     // by V = 2 (u - half p), the vertex, dF/du = 2 q V dV/du = -4.
-    let law = stage(4.0, 0.0, 0.0, 0.5, f64::INFINITY);
+    let law = stage(4.0, 0.0, 0.0, 0.5, INF);
     let law = stages(smallvec![law], 1.0, 1.0).cast::<num_dual::Dual64>().stages[0];
     let zero = num_dual::Dual64::from_re(0.0);
     let force = VelocityAt::Centred.deceleration(&law, zero, num_dual::Dual64::from_re(1.0).derivative(), zero + 0.5);
@@ -780,8 +783,8 @@ fn nodes_in_double_double_are_the_exact_discrete_solution_to_30_digits() {
     type Big = dashu_float::FBig<dashu_float::round::mode::HalfEven, 2>;
     let big = |value: f64| Big::try_from(value).unwrap().with_precision(256).value();
     let step = 7e-6;
-    let law = stage(8e5, 7e6, 400.0, 3.1, f64::INFINITY);
-    let problem = Problem { mass: 3.0, ..stages(smallvec![law], SPEED, f64::INFINITY) };
+    let law = stage(8e5, 7e6, 400.0, 3.1, INF);
+    let problem = Problem { mass: 3.0, ..endless(&[law]) };
     let [m, h, p, s, r, q, v0, two] =
         [3.0, step, law.static_force, law.stiffness, law.viscosity, law.drag, SPEED, 2.0].map(big);
     let half = &h / &two;
@@ -821,7 +824,7 @@ fn places_located_in_double_double_are_those_of_the_parabola_to_30_digits() {
     // A constant force: X = M V0²/(2 p), T = M V0/p, and V² = V0² - 2 p x/M at the end of a stage before.
     use twofloat::TwoFloat;
     let law = |end| stage(7e5, 0.0, 0.0, 0.0, end);
-    let two_stages = stages(smallvec![law(0.05), law(f64::INFINITY)], SPEED, f64::INFINITY);
+    let two_stages = endless(&[law(0.05), law(INF)]);
     let problem = Problem { mass: 3.0, ..two_stages }.cast::<TwoFloat>();
     let (mass, speed, force) = (problem.mass, problem.impact_speed, problem.stages[0].static_force);
     let depth = (mass * speed * speed).over(force + force);

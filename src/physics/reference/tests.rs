@@ -1,11 +1,18 @@
 #![expect(clippy::unwrap_used, reason = "a panic is how a test fails")]
 use super::*;
 use crate::physics::Stage;
-use crate::physics::scene::Concrete;
-use crate::testing::stage;
+use crate::testing::{scene, stage};
 
 fn problem(stages: &[Stage], impact_speed: f64, exit_depth: f64) -> Problem {
     Problem::of_stages(2.0, impact_speed, stages.iter().copied()).with_exit(exit_depth)
+}
+
+fn solved(problem: &Problem) -> ExactFlight {
+    flight(Source::Problem(problem)).unwrap()
+}
+
+fn kinds(flight: &ExactFlight) -> Vec<EventKind> {
+    flight.events.iter().map(|event| event.kind).collect()
 }
 
 /// Relative difference of two big floats.
@@ -43,80 +50,20 @@ fn assert_digits(exact: &Exact, digits: &str) {
 
 #[test]
 fn flights_have_the_50_digits_of_a_taylor_integration_of_the_equation_of_motion() {
-    // mpmath 1.3.0, odefun at 70 digits (Taylor series of the equation, no closed form), events by findroot:
-    // M = 2 kg; p, s, r, q; V0; [T, X] at rest when it rests, then [t, V] at x = 0.25 m.
-    type Case = ([f64; 4], f64, Option<[&'static str; 2]>, [&'static str; 2]);
-    let cases: [Case; 5] = [
-        (
-            [100.0, 50.0, 3.0, 0.0],
-            10.0,
-            Some([
-                "0.1436480398033285128838091009679671181352217854781109",
-                "0.7233580939141266333161533939084721917419804764546068",
-            ]),
-            [
-                "0.02750764993387161230309206021786409981502998861871275",
-                "8.160755698439112898951263331175209520921880397124731",
-            ],
-        ),
-        (
-            [100.0, 50.0, 40.0, 0.0],
-            10.0,
-            Some([
-                "0.07603459963009463475310942548804058242016277309471764",
-                "0.2902956610774561305897428290522743332925740961351568",
-            ]),
-            [
-                "0.04264223885741157320422351534768555790848867931006064",
-                "2.707299651822331005253424106540591501813351410542086",
-            ],
-        ),
-        (
-            [100.0, 0.0, 3.0, 0.0],
-            10.0,
-            Some([
-                "0.1749095096449940346903306579206362648027776374209561",
-                "0.8363496785001988436556447359787911732407454193014635",
-            ]),
-            [
-                "0.02740833822672784376776165178901438148613186069882230",
-                "8.254583088663607811611917410549280925693406965058885",
-            ],
-        ),
-        (
-            [-40.0, 0.0, 0.0, 0.5],
-            20.0,
-            None,
-            [
-                "0.01281501993864269016063512313366177804939093243492487",
-                "19.03678042178011068621646400694561841280086951319930",
-            ],
-        ),
-        (
-            [100.0, 50.0, 0.0, 0.5],
-            10.0,
-            Some([
-                "0.1431232539250746214127512051254289622924251649251116",
-                "0.7034674224983916520498186018599021303429284310342236",
-            ]),
-            [
-                "0.02787169522926311383514831318165740035152529546328560",
-                "7.952967386985787224345939111538901684438951382815890",
-            ],
-        ),
-    ];
-    for ([p, s, r, q], impact_speed, rest, passing) in cases {
-        let stage = Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end: f64::INFINITY };
-        if let Some([time, depth]) = rest {
-            let rested = flight(Source::Problem(&problem(&[stage], impact_speed, f64::INFINITY))).unwrap();
+    for line in include_str!("taylor_digits.txt").lines().filter(|line| !line.starts_with('#')) {
+        let words: Vec<&str> = line.split(' ').collect();
+        let [p, s, r, q, impact_speed] = [0, 1, 2, 3, 4].map(|column| words[column].parse().unwrap());
+        let law = stage(p, s, r, q, f64::INFINITY);
+        if words[5] != "-" {
+            let rested = solved(&problem(&[law], impact_speed, f64::INFINITY));
             assert_eq!(rested.outcome, Outcome::Stopped);
-            assert_digits(&rested.end.time, time);
-            assert_digits(&rested.end.depth, depth);
+            assert_digits(&rested.end.time, words[5]);
+            assert_digits(&rested.end.depth, words[6]);
         }
-        let left = flight(Source::Problem(&problem(&[stage], impact_speed, 0.25))).unwrap();
+        let left = solved(&problem(&[law], impact_speed, 0.25));
         assert_eq!(left.outcome, Outcome::Perforated);
-        assert_digits(&left.end.time, passing[0]);
-        assert_digits(&left.end.velocity, passing[1]);
+        assert_digits(&left.end.time, words[7]);
+        assert_digits(&left.end.velocity, words[8]);
     }
 }
 
@@ -127,7 +74,7 @@ fn quadrature_of_the_time_gives_the_closed_tunnel_time_to_rest_and_short_of_it()
     // To rest half of the digits are lost, where W is a small difference.
     for (exit_depth, limit) in [(0.2, 1e-113), (f64::INFINITY, 1e-55)] {
         let source = Problem { exit_depth, ..source.clone() };
-        let exact = flight(Source::Problem(&source)).unwrap();
+        let exact = solved(&source);
         let model = Source::Problem(&source).model(&Source::Problem(&source).inputs(384), 384).unwrap();
         let start = Point { time: int(0, 384), depth: int(0, 384), velocity: model.impact_speed.clone() };
         let summed = quadrature(&model, &model.stages[0], &start, &exact.end.depth.0);
@@ -157,14 +104,12 @@ fn a_tie_is_reached_with_no_speed_left() {
         target: Target::CraterAndTunnel,
         ..problem(&[Stage::crater(100.0, 1.0), Stage::tunnel(100.0, 1.0)], 10.0, exit_depth)
     };
-    let stopped = flight(Source::Problem(&tie(2.0))).unwrap();
+    let stopped = solved(&tie(2.0));
     assert_eq!(stopped.outcome, Outcome::StoppedInCrater);
-    let kinds: Vec<_> = stopped.events.iter().map(|e| e.kind).collect();
-    assert_eq!(kinds, [EventKind::CraterEnd, EventKind::Rest]);
-    let through = flight(Source::Problem(&tie(1.0))).unwrap();
+    assert_eq!(kinds(&stopped), [EventKind::CraterEnd, EventKind::Rest]);
+    let through = solved(&tie(1.0));
     assert_eq!((through.outcome, through.end.velocity.to_f64()), (Outcome::Perforated, 0.0));
-    let kinds: Vec<_> = through.events.iter().map(|e| e.kind).collect();
-    assert_eq!(kinds, [EventKind::CraterEnd, EventKind::Exit, EventKind::Rest]);
+    assert_eq!(kinds(&through), [EventKind::CraterEnd, EventKind::Exit, EventKind::Rest]);
 }
 
 #[test]
@@ -191,24 +136,7 @@ fn what_has_no_answer_is_an_error() {
 
 /// Forrestal 1994 shot 14, as published: S = 12, k = 2.
 fn shot_14(thickness: Option<f64>, criterion: Criterion) -> Scene {
-    Scene {
-        title: None,
-        mass: 0.906,
-        resistance: Resistance::Concrete(Concrete {
-            diameter: 0.0269,
-            nose_factor: 0.15625,
-            strength: 35.2e6,
-            density: 2370.0,
-            static_factor: 12.0,
-            inertia_factor: 1.0,
-            crater_ratio: 2.0,
-            crater_stiffness: CraterStiffness::Continuous,
-            layers: Vec::new(),
-        }),
-        thickness,
-        criterion,
-        velocity: None,
-    }
+    Scene { thickness, criterion, velocity: None, ..scene() }
 }
 
 #[test]
@@ -255,10 +183,6 @@ fn the_ndrc_exit_depth_inverts_the_relation_on_both_branches() {
     assert!((exact.end.depth.to_f64() / 0.0538 - 1.0).abs() < 4.0 * f64::EPSILON);
 }
 
-fn kinds(flight: &ExactFlight) -> Vec<EventKind> {
-    flight.events.iter().map(|event| event.kind).collect()
-}
-
 /// Depth and velocity a time `t` after `from` under `law`: the power series of the equation of motion, sixty terms
 /// in each of 64 parts. It knows no solution.
 fn carried(law: &Stage, mass: f64, from: &ExactState, t: &Big) -> (Big, Big) {
@@ -288,7 +212,7 @@ fn carried(law: &Stage, mass: f64, from: &ExactState, t: &Big) -> (Big, Big) {
 
 /// The flight of `problem`, seen to solve the equation of motion from each event to the next, to 48 digits.
 fn flown(problem: &Problem) -> ExactFlight {
-    let flight = flight(Source::Problem(problem)).unwrap();
+    let flight = solved(problem);
     let zero = Exact(int(0, 256));
     let mut from = ExactState { time: zero.clone(), depth: zero, velocity: flight.impact_speed.clone() };
     for ExactEvent { kind, state: to } in &flight.events {
@@ -389,12 +313,7 @@ fn a_linear_dashpot_is_crossed_in_a_logarithm_at_any_speed() {
     // M = r = 2: V = V0 - x and t = ln(V0/V), so half of V0 is left after x = V0/2 and t = ln 2.
     for exponent in [-60, 0, 200] {
         let impact_speed = 2.0_f64.powi(exponent);
-        let exact = flight(Source::Problem(&problem(
-            &[stage(0.0, 0.0, 2.0, 0.0, f64::INFINITY)],
-            impact_speed,
-            0.5 * impact_speed,
-        )))
-        .unwrap();
+        let exact = solved(&problem(&[stage(0.0, 0.0, 2.0, 0.0, f64::INFINITY)], impact_speed, 0.5 * impact_speed));
         assert!(apart(&exact.end.time.0, &int(2, 384).ln()) < 1e-50);
         assert!(exact.end.velocity.relative_error(0.5 * impact_speed) < 1e-50);
     }
@@ -406,7 +325,7 @@ fn stage_ends_at_one_place_are_each_told_with_or_without_speed_and_before_the_ex
     let none = f64::INFINITY;
     let [first, second] = [EventKind::StageEnd(0), EventKind::StageEnd(1)];
     // M = 2, V0 = 8: rest at x = 1.
-    let rest = flight(Source::Problem(&problem(&[law(1.0), law(1.0), law(none)], 8.0, none))).unwrap();
+    let rest = solved(&problem(&[law(1.0), law(1.0), law(none)], 8.0, none));
     assert_eq!((kinds(&rest), rest.stage), (vec![first, second, EventKind::Rest], 0));
     for (list, exit_depth, events, stage) in [
         (vec![law(1.0), law(1.0), law(none)], 1.0, vec![first, second, EventKind::Exit, EventKind::Rest], 0),
@@ -418,7 +337,7 @@ fn stage_ends_at_one_place_are_each_told_with_or_without_speed_and_before_the_ex
         (vec![law(0.0), law(0.5), law(none)], 0.0, vec![first, EventKind::Exit], 1),
         (vec![law(0.5), law(none)], 0.0, vec![EventKind::Exit], 0),
     ] {
-        let exact = flight(Source::Problem(&problem(&list, 8.0, exit_depth))).unwrap();
+        let exact = solved(&problem(&list, 8.0, exit_depth));
         assert_eq!((exact.outcome, kinds(&exact), exact.stage), (Outcome::Perforated, events, stage), "{list:?}");
     }
 }
@@ -431,21 +350,21 @@ fn a_tie_is_seen_through_rounding_and_its_condition_is_infinite() {
     for mass in [3.0, 5.0, 7.0, 11.0, 13.0] {
         let list = [stage(1.0, 0.0, 0.0, 0.0, 0.5), stage(mass - 1.0, 0.0, 0.0, 0.0, none)];
         let tie = Problem { mass, ..problem(&list, 1.0, 1.0) };
-        let exact = flight(Source::Problem(&tie)).unwrap();
+        let exact = solved(&tie);
         assert_eq!((exact.outcome, kinds(&exact)), (Outcome::Perforated, vec![inner, exit, rest]), "{mass}");
         assert_eq!(exact.end.velocity.to_f64(), 0.0);
         assert_eq!(conditions(Source::Problem(&tie)).unwrap().depth, f64::INFINITY);
     }
     // M x'' = -(2 + 2 x + 3 x'), M = 1, V0 = 3: u = x + 1 = 5 e^-t - 4 e^-2t, whose largest value is 25/16 at e^-t = 5/8.
     let damped = Problem { mass: 1.0, ..problem(&[stage(2.0, 2.0, 3.0, 0.0, none)], 3.0, 9.0 / 16.0) };
-    let exact = flight(Source::Problem(&damped)).unwrap();
+    let exact = solved(&damped);
     assert_eq!((exact.outcome, kinds(&exact)), (Outcome::Perforated, vec![exit, rest]));
     assert_eq!(exact.end.velocity.to_f64(), 0.0);
     assert!(apart(&exact.end.time.0, &(int(8, 384) / int(5, 384)).ln()) < 1e-50);
     // What is left of W is small beside W0 only: 2^350 of 2^400.
     let fast = 2.0_f64.powi(200);
     let force = fast * fast * (1.0 - 2.0_f64.powi(-50));
-    let exact = flight(Source::Problem(&problem(&[stage(force, 0.0, 0.0, 0.0, none)], fast, 1.0))).unwrap();
+    let exact = solved(&problem(&[stage(force, 0.0, 0.0, 0.0, none)], fast, 1.0));
     assert_eq!(exact.end.velocity.to_f64(), 2.0_f64.powi(175));
 }
 

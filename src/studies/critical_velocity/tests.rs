@@ -1,7 +1,7 @@
 use super::*;
 use crate::integrators::{Detail, Energy, Flight, Margin};
+use crate::physics::Stage;
 use crate::physics::exit_energy::expm1_over;
-use crate::physics::{Stage, Stages, Target};
 
 /// Crater and tunnel: mass, k d, P, Q, c if given, H.
 #[derive(Clone, Copy, Debug)]
@@ -20,9 +20,9 @@ impl Slab {
     #[expect(clippy::unnecessary_wraps, reason = "it stands for a scene, which may refuse")]
     fn at(self, v0: f64) -> Result<Problem, ResolveError> {
         let Self { mass, kd, p, q, c, h } = self;
-        let c = c.unwrap_or(mass * (p + q * v0 * v0) / (kd * (mass + kd * q)));
-        let crater = Stage::crater(c, kd);
-        Ok(Problem::crater_and_tunnel(mass, v0, Some(crater), Stage::tunnel(p, q)).with_exit(h))
+        let tunnel = Stage::tunnel(p, q);
+        let crater = c.map_or_else(|| Stage::continuous_crater(kd, &tunnel, mass, v0), |c| Stage::crater(c, kd));
+        Ok(Problem::crater_and_tunnel(mass, v0, Some(crater), tunnel).with_exit(h))
     }
 
     /// `docs/theory.md`, section 2.
@@ -50,6 +50,13 @@ fn stages_at(stages: &[Stage], exit: f64) -> impl Fn(f64) -> Result<Problem, Res
 
 fn constant(p: f64, q: f64, end: f64) -> Stage {
     Stage { end, ..Stage::tunnel(p, q) }
+}
+
+/// The slab with viscosity in its tunnel.
+fn viscous(v0: f64) -> Result<Problem, ResolveError> {
+    let mut problem = SLAB.at(v0)?;
+    problem.stages[1].viscosity = 1.0;
+    Ok(problem)
 }
 
 /// An integrator that only knows a margin.
@@ -152,13 +159,9 @@ fn layers_that_only_slow_have_a_critical_velocity_though_slower_flights_never_en
         (vec![resisting(1.0, 0.5), slowing(f64::INFINITY)], 1.25_f64.sqrt()),
         (vec![slowing(f64::INFINITY)], 1.0),
     ] {
-        let at = |impact_speed| {
-            let stages = Stages::from_slice(&stages);
-            let target = Target::Stages;
-            Ok::<_, ResolveError>(Problem { mass: 1.0, impact_speed, exit_depth: 1.0, stages, crater: None, target })
-        };
+        let at = stages_at(&stages, 1.0);
         for integrator in [&Taylor::default() as &dyn Integrator, &crate::integrators::ClosedForm] {
-            let found = critical_velocity(at, integrator).unwrap();
+            let found = critical_velocity(&at, integrator).unwrap();
             let (error, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap());
             assert!(error <= bar && error < 1e-14, "{} {stages:?}: {found:?} and not {exact}", integrator.name());
         }
@@ -196,47 +199,46 @@ fn tolerance_asked_for_is_kept_and_saves_flights() {
         ((u - 1e5 - 100.0 * u.sqrt()) / u, Some(1e-16))
     });
     let exact = 50.0 + (2500.0_f64 + 1e5).sqrt();
-    let viscous = |v0| {
-        let mut problem = SLAB.at(v0)?;
-        problem.stages[1].viscosity = 1.0;
-        Ok::<_, ResolveError>(problem)
-    };
     let fine = critical_velocity(viscous, &bent).unwrap();
     assert!((fine.velocity / exact - 1.0).abs() < 1e-15, "{fine:?}");
     assert!(fine.evaluations <= 15, "{}", fine.evaluations);
 }
 
-/// Findings 4 and 5 of the survey: these objectives made `BrentRoot` "converge" at an end of its bracket.
+/// Objectives that change their sign at V_c and are no margin: these made `BrentRoot` "converge" at an end of its bracket.
 #[test]
-fn outcome_as_objective_is_refused() {
+fn an_objective_that_is_no_margin_is_refused() {
     for bar in [None, Some(1e-15)] {
-        let boolean = Oracle(|problem: &Problem| (true_margin(problem).signum(), bar));
-        let refusal = search(SLAB, &boolean).unwrap_err();
-        assert!(matches!(refusal, CriticalError::Jump { .. }), "{refusal}");
-        assert!(!refusal.is_usage());
-    }
-}
-
-#[test]
-fn depth_capped_at_the_exit_as_objective_is_refused() {
-    for bar in [None, Some(1e-15)] {
-        let capped = Oracle(|problem: &Problem| (true_margin(problem).min(0.0), bar));
-        let refusal = search(SLAB, &capped).unwrap_err();
-        let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
+        let refused = |objective: fn(f64) -> f64| {
+            let refusal =
+                search(SLAB, &Oracle(|problem: &Problem| (objective(true_margin(problem)), bar))).unwrap_err();
+            assert!(!refusal.is_usage(), "{refusal}");
+            refusal
+        };
+        let of_outcome = refused(f64::signum);
+        assert!(matches!(of_outcome, CriticalError::Jump { .. }), "{of_outcome}");
+        // The depth capped at the exit, and its mirror image, the residual energy that is zero for every stop.
+        let capped = refused(|margin| margin.min(0.0));
+        let CriticalError::NoBracket { low, high } = capped else { panic!("{capped}") };
         assert!(low.w < 0.0 && high.w == 0.0);
-        assert!(refusal.to_string().contains(&low.to_string()) && refusal.to_string().contains(&high.to_string()));
-    }
-}
-
-/// The residual energy that is zero for every stop: the mirror image of the capped depth.
-#[test]
-fn residual_energy_without_a_sign_as_objective_is_refused() {
-    for bar in [None, Some(1e-15)] {
-        let residual = Oracle(|problem: &Problem| (true_margin(problem).max(0.0), bar));
-        let refusal = search(SLAB, &residual).unwrap_err();
-        let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
+        assert!(capped.to_string().contains(&low.to_string()) && capped.to_string().contains(&high.to_string()));
+        let residual = refused(|margin| margin.max(0.0));
+        let CriticalError::NoBracket { low, high } = residual else { panic!("{residual}") };
         assert!(low.w == 0.0 && high.w > 0.0);
+        // One sign throughout.
+        let never = refused(|_| -0.5);
+        let CriticalError::NoBracket { low, high } = never else { panic!("{never}") };
+        assert!(low.velocity() < high.velocity() && low.w < 0.0 && high.w < 0.0);
+        let nan = refused(|_| f64::NAN);
+        assert!(matches!(nan, CriticalError::NotFinite { .. }), "{nan}");
     }
+    // Within the bracket only, where argmin would call it convergence.
+    let exact = SLAB.critical();
+    let inside = Oracle(|problem: &Problem| {
+        let near = (problem.impact_speed / exact - 1.0).abs() < 1e-8;
+        (if near { f64::NAN } else { true_margin(problem) }, None)
+    });
+    let refusal = search(SLAB, &inside).unwrap_err();
+    assert!(matches!(refusal, CriticalError::NotFinite { velocity, .. } if (velocity / exact - 1.0).abs() < 1e-8));
 }
 
 /// Noise within the error bound, different at every speed, as adaptive steps make it.
@@ -254,73 +256,35 @@ fn noise_within_the_bar_costs_neither_flights_nor_truth() {
     }
 }
 
-/// The residual velocity with its sign has an infinite slope at `V_c`. Its zero is right, and so accepted.
+/// The residual velocity with its sign has an infinite slope at `V_c`; a scheme that sees the exit at a step's end makes a
+/// staircase of W over V0. Their sign change is right, and no bar is invented.
 #[test]
-fn root_of_a_margin_with_an_infinite_slope_is_found() {
-    let root = Oracle(|problem: &Problem| {
-        let margin = true_margin(problem);
-        (margin.abs().sqrt().copysign(margin), None)
-    });
-    let found = search(SLAB, &root).unwrap();
-    assert!((found.velocity / SLAB.critical() - 1.0).abs() < 1e-13);
-    assert_eq!(found.error_bar, None);
-}
-
-/// A scheme that sees the exit at a step's end: W is a staircase over V0. Its sign change is still located, and no
-/// error bound is invented.
-#[test]
-fn sign_change_of_a_staircase_is_located() {
-    let staircase = Oracle(|problem: &Problem| {
-        let u = problem.impact_speed.powi(2);
-        (((true_margin(problem) * u / 300.0).floor() * 300.0 + 40.0) / u, None)
-    });
-    let found = search(SLAB, &staircase).unwrap();
+fn a_sign_change_that_is_no_simple_root_is_located_without_a_bar() {
+    let root: fn(f64, f64) -> f64 = |margin, _| margin.abs().sqrt().copysign(margin);
     // The floor changes sign at W = 0.
-    assert!((found.velocity / SLAB.critical() - 1.0).abs() < 1e-12, "{} {}", found.velocity, SLAB.critical());
-    assert_eq!(found.error_bar, None);
-    assert!(found.evaluations < 80, "{}", found.evaluations);
+    let staircase = |margin: f64, u: f64| ((margin * u / 300.0).floor() * 300.0 + 40.0) / u;
+    for (objective, limit, evaluations) in [(root, 1e-13, u64::MAX), (staircase, 1e-12, 79)] {
+        let oracle = Oracle(|problem: &Problem| (objective(true_margin(problem), problem.impact_speed.powi(2)), None));
+        let found = search(SLAB, &oracle).unwrap();
+        assert!((found.velocity / SLAB.critical() - 1.0).abs() < limit, "{} {}", found.velocity, SLAB.critical());
+        assert_eq!(found.error_bar, None);
+        assert!(u64::from(found.evaluations) <= evaluations, "{}", found.evaluations);
+    }
 }
 
 #[test]
-fn nan_is_an_error_wherever_it_comes() {
-    let always = Oracle(|_: &Problem| (f64::NAN, None));
-    assert!(matches!(search(SLAB, &always), Err(CriticalError::NotFinite { .. })));
-    let exact = SLAB.critical();
-    // Within the bracket only, where argmin would call it convergence.
-    let inside = Oracle(|problem: &Problem| {
-        let near = (problem.impact_speed / exact - 1.0).abs() < 1e-8;
-        (if near { f64::NAN } else { true_margin(problem) }, None)
-    });
-    let refusal = search(SLAB, &inside).unwrap_err();
-    assert!(matches!(refusal, CriticalError::NotFinite { velocity, .. } if (velocity / exact - 1.0).abs() < 1e-8));
-}
-
-#[test]
-fn margin_of_one_sign_shows_both_ends() {
-    let never = Oracle(|_: &Problem| (-0.5, None));
-    let refusal = search(SLAB, &never).unwrap_err();
-    let CriticalError::NoBracket { low, high } = refusal else { panic!("{refusal}") };
-    assert!(low.velocity() < high.velocity() && low.w < 0.0 && high.w < 0.0);
+fn a_search_without_an_end_says_so() {
     // The slab of a kilometre: e^y leaves the range of the numbers.
     let refusal = search(Slab { h: 1000.0, ..SLAB }, &Energy::new()).unwrap_err();
     assert!(!refusal.is_usage() && refusal.to_string().contains("no critical velocity up to"), "{refusal}");
-}
-
-#[test]
-fn flights_are_bounded() {
     let refusal = within(3, |v0| SLAB.at(v0), &Energy::new()).unwrap_err();
     assert!(matches!(refusal, CriticalError::NotConverged { flights: 3, .. }), "{refusal}");
 }
 
 #[test]
-fn semi_infinite_target_is_a_mistake_of_the_caller() {
+fn without_a_far_side_there_is_none_and_without_thickness_it_is_zero_and_takes_no_flight() {
     let refusal = search(Slab { h: f64::INFINITY, ..SLAB }, &Energy::new()).unwrap_err();
-    assert_eq!(refusal, CriticalError::NoExit);
-    assert!(refusal.is_usage());
-}
-
-#[test]
-fn target_without_thickness_takes_no_flight() {
+    assert!(refusal == CriticalError::NoExit && refusal.is_usage());
     let found = search(Slab { h: 0.0, ..SLAB }, &Energy::new()).unwrap();
     assert_eq!((found.velocity, found.energy, found.evaluations, found.error_bar), (0.0, 0.0, 0, Some(0.0)));
     assert!(!found.note.is_empty());
@@ -330,11 +294,6 @@ fn target_without_thickness_takes_no_flight() {
 fn errors_of_scene_and_flight_come_through() {
     let refusal = critical_velocity(|_| Err(ResolveError::NoStage), &Energy::new()).unwrap_err();
     assert!(refusal.is_usage() && refusal.to_string().contains("the scene has no stage"), "{refusal}");
-    let viscous = |v0| {
-        let mut problem = SLAB.at(v0)?;
-        problem.stages[1].viscosity = 1.0;
-        Ok::<_, ResolveError>(problem)
-    };
     let refusal = critical_velocity(viscous, &Energy::new()).unwrap_err();
     assert!(refusal.is_usage() && matches!(refusal, CriticalError::Flight { .. }), "{refusal}");
 }

@@ -12,6 +12,11 @@ const KINDS: [(&str, Kind); 4] = [
     ("u - 0.3", |r| r.uniform() - 0.3),
 ];
 
+/// The fit to the errors that `error` gives of the steps.
+fn fitted(steps: impl IntoIterator<Item = f64>, mut error: impl FnMut(f64) -> f64) -> OrderFit {
+    fit(&steps.into_iter().map(|h| StepError::new(h, error(h))).collect::<Vec<_>>()).unwrap()
+}
+
 fn power(noise: &mut Noise, n: usize, order: f64, kind: Kind) -> Vec<StepError> {
     let steps = noise.steps(n, 1e-2, 3.0);
     // Round-off far below, so that only the noise is looked at.
@@ -102,12 +107,7 @@ fn an_order_off_by_a_half_fails_with_120_points() {
 fn smooth_errors_give_the_order_to_the_next_term() {
     let mut noise = Noise(4);
     for order in [1.0, 2.0] {
-        let points: Vec<_> = noise
-            .steps(60, 1e-2, 3.0)
-            .into_iter()
-            .map(|h| StepError::new(h, -3.0 * h.powf(order) * (1.0 + h)))
-            .collect();
-        let fit = fit(&points).unwrap();
+        let fit = fitted(noise.steps(60, 1e-2, 3.0), |h| -3.0 * h.powf(order) * (1.0 + h));
         let line = fit.line.unwrap();
         assert!((line.order - order).abs() < 0.01, "{line:?}");
         assert_eq!(fit.verdict(order), Verdict::Passed);
@@ -118,12 +118,8 @@ fn smooth_errors_give_the_order_to_the_next_term() {
 fn a_round_off_floor_is_excluded_and_marked() {
     let mut noise = Noise(5);
     for _ in 0..50 {
-        let points: Vec<_> = noise
-            .steps(60, 1e-2, 6.0)
-            .into_iter()
-            .map(|h| StepError::new(h, h * h * (0.1 + noise.uniform()) + 1e-14 * noise.normal()))
-            .collect();
-        let fit = fit(&points).unwrap();
+        let steps = noise.steps(60, 1e-2, 6.0);
+        let fit = fitted(steps, |h| h * h * (0.1 + noise.uniform()) + 1e-14 * noise.normal());
         assert_eq!(fit.verdict(2.0), Verdict::Passed, "{:?}", fit.line);
         assert!(fit.points[0].excluded == Some(Exclusion::RoundOffFloor) && !fit.points[0].used);
         assert!(fit.points.iter().filter(|p| p.used).all(|p| p.step > 1e-7), "floor in the fit");
@@ -132,43 +128,28 @@ fn a_round_off_floor_is_excluded_and_marked() {
 
 #[test]
 fn a_few_points_bent_by_round_off_do_not_decide_over_the_many_above() {
-    // A tenth of the finest error is noise, and nothing levels off: an exit velocity that is nearly exact.
     for seed in 0..400 {
+        // A tenth of the finest error is noise, and nothing levels off: an exit velocity that is nearly exact.
         let mut noise = Noise(seed);
-        let points: Vec<_> = noise
-            .steps(60, 1e-2, 3.0)
-            .into_iter()
-            .map(|h| StepError::new(h, 0.1 * h * h + 1e-12 * noise.normal()))
-            .collect();
-        let fit = fit(&points).unwrap();
-        assert_eq!(fit.verdict(2.0), Verdict::Passed, "{seed}: {:?}", fit.line);
-        assert!(fit.used() >= 30, "{seed}: {} of 60", fit.used());
-    }
-}
-
-#[test]
-fn one_finest_error_a_third_off_by_round_off_does_not_bend_the_line() {
-    // Seed 141 of the suite: the exit velocity without drag, 44 times the estimated round-off at the finest step.
-    for seed in 0..400 {
+        let steps = noise.steps(60, 1e-2, 3.0);
+        let bent = fitted(steps, |h| 0.1 * h * h + 1e-12 * noise.normal());
+        // Seed 141 of the suite: the exit velocity without drag, 44 times the estimated round-off at the finest step,
+        // whose error is a third off.
         let mut noise = Noise(seed);
         let steps = noise.steps(60, 1.0, 3.0);
         let finest = steps.iter().copied().fold(f64::INFINITY, f64::min);
-        let points: Vec<_> = steps
-            .into_iter()
-            .map(|h| StepError::new(h, 7.5e-6 * h * h * if h == finest { 1.31 } else { 1.0 + 3e-3 * noise.normal() }))
-            .collect();
-        let fit = fit(&points).unwrap();
-        assert_eq!(fit.verdict(2.0), Verdict::Passed, "{seed}: {:?}", fit.line);
-        assert!(fit.used() >= 30, "{seed}: {} of 60", fit.used());
+        let off = fitted(steps, |h| 7.5e-6 * h * h * if h == finest { 1.31 } else { 1.0 + 3e-3 * noise.normal() });
+        for fit in [bent, off] {
+            assert_eq!(fit.verdict(2.0), Verdict::Passed, "{seed}: {:?}", fit.line);
+            assert!(fit.used() >= 30, "{seed}: {} of 60", fit.used());
+        }
     }
 }
 
 #[test]
 fn an_error_that_levels_off_above_round_off_is_no_floor_and_fails() {
     // A method that converges to something else by one part in a million.
-    let mut noise = Noise(6);
-    let points: Vec<_> = noise.steps(60, 1e-1, 4.0).into_iter().map(|h| StepError::new(h, h * h + 1e-6)).collect();
-    let fit = fit(&points).unwrap();
+    let fit = fitted(Noise(6).steps(60, 1e-1, 4.0), |h| h * h + 1e-6);
     assert_eq!(fit.verdict(2.0), Verdict::Failed, "{:?} {}", fit.line, fit.reason);
     assert!(fit.points.iter().all(|point| point.excluded != Some(Exclusion::RoundOffFloor)));
 }
@@ -176,12 +157,7 @@ fn an_error_that_levels_off_above_round_off_is_no_floor_and_fails() {
 #[test]
 fn the_fine_end_decides_between_two_orders() {
     let mut noise = Noise(7);
-    let points: Vec<_> = noise
-        .steps(80, 1.0, 5.0)
-        .into_iter()
-        .map(|h| StepError::new(h, (h * h + 1e-3 * h) * (0.5 + noise.uniform())))
-        .collect();
-    let fit = fit(&points).unwrap();
+    let fit = fitted(noise.steps(80, 1.0, 5.0), |h| (h * h + 1e-3 * h) * (0.5 + noise.uniform()));
     assert_eq!(fit.verdict(1.0), Verdict::Passed, "{:?}", fit.line);
     assert_eq!(fit.points.last().unwrap().excluded, Some(Exclusion::PreAsymptotic));
 }
@@ -190,10 +166,8 @@ fn the_fine_end_decides_between_two_orders() {
 fn pure_round_off_and_zeros_are_at_the_floor_and_never_pass() {
     let mut noise = Noise(8);
     let steps = noise.steps(40, 1e-2, 3.0);
-    let round_off: Vec<_> = steps.iter().map(|&h| StepError::new(h, 1e-16 * noise.normal() / h.sqrt())).collect();
-    let zeros: Vec<_> = steps.iter().map(|&h| StepError::new(h, 0.0)).collect();
-    for points in [round_off, zeros] {
-        let fit = fit(&points).unwrap();
+    let round_off = fitted(steps.clone(), |h| 1e-16 * noise.normal() / h.sqrt());
+    for fit in [round_off, fitted(steps, |_| 0.0)] {
         assert_eq!(fit.class, Class::AtFloor, "{}", fit.reason);
         assert_eq!(fit.verdict(2.0), Verdict::Undecided);
     }
@@ -201,17 +175,16 @@ fn pure_round_off_and_zeros_are_at_the_floor_and_never_pass() {
 
 #[test]
 fn diverging_constant_and_alternating_errors_never_pass() {
-    let mut noise = Noise(9);
-    let steps = noise.steps(40, 1e-2, 3.0);
-    let with =
-        |f: &dyn Fn(f64) -> f64| fit(&steps.iter().map(|&h| StepError::new(h, f(h))).collect::<Vec<_>>()).unwrap();
-    let diverging = with(&|h| 1e-4 / h);
+    let steps = || Noise(9).steps(40, 1e-2, 3.0);
+    let diverging = fitted(steps(), |h| 1e-4 / h);
     assert_eq!((diverging.class, diverging.verdict(1.0)), (Class::Diverging, Verdict::Failed));
-    let constant = with(&|_| 1e-4);
+    let constant = fitted(steps(), |_| 1e-4);
     assert_eq!((constant.class, constant.verdict(2.0)), (Class::Undecided, Verdict::Failed));
-    let alternating: Vec<_> =
-        (0..12).map(|i| StepError::new(0.5_f64.powi(i), 0.1 * 0.25_f64.powi(i) * f64::from(1 - 2 * (i % 2)))).collect();
-    let alternating = fit(&alternating).unwrap();
+    let mut sign = -0.1;
+    let alternating = fitted((0..12).map(|i| 0.5_f64.powi(i)), |h| {
+        sign = -sign;
+        sign * h * h
+    });
     assert_eq!((alternating.class, alternating.verdict(2.0)), (Class::Oscillating, Verdict::Undecided));
 }
 
@@ -219,13 +192,8 @@ fn diverging_constant_and_alternating_errors_never_pass() {
 fn noise_does_not_converge() {
     let mut noise = Noise(10);
     let fits = 3_000;
-    let converging = (0..fits)
-        .filter(|_| {
-            let points: Vec<_> =
-                noise.steps(40, 1e-2, 3.0).into_iter().map(|h| StepError::new(h, noise.normal())).collect();
-            fit(&points).unwrap().class == Class::Converging
-        })
-        .count();
+    let converging =
+        (0..fits).filter(|_| fitted(noise.steps(40, 1e-2, 3.0), |_| noise.normal()).class == Class::Converging).count();
     assert!(converging <= 8, "{converging} of {fits}");
 }
 

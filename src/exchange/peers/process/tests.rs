@@ -33,6 +33,10 @@ fn peer_within(script: &str, limits: PeerLimits) -> Peer {
     Peer::start_within(&sh(&format!("{GREETING}; {script}")), limits).unwrap()
 }
 
+fn impatient() -> PeerLimits {
+    PeerLimits { silence: Duration::from_millis(400), ..PeerLimits::default() }
+}
+
 /// The failure of a peer that prints `line` as its answer.
 fn failure_of_answer(line: &str) -> PeerFailure {
     peer(&format!("read q; printf '%b\\n' {}; sleep 5", shlex::try_quote(line).unwrap())).ask(&request()).unwrap_err()
@@ -58,8 +62,7 @@ fn an_answer_is_heard_to_the_last_digit() {
 #[test]
 fn a_question_carries_its_number_and_every_field_of_the_contract() {
     let mut peer = peer(r#"read q; echo "$q" >&2; read q"#);
-    let limits = PeerLimits { silence: Duration::from_millis(500), ..PeerLimits::default() };
-    peer.line.limits = limits;
+    peer.line.limits = impatient();
     let failure = peer.ask(&request()).unwrap_err();
     let question: Value = serde_json::from_str(failure.stderr.lines().last().unwrap()).unwrap();
     let stage =
@@ -95,8 +98,7 @@ fn a_peer_that_dies_is_named_with_its_status_and_last_words_and_not_asked_again(
 
 #[test]
 fn a_peer_that_hangs_is_ended_after_the_time_limit_and_not_asked_again() {
-    let limits = PeerLimits { silence: Duration::from_millis(400), ..PeerLimits::default() };
-    let mut peer = peer_within("exec sleep 60", limits);
+    let mut peer = peer_within("exec sleep 60", impatient());
     let started = Instant::now();
     let failure = peer.ask(&request()).unwrap_err();
     assert_eq!(failure.to_string(), "fake 1 none was silent for 0.4 s");
@@ -126,7 +128,9 @@ fn nonsense_is_quoted() {
     assert!(!why.chars().any(char::is_control), "{why:?}");
     let long = ANSWER.replace("0.5", &format!("{:?}", "x".repeat(100_000)));
     assert_eq!(nonsense_of_answer(&long).chars().count(), QUOTED_CHARS + 1);
-    assert!(nonsense_of_answer("[1, 2]").contains("expected"));
+    for answer in ["[1, 2]", "[]", "null", "{}", r#"{"id": 1"#, "<html>404</html>"] {
+        assert!(!nonsense_of_answer(answer).is_empty(), "{answer}");
+    }
     assert!(nonsense_of_answer(&ANSWER.replace("0.5", r#""half a metre""#)).contains("invalid type"));
     assert!(nonsense_of_answer(&"[".repeat(5000)).contains("line 1"));
 }
@@ -138,22 +142,21 @@ fn an_answer_to_another_question_is_nonsense() {
         "it answers question 2 and was asked question 1"
     );
     assert!(nonsense_of_answer(&ANSWER.replace(r#""id": 1"#, r#""id": "1""#)).contains("question \"1\""));
+    for id in ["99", "1.5", "-1", "1e400", "null"] {
+        assert!(!nonsense_of_answer(&ANSWER.replace(r#""id": 1"#, &format!(r#""id": {id}"#))).is_empty(), "{id}");
+    }
     assert!(nonsense_of_answer(&ANSWER.replace(r#""id": 1, "#, "")).contains("missing field `id`"));
 }
 
 #[test]
 fn not_a_number_is_no_answer() {
-    for token in ["NaN", "Infinity", "-Infinity", "nan", "1e400", "-1e400"] {
+    for token in ["NaN", "Infinity", "-Infinity", "nan", "1e400", "-1e400", "1e999", r#""0.1""#, "[0.1]"] {
         let why = nonsense_of_answer(&ANSWER.replace("0.5", token));
         // All are refused where they stand, in whatever words.
         assert!(why.contains(" at line 1 column "), "{token}: {why}");
     }
     assert!(nonsense_of_answer(&ANSWER.replace("0.5", "null")).contains("null, expected f64"));
     assert!(nonsense_of_answer(r#"{"id": 1}"#).starts_with("missing field `depth_m`"));
-}
-
-#[test]
-fn an_unknown_outcome_is_nonsense() {
     let why = nonsense_of_answer(&ANSWER.replace("stopped", "vaporised"));
     assert!(why.starts_with("no outcome is called \"vaporised\""), "{why}");
 }
@@ -164,10 +167,7 @@ fn megabytes_without_a_line_end_are_cut_off() {
     let PeerFault::Nonsense { why, printed } = &failure.fault else { unreachable!("{failure}") };
     assert_eq!(why, "a line longer than 1048576 bytes");
     assert_eq!(printed.chars().count(), QUOTED_CHARS + 1);
-}
-
-#[test]
-fn megabytes_of_lines_are_nonsense_at_the_first() {
+    // Megabytes of lines are nonsense at the first.
     let failure = peer("read q; yes").ask(&request()).unwrap_err();
     assert!(matches!(failure.fault, PeerFault::Nonsense { printed, .. } if printed == "y"));
 }
@@ -184,8 +184,7 @@ fn megabytes_on_standard_error_block_nothing_and_only_the_end_is_kept() {
 
 #[test]
 fn a_peer_that_does_not_read_a_long_question_is_silent_and_blocks_nothing() {
-    let limits = PeerLimits { silence: Duration::from_millis(400), ..PeerLimits::default() };
-    let mut peer = peer_within("exec sleep 60", limits);
+    let mut peer = peer_within("exec sleep 60", impatient());
     let long = PeerRequest { stages: vec![request().stages[0]; 20_000], ..request() };
     assert!(matches!(peer.ask(&long).unwrap_err().fault, PeerFault::Silent { .. }));
 }
@@ -194,8 +193,7 @@ fn a_peer_that_does_not_read_a_long_question_is_silent_and_blocks_nothing() {
 fn a_grandchild_that_keeps_the_pipes_open_blocks_nothing() {
     let started = Instant::now();
     let mut peer = peer("read q; sleep 8 & exit 3");
-    let limits = PeerLimits { silence: Duration::from_millis(400), ..PeerLimits::default() };
-    peer.line.limits = limits;
+    peer.line.limits = impatient();
     assert!(peer.ask(&request()).is_err());
     drop(peer);
     assert!(started.elapsed() < Duration::from_secs(7), "{:?}", started.elapsed());
