@@ -16,8 +16,8 @@ use penetrode::integrators::lanes::Batch;
 use penetrode::integrators::{Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor};
 use penetrode::physics::reference::Source;
 use penetrode::physics::{Outcome, Problem, Scene};
-use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::critical_velocity;
+use penetrode::studies::error::Truth;
 use penetrode::studies::error::{flight_error, is_fixed};
 use penetrode::studies::quantity::Quantity;
 use penetrode::studies::random_scenes::{Generator, errors_of};
@@ -36,7 +36,7 @@ fn problem(name: &str) -> Problem {
 
 /// Nobody times a wrong answer: every free quantity within `limit` of the exact one.
 fn assert_right(method: &dyn Integrator, problem: &Problem, limit: f64) {
-    let exact = Yardstick::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
+    let exact = Truth::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
     let flight = method.solve(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
     for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
         if is_fixed(quantity, &exact) {

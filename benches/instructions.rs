@@ -15,8 +15,8 @@ use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::integrators::lanes::Batch;
 use penetrode::integrators::{Detail, Method, MethodName, MethodOptions};
 use penetrode::physics::{Problem, Scene, Stage, Target};
-use penetrode::studies::convergence::Yardstick;
 use penetrode::studies::critical_velocity;
+use penetrode::studies::error::Truth;
 use penetrode::studies::error::{flight_error, is_fixed};
 use penetrode::studies::quantity::Quantity;
 use penetrode::studies::random_scenes::Generator;
@@ -58,7 +58,7 @@ fn method(name: MethodName) -> Method {
 /// The method, once it solves `problem` to `limit` in every free quantity.
 fn right(name: MethodName, problem: &Problem, limit: f64) -> Method {
     let method = method(name);
-    let exact = Yardstick::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
+    let exact = Truth::of(problem).unwrap_or_else(|e| panic!("{e}")).flight;
     let flight = method.integrator().solve(problem, Detail::Events).unwrap_or_else(|e| panic!("{e}"));
     for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
         if !is_fixed(quantity, &exact) {
@@ -190,7 +190,7 @@ const TINY: f64 = 1e-60;
 /// `tunnel` with its far side at `share` of the depth of rest.
 fn with_exit(share: f64) -> Problem {
     let mut problem = problem("tunnel");
-    problem.exit_depth = share * Yardstick::of(&problem).unwrap_or_else(|e| panic!("{e}")).flight.end.depth;
+    problem.exit_depth = share * Truth::of(&problem).unwrap_or_else(|e| panic!("{e}")).flight.end.depth;
     problem
 }
 

@@ -10,8 +10,8 @@ use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::tables::read_bytes;
 use crate::physics::Problem;
 use crate::studies::audit::{Audit, ExactValues, Expectation, QuantityAudit, RESULTS, Table, audit};
-use crate::studies::convergence::Yardstick;
 use crate::studies::critical_velocity;
+use crate::studies::error::Truth;
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::quantity::Quantity;
 use crate::text::or_dash;
@@ -53,7 +53,7 @@ impl Ask for AuditArgs {
 fn exact_values(path: &str) -> Result<ExactValues, CliError> {
     let scene = read_scene(path)?;
     let problem: Problem = problem_of(&scene, path)?;
-    let exact = Yardstick::of(&problem)?.flight;
+    let exact = Truth::of(&problem)?.flight;
     let values = Quantity::ALL.map(|quantity| match quantity {
         Quantity::CriticalVelocity => critical_velocity::exact_or_refined(&scene).ok(),
         fixed if is_fixed(fixed, &exact) => None,

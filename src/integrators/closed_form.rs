@@ -4,7 +4,7 @@
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample};
-use crate::physics::closed_form::{Crossing, cross, cross_continuous_crater, margin_error};
+use crate::physics::closed_form::{cross, cross_continuous_crater, margin_error};
 use crate::physics::{CraterStiffness, Problem, State};
 
 /// Parts of the distance between two events in a trajectory.
@@ -97,7 +97,7 @@ impl StageSolver<f64> for Exact {
     fn solve_stage(&mut self, course: &mut Course<'_>) -> Result<StageEnd, IntegrationError> {
         let (problem, stage, entry) = (course.problem, course.stage, course.state);
         let limit = problem.limit_of(stage);
-        let crossing = if self.continuous && problem.crater == Some(stage) {
+        let end = if self.continuous && problem.crater == Some(stage) {
             cross_continuous_crater(problem, limit)
         } else {
             cross(&problem.stages[stage], problem.mass, entry, limit).map_err(|why| IntegrationError::Refused {
@@ -105,22 +105,15 @@ impl StageSolver<f64> for Exact {
                 why: format!("stage {stage} has no closed form: {why}; take an integrator, such as taylor"),
             })?
         };
-        let (rests, state) = match crossing {
-            Crossing::Passes { time, velocity } => (false, State { time: entry.time + time, depth: limit, velocity }),
-            Crossing::Rests { time, distance } => {
-                // The depth of rest may round to beyond the limit, which was not reached.
-                let depth = if entry.depth + distance > limit { limit } else { entry.depth + distance };
-                (true, State { time: entry.time + time, depth, velocity: 0.0 })
-            }
-            Crossing::Endless(why) => {
-                course.error_bound = margin_error(problem, stage, entry.depth, 0.0);
-                return Ok(StageEnd::Approach(entry, why));
-            }
-        };
-        if !state.is_finite() {
-            return Err(IntegrationError::NotFinite { what: "the closed form", last: entry });
+        if let StageEnd::Approach(..) = end {
+            course.error_bound = margin_error(problem, stage, entry.depth, 0.0);
         }
-        Ok(if rests { StageEnd::Rest(state) } else { StageEnd::Limit(state) })
+        let (StageEnd::Limit(state) | StageEnd::Rest(state) | StageEnd::Approach(state, _)) = end;
+        if state.is_finite() {
+            Ok(end)
+        } else {
+            Err(IntegrationError::NotFinite { what: "the closed form", last: entry })
+        }
     }
 
     fn margin(&mut self, course: &mut Course<'_>) -> Result<Bounded, IntegrationError> {

@@ -301,17 +301,17 @@ impl Law {
     /// Where the static force resists, it is a rest. Elsewhere the speed was lost in the tolerance. If the boundary is
     /// within reach, it counts as reached with u = 0, so that the margin is zero within its error bound (`Undecided`).
     /// If not, the place is approached for ever.
-    fn meaning_of_standstill(&self, at: Node, distance: f64, noise: f64) -> (Found, Node) {
+    fn meaning_of_standstill(&self, at: Node, distance: f64, noise: f64) -> StageEnd {
         let resists = self.p > 0.0 || (self.p == 0.0 && self.s > 0.0);
         let least_brake = if self.may_hang() { noise * (self.p.abs() + self.s * at.depth.abs()) } else { 0.0 };
         if resists || self.p + self.s * at.depth > least_brake {
-            return (Found::Rest, Node { depth: at.depth.max(0.0), velocity: 0.0, ..at });
+            return StageEnd::Rest(Node { depth: at.depth.max(0.0), velocity: 0.0, ..at });
         }
         let in_reach = distance - at.depth <= self.reach(at) + noise * (1.0 + at.depth.abs());
         if in_reach && distance.is_finite() {
-            return (Found::Boundary, Node { depth: distance, velocity: 0.0, ..at });
+            return StageEnd::Limit(Node { depth: distance, velocity: 0.0, ..at });
         }
-        (Found::Approach, at)
+        StageEnd::Approach(at, "it only approaches the place where nothing moves it on")
     }
 
     /// The shortest time in which something happens at speed `u` [L/V0].
@@ -400,17 +400,6 @@ impl Reduced {
     fn state(&self, node: Node) -> State {
         self.units.state(self.start, node)
     }
-}
-
-/// What a step or its end found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Found {
-    /// The limit of the stage.
-    Boundary,
-    /// Rest before it.
-    Rest,
-    /// Nothing stops it, and the boundary is out of reach: rest, or balance of drive and resistance, is approached.
-    Approach,
 }
 
 /// The law that the library's closures read, and what they count.
@@ -608,7 +597,7 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
         let mut solver = self.solver_at(0.0, stage.speed, h).map_err(|e| failure(e, epoch, before))?;
         let mut rejected_before = rejected_by(&solver);
 
-        let (end, place) = loop {
+        let end = loop {
             if course.cost.steps + cost.steps >= max_steps {
                 return Err(IntegrationError::StepBudgetSpent { max_steps, last: state_at(epoch, before) });
             }
@@ -622,7 +611,7 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             let backwards = after.depth < before.depth && after.velocity > 0.0;
             if backwards && is_lost(before.velocity, self.rtol, energy_max) {
                 cost.steps += 1;
-                break (Found::Rest, before);
+                break StageEnd::Rest(before);
             }
             if backwards || !(after.is_finite() && next_step.is_finite() && after.time > before.time) {
                 retries += 1;
@@ -642,12 +631,13 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             cost.steps += 1;
             if after.velocity <= 0.0 || after.depth >= stage.distance {
                 let scratch = &mut self.scratch;
-                let (end, place) = locate(&law, before, after, stage.distance, |t| {
+                let end = locate(&law, before, after, stage.distance, |t| {
                     solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]))
                 })
                 .map_err(|e| failure(e, epoch, before))?;
+                let (StageEnd::Limit(place) | StageEnd::Rest(place) | StageEnd::Approach(place, _)) = end;
                 energy_max = energy_max.max(place.velocity * place.velocity);
-                break (end, place);
+                break end;
             }
             energy_max = energy_max.max(after.velocity * after.velocity);
             before = after;
@@ -664,18 +654,17 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             self.reused = Some(solver);
         }
         let noise = self.scheme.margin_error(self.rtol);
-        let (end, place) = match end {
-            Found::Rest => law.meaning_of_standstill(place, stage.distance, noise),
-            reached => (reached, place),
-        };
         let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
         course.cost = course.cost + cost;
         course.error_bound += (noise + round_off) * energy_max;
-        let reached = state_at(epoch, place);
+        let end = match end {
+            StageEnd::Rest(place) => law.meaning_of_standstill(place, stage.distance, noise),
+            reached => reached,
+        };
         Ok(match end {
-            Found::Boundary => StageEnd::Limit(State { depth: course.limit()?, ..reached }),
-            Found::Rest => StageEnd::Rest(reached),
-            Found::Approach => StageEnd::Approach(reached, "it only approaches the place where nothing moves it on"),
+            StageEnd::Limit(at) => StageEnd::Limit(State { depth: course.limit()?, ..state_at(epoch, at) }),
+            StageEnd::Rest(at) => StageEnd::Rest(state_at(epoch, at)),
+            StageEnd::Approach(at, why) => StageEnd::Approach(state_at(epoch, at), why),
         })
     }
 }
@@ -703,7 +692,7 @@ fn locate(
     after: Node,
     distance: f64,
     mut at: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
-) -> Result<(Found, Node), DiffsolError> {
+) -> Result<StageEnd, DiffsolError> {
     let mut node_at = |time| at(time).map(|(xi, u)| Node { time, depth: xi, velocity: u });
     let mut last = after;
     if after.velocity <= 0.0 {
@@ -717,10 +706,10 @@ fn locate(
         last = Node { velocity: 0.0, ..rest };
     }
     if last.depth < distance {
-        return Ok((Found::Rest, last));
+        return Ok(StageEnd::Rest(last));
     }
     let boundary = bracketed_root(before, last, distance, |node| (node.depth - distance, node.velocity), &mut node_at)?;
-    Ok((Found::Boundary, Node { depth: distance, velocity: boundary.velocity.max(0.0), ..boundary }))
+    Ok(StageEnd::Limit(Node { depth: distance, velocity: boundary.velocity.max(0.0), ..boundary }))
 }
 
 /// Largest number of evaluations of [`bracketed_root`]; from half of them on the bracket is halved each time.

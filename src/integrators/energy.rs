@@ -204,7 +204,7 @@ impl<S: Scalar> Loss<S> {
 
     /// Whether w has come to its limit -a/κ, so that no distance however long changes it: behind a stop a target may be
     /// millions of drag lengths thick, and before one a driven projectile reaches its terminal velocity.
-    fn is_settled(&self, x: S, w: S) -> bool {
+    fn is_at_limit(&self, x: S, w: S) -> bool {
         let drag = self.drag.value().abs();
         drag > 0.0
             && self.growing.value() == 0.0
@@ -305,7 +305,7 @@ impl<S: Scalar> Walk<S> {
                 return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: last_state() });
             }
             let (x, w) = (self.depth, self.w);
-            if limit.value().is_finite() && loss.is_settled(x, w) {
+            if limit.value().is_finite() && loss.is_at_limit(x, w) {
                 self.depth = limit;
                 self.error += ROUNDINGS_PER_STEP * S::EPSILON * w.value().abs();
                 break;

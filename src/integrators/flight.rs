@@ -12,18 +12,8 @@ use std::cmp::Ordering;
 
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample};
 use crate::physics::exit_energy::{energy_beyond_stop, speed_missing};
+pub(crate) use crate::physics::problem::StageEnd;
 use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State};
-
-/// Where and how the solution through one stage ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum StageEnd<S = f64> {
-    /// At the limit of the stage; the velocity there may be zero.
-    Limit(State<S>),
-    /// At rest before the limit.
-    Rest(State<S>),
-    /// Neither: from the state given, a place before the limit is only approached.
-    Approach(State<S>, &'static str),
-}
 
 /// A method, as the loop sees it.
 pub(crate) trait StageSolver<S: Scalar> {

@@ -208,10 +208,8 @@ impl Batch {
             block.prepare(part);
             self.run(&mut block);
             for (index, problem) in part.iter().enumerate() {
-                answers.push(match block.summary(index, problem) {
-                    Some(summary) => Ok(summary),
-                    None => Taylor::default().solve(problem, Detail::Events).map(|flight| Summary::from(&flight)),
-                });
+                let alone = || Ok(Summary::from(&Taylor::default().solve(problem, Detail::Events)?));
+                answers.push(block.summary(index, problem).map_or_else(alone, Ok));
             }
         }
         answers

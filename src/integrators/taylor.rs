@@ -294,11 +294,6 @@ impl<S: Scalar, const K: usize> Series<S, K> {
         let advance = (a[0] + t2 * a[2]) + t * (a[1] + t2 * a[3]);
         State { time: t, depth: t * advance, velocity }
     }
-
-    /// Values of the coefficients of V.
-    fn velocity_values(&self) -> [f64; K] {
-        self.velocity.map(Scalar::value)
-    }
 }
 
 /// `log2 |x|` plus the exponent bias, 0 to 0.087 too small: exponent and significand read as one number.
@@ -544,7 +539,7 @@ fn search_certified<S: Scalar, const N: usize>(
 ) -> Step<S> {
     let at = |time| series.at(time);
     let distance = law.end.value();
-    if let Some(root) = locate::first_root(&series.velocity_values(), span) {
+    if let Some(root) = locate::first_root(&series.velocity.map(Scalar::value), span) {
         // The root is isolated; correct it in the number type, from the nearest trial.
         let rest = match locate::rest(law, at, at(root), span, closing) {
             Found::Inside(rest) => rest,

@@ -29,7 +29,7 @@
 use thiserror::Error;
 
 use super::exit_energy::{expm1_over, propagate};
-use super::problem::{Problem, Stage, State};
+use super::problem::{Problem, Stage, StageEnd, State};
 use super::scalar::Differentiable;
 use super::scene::CraterStiffness;
 
@@ -56,18 +56,20 @@ pub fn squared_speed_at<S: Differentiable>(problem: &Problem<S>, depth: S) -> Op
     Some(w)
 }
 
-/// How a stage is left.
-pub(crate) enum Crossing {
-    /// At its limit, after `time` (s), with `velocity` (m/s).
-    Passes { time: f64, velocity: f64 },
-    /// Not at all: rest after `time` (s) and `distance` (m).
-    Rests { time: f64, distance: f64 },
-    /// Not at all, and without rest.
-    Endless(&'static str),
+/// The end of a stage at `limit`, `time` (s) after `entry`, with `velocity` (m/s).
+fn passes(entry: State, limit: f64, time: f64, velocity: f64) -> StageEnd {
+    StageEnd::Limit(State { time: entry.time + time, depth: limit, velocity })
+}
+
+/// Rest, `time` (s) and `distance` (m) after `entry`. Its depth may round to beyond the limit, which was not reached.
+fn rests(entry: State, limit: f64, time: f64, distance: f64) -> StageEnd {
+    let depth = entry.depth + distance;
+    let depth = if depth > limit { limit } else { depth };
+    StageEnd::Rest(State { time: entry.time + time, depth, velocity: 0.0 })
 }
 
 /// One stage from `entry` (V > 0) to `limit` (beyond it, possibly infinite).
-pub(crate) fn cross(stage: &Stage, mass: f64, entry: State, limit: f64) -> Result<Crossing, &'static str> {
+pub(crate) fn cross(stage: &Stage, mass: f64, entry: State, limit: f64) -> Result<StageEnd, &'static str> {
     match (stage.stiffness > 0.0, stage.viscosity > 0.0, stage.drag > 0.0) {
         (false, false, _) => Ok(cross_drag(stage, mass, entry, limit)),
         (true, false, false) => Ok(cross_spring(stage, mass, entry, limit)),
@@ -79,7 +81,7 @@ pub(crate) fn cross(stage: &Stage, mass: f64, entry: State, limit: f64) -> Resul
 
 /// `F = p + q V²`, p of any sign, q >= 0: the tunnel, constant force, drag alone, free flight.
 #[inline]
-fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing {
+fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
     let (p, q, v0) = (stage.static_force, stage.drag, entry.velocity);
     let xi = limit - entry.depth;
     if limit.is_finite() {
@@ -88,7 +90,7 @@ fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing {
         if w >= 0.0 {
             // Without a static force w may underflow where its root does not.
             let v = if p == 0.0 { v0 * (-0.5 * decay.y).exp() } else { w.sqrt() };
-            return Crossing::Passes { time: drag_time(stage, mass, xi, &decay, v0, v), velocity: v };
+            return passes(entry, limit, drag_time(stage, mass, xi, &decay, v0, v), v);
         }
     }
     if p > 0.0 {
@@ -96,13 +98,14 @@ fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing {
         let tau = mass * v0 / p;
         // Below 1e-200 the logarithm equals u, and u may have lost its digits.
         let distance = if u > 1e-200 { 0.5 * mass / q * u.ln_1p() } else { 0.5 * tau * v0 };
-        return Crossing::Rests { time: tau * atan_over(u.sqrt()), distance };
+        return rests(entry, limit, tau * atan_over(u.sqrt()), distance);
     }
-    Crossing::Endless(match (p < 0.0, q > 0.0) {
+    let why = match (p < 0.0, q > 0.0) {
         (true, _) => "the last stage drives the projectile",
         (false, true) => "drag alone never brings it to rest",
         (false, false) => "no force acts in the last stage",
-    })
+    };
+    StageEnd::Approach(entry, why)
 }
 
 /// Time (s) from speed `v0` to `v` over the distance `xi` under `p + q V²`.
@@ -156,14 +159,14 @@ impl Decay {
 
 /// `F = p + s x`, s > 0: the crater, and a spring that may be pulled first (p + s x < 0).
 #[inline]
-fn cross_spring(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing {
+fn cross_spring(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
     let v0 = entry.velocity;
     let w = (stage.stiffness / mass).sqrt();
     let f0 = (stage.static_force + stage.stiffness * entry.depth) / mass;
     let xi = limit - entry.depth;
     if f0 == 0.0 {
         // The spring is entered where it is slack: the crater, and the hot path.
-        return cross_slack_spring(w, v0, xi, (v0 - w * xi) * (v0 + w * xi));
+        return cross_slack_spring(w, entry, limit, (v0 - w * xi) * (v0 + w * xi));
     }
     if limit.is_finite() {
         let f = (stage.static_force + stage.stiffness * limit) / mass;
@@ -172,22 +175,23 @@ fn cross_spring(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing 
             let v = energy.sqrt();
             // f V0 - f0 V; of the two terms the second is at worst minus half of the first.
             let crossed = xi * (w * w * v0 + f0 * ((f0 + f) / (v0 + v)));
-            return Crossing::Passes { time: (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, velocity: v };
+            return passes(entry, limit, (w * crossed).atan2(w * w * v * v0 + f0 * f) / w, v);
         }
     }
     let reach = f0.hypot(w * v0);
     let distance = if f0 > 0.0 { v0 * (v0 / (f0 + reach)) } else { (reach - f0) / (w * w) };
-    Crossing::Rests { time: (w * v0).atan2(f0) / w, distance }
+    rests(entry, limit, (w * v0).atan2(f0) / w, distance)
 }
 
-/// A spring of frequency `w` from its slack end, with V² `squared_speed` after the distance `xi`, continued below zero.
+/// A spring of frequency `w` from its slack end, with V² `squared_speed` at `limit`, continued below zero.
 #[inline]
-fn cross_slack_spring(w: f64, v0: f64, xi: f64, squared_speed: f64) -> Crossing {
+fn cross_slack_spring(w: f64, entry: State, limit: f64, squared_speed: f64) -> StageEnd {
+    let xi = limit - entry.depth;
     if squared_speed >= 0.0 {
         let v = squared_speed.sqrt();
-        Crossing::Passes { time: (w * xi).atan2(v) / w, velocity: v }
+        passes(entry, limit, (w * xi).atan2(v) / w, v)
     } else {
-        Crossing::Rests { time: std::f64::consts::FRAC_PI_2 / w, distance: v0 / w }
+        rests(entry, limit, std::f64::consts::FRAC_PI_2 / w, entry.velocity / w)
     }
 }
 
@@ -195,31 +199,31 @@ fn cross_slack_spring(w: f64, v0: f64, xi: f64, squared_speed: f64) -> Crossing 
 ///
 /// Never inlined: the hot path has no viscosity.
 #[inline(never)]
-fn cross_viscous(stage: &Stage, mass: f64, entry: State, limit: f64) -> Crossing {
+fn cross_viscous(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
     let motion = Damped::new(stage, mass, entry);
     let to_limit = limit - entry.depth;
     if stage.static_force == 0.0 && stage.stiffness == 0.0 {
         // Viscosity alone: the speed falls by r/M for each metre.
         let lost = motion.fast * to_limit / motion.v0;
         return if lost < 1.0 {
-            Crossing::Passes { time: -(-lost).ln_1p() / motion.fast, velocity: motion.v0 * (1.0 - lost) }
+            passes(entry, limit, -(-lost).ln_1p() / motion.fast, motion.v0 * (1.0 - lost))
         } else {
-            Crossing::Endless("viscosity alone never brings it to rest")
+            StageEnd::Approach(entry, "viscosity alone never brings it to rest")
         };
     }
     let rest = motion.rest_time();
     if let Some(time) = rest {
         let (distance, _) = motion.after(time);
         if distance < to_limit {
-            return Crossing::Rests { time, distance };
+            return rests(entry, limit, time, distance);
         }
     }
     if limit.is_infinite() {
-        return Crossing::Endless("its drive and its viscosity balance");
+        return StageEnd::Approach(entry, "its drive and its viscosity balance");
     }
     match motion.time_over(to_limit, rest) {
-        Some(time) => Crossing::Passes { time, velocity: motion.after(time).1.max(0.0) },
-        None => Crossing::Endless("it creeps towards a depth that it never reaches"),
+        Some(time) => passes(entry, limit, time, motion.after(time).1.max(0.0)),
+        None => StageEnd::Approach(entry, "it creeps towards a depth that it never reaches"),
     }
 }
 
@@ -411,13 +415,13 @@ pub(crate) fn margin_error(problem: &Problem, stage: usize, depth: f64, margin: 
 }
 
 /// The continuous crater from the face to `limit`, without c.
-pub(crate) fn cross_continuous_crater(problem: &Problem, limit: f64) -> Crossing {
+pub(crate) fn cross_continuous_crater(problem: &Problem, limit: f64) -> StageEnd {
     let (mass, v0) = (problem.mass, problem.impact_speed);
     let (kd, Stage { static_force: p, drag: q, .. }) = problem.crater_depth_and_tunnel();
     let w = (problem.stages[0].stiffness / mass).sqrt();
     let squared_speed =
         (v0 * v0 * (kd * mass + q * (kd - limit) * (kd + limit)) - limit * limit * p) / (kd * (mass + kd * q));
-    cross_slack_spring(w, v0, limit, squared_speed)
+    cross_slack_spring(w, State::at_impact(problem), limit, squared_speed)
 }
 
 /// The impact speed that just perforates.

@@ -291,6 +291,17 @@ impl std::fmt::Display for State {
     }
 }
 
+/// Where and how the solution through one stage ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum StageEnd<S = f64> {
+    /// At the limit of the stage; the velocity there may be zero.
+    Limit(State<S>),
+    /// At rest before the limit.
+    Rest(State<S>),
+    /// Neither: from the state given, a place before the limit is only approached.
+    Approach(State<S>, &'static str),
+}
+
 /// What happened at a place. The order of the variants is the order of events at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, strum::IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]

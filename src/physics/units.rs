@@ -14,7 +14,8 @@ use thiserror::Error;
 use uom::si::f64 as si;
 
 /// What a quantity of a scene is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::VariantArray)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Dimension {
     /// Mass (kg).
     Mass,
@@ -40,36 +41,8 @@ pub enum Dimension {
     Energy,
 }
 
-/// Units that `uom` rounds or lacks, by exact definition: dimension, spellings, SI value.
-const EXACT: &[(Dimension, &[&str], f64)] = &[
-    (Dimension::Mass, &["lb", "lbs", "lbm", "pound", "pounds"], 0.453_592_37),
-    (Dimension::Mass, &["oz", "ounce", "ounces"], 0.028_349_523_125),
-    (Dimension::Mass, &["slug", "slugs"], 14.593_902_937_206_364),
-    (Dimension::Force, &["lbf", "pound-force", "pounds-force"], 4.448_221_615_260_5),
-    (Dimension::Force, &["kip", "kips"], 4_448.221_615_260_5),
-    (Dimension::Pressure, &["psi", "lbf/in²"], 6_894.757_293_168_361),
-    (Dimension::Pressure, &["ksi", "kip/in²"], 6_894_757.293_168_361),
-    (Dimension::Pressure, &["psf", "lbf/ft²"], 47.880_258_980_335_84),
-    (Dimension::Density, &["lb/ft³", "pcf"], 16.018_463_373_960_14),
-    (Dimension::Density, &["lb/in³"], 27_679.904_710_203_125),
-    (Dimension::Density, &["slug/ft³"], 515.378_818_393_196_2),
-    (Dimension::Density, &["t/m³", "kg/dm³", "kg/L", "kg/l"], 1e3),
-    (Dimension::Stiffness, &["N/mm"], 1e3),
-    (Dimension::Stiffness, &["kN/mm"], 1e6),
-    (Dimension::Stiffness, &["lbf/in"], 175.126_835_246_476_36),
-    (Dimension::Stiffness, &["lbf/ft"], 14.593_902_937_206_364),
-    (Dimension::Viscosity, &["N s/m", "N·s/m", "N*s/m", "Ns/m"], 1.0),
-    (Dimension::Viscosity, &["kN s/m", "kN·s/m", "kN*s/m", "kNs/m"], 1e3),
-    (Dimension::Viscosity, &["lb/s"], 0.453_592_37),
-    (Dimension::Viscosity, &["slug/s", "lbf s/ft", "lbf·s/ft", "lbf*s/ft"], 14.593_902_937_206_364),
-    (Dimension::Drag, &["N s²/m²", "N·s²/m²", "N*s²/m²"], 1.0),
-    (Dimension::Drag, &["g/mm", "t/km"], 1.0),
-    (Dimension::Drag, &["g/m"], 1e-3),
-    (Dimension::Drag, &["t/m"], 1e3),
-    (Dimension::Drag, &["lb/ft"], 1.488_163_943_569_553_7),
-    (Dimension::Drag, &["lb/in"], 17.857_967_322_834_646),
-    (Dimension::Drag, &["slug/ft"], 47.880_258_980_335_84),
-];
+/// Units that `uom` rounds or lacks, by exact definition, one a line: dimension, spellings, SI value.
+const EXACT: &str = include_str!("units.txt");
 
 impl Dimension {
     /// Name for messages, and common units, the SI unit first.
@@ -107,9 +80,14 @@ impl Dimension {
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
     pub fn coefficient(self, unit: &str) -> Option<f64> {
         let unit = canonical(unit);
-        let exact = EXACT.iter().find(|(dimension, names, _)| *dimension == self && names.contains(&unit.as_str()));
-        if let Some((_, _, coefficient)) = exact {
-            return Some(*coefficient);
+        let exact = EXACT.lines().find_map(|line| {
+            let (dimension, rest) = line.split_once(" | ")?;
+            let (names, value) = rest.split_once(" | ")?;
+            let is_it = dimension == <&str>::from(self) && names.split(", ").any(|name| name == unit);
+            if is_it { value.parse().ok() } else { None }
+        });
+        if exact.is_some() {
+            return exact;
         }
         let coefficient = match self {
             Self::Mass => one::<si::Mass>(&unit).map(|q| q.value),
@@ -338,9 +316,11 @@ mod tests {
                 assert_eq!(Dimension::of(unit), Some(dimension), "{unit}");
             }
         }
-        for (dimension, names, value) in EXACT {
-            for name in *names {
-                assert_eq!(quantity(&format!("1{name}"), *dimension), Ok(*value), "{name}");
+        for line in EXACT.lines() {
+            let [dimension, names, value] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
+            let dimension = Dimension::VARIANTS.iter().find(|known| <&str>::from(*known) == dimension).unwrap();
+            for name in names.split(", ") {
+                assert_eq!(quantity(&format!("1{name}"), *dimension), Ok(value.parse().unwrap()), "{name}");
             }
         }
     }

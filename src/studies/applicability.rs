@@ -64,19 +64,10 @@ pub type Stretch = Vec<(f64, f64)>;
 
 /// The line of error `level` in `impacts` (ascending), in as many stretches as it has.
 pub fn contour(level: f64, impacts: &[f64], crater_ratio: f64) -> Vec<Stretch> {
-    let mut stretches = vec![Stretch::new()];
-    for &impact in impacts {
-        match geometry_at(level, impact, crater_ratio) {
-            Some(geometry) => {
-                if let Some(last) = stretches.last_mut() {
-                    last.push((impact, geometry));
-                }
-            }
-            None => stretches.push(Stretch::new()),
-        }
-    }
-    stretches.retain(|stretch| stretch.len() > 1);
-    stretches
+    let point = |&impact: &f64| Some((impact, geometry_at(level, impact, crater_ratio)?));
+    let points: Vec<_> = impacts.iter().map(point).collect();
+    let stretches = points.split(Option::is_none).filter(|stretch| stretch.len() > 1);
+    stretches.map(|stretch| stretch.iter().copied().flatten().collect()).collect()
 }
 
 /// A stretch of a line of equal error, with its error.

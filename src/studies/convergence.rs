@@ -5,7 +5,6 @@
 //! [`super::order`]; what order to expect is [`super::formal_order`](mod@super::formal_order).
 
 use super::critical_velocity;
-pub use super::error::Truth as Yardstick;
 use super::error::{StudyError, Truth, flight_error, free_quantities, signed_error};
 use super::formal_order::{Path, formal_order};
 use super::order::{Class, FitError, OrderFit, StepError, fit};

@@ -345,10 +345,7 @@ fn of_layers(mut problem: Problem) -> Result<f64, StudyError> {
 /// # Errors
 /// [`CriticalError`].
 pub fn exact_or_refined(scene: &Scene) -> Result<f64, CriticalError> {
-    match exact(scene) {
-        Ok(velocity) => Ok(velocity),
-        Err(_) => of_scene(scene, &Taylor::default()).map(|found| found.velocity),
-    }
+    exact(scene).or_else(|_| Ok(of_scene(scene, &Taylor::default())?.velocity))
 }
 
 /// The results of two flights, W < 0 at `low` and W > 0 at `high`, strictly.
@@ -594,14 +591,11 @@ impl<F: Fn(f64) -> Result<Problem, ResolveError>> CostFunction for &Objective<'_
         let u = param * self.unit;
         let point = match self.known.iter().find(|point| point.u / self.unit == *param) {
             Some(known) => *known,
-            None => match self.search.at(u) {
-                Ok(point) => point,
-                Err(error) => {
-                    let message = error.to_string();
-                    *self.failure.borrow_mut() = Some(error);
-                    return Err(argmin::core::Error::msg(message));
-                }
-            },
+            None => self.search.at(u).map_err(|error| {
+                let message = error.to_string();
+                *self.failure.borrow_mut() = Some(error);
+                argmin::core::Error::msg(message)
+            })?,
         };
         self.points.borrow_mut().push(Point { u, ..point });
         Ok(point.w / self.scale)

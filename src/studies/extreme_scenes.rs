@@ -20,8 +20,7 @@ use rayon::prelude::*;
 use twofloat::TwoFloat;
 
 use super::critical_velocity;
-pub(crate) use super::error::exceeds;
-use super::error::{Errors, compare, conditions_in_dual_numbers};
+use super::error::{Errors, compare, conditions_in_dual_numbers, exceeds};
 use super::quantity::Quantity;
 use super::random::Random;
 use super::random_scenes::errors_of;
@@ -212,8 +211,10 @@ fn examine_unguarded(index: u64, scene: &Scene) -> Summary {
     let mut seen = Summary { scenes: 1, ..Summary::default() };
     match scene.problem() {
         Ok(problem) => {
-            examine_problem(index, &problem, &mut seen);
-            examine_critical(index, scene, &mut seen);
+            let examined = examine_problem(index, &problem, &mut seen);
+            examined.unwrap_or_else(|what| seen.defect(index, what));
+            let examined = examine_critical(index, scene, &mut seen);
+            examined.unwrap_or_else(|what| seen.defect(index, what));
         }
         Err(error) => {
             if error.is_usage() {
@@ -225,29 +226,21 @@ fn examine_unguarded(index: u64, scene: &Scene) -> Summary {
     seen
 }
 
-fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) {
+/// Adds what the methods make of `problem`; the error says why there is nothing to judge them by.
+fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) -> Result<(), String> {
     let fine = problem.cast::<TwoFloat>();
-    let exact = match Taylor::default().solve_in(&fine, Detail::Events) {
-        Ok(exact) => exact,
-        Err(error) => {
-            return seen.defect(index, format!("no flight in double-double: {error}"));
-        }
-    };
-    let margin = match Energy::new().exit_margin_in(&fine) {
-        Ok(margin) => margin.map(|(value, error, _)| (value, error)),
-        Err(error) => {
-            return seen.defect(index, format!("no margin in double-double: {error}"));
-        }
-    };
+    let exact = Taylor::default().solve_in(&fine, Detail::Events);
+    let exact = exact.map_err(|error| format!("no flight in double-double: {error}"))?;
+    let margin = Energy::new().exit_margin_in(&fine);
+    let margin = margin.map_err(|error| format!("no margin in double-double: {error}"))?;
+    let margin = margin.map(|(value, error, _)| (value, error));
     let perforates = match margin {
         Some((value, error)) if value.value().abs() > error => value.value() > 0.0,
         // A tie finer than double-double, or no far side.
         Some(_) => {
             seen.asked_reference = 1;
-            match reference::flight(Source::Problem(problem)) {
-                Ok(flight) => flight.outcome == Outcome::Perforated,
-                Err(_) => exact.outcome == Outcome::Perforated,
-            }
+            reference::flight(Source::Problem(problem)).map_or(exact.outcome, |flight| flight.outcome)
+                == Outcome::Perforated
         }
         None => exact.outcome == Outcome::Perforated,
     };
@@ -312,6 +305,7 @@ fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) {
             seen.admit((method, quantity), Worst { units, index });
         }
     }
+    Ok(())
 }
 
 /// Where an ulp decides on which side of a force jump at k d the projectile stops: the force before over that behind, or
@@ -335,36 +329,27 @@ fn excused(mut errors: Errors, jump: Option<f64>) -> Errors {
     errors
 }
 
-fn examine_critical(index: u64, scene: &Scene, seen: &mut Summary) {
-    if scene.thickness.is_none() {
-        return;
-    }
+/// Adds how the two critical velocities of `scene` compare; the error says which one is missing.
+fn examine_critical(index: u64, scene: &Scene, seen: &mut Summary) -> Result<(), String> {
+    let Some(thickness) = scene.thickness else { return Ok(()) };
     let exact = critical_velocity::exact(scene);
     let found = critical_velocity::of_scene(scene, &Energy::new());
     let (exact, found) = match (exact, found) {
         (Ok(exact), Ok(found)) => (exact, found),
-        (Err(_), Err(_)) => {
+        (Err(_) | Ok(SEARCHED_MAX..), Err(_)) => {
             seen.critical_refused = 1;
-            return;
-        }
-        (Ok(exact), Err(_)) if exact > SEARCHED_MAX => {
-            seen.critical_refused = 1;
-            return;
+            return Ok(());
         }
         (Ok(exact), Err(error)) => {
-            return seen.defect(index, format!("V_c = {exact:e} by the closed form, but the search says: {error}"));
+            return Err(format!("V_c = {exact:e} by the closed form, but the search says: {error}"));
         }
         (Err(error), Ok(found)) => {
-            let velocity = found.velocity;
-            return seen.defect(index, format!("V_c = {velocity:e} by search, but the closed form says: {error}"));
+            return Err(format!("V_c = {:e} by search, but the closed form says: {error}", found.velocity));
         }
     };
     seen.critical_found = 1;
     // The drag over the thickness stands in an exponent, whose digits it takes.
-    let condition = match (scene.drag(), scene.thickness) {
-        (Some(drag), Some(thickness)) => 2.0 + 2.0 * drag * thickness / scene.mass,
-        _ => 2.0,
-    };
+    let condition = scene.drag().map_or(2.0, |drag| 2.0 + 2.0 * drag * thickness / scene.mass);
     let (off, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap_or(f64::NAN));
     let units = (off / exact / f64::EPSILON / condition).min(off / bar * ULPS_MAX);
     let mut units = if off == 0.0 { 0.0 } else { units };
@@ -389,6 +374,7 @@ fn examine_critical(index: u64, scene: &Scene, seen: &mut Summary) {
         }
     }
     seen.admit((MethodName::Energy, Quantity::CriticalVelocity), Worst { units, index });
+    Ok(())
 }
 
 /// The worst error of a method in a quantity, and the scene that makes it.

@@ -1,6 +1,5 @@
 //! Random scenes from a seed, and how the closed form fares on a scene.
 
-pub use super::error::condition_of;
 use super::error::{Errors, StudyError};
 use super::random::Random;
 use crate::integrators::closed_form::solve_crater_and_tunnel;

@@ -386,11 +386,8 @@ impl std::str::FromStr for Spread {
         if parameter.moves() != parameter {
             return Err(SpreadError::Group(parameter));
         }
-        let (digits, unit) = match relative.trim().strip_suffix('%') {
-            Some(digits) => (digits.trim(), 0.01),
-            None => (relative.trim(), 1.0),
-        };
-        let relative = digits.parse::<f64>().map_err(|_| form())? * unit;
+        let (digits, unit) = relative.trim().strip_suffix('%').map_or((relative, 1.0), |digits| (digits, 0.01));
+        let relative = digits.trim().parse::<f64>().map_err(|_| form())? * unit;
         if !(0.0..=1.0).contains(&relative) {
             return Err(form());
         }

@@ -21,7 +21,7 @@ use penetrode::integrators::diffsol::{Diffsol, Scheme};
 use penetrode::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
 use penetrode::physics::reference::{self, Conditions, Source};
 use penetrode::physics::{EventKind, Outcome, Problem, Scene, State};
-use penetrode::studies::convergence::Yardstick;
+use penetrode::studies::error::Truth;
 use penetrode::studies::random_scenes::Generator;
 
 use reduced::{Reduced, Solved, StageEnd, chain};
@@ -147,7 +147,7 @@ impl Known {
     fn of(scene: &Scene) -> Self {
         let problem = scene.problem().unwrap_or_else(|error| panic!("{error}"));
         // The closed form, or for a stage without one the Taylor series to round-off.
-        let exact = Yardstick::of(&problem).unwrap_or_else(|error| panic!("{error}")).flight;
+        let exact = Truth::of(&problem).unwrap_or_else(|error| panic!("{error}")).flight;
         let exact = Solved::of(Ok(exact)).unwrap_or_else(|error| panic!("{error}"));
         let conditions = reference::conditions(Source::Problem(&problem)).unwrap_or(Conditions {
             depth: 1.0,

@@ -449,15 +449,13 @@ fn run(case: &Case, contender: Contender, setting: Setting, effort: Effort, mut 
         });
         Some(timing.over(case.problems.len()))
     });
-    match measured {
-        Ok(time) => tally.finish(time),
-        Err(error) => {
-            for _ in &case.problems {
-                tally.add(Judgement::Failed(error.to_string()), None);
-            }
-            tally.finish(None)
+    let time = measured.unwrap_or_else(|error| {
+        for _ in &case.problems {
+            tally.add(Judgement::Failed(error.to_string()), None);
         }
-    }
+        None
+    });
+    tally.finish(time)
 }
 
 /// Time of a scene in lanes: the case repeated until the lanes are full.
