@@ -466,7 +466,7 @@ impl<F: Fn(f64) -> Result<Problem, ResolveError>> Search<'_, F> {
                 let line = if expansion == 0 { f64::NAN } else { Bracket { low, high }.secant_root() };
                 let next = if line > high.u && line < 1e12 * high.u { 2.0 * line - high.u } else { high.u * factor };
                 if expansion == EXPANSIONS_MAX || !next.is_finite() {
-                    return Err(CriticalError::NoBracket { low: first, high: high });
+                    return Err(CriticalError::NoBracket { low: first, high });
                 }
                 high = self.at(next)?;
                 if high.w > 0.0 {
@@ -480,7 +480,7 @@ impl<F: Fn(f64) -> Result<Problem, ResolveError>> Search<'_, F> {
         if low.w < 0.0 && high.w > 0.0 {
             Ok(Some(Bracket { low, high }))
         } else {
-            Err(CriticalError::NoBracket { low: low, high: high })
+            Err(CriticalError::NoBracket { low, high })
         }
     }
 

@@ -40,7 +40,7 @@ pub fn in_units(problem: &Problem, Units { length, mass, time }: Units) -> Probl
 /// return is a motion under -F, in which drag adds energy. It must leave at y = x_end with V0 after the same time.
 ///
 /// `None` where there is no such motion: viscosity, which is not even in V, or an end at rest.
-pub fn way_back(problem: &Problem, there: &Flight) -> Option<Problem> {
+pub fn reversed(problem: &Problem, there: &Flight) -> Option<Problem> {
     let viscous = problem.stages.iter().any(|law| law.viscosity != 0.0);
     if viscous || there.outcome.is_stop() || there.end.velocity <= 0.0 {
         return None;

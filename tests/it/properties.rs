@@ -4,7 +4,7 @@
 use approx::assert_relative_eq;
 use penetrode::integrators::{Detail, Energy, Flight, Integrator, Taylor};
 use penetrode::physics::{Outcome, Problem, Stage, Stages};
-use penetrode::studies::relations::{Units, in_units, way_back};
+use penetrode::studies::relations::{Units, in_units, reversed};
 use proptest::prelude::*;
 
 /// Mass, V0, k d, P, Q, c: a crater and a tunnel of ordinary or less ordinary size, the force continuous at k d.
@@ -151,7 +151,7 @@ proptest! {
         let exit = part * shot.reach();
         let problem = shot.problem(exit);
         let there = solve(&problem);
-        let back = solve(&way_back(&problem, &there).unwrap());
+        let back = solve(&reversed(&problem, &there).unwrap());
         // Going back multiplies what was lost by V0²/V_r².
         let gain = (shot.speed / there.end.velocity).powi(2);
         prop_assert!((back.end.velocity / shot.speed - 1.0).abs() <= 1e-13 * gain, "{}", back.end.velocity);

@@ -14,9 +14,6 @@ use crate::testing::{kinds, stage};
 
 const INF: f64 = f64::INFINITY;
 
-const VELOCITIES: [VelocityAt; 3] = VelocityAt::ALL;
-const BOUNDARIES: [Boundaries; 3] = Boundaries::ALL;
-
 /// Mass (kg), static strength P (N), drag Q (kg/m) and crater depth k d (m) of a 50 mm projectile in concrete
 /// of 36 N/mm², at V0 (m/s).
 const MASS: f64 = 2.0;
@@ -58,7 +55,9 @@ fn spread(count: u32) -> impl Iterator<Item = f64> {
 
 /// Every combination of the rules.
 fn combinations() -> impl Iterator<Item = (VelocityAt, Boundaries)> {
-    VELOCITIES.into_iter().flat_map(|velocity| BOUNDARIES.into_iter().map(move |boundaries| (velocity, boundaries)))
+    VelocityAt::ALL
+        .into_iter()
+        .flat_map(|velocity| Boundaries::ALL.into_iter().map(move |boundaries| (velocity, boundaries)))
 }
 
 /// A crater without end, with w = `w` (1/s).
@@ -70,7 +69,7 @@ fn spring(w: f64) -> Problem {
 fn nodes_in_the_crater_are_the_exact_discrete_solution_for_every_velocity_rule() {
     // x(i) = V0 dt sin(i th)/sin(th), 2 sin(th/2) = w dt, over many swings: no event is looked for.
     let w = 2300.0;
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         for (w_dt, limit) in [(1e-3, 1e-12), (0.1, 1e-12), (0.37, 1e-12), (1.0, 1e-12), (1.999_999, 4e-10)] {
             let step = w_dt / w;
             let states = scheme(step, velocity, Boundaries::StepEnd).free_states(&spring(w), 4001).unwrap();
@@ -108,7 +107,7 @@ fn amplitudes_grow_linearly_at_the_limit_and_geometrically_beyond() {
 fn the_stability_limit_separates_decay_from_growth() {
     // A linear spring and dashpot: the limit is sharp, combined too. Ratios g/w on both sides of the value (0.44)
     // below which the predicted rule is limited by the spring.
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         for ratio in [0.02, 0.2, 0.43, 0.45, 1.0, 5.0] {
             let w = 100.0;
             let law = stage(0.0, MASS * w * w, MASS * w * ratio, 0.0, INF);
@@ -127,7 +126,7 @@ fn the_stability_limit_separates_decay_from_growth() {
     let tunnel = Stage::tunnel(STRENGTH, DRAG);
     let lagged = stability_limit(&tunnel, MASS, SPEED, VelocityAt::LaggedHalfStep);
     approx::assert_relative_eq!(lagged, MASS / (DRAG * SPEED), max_relative = 1e-15);
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         assert_eq!(stability_limit(&Stage::tunnel(STRENGTH, 0.0), MASS, SPEED, velocity), INF);
         approx::assert_relative_eq!(stability_limit(&Stage::crater(8.0, 1.0), 2.0, SPEED, velocity), 1.0);
     }
@@ -306,7 +305,7 @@ fn crater_end_exit_and_rest_at_one_node_come_in_this_order_and_perforate() {
         assert_eq!(flight.outcome, Outcome::Perforated);
     }
     // With a step that does not meet the place, located: still all three, at the same place.
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
             let flight =
                 scheme(3.0 / 64.0, velocity, boundaries).solve(&binary(list.clone(), 1.0), Detail::Events).unwrap();
@@ -331,7 +330,7 @@ fn the_force_of_the_far_side_holds_from_the_node_that_stands_on_the_end() {
 fn a_stage_end_touched_on_the_way_back_to_rest_is_reached() {
     // Whole steps see x(6) = 0.984 and V < 0; the vertex in between stands at 1.
     let list: Stages = smallvec![stage(64.0, 0.0, 0.0, 0.0, 0.999), Stage::tunnel(64.0, 0.0)];
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
             let scheme = scheme(3.0 / 64.0, velocity, boundaries);
             let flight = scheme.solve(&binary(list.clone(), INF), Detail::Events).unwrap();
@@ -361,7 +360,7 @@ fn rest_never_lies_above_a_place_already_reached() {
 fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
     for tunnel in [1.0, 64.0, 1e6] {
         let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], INF);
-        for velocity in VELOCITIES {
+        for velocity in VelocityAt::ALL {
             let flight = scheme(1.0 / 64.0, velocity, Boundaries::Landed).solve(&problem, Detail::Events).unwrap();
             assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest]);
             assert_eq!(flight.outcome, Outcome::StoppedInCrater);
@@ -406,7 +405,7 @@ fn a_step_far_beyond_rest_still_ends_the_flight() {
 #[test]
 fn step_end_shows_whole_steps_and_the_largest_depth() {
     let step = 7e-6;
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         let scheme = scheme(step, velocity, Boundaries::StepEnd);
         for problem in [concrete(DRAG, 1.0, SPEED, 0.13), concrete(DRAG, 1.0, SPEED, INF)] {
             let flight = scheme.solve(&problem, Detail::Trajectory).unwrap();
@@ -478,7 +477,7 @@ fn the_default_step_is_stable_and_affordable() {
         thin(1e-8),
         stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, INF)], SPEED, 1.0),
     ] {
-        for velocity in VELOCITIES {
+        for velocity in VelocityAt::ALL {
             let scheme = CentralDifference { velocity, ..CentralDifference::default() };
             let step = scheme.time_step(&problem);
             let flight = scheme.solve(&problem, Detail::End).unwrap();
@@ -502,7 +501,7 @@ fn a_step_that_no_budget_suffices_for_is_refused_after_the_first_steps() {
     for problem in [semi_infinite.clone(), Problem { exit_depth: 0.05, ..semi_infinite.clone() }] {
         // The flight lasts 8e-4 s, or 2e-4 s, and a hundred million such steps a ten-thousandth of it at most.
         for step in [1e-16, 1e-300, f64::from_bits(10)] {
-            for velocity in VELOCITIES {
+            for velocity in VelocityAt::ALL {
                 let error = scheme(step, velocity, Boundaries::StepEnd).solve(&problem, Detail::End).unwrap_err();
                 let IntegrationError::StepBudgetSpent { last, .. } = error else { unreachable!("{error}") };
                 assert!(last.time < 1.1e6 * step && last.velocity > 0.99 * SPEED, "{last}");
@@ -538,7 +537,7 @@ fn a_spent_budget_and_an_overflow_are_errors_with_the_state_reached() {
     let error = scheme(1e6, VelocityAt::Centred, Boundaries::Landed).solve(&driven, Detail::End).unwrap_err();
     assert!(matches!(error, IntegrationError::NotFinite { what: "depth", .. }), "{error}");
     let rough = stages(smallvec![Stage::tunnel(STRENGTH, 1e300)], 1e10, 1.0);
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         match scheme(1e-15, velocity, Boundaries::StepEnd).solve(&rough, Detail::End) {
             Ok(flight) => assert!(flight.end.velocity >= 0.0 && flight.end.depth.is_finite()),
             Err(error) => assert!(matches!(error, IntegrationError::NotFinite { .. }), "{error}"),
@@ -603,7 +602,7 @@ fn other_number_types_give_the_same_path() {
 fn a_constant_source_is_a_smaller_static_force_and_an_end_in_time_changes_the_law() {
     let law = stage(STRENGTH, 2e5, 30.0, DRAG, INF);
     let driven = Stage { static_force: STRENGTH - 4e5, ..law };
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         let scheme = scheme(1e-6, velocity, Boundaries::Landed);
         let plain = scheme.free_states(&endless(&[driven]), 101).unwrap();
         let forced = endless(&[law, law]);
@@ -703,7 +702,7 @@ fn an_outer_force_that_grows_with_time_gives_the_exact_discrete_cubic() {
     // the first step, so x(i) = V0 t + k t (t² - dt²).
     let (k, step) = (64.0, 1.0 / 64.0);
     let free = stages(smallvec![stage(0.0, 0.0, 0.0, 0.0, INF)], 8.0, INF);
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         let scheme = scheme(step, velocity, Boundaries::Landed);
         let states = scheme.forced_states(&free, |_, t| 6.0 * MASS * k * t, &[0.25]).unwrap();
         assert_eq!(states.len(), 17);
@@ -743,7 +742,7 @@ fn a_flight_without_an_end_is_refused_where_it_becomes_one() {
     let creep = stages(smallvec![stage(-1000.0, 100.0, 1000.0, 0.0, INF)], 1.0, INF);
     // A dashpot alone stops the projectile nowhere: V underflows to zero, which is not rest.
     let underflow = stages(smallvec![dashpot(200.0)], SPEED, 10.0);
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         let last = refused(&scheme(1e-3, velocity, Boundaries::Interpolated), &creep);
         approx::assert_relative_eq!(last.depth, 10.0, max_relative = 1e-9);
         refused(&scheme(1e-3, velocity, Boundaries::Landed), &underflow);
@@ -789,7 +788,7 @@ fn nodes_in_double_double_are_the_exact_discrete_solution_to_30_digits() {
         [3.0, step, law.static_force, law.stiffness, law.viscosity, law.drag, SPEED, 2.0].map(big);
     let half = &h / &two;
     let deceleration = |x: &Big, v: &Big| (&p + &s * x + &r * v + &q * v * v) / &m;
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         let evaluated_at = |x: &Big, u: &Big| match velocity {
             VelocityAt::LaggedHalfStep => u.clone(),
             VelocityAt::PredictedHalfStep => u - &half * deceleration(x, u),
@@ -829,7 +828,7 @@ fn places_located_in_double_double_are_those_of_the_parabola_to_30_digits() {
     let (mass, speed, force) = (problem.mass, problem.impact_speed, problem.stages[0].static_force);
     let depth = (mass * speed * speed).over(force + force);
     let time = (mass * speed).over(force);
-    for velocity in VELOCITIES {
+    for velocity in VelocityAt::ALL {
         for boundaries in [Boundaries::Interpolated, Boundaries::Landed] {
             let flight = scheme(7e-6, velocity, boundaries).solve_in(&problem, Detail::Events).unwrap();
             let at_end = flight.events[0].state;

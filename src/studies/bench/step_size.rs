@@ -24,12 +24,6 @@ pub const LEVELS: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 /// The quantities that are asked for, where the scene leaves them free.
 pub const QUANTITIES: [Quantity; 4] = [Quantity::Depth, Quantity::Time, Quantity::Velocity, Quantity::CriticalVelocity];
 
-/// Velocity rules of the variants.
-pub const VELOCITIES: [VelocityAt; 3] = VelocityAt::ALL;
-
-/// Boundary rules of the variants.
-pub const BOUNDARIES: [Boundaries; 3] = Boundaries::ALL;
-
 /// Adaptive methods that stand beside the variants, as far as the build has them.
 const ADAPTIVE: [MethodName; 2] = [MethodName::Taylor, MethodName::Tsit45];
 
@@ -283,8 +277,8 @@ pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<
         let time = exact.end.time;
         let steps = Walk { from: time, to: time / steps_max, per_decade: 12, probes: 128, seed };
         let mut curves = Vec::new();
-        for velocity in VELOCITIES {
-            for boundaries in BOUNDARIES {
+        for velocity in VelocityAt::ALL {
+            for boundaries in Boundaries::ALL {
                 let options = MethodOptions { velocity: Some(velocity), events: Some(boundaries), ..plain.clone() };
                 let with_size = |dt| MethodOptions { dt: Some(dt), ..options.clone() };
                 let name = variant_name(velocity, boundaries);

@@ -194,7 +194,7 @@ impl std::fmt::Display for Setting {
 }
 
 /// Solves one problem.
-pub type SolveOne<'a> = dyn FnMut(&Problem) -> Result<Flight, IntegrationError> + 'a;
+type SolveOne = dyn Fn(&Problem) -> Result<Flight, IntegrationError>;
 
 impl Contender {
     /// Every contender of this build: each method, the paper's variant of its scheme and the most accurate one.
@@ -233,27 +233,26 @@ impl Contender {
         }
     }
 
-    /// Calls `work` with the function that solves one problem, and that reuses what the method stores between solutions.
-    fn with<R>(self, setting: Setting, work: impl FnOnce(&mut SolveOne<'_>) -> R) -> Result<R, IntegrationError> {
-        match self {
-            Self::Batch => {
-                Ok(work(&mut |problem| Batch::new().solve(std::slice::from_ref(problem)).remove(0).map(|s| s.flight())))
-            }
+    /// The function that solves one problem, and that reuses what the method stores between solutions.
+    fn solver(self, setting: Setting) -> Result<Box<SolveOne>, IntegrationError> {
+        Ok(match self {
+            Self::Batch => Box::new(|problem| {
+                Batch::new().solve(std::slice::from_ref(problem)).remove(0).map(|summary| summary.flight())
+            }),
             Self::Scheme(velocity, boundaries) => {
                 let factor = if let Setting::Step(factor) = setting { factor } else { 1.0 };
-                Ok(work(&mut |problem| {
+                Box::new(move |problem| {
                     let step = factor * default_time_step(problem, velocity);
                     CentralDifference::uniform(step, velocity, boundaries).solve_in(problem, Detail::Events)
-                }))
+                })
             }
             Self::Method(name) => {
                 let rtol = if let Setting::Tolerance(rtol) = setting { Some(rtol) } else { None };
                 let method = Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() })?;
                 let reused = method.integrator().reusing();
-                let integrator = reused.as_deref().unwrap_or(method.integrator());
-                Ok(work(&mut |problem| integrator.solve(problem, Detail::Events)))
+                Box::new(move |problem| reused.as_deref().unwrap_or(method.integrator()).solve(problem, Detail::Events))
             }
-        }
+        })
     }
 }
 
@@ -425,37 +424,24 @@ pub(super) fn until_too_long(
 }
 
 fn run(case: &Case, contender: Contender, setting: Setting, effort: Effort, mut tally: Tally) -> Run {
-    let measured = contender.with(setting, |solve| {
-        let mut answered = false;
+    let solver = contender.solver(setting);
+    for known in &case.problems {
+        match solver.as_ref().map_err(Clone::clone).and_then(|solve| solve(&known.problem)) {
+            Ok(flight) => tally.add(known.judge(&flight, true), Some(flight.cost.force_evaluations)),
+            Err(error) => tally.add(Judgement::Failed(error.to_string()), None),
+        }
+    }
+    // How long it takes to give no answer at all is of no use to anybody.
+    let Some(solve) = solver.ok().filter(|_| tally.counted > 0) else { return tally.finish(None) };
+    if contender == Contender::Batch {
+        return tally.finish(Some(time_in_lanes(case, effort)));
+    }
+    let timing = effort.time(&mut || {
         for known in &case.problems {
-            let (judgement, evaluations) = match solve(&known.problem) {
-                Ok(flight) => (known.judge(&flight, true), Some(flight.cost.force_evaluations)),
-                Err(error) => (Judgement::Failed(error.to_string()), None),
-            };
-            answered |= evaluations.is_some();
-            tally.add(judgement, evaluations);
+            let _ = std::hint::black_box(solve(std::hint::black_box(&known.problem)));
         }
-        // How long it takes to give no answer at all is of no use to anybody.
-        if !answered {
-            return None;
-        }
-        if contender == Contender::Batch {
-            return Some(time_in_lanes(case, effort));
-        }
-        let timing = effort.time(&mut || {
-            for known in &case.problems {
-                let _ = std::hint::black_box(solve(std::hint::black_box(&known.problem)));
-            }
-        });
-        Some(timing.over(case.problems.len()))
     });
-    let time = measured.unwrap_or_else(|error| {
-        for _ in &case.problems {
-            tally.add(Judgement::Failed(error.to_string()), None);
-        }
-        None
-    });
-    tally.finish(time)
+    tally.finish(Some(timing.over(case.problems.len())))
 }
 
 /// Time of a scene in lanes: the case repeated until the lanes are full.

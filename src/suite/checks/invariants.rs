@@ -5,7 +5,7 @@ use super::{Subject, off, solve, worse, worst_of};
 use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Stage, Stages, State, Target};
 use crate::studies::error::{free_quantities, signed_error, value_of};
-use crate::studies::relations::{Units, in_units, way_back};
+use crate::studies::relations::{Units, in_units, reversed};
 
 check! {
     /// Kinetic energy lost against work done, at every row of the trajectory; worst residual over M V0²/2.
@@ -92,7 +92,7 @@ fn work(stage: &Stage, mass: f64, depth: f64, distance: f64, speed: f64) -> f64 
 fn time_reversal(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
     let there = subject.solution(Detail::Events)?;
-    let back = way_back(problem, &there)
+    let back = reversed(problem, &there)
         .ok_or_else(|| NotMeasured::skip("from rest, or through viscosity, there is no motion back"))?;
     let again = solve(&subject.method(None)?, &back, Detail::End)?;
     let speed = again.end.velocity / problem.impact_speed - 1.0;

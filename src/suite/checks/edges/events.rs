@@ -10,7 +10,7 @@ use crate::integrators::{
 };
 use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
 use crate::studies::critical_velocity;
-use crate::studies::relations::way_back;
+use crate::studies::relations::reversed;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 check! {
@@ -439,7 +439,7 @@ fn back_again(subject: &Subject<'_>) -> Found {
     let drag = subject.method_name() != MethodName::ClosedForm;
     let problem = slab(drag).resolve(600.0)?;
     let there = subject.flight(&problem)?;
-    let back = way_back(&problem, &there).ok_or_else(|| NotMeasured::broken("the projectile does not leave"))?;
+    let back = reversed(&problem, &there).ok_or_else(|| NotMeasured::broken("the projectile does not leave"))?;
     let again = subject.flight(&back)?;
     let places: BTreeSet<_> = again.events.iter().map(|event| event.kind).collect();
     let right = BTreeSet::from([EventKind::StageEnd(0), EventKind::Exit]);
