@@ -46,7 +46,7 @@ impl Ask for StressArgs {
         let suite = Suite::edges()?;
         let mut judged = judge_all(&suite, self.seed, &PeerAnswers::default(), "cases");
         let random = self.cases.map(|cases| self.run_random(cases));
-        judged.extend(random.as_ref().map(|(summary, wall_ms)| judged_random_scenes(summary, *wall_ms)));
+        judged.extend(random.as_ref().and_then(|(summary, wall_ms)| judged_random_scenes(&suite, summary, *wall_ms)));
         let run = Run {
             suite: &suite,
             judged: &judged,

@@ -347,11 +347,6 @@ impl Panel {
         panel
     }
 
-    /// Adds a rectangle: a bar, a cell of a matrix, a limit.
-    pub fn rectangle(self, name: impl Into<String>, ink: Ink, x: [f64; 2], y: [f64; 2]) -> Self {
-        self.series(name, Style::area(ink), [(x[0], y[0]), (x[0], y[1]), (x[1], y[1]), (x[1], y[0])])
-    }
-
     /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands at its left end.
     pub fn slope(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
         self.references.push(Reference { name: name.into(), slope, through, is_shaded: false });

@@ -47,7 +47,9 @@ fn energy_balance(subject: &Subject<'_>) -> Found {
         if distance <= 0.0 {
             continue;
         }
-        let law = &problem.stages[stage_at(problem, a.state.depth + 0.5 * distance)];
+        let middle = a.state.depth + 0.5 * distance;
+        let law = problem.stages.iter().find(|stage| middle < stage.end).or(problem.stages.last());
+        let law = law.ok_or_else(|| NotMeasured::broken("a problem without stages"))?;
         spent += work(law, problem.mass, a.state.depth, distance, a.state.velocity);
         let kinetic =
             0.5 * problem.mass * (problem.impact_speed - b.state.velocity) * (problem.impact_speed + b.state.velocity);
@@ -56,11 +58,6 @@ fn energy_balance(subject: &Subject<'_>) -> Found {
     }
     let remark = format!("{} rows of the path", flight.trajectory.len());
     Ok(Measurement::new(residual).remark(remark).evidence(Evidence::Series(points)))
-}
-
-/// Index of the stage that holds `depth`.
-fn stage_at(problem: &Problem, depth: f64) -> usize {
-    problem.stages.iter().position(|s| depth < s.end).unwrap_or(problem.stages.len() - 1)
 }
 
 /// `∫ F dx` (J) over `distance` from `depth`, entered at `speed`, through one stage.

@@ -72,7 +72,7 @@ use super::claim::{Claim, Found, Measurement, NotMeasured, Section};
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
-use crate::physics::{Advice, Problem, Resistance, Scene};
+use crate::physics::{Advice, Problem, Scene};
 use crate::studies::convergence::QuantityStudy;
 use crate::studies::error::Truth;
 use crate::studies::quantity::Quantity;
@@ -208,11 +208,6 @@ impl<'a> Subject<'a> {
     /// The exact solution, or a refined one.
     fn truth(&self) -> Result<Truth, NotMeasured> {
         Ok(Truth::of(self.problem()?)?)
-    }
-
-    /// Whether the scene is one crater and one tunnel.
-    fn is_plain_concrete(&self) -> Result<bool, NotMeasured> {
-        Ok(matches!(&self.scene()?.resistance, Resistance::Concrete(c) if c.layers.is_empty()))
     }
 }
 

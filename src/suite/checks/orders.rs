@@ -22,9 +22,8 @@ check! {
         /// Pattern of the steps.
         #[serde(default)]
         steps: StepPattern,
-        /// How many step sizes.
-        #[serde(default = "default_points")]
-        points: usize,
+        /// How many step sizes; 60 where it is left out.
+        points: Option<usize>,
     } in Orders, "order", by fixed_step;
     /// Error against tolerance: distance of the slope from 1.
     Proportionality {
@@ -49,10 +48,6 @@ check! {
     GridConvergence {} in Solution, "relative", by grid_convergence;
 }
 
-fn default_points() -> usize {
-    60
-}
-
 /// How the steps of one run are laid out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -69,7 +64,7 @@ pub enum StepPattern {
 }
 
 fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subject: &Subject<'_>) -> Found {
-    let (claim, seed) = (subject.claim, subject.context.seed);
+    let (claim, seed, points) = (subject.claim, subject.context.seed, points.unwrap_or(60));
     let critical = claim.quantity == Some(Quantity::CriticalVelocity);
     let key = format!("{:?} {} {} {pattern:?} {points} {critical}", claim.scene, claim.velocity, claim.boundaries);
     let study = shared_study(subject, key, |exact| {

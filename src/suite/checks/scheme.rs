@@ -164,12 +164,10 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
     let claim = subject.claim;
     applies!(claim.velocity == VelocityAt::LaggedHalfStep, "only a lagged drag has this constant");
     let exact = subject.truth()?.flight;
-    let tunnel = match problem.stages.last() {
-        Some(stage) if subject.is_plain_concrete()? && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0 => {
-            *stage
-        }
-        _ => return Err(NotMeasured::skip("the motion does not end in a tunnel with drag")),
-    };
+    let is_plain = subject.scene()?.concrete().is_some_and(|concrete| concrete.layers.is_empty());
+    let ends_in = |stage: &&Stage| is_plain && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0;
+    let tunnel = problem.stages.last().filter(ends_in);
+    let tunnel = tunnel.ok_or_else(|| NotMeasured::skip("the motion does not end in a tunnel with drag"))?;
     let continuous = problem.crater.is_none_or(|i| {
         let at = exact.crater_end().unwrap_or(exact.end);
         let (left, right) = (problem.stages[i].force(at.depth, at.velocity), tunnel.force(at.depth, at.velocity));

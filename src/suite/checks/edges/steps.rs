@@ -9,13 +9,14 @@ use crate::integrators::{
 };
 use crate::physics::{Outcome, Problem, Stage};
 use crate::studies::error::flight_error;
+use crate::studies::extreme_scenes::Summary;
 use crate::studies::order::{OrderFit, StepError, fit};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 use crate::studies::random_scenes::closed_form_errors_at_inputs;
 use crate::studies::{Path, extreme_scenes, formal_order, rounding, stability};
 use crate::suite::claim::{Claim, Evidence, Found, Judged, Measurement, NotMeasured, Section};
-use crate::suite::{Check, Verdict};
+use crate::suite::{Check, Suite, Verdict};
 
 check! {
     /// S1 of `verification/edges.toml`.
@@ -240,41 +241,34 @@ fn order_crossover(subject: &Subject<'_>) -> Found {
 
 #[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
 fn random_scenes(subject: &Subject<'_>) -> Found {
-    let summary = extreme_scenes::run(2000, subject.context.seed, &|| {});
-    let undecided: u64 = summary.tallies.values().map(|tally| tally.undecided).sum();
-    let mut remark = format!("{} scenes, {undecided} outcomes undecided", summary.scenes);
-    if let Some(defect) = summary.defects.first() {
-        remark = format!("{remark}; scene {}: {}", defect.index, defect.what);
-    }
-    Ok(Measurement::new(summary.defect_count as f64).remark(remark))
+    Ok(defects_of(&extreme_scenes::run(2000, subject.context.seed, &|| {})))
 }
 
-/// The random scenes of `stress --cases` as one claim; `wall_ms` is the time spent on them (ms).
-pub fn judged_random_scenes(summary: &extreme_scenes::Summary, wall_ms: f64) -> Judged {
+fn defects_of(summary: &Summary) -> Measurement {
+    let undecided: u64 = summary.tallies.values().map(|tally| tally.undecided).sum();
+    let Summary { scenes, unresolved, .. } = summary;
     let first = summary.defects.first().map(|d| format!("; scene {}: {}", d.index, d.what)).unwrap_or_default();
+    Measurement {
+        verdict: (scenes == unresolved).then_some(Verdict::Undecided),
+        ..Measurement::new(summary.defect_count as f64)
+            .remark(format!("{scenes} scenes, {unresolved} unresolved, {undecided} outcomes undecided{first}"))
+    }
+}
+
+/// The random scenes of `stress --cases` as one more claim of `suite`, in place of those that it draws itself; `wall_ms`
+/// is the time spent on them (ms).
+pub fn judged_random_scenes(suite: &Suite, summary: &Summary, wall_ms: f64) -> Option<Judged> {
+    let drawn = suite.claims.iter().find(|claim| matches!(claim.check, Check::RandomScenes(_)))?;
     let claim = Claim {
         id: "random-scenes".to_owned(),
         table: "random-scenes".to_owned(),
         statement: "every random scene: outcomes right or undecided, every number within its limit".to_owned(),
-        check: Check::RandomScenes(RandomScenes {}),
         section: Section::Random,
-        scene: None,
-        method: None,
-        quantity: None,
-        velocity: VelocityAt::default(),
-        boundaries: Boundaries::default(),
-        limit: 0.0,
-        unit: RandomScenes::UNIT,
         reason: "zero: an outcome is right, or inside its own error bar; numbers keep to 64 ulp times their condition number"
             .to_owned(),
+        ..drawn.clone()
     };
-    let nothing_seen = summary.scenes == summary.unresolved;
-    let found = Measurement {
-        verdict: nothing_seen.then_some(Verdict::Undecided),
-        ..Measurement::new(summary.defect_count as f64)
-            .remark(format!("{} scenes, {} unresolved{first}", summary.scenes, summary.unresolved))
-    };
-    Judged::new(claim, Ok(found), wall_ms)
+    Some(Judged::new(claim, Ok(defects_of(summary)), wall_ms))
 }
 
 fn digits_lost(_: &Subject<'_>) -> Found {
