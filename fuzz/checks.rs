@@ -2,7 +2,7 @@
 
 use dashu_int::ops::Gcd;
 use dashu_int::{IBig, Sign};
-use penetrode::exchange::tables::{CsvTable, Rows};
+use penetrode::exchange::tables::CsvTable;
 use penetrode::integrators::locate::{COEFFICIENTS_MAX, first_root};
 use penetrode::physics::{Advice, Scene};
 use penetrode::studies::Verdict;
@@ -52,7 +52,7 @@ pub fn batch(data: &[u8]) {
         let mut table = CsvTable::new("fuzz.csv", data, &SCENES).map_err(|error| error.to_string())?;
         let mut all = Vec::new();
         loop {
-            let scenes = Scenes::Table(Rows::Csv(table.next_rows(chunk, None).map_err(|error| error.to_string())?));
+            let scenes = Scenes::Table(table.next_rows(chunk, None).map_err(|error| error.to_string())?);
             if scenes.is_empty() {
                 return Ok::<_, String>(all);
             }

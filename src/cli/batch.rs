@@ -14,7 +14,7 @@ use super::{CliError, Exit, Run};
 use crate::exchange::input::{is_standard, name_of};
 #[cfg(feature = "parquet")]
 use crate::exchange::tables::parquet::ParquetReader;
-use crate::exchange::tables::{self, Block, CsvTable, Rows, TableWriter};
+use crate::exchange::tables::{self, Block, CsvTable, TableWriter};
 use crate::integrators::Method;
 use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, answers};
 use crate::text::count;
@@ -201,16 +201,16 @@ impl Source {
         let scenes = match self {
             Self::Csv(table) => {
                 let used = match used {
-                    Some(Scenes::Table(Rows::Csv(records))) => Some(records),
+                    Some(Scenes::Table(rows)) => Some(rows),
                     _ => None,
                 };
-                Scenes::Table(Rows::Csv(table.next_rows(CHUNK, used)?))
+                Scenes::Table(table.next_rows(CHUNK, used)?)
             }
             #[cfg(feature = "parquet")]
             Self::Parquet(table, progress) => {
-                let columns = table.next_rows(CHUNK)?;
-                progress.inc(columns.len() as u64);
-                Scenes::Table(Rows::Parquet(columns))
+                let rows = table.next_rows(CHUNK)?;
+                progress.inc(rows.len() as u64);
+                Scenes::Table(rows)
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;

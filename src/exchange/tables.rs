@@ -18,6 +18,7 @@ use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 use ::csv::ByteRecord;
 
@@ -176,37 +177,42 @@ impl Format {
     }
 }
 
-/// Rows of a table, some thousands of them.
+/// Rows of a table, some thousands of them, with the layout to read them by.
 #[derive(Debug)]
-pub enum Rows {
-    /// Records of a CSV table.
-    Csv(csv::Records),
-    /// Columns of a Parquet table.
+pub struct Rows {
+    layout: Arc<Layout>,
+    /// Rows in use; further records wait to be filled again.
+    count: usize,
+    data: Data,
+}
+
+#[derive(Debug)]
+enum Data {
+    /// Records of a CSV table, and the line of each.
+    Csv(Vec<ByteRecord>, Vec<u64>),
+    /// Columns of a Parquet table in the order of the format, an empty one where the table has none, and the number of
+    /// the first row, from 1.
     #[cfg(feature = "parquet")]
-    Parquet(parquet::Columns),
+    Parquet(Vec<Cells>, u64),
 }
 
 impl Rows {
     /// How many.
     pub fn len(&self) -> usize {
-        match self {
-            Self::Csv(records) => records.len(),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(columns) => columns.len(),
-        }
+        self.count
     }
 
     /// True if there is none.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.count == 0
     }
 
     /// Line or number of row `index` in its table.
     pub fn at(&self, index: usize) -> At {
-        match self {
-            Self::Csv(records) => records.at(index),
+        match &self.data {
+            Data::Csv(_, lines) => At::Line(lines[index]),
             #[cfg(feature = "parquet")]
-            Self::Parquet(columns) => columns.at(index),
+            Data::Parquet(_, first) => At::Row(first + index as u64),
         }
     }
 
@@ -215,11 +221,16 @@ impl Rows {
     /// # Errors
     /// [`Fault::Ragged`].
     pub fn row(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
-        match self {
-            Self::Csv(records) => records.row(index),
+        let (at, expected) = (self.at(index), self.layout.width);
+        let record = match &self.data {
+            Data::Csv(records, _) if records[index].len() != expected => {
+                return Err(TableError::of_row(at, 0, Fault::Ragged { found: records[index].len(), expected }));
+            }
+            Data::Csv(records, _) => Record::Csv(&records[index]),
             #[cfg(feature = "parquet")]
-            Self::Parquet(columns) => Ok(columns.row(index)),
-        }
+            Data::Parquet(cells, _) => Record::Parquet(cells, index),
+        };
+        Ok(Row { layout: &self.layout, at, record })
     }
 }
 
@@ -252,6 +263,16 @@ impl<'a> Row<'a> {
     /// Position of `column` in the table, from 1; 0 where the table does not have it.
     pub fn position(&self, column: usize) -> usize {
         self.layout.places[column].map_or(0, |place| place + 1)
+    }
+
+    /// Refuses a cell that is not text, whether it is used or not.
+    fn check_text(&self) -> Result<(), Box<TableError>> {
+        let bad = match self.record {
+            Record::Csv(record) => record.iter().position(|cell| std::str::from_utf8(cell).is_err()),
+            #[cfg(feature = "parquet")]
+            Record::Parquet(..) => None,
+        };
+        bad.map_or(Ok(()), |column| Err(TableError::of_row(self.at, column + 1, Fault::NotText)))
     }
 
     /// `fault` of the cell in `column`.
@@ -381,8 +402,8 @@ pub fn read<T>(
             return if all.is_empty() { Err(TableError::new(place, Fault::NoRows, format)) } else { Ok(all) };
         }
         for index in 0..records.len() {
-            let row = records.row_of_text(index).and_then(|row| each(&row));
-            all.push(row.map_err(|error| error.in_file(file))?);
+            let made = records.row(index).and_then(|row| row.check_text().and_then(|()| each(&row)));
+            all.push(made.map_err(|error| error.in_file(file))?);
         }
         used = Some(records);
     }

@@ -324,7 +324,7 @@ mod tests {
     fn table(lines: &str) -> Scenes {
         let text = format!("{}\n{lines}", SCENES.header());
         let mut table = CsvTable::new("t.csv", text.as_bytes(), &SCENES).unwrap();
-        Scenes::Table(Rows::Csv(table.next_rows(100, None).unwrap()))
+        Scenes::Table(table.next_rows(100, None).unwrap())
     }
 
     #[test]

@@ -8,63 +8,10 @@ use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::error::{At, Fault, Place, TableError};
 use super::lines::{LineEnds, line_of};
-use super::{Format, Layout, Record, Row};
+use super::{Data, Format, Layout, Rows};
 
 /// Longest line (bytes): without a limit one open quote, or a file that is no table, would fill the memory.
 const LINE_MAX: u64 = 1 << 20;
-
-/// Records of a table, with the layout to read them by.
-#[derive(Debug)]
-pub struct Records {
-    layout: Arc<Layout>,
-    #[expect(clippy::struct_field_names, reason = "the records are what the type is of")]
-    records: Vec<ByteRecord>,
-    /// Line of each.
-    lines: Vec<u64>,
-    /// Records in use; the others wait to be filled again.
-    count: usize,
-}
-
-impl Records {
-    /// How many.
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
-    /// True if there is none.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
-    /// Line of record `index`.
-    pub fn at(&self, index: usize) -> At {
-        At::Line(self.lines[index])
-    }
-
-    /// Record `index`, from 0.
-    ///
-    /// # Errors
-    /// [`Fault::Ragged`].
-    pub fn row(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
-        let (record, at) = (&self.records[index], self.at(index));
-        let (found, expected) = (record.len(), self.layout.width);
-        if found != expected {
-            return Err(TableError::of_row(at, 0, Fault::Ragged { found, expected }));
-        }
-        Ok(Row { layout: &self.layout, at, record: Record::Csv(record) })
-    }
-
-    /// Record `index`, every cell of which is text.
-    ///
-    /// # Errors
-    /// [`Fault::Ragged`] and [`Fault::NotText`].
-    pub fn row_of_text(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
-        match self.records[index].iter().position(|cell| std::str::from_utf8(cell).is_err()) {
-            Some(column) => Err(TableError::of_row(self.at(index), column + 1, Fault::NotText)),
-            None => self.row(index),
-        }
-    }
-}
 
 /// What a limited reader says when a line is too long.
 const TOO_LONG: &str = "line longer than 1 MiB";
@@ -136,8 +83,11 @@ impl<R: Read> CsvTable<R> {
     ///
     /// # Errors
     /// [`TableError`] for a table that cannot be read on.
-    pub fn next_rows(&mut self, count: usize, used: Option<Records>) -> Result<Records, Box<TableError>> {
-        let (mut records, mut lines) = used.map_or_else(Default::default, |used| (used.records, used.lines));
+    pub fn next_rows(&mut self, count: usize, used: Option<Rows>) -> Result<Rows, Box<TableError>> {
+        let (mut records, mut lines) = match used.map(|used| used.data) {
+            Some(Data::Csv(records, lines)) => (records, lines),
+            _ => Default::default(),
+        };
         lines.clear();
         while lines.len() < count {
             let index = lines.len();
@@ -160,7 +110,7 @@ impl<R: Read> CsvTable<R> {
             }
             lines.push(line);
         }
-        Ok(Records { layout: Arc::clone(&self.layout), records, count: lines.len(), lines })
+        Ok(Rows { layout: Arc::clone(&self.layout), count: lines.len(), data: Data::Csv(records, lines) })
     }
 }
 
@@ -179,7 +129,7 @@ fn failure(file: &str, line: u64, error: &::csv::Error, format: &Format) -> Box<
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
-    use super::super::{Column, Need};
+    use super::super::{Column, Need, Row};
     use super::*;
 
     static FORMAT: Format = Format {

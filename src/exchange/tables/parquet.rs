@@ -20,7 +20,7 @@ use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnDescriptor, ColumnPath, Type};
 
 use super::error::{At, Fault, Place, TableError};
-use super::{Cells, Column, Format, Kind, Layout, Record, Row};
+use super::{Cells, Column, Data, Format, Kind, Layout, Rows};
 use crate::text::shortened;
 
 /// Rows of a row group that is written: some megabytes.
@@ -38,39 +38,6 @@ const SIGNED: [ConvertedType; 4] =
 fn guarded<R>(work: impl FnOnce() -> Result<R, ParquetError>) -> Result<R, ParquetError> {
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|_| Err(ParquetError::General("the file is damaged".to_owned())))
-}
-
-/// Rows of a table, column by column.
-#[derive(Debug)]
-pub struct Columns {
-    layout: Arc<Layout>,
-    /// Number of the first row, from 1.
-    first: u64,
-    count: usize,
-    /// In the order of the format; empty for a column that the table does not have.
-    cells: Vec<Cells>,
-}
-
-impl Columns {
-    /// How many rows.
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
-    /// True if there is none.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
-    /// Number of row `index` in its table.
-    pub fn at(&self, index: usize) -> At {
-        At::Row(self.first + index as u64)
-    }
-
-    /// Row `index`, from 0.
-    pub fn row(&self, index: usize) -> Row<'_> {
-        Row { layout: &self.layout, at: self.at(index), record: Record::Parquet(&self.cells, index) }
-    }
 }
 
 /// A Parquet table that is being read.
@@ -133,21 +100,21 @@ impl ParquetReader {
     ///
     /// # Errors
     /// [`TableError`] for a table that cannot be read on.
-    pub fn next_rows(&mut self, count: usize) -> Result<Columns, Box<TableError>> {
+    pub fn next_rows(&mut self, count: usize) -> Result<Rows, Box<TableError>> {
         guarded(|| self.read(count)).map_err(|error| {
             TableError::new(Place { file: self.file.clone(), ..Place::default() }, unsound(&error), self.format)
         })
     }
 
-    fn read(&mut self, count: usize) -> Result<Columns, ParquetError> {
-        let cells = self.format.columns.iter().map(|column| Cells::empty(column.kind)).collect();
-        let mut rows = Columns { layout: Arc::clone(&self.layout), first: self.rows + 1, count: 0, cells };
-        while rows.count < count {
+    fn read(&mut self, count: usize) -> Result<Rows, ParquetError> {
+        let mut cells: Vec<_> = self.format.columns.iter().map(|column| Cells::empty(column.kind)).collect();
+        let mut read = 0;
+        while read < count {
             if self.left == 0 && !self.next_group()? {
                 break;
             }
-            let part = self.left.min(count - rows.count);
-            for ((reader, cells), unsigned) in self.columns.iter_mut().zip(&mut rows.cells).zip(&self.unsigned) {
+            let part = self.left.min(count - read);
+            for ((reader, cells), unsigned) in self.columns.iter_mut().zip(&mut cells).zip(&self.unsigned) {
                 match (reader, cells) {
                     (Some(reader), Cells::Numbers(numbers)) => read_numbers(reader, *unsigned, part, numbers)?,
                     (Some(reader), Cells::Texts(texts)) => read_texts(reader, part, texts)?,
@@ -155,10 +122,11 @@ impl ParquetReader {
                 }
             }
             self.left -= part;
-            rows.count += part;
+            read += part;
         }
-        self.rows += rows.count as u64;
-        Ok(rows)
+        let first = self.rows + 1;
+        self.rows += read as u64;
+        Ok(Rows { layout: Arc::clone(&self.layout), count: read, data: Data::Parquet(cells, first) })
     }
 
     /// Opens the next row group; false at the end.

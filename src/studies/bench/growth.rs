@@ -171,7 +171,7 @@ fn write_scenes(path: &Path, count: u64, seed: u64) -> io::Result<()> {
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
     use super::*;
-    use crate::exchange::tables::{CsvTable, Rows};
+    use crate::exchange::tables::CsvTable;
     use crate::physics::Scene;
     use crate::studies::batch::Scenes;
 
@@ -182,7 +182,7 @@ mod tests {
         for count in [1, 1023, 1024, 1500] {
             write_scenes(&path, count, 7).unwrap();
             let mut table = CsvTable::new("scenes", File::open(&path).unwrap(), &SCENES).unwrap();
-            let read = Scenes::Table(Rows::Csv(table.next_rows(10_000, None).unwrap()));
+            let read = Scenes::Table(table.next_rows(10_000, None).unwrap());
             let expected: Vec<Scene> = (0..6).flat_map(|part| random_rows(7, part)).take(count as usize).collect();
             assert_eq!(read.scenes(0..read.len()), expected.into_iter().map(Ok).collect::<Vec<_>>());
         }
