@@ -480,7 +480,6 @@ mod tests {
         assert_eq!(read(&format!("{header}{good}")).unwrap()[0].set, "own");
         for (from, to, message) in [
             ("173", "deep", "own.csv:3, column 8: `deep` in `depth_mm` is not a number"),
-            ("ogive", "blunt", "own.csv:3, column 3: `blunt` in `nose` is not flat, flat_assumed, ogive, "),
             (",2,", ",,", "own.csv:3, column 4: the cell in `CRH` is empty"),
             ("0.906", "-1", "own.csv:3, column 1: `-1` in `M_kg` is not a number > 0"),
             ("277", "NaN", "own.csv:3, column 7: `NaN` in `V0_m_s` is not a number > 0"),

@@ -59,49 +59,35 @@ fn headings(document: &str) -> io::Result<Vec<String>> {
     Ok(marked.map(|line| line.trim_start_matches(['#', ' ']).to_owned()).collect())
 }
 
-#[test]
-fn every_cited_section_of_the_theory_exists() -> io::Result<()> {
-    let headings = headings("docs/theory.md")?;
-    let mut cited = 0;
+/// Checks what stands behind each mention of `document`: `cited` gives the start of the heading that it names.
+fn all_exist(document: &str, least: usize, cited: impl Fn(&str) -> Option<String>) -> io::Result<()> {
+    let headings = headings(&format!("docs/{document}"))?;
+    let mut count = 0;
     for (path, text) in citing()? {
-        for rest in text.split("theory.md").skip(1) {
-            let rest = rest.trim_start_matches(['`', ')', ',', ' ']);
-            let Some(numbers) = rest.strip_prefix("sections ").or_else(|| rest.strip_prefix("section ")) else {
-                continue;
-            };
-            let number: String = numbers.chars().take_while(char::is_ascii_digit).collect();
-            assert!(
-                headings.iter().any(|heading| heading.starts_with(&format!("{number}. "))),
-                "{}: docs/theory.md has no section `{number}`",
-                path.display()
-            );
-            cited += 1;
+        let mentions = text.split(document).skip(1);
+        for heading in mentions.filter_map(|rest| cited(rest.trim_start_matches(['`', ')']))) {
+            let is_there = headings.iter().any(|known| format!("{known}\n").starts_with(&heading));
+            assert!(is_there, "{}: docs/{document} has no heading \"{heading}\"", path.display());
+            count += 1;
         }
     }
-    assert!(cited >= 30, "only {cited} citations were found: is their form another one?");
+    assert!(count >= least, "only {count} citations were found: is their form another one?");
     Ok(())
 }
 
 #[test]
+fn every_cited_section_of_the_theory_exists() -> io::Result<()> {
+    all_exist("theory.md", 30, |rest| {
+        let rest = rest.trim_start_matches(['`', ')', ',', ' ']);
+        let numbers = rest.strip_prefix("sections ").or_else(|| rest.strip_prefix("section "))?;
+        let number: String = numbers.chars().take_while(char::is_ascii_digit).collect();
+        Some(format!("{number}. "))
+    })
+}
+
+#[test]
 fn every_cited_heading_of_the_reference_exists() -> io::Result<()> {
-    let headings = headings("docs/reference.md")?;
-    let mut cited = 0;
-    for (path, text) in citing()? {
-        for rest in text.split("reference.md").skip(1) {
-            let rest = rest.trim_start_matches(['`', ')']);
-            let Some((heading, _)) = rest.strip_prefix(", \"").and_then(|quoted| quoted.split_once('"')) else {
-                continue;
-            };
-            assert!(
-                headings.iter().any(|known| known == heading),
-                "{}: docs/reference.md has no heading \"{heading}\"",
-                path.display()
-            );
-            cited += 1;
-        }
-    }
-    assert!(cited >= 10, "only {cited} citations were found: is their form another one?");
-    Ok(())
+    all_exist("reference.md", 10, |rest| Some(format!("{}\n", rest.strip_prefix(", \"")?.split_once('"')?.0)))
 }
 
 #[test]

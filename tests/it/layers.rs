@@ -91,16 +91,6 @@ fn every_boundary_is_an_event_and_the_force_jumps_there() {
 }
 
 #[test]
-fn crater_takes_its_constant_from_the_layer_just_beyond_it() {
-    // k d = 100 mm: a face of 60 mm lies within the crater, and the layer behind it gives P and Q.
-    let thin = "thickness = 0.06\nstrength = 10e6\ndensity = 1000";
-    let through = layers(300.0, &[thin, BACKING]).problem().unwrap();
-    let alone = layers(300.0, &["thickness = 0.26\nstrength = 40e6\ndensity = 2350"]).problem().unwrap();
-    assert_eq!(through.stages[0], alone.stages[0]);
-    assert_eq!(through.stages.len(), 2);
-}
-
-#[test]
 fn an_air_gap_is_crossed_at_constant_speed() {
     let problem = layers(320.0, &[FACE, GAP, BACKING]).problem().unwrap();
     let exact = ClosedForm.solve(&problem, Detail::Events).unwrap();
@@ -112,15 +102,6 @@ fn an_air_gap_is_crossed_at_constant_speed() {
         assert!(((out.time - into.time) * into.velocity / 0.3 - 1.0).abs() < 1e-14, "{}", method.name());
     }
     assert!(matches!(exact.outcome, Outcome::Stopped | Outcome::Perforated));
-}
-
-#[test]
-fn a_crater_that_ends_in_a_gap_meets_no_force() {
-    let problem =
-        layers(320.0, &["thickness = 0.05\nstrength = 60e6\ndensity = 2450", GAP, BACKING]).problem().unwrap();
-    let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
-    assert_eq!(flight.crater_end().unwrap().velocity, 320.0);
-    assert_eq!(flight.at(EventKind::StageEnd(1)).unwrap().velocity, 320.0);
 }
 
 /// With viscosity and drag nothing is known in elementary functions: the reference is the same series in twice the

@@ -347,26 +347,6 @@ fn unreadable_files_are_refused_by_name() {
 }
 
 #[test]
-fn bytes_that_are_not_utf_8_are_refused_at_their_place() {
-    let error = text_of(b"title = \"\xc3\xa4\"\nx = \"\xff\xfe\"".to_vec(), "scene.toml").unwrap_err();
-    assert_eq!(error.location(), "scene.toml:2:6");
-    assert_eq!(error.message, "the byte 0xff is not UTF-8");
-}
-
-#[test]
-fn no_file_steers_the_terminal_that_shows_it() {
-    let hostile = "[projectile]\n\"ma\\u001b[31mss\\u202e\" = 1 # \u{1b}]0;owned\u{7}\u{9b}\u{202e}";
-    let hostiles = [hostile.to_owned(), hostile.replace('#', "\n#"), format!("x = {hostile}"), "a\rb".to_owned()];
-    for text in hostiles {
-        let error = Scene::from_toml(&text, "evil\u{1b}[2J.toml").unwrap_err();
-        for shown in [error.render(false), error.to_string()] {
-            let steers = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
-            assert!(!shown.chars().any(steers), "{shown:?}");
-        }
-    }
-}
-
-#[test]
 fn a_carriage_return_stays_only_as_part_of_a_line_end() {
     assert_eq!(printable("a\rb\r\nc\n\rd\r"), "a?b\r\nc\n?d?");
 }

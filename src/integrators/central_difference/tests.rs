@@ -294,11 +294,15 @@ fn crater_end_exit_and_rest_at_one_node_come_in_this_order_and_perforate() {
         assert_eq!(flight.outcome, Outcome::Perforated);
         assert_eq!(flight.end, State { time: 0.25, depth: 1.0, velocity: 0.0 });
         assert_eq!((flight.stage, flight.exit_margin), (0, Some(0.0)));
-        // A little more target, and it stops on the crater's end, which still is the crater.
-        let flight = scheme.solve(&binary(list.clone(), 1.0 + f64::EPSILON), Detail::Events).unwrap();
-        assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest]);
-        assert_eq!((flight.outcome, flight.stage), (Outcome::StoppedInCrater, 0));
-        assert!(flight.exit_margin.unwrap() < 0.0);
+        // A little more target, and it stops on the crater's end, which still is the crater; the tunnel is not asked.
+        let beyond = [(64.0, 1.0 + f64::EPSILON), (1.0, INF), (64.0, INF), (1e6, INF)];
+        for (tunnel, exit_depth) in beyond.into_iter().take(if boundaries == Boundaries::Landed { 4 } else { 1 }) {
+            let list = smallvec![list[0], Stage::tunnel(tunnel, 0.0)];
+            let flight = scheme.solve(&binary(list, exit_depth), Detail::Events).unwrap();
+            assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest]);
+            assert_eq!((flight.outcome, flight.stage), (Outcome::StoppedInCrater, 0));
+            assert!(flight.exit_margin.is_none_or(|margin| margin < 0.0));
+        }
         // A little less, and it leaves.
         let flight = scheme.solve(&binary(list.clone(), 1.0 - f64::EPSILON), Detail::Events).unwrap();
         assert_eq!(kinds(&flight.events)[0], EventKind::Exit, "the crater's end lies behind the target");
@@ -354,18 +358,6 @@ fn rest_never_lies_above_a_place_already_reached() {
     let flight = flight.unwrap();
     assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest]);
     assert_eq!(flight.end.depth, 0.1);
-}
-
-#[test]
-fn landing_at_rest_on_a_jump_asks_only_the_near_side() {
-    for tunnel in [1.0, 64.0, 1e6] {
-        let problem = binary(smallvec![stage(64.0, 0.0, 0.0, 0.0, 1.0), Stage::tunnel(tunnel, 0.0)], INF);
-        for velocity in VelocityAt::ALL {
-            let flight = scheme(1.0 / 64.0, velocity, Boundaries::Landed).solve(&problem, Detail::Events).unwrap();
-            assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest]);
-            assert_eq!(flight.outcome, Outcome::StoppedInCrater);
-        }
-    }
 }
 
 #[test]

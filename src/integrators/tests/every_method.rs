@@ -216,7 +216,7 @@ fn a_looser_tolerance_is_kept_at_less_work() {
     }
 }
 
-/// Powers of two as units of length and time: no number rounds differently, and no step is taken more.
+/// Powers of two as units of length, mass and time: no number rounds differently, and no step is taken more.
 #[test]
 fn units_are_free_to_the_bit() {
     let mut random = Random::new(8);
@@ -224,9 +224,9 @@ fn units_are_free_to_the_bit() {
         let problem = random_stages(&mut random, true);
         for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_library(*name)) {
             let Some(Ok(flight)) = answer(&method, &problem, Detail::Events) else { continue };
-            for (length, time) in [(67, 67), (-67, -67), (3, -37), (-2, 38)] {
-                let (length, time) = (2_f64.powi(length), 2_f64.powi(time));
-                let scaled = in_units(&problem, Units { length, mass: 4.0, time });
+            for (length, mass, time) in [(67, 60, 67), (-67, -60, -67), (3, 2, -37), (-2, 7, 38)] {
+                let [length, mass, time] = [length, mass, time].map(|power| 2_f64.powi(power));
+                let scaled = in_units(&problem, Units { length, mass, time });
                 let other = method.integrator().solve(&scaled, Detail::Events).unwrap();
                 let State { time: t, depth, velocity } = flight.end;
                 let end = State { time: t * time, depth: depth * length, velocity: velocity / time * length };
