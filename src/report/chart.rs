@@ -494,7 +494,9 @@ impl Panel {
                 @for line in lines {
                     @if let Some(ends) = line.ends(&frame) {
                         @let (x, y) = frame.inside(ends[0]);
-                        (text((x + 5.0, y - 5.0), &line.name, Ink::Muted, Anchor::Start))
+                        // At the top of the diagram below its line: above it stands the name of the axis.
+                        @let above = if ends[0].1 > 0.9 { -12.0 } else { 5.0 };
+                        (text((x + 5.0, y - above), &line.name, Ink::Muted, Anchor::Start))
                     }
                 }
                 @for (at, label, anchor) in &self.labels {
