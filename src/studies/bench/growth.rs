@@ -63,13 +63,13 @@ pub fn counts(most: u64) -> Vec<u64> {
 /// # Errors
 /// Where the table of scenes cannot be written, or the program cannot be run or fails.
 pub fn measure(program: &Path, counts: &[u64], threads: &[u16], seed: u64, done: &dyn Fn()) -> io::Result<Vec<Growth>> {
-    let folder = tempfile::tempdir().map_err(|cause| during("a temporary folder", cause))?;
+    let folder = tempfile::tempdir().map_err(during("a temporary folder"))?;
     let mut growths = Vec::new();
     for &scenes in counts {
         let table = folder.path().join("scenes.csv");
         let source = if scenes <= FILE_MAX { Source::File } else { Source::Generator };
         if source == Source::File {
-            write_scenes(&table, scenes, seed).map_err(|cause| during("the table of scenes", cause))?;
+            write_scenes(&table, scenes, seed).map_err(during("the table of scenes"))?;
         }
         for &threads in threads {
             growths.push(repeated(program, &table, (scenes, threads), source, seed)?);
@@ -79,9 +79,9 @@ pub fn measure(program: &Path, counts: &[u64], threads: &[u16], seed: u64, done:
     Ok(growths)
 }
 
-/// What was being done when `cause` came.
-fn during(what: &str, cause: io::Error) -> io::Error {
-    io::Error::new(cause.kind(), format!("{what}: {cause}"))
+/// Adds to an error what was being done when it came.
+fn during(what: &'static str) -> impl Fn(io::Error) -> io::Error + Copy {
+    move |cause| io::Error::new(cause.kind(), format!("{what}: {cause}"))
 }
 
 /// The shortest of some runs: what disturbs a process only ever makes it longer.
@@ -112,7 +112,7 @@ fn repeated(
 
 /// Runs `command` to its end: time (s) and peak memory (bytes).
 fn run(command: &mut Command, scenes: u64) -> io::Result<(f64, Option<u64>)> {
-    let failed = |cause| during("penetrode batch", cause);
+    let failed = during("penetrode batch");
     let mut complaints = tempfile::tempfile().map_err(failed)?;
     let started = Instant::now();
     let mut child = command
