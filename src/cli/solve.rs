@@ -54,7 +54,7 @@ pub struct SolveJson {
     end: State,
     /// Least W = V² over V0² at the stage ends and the exit, below zero for a stop: the exit energy unless a stage drives.
     exit_margin: Option<f64>,
-    /// Half-width of its error bar.
+    /// Half-width of its error bound.
     exit_margin_error: Option<f64>,
     events: Vec<EventJson>,
     cost: CostJson,

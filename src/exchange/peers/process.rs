@@ -45,13 +45,15 @@ impl Default for PeerLimits {
 }
 
 /// Who a peer says it is; control characters are replaced and lengths bounded.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub struct PeerIdentity {
     /// Name of the program.
     pub name: String,
     /// Its version; empty when it gives none.
+    #[serde(default)]
     pub version: String,
     /// Its method; empty when it gives none.
+    #[serde(default)]
     pub method: String,
 }
 
@@ -356,22 +358,15 @@ fn store_tail(mut complaints: ChildStderr, tail: &Mutex<Vec<u8>>, limit: usize, 
 
 /// Reads the greeting.
 fn greeting(line: &[u8]) -> Result<PeerIdentity, PeerFault> {
-    #[derive(Deserialize)]
-    struct Greeting {
-        name: String,
-        #[serde(default)]
-        version: String,
-        #[serde(default)]
-        method: String,
-    }
-    let Greeting { name, version, method } =
+    let mut identity: PeerIdentity =
         serde_json::from_slice(line).map_err(|error| PeerFault::nonsense(&format!("no greeting ({error})"), line))?;
-    if name.trim().is_empty() {
+    if identity.name.trim().is_empty() {
         return Err(PeerFault::nonsense("a greeting without a name", line));
     }
-    let [name, version, method] =
-        [name, version, method].map(|text| escaped(&text.chars().take(NAME_CHARS).collect::<String>()));
-    Ok(PeerIdentity { name, version, method })
+    for text in [&mut identity.name, &mut identity.version, &mut identity.method] {
+        *text = escaped(&text.chars().take(NAME_CHARS).collect::<String>());
+    }
+    Ok(identity)
 }
 
 /// Reads the answer to question number `id`.

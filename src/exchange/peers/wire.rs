@@ -1,6 +1,5 @@
 //! The objects of the peer protocol, and how far two answers to one question differ.
 
-use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::integrators::{Cost, Flight};
@@ -35,12 +34,9 @@ pub struct EventJson {
     /// Index from 0 of the stage that ended; with `stage-end` only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<usize>,
-    /// Time since impact (s).
-    pub time_s: f64,
-    /// Depth from the impact face (m).
-    pub depth_m: f64,
-    /// Velocity (m/s).
-    pub velocity_m_s: f64,
+    /// When, where and how fast.
+    #[serde(flatten)]
+    pub state: State,
 }
 
 impl EventJson {
@@ -64,8 +60,7 @@ impl From<&Event> for EventJson {
             EventKind::Exit => (EventName::Exit, None),
             EventKind::Rest => (EventName::Rest, None),
         };
-        let State { time, depth, velocity } = event.state;
-        Self { event: name, stage, time_s: time, depth_m: depth, velocity_m_s: velocity }
+        Self { event: name, stage, state: event.state }
     }
 }
 
@@ -172,10 +167,7 @@ pub struct Difference {
 impl PeerAnswer {
     /// The answer as a flight through `problem`, with the events that the peer lists.
     pub fn flight(&self, problem: &Problem) -> Flight {
-        let event = |event: &EventJson| {
-            let state = State { time: event.time_s, depth: event.depth_m, velocity: event.velocity_m_s };
-            Some(Event { kind: event.kind(problem)?, state })
-        };
+        let event = |event: &EventJson| Some(Event { kind: event.kind(problem)?, state: event.state });
         Flight {
             outcome: self.outcome,
             stage: 0,
@@ -246,13 +238,7 @@ fn not_named() -> Outcome {
 }
 
 fn by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Outcome, D::Error> {
-    use Outcome::{Perforated, Stopped, StoppedInCrater, StoppedInTunnel, Undecided};
-    let Some(name) = Option::<String>::deserialize(deserializer)? else { return Ok(not_named()) };
-    let outcomes = [StoppedInCrater, StoppedInTunnel, Stopped, Perforated, Undecided];
-    outcomes
-        .into_iter()
-        .find(|outcome| outcome.name() == name)
-        .ok_or_else(|| D::Error::custom(format!("no outcome is called {name:?}")))
+    Ok(Option::deserialize(deserializer)?.unwrap_or_else(not_named))
 }
 
 fn none_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<EventJson>, D::Error> {

@@ -158,7 +158,7 @@ fn not_a_number_is_no_answer() {
     assert!(nonsense_of_answer(&ANSWER.replace("0.5", "null")).contains("null, expected f64"));
     assert!(nonsense_of_answer(r#"{"id": 1}"#).starts_with("missing field `depth_m`"));
     let why = nonsense_of_answer(&ANSWER.replace("stopped", "vaporised"));
-    assert!(why.starts_with("no outcome is called \"vaporised\""), "{why}");
+    assert!(why.starts_with("unknown variant `vaporised`, expected one of `stopped-in-crater`, "), "{why}");
 }
 
 #[test]
