@@ -1,5 +1,7 @@
 //! What crosses the border of the program: scene files, tables, and other people's solvers.
 
+#[cfg(feature = "report")]
+pub(crate) mod decode;
 pub mod diagnostic;
 pub mod input;
 pub mod peers;

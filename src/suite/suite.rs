@@ -10,7 +10,8 @@ use serde::Deserialize;
 use super::checks::{Context, Memo, PeerAnswers, Subject};
 use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
 use crate::exchange::SceneError;
-use crate::exchange::diagnostic::{Dialect, Fault, decode, did_you_mean, nearest, read_text};
+use crate::exchange::decode::decode;
+use crate::exchange::diagnostic::{Dialect, Fault, did_you_mean, nearest, read_text};
 use crate::exchange::scene_file::SHIPPED;
 use crate::physics::{Problem, Scene, Shown};
 
