@@ -82,7 +82,14 @@ fn bar_of_the_margin_fades_with_drag_as_the_error_does() {
 }
 
 #[test]
-fn a_tolerance_outside_its_range_is_refused() {
+fn a_tolerance_is_kept_at_an_exit_and_refused_outside_its_range() {
+    let problem = slab(900.0, 0.4);
+    let exact = Energy::new().solve(&problem, Detail::End).unwrap().end;
+    for rtol in [1e-12, 1e-9, 1e-6, 1e-3] {
+        let end = Energy::with_rtol(rtol).unwrap().solve(&problem, Detail::End).unwrap().end;
+        let off = [end.velocity / exact.velocity - 1.0, end.time / exact.time - 1.0];
+        assert!(off.iter().all(|off| off.abs() < 10.0 * rtol), "rtol {rtol:e}: {off:?}");
+    }
     for bad in [0.0, -1e-6, 0.5, f64::NAN] {
         assert!(Energy::with_rtol(bad).unwrap_err().is_usage(), "rtol {bad}");
     }
