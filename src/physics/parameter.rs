@@ -528,6 +528,19 @@ mod tests {
     }
 
     #[test]
+    fn a_stage_or_a_layer_beyond_the_last_is_absent() {
+        for (name, path) in [("layered", "target.layer"), ("overdamped", "stage")] {
+            let scene = shipped(name);
+            let known = Parameter::all_of(&scene);
+            let count =
+                (0..).take_while(|i| known.iter().any(|p| p.to_string().starts_with(&format!("{path}.{i}.")))).count();
+            let number = if path == "stage" { "drag" } else { "strength" };
+            let beyond: Parameter = format!("{path}.{count}.{number}").parse().unwrap();
+            assert!(count > 0 && matches!(beyond.get(&scene), Err(ParameterError::Absent { .. })), "{beyond}");
+        }
+    }
+
+    #[test]
     fn columns_of_a_table_are_the_paths_of_a_plain_target_with_their_units() {
         let columns: Vec<_> = Parameter::PLAIN[..11].iter().map(|parameter| parameter.column()).collect();
         assert_eq!(columns.join(",") + ",criterion", crate::studies::batch::SCENES.header());

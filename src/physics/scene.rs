@@ -684,6 +684,13 @@ mod tests {
     }
 
     #[test]
+    fn a_crater_before_drag_alone_has_no_force_at_speed_zero() {
+        let drag_alone = scene_of(Concrete { static_factor: 0.0, ..concrete() });
+        assert_eq!(drag_alone.resolve(0.0).unwrap().stages[0].stiffness, 0.0);
+        assert!(drag_alone.resolve(1.0).unwrap().stages[0].stiffness > 0.0);
+    }
+
+    #[test]
     fn layers_become_stages_from_the_one_that_holds_the_crater_end() {
         let open = f64::INFINITY;
         for (thicknesses, ends, exit_depth, strength) in [
