@@ -74,7 +74,7 @@ fn says_what_was_recorded(peer: BundledPeer, environment: &Environment) -> Check
     let mut live = Peer::start(&environment.command(peer))?;
     let identity = live.identity();
     ensure!(
-        !((&identity.name, &identity.version) != (&recording.program, &recording.version)),
+        (&identity.name, &identity.version) == (&recording.program, &recording.version),
         "{identity} is not the program of the recording, {}",
         recording.version
     );
@@ -208,7 +208,7 @@ fn survives_hostile_lines(peer: BundledPeer, environment: &Environment) -> Check
     let answers = output.stdout.split(|byte| *byte == b'\n').filter(|line| !line.is_empty());
     let answers = answers.map(serde_json::from_slice).collect::<Result<Vec<Value>, _>>()?;
     ensure!(
-        !(answers.len() != asked.len() || !output.status.success()),
+        answers.len() == asked.len() && output.status.success(),
         "{} answers to {} lines, {}",
         answers.len(),
         asked.len(),

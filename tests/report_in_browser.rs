@@ -306,7 +306,7 @@ fn fits(stage: &Stage) -> Check {
             ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
             for key in ["folded", "unfolded"] {
                 ensure!(
-                    !(found[key].as_u64().is_none_or(|extent| extent > u64::from(width))),
+                    found[key].as_u64().is_some_and(|extent| extent <= u64::from(width)),
                     "{folder}, {width} px: {key} the page is {} px wide",
                     found[key]
                 );
@@ -316,7 +316,7 @@ fn fits(stage: &Stage) -> Check {
             }
             let enough = found["figures"].as_u64() >= Some(figures.split(' ').count() as u64);
             ensure!(
-                !(!enough || found["svgs"].as_u64() < found["figures"].as_u64()),
+                enough && found["svgs"].as_u64() >= found["figures"].as_u64(),
                 "{folder}: {} figures of {} drawings",
                 found["figures"],
                 found["svgs"]

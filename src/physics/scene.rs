@@ -685,9 +685,11 @@ mod tests {
 
     #[test]
     fn a_crater_before_drag_alone_has_no_force_at_speed_zero() {
-        let drag_alone = scene_of(Concrete { static_factor: 0.0, ..concrete() });
-        assert_eq!(drag_alone.resolve(0.0).unwrap().stages[0].stiffness, 0.0);
-        assert!(drag_alone.resolve(1.0).unwrap().stages[0].stiffness > 0.0);
+        let mut scene = layered(&[0.04, 0.1, f64::INFINITY]);
+        let Resistance::Concrete(concrete) = &mut scene.resistance else { unreachable!() };
+        concrete.layers[1].strength = 0.0;
+        assert_eq!(scene.resolve(0.0).unwrap().stages[0].stiffness, 0.0);
+        assert!(scene.resolve(1.0).unwrap().stages[0].stiffness > 0.0);
     }
 
     #[test]

@@ -304,6 +304,7 @@ fn decimal(text: &str) -> Option<(i128, i64)> {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
 

@@ -1,6 +1,6 @@
 //! `bench` as a person or a script meets it: errors, failed runs, schema, report folder. No time decides a test.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use std::fs;
 

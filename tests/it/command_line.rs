@@ -218,7 +218,7 @@ fn a_suite_of_ones_own_runs_on_ones_own_scene() {
 #[test]
 fn bad_convergence_data_never_passes() {
     let exit = |rows: &[(f64, f64)]| {
-        let rows: String = rows.iter().map(|(dt, x)| format!("{dt},{x}\n")).collect();
+        let rows = rows.iter().map(|(dt, x)| format!("{dt},{x}")).collect::<Vec<_>>().join("\n");
         run_with(&format!("dt_s,depth_m\n{rows}"), "audit -").code
     };
     let of = |f: &dyn Fn(f64) -> f64| exit(&[1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125].map(|h| (h, f(h))));

@@ -172,7 +172,7 @@ fn time_is_regular_when_the_speed_almost_vanishes_at_a_boundary() {
 }
 
 /// The end with its derivative by the impact speed.
-fn derived(problem: Problem) -> State<Dual64> {
+fn derived(problem: &Problem) -> State<Dual64> {
     let mut dual = problem.cast::<Dual64>();
     dual.impact_speed = dual.impact_speed.derivative();
     Energy::new().solve_in(&dual, Detail::End).unwrap().end
@@ -183,7 +183,7 @@ fn derived(problem: Problem) -> State<Dual64> {
 fn dual_numbers_carry_sensitivities_through_rest() {
     let (mass, p, q, kd, c) = (2.0, 848_230.0, 3.25, 0.1, 9e6);
     let problem = |v0| concrete(mass, v0, f64::INFINITY, kd, p, q, Some(c));
-    let end = derived(problem(300.0));
+    let end = derived(&problem(300.0));
     // V1² = V0² - c (k d)²/M; dX/dV1² = M/(2 (P + Q V1²)).
     let v1_squared = 300.0_f64.powi(2) - c * kd * kd / mass;
     let exact = 300.0 * mass / (p + q * v1_squared);
@@ -432,13 +432,13 @@ fn a_rest_that_rounds_onto_a_boundary_has_its_time_beyond_it() {
 #[test]
 fn the_depth_of_rest_moves_with_the_impact_speed() {
     for (p, s, q) in [(2.0, 30.0, 0.7), (0.0, 30.0, 0.0), (-3.0, 30.0, 0.4), (5.0, 0.0, 0.6)] {
-        let depth = derived(of_stages(1.0, 5.0, f64::INFINITY, &[stage(p, s, q, f64::INFINITY)])).depth;
+        let depth = derived(&of_stages(1.0, 5.0, f64::INFINITY, &[stage(p, s, q, f64::INFINITY)])).depth;
         let exact = 5.0 * (-2.0 * q * depth.re).exp() / (p + s * depth.re);
         assert!((depth.eps / exact - 1.0).abs() < 1e-13, "{p}, {s}, {q}: {:e} {exact:e}", depth.eps);
     }
     // As above, nearer to the boundary than the spacing of the depths.
     let first = stage(0.5 * (1.0 - 2.0_f64.powi(-53)), 0.0, 0.0, 1.0);
-    let depth = derived(of_stages(1.0, 1.0, f64::INFINITY, &[first, stage(500.0, 0.0, 0.0, f64::INFINITY)])).depth;
+    let depth = derived(&of_stages(1.0, 1.0, f64::INFINITY, &[first, stage(500.0, 0.0, 0.0, f64::INFINITY)])).depth;
     assert!(depth.re == 1.0 && (depth.eps * 500.0 - 1.0).abs() < 1e-13, "{depth:?}");
 }
 
