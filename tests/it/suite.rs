@@ -37,7 +37,7 @@ fn every_claim_of_the_shipped_suite_holds_and_no_limit_is_loose() {
     assert_eq!(loose, []);
 }
 
-/// Ten minutes of one processor: `cargo test --release --test suite -- --ignored --nocapture`.
+/// Ten minutes of one processor: `cargo test --release --test it suite -- --ignored --nocapture`.
 #[test]
 #[ignore = "200 runs of the suite"]
 fn no_seed_raises_a_false_alarm() {
