@@ -201,8 +201,8 @@ pub trait Run {
         false
     }
 
-    /// Schema of that JSON, where the command has one.
-    fn schema() -> Option<Schema>
+    /// What makes the schema of that JSON, where the command has one.
+    fn schema() -> Option<fn() -> Schema>
     where
         Self: Sized,
     {
@@ -270,8 +270,8 @@ impl<A: Ask> Run for Printing<A> {
         self.json
     }
 
-    fn schema() -> Option<Schema> {
-        Some(schema_for!(A::Answer))
+    fn schema() -> Option<fn() -> Schema> {
+        Some(|| schema_for!(A::Answer))
     }
 }
 
@@ -292,11 +292,9 @@ macro_rules! commands {
                 }
             }
 
-            /// Name and schema of each command that prints JSON.
-            fn schemas() -> impl Iterator<Item = (&'static str, Schema)> {
-                [$(($name, <$arguments>::schema as fn() -> Option<Schema>),)+]
-                    .into_iter()
-                    .filter_map(|(name, schema)| Some((name, schema()?)))
+            /// Name of each command that prints JSON, and what makes its schema: only one is ever wanted.
+            fn schemas() -> impl Iterator<Item = (&'static str, fn() -> Schema)> {
+                [$(($name, <$arguments>::schema()),)+].into_iter().filter_map(|(name, schema)| Some((name, schema?)))
             }
         }
     };

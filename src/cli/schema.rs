@@ -18,7 +18,7 @@ pub struct SchemaArgs {
 impl Run for SchemaArgs {
     fn run(&self) -> Result<Exit, CliError> {
         for (_, schema) in Command::schemas().filter(|(name, _)| *name == self.command) {
-            output::print_json(&schema).map_err(CliError::stdout)?;
+            output::print_json(&schema()).map_err(CliError::stdout)?;
         }
         Ok(Exit::Success)
     }

@@ -15,6 +15,7 @@ pub mod lines;
 pub mod parquet;
 
 use std::borrow::Cow;
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
@@ -427,7 +428,8 @@ pub fn push_line(line: &mut String, values: &[Value<'_>]) {
             line.push(',');
         }
         match value {
-            Value::Count(count) => line.push_str(&count.to_string()),
+            // Writing to a string cannot fail.
+            Value::Count(count) => drop(write!(line, "{count}")),
             Value::Number(Some(number)) => push_number(line, *number),
             Value::Number(None) => {}
             Value::Text(text) => push_text(line, text),

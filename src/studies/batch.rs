@@ -174,6 +174,9 @@ impl Scenes {
     /// The rows of results of `answers`, which begin with scene `from`; their numbers in the table begin with `first`.
     pub fn results(&self, from: usize, first: u64, answers: &[Result<Answer, RowError>], is_parquet: bool) -> Block {
         let mut block = Block::empty(&RESULT_COLUMNS, is_parquet);
+        if let Block::Lines(lines) = &mut block {
+            lines.reserve(160 * answers.len());
+        }
         for ((index, row), answer) in (from..).zip(first..).zip(answers) {
             let message = self.message(index, answer);
             let (outcome, numbers) = match answer {
@@ -230,15 +233,9 @@ pub fn answers(
     with_critical: bool,
 ) -> Vec<Result<Answer, RowError>> {
     let mut problems = Vec::with_capacity(scenes.len());
-    // A scene without a problem keeps its error.
-    let scenes: Vec<Result<Scene, RowError>> = scenes
-        .into_iter()
-        .map(|scene| {
-            let scene = scene?;
-            problems.push(scene.problem()?);
-            Ok(scene)
-        })
-        .collect();
+    // Why a scene has no problem; scenes are large and stay where they are.
+    let causes: Vec<Option<ResolveError>> =
+        scenes.iter().map(|scene| scene.as_ref().ok()?.problem().map(|problem| problems.push(problem)).err()).collect();
     let answer = |solution, stable| Answer { solution, critical: None, stable };
     let solved: Vec<Result<Answer, IntegrationError>> = if method.is_plain(MethodName::Taylor) {
         Batch::new().solve(&problems).into_iter().map(|solution| Ok(answer(solution?, true))).collect()
@@ -252,8 +249,9 @@ pub fn answers(
         problems.iter().map(solve).collect()
     };
     let mut solved = solved.into_iter();
-    let answers = scenes.into_iter().map(|scene| {
+    let answers = scenes.into_iter().zip(causes).map(|(scene, cause)| {
         let scene = scene?;
+        cause.map_or(Ok(()), Err)?;
         let Some(answer) = solved.next() else { unreachable!("one solution a problem, and one problem a scene") };
         let mut answer = answer?;
         if with_critical && scene.thickness.is_some() {
