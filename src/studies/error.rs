@@ -154,15 +154,27 @@ pub fn compare(a: f64, b: f64) -> Ordering {
     a.is_nan().cmp(&b.is_nan()).then(a.total_cmp(&b))
 }
 
+/// Units of round-off of W/V0², over max(1, condition number), up to which rounding may decide whether an event is there.
+const TIE: f64 = 64.0;
+
 /// Absolute errors of the quantities of one flight.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Errors(pub Vec<(f64, Quantity)>);
 
 impl Errors {
     /// Of `flight` against `exact`, in units of round-off: the difference in double-double.
+    ///
+    /// The crater's end that only one of them lists counts with W/V0² there, whose sign decides the event.
     pub fn in_double_double(flight: &Flight, exact: &Flight<TwoFloat>, impact_speed: f64) -> Self {
         let error = |quantity: Quantity| {
-            let (value, exact) = value_of(quantity, flight).zip(value_of(quantity, exact))?;
+            let (value, exact) = match (value_of(quantity, flight), value_of(quantity, exact)) {
+                (Some(value), Some(exact)) => (value, exact),
+                (value, exact) if quantity == Quantity::CraterEndVelocity => {
+                    let velocity = value.or(exact.map(|exact| exact.value()))?;
+                    return Some(((velocity / impact_speed).powi(2) / f64::EPSILON, quantity));
+                }
+                _ => return None,
+            };
             let scale = if quantity.is_over_impact_speed() { impact_speed } else { exact.value() };
             let error = (TwoFloat::from(value) - exact).value().abs();
             let units = if error == 0.0 { 0.0 } else { error / scale.abs() / f64::EPSILON };
@@ -172,23 +184,27 @@ impl Errors {
     }
 
     /// Of `flight` against 50 digits with the same outcome, in units of round-off over max(1, condition number).
+    ///
+    /// The crater's end that only one of them lists counts with W/V0² there, whose sign decides the event. Beyond
+    /// [`TIE`] that is no rounding: the error is NaN.
     pub fn in_50_digits(flight: &Flight, exact: &ExactFlight, conditions: &Conditions) -> Self {
         let mut errors = Vec::with_capacity(5);
         for quantity in Quantity::OF_A_FLIGHT {
             let end = if quantity.is_at_crater_end() { exact.crater_end() } else { Some(&exact.end) };
+            let condition = condition_of(conditions, quantity).unwrap_or(1.0).max(1.0);
             let error = match (value_of(quantity, flight), end, quantity) {
                 (Some(value), Some(end), Quantity::Depth) => end.depth.relative_error(value),
                 (Some(value), Some(end), Quantity::Time | Quantity::CraterEndTime) => end.time.relative_error(value),
                 (Some(value), Some(end), _) => end.velocity.error_over(value, &exact.impact_speed),
-                // One lacks an event that the other has. The sign of W there decides that: W itself is the error.
-                (Some(v), None, Quantity::CraterEndVelocity) => (v / exact.impact_speed.to_f64()).powi(2),
-                (None, Some(end), Quantity::CraterEndVelocity) => {
-                    end.velocity.error_over(0.0, &exact.impact_speed).powi(2)
+                (value, end, Quantity::CraterEndVelocity) if value.is_some() || end.is_some() => {
+                    let velocity = value.map(|v| v / exact.impact_speed.to_f64());
+                    let velocity = velocity.or(end.map(|end| end.velocity.error_over(0.0, &exact.impact_speed)));
+                    let w = velocity.map_or(f64::NAN, |velocity| velocity * velocity);
+                    if w / f64::EPSILON / condition <= TIE { w } else { f64::NAN }
                 }
                 _ => continue,
             };
-            let condition = condition_of(conditions, quantity).unwrap_or(1.0);
-            errors.push((error.abs() / f64::EPSILON / condition.max(1.0), quantity));
+            errors.push((error.abs() / f64::EPSILON / condition, quantity));
         }
         Self(errors)
     }

@@ -550,9 +550,7 @@ mod tests {
         assert_eq!(known.judge(&undecided, true), Judgement::Undecided);
         let mut silent = right.clone();
         silent.events.clear();
-        // An event that only the exact solution has counts with W there.
-        let with_crater_end = known.judge(&silent, true);
-        assert!(matches!(with_crater_end, Judgement::Right(w, Quantity::CraterEndVelocity) if w > 1e-3));
+        assert!(matches!(known.judge(&silent, true), Judgement::Failed(_)));
         assert!(matches!(known.judge(&silent, false), Judgement::Right(..)), "a peer need not list events");
         let mut lost = right;
         lost.end.time = f64::NAN;
