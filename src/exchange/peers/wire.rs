@@ -182,7 +182,8 @@ impl PeerAnswer {
         }
     }
 
-    /// Differences from `reference`, another solution of `problem`: the end, and each event that both list.
+    /// Differences from `reference`, another solution of `problem`: of the end, and of each event listed here. An event
+    /// that the reference lacks is compared with its end.
     ///
     /// `None` if the outcomes contradict each other: then no number can be compared.
     pub fn differences_from(&self, reference: &Flight, problem: &Problem) -> Option<Vec<Difference>> {
@@ -191,14 +192,14 @@ impl PeerAnswer {
         }
         let ours = self.flight(problem);
         let mut differences = compare("", ours.end, reference.end, problem);
-        for Event { kind, .. } in &reference.events {
-            if let (Some(ours), Some(theirs)) = (ours.at(*kind), reference.at(*kind)) {
-                let prefix = match kind {
-                    EventKind::StageEnd(index) => format!("stage-end {index} "),
-                    _ => format!("{} ", kind.name()),
-                };
-                differences.extend(compare(&prefix, ours, theirs, problem));
-            }
+        for Event { kind, state } in &ours.events {
+            let prefix = match kind {
+                EventKind::StageEnd(index) => format!("stage-end {index} "),
+                _ => format!("{} ", kind.name()),
+            };
+            // An event that the reference lacks is none, unless it is where the reference ends.
+            let theirs = reference.at(*kind).unwrap_or(reference.end);
+            differences.extend(compare(&prefix, *state, theirs, problem));
         }
         Some(differences)
     }
@@ -295,6 +296,17 @@ mod tests {
         // 150 m/s of 300 are left there: the time of the passage magnifies an error of the energy twice.
         assert_eq!(time.conditioning, 2.0);
         assert!(differences.iter().filter(|d| d.quantity != "crater-end time").all(|d| d.relative == 0.0));
+    }
+
+    #[test]
+    fn an_event_that_the_reference_lacks_differs_by_its_distance_from_the_end() {
+        let invented = r#"[{"event": "crater-end", "time_s": 4.0e-4, "depth_m": 0.1, "velocity_m_s": 150}]"#;
+        let theirs = answer(Outcome::Stopped, 0.0, invented);
+        let ours = answer(Outcome::StoppedInTunnel, 0.0, "null").flight(&problem());
+        let differences = theirs.differences_from(&ours, &problem()).unwrap();
+        let of = |name: &str| differences.iter().find(|d| d.quantity == name).unwrap().relative;
+        assert_eq!(of("crater-end depth"), ((0.1 - ours.end.depth) / ours.end.depth).abs());
+        assert!(of("crater-end depth") > 0.1 && of("crater-end velocity") == 0.5);
     }
 
     #[test]
