@@ -170,7 +170,7 @@ impl Errors {
             let (value, exact) = match (value_of(quantity, flight), value_of(quantity, exact)) {
                 (Some(value), Some(exact)) => (value, exact),
                 (value, exact) if quantity == Quantity::CraterEndVelocity => {
-                    let velocity = value.or(exact.map(|exact| exact.value()))?;
+                    let velocity = value.or(exact.map(Scalar::value))?;
                     return Some(((velocity / impact_speed).powi(2) / f64::EPSILON, quantity));
                 }
                 _ => return None,
@@ -276,4 +276,36 @@ pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, Integ
     let [depth, time, velocity, at_crater_end @ ..] = sums;
     let [crater_end_time, crater_end_velocity] = at_crater_end.map(Some);
     Ok(Conditions { depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin: None })
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use super::*;
+    use crate::physics::reference::{self, Source};
+    use crate::physics::{Event, EventKind};
+    use crate::testing::scene;
+
+    #[test]
+    fn a_crater_end_that_is_not_listed_is_no_rounding_and_at_rest_it_may_be() {
+        let problem = scene().problem().unwrap();
+        let exact = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap();
+        let mut flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+        assert!(!Errors::in_double_double(&flight, &exact, problem.impact_speed).exceed(TIE));
+        flight.events.clear();
+        // W is most of V0² there.
+        let (units, quantity) = Errors::in_double_double(&flight, &exact, problem.impact_speed).worst().unwrap();
+        assert!(units * f64::EPSILON > 0.5 && quantity == Quantity::CraterEndVelocity, "{units}");
+        let source = Source::Problem(&problem);
+        let (exact, conditions) = (reference::flight(source).unwrap(), reference::conditions(source).unwrap());
+        assert!(Errors::in_50_digits(&flight, &exact, &conditions).worst().unwrap().0.is_nan());
+        // Rest in the crater, a rounding before its end: whether that is passed nobody can say.
+        let slow = scene().resolve(1.0).unwrap();
+        let source = Source::Problem(&slow);
+        let (exact, conditions) = (reference::flight(source).unwrap(), reference::conditions(source).unwrap());
+        let mut touching = Taylor::default().solve(&slow, Detail::Events).unwrap();
+        let state = State { velocity: 1e-9, ..touching.end };
+        touching.events.insert(0, Event { kind: EventKind::CraterEnd, state });
+        assert!(!Errors::in_50_digits(&touching, &exact, &conditions).exceed(TIE));
+    }
 }
