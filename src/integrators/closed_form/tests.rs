@@ -493,23 +493,6 @@ fn speed_over_depth_with_stiffness_and_drag_is_that_of_the_reference() {
     assert!(worst <= LIMIT, "{worst} ulps of V0");
 }
 
-fn perforating(impact_speed: f64) -> Problem {
-    let (crater, tunnel) = (Stage::crater(8.0e6, 0.1), Stage::tunnel(1e5, 1.0));
-    Problem::crater_and_tunnel(2.0, impact_speed, Some(crater), tunnel).with_exit(0.3)
-}
-
-#[test]
-fn a_trajectory_rises_in_time_and_depth_and_gives_the_force_of_the_stage_ahead() {
-    let problem = perforating(400.0);
-    let samples = ClosedForm.solve(&problem, Detail::Trajectory).unwrap().trajectory;
-    assert_eq!(samples.len(), 2 * INTERVALS as usize + 1);
-    assert!(samples.windows(2).all(|w| w[0].state.time < w[1].state.time && w[0].state.depth < w[1].state.depth));
-    let boundary = samples[INTERVALS as usize];
-    assert_eq!((boundary.state.depth, boundary.stage), (0.1, 1));
-    assert_eq!(boundary.force, 1e5 + boundary.state.velocity.powi(2));
-    assert_eq!(samples.last().unwrap().state.depth, 0.3);
-}
-
 #[test]
 fn a_trajectory_gives_no_depth_twice_and_stays_at_its_end_in_the_stage_it_ended_in() {
     assert_eq!(ClosedForm.name(), "closed-form");
@@ -522,8 +505,9 @@ fn a_trajectory_gives_no_depth_twice_and_stays_at_its_end_in_the_stage_it_ended_
     let next = 0.1_f64.next_up();
     // Exits at a stage end, behind it, one spacing behind it, and where two stages end.
     for (exit_depth, last) in [(0.2, 2), (0.3, 3), (next, 2), (0.1, 0)] {
-        let problem = Problem { stages: stages.into_iter().collect(), exit_depth, ..perforating(400.0) };
-        let samples = ClosedForm.solve(&problem, Detail::Trajectory).unwrap().trajectory;
+        let samples =
+            ClosedForm.solve(&of_stages(2.0, 400.0, exit_depth, &stages), Detail::Trajectory).unwrap().trajectory;
+        assert_eq!(samples.len() == 2 * INTERVALS as usize + 1, exit_depth == 0.2, "{exit_depth}");
         assert!(samples.windows(2).all(|w| w[0].state.depth < w[1].state.depth), "{exit_depth}");
         for sample in &samples {
             let State { depth, velocity, .. } = sample.state;

@@ -1,36 +1,10 @@
-use num_dual::Dual64;
 use twofloat::TwoFloat;
 
 use super::super::energy::Energy;
 use super::*;
 use crate::integrators::Cost;
-use crate::physics::{Advice, EventKind, Outcome};
-use crate::studies::relations::{Units, in_units};
-use crate::testing::{Random, continuous, kinds, of_stages, stage};
-
-/// The scenes of the peer benchmark: strength 36e6 Pa, S 12, k 2, density 2300, nose factor 0.72, d 50 mm, M 2 kg.
-fn peer_scene(impact_speed: f64, exit_depth: f64) -> Problem {
-    let d: f64 = 0.05;
-    let area = std::f64::consts::FRAC_PI_4 * d * d;
-    continuous(2.0, area * 36.0e6 * 12.0, area * 0.72 * 2300.0, 0.1, impact_speed, exit_depth)
-}
-
-/// One to four stages with any of the four terms, driven ones among them.
-fn random_stages(random: &mut Random) -> Problem {
-    let count = 1 + random.below(4);
-    let mut end = 0.0;
-    let term = |random: &mut Random, low, high| if random.chance(0.5) { random.log_uniform(low, high) } else { 0.0 };
-    let stages: Vec<Stage> = (0..count)
-        .map(|index| {
-            end += if random.chance(0.1) { 0.0 } else { random.uniform(0.01, 0.5) };
-            let p = random.log_uniform(1.0, 1e3) * if random.chance(0.2) { -1.0 } else { 1.0 };
-            let (s, r, q) = (term(random, 1.0, 1e4), term(random, 0.1, 300.0), term(random, 0.01, 30.0));
-            stage(p, s, r, q, if index + 1 == count { f64::INFINITY } else { end })
-        })
-        .collect();
-    let (impact_speed, is_endless) = (random.log_uniform(0.1, 100.0), random.chance(0.5));
-    of_stages(1.0, impact_speed, if is_endless { f64::INFINITY } else { random.uniform(0.02, 2.5) }, &stages)
-}
+use crate::physics::{EventKind, Outcome};
+use crate::testing::{continuous, kinds, of_stages};
 
 fn solve(problem: &Problem) -> Flight {
     Taylor::default().solve(problem, Detail::Events).unwrap()
@@ -45,45 +19,8 @@ fn one_stage(stage: Stage, impact_speed: f64, exit_depth: f64) -> Problem {
 }
 
 #[test]
-fn f64_agrees_with_double_double_on_random_stages_of_every_kind() {
-    let mut random = Random::new(2);
-    let mut finished = 0;
-    for _ in 0..400 {
-        let problem = random_stages(&mut random);
-        let flight = Taylor::default().solve(&problem, Detail::Events);
-        let reference = Taylor::default().solve_in::<TwoFloat>(&problem.cast(), Detail::Events);
-        let (flight, reference) = match (flight, reference) {
-            (Ok(flight), Ok(reference)) => (flight, reference.values()),
-            (Err(a), Err(b)) => {
-                assert_eq!(std::mem::discriminant(&a), std::mem::discriminant(&b), "{problem:?}");
-                continue;
-            }
-            (a, b) => panic!("{problem:?}\n{a:?}\n{b:?}"),
-        };
-        finished += 1;
-        assert_eq!(flight.outcome, reference.outcome, "{problem:?}");
-        assert_eq!(kinds(&flight.events), kinds(&reference.events), "{problem:?}");
-        let fastest = reference.events.iter().map(|e| e.state.velocity).fold(problem.impact_speed, f64::max);
-        for (event, exact) in flight.events.iter().zip(&reference.events) {
-            // Inherent: a boundary passed slowly, before or here, scatters the time after it.
-            let condition = reference
-                .events
-                .iter()
-                .filter(|e| e.kind != EventKind::Rest)
-                .map(|e| fastest / e.state.velocity)
-                .fold(1.0, f64::max);
-            assert!(relative(event.state.depth, exact.state.depth) < 5e-15 * condition, "{event:?} {problem:?}");
-            assert!(relative(event.state.time, exact.state.time) < 2e-14 * condition, "{event:?} {problem:?}");
-            let off = (event.state.velocity - exact.state.velocity).abs() / fastest;
-            assert!(off < 2e-14 * condition, "{event:?} {exact:?} {problem:?}");
-        }
-    }
-    assert!(finished > 250, "only {finished} flights ended");
-}
-
-#[test]
 fn a_boundary_on_the_end_of_a_step_is_passed_once() {
-    let scene = peer_scene(900.0, f64::INFINITY);
+    let scene = continuous(2.0, 848_230.0, 3.25, 0.1, 900.0, f64::INFINITY);
     let flight = Taylor::default().solve(&scene, Detail::Trajectory).unwrap();
     // Samples: impact, crater end, steps of the tunnel, rest.
     let inside = flight.trajectory.len() - 2;
@@ -115,59 +52,12 @@ fn no_step_spans_more_than_the_phase_in_which_the_sign_of_v_is_decisive() {
 
 #[test]
 fn only_stages_entered_cost_anything() {
-    let flight = solve(&peer_scene(60.0, f64::INFINITY));
+    let scene = continuous(2.0, 848_230.0, 3.25, 0.1, 60.0, f64::INFINITY);
+    let flight = solve(&scene);
     assert_eq!(flight.outcome, Outcome::StoppedInCrater);
     assert_eq!(flight.cost, Cost { steps: 1, rejected_steps: 0, force_evaluations: 23 });
-    assert!(flight.trajectory.is_empty() && flight.notes.is_empty());
-    let lines = Taylor::default().explain(&peer_scene(60.0, f64::INFINITY), &flight);
+    let lines = Taylor::default().explain(&scene, &flight);
     assert_eq!(lines, ["stage 0: a spring alone: recurrence of one term, no convolution"]);
-    // The end alone is the same end.
-    let end = Taylor::default().solve(&peer_scene(60.0, 1.0), Detail::End).unwrap();
-    assert!(end.events.is_empty());
-    assert_eq!(end.end, flight.end);
-}
-
-#[test]
-fn the_same_code_runs_in_single_precision_and_in_dual_numbers() {
-    let scene = peer_scene(300.0, f64::INFINITY);
-    let single = Taylor::default().solve_in::<f32>(&scene.cast(), Detail::Events).unwrap();
-    assert!(relative(single.end.depth.value(), 0.144_826_200_112_217_08) < 5e-7);
-    assert_eq!(single.outcome, Outcome::StoppedInTunnel);
-
-    // d/dV0 of the tunnel alone: X = (M/2Q) ln(1 + Q V0²/P), dX/dV0 = M V0/(P + Q V0²), dT/dV0 = M/(P + Q V0²).
-    let (mass, tunnel @ Stage { static_force, drag, .. }) = (scene.mass, scene.stages[1]);
-    let mut problem: Problem<Dual64> = Problem::crater_and_tunnel(mass, 300.0, None, tunnel).cast();
-    problem.impact_speed = Dual64::new(300.0, 1.0);
-    let flight = Taylor::default().solve_in(&problem, Detail::Events).unwrap();
-    let force = static_force + drag * 300.0 * 300.0;
-    assert!(relative(flight.end.depth.eps, mass * 300.0 / force) < 1e-14);
-    assert!(relative(flight.end.time.eps, mass / force) < 1e-14);
-
-    // And through an exit: dV_r/dV0 = (V0/V_r) exp(-2 Q H/M).
-    problem.exit_depth = Dual64::from_re(0.05);
-    let flight = Taylor::default().solve_in(&problem, Detail::Events).unwrap();
-    let slope = 300.0 / flight.end.velocity.re * (-2.0 * drag * 0.05 / mass).exp();
-    assert!(relative(flight.end.velocity.eps, slope) < 1e-14, "{} {slope}", flight.end.velocity.eps);
-    assert_eq!(flight.end.depth.eps, 0.0);
-}
-
-#[test]
-fn a_tolerance_outside_its_range_is_refused() {
-    for bad in [-1e-3, 0.2, f64::NAN] {
-        assert!(Taylor::with_rtol(bad).is_err_and(|e| e.is_usage()));
-    }
-}
-
-/// Scaling length by a, time by b and mass by c changes no outcome and scales depth and time.
-#[test]
-fn extreme_units_are_no_error() {
-    let scene = peer_scene(300.0, f64::INFINITY);
-    let base = solve(&scene);
-    for (length, time, mass) in [(1e-12, 1e6, 1e-9), (1e9, 1e-12, 1e12), (1e-30, 1e-30, 1e-30)] {
-        let flight = solve(&in_units(&scene, Units { length, mass, time }));
-        assert!(relative(flight.end.depth, base.end.depth * length) < 2e-15);
-        assert!(relative(flight.end.time, base.end.time * time) < 2e-15);
-    }
 }
 
 /// Mass 2, one stage: a problem for the parts of a course that are asked directly.

@@ -3,11 +3,13 @@
 //! A method that refuses a problem (`energy` a viscous stage, `closed-form` a stage without one) is left out of that
 //! problem. What only one method promises is tested beside it. The fixed-step scheme has other rules at boundaries.
 
+use num_dual::Dual64;
 use twofloat::TwoFloat;
 
 use super::*;
 use crate::physics::closed_form::critical_of_stages;
-use crate::physics::{Advice, EventKind, Outcome, Problem, Stage, State, Target};
+use crate::physics::exit_energy::propagate;
+use crate::physics::{Advice, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
 use crate::studies::relations::{Units, in_units};
 use crate::testing::{Random, continuous, kinds, of_stages, random_concrete, stage, tunnel};
 
@@ -194,13 +196,18 @@ fn rest_near_the_crater_end_is_continuous_and_cheap() {
 }
 
 #[test]
-fn a_looser_tolerance_is_kept_at_less_work() {
+fn a_tolerance_is_kept_at_less_work_the_looser_it_is_and_refused_outside_its_range() {
     let mut random = Random::new(5);
-    let problems: Vec<_> = (0..200).map(|_| random_concrete(&mut random).with_exit(INF)).collect();
+    let mut problems: Vec<_> = (0..200).map(|_| random_concrete(&mut random).with_exit(INF)).collect();
+    problems.push(continuous(2.0, 848_230.0, 3.25, 0.1, 900.0, 0.4));
     for name in [MethodName::Taylor, MethodName::Energy] {
+        let with = |rtol| Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() });
+        for bad in [0.0, -1e-6, 0.2, 0.5, f64::NAN] {
+            assert!(with(Some(bad)).is_err_and(|error| error.is_usage()), "{name}: {bad}");
+        }
         let mut work = Vec::new();
         for rtol in [Some(1e-3), Some(1e-6), Some(1e-9), Some(1e-12), None] {
-            let method = Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() }).unwrap();
+            let method = with(rtol).unwrap();
             let mut evaluations = 0;
             for problem in &problems {
                 let exact = ClosedForm.solve(problem, Detail::End).unwrap().end;
@@ -208,6 +215,8 @@ fn a_looser_tolerance_is_kept_at_less_work() {
                 let off = [flight.end.depth / exact.depth - 1.0, flight.end.time / exact.time - 1.0];
                 let rtol = rtol.unwrap_or(0.0);
                 assert!(off[0].abs() < rtol.max(5e-15) && off[1].abs() < rtol.max(1e-13), "{name}, {rtol:e}: {off:?}");
+                let slower = (flight.end.velocity - exact.velocity).abs() / problem.impact_speed;
+                assert!(slower < rtol.max(1e-14), "{name}, {rtol:e}: {slower:e}");
                 evaluations += flight.cost.force_evaluations;
             }
             work.push(evaluations);
@@ -224,7 +233,9 @@ fn units_are_free_to_the_bit() {
         let problem = random_stages(&mut random, true);
         for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_library(*name)) {
             let Some(Ok(flight)) = answer(&method, &problem, Detail::Events) else { continue };
-            for (length, mass, time) in [(67, 60, 67), (-67, -60, -67), (3, 2, -37), (-2, 7, 38)] {
+            for (length, mass, time) in
+                [(67, 60, 67), (-67, -60, -67), (-100, -100, -100), (30, 40, -40), (-40, -30, 20)]
+            {
                 let [length, mass, time] = [length, mass, time].map(|power| 2_f64.powi(power));
                 let scaled = in_units(&problem, Units { length, mass, time });
                 let other = method.integrator().solve(&scaled, Detail::Events).unwrap();
@@ -343,6 +354,103 @@ fn an_approach_that_the_error_bound_cannot_tell_from_arrival_is_undecided() {
         }
         assert!(undecided >= 2, "{name}: {undecided}");
     }
+}
+
+/// The method over time or over depth, in numbers of any type.
+fn solve_in<S: Scalar>(name: MethodName, problem: &Problem<S>, detail: Detail) -> Result<Flight<S>, IntegrationError> {
+    match name {
+        MethodName::Taylor => Taylor::default().solve_in(problem, detail),
+        _ => Energy::new().solve_in(problem, detail),
+    }
+}
+
+/// Depth and time of the tunnel scene in twenty digits, and the derivatives of the closed form (docs/theory.md, section
+/// 2) by V0, in the tunnel alone and behind a crater of given c: nothing is of `f64` only.
+#[test]
+fn digits_and_derivatives_are_those_of_the_type_of_numbers() {
+    let of = TwoFloat::from;
+    // Two exact pieces each.
+    let digits = |head: f64, tail: f64, scale: f64| (TwoFloat::new_mul(head, 1e6) + of(tail)).over(of(scale));
+    let depth = digits(14_482_620_011_221.0, 707_453.0, 1e20);
+    let time = digits(82_919_669_482_493.0, 341_157.0, 1e22).over(of(10.0));
+    // c is computed in double-double too, since the digits were.
+    let mut wide = tunnel(INF).cast::<TwoFloat>();
+    let (mass, kd, law) = (wide.mass, wide.stages[0].end, wide.stages[1]);
+    wide.stages[0].stiffness = (mass * (law.static_force + law.drag * of(9e4))).over(kd * (mass + kd * law.drag));
+    for name in [MethodName::Taylor, MethodName::Energy] {
+        let single = solve_in::<f32>(name, &tunnel(INF).cast(), Detail::Events).unwrap();
+        assert_eq!(single.outcome, Outcome::StoppedInTunnel, "{name}");
+        assert!((single.end.depth.value() / depth.value() - 1.0).abs() < 5e-7, "{name}: {:?}", single.end);
+        let end = solve_in(name, &wide, Detail::End).unwrap().end;
+        for (found, exact) in [(end.depth, depth), (end.time, time)] {
+            let off = (found.over(exact) - of(1.0)).value().abs();
+            assert!(off < 5e-20, "{name}: {off:e}");
+        }
+        let (m, v0, law) = (2.0, 300.0, Stage::tunnel(848_230.0, 3.25));
+        for (c, kd) in [(0.0, 0.0), (9e6, 0.1)] {
+            let crater = (kd > 0.0).then(|| Stage::crater(c, kd));
+            let mut problem = Problem::crater_and_tunnel(m, v0, crater, law).cast::<Dual64>();
+            problem.impact_speed = problem.impact_speed.derivative();
+            let v1 = f64::sqrt(v0 * v0 - c * kd * kd / m);
+            let (force, left) = (law.static_force + law.drag * v1 * v1, (-2.0 * law.drag * 0.04 / m).exp());
+            let rest = solve_in(name, &problem, Detail::Events).unwrap().end;
+            problem.exit_depth = Dual64::from_re(kd + 0.04);
+            let exit = solve_in(name, &problem, Detail::Events).unwrap().end;
+            for (slope, exact) in [
+                (rest.depth.eps, m * v0 / force),
+                (rest.time.eps, m * v0 / v1 / force - kd / v0 / v1),
+                (exit.velocity.eps, v0 / exit.velocity.re * left),
+            ] {
+                assert!((slope / exact - 1.0).abs() < 1e-14, "{name}, {kd}: {slope:e} {exact:e}");
+            }
+            assert_eq!(exit.depth.eps, 0.0, "{name}");
+        }
+    }
+}
+
+/// Double-double takes other steps, and what two methods have in common is neither a variable nor a line: all that
+/// they find of stages of any kind is the same, so it does not depend on how it was computed.
+#[test]
+fn stages_of_any_kind_give_the_numbers_of_double_double_by_the_other_method() {
+    let mut random = Random::new(2);
+    let mut compared = [0; 3];
+    for case in 0..900 {
+        let problem = random_stages(&mut random, case % 3 == 0);
+        let problem = if case % 2 == 0 { problem } else { problem.with_exit(INF) };
+        let viscous = problem.stages.iter().any(|law| law.viscosity > 0.0);
+        let other = |name| if viscous || name == MethodName::Energy { MethodName::Taylor } else { MethodName::Energy };
+        for name in if viscous { &[MethodName::Taylor][..] } else { &[MethodName::Taylor, MethodName::Energy] } {
+            let flight = solve_in(*name, &problem, Detail::Trajectory);
+            let exact = solve_in::<TwoFloat>(other(*name), &problem.cast(), Detail::Events);
+            let (flight, exact) = match (flight, exact) {
+                (Ok(flight), Ok(exact)) => (flight, exact.values()),
+                (Err(a), Err(b)) => {
+                    assert_eq!(std::mem::discriminant(&a), std::mem::discriminant(&b), "{name}: {problem:?}");
+                    continue;
+                }
+                (a, b) => panic!("{name}: {problem:?}\n{a:?}\n{b:?}"),
+            };
+            compared[usize::from(*name == MethodName::Energy) + 2 * usize::from(viscous)] += 1;
+            assert_eq!((flight.outcome, kinds(&flight.events)), (exact.outcome, kinds(&exact.events)), "{problem:?}");
+            for rows in flight.trajectory.windows(2).map(|rows| [rows[0].state, rows[1].state]) {
+                let ascends = rows[0].time <= rows[1].time && rows[0].depth <= rows[1].depth;
+                assert!(ascends, "{name}: {rows:?} in {problem:?}");
+            }
+            assert!(flight.cost.steps < 400, "{name}: {:?}", flight.cost);
+            // A boundary passed slowly, before or here, scatters the time after it.
+            let fastest = exact.events.iter().map(|e| e.state.velocity).fold(problem.impact_speed, f64::max);
+            let passed = exact.events.iter().filter(|e| e.kind != EventKind::Rest);
+            let condition = passed.map(|e| fastest / e.state.velocity).fold(1.0, f64::max);
+            for (found, exact) in flight.events.iter().zip(&exact.events).map(|(a, b)| (a.state, b.state)) {
+                let off = [(found.depth, exact.depth), (found.time, exact.time)]
+                    .map(|(a, b)| if a == b { 0.0 } else { (a / b - 1.0).abs() });
+                let off = [off[0], off[1], (found.velocity - exact.velocity).abs() / fastest];
+                let within = off.iter().zip([5e-15, 2e-14, 2e-14]).all(|(off, limit)| *off < limit * condition);
+                assert!(within, "{name}: {off:?} over {condition:e}, {found} for {exact} in {problem:?}");
+            }
+        }
+    }
+    assert!(compared.iter().all(|count| *count > 150), "{compared:?}");
 }
 
 #[test]
@@ -497,11 +605,11 @@ fn a_flight_that_ends_at_impact_takes_no_step() {
 }
 
 #[test]
-fn detail_changes_what_is_listed_and_no_number() {
-    for exit_depth in [0.12, INF] {
+fn detail_changes_what_is_listed_and_no_number_and_a_trajectory_keeps_the_energy() {
+    for problem in [0.12, INF].map(tunnel) {
         for (name, method) in methods(1e-8) {
             let [end, events, trajectory] = [Detail::End, Detail::Events, Detail::Trajectory]
-                .map(|detail| method.integrator().solve(&tunnel(exit_depth), detail).unwrap());
+                .map(|detail| method.integrator().solve(&problem, detail).unwrap());
             for other in [&events, &trajectory] {
                 assert_eq!((end.end, end.cost, end.outcome), (other.end, other.cost, other.outcome), "{name}");
                 assert_eq!((end.exit_margin, end.exit_margin_error), (other.exit_margin, other.exit_margin_error));
@@ -509,10 +617,17 @@ fn detail_changes_what_is_listed_and_no_number() {
             assert!(end.events.is_empty() && end.trajectory.is_empty() && events.trajectory.is_empty(), "{name}");
             assert_eq!(events.events, trajectory.events, "{name}");
             let rows = &trajectory.trajectory;
-            assert_eq!(rows[0].state, State::at_impact(&tunnel(INF)), "{name}");
+            assert_eq!(rows[0].state, State::at_impact(&problem), "{name}");
             assert_eq!(rows.last().unwrap().state, end.end, "{name}");
-            assert!(rows.windows(2).all(|rows| rows[0].state.time < rows[1].state.time), "{name}");
-            let force = |row: &Sample| tunnel(INF).stages[row.stage].force(row.state.depth, row.state.velocity);
+            for (before, after) in rows.windows(2).map(|rows| (rows[0].state, rows[1].state)) {
+                assert!(before.time < after.time && before.depth < after.depth, "{name}: {before} {after}");
+                let limit = if is_library(name) { 1e-8 } else { 2e-15 };
+                let law = problem.stages.iter().find(|law| after.depth <= law.end).unwrap();
+                let w = propagate(law, problem.mass, before.velocity.powi(2), before.depth, after.depth);
+                let off = (w - after.velocity.powi(2)).abs() / 9e4;
+                assert!(off < limit, "{name}, from {before} to {after}: {off:e}");
+            }
+            let force = |row: &Sample| problem.stages[row.stage].force(row.state.depth, row.state.velocity);
             assert!(rows.iter().all(|row| row.force == force(row)), "{name}");
         }
     }
