@@ -528,19 +528,6 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_or_a_layer_beyond_the_last_is_absent() {
-        for (name, path) in [("layered", "target.layer"), ("overdamped", "stage")] {
-            let scene = shipped(name);
-            let known = Parameter::all_of(&scene);
-            let count =
-                (0..9).take_while(|i| known.iter().any(|p| p.to_string().starts_with(&format!("{path}.{i}.")))).count();
-            let number = if path == "stage" { "drag" } else { "strength" };
-            let beyond: Parameter = format!("{path}.{count}.{number}").parse().unwrap();
-            assert!(count > 0 && matches!(beyond.get(&scene), Err(ParameterError::Absent { .. })), "{beyond}");
-        }
-    }
-
-    #[test]
     fn columns_of_a_table_are_the_paths_of_a_plain_target_with_their_units() {
         let columns: Vec<_> = Parameter::PLAIN[..11].iter().map(|parameter| parameter.column()).collect();
         assert_eq!(columns.join(",") + ",criterion", crate::studies::batch::SCENES.header());
@@ -561,6 +548,16 @@ mod tests {
                 Absence::Means(text) => assert!(!text.is_empty()),
             }
         }
+        let listed = [shipped("layered"), shipped("stiff")].into_iter().flat_map(|scene| Parameter::all_of(&scene));
+        let numbers: Vec<_> =
+            Parameter::PLAIN.into_iter().chain(listed.filter(|p| p.to_string().contains(".0."))).collect();
+        let of =
+            |range| numbers.iter().filter(|p| p.entry().range == range).map(ToString::to_string).collect::<Vec<_>>();
+        let positive = ["projectile.mass", "projectile.diameter", "target.strength", "resistance.S"];
+        assert_eq!(of(Range::Positive), [&positive[..], &["resistance.crater_stiffness", "N"]].concat());
+        assert_eq!(of(Range::UnitInterval), ["projectile.nose.factor"]);
+        assert_eq!(of(Range::Finite), ["stage.0.static_force"]);
+        assert_eq!(of(Range::NotNegative).len(), numbers.len() - 8);
     }
 
     #[test]
@@ -618,11 +615,13 @@ mod tests {
     fn numbers_that_a_scene_lacks_are_refused_with_the_reason() {
         let absent = |path: &str, scene: &str| {
             let parameter: Parameter = path.parse().unwrap();
-            parameter.set(&mut shipped(scene), 1.0).unwrap_err().to_string()
+            let mut scene = shipped(scene);
+            assert!(matches!(parameter.get(&scene), Err(ParameterError::Absent { .. })), "{path}");
+            parameter.set(&mut scene, 1.0).unwrap_err().to_string()
         };
         assert!(absent("target.strength", "layered").contains("target.layer.0.strength"));
         assert!(absent("H/d", "viscous").contains("stages outright"));
-        assert!(absent("stage.9.drag", "viscous").contains("fewer stages"));
+        assert!(absent("stage.1.drag", "viscous").contains("fewer stages"));
         assert!(absent("target.layer.3.strength", "layered").contains("fewer layers"));
         assert!("target.colour".parse::<Parameter>().unwrap_err().help().contains("projectile.mass"));
         assert!("target.layer.x.strength".parse::<Parameter>().is_err());

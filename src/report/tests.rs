@@ -1,6 +1,7 @@
 //! The whole folder, from a few real claims and a few hostile ones.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use super::{Environment, Run, folder};
 use crate::suite::checks::{Peer, PeerAnswers};
@@ -8,8 +9,8 @@ use crate::suite::{Check, Evidence, Judged, Suite, Verdict};
 
 const HOSTILE: &str = "a\"b'<script>alert(1)</script>&|`*_\n\u{1b}[2J\u{202e},=1+1]]>";
 
-/// A quick part of the suite, judged; the last claims are hostile, failed and undecided.
-fn judged() -> (Suite, Vec<Judged>) {
+/// A quick part of the suite, judged once; the last claims are hostile, failed and undecided.
+static JUDGED: LazyLock<(Suite, Vec<Judged>)> = LazyLock::new(|| {
     let mut suite = Suite::embedded().unwrap();
     let starts = "small-impact/approach peer/ invariant/energy sweep/ map/ measured rounding stability/m";
     suite.claims.retain(|claim| {
@@ -34,7 +35,7 @@ fn judged() -> (Suite, Vec<Judged>) {
     judged.push(peer);
     suite.title = HOSTILE.to_owned();
     (suite, judged)
-}
+});
 
 fn run<'a>(suite: &'a Suite, judged: &'a [Judged]) -> Run<'a> {
     let environment = Environment::here(1, HOSTILE.to_owned(), suite, vec![(HOSTILE.to_owned(), HOSTILE.to_owned())]);
@@ -52,8 +53,8 @@ fn files(suite: &Suite, judged: &[Judged]) -> Vec<(String, String)> {
 
 #[test]
 fn text_of_others_acts_in_no_file() {
-    let (suite, judged) = judged();
-    for (name, text) in files(&suite, &judged) {
+    let (suite, judged) = &*JUDGED;
+    for (name, text) in files(suite, judged) {
         let extension = Path::new(&name).extension().unwrap().to_str().unwrap();
         if ["html", "svg", "xml", "md"].contains(&extension) {
             assert!(!text.contains("<script"), "{name}");
@@ -74,9 +75,9 @@ fn text_of_others_acts_in_no_file() {
 
 #[test]
 fn reports_of_one_run_differ_in_times_alone() {
-    let (suite, judged) = judged();
+    let (suite, judged) = &*JUDGED;
     let slower: Vec<Judged> = judged.iter().cloned().map(|j| Judged { wall_ms: j.wall_ms * 3.0 + 1.0, ..j }).collect();
-    let (first, second) = (files(&suite, &judged), files(&suite, &slower));
+    let (first, second) = (files(suite, judged), files(suite, &slower));
     let names = |files: &[(String, String)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&first), names(&second));
     for ((name, first), (_, second)) in first.into_iter().zip(second) {
@@ -114,7 +115,7 @@ fn without_times(text: &str) -> String {
 #[test]
 fn stress_reports_of_one_run_differ_in_times_alone() {
     // A few cases, judged, are enough: those with figures and one that failed.
-    let (suite, judged) = (Suite::edges().unwrap(), judged().1);
+    let (suite, judged) = (Suite::edges().unwrap(), &JUDGED.1);
     let of = |id: &str, evidence, verdict, wall_ms| Judged {
         claim: suite.claims.iter().find(|claim| claim.id == id).unwrap().clone(),
         verdict,
@@ -147,8 +148,8 @@ fn stress_reports_of_one_run_differ_in_times_alone() {
 
 #[test]
 fn junit_says_what_became_of_each_claim() {
-    let (suite, judged) = judged();
-    let (_, xml) = files(&suite, &judged).into_iter().find(|(name, _)| name == "junit.xml").unwrap();
+    let (suite, judged) = &*JUDGED;
+    let (_, xml) = files(suite, judged).into_iter().find(|(name, _)| name == "junit.xml").unwrap();
     let report = quick_junit::Report::deserialize_from_str(&xml).unwrap();
     let count = |verdict| judged.iter().filter(|j| j.verdict == verdict).count();
     assert_eq!(report.tests, judged.len());
@@ -162,15 +163,10 @@ fn junit_says_what_became_of_each_claim() {
 }
 
 #[test]
-fn an_interrupted_or_refused_run_leaves_what_was_there() {
-    let (suite, judged) = judged();
-    let run = run(&suite, &judged);
+fn a_report_replaces_an_older_one_whole() {
+    let (suite, judged) = &*JUDGED;
+    let run = run(suite, judged);
     let place = tempfile::tempdir().unwrap();
-    let strange = place.path().join("strange");
-    std::fs::create_dir(&strange).unwrap();
-    std::fs::write(strange.join("thesis.txt"), "years of work").unwrap();
-    assert!(matches!(folder::write(folder::files(&run), &strange), Err(folder::FolderError::NotOurs { .. })));
-    assert_eq!(std::fs::read_dir(&strange).unwrap().count(), 1);
     // Twice: an empty folder, made by hand, then one of ours in its place, with nothing left over beside it.
     let ours = place.path().join("report");
     std::fs::create_dir(&ours).unwrap();
@@ -183,13 +179,13 @@ fn an_interrupted_or_refused_run_leaves_what_was_there() {
     }
     folder::write(folder::files(&run), &ours).unwrap();
     assert!(!ours.join("figures/old.svg").exists() && ours.join("figures/observed-orders.svg").exists());
-    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 2);
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
 }
 
 #[test]
 fn a_report_never_replaces_what_is_not_its_own() {
-    let (suite, judged) = judged();
-    let run = run(&suite, &judged);
+    let (suite, judged) = &*JUDGED;
+    let run = run(suite, judged);
     for foreign in ["notes.txt", "tables/mine.csv", "figures/deep/mine.svg", "mine", ".hidden"] {
         let place = tempfile::tempdir().unwrap();
         let report = place.path().join("report");
