@@ -103,20 +103,10 @@ mod tests {
     use super::*;
     use crate::integrators::{Diffsol, Integrator};
     use crate::physics::Outcome;
-    use crate::testing::stage;
+    use crate::testing::{of_stages, stage};
 
-    fn of_stages(impact_speed: f64, exit_depth: f64, stages: &[Stage]) -> Problem {
-        Problem::of_stages(1.0, impact_speed, stages.iter().copied()).with_exit(exit_depth)
-    }
-
-    /// Weight through a viscous layer: the drive fades over x, and it leaves at a tenth of its speed.
-    fn stiff_scene() -> Problem {
-        of_stages(1.0, 9.0, &[stage(-1000.0, 100.0, 1000.0, 0.0, f64::INFINITY)])
-    }
-
-    /// As viscous, but it resists: rest comes inside the transient.
-    fn viscous_scene() -> Problem {
-        of_stages(1.0, 9.0, &[stage(10.0, 100.0, 1000.0, 0.0, f64::INFINITY)])
+    fn one_stage(exit_depth: f64, stage: Stage) -> Problem {
+        of_stages(1.0, 1.0, exit_depth, &[stage])
     }
 
     #[test]
@@ -124,8 +114,7 @@ mod tests {
     fn measure_evaluations() {
         for rtol in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
             for viscosity in [10.0, 30.0, 100.0, 300.0] {
-                let problem =
-                    of_stages(1.0, 4.0, &[stage(-viscosity, viscosity / 10.0, viscosity, 0.0, f64::INFINITY)]);
+                let problem = one_stage(4.0, stage(-viscosity, viscosity / 10.0, viscosity, 0.0, f64::INFINITY));
                 print!("{rtol:e} Z = {:7.1?}: ", Choice::of(&problem, 0, 0.0, 1.0).stiffness);
                 for scheme in Scheme::ALL {
                     let flight = Diffsol::new(scheme, rtol).solve(&problem, Detail::End).unwrap();
@@ -138,29 +127,26 @@ mod tests {
 
     #[test]
     fn a_stiff_stage_costs_a_tenth_of_the_explicit_evaluations_at_most() {
-        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
-        let adaptive = Diffsol::adaptive(1e-6).solve(&stiff_scene(), Detail::Events).unwrap();
-        assert!(
-            10 * adaptive.cost.force_evaluations <= explicit.cost.force_evaluations,
-            "{:?} against {:?}",
-            adaptive.cost,
-            explicit.cost
-        );
+        // Weight through a viscous layer: the drive fades over x, and it leaves at a tenth of its speed.
+        let stiff = one_stage(9.0, stage(-1000.0, 100.0, 1000.0, 0.0, f64::INFINITY));
+        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&stiff, Detail::Events).unwrap().cost;
+        let adaptive = Diffsol::adaptive(1e-6).solve(&stiff, Detail::Events).unwrap();
+        let evaluations = adaptive.cost.force_evaluations;
+        assert!(10 * evaluations <= explicit.force_evaluations, "{evaluations} against {explicit:?}");
         assert_eq!(adaptive.outcome, Outcome::Perforated);
         // Overdamped closed form, to 30 digits: fast and slow rate from l² - 1000 l + 100 = 0.
         assert!((adaptive.end.velocity - 0.100_010_002_000_500_14).abs() < 1e-9, "{}", adaptive.end);
         assert!((adaptive.end.time / 23.023_548_214_4 - 1.0).abs() < 1e-5, "{}", adaptive.end);
-        assert!(
-            adaptive.notes.iter().any(|note| note.contains("bdf") && note.contains("stiff")),
-            "{:?}",
-            adaptive.notes
-        );
+        let is_said = adaptive.notes.iter().any(|note| note.contains("bdf") && note.contains("stiff"));
+        assert!(is_said, "{:?}", adaptive.notes);
     }
 
     #[test]
     fn a_stage_that_only_resists_stays_explicit_however_viscous() {
-        let flight = Diffsol::adaptive(1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
-        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&viscous_scene(), Detail::Events).unwrap();
+        // Rest comes inside the transient.
+        let viscous = one_stage(9.0, stage(10.0, 100.0, 1000.0, 0.0, f64::INFINITY));
+        let flight = Diffsol::adaptive(1e-6).solve(&viscous, Detail::Events).unwrap();
+        let explicit = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&viscous, Detail::Events).unwrap();
         assert_eq!(flight.cost, explicit.cost);
         assert_eq!(flight.end, explicit.end);
         assert!(flight.notes.iter().any(|note| note.contains("never stiff")), "{:?}", flight.notes);
@@ -171,29 +157,21 @@ mod tests {
 
     #[test]
     fn each_stage_gets_the_method_that_suits_it() {
-        let problem = of_stages(
-            1.0,
-            9.5,
-            &[
-                stage(0.1, 0.0, 0.0, 0.0, 0.5),
-                stage(-1000.0, 100.0, 1000.0, 0.0, 9.0),
-                stage(1e-4, 0.0, 0.0, 0.0, f64::INFINITY),
-            ],
-        );
+        let (before, behind) = (stage(0.1, 0.0, 0.0, 0.0, 0.5), stage(1e-4, 0.0, 0.0, 0.0, f64::INFINITY));
+        let problem = of_stages(1.0, 1.0, 9.5, &[before, stage(-1000.0, 100.0, 1000.0, 0.0, 9.0), behind]);
         let flight = Diffsol::adaptive(1e-8).solve(&problem, Detail::Events).unwrap();
         let named: Vec<_> = flight.notes.iter().filter_map(|note| note.split(' ').nth(3)).collect();
         assert_eq!(named, ["tsit45:", "bdf:", "tsit45:"]);
-        let all_explicit = Diffsol::new(Scheme::Tsit45, 1e-8).solve(&problem, Detail::Events).unwrap();
-        assert!(
-            (flight.exit_margin.unwrap() - all_explicit.exit_margin.unwrap()).abs() < flight.exit_margin_error.unwrap()
-        );
+        let explicit = Diffsol::new(Scheme::Tsit45, 1e-8).solve(&problem, Detail::Events).unwrap();
+        let off = (flight.exit_margin.unwrap() - explicit.exit_margin.unwrap()).abs();
+        assert!(off < flight.exit_margin_error.unwrap(), "{off:e}");
     }
 
     #[test]
     fn a_drive_without_resistance_to_motion_is_not_stiff() {
-        let problem = of_stages(1.0, 5.0, &[stage(-10.0, 0.0, 0.0, 0.0, f64::INFINITY)]);
+        let problem = one_stage(5.0, stage(-10.0, 0.0, 0.0, 0.0, f64::INFINITY));
         assert_eq!(Choice::of(&problem, 0, 0.0, 1.0), Choice { scheme: EXPLICIT, stiffness: Some(0.0) });
-        let drag = of_stages(1.0, 5000.0, &[stage(-10.0, 0.0, 0.0, 10.0, f64::INFINITY)]);
+        let drag = one_stage(5000.0, stage(-10.0, 0.0, 0.0, 10.0, f64::INFINITY));
         assert_eq!(Choice::of(&drag, 0, 0.0, 1.0).scheme, IMPLICIT);
     }
 
@@ -222,7 +200,7 @@ mod tests {
             (exit_depth, EXPLICIT, "tsit45: it drives but is not stiff"),
             (exit_depth.next_up(), IMPLICIT, "bdf: it drives and is stiff"),
         ] {
-            let problem = of_stages(1.0, exit_depth, &[stage(-128.0, 0.0, 128.0, 0.0, f64::INFINITY)]);
+            let problem = one_stage(exit_depth, stage(-128.0, 0.0, 128.0, 0.0, f64::INFINITY));
             let choice = Choice::of(&problem, 0, 1.0, 1.0);
             assert_eq!(choice.scheme, scheme);
             assert!((choice.stiffness.unwrap() - STIFFNESS_LIMIT).abs() < 1e-12, "{choice:?}");

@@ -115,19 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn stages_and_layers_have_no_groups() {
+    fn stages_and_layers_have_no_groups_and_no_drag_no_geometry_function() {
+        let bare = Resistance::Concrete(Concrete { density: 0.0, ..concrete() });
+        assert_eq!(Groups::of(&Scene { resistance: bare, ..scene() }, 1.0).unwrap().geometry, None);
         let stages = Scene { resistance: Resistance::Stages(Vec::new()), ..scene() };
         assert_eq!(Groups::of(&stages, 1.0), None);
         let layer = Layer { thickness: 1.0, strength: 30e6, density: 2300.0, static_factor: 12.0, viscosity: 0.0 };
         let layered = Resistance::Concrete(Concrete { layers: vec![layer], ..concrete() });
         assert_eq!(Groups::of(&Scene { resistance: layered, ..scene() }, 1.0), None);
-    }
-
-    #[test]
-    fn geometry_function_is_absent_without_drag() {
-        let mut frictionless = scene();
-        frictionless.resistance = Resistance::Concrete(Concrete { density: 0.0, ..concrete() });
-        assert_eq!(Groups::of(&frictionless, 1.0).unwrap().geometry, None);
     }
 
     #[test]

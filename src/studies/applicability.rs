@@ -155,6 +155,8 @@ mod tests {
             (100.0, 10.0, 2.0, 16.336_651_809_520_088),
             (0.2, 20.0, 0.707, 0.428_021_653_964_986_7),
             (50.0, 234.3, 2.365, 30.038_836_818_523_704),
+            // Forrestal 1994 shot 14 with the published groups: 6.21.
+            (8.455, 125.9, 2.0, 6.215_773_173_665_595),
         ] {
             assert!((depth_ratio(impact, geometry, k) / expected - 1.0).abs() < 4e-16, "{impact} {geometry}");
         }

@@ -99,7 +99,7 @@ pub fn formal_order(velocity: VelocityAt, boundaries: Boundaries, path: &Path, q
 #[expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 mod tests {
     use super::*;
-    use crate::integrators::central_difference::tests::{DRAG as Q, SPEED, concrete};
+    use crate::integrators::central_difference::tests::{DRAG as Q, SPEED, combinations, concrete};
     use crate::integrators::{CentralDifference, Cost};
     use crate::physics::{Event, Stage, State};
     use crate::studies::convergence::{Ladder, STEPS_OVER_TIME, of_fixed_steps};
@@ -124,77 +124,42 @@ mod tests {
         Path { to_end: Stretch { force_jumps: true, ..path.to_end }, ..path }
     }
 
+    /// Without lag a continuous force is second order; what is taken at the end of a step is first.
     #[test]
-    fn a_rest_in_the_crater_is_second_order_and_its_step_end_time_first() {
-        for velocity in VelocityAt::ALL {
-            for boundaries in Boundaries::ALL {
-                let time = if boundaries == Boundaries::StepEnd { 1.0 } else { 2.0 };
-                assert_eq!(row(velocity, boundaries, CRATER), [Some(2.0), Some(time), None, None, None]);
-            }
-        }
-    }
-
-    #[test]
-    fn a_continuous_tunnel_without_lag_is_second_order_and_first_where_taken_late() {
-        for velocity in VelocityAt::ALL {
+    fn orders_follow_from_the_rules_and_the_path() {
+        let (one, two) = (Some(1.0), Some(2.0));
+        for (velocity, boundaries) in combinations() {
+            let taken = if boundaries == Boundaries::StepEnd { one } else { two };
+            let row = |path| row(velocity, boundaries, path);
+            assert_eq!(row(CRATER), [two, taken, None, None, None], "rest in the crater: {velocity}, {boundaries}");
             for path in [TUNNEL, DRAG] {
-                if path.to_end.velocity_dependent && velocity == VelocityAt::LaggedHalfStep {
-                    continue;
+                let said = format!("{velocity}, {boundaries}, {path:?}");
+                let lags = velocity == VelocityAt::LaggedHalfStep && path.to_end.velocity_dependent;
+                if lags {
+                    // First order, but not at the end of a crater without drag.
+                    assert_eq!(row(path), [one, one, None, taken, taken], "{said}");
+                } else {
+                    assert_eq!(row(path), [two, taken, None, taken, taken], "{said}");
+                    assert_eq!(row(Path { perforates: true, ..path }), [None, taken, taken, taken, taken], "{said}");
                 }
-                for boundaries in Boundaries::ALL {
-                    let taken = Some(if boundaries == Boundaries::StepEnd { 1.0 } else { 2.0 });
-                    assert_eq!(row(velocity, boundaries, path), [Some(2.0), taken, None, taken, taken]);
-                    let through = Path { perforates: true, ..path };
-                    assert_eq!(row(velocity, boundaries, through), [None, taken, taken, taken, taken]);
-                }
+                // A jump of the force keeps the order only where it is landed on.
+                let jumped = match boundaries {
+                    Boundaries::StepEnd => [one, one, None, one, one],
+                    Boundaries::Interpolated => [one, one, None, two, one],
+                    Boundaries::Landed if lags => [one, one, None, two, two],
+                    Boundaries::Landed => [two, two, None, two, two],
+                };
+                assert_eq!(row(with_jump(path)), jumped, "{said}, with a jump");
             }
-        }
-    }
-
-    #[test]
-    fn lagged_drag_is_first_order_but_not_at_the_end_of_a_crater_without_drag() {
-        for boundaries in Boundaries::ALL {
-            let at_crater_end = Some(if boundaries == Boundaries::StepEnd { 1.0 } else { 2.0 });
             for path in [DRAG, with_jump(DRAG)] {
-                if path == with_jump(DRAG) && boundaries != Boundaries::Landed {
-                    continue;
-                }
-                let expected = [Some(1.0), Some(1.0), None, at_crater_end, at_crater_end];
-                assert_eq!(row(VelocityAt::LaggedHalfStep, boundaries, path), expected);
+                let depth = formal_order(velocity, boundaries, &path, Quantity::Depth);
+                let through = Path { perforates: true, ..path };
+                let critical = formal_order(velocity, boundaries, &through, Quantity::CriticalVelocity);
+                assert_eq!(critical, depth, "the critical velocity has the order of the depth at rest");
             }
         }
         let viscous_crater = Path { to_crater_end: Some(DRAGGED), ..DRAG };
-        let order =
-            formal_order(VelocityAt::LaggedHalfStep, Boundaries::Landed, &viscous_crater, Quantity::CraterEndVelocity);
-        assert_eq!(order, Some(1.0));
-    }
-
-    #[test]
-    fn a_force_jump_is_second_order_only_when_landed_and_not_lagged() {
-        let (one, two) = (Some(1.0), Some(2.0));
-        for path in [TUNNEL, DRAG] {
-            let path = with_jump(path);
-            for velocity in VelocityAt::ALL {
-                assert_eq!(row(velocity, Boundaries::StepEnd, path), [one, one, None, one, one]);
-                assert_eq!(row(velocity, Boundaries::Interpolated, path), [one, one, None, two, one]);
-                let lags = velocity == VelocityAt::LaggedHalfStep && path.to_end.velocity_dependent;
-                let end = if lags { one } else { two };
-                assert_eq!(row(velocity, Boundaries::Landed, path), [end, end, None, two, two]);
-            }
-        }
-    }
-
-    #[test]
-    fn the_critical_velocity_has_the_order_of_the_depth_at_rest() {
-        for velocity in VelocityAt::ALL {
-            for boundaries in Boundaries::ALL {
-                for path in [DRAG, with_jump(DRAG)] {
-                    let depth = formal_order(velocity, boundaries, &path, Quantity::Depth);
-                    let through = Path { perforates: true, ..path };
-                    assert_eq!(formal_order(velocity, boundaries, &through, Quantity::CriticalVelocity), depth);
-                }
-            }
-        }
+        assert_eq!(row(VelocityAt::LaggedHalfStep, Boundaries::Landed, viscous_crater)[4], one);
     }
 
     /// A flight that ended in stage `stage`, with `events` at these depths and velocities.
@@ -252,18 +217,16 @@ mod tests {
         let exact = Truth::of(&problem).unwrap().flight;
         let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
         let ladder = Ladder { from, to, points: 60, seed: 1 };
-        for velocity in VelocityAt::ALL {
-            for boundaries in Boundaries::ALL {
-                let scheme = |size| CentralDifference::uniform(size, velocity, boundaries);
-                let studies = of_fixed_steps(&scene(), &problem, &exact, &scheme, ladder, false).unwrap().quantities;
-                assert_eq!(studies.len(), 2, "time and velocity");
-                for study in studies {
-                    let (order, formal) = (study.fit.unwrap().line.unwrap().order, study.formal.unwrap());
-                    // No stage end is landed on here: the place of the exit in the step is a noise.
-                    let band = if boundaries == Boundaries::StepEnd { 0.4 } else { 0.1 };
-                    let quantity = study.quantity;
-                    assert!((order - formal).abs() < band, "{velocity}, {boundaries}: {quantity} of order {order:.3}");
-                }
+        for (velocity, boundaries) in combinations() {
+            let scheme = |size| CentralDifference::uniform(size, velocity, boundaries);
+            let studies = of_fixed_steps(&scene(), &problem, &exact, &scheme, ladder, false).unwrap().quantities;
+            assert_eq!(studies.len(), 2, "time and velocity");
+            for study in studies {
+                let (order, formal) = (study.fit.unwrap().line.unwrap().order, study.formal.unwrap());
+                // No stage end is landed on here: the place of the exit in the step is a noise.
+                let band = if boundaries == Boundaries::StepEnd { 0.4 } else { 0.1 };
+                let quantity = study.quantity;
+                assert!((order - formal).abs() < band, "{velocity}, {boundaries}: {quantity} of order {order:.3}");
             }
         }
     }

@@ -3,51 +3,30 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
 use penetrode::integrators::lanes::Summary;
 use penetrode::physics::reference::Source;
-use penetrode::physics::{CraterStiffness, Outcome, Scene, State};
+use penetrode::physics::{Outcome, Parameter, Scene, State};
 use penetrode::studies::critical_velocity;
 use penetrode::studies::random_scenes::{Generator, errors_of};
 
 use crate::program::{Said, run_in, run_with};
 
-const HEADER: &str = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,thickness_m,S,B,k,crater_stiffness_n_m,\
-                      velocity_m_s";
+/// Numbers of a row.
+const COLUMNS: &[Parameter] = Parameter::PLAIN.split_at(11).0;
+
+/// The table of `rows`.
+fn table(rows: &[String]) -> String {
+    let header: Vec<_> = COLUMNS.iter().map(|parameter| parameter.column()).collect();
+    format!("{}\n{}\n", header.join(","), rows.join("\n"))
+}
 
 /// A scene as a row.
 fn row(scene: &Scene) -> String {
-    let concrete = scene.concrete().unwrap();
-    let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-    let stiffness = match concrete.crater_stiffness {
-        CraterStiffness::Continuous => None,
-        CraterStiffness::Given(stiffness) => Some(stiffness),
-    };
-    format!(
-        "{},{},{},{},{},{},{},{},{},{},{}",
-        scene.mass,
-        concrete.diameter,
-        concrete.nose_factor,
-        concrete.strength,
-        concrete.density,
-        optional(scene.thickness),
-        concrete.static_factor,
-        concrete.inertia_factor,
-        concrete.crater_ratio,
-        optional(stiffness),
-        scene.velocity.unwrap(),
-    )
-}
-
-fn table(rows: &[String]) -> String {
-    let mut text = format!("{HEADER}\n");
-    for row in rows {
-        writeln!(text, "{row}").unwrap();
-    }
-    text
+    let cell = |parameter: &Parameter| parameter.get(scene).map_or(String::new(), |value| value.to_string());
+    COLUMNS.iter().map(cell).collect::<Vec<_>>().join(",")
 }
 
 fn random_scenes(count: usize) -> Vec<Scene> {
@@ -156,7 +135,7 @@ fn a_flight_stays_where_its_critical_velocity_fails_or_is_undecided() {
     let folder = tempfile::tempdir().unwrap();
     for (thickness, bad, undecided, cause) in [("2000", 1, 0, "no critical velocity"), ("40", 0, 1, "V_c is undecided")]
     {
-        let scenes = format!("{HEADER}\n{}\n{}\n", of_thickness(""), of_thickness(thickness));
+        let scenes = table(&["", thickness].map(of_thickness));
         let said = run(folder.path(), &scenes, "--out r.csv --critical --method closed-form");
         let expected = (if bad > 0 { 3 } else { 0 }, format!("2 rows: {bad} bad, {undecided} undecided\n"));
         assert_eq!((said.code, said.err), expected);
@@ -170,16 +149,11 @@ fn a_flight_stays_where_its_critical_velocity_fails_or_is_undecided() {
 }
 
 #[test]
-fn a_table_without_rows_has_results_without_rows_and_says_so() {
-    let said = run_with(&format!("{HEADER}\n"), "batch - --out -").expect(0);
-    assert_eq!(said.out.lines().count(), 1);
-    assert!(said.err.contains("0 rows"), "{said:?}");
-}
-
-#[test]
-fn a_table_may_come_from_a_pipe_and_go_into_one() {
-    let said = run_with(&format!("{HEADER}\n2,0.05,0.72,36e6,2300,,,,,,300\n"), "batch - --out -").expect(0);
+fn a_table_may_come_from_a_pipe_and_go_into_one_and_without_rows_has_results_without_rows() {
+    let said = run_with(&table(&["2,0.05,0.72,36e6,2300,,,,,,300".to_owned()]), "batch - --out -").expect(0);
     assert!(said.out.contains("\n1,stopped-in-tunnel,0.1448"));
+    let said = run_with(&table(&[]), "batch - --out -").expect(0);
+    assert!(said.out.lines().count() == 1 && said.err.contains("0 rows"), "{said:?}");
 }
 
 #[test]

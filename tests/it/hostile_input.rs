@@ -65,43 +65,21 @@ fn refusals(kind: &str, line: &str) -> String {
 }
 
 #[test]
-fn the_corpus_is_of_eighty_files_and_more() {
+fn a_bad_file_is_refused_at_its_place() {
     let count: usize = names(&corpus()).iter().map(|kind| names(&corpus().join(kind)).len()).sum();
     assert!(count >= 80, "{count}");
-}
-
-#[test]
-fn a_bad_scene_is_refused_at_its_place() {
-    assert_snapshot!("scenes", refusals("scene", "solve {} --trajectory out.csv"));
-}
-
-#[test]
-fn a_bad_suite_is_refused_at_its_place() {
-    assert_snapshot!("suites", refusals("suite", "verify {} --out report"));
-}
-
-#[test]
-fn a_bad_table_of_scenes_is_refused_at_its_place() {
-    let said = refusals("batch", "batch {} --out out.csv");
-    // Nothing is on standard output either, not even the names of the columns.
-    assert!(refusals("batch", "batch {} --out -") == said);
-    assert_snapshot!("batch_tables", said);
-}
-
-#[test]
-fn a_bad_table_of_step_sizes_is_refused_at_its_place() {
-    assert_snapshot!("audit_tables", refusals("audit", "audit {}"));
-}
-
-#[test]
-fn a_bad_table_of_measured_points_is_refused_at_its_place() {
-    let sweep = "sweep slab.toml --vary H/d=1:5:3 --data {} --out out.csv";
-    assert_snapshot!("measured_points", refusals("points", sweep));
-}
-
-#[test]
-fn a_bad_table_of_experiments_is_refused_at_its_place() {
-    assert_snapshot!("experiments", refusals("experiments", "experiments {} --out out.csv"));
+    for (snapshot, kind, line) in [
+        ("scenes", "scene", "solve {} --trajectory out.csv"),
+        ("suites", "suite", "verify {} --out report"),
+        ("batch_tables", "batch", "batch {} --out out.csv"),
+        // Nothing is on standard output either, not even the names of the columns.
+        ("batch_tables", "batch", "batch {} --out -"),
+        ("audit_tables", "audit", "audit {}"),
+        ("measured_points", "points", "sweep slab.toml --vary H/d=1:5:3 --data {} --out out.csv"),
+        ("experiments", "experiments", "experiments {} --out out.csv"),
+    ] {
+        assert_snapshot!(snapshot, refusals(kind, line));
+    }
 }
 
 /// The results say what is wrong with a row that is no scene, and the others are solved: exit code 3.

@@ -57,43 +57,46 @@ proptest! {
 }
 
 #[test]
-fn a_touching_root_is_found_and_a_near_miss_is_not() {
-    // (t - 1/2)² on a step where both ends are positive.
-    let touch = first_root(&[0.25, -1.0, 1.0], 2.0).unwrap();
-    assert!((touch - 0.5).abs() < 1e-6, "{touch}");
-    assert_eq!(first_root(&[0.25 + 1e-9, -1.0, 1.0], 2.0), None);
-    // A pair 2e-5 apart inside one step: the earlier.
-    let pair = first_root(&[0.25 - 1e-10, -1.0, 1.0], 2.0).unwrap();
-    assert!((pair - (0.5 - 1e-5)).abs() < 1e-9, "{pair}");
-}
-
-#[test]
-fn a_root_at_the_end_of_the_span_counts_and_one_at_its_start_does_not() {
-    assert_eq!(first_root(&[-1.0, 1.0], 1.0), Some(1.0));
-    assert_eq!(first_root(&[0.0, 1.0], 1.0), None);
-    assert_eq!(first_root(&[0.0, 0.0, -0.5, 1.0], 1.0).map(|t| (t - 0.5).abs() < 1e-15), Some(true));
-    assert_eq!(first_root(&[1.0, 1.0], 1.0), None);
-    assert_eq!(first_root(&[], 1.0), None);
-    assert_eq!(first_root(&[0.0], 1.0), None);
-}
-
-#[test]
-fn a_root_just_behind_the_span_is_not_on_it() {
+fn the_first_root_on_a_span_is_that_behind_its_start_to_its_end() {
+    // (t - 1/2)² on a span with both ends positive, less or more by `off`.
+    let touch = |off: f64| vec![0.25 + off, -1.0, 1.0];
+    let behind_a_miss = |root: f64, near: f64, off: f64| product(&[root], &[(near, off)]);
+    let mut cases = vec![
+        ("a root at the end counts", vec![-1.0, 1.0], 1.0, Some((1.0, 0.0))),
+        ("one at the start does not", vec![0.0, 1.0], 1.0, None),
+        ("nor do two", vec![0.0, 0.0, -0.5, 1.0], 1.0, Some((0.5, 1e-15))),
+        ("a negative root is none", vec![1.0, 1.0], 1.0, None),
+        ("nothing has none", vec![], 1.0, None),
+        ("nor has zero", vec![0.0], 1.0, None),
+        ("a touch is found", touch(0.0), 2.0, Some((0.5, 1e-6))),
+        ("a near miss is not", touch(1e-9), 2.0, None),
+        ("of a pair in one step, the earlier", touch(-1e-10), 2.0, Some((0.5 - 1e-5, 1e-9))),
+        // 12 epsilons of 1/4 + 2 + 4: 1.7e-14.
+        ("a miss below the noise is a touch", touch(1.4e-14), 2.0, Some((0.5, 1e-6))),
+        ("a miss above the noise is none", touch(2.1e-14), 2.0, None),
+        ("where nothing differs from zero, the middle", product(&[0.5; 40], &[]), 1.0, Some((0.5, 0.0))),
+    ];
+    // A near miss has the boxes narrowed, and they must widen behind it, or their number runs out.
+    for (near, off) in [(0.1, 1e-3), (0.1, 1e-5), (0.1, 1e-6), (0.296_875, 1.0 / 512.0)] {
+        cases.push(("on a corner, the corner itself", behind_a_miss(0.5, near, off), 1.0, Some((0.5, 0.0))));
+    }
+    for root in [0.8, 0.95] {
+        cases.push(("behind a near miss", behind_a_miss(root, 0.1, 1e-5), 1.0, Some((root, 1e-15))));
+    }
     // A pair of complex roots by the real line has the boxes halved, so that their widths do not fill the span.
     for root in [1.001, 1.01, 1.1, 1.4] {
         for near in [0.1, 0.3, 0.55, 0.7, 0.8, 0.9, 0.95] {
-            for off in [1e-2, 1e-3] {
-                assert_eq!(first_root(&product(&[root], &[(near, off)]), 1.0), None, "{root}, {near}, {off}");
-            }
+            cases.extend([1e-2, 1e-3].map(|off| ("just behind the span", behind_a_miss(root, near, off), 1.0, None)));
         }
     }
-}
-
-#[test]
-fn a_miss_is_told_from_a_touch_down_to_the_noise() {
-    // 12 epsilons of 1/4 + 2 + 4: 1.7e-14.
-    assert!(first_root(&[0.25 + 1.4e-14, -1.0, 1.0], 2.0).is_some());
-    assert_eq!(first_root(&[0.25 + 2.1e-14, -1.0, 1.0], 2.0), None);
+    for (claim, polynomial, span, expected) in cases {
+        let found = first_root(&polynomial, span);
+        let is_there = match (found, expected) {
+            (Some(found), Some((root, within))) => (found - root).abs() <= within,
+            (found, expected) => found.is_none() && expected.is_none(),
+        };
+        assert!(is_there, "{claim}: {found:?}, not {expected:?}, of {polynomial:?}");
+    }
 }
 
 #[test]
@@ -199,23 +202,6 @@ fn one_correction_is_of_fourth_order_and_states_its_error() {
         let (order, bound) = ((to.time - passage) / passage.powi(5), to.error / (at(to.time).depth - law.end).abs());
         assert!(near(order, constant) && near(bound, stated), "{velocity}, {part}: {order}, {bound}");
     }
-}
-
-/// A near miss has the boxes narrowed, and they must widen behind it, or their number runs out.
-#[test]
-fn a_simple_root_on_a_corner_behind_a_near_miss_is_the_corner_itself() {
-    for (near, off) in [(0.1, 1e-3), (0.1, 1e-5), (0.1, 1e-6), (0.296_875, 1.0 / 512.0)] {
-        assert_eq!(first_root(&product(&[0.5], &[(near, off)]), 1.0), Some(0.5), "{near}, {off}");
-    }
-    for root in [0.8, 0.95] {
-        let found = first_root(&product(&[root], &[(0.1, 1e-5)]), 1.0).unwrap();
-        assert!((found - root).abs() < 1e-15, "{found} for {root}");
-    }
-}
-
-#[test]
-fn where_nothing_is_told_from_zero_the_root_is_the_middle() {
-    assert_eq!(first_root(&product(&[0.5; 40], &[]), 1.0), Some(0.5));
 }
 
 fn jet(first: f64, second: f64, third: f64) -> Jet<f64> {

@@ -9,7 +9,7 @@ use twofloat::TwoFloat;
 use super::*;
 use crate::physics::closed_form::critical_of_stages;
 use crate::physics::exit_energy::propagate;
-use crate::physics::{Advice, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
+use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
 use crate::studies::relations::{Units, in_units};
 use crate::testing::{Random, continuous, kinds, of_stages, random_concrete, stage, tunnel};
 
@@ -476,7 +476,12 @@ fn events_at_one_place_are_listed_in_order() {
         for (name, flight) in flights(&problem).into_iter().chain(located_by_steps(&problem)) {
             assert_eq!((kinds(&flight.events), flight.stage), (expected.clone(), stage), "{name}");
             assert_eq!((flight.outcome, flight.end.depth), (Outcome::Perforated, problem.exit_depth), "{name}");
-            assert!(flight.events.windows(2).all(|e| e[0].state.time <= e[1].state.time), "{name}");
+            for (before, after) in flight.events.windows(2).map(|e| (e[0].state, e[1].state)) {
+                let is_later = before.time < after.time || after.depth - before.depth < 1e-9;
+                assert!(before.time <= after.time && is_later, "{name}: {before} {after}");
+            }
+            let is_off = |e: &Event| matches!(e.kind, EventKind::StageEnd(i) if e.state.depth != problem.stages[i].end);
+            assert!(!flight.events.iter().any(is_off), "{name}: {:?}", flight.events);
             assert_eq!(flight.events.last().unwrap().state, flight.end, "{name}");
         }
     }

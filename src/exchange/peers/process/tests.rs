@@ -117,48 +117,40 @@ fn a_peer_that_closes_its_output_and_runs_on_has_died() {
 #[test]
 fn nonsense_is_quoted() {
     let failure = failure_of_answer("Loading solver ... done");
-    assert!(
-        failure
-            .to_string()
-            .starts_with("fake 1 none answers nonsense: expected value at line 1 column 1; it printed `Loading")
-    );
-    assert!(nonsense_of_answer("").contains("EOF"));
+    let words = "fake 1 none answers nonsense: expected value at line 1 column 1; it printed `Loading";
+    assert!(failure.to_string().starts_with(words), "{failure}");
     let event = r#"{"event": "\\033[31m", "time_s": 0, "depth_m": 0, "velocity_m_s": 0}"#;
     let why = nonsense_of_answer(&format!(r#"{{"id": 1, "events": [{event}]}}"#));
     assert!(!why.chars().any(char::is_control), "{why:?}");
     let long = ANSWER.replace("0.5", &format!("{:?}", "x".repeat(100_000)));
     assert_eq!(nonsense_of_answer(&long).chars().count(), QUOTED_CHARS + 1);
-    for answer in ["[1, 2]", "[]", "null", "{}", r#"{"id": 1"#, "<html>404</html>"] {
-        assert!(!nonsense_of_answer(answer).is_empty(), "{answer}");
-    }
-    assert!(nonsense_of_answer(&ANSWER.replace("0.5", r#""half a metre""#)).contains("invalid type"));
-    assert!(nonsense_of_answer(&"[".repeat(5000)).contains("line 1"));
 }
 
+/// No answer, an answer to another question, and one that is no number or no outcome, each with words of the refusal.
 #[test]
-fn an_answer_to_another_question_is_nonsense() {
-    assert_eq!(
-        nonsense_of_answer(&ANSWER.replace(r#""id": 1"#, r#""id": 2"#)),
-        "it answers question 2 and was asked question 1"
-    );
-    assert!(nonsense_of_answer(&ANSWER.replace(r#""id": 1"#, r#""id": "1""#)).contains("question \"1\""));
-    for id in ["99", "1.5", "-1", "1e400", "null"] {
-        assert!(!nonsense_of_answer(&ANSWER.replace(r#""id": 1"#, &format!(r#""id": {id}"#))).is_empty(), "{id}");
+fn what_is_no_answer_says_why() {
+    let with = |from: &str, to: &str| ANSWER.replace(from, to);
+    let of_id = |id: &str| with(r#""id": 1"#, &format!(r#""id": {id}"#));
+    let texts = ["[1, 2]", "[]", "null", "{}", r#"{"id": 1"#, "<html>404</html>"].map(|text| (text.to_owned(), ""));
+    let ids = ["99", "1.5", "-1", "1e400", "null"].map(|id| (of_id(id), ""));
+    // All are refused where they stand, in whatever words.
+    let depths = ["NaN", "Infinity", "-Infinity", "nan", "1e400", "-1e400", "1e999", r#""0.1""#, "[0.1]"];
+    for (answer, words) in
+        texts.into_iter().chain(ids).chain(depths.map(|depth| (with("0.5", depth), " at line 1 column "))).chain([
+            (String::new(), "EOF"),
+            (with("0.5", r#""half a metre""#), "invalid type"),
+            ("[".repeat(5000), "line 1"),
+            (of_id("2"), "it answers question 2 and was asked question 1"),
+            (of_id(r#""1""#), "question \"1\""),
+            (with(r#""id": 1, "#, ""), "missing field `id`"),
+            (with("0.5", "null"), "null, expected f64"),
+            (r#"{"id": 1}"#.to_owned(), "missing field `depth_m`"),
+            (with("stopped", "vaporised"), "unknown variant `vaporised`, expected one of `stopped-in-crater`, "),
+        ])
+    {
+        let why = nonsense_of_answer(&answer);
+        assert!(!why.is_empty() && why.contains(words), "{answer:.100}: {why}");
     }
-    assert!(nonsense_of_answer(&ANSWER.replace(r#""id": 1, "#, "")).contains("missing field `id`"));
-}
-
-#[test]
-fn not_a_number_is_no_answer() {
-    for token in ["NaN", "Infinity", "-Infinity", "nan", "1e400", "-1e400", "1e999", r#""0.1""#, "[0.1]"] {
-        let why = nonsense_of_answer(&ANSWER.replace("0.5", token));
-        // All are refused where they stand, in whatever words.
-        assert!(why.contains(" at line 1 column "), "{token}: {why}");
-    }
-    assert!(nonsense_of_answer(&ANSWER.replace("0.5", "null")).contains("null, expected f64"));
-    assert!(nonsense_of_answer(r#"{"id": 1}"#).starts_with("missing field `depth_m`"));
-    let why = nonsense_of_answer(&ANSWER.replace("stopped", "vaporised"));
-    assert!(why.starts_with("unknown variant `vaporised`, expected one of `stopped-in-crater`, "), "{why}");
 }
 
 #[test]
