@@ -456,11 +456,8 @@ pub enum CriticalError {
     #[error("the critical energy leaves the range of 64-bit numbers: the drag over the thickness is too large")]
     OutOfRange,
     /// A stage with viscosity loses energy in proportion to the path's speed, so W(exit) is not affine in V0².
-    #[error("stage {stage} is viscous: the critical velocity has no closed form")]
-    Viscous {
-        /// Index of the stage from 0.
-        stage: usize,
-    },
+    #[error("stage {0} is viscous: the critical velocity has no closed form")]
+    Viscous(usize),
 }
 
 /// Critical velocity of crater and tunnel: the impact speed with `X = H`, the exit depth of `problem`.
@@ -482,26 +479,22 @@ pub fn critical(problem: &Problem, stiffness: CraterStiffness) -> Result<Critica
     }
     let (mass, h) = (problem.mass, problem.exit_depth);
     let (kd, Stage { static_force: p, drag: q, .. }) = problem.crater_depth_and_tunnel();
-    if h <= kd {
-        return Critical::new(
-            mass,
-            match stiffness {
-                // H = k d = 0 is 0/0 in either form: nothing to perforate.
-                _ if h == 0.0 => 0.0,
-                CraterStiffness::Continuous => 0.5 * h * h * p / (kd + q / mass * (kd - h) * (kd + h)),
-                CraterStiffness::Given(c) => 0.5 * c * h * h,
-            },
-        );
-    }
-    let beyond = h - kd;
-    let at_crater_end = p * beyond * expm1_over(2.0 * q * beyond / mass);
-    Critical::new(
-        mass,
+    let energy = if h <= kd {
+        match stiffness {
+            // H = k d = 0 is 0/0 in either form: nothing to perforate.
+            _ if h == 0.0 => 0.0,
+            CraterStiffness::Continuous => 0.5 * h * h * p / (kd + q / mass * (kd - h) * (kd + h)),
+            CraterStiffness::Given(c) => 0.5 * c * h * h,
+        }
+    } else {
+        let beyond = h - kd;
+        let at_crater_end = p * beyond * expm1_over(2.0 * q * beyond / mass);
         match stiffness {
             CraterStiffness::Continuous => at_crater_end * (1.0 + kd * q / mass) + 0.5 * kd * p,
             CraterStiffness::Given(c) => at_crater_end + 0.5 * c * kd * kd,
-        },
-    )
+        }
+    };
+    Critical::new(mass, energy)
 }
 
 /// Critical velocity of stages with fixed coefficients and no viscosity; the impact speed of `problem` is not used.
@@ -523,7 +516,7 @@ pub fn critical_of_stages(problem: &Problem) -> Result<Critical, CriticalError> 
             continue;
         }
         if stage.viscosity > 0.0 {
-            return Err(CriticalError::Viscous { stage: index });
+            return Err(CriticalError::Viscous(index));
         }
         // W(to) = W(from) e^{-y} - loss, solved for W(from); cut before the exponential, which may be infinite.
         let loss = -propagate(stage, problem.mass, 0.0, from, to);

@@ -451,8 +451,7 @@ impl FromStr for Parameter {
         let general = words.collect::<Vec<_>>().join(".");
         let listed = LayerNumber::ALL.map(|which| Self::Layer(index, which)).into_iter();
         let mut all = listed.chain(StageNumber::ALL.map(|which| Self::Stage(index, which))).chain(Self::PLAIN);
-        all.find(|parameter| parameter.entry().path == general)
-            .ok_or_else(|| ParameterError::Unknown { path: path.to_owned() })
+        all.find(|parameter| parameter.entry().path == general).ok_or_else(|| ParameterError::Unknown(path.to_owned()))
     }
 }
 
@@ -461,11 +460,8 @@ impl FromStr for Parameter {
 #[non_exhaustive]
 pub enum ParameterError {
     /// No number of any scene has this path.
-    #[error("`{path}` names no number of a scene")]
-    Unknown {
-        /// The text.
-        path: String,
-    },
+    #[error("`{0}` names no number of a scene")]
+    Unknown(String),
     /// This scene does not have the number.
     #[error("the scene has no `{parameter}`: {why}")]
     Absent {
@@ -489,7 +485,7 @@ pub enum ParameterError {
 impl Advice for ParameterError {
     fn help(&self) -> String {
         match self {
-            Self::Unknown { .. } => {
+            Self::Unknown(_) => {
                 let names = Parameter::PLAIN.map(|parameter| parameter.entry().path).join(", ");
                 format!("choose from {names}, target.layer.0.strength and its like, stage.0.drag and its like")
             }

@@ -98,7 +98,7 @@ impl<S: Scalar> Stage<S> {
 
     /// `to` of each of its numbers.
     #[inline(always)]
-    pub fn map<T>(&self, to: impl Fn(S) -> T) -> Stage<T> {
+    pub fn map<T>(&self, mut to: impl FnMut(S) -> T) -> Stage<T> {
         Stage {
             static_force: to(self.static_force),
             stiffness: to(self.stiffness),
@@ -159,6 +159,17 @@ pub struct Problem<S = f64> {
     pub crater: Option<usize>,
     /// How boundaries and stops are named.
     pub target: Target,
+}
+
+impl<S> Problem<S> {
+    /// Name of a stop in stage `index`.
+    pub fn stop_in(&self, index: usize) -> Outcome {
+        match (self.target, self.crater) {
+            (Target::Stages, _) => Outcome::Stopped,
+            (Target::CraterAndTunnel, Some(crater)) if index <= crater => Outcome::StoppedInCrater,
+            (Target::CraterAndTunnel, _) => Outcome::StoppedInTunnel,
+        }
+    }
 }
 
 impl<S: Scalar> Problem<S> {
@@ -226,15 +237,6 @@ impl<S: Scalar> Problem<S> {
     pub fn limit_of(&self, index: usize) -> S {
         let end = self.stages[index].end;
         if self.exit_depth.value() < end.value() { self.exit_depth } else { end }
-    }
-
-    /// Name of a stop in stage `index`.
-    pub fn stop_in(&self, index: usize) -> Outcome {
-        match (self.target, self.crater) {
-            (Target::Stages, _) => Outcome::Stopped,
-            (Target::CraterAndTunnel, Some(crater)) if index <= crater => Outcome::StoppedInCrater,
-            (Target::CraterAndTunnel, _) => Outcome::StoppedInTunnel,
-        }
     }
 
     /// The same problem in another number type, coefficients taken over by value.
@@ -318,7 +320,7 @@ pub enum EventKind {
 
 impl EventKind {
     /// The event at the end of stage `index` of `problem`.
-    pub fn boundary<S: Scalar>(problem: &Problem<S>, index: usize) -> Self {
+    pub fn boundary<S>(problem: &Problem<S>, index: usize) -> Self {
         if problem.crater == Some(index) { Self::CraterEnd } else { Self::StageEnd(index) }
     }
 

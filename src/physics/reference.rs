@@ -24,7 +24,7 @@ use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
 use thiserror::Error;
 
-use super::problem::{EventKind, Outcome, Problem, Target};
+use super::problem::{Event, EventKind, Outcome, Problem, Stage, Stages, State, Target};
 use super::scene::{CraterStiffness, Criterion, Resistance, Scene};
 
 /// A binary float of any precision, rounding half to even.
@@ -83,24 +83,10 @@ impl Exact {
 }
 
 /// A place and an instant to 50 digits.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ExactState {
-    /// Time since impact (s).
-    pub time: Exact,
-    /// Depth from the impact face (m).
-    pub depth: Exact,
-    /// Velocity (m/s).
-    pub velocity: Exact,
-}
+pub type ExactState = State<Exact>;
 
 /// An event and its exact state.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ExactEvent {
-    /// What happened.
-    pub kind: EventKind,
-    /// When, where and how fast.
-    pub state: ExactState,
-}
+pub type ExactEvent = Event<Exact>;
 
 /// A flight to 50 digits.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +109,29 @@ impl ExactFlight {
     /// State at x = k d, if the flight reached it.
     pub fn crater_end(&self) -> Option<&ExactState> {
         self.events.iter().find(|e| e.kind == EventKind::CraterEnd).map(|e| &e.state)
+    }
+
+    fn same_course(&self, other: &Self) -> bool {
+        self.outcome == other.outcome
+            && self.stage == other.stage
+            && self.events.iter().map(|e| e.kind).eq(other.events.iter().map(|e| e.kind))
+    }
+
+    fn agrees(&self, other: &Self) -> bool {
+        let states = |a: &ExactState, b: &ExactState| {
+            [(&a.time, &b.time), (&a.depth, &b.depth), (&a.velocity, &b.velocity)]
+                .iter()
+                .all(|(a, b)| agree(&a.0, &b.0))
+        };
+        self.same_course(other)
+            && states(&self.end, &other.end)
+            && self.events.iter().zip(&other.events).all(|(a, b)| states(&a.state, &b.state))
+            && match (&self.exit_margin, &other.exit_margin) {
+                // A margin that is all cancellation is good to 50 digits of one.
+                (Some(Exact(a)), Some(Exact(b))) => agree(a, b) || (magnitude(a - b) << AGREEMENT_BITS) < Big::ONE,
+                (None, None) => true,
+                _ => false,
+            }
     }
 }
 
@@ -172,17 +181,11 @@ pub enum ReferenceError {
     #[error("there is no critical velocity")]
     NoCritical,
     /// The scene gives layers, or no impact speed where one is needed.
-    #[error("the reference does not read this scene: {why}")]
-    Scene {
-        /// What it lacks.
-        why: &'static str,
-    },
+    #[error("the reference does not read this scene: {0}")]
+    Scene(&'static str),
     /// Two precisions never agreed: a tie finer than the numbers resolve.
-    #[error("{bits} bits do not settle the answer")]
-    Unsettled {
-        /// Bits of the last attempt.
-        bits: usize,
-    },
+    #[error("{0} bits do not settle the answer")]
+    Unsettled(usize),
 }
 
 /// Where the exact inputs come from.
@@ -199,7 +202,7 @@ pub enum Source<'a> {
 /// # Errors
 /// [`ReferenceError`].
 pub fn flight(source: Source<'_>) -> Result<ExactFlight, ReferenceError> {
-    settled(|bits| solve(&source.model(&source.inputs(bits), bits)?), Raw::agrees).map(|(raw, _)| raw.into_exact())
+    settled(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees).map(|(flight, _)| flight)
 }
 
 /// The critical velocity of `source` to 50 digits; its impact speed is not used.
@@ -208,10 +211,7 @@ pub fn flight(source: Source<'_>) -> Result<ExactFlight, ReferenceError> {
 /// [`ReferenceError`].
 pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
     let (critical, _) = settled(
-        |bits| {
-            squared_critical(source, &source.inputs(bits), bits)
-                .map(|(mass, squared)| [squared.sqrt(), half(mass * squared)])
-        },
+        |bits| squared_critical(source, bits, None).map(|(mass, squared)| [squared.sqrt(), half(mass * squared)]),
         |a, b| a.iter().zip(b).all(|(a, b)| agree(a, b)),
     )?;
     let [velocity, energy] = critical.map(Exact);
@@ -225,46 +225,43 @@ pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
 /// # Errors
 /// [`ReferenceError`].
 pub fn conditions(source: Source<'_>) -> Result<Conditions, ReferenceError> {
-    let (base, bits) = settled(|bits| solve(&source.model(&source.inputs(bits), bits)?), Raw::agrees)?;
-    let crater = base.crater_end().is_some();
-    let mut sum = Conditions {
-        depth: 0.0,
-        time: 0.0,
-        velocity: 0.0,
-        crater_end_time: crater.then_some(0.0),
-        crater_end_velocity: crater.then_some(0.0),
-        exit_margin: base.margin.is_some().then_some(0.0),
-    };
-    let add = |to: &mut Option<f64>, term: f64| {
-        if let Some(to) = to {
-            *to += term;
-        }
-    };
-    for stepped in source.stepped_inputs(bits) {
-        let moved = solve(&source.model(&stepped, bits)?)?;
+    let (base, bits) = settled(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees)?;
+    let mut sums = [0.0; 6];
+    for input in source.moving_inputs()? {
+        let moved = solve(&source.model(bits, Some(input))?)?;
         if !moved.same_course(&base) {
-            let lost = f64::INFINITY;
-            return Ok(Conditions {
-                depth: lost,
-                time: lost,
-                velocity: lost,
-                crater_end_time: crater.then_some(lost),
-                crater_end_velocity: crater.then_some(lost),
-                exit_margin: sum.exit_margin.map(|_| lost),
-            });
+            sums = [f64::INFINITY; 6];
+            break;
         }
-        sum.depth += quotient(&moved.end.depth, &base.end.depth, &base.end.depth);
-        sum.time += quotient(&moved.end.time, &base.end.time, &base.end.time);
-        sum.velocity += quotient(&moved.end.velocity, &base.end.velocity, &base.impact_speed);
-        if let (Some(moved), Some(base_end)) = (moved.crater_end(), base.crater_end()) {
-            add(&mut sum.crater_end_time, quotient(&moved.time, &base_end.time, &base_end.time));
-            add(&mut sum.crater_end_velocity, quotient(&moved.velocity, &base_end.velocity, &base.impact_speed));
-        }
-        if let (Some(moved), Some(margin)) = (&moved.margin, &base.margin) {
-            add(&mut sum.exit_margin, quotient(moved, margin, &int(1, bits)));
+        for (sum, term) in sums.iter_mut().zip(quotients(&moved, &base, bits)) {
+            *sum += term;
         }
     }
-    Ok(sum)
+    let [depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin] = sums;
+    let at_crater_end = |sum| base.crater_end().map(|_| sum);
+    Ok(Conditions {
+        depth,
+        time,
+        velocity,
+        crater_end_time: at_crater_end(crater_end_time),
+        crater_end_velocity: at_crater_end(crater_end_velocity),
+        exit_margin: base.exit_margin.as_ref().map(|_| exit_margin),
+    })
+}
+
+/// The terms of [`Conditions`] for one input, in its order; zero for what the flights do not have.
+fn quotients(moved: &ExactFlight, base: &ExactFlight, bits: usize) -> [f64; 6] {
+    let of = |moved: &Exact, base: &Exact, scale: &Exact| quotient(&moved.0, &base.0, &scale.0);
+    let at = |moved: &ExactState, state: &ExactState| {
+        let velocity = of(&moved.velocity, &state.velocity, &base.impact_speed);
+        [of(&moved.depth, &state.depth, &state.depth), of(&moved.time, &state.time, &state.time), velocity]
+    };
+    let [depth, time, velocity] = at(&moved.end, &base.end);
+    let crater_ends = moved.crater_end().zip(base.crater_end());
+    let [_, crater_end_time, crater_end_velocity] = crater_ends.map_or([0.0; 3], |(moved, base)| at(moved, base));
+    let margins = moved.exit_margin.as_ref().zip(base.exit_margin.as_ref());
+    let exit_margin = margins.map_or(0.0, |(moved, base)| quotient(&moved.0, &base.0, &int(1, bits)));
+    [depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin]
 }
 
 /// Condition number of the critical velocity of `source` with respect to all its inputs.
@@ -272,11 +269,11 @@ pub fn conditions(source: Source<'_>) -> Result<Conditions, ReferenceError> {
 /// # Errors
 /// [`ReferenceError`].
 pub fn critical_condition(source: Source<'_>) -> Result<f64, ReferenceError> {
-    let velocity = |inputs: &[Big], bits| squared_critical(source, inputs, bits).map(|(_, squared)| squared.sqrt());
-    let (base, bits) = settled(|bits| velocity(&source.inputs(bits), bits), agree)?;
+    let velocity = |bits, moved| squared_critical(source, bits, moved).map(|(_, squared)| squared.sqrt());
+    let (base, bits) = settled(|bits| velocity(bits, None), agree)?;
     let mut sum = 0.0;
-    for stepped in source.stepped_inputs(bits) {
-        sum += quotient(&velocity(&stepped, bits)?, &base, &base);
+    for input in source.moving_inputs()? {
+        sum += quotient(&velocity(bits, Some(input))?, &base, &base);
     }
     Ok(sum)
 }
@@ -308,7 +305,7 @@ fn settled<T>(
         }
         last = next;
     }
-    Err(ReferenceError::Unsettled { bits })
+    Err(ReferenceError::Unsettled(bits))
 }
 
 fn agree(a: &Big, b: &Big) -> bool {
@@ -325,6 +322,10 @@ fn big(value: f64, bits: usize) -> Big {
 
 fn int(value: i32, bits: usize) -> Big {
     big(f64::from(value), bits)
+}
+
+fn is_finite(value: &Big) -> bool {
+    *value < Big::INFINITY
 }
 
 fn is_zero(value: &Big) -> bool {
@@ -389,149 +390,111 @@ fn vanishes(value: &Big, size: &Big, bits: usize) -> bool {
     (magnitude(value.clone()) << (bits / 2).cast_signed()) <= *size
 }
 
-/// A stage's coefficients.
-#[derive(Clone, Debug)]
-struct Law {
-    p: Big,
-    s: Big,
-    r: Big,
-    q: Big,
-    end: Option<Big>,
-}
-
-/// A problem in big floats.
+/// A problem in big floats; a depth that it does not have is infinite.
 struct Model {
     bits: usize,
-    mass: Big,
-    impact_speed: Big,
-    exit: Option<Big>,
-    stages: Vec<Law>,
-    crater: Option<usize>,
-    target: Target,
+    problem: Problem<Big>,
+}
+
+/// Place of the impact speed among the inputs of either source.
+const IMPACT_SPEED: usize = 1;
+
+/// The numbers of a source as they are read, one of them moved by a relative 2^-80 where that is asked for.
+struct Inputs {
+    bits: usize,
+    moved: Option<usize>,
+    /// Those read so far, without infinite ones.
+    values: Vec<f64>,
+}
+
+impl Inputs {
+    fn number(&mut self, value: f64) -> Big {
+        if value.is_infinite() {
+            return Big::INFINITY;
+        }
+        let exact = big(value, self.bits);
+        let moves = self.moved == Some(self.values.len());
+        self.values.push(value);
+        if moves { &exact + (exact.clone() >> STEP_BITS) } else { exact }
+    }
+
+    fn stages(&mut self, stages: &[Stage]) -> Stages<Big> {
+        stages.iter().map(|stage| stage.map(|value| self.number(value))).collect()
+    }
 }
 
 impl Source<'_> {
-    /// Every number that goes in, in the order that [`Source::model`] reads them.
-    fn inputs(&self, bits: usize) -> Vec<Big> {
-        let mut list = Vec::new();
-        match self {
-            Self::Problem(problem) => {
-                list.extend([problem.mass, problem.impact_speed]);
-                list.extend(problem.has_exit().then_some(problem.exit_depth));
-                for stage in &problem.stages {
-                    list.extend([stage.static_force, stage.stiffness, stage.viscosity, stage.drag]);
-                    list.extend(stage.end.is_finite().then_some(stage.end));
-                }
-            }
-            Self::Scene(scene, impact_speed) => {
-                list.extend([scene.mass, *impact_speed]);
-                list.extend(scene.thickness);
-                match &scene.resistance {
-                    Resistance::Concrete(concrete) => {
-                        list.extend([
-                            concrete.diameter,
-                            concrete.nose_factor,
-                            concrete.strength,
-                            concrete.density,
-                            concrete.static_factor,
-                            concrete.inertia_factor,
-                            concrete.crater_ratio,
-                        ]);
-                        if let CraterStiffness::Given(stiffness) = concrete.crater_stiffness {
-                            list.push(stiffness);
-                        }
-                    }
-                    Resistance::Stages(stages) => {
-                        for stage in stages {
-                            list.extend([stage.static_force, stage.stiffness, stage.viscosity, stage.drag]);
-                            list.extend(stage.end.is_finite().then_some(stage.end));
-                        }
-                    }
-                }
-            }
+    /// The inputs that are not zero, by their places.
+    fn moving_inputs(self) -> Result<Vec<usize>, ReferenceError> {
+        let mut inputs = Inputs { bits: FIRST_BITS, moved: None, values: Vec::new() };
+        self.read(&mut inputs)?;
+        Ok((0..inputs.values.len()).filter(|&i| inputs.values[i] != 0.0).collect())
+    }
+
+    /// The problem with `bits` bits, the input at the place `moved` moved by a relative 2^-80.
+    fn model(self, bits: usize, moved: Option<usize>) -> Result<Model, ReferenceError> {
+        Ok(Model { bits, problem: self.read(&mut Inputs { bits, moved, values: Vec::new() })? })
+    }
+
+    fn read(self, inputs: &mut Inputs) -> Result<Problem<Big>, ReferenceError> {
+        let [mass, impact_speed] = match self {
+            Self::Problem(problem) => [problem.mass, problem.impact_speed],
+            Self::Scene(scene, impact_speed) => [scene.mass, impact_speed],
         }
-        list.into_iter().map(|value| big(value, bits)).collect()
-    }
-
-    /// The inputs with one of them moved by a relative 2^-80, for each that is not zero.
-    fn stepped_inputs(&self, bits: usize) -> impl Iterator<Item = Vec<Big>> {
-        let inputs = self.inputs(bits);
-        (0..inputs.len())
-            .filter(|&i| !is_zero(&inputs[i]))
-            .map(move_one(inputs.clone()))
-            .collect::<Vec<_>>()
-            .into_iter()
-    }
-
-    /// The problem that `inputs` describe.
-    fn model(&self, inputs: &[Big], bits: usize) -> Result<Model, ReferenceError> {
-        let short = ReferenceError::Scene { why: "inputs are missing" };
-        let mut next = {
-            let mut rest = inputs.iter();
-            move || rest.next().cloned().ok_or_else(|| short.clone())
+        .map(|value| inputs.number(value));
+        let exit_depth = inputs.number(match self {
+            Self::Problem(problem) => problem.exit_depth,
+            Self::Scene(scene, _) => scene.thickness.unwrap_or(f64::INFINITY),
+        });
+        let (scene, concrete) = match self {
+            Self::Problem(&Problem { ref stages, crater, target, .. }) => {
+                let stages = inputs.stages(stages);
+                return Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target });
+            }
+            Self::Scene(Scene { resistance: Resistance::Stages(stages), .. }, _) => {
+                let stages = inputs.stages(stages);
+                return Ok(Problem { mass, impact_speed, exit_depth, stages, crater: None, target: Target::Stages });
+            }
+            Self::Scene(scene @ Scene { resistance: Resistance::Concrete(concrete), .. }, _) => (scene, concrete),
         };
-        let mass = next()?;
-        let impact_speed = next()?;
-        let mut outright = |stages: &[super::problem::Stage], exit: bool| {
-            let exit = if exit { Some(next()?) } else { None };
-            let mut laws = Vec::with_capacity(stages.len());
-            for stage in stages {
-                let (p, s, r, q) = (next()?, next()?, next()?, next()?);
-                let end = if stage.end.is_finite() { Some(next()?) } else { None };
-                laws.push(Law { p, s, r, q, end });
-            }
-            Ok((exit, laws))
-        };
-        match self {
-            Self::Problem(problem) => {
-                let (exit, stages) = outright(&problem.stages, problem.has_exit())?;
-                Ok(Model { bits, mass, impact_speed, exit, stages, crater: problem.crater, target: problem.target })
-            }
-            Self::Scene(Scene { resistance: Resistance::Stages(stages), thickness, .. }, _) => {
-                let (exit, stages) = outright(stages, thickness.is_some())?;
-                Ok(Model { bits, mass, impact_speed, exit, stages, crater: None, target: Target::Stages })
-            }
-            Self::Scene(Scene { resistance: Resistance::Concrete(concrete), thickness, criterion, .. }, _) => {
-                if !concrete.layers.is_empty() {
-                    return Err(ReferenceError::Scene { why: "it has layers; give the problem it resolves into" });
-                }
-                let thickness = if thickness.is_some() { Some(next()?) } else { None };
-                let (d, nose, strength, density) = (next()?, next()?, next()?, next()?);
-                let (static_factor, inertia_factor, k) = (next()?, next()?, next()?);
-                let area = Big::pi(bits) * square(&d) / int(4, bits);
-                let p = &area * static_factor * strength;
-                let q = area * nose * inertia_factor * density;
-                let kd = k * &d;
-                let exit = match criterion {
-                    Criterion::FullDepth => thickness,
-                    Criterion::Ndrc => thickness.map(|h| ndrc_depth(&h, &d, bits)),
-                };
-                let mut stages = Vec::with_capacity(2);
-                let crater = is_positive(&kd).then_some(0);
-                if crater.is_some() {
-                    let s = match concrete.crater_stiffness {
-                        CraterStiffness::Given(_) => next()?,
-                        // From c k d = P + Q V1² and M V1² = M V0² - c (k d)².
-                        CraterStiffness::Continuous => {
-                            let work = &mass * (&p + &q * square(&impact_speed));
-                            work / (&kd * (&mass + &kd * &q))
-                        }
-                    };
-                    stages.push(Law { p: Big::ZERO, s, r: Big::ZERO, q: Big::ZERO, end: Some(kd) });
-                }
-                stages.push(Law { p, s: Big::ZERO, r: Big::ZERO, q, end: None });
-                Ok(Model { bits, mass, impact_speed, exit, stages, crater, target: Target::CraterAndTunnel })
-            }
+        if !concrete.layers.is_empty() {
+            return Err(ReferenceError::Scene("it has layers; give the problem it resolves into"));
         }
-    }
-}
-
-/// Steps input `i` of a copy of `inputs`.
-fn move_one(inputs: Vec<Big>) -> impl Fn(usize) -> Vec<Big> {
-    move |i| {
-        let mut moved = inputs.clone();
-        moved[i] = &inputs[i] + (inputs[i].clone() >> STEP_BITS);
-        moved
+        let [d, nose, strength, density, static_factor, inertia_factor, k] = [
+            concrete.diameter,
+            concrete.nose_factor,
+            concrete.strength,
+            concrete.density,
+            concrete.static_factor,
+            concrete.inertia_factor,
+            concrete.crater_ratio,
+        ]
+        .map(|value| inputs.number(value));
+        let area = Big::pi(inputs.bits) * square(&d) / int(4, inputs.bits);
+        let p = &area * static_factor * strength;
+        let q = area * nose * inertia_factor * density;
+        let kd = k * &d;
+        let exit_depth = match scene.criterion {
+            Criterion::Ndrc if scene.thickness.is_some() => ndrc_depth(&exit_depth, &d, inputs.bits),
+            _ => exit_depth,
+        };
+        let law =
+            |static_force, stiffness, drag, end| Stage { static_force, stiffness, viscosity: Big::ZERO, drag, end };
+        let mut stages = Stages::new();
+        let crater = is_positive(&kd).then_some(0);
+        if crater.is_some() {
+            let stiffness = match concrete.crater_stiffness {
+                CraterStiffness::Given(stiffness) => inputs.number(stiffness),
+                // From c k d = P + Q V1² and M V1² = M V0² - c (k d)².
+                CraterStiffness::Continuous => {
+                    let work = &mass * (&p + &q * square(&impact_speed));
+                    work / (&kd * (&mass + &kd * &q))
+                }
+            };
+            stages.push(law(Big::ZERO, stiffness, Big::ZERO, kd));
+        }
+        stages.push(law(p, Big::ZERO, q, Big::INFINITY));
+        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target: Target::CraterAndTunnel })
     }
 }
 
@@ -551,96 +514,33 @@ fn ndrc_depth(h: &Big, d: &Big, bits: usize) -> Big {
     y * d
 }
 
-/// Time, depth, velocity.
-#[derive(Clone)]
-struct Point {
-    time: Big,
-    depth: Big,
-    velocity: Big,
-}
+/// A state at one precision.
+type Point = State<Big>;
 
-/// A flight at one precision.
-struct Raw {
-    outcome: Outcome,
-    stage: usize,
-    end: Point,
-    events: Vec<(EventKind, Point)>,
-    margin: Option<Big>,
-    impact_speed: Big,
-}
-
-impl Raw {
-    fn same_course(&self, other: &Self) -> bool {
-        self.outcome == other.outcome
-            && self.stage == other.stage
-            && self.events.iter().map(|e| e.0).eq(other.events.iter().map(|e| e.0))
-    }
-
-    fn agrees(&self, other: &Self) -> bool {
-        let points = |a: &Point, b: &Point| {
-            agree(&a.time, &b.time) && agree(&a.depth, &b.depth) && agree(&a.velocity, &b.velocity)
-        };
-        self.same_course(other)
-            && points(&self.end, &other.end)
-            && self.events.iter().zip(&other.events).all(|(a, b)| points(&a.1, &b.1))
-            && match (&self.margin, &other.margin) {
-                // A margin that is all cancellation is good to 50 digits of one.
-                (Some(a), Some(b)) => agree(a, b) || (magnitude(a - b) << AGREEMENT_BITS) < Big::ONE,
-                (None, None) => true,
-                _ => false,
-            }
-    }
-
-    fn crater_end(&self) -> Option<&Point> {
-        self.events.iter().find(|e| e.0 == EventKind::CraterEnd).map(|e| &e.1)
-    }
-
-    fn into_exact(self) -> ExactFlight {
-        let state = |p: Point| ExactState { time: Exact(p.time), depth: Exact(p.depth), velocity: Exact(p.velocity) };
-        ExactFlight {
-            outcome: self.outcome,
-            stage: self.stage,
-            end: state(self.end),
-            events: self.events.into_iter().map(|(kind, p)| ExactEvent { kind, state: state(p) }).collect(),
-            exit_margin: self.margin.map(Exact),
-            impact_speed: Exact(self.impact_speed),
-        }
-    }
+fn exact(Point { time, depth, velocity }: &Point) -> ExactState {
+    State { time: Exact(time.clone()), depth: Exact(depth.clone()), velocity: Exact(velocity.clone()) }
 }
 
 impl Model {
     /// Where stage `index` is left: its end or the exit; none when there is neither.
     fn limit(&self, index: usize) -> Option<&Big> {
-        match (&self.stages[index].end, &self.exit) {
-            (Some(end), Some(exit)) => Some(if exit < end { exit } else { end }),
-            (end, exit) => end.as_ref().or(exit.as_ref()),
-        }
-    }
-
-    fn boundary(&self, index: usize) -> EventKind {
-        if self.crater == Some(index) { EventKind::CraterEnd } else { EventKind::StageEnd(index) }
-    }
-
-    fn stop_in(&self, index: usize) -> Outcome {
-        match (self.target, self.crater) {
-            (Target::Stages, _) => Outcome::Stopped,
-            (Target::CraterAndTunnel, Some(crater)) if index <= crater => Outcome::StoppedInCrater,
-            (Target::CraterAndTunnel, _) => Outcome::StoppedInTunnel,
-        }
+        let (end, exit) = (&self.problem.stages[index].end, &self.problem.exit_depth);
+        Some(if exit < end { exit } else { end }).filter(|limit| is_finite(limit))
     }
 }
 
 /// Solves the model.
-fn solve(model: &Model) -> Result<Raw, ReferenceError> {
-    let zero = int(0, model.bits);
-    let mut now = Point { time: zero.clone(), depth: zero.clone(), velocity: model.impact_speed.clone() };
-    let mut events: Vec<(EventKind, Point)> = Vec::new();
+fn solve(model: &Model) -> Result<ExactFlight, ReferenceError> {
+    let (problem, zero) = (&model.problem, int(0, model.bits));
+    let mut now = Point { time: zero.clone(), depth: zero.clone(), velocity: problem.impact_speed.clone() };
+    let mut events: Vec<ExactEvent> = Vec::new();
     let mut solved_last = None;
-    let finish = |outcome, stage, end: Point, events: Vec<(EventKind, Point)>| {
-        let margin = margin(model, outcome, stage, &end, &events);
-        Raw { outcome, stage, end, events, margin, impact_speed: model.impact_speed.clone() }
+    let finish = |outcome, stage, end: Point, events: Vec<ExactEvent>| {
+        let exit_margin = margin(model, outcome, stage, &end, &events).map(Exact);
+        let impact_speed = Exact(problem.impact_speed.clone());
+        ExactFlight { outcome, stage, end: exact(&end), events, exit_margin, impact_speed }
     };
-    for (index, law) in model.stages.iter().enumerate() {
+    for (index, law) in problem.stages.iter().enumerate() {
         let limit = model.limit(index);
         if limit.is_none_or(|limit| *limit > now.depth) {
             let rests = if is_zero(&now.velocity) {
@@ -652,18 +552,18 @@ fn solve(model: &Model) -> Result<Raw, ReferenceError> {
                 rests
             };
             if rests {
-                events.push((EventKind::Rest, now.clone()));
+                events.push(Event { kind: EventKind::Rest, state: exact(&now) });
                 let stage = solved_last.unwrap_or(index);
-                return Ok(finish(model.stop_in(stage), stage, now, events));
+                return Ok(finish(problem.stop_in(stage), stage, now, events));
             }
         }
-        if law.end.is_some() && law.end.as_ref() == limit {
+        if limit == Some(&law.end) {
             // Even at the exit: the last stage there, which has no length, does that, so that every end is listed before.
-            events.push((model.boundary(index), now.clone()));
+            events.push(Event { kind: EventKind::boundary(problem, index), state: exact(&now) });
         } else if limit.is_some() {
-            events.push((EventKind::Exit, now.clone()));
+            events.push(Event { kind: EventKind::Exit, state: exact(&now) });
             if is_zero(&now.velocity) {
-                events.push((EventKind::Rest, now.clone()));
+                events.push(Event { kind: EventKind::Rest, state: exact(&now) });
             }
             return Ok(finish(Outcome::Perforated, solved_last.unwrap_or(index), now, events));
         }
@@ -675,12 +575,12 @@ fn solve(model: &Model) -> Result<Raw, ReferenceError> {
 fn through(
     model: &Model,
     index: usize,
-    law: &Law,
+    law: &Stage<Big>,
     from: &Point,
     limit: Option<&Big>,
 ) -> Result<(Point, bool), ReferenceError> {
-    if is_positive(&law.r) {
-        if is_positive(&law.q) {
+    if is_positive(&law.viscosity) {
+        if is_positive(&law.drag) {
             return Err(ReferenceError::Unsupported { stage: index, why: "viscosity and drag act together" });
         }
         return damped(model, law, from, limit);
@@ -688,7 +588,8 @@ fn through(
     // Without viscosity W over x decides. In a resisting or driven stage alike W >= 0 at the limit means W > 0 before.
     let bits = model.bits;
     if let Some(limit) = limit {
-        let (gain, loss) = squared_speed_terms(law, &model.mass, &square(&from.velocity), &from.depth, limit, bits);
+        let (gain, loss) =
+            squared_speed_terms(law, &model.problem.mass, &square(&from.velocity), &from.depth, limit, bits);
         let w = &gain - &loss;
         let touches = vanishes(&w, &(magnitude(gain) + magnitude(loss)), bits);
         if touches || is_positive(&w) {
@@ -704,8 +605,8 @@ fn through(
 }
 
 /// W at `to` as gain minus loss, `w` at `from` taken through a stage without viscosity.
-fn squared_speed_terms(law: &Law, mass: &Big, w: &Big, from: &Big, to: &Big, bits: usize) -> (Big, Big) {
-    let Law { p, s, q, .. } = law;
+fn squared_speed_terms(law: &Stage<Big>, mass: &Big, w: &Big, from: &Big, to: &Big, bits: usize) -> (Big, Big) {
+    let Stage { static_force: p, stiffness: s, drag: q, .. } = law;
     if is_zero(q) {
         let work = p * (to - from) + half(s * (square(to) - square(from)));
         return (w.clone(), twice(work) / mass);
@@ -717,9 +618,9 @@ fn squared_speed_terms(law: &Law, mass: &Big, w: &Big, from: &Big, to: &Big, bit
 }
 
 /// Depth of rest in a stage without viscosity and without a limit.
-fn rest_depth(model: &Model, law: &Law, from: &Point) -> Result<Big, ReferenceError> {
-    let Law { p, s, q, .. } = law;
-    let (mass, w0, bits) = (&model.mass, square(&from.velocity), model.bits);
+fn rest_depth(model: &Model, law: &Stage<Big>, from: &Point) -> Result<Big, ReferenceError> {
+    let Stage { static_force: p, stiffness: s, drag: q, .. } = law;
+    let (mass, w0, bits) = (&model.problem.mass, square(&from.velocity), model.bits);
     match (is_positive(s), is_positive(q)) {
         (false, _) if !is_positive(p) => Err(ReferenceError::NeverEnds),
         (false, false) => Ok(&from.depth + mass * w0 / twice(p.clone())),
@@ -748,9 +649,9 @@ fn rest_depth(model: &Model, law: &Law, from: &Point) -> Result<Big, ReferenceEr
 }
 
 /// Time from `from` to depth `to`, where the speed is `velocity`, in a stage without viscosity.
-fn passage_time(model: &Model, law: &Law, from: &Point, to: &Big, velocity: &Big) -> Big {
-    let Law { p, s, q, .. } = law;
-    let (mass, bits, v0) = (&model.mass, model.bits, &from.velocity);
+fn passage_time(model: &Model, law: &Stage<Big>, from: &Point, to: &Big, velocity: &Big) -> Big {
+    let Stage { static_force: p, stiffness: s, drag: q, .. } = law;
+    let (mass, bits, v0) = (&model.problem.mass, model.bits, &from.velocity);
     let xi = to - &from.depth;
     if is_zero(&xi) {
         return int(0, bits);
@@ -783,7 +684,7 @@ fn passage_time(model: &Model, law: &Law, from: &Point, to: &Big, velocity: &Big
 ///
 /// With `x = a + (b - a) z`, `z = 1/(1 + e^{-2 sigma})`, `sigma = (pi/2) sinh(h j)`. W near its zero is a difference,
 /// which costs the time of rest half of its bits: the attempts with more of them make up for it.
-fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
+fn quadrature(model: &Model, law: &Stage<Big>, from: &Point, to: &Big) -> Big {
     let bits = model.bits;
     let one = int(1, bits);
     let length = to - &from.depth;
@@ -803,7 +704,7 @@ fn quadrature(model: &Model, law: &Law, from: &Point, to: &Big) -> Big {
         let near_end = &one / (&one + &far);
         let z = &far / (&one + &far);
         let x = &from.depth + &length * &z;
-        let (gain, loss) = squared_speed_terms(law, &model.mass, &squared, &from.depth, &x, bits);
+        let (gain, loss) = squared_speed_terms(law, &model.problem.mass, &squared, &from.depth, &x, bits);
         let w = gain - loss;
         if !is_positive(&w) {
             continue;
@@ -824,8 +725,8 @@ enum Linear {
 }
 
 impl Linear {
-    fn new(law: &Law, mass: &Big, from: &Point, bits: usize) -> Self {
-        let Law { p, s, r, .. } = law;
+    fn new(law: &Stage<Big>, mass: &Big, from: &Point, bits: usize) -> Self {
+        let Stage { static_force: p, stiffness: s, viscosity: r, .. } = law;
         if is_zero(s) {
             let (start, speed) = (from.depth.clone(), from.velocity.clone());
             return Self::Drift { start, speed, rate: r / mass, drift: p / r };
@@ -898,9 +799,9 @@ impl Linear {
 }
 
 /// A stage `p + s x + r V`: the point at `limit` and `false`, or the point of rest and `true`.
-fn damped(model: &Model, law: &Law, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
+fn damped(model: &Model, law: &Stage<Big>, from: &Point, limit: Option<&Big>) -> Result<(Point, bool), ReferenceError> {
     let bits = model.bits;
-    let motion = Linear::new(law, &model.mass, from, bits);
+    let motion = Linear::new(law, &model.problem.mass, from, bits);
     let rest = motion.rest_time(bits);
     if let Some(rest) = &rest {
         let (depth, _) = motion.after(rest);
@@ -958,12 +859,12 @@ fn root(low: &Big, high: &Big, bits: usize, value_and_slope: impl Fn(&Big) -> (B
 }
 
 /// The exit margin: least W over the stage ends ahead and the exit, over V0².
-fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[(EventKind, Point)]) -> Option<Big> {
-    let exit = model.exit.as_ref()?;
-    if is_zero(&model.impact_speed) {
+fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[ExactEvent]) -> Option<Big> {
+    let Problem { mass, impact_speed, exit_depth, stages, .. } = &model.problem;
+    if !is_finite(exit_depth) || is_zero(impact_speed) {
         return None;
     }
-    let scale = square(&model.impact_speed);
+    let scale = square(impact_speed);
     let mut least: Option<Big> = None;
     let mut take = |w: Big| {
         if least.as_ref().is_none_or(|least| w < *least) {
@@ -971,26 +872,25 @@ fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[
         }
     };
     if outcome == Outcome::Perforated {
-        for (kind, point) in events {
+        for Event { kind, state } in events {
             if *kind != EventKind::Rest {
-                take(square(&point.velocity));
+                take(square(&state.velocity.0));
             }
         }
     } else {
         let (mut w, mut from) = (int(0, model.bits), end.depth.clone());
-        for index in stage..model.stages.len() {
-            let law = &model.stages[index];
+        for (index, law) in stages.iter().enumerate().skip(stage) {
             let to = model.limit(index)?.clone();
-            if is_positive(&law.r) {
-                let work = &law.p * (&to - &from) + half(&law.s * (square(&to) - square(&from)));
-                w -= twice(work) / &model.mass;
+            if is_positive(&law.viscosity) {
+                let work = &law.static_force * (&to - &from) + half(&law.stiffness * (square(&to) - square(&from)));
+                w -= twice(work) / mass;
             } else {
-                let (gain, loss) = squared_speed_terms(law, &model.mass, &w, &from, &to, model.bits);
+                let (gain, loss) = squared_speed_terms(law, mass, &w, &from, &to, model.bits);
                 w = gain - loss;
             }
             take(w.clone());
             from = to;
-            if law.end.as_ref().is_none_or(|end| end >= exit) {
+            if law.end >= *exit_depth {
                 break;
             }
         }
@@ -999,31 +899,36 @@ fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[
 }
 
 /// Mass and `V_c²`: W at each stage end up to the exit is affine in V0², and none may be below zero.
-fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(Big, Big), ReferenceError> {
-    // The models at V0² = 0 and 1 (input 1 is the impact speed in either source): only a continuous crater differs.
-    let at = |impact_speed: i32| {
-        let mut inputs = inputs.to_vec();
-        inputs[1] = int(impact_speed, bits);
-        source.model(&inputs, bits)
+fn squared_critical(source: Source<'_>, bits: usize, moved: Option<usize>) -> Result<(Big, Big), ReferenceError> {
+    // The models at V0² = 0 and 1: only a continuous crater differs.
+    let at = |impact_speed| {
+        let source = match source {
+            Source::Scene(scene, _) => Source::Scene(scene, impact_speed),
+            problem @ Source::Problem(_) => problem,
+        };
+        source.model(bits, moved.filter(|input| *input != IMPACT_SPEED))
     };
-    let (model, moved) = (at(0)?, at(1)?);
-    let exit = model.exit.as_ref().ok_or(ReferenceError::NoCritical)?;
+    let (model, moved) = (at(0.0)?, at(1.0)?);
+    let Problem { mass, exit_depth, stages, .. } = &model.problem;
+    if !is_finite(exit_depth) {
+        return Err(ReferenceError::NoCritical);
+    }
     // W = w + slope V0² at depth `from`.
     let (mut w, mut slope, mut from) = (int(0, bits), int(1, bits), int(0, bits));
     let mut squared = int(0, bits);
-    for (index, (law, moved_law)) in model.stages.iter().zip(&moved.stages).enumerate() {
+    for (index, (law, moved_law)) in stages.iter().zip(&moved.problem.stages).enumerate() {
         let to = model.limit(index).ok_or(ReferenceError::NoCritical)?;
         if *to > from {
-            if is_positive(&law.r) {
+            if is_positive(&law.viscosity) {
                 return Err(ReferenceError::NoCritical);
             }
-            let beyond = |law: &Law, w: &Big| {
-                let (gain, loss) = squared_speed_terms(law, &model.mass, w, &from, to, bits);
+            let beyond = |law: &Stage<Big>, w: &Big| {
+                let (gain, loss) = squared_speed_terms(law, mass, w, &from, to, bits);
                 gain - loss
             };
             // Only the continuous crater needs the difference, in which a slope of e^{-y} would drown.
-            slope = if law.s == moved_law.s {
-                slope * (-(twice(&law.q * (to - &from)) / &model.mass)).exp()
+            slope = if law.stiffness == moved_law.stiffness {
+                slope * (-(twice(&law.drag * (to - &from)) / mass)).exp()
             } else {
                 beyond(moved_law, &(&w + slope)) - beyond(law, &w)
             };
@@ -1034,11 +939,11 @@ fn squared_critical(source: Source<'_>, inputs: &[Big], bits: usize) -> Result<(
                 squared = demand;
             }
         }
-        if law.end.as_ref().is_none_or(|end| end >= exit) {
+        if law.end >= *exit_depth {
             break;
         }
     }
-    Ok((model.mass, squared))
+    Ok((mass.clone(), squared))
 }
 
 #[cfg(test)]

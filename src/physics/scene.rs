@@ -180,11 +180,8 @@ pub enum ResolveError {
         previous: f64,
     },
     /// The last stage ends inside the target.
-    #[error("the last stage ends at {} m, inside the target", Shown(*.end))]
-    TargetGoesOn {
-        /// End of the last stage (m).
-        end: f64,
-    },
+    #[error("the last stage ends at {} m, inside the target", Shown(*.0))]
+    TargetGoesOn(f64),
     /// The thickness of a layered target is not the sum of its layers.
     #[error("the layers sum up to {} m, the target's thickness says {} m", Shown(*.sum), Shown(*.thickness))]
     LayersDoNotSumUp {
@@ -215,7 +212,7 @@ impl Advice for ResolveError {
             Self::NoDiameter => "take the criterion `full-depth`",
             Self::NoStage => "give at least one stage",
             Self::StageEndsFall { .. } => "order the stages by their ends, and leave out only the last end",
-            Self::TargetGoesOn { .. } => "leave out the end of the last stage, or end the target there",
+            Self::TargetGoesOn(_) => "leave out the end of the last stage, or end the target there",
             Self::LayersDoNotSumUp { .. } => "leave out the thickness; it follows from the layers",
             Self::OutOfRange { .. } => "check the units of the scene; its numbers lie too far apart",
         }
@@ -427,7 +424,7 @@ fn given<S: Scalar>(
         return Err(ResolveError::NoStage);
     }
     if previous < exit_depth {
-        return Err(ResolveError::TargetGoesOn { end: previous });
+        return Err(ResolveError::TargetGoesOn(previous));
     }
     let lifted = |(index, stage): (usize, &Stage)| {
         let of = |which: StageNumber| number(Parameter::Stage(index, which), which.of(*stage));
@@ -751,7 +748,7 @@ mod tests {
         let stages = vec![at(0.4), at(0.4), Stage::tunnel(5.0, 0.0)];
         let problem = stages_scene(stages.clone()).problem().unwrap();
         assert_eq!((problem.stages.to_vec(), problem.crater, problem.target), (stages, None, Target::Stages));
-        assert_eq!(stages_scene(vec![at(0.4)]).problem(), Err(ResolveError::TargetGoesOn { end: 0.4 }));
+        assert_eq!(stages_scene(vec![at(0.4)]).problem(), Err(ResolveError::TargetGoesOn(0.4)));
         let ending = Scene { thickness: Some(0.4), ..stages_scene(vec![at(0.4)]) };
         assert_eq!(ending.problem().unwrap().stages[0].end, f64::INFINITY);
         for ends in [[0.4, 0.3, f64::INFINITY], [0.4, f64::INFINITY, f64::INFINITY], [0.4, f64::NAN, f64::INFINITY]] {
@@ -847,7 +844,7 @@ mod tests {
             ResolveError::NoDiameter,
             ResolveError::NoStage,
             ResolveError::StageEndsFall { stage: 1, end: 0.3, previous: 0.4 },
-            ResolveError::TargetGoesOn { end: 0.4 },
+            ResolveError::TargetGoesOn(0.4),
             ResolveError::LayersDoNotSumUp { sum: 0.3, thickness: 1.0 },
             ResolveError::OutOfRange { quantity: "the drag Q [kg/m]", value: 1e-310 },
         ] {

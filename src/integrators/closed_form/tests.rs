@@ -429,7 +429,7 @@ fn a_barrier_before_a_drive_decides_the_critical_velocity() {
     let critical = critical_of_stages(&problem(&stages, 2.0, 1.0, 1.5)).unwrap();
     assert!((critical.energy / 1e5 - 1.0).abs() < 4.0 * f64::EPSILON);
     let viscous = [Stage { viscosity: 1.0, ..stages[2] }];
-    assert_eq!(critical_of_stages(&problem(&viscous, 2.0, 1.0, 1.5)), Err(CriticalError::Viscous { stage: 0 }));
+    assert_eq!(critical_of_stages(&problem(&viscous, 2.0, 1.0, 1.5)), Err(CriticalError::Viscous(0)));
 }
 
 #[test]
