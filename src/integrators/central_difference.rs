@@ -30,7 +30,7 @@ pub(crate) mod tests;
 use serde::Deserialize;
 
 use super::flight::at_once;
-use super::outcome::{Detail, Flight, IntegrationError, Integrator};
+use super::outcome::{Detail, Flight, IntegrationError, Integrator, Solved};
 use crate::physics::{Problem, Scalar, State};
 use boundaries::Run;
 use scheme::Stepper;
@@ -164,7 +164,7 @@ impl Integrator for CentralDifference {
         NAME
     }
 
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
         self.solve_in(problem, detail)
     }
 }
@@ -196,7 +196,7 @@ impl CentralDifference {
     /// - `NotFinite`: x or V overflowed, as beyond the stability limit they may;
     /// - `NeverEnds`: no exit depth, and a last stage without a static force that resists; or the velocity died out
     ///   without a force at rest.
-    pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Result<Flight<S>, IntegrationError> {
+    pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
         self.check::<S>()?;
         match at_once(problem, detail) {
             Some(flight) => Ok(flight),
@@ -209,11 +209,7 @@ impl CentralDifference {
     ///
     /// # Errors
     /// `BadOption` as in [`Self::solve_in`]. States may overflow to infinity and NaN: that is what they are for.
-    pub fn free_states<S: Scalar>(
-        &self,
-        problem: &Problem<S>,
-        count: usize,
-    ) -> Result<Vec<State<S>>, IntegrationError> {
+    pub fn free_states<S: Scalar>(&self, problem: &Problem<S>, count: usize) -> Solved<Vec<State<S>>> {
         self.check::<S>()?;
         Ok(Stepper::new(self, problem).free(count))
     }
@@ -230,7 +226,7 @@ impl CentralDifference {
         problem: &Problem<S>,
         source: impl Fn(usize, S) -> S,
         ends: &[f64],
-    ) -> Result<Vec<State<S>>, IntegrationError> {
+    ) -> Solved<Vec<State<S>>> {
         self.check::<S>()?;
         if ends.is_empty() || ends.len() > problem.stages.len() {
             let value = format!("{} times", ends.len());
@@ -240,7 +236,7 @@ impl CentralDifference {
     }
 
     /// Refuses options outside their domain, as numbers of type `S`.
-    fn check<S: Scalar>(&self) -> Result<(), IntegrationError> {
+    fn check<S: Scalar>(&self) -> Solved<()> {
         let bad = |option, value: &str, allowed| Err(IntegrationError::bad_option(option, value, allowed));
         let is_bad = |size: &&f64| {
             let size = S::from_f64(**size).value();

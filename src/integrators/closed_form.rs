@@ -3,7 +3,7 @@
 //! [`crate::physics::closed_form`] has the formulas of one stage. A scene that enters a stage without one is refused.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample};
+use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample, Solved};
 use crate::physics::closed_form::{cross, cross_continuous_crater, margin_error};
 use crate::physics::{CraterStiffness, Problem, State};
 
@@ -33,7 +33,7 @@ impl Integrator for ClosedForm {
         "closed-form"
     }
 
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
         let mut flight = flight::solve(problem, detail.min(Detail::Events), &mut Exact { continuous: false })?;
         if detail == Detail::Trajectory && flight.end.time > 0.0 {
             flight.trajectory = path(problem, &flight, INTERVALS, |share| share)?;
@@ -68,7 +68,7 @@ impl Integrator for ClosedForm {
 ///
 /// # Errors
 /// As [`ClosedForm`].
-pub fn solve_crater_and_tunnel(problem: &Problem, stiffness: CraterStiffness) -> Result<Flight, IntegrationError> {
+pub fn solve_crater_and_tunnel(problem: &Problem, stiffness: CraterStiffness) -> Solved {
     let continuous = stiffness == CraterStiffness::Continuous;
     flight::solve(problem, Detail::Events, &mut Exact { continuous })
 }
@@ -79,7 +79,7 @@ pub fn solve_crater_and_tunnel(problem: &Problem, stiffness: CraterStiffness) ->
 ///
 /// # Errors
 /// As [`ClosedForm`], for the stages up to `depth` only.
-pub fn state_at(problem: &Problem, depth: f64) -> Result<Option<State>, IntegrationError> {
+pub fn state_at(problem: &Problem, depth: f64) -> Solved<Option<State>> {
     if !(0.0..=problem.exit_depth).contains(&depth) || depth.is_infinite() {
         return Ok(None);
     }
@@ -94,7 +94,7 @@ struct Exact {
 }
 
 impl StageSolver<f64> for Exact {
-    fn solve_stage(&mut self, course: &mut Course<'_>) -> Result<StageEnd, IntegrationError> {
+    fn solve_stage(&mut self, course: &mut Course<'_>) -> Solved<StageEnd> {
         let (problem, stage, entry) = (course.problem, course.stage, course.state);
         let limit = problem.limit_of(stage);
         let end = if self.continuous && problem.crater == Some(stage) {
@@ -116,7 +116,7 @@ impl StageSolver<f64> for Exact {
         }
     }
 
-    fn margin(&mut self, course: &mut Course<'_>) -> Result<Bounded, IntegrationError> {
+    fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
         let value = course.margin().value;
         Ok(Bounded { value, bound: margin_error(course.problem, course.stage, course.state.depth, value) })
     }
@@ -129,12 +129,7 @@ impl StageSolver<f64> for Exact {
 ///
 /// # Errors
 /// As [`ClosedForm`].
-pub fn path(
-    problem: &Problem,
-    flight: &Flight,
-    intervals: u32,
-    place: impl Fn(f64) -> f64,
-) -> Result<Vec<Sample>, IntegrationError> {
+pub fn path(problem: &Problem, flight: &Flight, intervals: u32, place: impl Fn(f64) -> f64) -> Solved<Vec<Sample>> {
     let sample = |state: State, stage: usize| {
         let force = problem.stages[stage].force(state.depth, state.velocity);
         Sample { state, force, stage }

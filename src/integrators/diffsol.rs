@@ -37,8 +37,8 @@ use self_cell::self_cell;
 
 use super::adaptive::{Choice, EXPLICIT, IMPLICIT};
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator};
-use crate::physics::{Problem, Stage, State};
+use super::outcome::{Cost, Detail, IntegrationError, Integrator, Solved};
+use crate::physics::{Problem, State};
 
 type Matrix = NalgebraMat<f64>;
 type Pair = NalgebraVec<f64>;
@@ -151,7 +151,7 @@ impl Diffsol {
         Self { scheme: None, rtol, max_steps: MAX_STEPS }
     }
 
-    fn solver(&self) -> Result<Reusing, IntegrationError> {
+    fn solver(&self) -> Solved<Reusing> {
         check_rtol(self.scheme.unwrap_or(IMPLICIT), self.rtol)?;
         let schemes = self.scheme.map_or(vec![EXPLICIT, IMPLICIT], |scheme| vec![scheme]);
         let solvers = schemes.into_iter().map(|scheme| Solver::of(scheme, self.rtol)).collect::<Result<_, _>>()?;
@@ -168,7 +168,7 @@ impl Integrator for Diffsol {
         self.scheme.and_then(Scheme::order)
     }
 
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
         self.solver()?.solve(problem, detail)
     }
 
@@ -200,26 +200,27 @@ impl Integrator for Reusing {
         self.of.order()
     }
 
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
-        flight::solve(problem, detail, &mut Stages { method: self, units: Units::of(problem) })
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
+        flight::solve(problem, detail, &mut Stages { method: self, length: length_of(problem) })
     }
 }
 
 /// A method as the loop sees it.
 struct Stages<'m> {
     method: &'m Reusing,
-    units: Units,
+    /// Unit of depth L (m) of the problem.
+    length: f64,
 }
 
 impl StageSolver<f64> for Stages<'_> {
-    fn solve_stage(&mut self, course: &mut Course<'_>) -> Result<StageEnd, IntegrationError> {
+    fn solve_stage(&mut self, course: &mut Course<'_>) -> Solved<StageEnd> {
         let Reusing { of, solvers } = self.method;
-        let stage = Reduced::of(course, self.units)?;
+        let stage = Reduced::of(course, self.length)?;
         let index = if of.scheme.is_some() { 0 } else { usize::from(Choice::note(course).is_implicit()) };
-        solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, of.name(), of.max_steps, course))
+        solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, of, course))
     }
 
-    fn margin(&mut self, course: &mut Course<'_>) -> Result<Bounded, IntegrationError> {
+    fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
         // A depth has 53 bits, and what is left of the target behind a stop may be no longer than its rounding.
         let Problem { mass, impact_speed, .. } = *course.problem;
         let force = course.problem.stages[course.stage].force(course.state.depth, 0.0).abs();
@@ -230,7 +231,7 @@ impl StageSolver<f64> for Stages<'_> {
 }
 
 /// Refuses a tolerance outside the range of `scheme`, NaN included.
-fn check_rtol(scheme: Scheme, rtol: f64) -> Result<(), IntegrationError> {
+fn check_rtol(scheme: Scheme, rtol: f64) -> Solved<()> {
     if (scheme.rtol_min()..=0.1).contains(&rtol) {
         return Ok(());
     }
@@ -252,16 +253,6 @@ struct Law {
 }
 
 impl Law {
-    fn new(stage: &Stage, mass: f64, start: f64, units: &Units) -> Self {
-        let Units { length, speed } = *units;
-        Self {
-            p: (stage.static_force + stage.stiffness * start) / mass * length / speed / speed,
-            s: stage.stiffness / mass * (length / speed) * (length / speed),
-            r: stage.viscosity / mass * (length / speed),
-            q: stage.drag / mass * length,
-        }
-    }
-
     fn is_finite(&self) -> bool {
         self.p.is_finite() && self.s.is_finite() && self.r.is_finite() && self.q.is_finite()
     }
@@ -328,52 +319,36 @@ impl Law {
     }
 }
 
-/// The units of a stage.
-#[derive(Clone, Copy, Debug)]
-struct Units {
-    /// Depth L (m).
-    length: f64,
-    /// Speed V0 (m/s).
-    speed: f64,
-}
-
-impl Units {
-    /// First boundary in x, the exit depth among them, else the shortest length that the first stage's law has.
-    fn of(problem: &Problem) -> Self {
-        let speed = problem.impact_speed;
-        let boundary = problem
-            .stages
-            .iter()
-            .map(|stage| stage.end)
-            .chain([problem.exit_depth])
-            .filter(|&depth| depth > 0.0 && depth.is_finite())
-            .reduce(f64::min);
-        let law = problem.stages[0];
-        let (m, w) = (problem.mass, speed * speed);
-        let own = [
-            m * w / (2.0 * law.static_force.abs()),
-            speed * (m / law.stiffness).sqrt(),
-            m * speed / law.viscosity,
-            m / law.drag,
-        ];
-        let own = own.into_iter().filter(|length| length.is_finite() && *length > 0.0).fold(f64::INFINITY, f64::min);
-        Self { length: boundary.unwrap_or(if own.is_finite() { own } else { 1.0 }), speed }
-    }
-
-    /// The state at `node` of a stage entered at `start`.
-    fn state(&self, start: State, node: Node) -> State {
-        State {
-            time: start.time + node.time * (self.length / self.speed),
-            depth: start.depth + node.depth * self.length,
-            velocity: node.velocity * self.speed,
-        }
-    }
+/// The length L (m) of a problem: the first boundary in x, the exit depth among them, else the shortest length that the
+/// first stage's law has.
+fn length_of(problem: &Problem) -> f64 {
+    let speed = problem.impact_speed;
+    let boundary = problem
+        .stages
+        .iter()
+        .map(|stage| stage.end)
+        .chain([problem.exit_depth])
+        .filter(|&depth| depth > 0.0 && depth.is_finite())
+        .reduce(f64::min);
+    let law = problem.stages[0];
+    let (m, w) = (problem.mass, speed * speed);
+    let own = [
+        m * w / (2.0 * law.static_force.abs()),
+        speed * (m / law.stiffness).sqrt(),
+        m * speed / law.viscosity,
+        m / law.drag,
+    ];
+    let own = own.into_iter().filter(|length| length.is_finite() && *length > 0.0).fold(f64::INFINITY, f64::min);
+    boundary.unwrap_or(if own.is_finite() { own } else { 1.0 })
 }
 
 /// One stage in its own units.
 struct Reduced {
     law: Law,
-    units: Units,
+    /// Unit of depth L (m).
+    length: f64,
+    /// Unit of speed V0 (m/s).
+    unit_speed: f64,
     /// State at the start; moving.
     start: State,
     /// Speed at the start [V0].
@@ -383,22 +358,33 @@ struct Reduced {
 }
 
 impl Reduced {
-    fn of(course: &Course<'_>, units: Units) -> Result<Self, IntegrationError> {
+    fn of(course: &Course<'_>, length: f64) -> Solved<Self> {
         let (problem, start) = (course.problem, course.state);
         let limit = problem.limit_of(course.stage);
         // What the tolerance leaves open in x must be little beside the stage: a thin rest of a slab is its own unit.
-        let units = Units { length: units.length.min(limit - start.depth), ..units };
-        let law = Law::new(&problem.stages[course.stage], problem.mass, start.depth, &units);
-        let distance = (limit - start.depth) / units.length;
+        let (length, speed) = (length.min(limit - start.depth), problem.impact_speed);
+        let (stage, mass) = (&problem.stages[course.stage], problem.mass);
+        let law = Law {
+            p: (stage.static_force + stage.stiffness * start.depth) / mass * length / speed / speed,
+            s: stage.stiffness / mass * (length / speed) * (length / speed),
+            r: stage.viscosity / mass * (length / speed),
+            q: stage.drag / mass * length,
+        };
+        let distance = (limit - start.depth) / length;
         if !law.is_finite() || distance.is_nan() {
             return Err(IntegrationError::NotFinite { what: "the force over the mass", last: start });
         }
         course.limit()?;
-        Ok(Self { law, units, start, speed: start.velocity / units.speed, distance })
+        Ok(Self { law, length, unit_speed: speed, start, speed: start.velocity / speed, distance })
     }
 
+    /// The state at `node`.
     fn state(&self, node: Node) -> State {
-        self.units.state(self.start, node)
+        State {
+            time: self.start.time + node.time * (self.length / self.unit_speed),
+            depth: self.start.depth + node.depth * self.length,
+            velocity: node.velocity * self.unit_speed,
+        }
     }
 }
 
@@ -430,9 +416,8 @@ impl Force {
     }
 }
 
-/// What solves a stage: in its own units, by the method named, within a number of steps.
-type SolveStage<'p> =
-    Box<dyn FnMut(&Reduced, &'static str, u64, &mut Course<'_>) -> Result<StageEnd, IntegrationError> + 'p>;
+/// What solves a stage, in its own units and as a method asks for it.
+type SolveStage<'p> = Box<dyn FnMut(&Reduced, &Diffsol, &mut Course<'_>) -> Solved<StageEnd> + 'p>;
 
 /// The library's problem, which its solvers borrow.
 trait LibraryProblem {
@@ -450,7 +435,7 @@ self_cell! {
 
 impl Solver {
     /// A solver by `scheme`, for tolerance `rtol`.
-    fn of(scheme: Scheme, rtol: f64) -> Result<Self, IntegrationError> {
+    fn of(scheme: Scheme, rtol: f64) -> Solved<Self> {
         let force = Rc::new(Force::default());
         let [of_rate, of_jacobian, of_start] = [&force, &force, &force].map(Rc::clone);
         let tolerance = scheme.library_rtol(rtol);
@@ -521,9 +506,8 @@ impl<Eqn: OdeEquations<V = Pair, T = f64>> OfScheme<Eqn> {
         make: impl Fn(f64) -> Result<S, DiffsolError> + 'p,
     ) -> SolveStage<'p> {
         let scratch = Pair::zeros(2, NalgebraContext::default());
-        let (scheme, rtol, force) = (self.scheme, self.rtol, &*self.force);
-        let mut stages = SolverOf { scheme, rtol, force, make, reused: None, scratch };
-        Box::new(move |stage, method, max_steps, course| stages.solve(stage, method, max_steps, course))
+        let mut stages = SolverOf { of: self, make, reused: None, scratch };
+        Box::new(move |stage, method, course| stages.solve(stage, method, course))
     }
 }
 
@@ -534,10 +518,8 @@ const STEP_MIN: f64 = 1e-30;
 const RETRIES_MAX: u32 = 60;
 
 /// Solves stages with solvers that `make` makes.
-struct SolverOf<'f, S, Make> {
-    scheme: Scheme,
-    rtol: f64,
-    force: &'f Force,
+struct SolverOf<'p, Eqn: OdeEquations, S, Make> {
+    of: &'p OfScheme<Eqn>,
     /// Makes a solver with a first step of the length given, at the start that `force` holds.
     make: Make,
     /// Reused from stage to stage and flight to flight when explicit: all that a step reads is overwritten.
@@ -546,17 +528,18 @@ struct SolverOf<'f, S, Make> {
     scratch: Pair,
 }
 
-impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
+impl<'p, Eqn, S, Make> SolverOf<'p, Eqn, S, Make>
+where
+    Eqn: OdeEquations<T = f64, V = Pair>,
+    S: OdeSolverMethod<'p, Eqn>,
+    Make: Fn(f64) -> Result<S, DiffsolError>,
+{
     /// A solver at `(xi, u)`, at time zero, about to try a step of length `h`; the law is already set.
-    fn solver_at<'a, Eqn>(&mut self, xi: f64, u: f64, h: f64) -> Result<S, DiffsolError>
-    where
-        Eqn: OdeEquations<T = f64, V = Pair> + 'a,
-        S: OdeSolverMethod<'a, Eqn>,
-    {
-        self.force.start.set((xi, u));
+    fn solver_at(&mut self, xi: f64, u: f64, h: f64) -> Result<S, DiffsolError> {
+        self.of.force.start.set((xi, u));
         let Some(mut solver) = self.reused.take() else { return (self.make)(h) };
         let mut dy = [0.0; 2];
-        self.force.rate(&[xi, u], &mut dy);
+        self.of.force.rate(&[xi, u], &mut dy);
         let state = solver.state_mut();
         (state.y[0], state.y[1]) = (xi, u);
         (state.dy[0], state.dy[1]) = (dy[0], dy[1]);
@@ -564,22 +547,13 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
         Ok(solver)
     }
 
-    fn solve<'a, Eqn>(
-        &mut self,
-        stage: &Reduced,
-        method: &'static str,
-        max_steps: u64,
-        course: &mut Course<'_>,
-    ) -> Result<StageEnd, IntegrationError>
-    where
-        Eqn: OdeEquations<T = f64, V = Pair> + 'a,
-        S: OdeSolverMethod<'a, Eqn>,
-    {
-        let law = stage.law;
-        self.force.law.set(law);
-        self.force.evaluations.set(0);
+    fn solve(&mut self, stage: &Reduced, method: &Diffsol, course: &mut Course<'_>) -> Solved<StageEnd> {
+        let (law, max_steps) = (stage.law, method.max_steps);
+        let &OfScheme { scheme, rtol, ref force, .. } = self.of;
+        force.law.set(law);
+        force.evaluations.set(0);
         let longest_step = law.longest_step();
-        let first_step = self.scheme.first_step_share(self.rtol) * law.shortest_time(stage.speed, stage.distance);
+        let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed, stage.distance);
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
         let mut before = Node { time: 0.0, depth: 0.0, velocity: stage.speed };
@@ -590,7 +564,7 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
         let mut cost = Cost::default();
         let state_at = |epoch: f64, at: Node| stage.state(Node { time: epoch + at.time, ..at });
         let failure = |cause: DiffsolError, epoch: f64, at: Node| IntegrationError::SolverFailed {
-            method,
+            method: method.name(),
             cause: cause.to_string(),
             last: state_at(epoch, at),
         };
@@ -609,7 +583,7 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             // Backwards with u > 0 at both ends: u was negative in between. Where it was lost in the tolerance already
             // (an explicit method at its stability limit), that is the rest; elsewhere the step was too long.
             let backwards = after.depth < before.depth && after.velocity > 0.0;
-            if backwards && is_lost(before.velocity, self.rtol, energy_max) {
+            if backwards && is_lost(before.velocity, rtol, energy_max) {
                 cost.steps += 1;
                 break StageEnd::Rest(before);
             }
@@ -649,11 +623,11 @@ impl<S, Make: Fn(f64) -> Result<S, DiffsolError>> SolverOf<'_, S, Make> {
             }
         };
         cost.rejected_steps += rejected_by(&solver) - rejected_before;
-        cost.force_evaluations = self.force.evaluations.get();
-        if !self.scheme.is_implicit() {
+        cost.force_evaluations = force.evaluations.get();
+        if !scheme.is_implicit() {
             self.reused = Some(solver);
         }
-        let noise = self.scheme.margin_error(self.rtol);
+        let noise = scheme.margin_error(rtol);
         let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
         course.cost = course.cost + cost;
         course.error_bound += (noise + round_off) * energy_max;

@@ -13,7 +13,7 @@
 use diffsol::{DiffsolError, MatrixCommon, NalgebraMat, OdeBuilder, SensitivitiesOdeSolverMethod};
 use num_dual::Dual64;
 
-use super::outcome::IntegrationError;
+use super::outcome::{IntegrationError, Solved};
 use crate::physics::State;
 
 /// `[xi, u]` at `tau = 1` of the stage with the numbers `law = [a, b, r, q, u0]`, with the derivatives at fixed time.
@@ -22,7 +22,7 @@ use crate::physics::State;
 ///
 /// # Errors
 /// [`IntegrationError::SolverFailed`].
-pub fn cross_stage(law: [Dual64; 5], rtol: f64) -> Result<[Dual64; 2], IntegrationError> {
+pub fn cross_stage(law: [Dual64; 5], rtol: f64) -> Solved<[Dual64; 2]> {
     integrate(law, rtol).map_err(|cause| IntegrationError::SolverFailed {
         method: "tsit45",
         cause: cause.to_string(),

@@ -24,7 +24,7 @@
 //! refused.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin};
+use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved};
 use crate::physics::{Problem, Scalar, Stage, State};
 
 /// Name of the method.
@@ -76,7 +76,7 @@ impl Energy {
     ///
     /// # Errors
     /// [`IntegrationError::BadOption`] outside that range, NaN included.
-    pub fn with_rtol(rtol: f64) -> Result<Self, IntegrationError> {
+    pub fn with_rtol(rtol: f64) -> Solved<Self> {
         if rtol > 0.0 && rtol <= 0.01 {
             Ok(Self { rtol })
         } else {
@@ -98,7 +98,7 @@ impl Energy {
     /// - [`IntegrationError::Refused`]: a stage before the exit depth is viscous;
     /// - [`IntegrationError::NeverEnds`]: an unbounded last stage does not resist at rest;
     /// - [`IntegrationError::NotFinite`], [`IntegrationError::StepBudgetSpent`]: numbers beyond the range of `S`.
-    pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Result<Flight<S>, IntegrationError> {
+    pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
         refuse_viscosity(problem)?;
         let now = State { time: S::zero(), depth: S::zero(), velocity: S::one() };
         let mut stages = Stages { walk: Walk::from_impact(self.tolerance::<S>()), now, clock: Cost::default() };
@@ -112,7 +112,7 @@ impl Energy {
     ///
     /// # Errors
     /// As [`Energy::solve_in`], save that a flight with an exit always ends here.
-    pub fn exit_margin_in<S: Scalar>(&self, problem: &Problem<S>) -> Result<Option<(S, f64, Cost)>, IntegrationError> {
+    pub fn exit_margin_in<S: Scalar>(&self, problem: &Problem<S>) -> Solved<Option<(S, f64, Cost)>> {
         refuse_viscosity(problem)?;
         if !problem.has_exit() || problem.impact_speed.value() <= 0.0 {
             return Ok(None);
@@ -131,18 +131,18 @@ impl Integrator for Energy {
         NAME
     }
 
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError> {
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
         self.solve_in(problem, detail)
     }
 
-    fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
+    fn exit_margin(&self, problem: &Problem) -> Solved<Option<Margin>> {
         let margin = self.exit_margin_in(problem)?;
         Ok(margin.map(|(value, error, cost)| Margin { value, error: Some(error), cost }))
     }
 }
 
 /// Refuses a problem with viscosity before its exit.
-fn refuse_viscosity<S: Scalar>(problem: &Problem<S>) -> Result<(), IntegrationError> {
+fn refuse_viscosity<S: Scalar>(problem: &Problem<S>) -> Solved<()> {
     for (index, stage) in problem.stages.iter().enumerate() {
         if problem.start_of(index).value() >= problem.exit_depth.value() {
             break;
@@ -179,7 +179,7 @@ struct Loss<S> {
 
 impl<S: Scalar> Loss<S> {
     /// The loss of `stage` in `problem`, whose impact speed is the unit of speed.
-    fn of(stage: &Stage<S>, problem: &Problem<S>, last: impl Fn() -> State) -> Result<Self, IntegrationError> {
+    fn of(stage: &Stage<S>, problem: &Problem<S>, last: impl Fn() -> State) -> Solved<Self> {
         // Quotients throughout: neither 1/M nor the square of a speed may leave the range of the number type where the
         // result does not.
         let two = S::from_f64(2.0);
@@ -263,12 +263,7 @@ impl<S: Scalar> Walk<S> {
 
     /// Propagates w from the start of stage `first` to the exit. An error names the state that `last` makes of the walk
     /// at the start of its stage.
-    fn reach_exit(
-        &mut self,
-        problem: &Problem<S>,
-        first: usize,
-        last: impl Fn(&Self) -> State,
-    ) -> Result<(), IntegrationError> {
+    fn reach_exit(&mut self, problem: &Problem<S>, first: usize, last: impl Fn(&Self) -> State) -> Solved<()> {
         for (index, stage) in problem.stages.iter().enumerate().skip(first) {
             let from = *self;
             let loss = Loss::of(stage, problem, || last(&from))?;
@@ -297,7 +292,7 @@ impl<S: Scalar> Walk<S> {
         limit: S,
         seek_rest: bool,
         last_state: impl Fn() -> State,
-    ) -> Result<Option<S>, IntegrationError> {
+    ) -> Solved<Option<S>> {
         let longest = DRAG_LENGTHS_MAX / loss.drag.value().abs();
         let mut rest = None;
         while self.depth.value() < limit.value() {
@@ -412,7 +407,7 @@ struct Stages<S> {
 }
 
 impl<S: Scalar> StageSolver<S> for Stages<S> {
-    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError> {
+    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>> {
         let problem = course.problem;
         let here = course.state.values();
         let loss = Loss::of(&problem.stages[course.stage], problem, || here)?;
@@ -427,7 +422,7 @@ impl<S: Scalar> StageSolver<S> for Stages<S> {
     }
 
     /// w itself, continued to the exit behind a stop.
-    fn margin(&mut self, course: &mut Course<'_, S>) -> Result<Bounded, IntegrationError> {
+    fn margin(&mut self, course: &mut Course<'_, S>) -> Solved<Bounded> {
         let (problem, last) = (course.problem, course.state.values());
         if !course.is_through && problem.stages[course.stage].end.value() < problem.exit_depth.value() {
             self.walk.reach_exit(problem, course.stage + 1, |_| last)?;
@@ -446,7 +441,7 @@ impl<S: Scalar> Clock<S> {
         velocity: S,
         cost: &mut Cost,
         course: &mut Course<'_, S>,
-    ) -> Result<Reduced<S>, IntegrationError> {
+    ) -> Solved<Reduced<S>> {
         let mut now = from;
         let end_rate = self.loss.rate(depth, velocity * velocity).value();
         for _ in 0..STEPS_MAX {

@@ -10,7 +10,7 @@
 
 use std::cmp::Ordering;
 
-use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample};
+use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample, Solved};
 use crate::physics::exit_energy::{energy_beyond_stop, speed_missing};
 pub(crate) use crate::physics::problem::StageEnd;
 use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State};
@@ -23,14 +23,14 @@ pub(crate) trait StageSolver<S: Scalar> {
     ///
     /// # Errors
     /// [`IntegrationError`]: the stage is refused, a budget is spent, or a number is not finite.
-    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError>;
+    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>>;
 
     /// Exit margin of the finished flight with its error bound.
     ///
     /// # Errors
     /// As [`StageSolver::solve_stage`], for a method that integrates beyond a stop.
     #[inline(always)]
-    fn margin(&mut self, course: &mut Course<'_, S>) -> Result<Bounded, IntegrationError> {
+    fn margin(&mut self, course: &mut Course<'_, S>) -> Solved<Bounded> {
         Ok(course.margin())
     }
 }
@@ -104,7 +104,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// # Errors
     /// [`IntegrationError::NeverEnds`] where nothing can.
     #[inline(always)]
-    pub(crate) fn limit(&self) -> Result<S, IntegrationError> {
+    pub(crate) fn limit(&self) -> Solved<S> {
         let limit = self.problem.limit_of(self.stage);
         let law = &self.problem.stages[self.stage];
         if limit.value() == f64::INFINITY && !stops_far_out(law) {
@@ -114,7 +114,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     }
 
     #[cold]
-    fn never_ends(&self) -> Result<S, IntegrationError> {
+    fn never_ends(&self) -> Solved<S> {
         let law = &self.problem.stages[self.stage];
         let why = if law.static_force.value() < 0.0 {
             "the last stage drives the projectile and has no far side"
@@ -207,7 +207,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// [`IntegrationError::NeverEnds`] where more is missing than the error bound: `W(limit)` would be
     /// `-missing (2 V + missing)` below that of the present state, and the place itself is rounded.
     #[cold]
-    fn arrive_in_doubt(&self, at: State<S>, why: &'static str) -> Result<State<S>, IntegrationError> {
+    fn arrive_in_doubt(&self, at: State<S>, why: &'static str) -> Solved<State<S>> {
         let (last, limit) = (at.values(), self.problem.limit_of(self.stage));
         let (law, mass) = (self.problem.stages[self.stage].values(), self.problem.mass.value());
         let v = last.velocity.max(0.0);
@@ -287,7 +287,7 @@ pub(crate) fn solve<S: Scalar>(
     problem: &Problem<S>,
     detail: Detail,
     method: &mut impl StageSolver<S>,
-) -> Result<Flight<S>, IntegrationError> {
+) -> Solved<Flight<S>> {
     if let Some(flight) = at_once(problem, detail) {
         return Ok(flight);
     }

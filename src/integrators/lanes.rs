@@ -35,7 +35,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator};
+use super::outcome::{Cost, Detail, Flight, Integrator, Solved};
 use super::taylor::Taylor;
 use crate::physics::{Event, EventKind, Outcome, Problem, State, Target, exit_energy};
 
@@ -201,7 +201,7 @@ impl Batch {
     /// Solves `problems`; answers come in their order, one each.
     ///
     /// The error of an answer is the one that [`Taylor`] gives for that problem; it stops no other.
-    pub fn solve(&self, problems: &[Problem]) -> Vec<Result<Summary, IntegrationError>> {
+    pub fn solve(&self, problems: &[Problem]) -> Vec<Solved<Summary>> {
         let mut answers = Vec::with_capacity(problems.len());
         let mut block = Block::default();
         for part in problems.chunks(BLOCK) {

@@ -28,5 +28,5 @@ pub use closed_form::ClosedForm;
 pub use diffsol::{Diffsol, Scheme};
 pub use energy::Energy;
 pub use method::{Method, MethodName, MethodOptions};
-pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, StepLimit};
+pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, Solved, StepLimit};
 pub use taylor::Taylor;

@@ -123,6 +123,9 @@ impl<S: Scalar> Flight<S> {
     }
 }
 
+/// What a method gives.
+pub type Solved<T = Flight> = Result<T, IntegrationError>;
+
 /// Why an integration stopped without an answer.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -242,7 +245,7 @@ pub trait Integrator {
     ///
     /// # Errors
     /// [`IntegrationError`]: the method refuses the problem, or no end can be computed.
-    fn solve(&self, problem: &Problem, detail: Detail) -> Result<Flight, IntegrationError>;
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved;
 
     /// The exit margin of `problem`; `None` without an exit depth, or at no impact speed.
     ///
@@ -251,7 +254,7 @@ pub trait Integrator {
     ///
     /// # Errors
     /// As [`Integrator::solve`].
-    fn exit_margin(&self, problem: &Problem) -> Result<Option<Margin>, IntegrationError> {
+    fn exit_margin(&self, problem: &Problem) -> Solved<Option<Margin>> {
         let flight = self.solve(problem, Detail::End)?;
         Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }))
     }

@@ -66,18 +66,15 @@ pub enum AuditError {
     #[error(transparent)]
     Table(#[from] Box<TableError>),
     /// An order to compare with that no study of step sizes can show.
-    #[error("the order {} is not allowed: a number from {ORDER_MIN} to {ORDER_MAX}", Shown(*.order))]
-    BadOrder {
-        /// Order given.
-        order: f64,
-    },
+    #[error("the order {} is not allowed: a number from {ORDER_MIN} to {ORDER_MAX}", Shown(*.0))]
+    BadOrder(f64),
 }
 
 impl Advice for AuditError {
     fn help(&self) -> String {
         match self {
             Self::Table(error) => error.help(),
-            Self::BadOrder { .. } => "give the formal order of the other code's scheme, such as 1 or 2".to_owned(),
+            Self::BadOrder(_) => "give the formal order of the other code's scheme, such as 1 or 2".to_owned(),
         }
     }
 }
@@ -134,12 +131,20 @@ pub struct Table {
     findings: Vec<Finding>,
 }
 
+/// A row as it stands.
 #[derive(Clone, Debug, PartialEq)]
 struct StepRow {
     line: u64,
     step: f64,
-    /// One per column of the table.
-    values: Vec<f64>,
+    /// For each quantity the value and half a unit of its last digit, if there is one.
+    cells: [Option<(f64, f64)>; Quantity::ALL.len()],
+}
+
+impl StepRow {
+    /// Value of `quantity`, of which the table has a column.
+    fn value(&self, quantity: Quantity) -> f64 {
+        self.cells[quantity as usize].map_or(f64::NAN, |(value, _)| value)
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -151,10 +156,7 @@ struct ResultColumn {
     rounding: f64,
 }
 
-/// A row as it stands: line, step, and for each quantity the value and half a unit of its last digit, if there is one.
-type Cells = (u64, f64, [Option<(f64, f64)>; Quantity::ALL.len()]);
-
-fn cells_of(row: &Row<'_>) -> Result<Cells, Box<TableError>> {
+fn step_row(row: &Row<'_>) -> Result<StepRow, Box<TableError>> {
     let number = |column| match row.text(column)? {
         "" => Ok(None),
         text => match parse(text) {
@@ -166,11 +168,11 @@ fn cells_of(row: &Row<'_>) -> Result<Cells, Box<TableError>> {
     if step <= 0.0 {
         return Err(row.refuse_cell(0, row.text(0)?, "not a time above zero, in seconds"));
     }
-    let mut values = [None; Quantity::ALL.len()];
-    for (value, quantity) in values.iter_mut().zip(Quantity::ALL) {
-        *value = number(column_of(quantity))?;
+    let mut cells = [None; Quantity::ALL.len()];
+    for (cell, quantity) in cells.iter_mut().zip(Quantity::ALL) {
+        *cell = number(column_of(quantity))?;
     }
-    Ok((row.at().number(), step, values))
+    Ok(StepRow { line: row.at().number(), step, cells })
 }
 
 impl Table {
@@ -184,7 +186,7 @@ impl Table {
     /// [`ROWS_MAX`] rows at most.
     pub fn read(file: &str, bytes: &[u8]) -> Result<Self, AuditError> {
         let (mut count, mut header, mut positions) = (0, At::Table, Vec::new());
-        let cells = tables::read(file, bytes, &RESULTS, |row| {
+        let rows = tables::read(file, bytes, &RESULTS, |row| {
             count += 1;
             if count > ROWS_MAX {
                 return Err(TableError::of_row(row.at(), 0, Fault::TooManyRows(ROWS_MAX)));
@@ -193,31 +195,26 @@ impl Table {
                 header = row.header();
                 positions = Quantity::ALL.map(|quantity| (row.position(column_of(quantity)), quantity)).to_vec();
             }
-            cells_of(row)
+            step_row(row)
         })?;
         positions.sort_by_key(|(number, _)| *number);
-        let mut table = Self { file: file.to_owned(), rows: Vec::new(), columns: Vec::new(), findings: Vec::new() };
+        let mut table = Self { file: file.to_owned(), rows, columns: Vec::new(), findings: Vec::new() };
         for (number, quantity) in positions.into_iter().filter(|(number, _)| *number > 0) {
-            let filled = || cells.iter().filter_map(|(.., values)| values[quantity as usize]);
-            // A column of a template that was never filled says nothing; a gap in a column that is used hides something.
-            if filled().next().is_none() {
+            let filled = table.rows.iter().filter_map(|row| row.cells[quantity as usize]);
+            let Some(rounding) = filled.map(|(_, rounding)| rounding).reduce(f64::min) else {
+                // A column of a template that was never filled says nothing; a gap in a column that is used hides something.
                 table.remark(FindingKind::EmptyColumn, Some(quantity), "the column is empty and left out".to_owned());
                 continue;
-            }
-            if let Some((line, ..)) = cells.iter().find(|(.., values)| values[quantity as usize].is_none()) {
+            };
+            if let Some(row) = table.rows.iter().find(|row| row.cells[quantity as usize].is_none()) {
                 let fault = Fault::EmptyCell(RESULTS.columns[column_of(quantity)].name);
-                return Err(TableError::of_row(At::Line(*line), number, fault).in_file(file).into());
+                return Err(TableError::of_row(At::Line(row.line), number, fault).in_file(file).into());
             }
-            let rounding = filled().map(|(_, rounding)| rounding).fold(f64::INFINITY, f64::min);
             table.columns.push(ResultColumn { quantity, number, rounding });
         }
         if table.columns.is_empty() {
             let place = Place { file: file.to_owned(), at: header, column: 0 };
             return Err(TableError::new(place, Fault::NoResults, &RESULTS).into());
-        }
-        for (line, step, cells) in cells {
-            let value = |column: &ResultColumn| cells[column.quantity as usize].map_or(f64::NAN, |(value, _)| value);
-            table.rows.push(StepRow { line, step, values: table.columns.iter().map(value).collect() });
         }
         table.put_in_order()?;
         Ok(table)
@@ -244,7 +241,8 @@ impl Table {
                 different.push(row);
                 continue;
             };
-            for ((column, &first), &second) in self.columns.iter().zip(&before.values).zip(&row.values) {
+            for column in &self.columns {
+                let [first, second] = [before, &row].map(|row| row.value(column.quantity));
                 // NaN twice is the same cell twice; -0 and 0 are one value.
                 if first != second && !(first.is_nan() && second.is_nan()) {
                     let place = Place { file: self.file.clone(), at: At::Line(row.line), column: column.number };
@@ -417,7 +415,7 @@ pub struct Audit {
 /// [`AuditError::BadOrder`] for an expected order outside [`ORDER_MIN`] to [`ORDER_MAX`].
 pub fn audit(table: &Table, expectation: &Expectation) -> Result<Audit, AuditError> {
     if let Some(order) = expectation.order.filter(|order| !(ORDER_MIN..=ORDER_MAX).contains(order)) {
-        return Err(AuditError::BadOrder { order });
+        return Err(AuditError::BadOrder(order));
     }
     let mut findings = table.findings.clone();
     let mut quantities = Vec::new();
@@ -443,12 +441,13 @@ impl QuantityAudit {
 
 /// A column before anything is known of it: failed until shown otherwise.
 fn unjudged(table: &Table, index: usize, expectation: &Expectation) -> QuantityAudit {
+    let quantity = table.columns[index].quantity;
     let points = table.rows.iter().map(|row| {
-        let (dt_s, value) = (row.step, row.values[index]);
+        let (dt_s, value) = (row.step, row.value(quantity));
         AuditPoint { dt_s, value, error: None, used: false, excluded: None }
     });
     QuantityAudit {
-        quantity: table.columns[index].quantity,
+        quantity,
         formal_order: expectation.order,
         observed_order: None,
         interval: None,
@@ -471,9 +470,9 @@ fn unjudged(table: &Table, index: usize, expectation: &Expectation) -> QuantityA
 
 /// One column of a table as grids, with the rounding of its digits.
 fn grids_of(table: &Table, index: usize) -> Vec<GridValue> {
-    let rounding = table.columns[index].rounding;
+    let ResultColumn { quantity, rounding, .. } = table.columns[index];
     let grid = |row: &StepRow| {
-        let value = row.values[index];
+        let value = row.value(quantity);
         GridValue { step: row.step, value, round_off: rounding.max(0.5 * f64::EPSILON * value.abs()) }
     };
     table.rows.iter().map(grid).collect()
@@ -486,9 +485,9 @@ fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAud
         findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
     };
     let mut judged = unjudged(table, index, expectation);
-    if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.values[index].is_finite()) {
+    if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.value(quantity).is_finite()) {
         judged.reason =
-            format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.values[index], row.step);
+            format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.value(quantity), row.step);
         remark(FindingKind::NotFinite, &judged.reason);
         return (judged, findings);
     }

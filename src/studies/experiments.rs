@@ -355,15 +355,21 @@ pub struct SetSummary {
 
 /// Sets in the order in which they appear, shallow experiments apart.
 pub fn summaries(comparisons: &[Comparison]) -> Vec<SetSummary> {
-    let mut groups: Vec<(String, Vec<&Comparison>)> = Vec::new();
-    for comparison in comparisons {
-        let name = comparison.group();
-        match groups.iter_mut().find(|(group, _)| *group == name) {
-            Some((_, of_group)) => of_group.push(comparison),
-            None => groups.push((name, vec![comparison])),
+    let groups = grouped(comparisons, |comparison| comparison.group()).into_iter();
+    groups.map(|(group, of_group)| summary(group, &of_group)).collect()
+}
+
+/// `items` by `key`, groups in the order in which they first appear.
+pub fn grouped<T: Copy, K: PartialEq>(items: impl IntoIterator<Item = T>, key: impl Fn(&T) -> K) -> Vec<(K, Vec<T>)> {
+    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
+    for item in items {
+        let key = key(&item);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, members)) => members.push(item),
+            None => groups.push((key, vec![item])),
         }
     }
-    groups.into_iter().map(|(group, of_group)| summary(group, &of_group)).collect()
+    groups
 }
 
 /// `of_group` has at least one comparison.

@@ -20,6 +20,7 @@
 //! Source of the statistics: Draper and Smith, Applied Regression Analysis, ch. 1; Student t by Abramowitz and Stegun
 //! 26.7.3 and 26.7.4.
 
+use std::convert::Infallible;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -526,16 +527,23 @@ pub fn student_t(level: f64, dof: usize) -> f64 {
 }
 
 /// The end of the places that are `inside`, between one that is and one that is not, after `halvings`.
-pub(super) fn bisect(mut within: f64, mut beyond: f64, halvings: u32, inside: impl Fn(f64) -> bool) -> f64 {
+pub(super) fn bisect(within: f64, beyond: f64, halvings: u32, inside: impl Fn(f64) -> bool) -> f64 {
+    let Ok(end) = try_bisect(within, beyond, halvings, |place| Ok::<_, Infallible>(inside(place)));
+    end
+}
+
+/// As [`bisect`], where `inside` may have no answer.
+pub(crate) fn try_bisect<E>(
+    mut within: f64,
+    mut beyond: f64,
+    halvings: u32,
+    inside: impl Fn(f64) -> Result<bool, E>,
+) -> Result<f64, E> {
     for _ in 0..halvings {
         let middle = 0.5 * (within + beyond);
-        if inside(middle) {
-            within = middle;
-        } else {
-            beyond = middle;
-        }
+        *if inside(middle)? { &mut within } else { &mut beyond } = middle;
     }
-    0.5 * (within + beyond)
+    Ok(0.5 * (within + beyond))
 }
 
 /// Probability that |T| < sqrt(dof) tan(theta).

@@ -62,10 +62,7 @@ impl Generator {
 /// [`StudyError`].
 pub fn closed_form_errors(scene: &Scene) -> Result<Errors, StudyError> {
     let problem = scene.problem()?;
-    let flight = ClosedForm.solve(&problem, Detail::Events)?;
-    let mut errors = errors_of(Source::Scene(scene, problem.impact_speed), &flight)?;
-    errors.0.extend(errors_without_stiffness(scene, &problem)?.0);
-    Ok(errors)
+    errors_of_both_forms(scene, &problem, Source::Scene(scene, problem.impact_speed))
 }
 
 /// As [`closed_form_errors`], the closed form of the stages against 50 digits of the same stages.
@@ -74,19 +71,18 @@ pub fn closed_form_errors(scene: &Scene) -> Result<Errors, StudyError> {
 /// [`StudyError`].
 pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<Errors, StudyError> {
     let problem = scene.problem()?;
-    let flight = ClosedForm.solve(&problem, Detail::Events)?;
-    let mut errors = errors_of(Source::Problem(&problem), &flight)?;
-    errors.0.extend(errors_without_stiffness(scene, &problem)?.0);
-    Ok(errors)
+    errors_of_both_forms(scene, &problem, Source::Problem(&problem))
 }
 
-/// As [`closed_form_errors`] for one crater and one tunnel, with the speed in the crater computed without c.
-fn errors_without_stiffness(scene: &Scene, problem: &Problem) -> Result<Errors, StudyError> {
-    let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) else {
-        return Ok(Errors::default());
-    };
-    let flight = solve_crater_and_tunnel(problem, concrete.crater_stiffness)?;
-    errors_of(Source::Scene(scene, problem.impact_speed), &flight)
+/// The closed form of the stages against `source`, and for one crater and one tunnel, with the speed in the crater
+/// computed without c, against the scene.
+fn errors_of_both_forms(scene: &Scene, problem: &Problem, source: Source<'_>) -> Result<Errors, StudyError> {
+    let mut errors = errors_of(source, &ClosedForm.solve(problem, Detail::Events)?)?;
+    if let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) {
+        let flight = solve_crater_and_tunnel(problem, concrete.crater_stiffness)?;
+        errors.0.extend(errors_of(Source::Scene(scene, problem.impact_speed), &flight)?.0);
+    }
+    Ok(errors)
 }
 
 /// `flight` against 50 digits of `source`, in ulp over max(1, condition number).

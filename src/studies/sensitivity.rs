@@ -334,11 +334,8 @@ pub struct Spread {
 #[non_exhaustive]
 pub enum SpreadError {
     /// Not `PATH=REL`.
-    #[error("`{text}` is not of the form PATH=REL, REL from 0 to 1 or in percent")]
-    Form {
-        /// The text.
-        text: String,
-    },
+    #[error("`{0}` is not of the form PATH=REL, REL from 0 to 1 or in percent")]
+    Form(String),
     /// The number.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
@@ -380,7 +377,7 @@ impl std::str::FromStr for Spread {
     type Err = SpreadError;
 
     fn from_str(text: &str) -> Result<Self, SpreadError> {
-        let form = || SpreadError::Form { text: text.to_owned() };
+        let form = || SpreadError::Form(text.to_owned());
         let (path, relative) = text.split_once('=').ok_or_else(form)?;
         let parameter: Parameter = path.trim().parse()?;
         if parameter.moves() != parameter {
@@ -698,7 +695,7 @@ mod tests {
             "projectile.mass=nan",
             "projectile.mass=200%",
         ] {
-            assert!(matches!(text.parse::<Spread>(), Err(SpreadError::Form { .. })), "{text}");
+            assert!(matches!(text.parse::<Spread>(), Err(SpreadError::Form(_))), "{text}");
         }
         assert!(matches!("H/d=0.1".parse::<Spread>(), Err(SpreadError::Group(_))));
         assert_eq!("projectile.mass=5 %".parse::<Spread>().unwrap().relative, 0.05);

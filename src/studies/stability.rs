@@ -13,6 +13,7 @@
 //! The formulas are derived here from Eq. 6-8 alone, apart from
 //! [`crate::integrators::central_difference::stability_limit`], which states the limit in closed form.
 
+use super::order::{bisect, try_bisect};
 use crate::integrators::IntegrationError;
 use crate::integrators::central_difference::{Boundaries, CentralDifference, VelocityAt};
 use crate::physics::{Problem, Stage, State};
@@ -83,11 +84,12 @@ pub fn map(count: usize) -> Result<Vec<BoundaryPoint>, IntegrationError> {
         for i in 0..count {
             let drag_group = 0.9 * i as f64 / count as f64;
             let g = 2.0 * drag_group;
+            // Where growth sets in, between w dt = 0.01 and 20.
             points.push(BoundaryPoint {
                 velocity,
                 drag_group,
-                measured: onset(|a| grows(velocity, a, g))?,
-                theory: onset(|a| Ok::<_, IntegrationError>(growth_in_theory(velocity, a, g) > 1.0 + 1e-12))?,
+                measured: try_bisect(0.01, 20.0, 50, |a| grows(velocity, a, g).map(|grows| !grows))?,
+                theory: bisect(0.01, 20.0, 50, |a| growth_in_theory(velocity, a, g) <= 1.0 + 1e-12),
             });
         }
     }
@@ -102,20 +104,6 @@ fn grows(velocity: VelocityAt, w_dt: f64, drag_dt: f64) -> Result<bool, Integrat
     // Beyond the range of the numbers there is no ratio: max ignores a NaN, and the last state shows it.
     let overflows = late.last().is_none_or(|s| !s.depth.is_finite());
     Ok(overflows || reach(late) > 1.5 * reach(early))
-}
-
-/// Where `grows` turns true between w dt = 0.01 and 20, by bisection.
-fn onset<E>(grows: impl Fn(f64) -> Result<bool, E>) -> Result<f64, E> {
-    let (mut stable, mut unstable) = (0.01, 20.0);
-    for _ in 0..50 {
-        let middle = 0.5 * (stable + unstable);
-        if grows(middle)? {
-            unstable = middle;
-        } else {
-            stable = middle;
-        }
-    }
-    Ok(0.5 * (stable + unstable))
 }
 
 #[cfg(test)]

@@ -49,11 +49,8 @@ fn as_text<S: Serializer>(value: &impl std::fmt::Display, serializer: S) -> Resu
 #[non_exhaustive]
 pub enum SweepError {
     /// Not `PATH=A:B:N` or `PATH=A:B:N:log`.
-    #[error("`{text}` is not of the form PATH=A:B:N or PATH=A:B:N:log")]
-    Form {
-        /// The text.
-        text: String,
-    },
+    #[error("`{0}` is not of the form PATH=A:B:N or PATH=A:B:N:log")]
+    Form(String),
     /// A parameter or a value.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
@@ -66,11 +63,8 @@ pub enum SweepError {
         to: String,
     },
     /// A number of values that no two ends have.
-    #[error("`{text}` is no number of values: two or more, or one where both ends are equal")]
-    Count {
-        /// The text.
-        text: String,
-    },
+    #[error("`{0}` is no number of values: two or more, or one where both ends are equal")]
+    Count(String),
     /// Logarithmic steps through zero.
     #[error("logarithmic steps lead from {} to {} only where both are above zero", Shown(*.from), Shown(*.to))]
     Logarithm {
@@ -80,11 +74,8 @@ pub enum SweepError {
         to: f64,
     },
     /// More points than fit.
-    #[error("{points} points are too many: at most {POINTS_MAX}")]
-    TooMany {
-        /// Product of the counts.
-        points: usize,
-    },
+    #[error("{0} points are too many: at most {POINTS_MAX}")]
+    TooMany(usize),
     /// Two axes that set the same number.
     #[error("`{first}` and `{second}` both set `{moved}`", moved = .first.moves())]
     Twice {
@@ -100,7 +91,7 @@ impl Advice for SweepError {
         match self {
             Self::Parameter(error) => error.help(),
             Self::Twice { .. } => "vary one of them".to_owned(),
-            Self::TooMany { .. } => "take fewer values".to_owned(),
+            Self::TooMany(_) => "take fewer values".to_owned(),
             Self::OneUnit { .. } => "give both ends a unit, or neither for SI".to_owned(),
             _ => "write for example H/d=0.5:18:200 or target.strength=20MPa:60MPa:5:log".to_owned(),
         }
@@ -111,7 +102,7 @@ impl std::str::FromStr for Axis {
     type Err = SweepError;
 
     fn from_str(text: &str) -> Result<Self, SweepError> {
-        let form = || SweepError::Form { text: text.to_owned() };
+        let form = || SweepError::Form(text.to_owned());
         let (path, range) = text.split_once('=').ok_or_else(form)?;
         let parameter: Parameter = path.trim().parse()?;
         let parts: Vec<_> = range.split(':').collect();
@@ -128,13 +119,13 @@ impl std::str::FromStr for Axis {
             let [from, to] = texts.map(str::to_owned);
             return Err(SweepError::OneUnit { from, to });
         }
-        let bad_count = || SweepError::Count { text: count.to_owned() };
+        let bad_count = || SweepError::Count(count.to_owned());
         let count: usize = count.trim().parse().map_err(|_| bad_count())?;
         if count == 0 || (count == 1 && from != to) {
             return Err(bad_count());
         }
         if count > POINTS_MAX {
-            return Err(SweepError::TooMany { points: count });
+            return Err(SweepError::TooMany(count));
         }
         if logarithmic && !(from > 0.0 && to > 0.0) {
             return Err(SweepError::Logarithm { from, to });
@@ -252,7 +243,7 @@ impl Plan {
     /// does not have.
     pub fn new(scene: Scene, axes: &[Axis]) -> Result<Self, SweepError> {
         if axes.is_empty() || axes.len() > 2 {
-            return Err(SweepError::Form { text: format!("{} axes", axes.len()) });
+            return Err(SweepError::Form(format!("{} axes", axes.len())));
         }
         if let [first, second] = axes
             && first.parameter.moves() == second.parameter.moves()
@@ -261,7 +252,7 @@ impl Plan {
         }
         let points = axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul);
         if points > POINTS_MAX {
-            return Err(SweepError::TooMany { points });
+            return Err(SweepError::TooMany(points));
         }
         let mut probe = scene.clone();
         for axis in axes {
@@ -490,10 +481,10 @@ mod tests {
     #[test]
     fn axes_that_say_nothing_definite_are_refused() {
         for text in ["H/d", "H/d=1:2", "H/d=1:2:3:lin", "H/d=1:2:3:log:4"] {
-            assert!(matches!(text.parse::<Axis>(), Err(SweepError::Form { .. })), "{text}");
+            assert!(matches!(text.parse::<Axis>(), Err(SweepError::Form(_))), "{text}");
         }
         for text in ["H/d=1:2:1", "H/d=1:2:0", "H/d=1:2:-3", "H/d=1:2:x"] {
-            assert!(matches!(text.parse::<Axis>(), Err(SweepError::Count { .. })), "{text}");
+            assert!(matches!(text.parse::<Axis>(), Err(SweepError::Count(_))), "{text}");
         }
         assert!(matches!("N=0:2:3:log".parse::<Axis>(), Err(SweepError::Logarithm { .. })));
         for text in ["target.strength=20MPa:60:3", "target.strength=20e6:60 MPa:3"] {
@@ -502,12 +493,12 @@ mod tests {
         for text in ["target.thickness=0:60mm:3", "target.thickness=60 mm:0:3", "target.strength=20e6:60e6:3"] {
             assert!(text.parse::<Axis>().is_ok(), "{text}");
         }
-        assert!(matches!("H/d=1:2:99999999999".parse::<Axis>(), Err(SweepError::TooMany { .. })));
+        assert!(matches!("H/d=1:2:99999999999".parse::<Axis>(), Err(SweepError::TooMany(_))));
         let axis = |text: &str| text.parse::<Axis>().unwrap();
         let refused = Plan::new(slab(), &[axis("H/d=1:2:3"), axis("target.thickness=1:2:3")]);
         assert!(matches!(refused, Err(SweepError::Twice { .. })));
         let refused = Plan::new(slab(), &[axis("N=1:2:10000"), axis("I=1:2:10000")]);
-        assert!(matches!(refused, Err(SweepError::TooMany { points: 100_000_000 })));
+        assert!(matches!(refused, Err(SweepError::TooMany(100_000_000))));
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use serde::Serialize;
 
 /// What a claim, a fit or a table can come to. The order of the variants is the order of severity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::IntoStaticStr)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Verdict {
     /// Within its limit; as expected where something was expected.
     Passed,
@@ -20,12 +21,7 @@ pub enum Verdict {
 impl Verdict {
     /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::Skipped => "skipped",
-            Self::Undecided => "undecided",
-            Self::Failed => "failed",
-        }
+        self.into()
     }
 
     /// `measured` against `limit`. What is not a number fails: it never passes.

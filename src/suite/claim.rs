@@ -14,7 +14,7 @@ use super::verdict::Verdict;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::MethodName;
 use crate::studies::applicability::Line;
-use crate::studies::experiments::{Comparison, MarkedScene};
+use crate::studies::experiments::{Comparison, MarkedScene, grouped};
 use crate::studies::order::OrderFit;
 use crate::studies::quantity::Quantity;
 use crate::studies::rounding::Floor;
@@ -234,8 +234,8 @@ impl Measurement {
     }
 }
 
-/// What measuring a claim gives.
-pub type Found = Result<Measurement, NotMeasured>;
+/// What measuring a claim, or a part of it, gives.
+pub type Found<T = Measurement> = Result<T, NotMeasured>;
 
 /// Why a claim has no measurement, and the verdict that follows.
 #[derive(Clone, Debug, PartialEq)]
@@ -367,19 +367,6 @@ pub fn skipped(judged: &[Judged]) -> Vec<(&str, usize)> {
     let skipped = judged.iter().filter(|j| j.verdict == Verdict::Skipped);
     let groups = grouped(skipped, |judged| judged.remark.as_str()).into_iter();
     groups.map(|(reason, claims)| (reason, claims.len())).collect()
-}
-
-/// `items` by `key`, groups in the order in which they first appear.
-pub fn grouped<T: Copy, K: PartialEq>(items: impl IntoIterator<Item = T>, key: impl Fn(&T) -> K) -> Vec<(K, Vec<T>)> {
-    let mut groups: Vec<(K, Vec<T>)> = Vec::new();
-    for item in items {
-        let key = key(&item);
-        match groups.iter_mut().find(|(known, _)| *known == key) {
-            Some((_, members)) => members.push(item),
-            None => groups.push((key, vec![item])),
-        }
-    }
-    groups
 }
 
 /// The largest measured value.

@@ -6,9 +6,8 @@ pub mod claim;
 pub mod suite;
 pub mod verdict;
 
+pub use crate::studies::experiments::grouped;
 pub use checks::Check;
-pub use claim::{
-    Claim, Evidence, Judged, LOOSENESS_MAX, Measurement, Section, grouped, looseness, skipped, tables, worst,
-};
+pub use claim::{Claim, Evidence, Judged, LOOSENESS_MAX, Measurement, Section, looseness, skipped, tables, worst};
 pub use suite::{Scenes, Suite};
 pub use verdict::{Counts, Verdict};

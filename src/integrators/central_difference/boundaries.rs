@@ -4,7 +4,7 @@ use super::scheme::{Node, Pause, Stepper, Sum};
 use super::stability::cannot_end;
 use super::{Boundaries, CentralDifference, Steps};
 use crate::integrators::flight::Course;
-use crate::integrators::outcome::{Detail, Flight, IntegrationError};
+use crate::integrators::outcome::{Detail, Flight, IntegrationError, Solved};
 use crate::physics::{Problem, Scalar, State};
 
 /// Steps without any change of x and V after which the scheme counts as stuck for ever.
@@ -75,11 +75,7 @@ pub(super) struct Run<'a, S> {
 
 impl<'a, S: Scalar> Run<'a, S> {
     /// [`CentralDifference::solve_in`].
-    pub(super) fn solve(
-        options: &'a CentralDifference,
-        problem: &'a Problem<S>,
-        detail: Detail,
-    ) -> Result<Flight<S>, IntegrationError> {
+    pub(super) fn solve(options: &'a CentralDifference, problem: &'a Problem<S>, detail: Detail) -> Solved<Flight<S>> {
         let mut run = Self { stepper: Stepper::new(options, problem), course: Course::new(problem, detail) };
         // Ends at the face are reached at once; `Stepper::new` has passed them.
         run.pass_ends(0..run.stepper.stage, State::at_impact(problem));
@@ -87,7 +83,7 @@ impl<'a, S: Scalar> Run<'a, S> {
         run.run_to_end()
     }
 
-    fn run_to_end(mut self) -> Result<Flight<S>, IntegrationError> {
+    fn run_to_end(mut self) -> Solved<Flight<S>> {
         let (problem, max_steps) = (self.stepper.problem, self.stepper.options.max_steps);
         let is_hopeless =
             matches!(self.stepper.options.steps, Steps::Uniform(h) if cannot_end(problem, h * max_steps as f64));
@@ -122,7 +118,7 @@ impl<'a, S: Scalar> Run<'a, S> {
     }
 
     /// Without a far side, a last stage that does not resist at rest never stops the projectile.
-    fn refuse_endless(&self) -> Result<(), IntegrationError> {
+    fn refuse_endless(&self) -> Solved<()> {
         let stage = &self.stepper.problem.stages[self.stepper.stage];
         let resists = stage.stiffness.value() > 0.0 || stage.static_force.value() > 0.0;
         if resists || self.stepper.problem.has_exit() || stage.end.value().is_finite() {
@@ -131,11 +127,11 @@ impl<'a, S: Scalar> Run<'a, S> {
         self.never_ends("no exit depth, and the last stage has no static force that resists")
     }
 
-    fn never_ends<T>(&self, why: &'static str) -> Result<T, IntegrationError> {
+    fn never_ends<T>(&self, why: &'static str) -> Solved<T> {
         Err(IntegrationError::NeverEnds { why, last: self.stepper.state().values() })
     }
 
-    fn finite(&self, what: &'static str, number: S) -> Result<(), IntegrationError> {
+    fn finite(&self, what: &'static str, number: S) -> Solved<()> {
         if number.value().is_finite() {
             return Ok(());
         }
@@ -157,7 +153,7 @@ impl<'a, S: Scalar> Run<'a, S> {
     }
 
     /// Treats a next step that reaches a stage end or the exit. True if the run ends in it.
-    fn cross(&mut self, x: Sum<S>, u: Sum<S>) -> Result<bool, IntegrationError> {
+    fn cross(&mut self, x: Sum<S>, u: Sum<S>) -> Solved<bool> {
         self.finite("depth", x.value)?;
         let h = self.stepper.clock.step();
         if let Some(end) = self.landing() {
@@ -176,7 +172,7 @@ impl<'a, S: Scalar> Run<'a, S> {
 
     /// Treats a next step, to the node `next`, that comes to rest before any stage end or exit. True if the run ends
     /// in it.
-    fn come_to_rest(&mut self, next: Node<S>) -> Result<bool, IntegrationError> {
+    fn come_to_rest(&mut self, next: Node<S>) -> Solved<bool> {
         self.finite("velocity", next.v)?;
         self.stepper.cost.force_evaluations += self.stepper.options.velocity.evaluations();
         if let Some(end) = self.landing()
@@ -194,7 +190,7 @@ impl<'a, S: Scalar> Run<'a, S> {
     }
 
     /// Takes the step shortened to `part`, which lands on the stage end `end`, and starts afresh behind it.
-    fn land(&mut self, end: S, part: S) -> Result<bool, IntegrationError> {
+    fn land(&mut self, end: S, part: S) -> Solved<bool> {
         let first = self.stepper.stage;
         self.stepper.step_max = self.stepper.step_max.max(part.value());
         let (_, u) = self.stepper.node.ahead(part, self.stepper.options.summation);

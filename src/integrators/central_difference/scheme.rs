@@ -2,7 +2,7 @@
 
 use super::stability::stability_limit;
 use super::{CentralDifference, Steps, Summation, VelocityAt};
-use crate::integrators::outcome::{Cost, IntegrationError, StepLimit};
+use crate::integrators::outcome::{Cost, IntegrationError, Solved, StepLimit};
 use crate::physics::{Problem, Scalar, Stage, State};
 
 impl VelocityAt {
@@ -312,11 +312,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     /// [`CentralDifference::forced_states`].
-    pub(super) fn forced(
-        mut self,
-        source: impl Fn(usize, S) -> S,
-        ends: &[f64],
-    ) -> Result<Vec<State<S>>, IntegrationError> {
+    pub(super) fn forced(mut self, source: impl Fn(usize, S) -> S, ends: &[f64]) -> Solved<Vec<State<S>>> {
         let problem = self.problem;
         let mut states = vec![self.state()];
         for (stage, &end) in ends.iter().enumerate() {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::integrators::Energy;
-use crate::physics::{Advice, Outcome};
+use crate::physics::{Advice, Outcome, Stage};
 use crate::testing::{Random, of_stages, random_concrete, stage, tunnel};
 
 fn kind_and_place(end: StageEnd) -> (&'static str, Node) {
@@ -269,7 +269,7 @@ fn first_step_is_a_share_of_the_fastest_time_that_keeps_its_local_error_at_the_t
 
 #[test]
 fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
-    let unit = |exit, stages: &[Stage]| Units::of(&of_stages(2.0, 3.0, exit, stages)).length;
+    let unit = |exit, stages: &[Stage]| length_of(&of_stages(2.0, 3.0, exit, stages));
     let still = stage(0.0, 0.0, 0.0, 0.0, INF);
     assert_eq!(unit(5.0, &[Stage { end: 0.0, ..still }, Stage { end: 4.0, ..still }, still]), 4.0);
     assert_eq!(unit(0.5, &[Stage { end: 4.0, ..still }, still]), 0.5);
@@ -286,9 +286,10 @@ fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
     }
     // M/q = 1e-330 m is less than any number.
     let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
-    assert!((Units::of(&light).length - 1.0).abs() < 1e-15);
+    assert!((length_of(&light) - 1.0).abs() < 1e-15);
     let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
-    let state = Units { length: 2.0, speed: 4.0 }.state(start, Node { time: 3.0, depth: 5.0, velocity: 6.0 });
+    let stage = Reduced { law: Law::default(), length: 2.0, unit_speed: 4.0, start, speed: 1.75, distance: INF };
+    let state = stage.state(Node { time: 3.0, depth: 5.0, velocity: 6.0 });
     assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
 }
 

@@ -1,5 +1,6 @@
 use super::super::taylor::Series;
 use super::*;
+use crate::integrators::IntegrationError;
 use crate::physics::Stage;
 use crate::physics::reference::{self, Exact, Source};
 

@@ -46,7 +46,7 @@ fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
     for (index, row) in rows.iter().enumerate() {
         holds!(row.error.is_empty(), "point {index}: {}", row.error);
         let ratio = from + (to - from) * index as f64 / (points - 1) as f64;
-        let by = |criterion| -> Result<(f64, f64), NotMeasured> {
+        let by = |criterion| -> Found<(f64, f64)> {
             let thickness = Some(ratio * concrete.diameter);
             let scene = Scene { thickness, criterion, ..scene.clone() };
             let velocity = critical_velocity::exact(&scene)?;

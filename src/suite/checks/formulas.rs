@@ -111,11 +111,7 @@ fn scene(geometry: Option<f64>) -> (Scene, Concrete) {
 }
 
 /// X/d by the claim's method at impact function `impact`.
-pub(super) fn solved_depth_ratio(
-    subject: &Subject<'_>,
-    geometry: Option<f64>,
-    impact: f64,
-) -> Result<f64, NotMeasured> {
+pub(super) fn solved_depth_ratio(subject: &Subject<'_>, geometry: Option<f64>, impact: f64) -> Found<f64> {
     let (scene, concrete) = scene(geometry);
     let method = subject.method(None)?;
     let speed = groups::impact_speed_for(impact, MASS, &concrete);
@@ -175,7 +171,7 @@ fn small_impact(&SmallImpact { from, to, points }: &SmallImpact, subject: &Subje
 const GEOMETRY: [f64; 2] = [1e4, 1e7];
 
 /// Errors of Eq. 11-12 over 1/N at fixed I.
-fn approach(subject: &Subject<'_>, impact: f64) -> Result<Vec<StepError>, NotMeasured> {
+fn approach(subject: &Subject<'_>, impact: f64) -> Found<Vec<StepError>> {
     const POINTS: usize = 40;
     let mut random = Random::for_part(1, &subject.claim.id);
     let limit = depth_ratio(impact, 2.0);
@@ -201,7 +197,7 @@ fn approach_constant(&ApproachConstant { impact }: &ApproachConstant, subject: &
     // (X(N) - limit) N = C + C'/N: two geometry functions extrapolate C' away.
     let n = 1e5;
     let limit = depth_ratio(impact, 2.0);
-    let at = |n: f64| -> Result<f64, NotMeasured> { Ok((solved_depth_ratio(subject, Some(n), impact)? - limit) * n) };
+    let at = |n: f64| -> Found<f64> { Ok((solved_depth_ratio(subject, Some(n), impact)? - limit) * n) };
     let measured = 2.0 * at(2.0 * n)? - at(n)?;
     // The stated first-order difference is relative to X/d, and per 1/N.
     let predicted = model_difference(impact, 1.0, 2.0) * limit;

@@ -14,7 +14,7 @@ use num_dual::{Dual2_64, DualNum, second_derivative};
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::super::claim::{Found, NotMeasured};
+use super::super::claim::Found;
 use super::{Subject, orders};
 use crate::integrators::CentralDifference;
 use crate::physics::{Problem, Stage, State};
@@ -96,7 +96,7 @@ fn order(&Manufactured { path, order: expected }: &Manufactured, subject: &Subje
     let ends = path.ends();
     let (amplitude, ..) = path.at(ends.len() - 1, END);
     let error =
-        |size: f64| -> Result<StepError, NotMeasured> {
+        |size: f64| -> Found<StepError> {
             let states = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries)
                 .forced_states(&problem, |stage, t| path.source(&problem, stage, t), ends)?;
             let off = |state: &State| {

@@ -132,11 +132,11 @@ every_check! {
 #[derive(Debug, Default)]
 pub struct Memo(Mutex<HashMap<String, Arc<OnceLock<Studied>>>>);
 
-type Studied = Result<Arc<Vec<QuantityStudy>>, NotMeasured>;
+type Studied = Found<Arc<Vec<QuantityStudy>>>;
 
 impl Memo {
     /// The studies under `key`, by `compute` if nobody has asked for them yet; whoever asks meanwhile waits.
-    fn get(&self, key: String, compute: impl FnOnce() -> Result<Vec<QuantityStudy>, NotMeasured>) -> Studied {
+    fn get(&self, key: String, compute: impl FnOnce() -> Found<Vec<QuantityStudy>>) -> Studied {
         let cell = self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(key).or_default().clone();
         cell.get_or_init(|| compute().map(Arc::new)).clone()
     }
@@ -165,23 +165,23 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    fn scene_name(&self) -> Result<&'a str, NotMeasured> {
+    fn scene_name(&self) -> Found<&'a str> {
         self.claim.scene.as_deref().ok_or_else(|| NotMeasured::broken("the claim names no scene"))
     }
 
     /// Scene of the claim.
-    fn scene(&self) -> Result<&'a Scene, NotMeasured> {
+    fn scene(&self) -> Found<&'a Scene> {
         let name = self.scene_name()?;
         self.context.scenes.get(name).ok_or_else(|| NotMeasured::broken(format!("no scene {name}")))
     }
 
     /// Problem of the claim's scene.
-    fn problem(&self) -> Result<&'a Problem, NotMeasured> {
+    fn problem(&self) -> Found<&'a Problem> {
         self.context.scenes.problem(self.scene_name()?).map_err(NotMeasured::broken)
     }
 
     /// Quantity of the claim.
-    fn quantity(&self) -> Result<Quantity, NotMeasured> {
+    fn quantity(&self) -> Found<Quantity> {
         self.claim.quantity.ok_or_else(|| NotMeasured::broken("the claim names no quantity"))
     }
 
@@ -191,12 +191,12 @@ impl<'a> Subject<'a> {
     }
 
     /// The claim's method at a tolerance, or at its default.
-    fn method(&self, rtol: Option<f64>) -> Result<Method, NotMeasured> {
+    fn method(&self, rtol: Option<f64>) -> Found<Method> {
         build(self.method_name(), &MethodOptions { rtol, ..MethodOptions::default() })
     }
 
     /// Solution of the claim's problem by its method at the default tolerance.
-    fn solution(&self, detail: Detail) -> Result<Flight, NotMeasured> {
+    fn solution(&self, detail: Detail) -> Found<Flight> {
         solve(&self.method(None)?, self.problem()?, detail)
     }
 
@@ -206,19 +206,19 @@ impl<'a> Subject<'a> {
     }
 
     /// The exact solution, or a refined one.
-    fn truth(&self) -> Result<Truth, NotMeasured> {
+    fn truth(&self) -> Found<Truth> {
         Ok(Truth::of(self.problem()?)?)
     }
 }
 
 /// The method `name`; one that this build lacks makes the claim inapplicable.
-fn build(name: MethodName, options: &MethodOptions) -> Result<Method, NotMeasured> {
+fn build(name: MethodName, options: &MethodOptions) -> Found<Method> {
     applies!(name.is_built(), "this build leaves out {name}");
     Ok(Method::new(name, options)?)
 }
 
 /// A solution; a refusal of the method makes the claim inapplicable, a failure breaks it.
-fn solve(method: &Method, problem: &Problem, detail: Detail) -> Result<Flight, NotMeasured> {
+fn solve(method: &Method, problem: &Problem, detail: Detail) -> Found<Flight> {
     method.integrator().solve(problem, detail).map_err(refusal_or_failure)
 }
 

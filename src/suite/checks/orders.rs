@@ -99,7 +99,7 @@ fn work_order(&WorkOrder { from, to }: &WorkOrder, subject: &Subject<'_>) -> Fou
 }
 
 /// Values of `quantity` by the claim's scheme at the steps `sizes`.
-fn values_at(subject: &Subject<'_>, quantity: Quantity, sizes: &[f64]) -> Result<Vec<GridValue>, NotMeasured> {
+fn values_at(subject: &Subject<'_>, quantity: Quantity, sizes: &[f64]) -> Found<Vec<GridValue>> {
     let mut grids = Vec::new();
     for &size in sizes {
         let scheme = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries);
@@ -152,7 +152,7 @@ fn grid_convergence(subject: &Subject<'_>) -> Found {
 
 const NOT_OF_A_FLIGHT: &str = "no such quantity of one solution";
 
-fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<QuantityStudy, NotMeasured> {
+fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Found<QuantityStudy> {
     let ladder = Ladder { from: to.min(from), to: to.max(from), points: 40, seed: subject.context.seed };
     let key = format!("{:?} {} {from} {to}", subject.claim.scene, subject.method_name());
     shared_study(subject, key, |exact| {
@@ -164,8 +164,8 @@ fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Result<Quantity
 fn shared_study(
     subject: &Subject<'_>,
     key: String,
-    compute: impl FnOnce(&Flight) -> Result<Convergence, NotMeasured>,
-) -> Result<QuantityStudy, NotMeasured> {
+    compute: impl FnOnce(&Flight) -> Found<Convergence>,
+) -> Found<QuantityStudy> {
     let quantity = free_quantity(subject)?;
     let studies = subject.context.memo.get(key, || Ok(compute(&subject.truth()?.flight)?.quantities))?;
     let study = studies.iter().find(|study| study.quantity == quantity);
@@ -173,7 +173,7 @@ fn shared_study(
 }
 
 /// The claim's quantity, if the scene leaves it free.
-fn free_quantity(subject: &Subject<'_>) -> Result<Quantity, NotMeasured> {
+fn free_quantity(subject: &Subject<'_>) -> Found<Quantity> {
     let quantity = subject.quantity()?;
     if quantity == Quantity::CriticalVelocity {
         applies!(subject.problem()?.has_exit(), "{NO_FAR_SIDE}");

@@ -110,7 +110,7 @@ impl PeerAnswers {
     }
 
     /// What the program `name` says of `problem`, which is the scene called `scene`.
-    fn answer(&self, name: &str, scene: &str, problem: &Problem) -> Result<PeerAnswer, NotMeasured> {
+    fn answer(&self, name: &str, scene: &str, problem: &Problem) -> Found<PeerAnswer> {
         let Some(source) = self.sources.get(name) else {
             return Err(NotMeasured::skip(if name == USER {
                 "no program was given with --peer".to_owned()

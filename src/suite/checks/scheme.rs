@@ -5,6 +5,7 @@ use super::{Subject, off, worst_of};
 use crate::integrators::central_difference::stability_limit as stability_limit_of;
 use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, VelocityAt};
 use crate::physics::{Outcome, Problem, Stage, State};
+use crate::studies::order::try_bisect;
 use crate::studies::quantity::Quantity;
 use crate::studies::{rounding, stability};
 
@@ -48,24 +49,24 @@ check! {
 }
 
 /// Solution by the claim's velocity rule and `boundaries` at equal steps of `dt` (s).
-fn at_step(subject: &Subject<'_>, boundaries: Boundaries, dt: f64) -> Result<Flight, NotMeasured> {
+fn at_step(subject: &Subject<'_>, boundaries: Boundaries, dt: f64) -> Found<Flight> {
     let scheme = CentralDifference::uniform(dt, subject.claim.velocity, boundaries);
     Ok(scheme.solve(subject.problem()?, Detail::Events)?)
 }
 
 /// First `steps` nodes of the claim's scheme at equal steps of `dt` (s), boundaries ignored.
-fn free_states(subject: &Subject<'_>, problem: &Problem, dt: f64, steps: usize) -> Result<Vec<State>, NotMeasured> {
+fn free_states(subject: &Subject<'_>, problem: &Problem, dt: f64, steps: usize) -> Found<Vec<State>> {
     Ok(CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd).free_states(problem, steps)?)
 }
 
 /// Mean of `of` over `places`.
-fn mean(places: [f64; 6], of: impl Fn(f64) -> Result<f64, NotMeasured>) -> Result<f64, NotMeasured> {
+fn mean(places: [f64; 6], of: impl Fn(f64) -> Found<f64>) -> Found<f64> {
     let sum = places.into_iter().try_fold(0.0, |sum, place| Ok::<_, NotMeasured>(sum + of(place)?))?;
     Ok(sum / places.len() as f64)
 }
 
 /// The exact solution of a motion that comes to rest in the crater, and the frequency w (1/s) there.
-fn rest_in_crater(subject: &Subject<'_>) -> Result<(Flight, f64), NotMeasured> {
+fn rest_in_crater(subject: &Subject<'_>) -> Found<(Flight, f64)> {
     let problem = subject.problem()?;
     let exact = subject.truth()?.flight;
     let rests = problem.crater == Some(0) && exact.stage == 0 && exact.outcome != Outcome::Perforated;
@@ -121,7 +122,7 @@ fn crater_constant(subject: &Subject<'_>) -> Found {
     let is_located = subject.claim.boundaries != Boundaries::StepEnd;
     applies!(is_located, "step ends leave a depth error anywhere between 0 and (w dt)²/8");
     // Richardson over two steps removes the next even power; what remains is (w dt)^4.
-    let ratio = |w_dt: f64| -> Result<f64, NotMeasured> {
+    let ratio = |w_dt: f64| -> Found<f64> {
         let flight = at_step(subject, subject.claim.boundaries, w_dt / w)?;
         Ok(match subject.quantity()? {
             Quantity::Depth => (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0,
@@ -190,7 +191,7 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
     let has_limit = claim.boundaries != Boundaries::StepEnd || claim.quantity == Some(Quantity::Depth);
     applies!(has_limit, "with step ends only the depth has a limit of error/dt");
     // error(dt)/dt = C + C' dt: extrapolated from a step and twice the step, averaged over steps without common ratio.
-    let error = |steps: f64| -> Result<f64, NotMeasured> {
+    let error = |steps: f64| -> Found<f64> {
         let dt = end.time / steps;
         let flight = at_step(subject, claim.boundaries, dt)?;
         holds!(flight.outcome.agrees_with(exact.outcome), "the scheme has another outcome at this step");
@@ -213,7 +214,7 @@ fn stability_limit(subject: &Subject<'_>) -> Found {
     applies!(crater.stiffness > 0.0, "a stage without stiffness has no step limit");
     let free = Problem { exit_depth: f64::INFINITY, ..problem.clone() };
     let w = (crater.stiffness / free.mass).sqrt();
-    let grows = |w_dt: f64| -> Result<bool, NotMeasured> {
+    let grows = |w_dt: f64| -> Found<bool> {
         let states = free_states(subject, &free, w_dt / w, 4000)?;
         let reach = |part: &[State]| worst_of(part.iter().map(|s| s.depth.abs()));
         let (early, late) = states.split_at(states.len() / 2);
@@ -222,13 +223,9 @@ fn stability_limit(subject: &Subject<'_>) -> Found {
         let ratio = reach(late) / reach(early);
         Ok(ratio.is_nan() || ratio > 1.5)
     };
-    let (mut stable, mut unstable) = (1.0, 3.0);
+    let (stable, unstable) = (1.0, 3.0);
     holds!(!grows(stable)? && grows(unstable)?, "no limit between w dt = 1 and 3");
-    for _ in 0..40 {
-        let middle = 0.5 * (stable + unstable);
-        *if grows(middle)? { &mut unstable } else { &mut stable } = middle;
-    }
-    let limit = 0.5 * (stable + unstable);
+    let limit = try_bisect(stable, unstable, 40, |w_dt| grows(w_dt).map(|grows| !grows))?;
     // What the crate states, for a crater without drag.
     let stated = w * stability_limit_of(&crater, free.mass, free.impact_speed, subject.claim.velocity);
     let error = worst_of([limit, stated].map(|limit| (limit - 2.0).abs() / 2.0));

@@ -61,7 +61,7 @@ fn undecided_max(subject: &Subject<'_>) -> f64 {
 }
 
 /// Checks outcome and error bound of one solution near V_c.
-fn check_outcome(subject: &Subject<'_>, problem: &Problem, seen: &mut Violations) -> Result<Outcome, NotMeasured> {
+fn check_outcome(subject: &Subject<'_>, problem: &Problem, seen: &mut Violations) -> Found<Outcome> {
     let margin = exact_margin(problem)?;
     let flight = subject.flight(problem)?;
     seen.expect(is_right(flight.outcome, margin), || {

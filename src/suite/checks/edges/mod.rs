@@ -13,18 +13,18 @@ use super::{Subject, formulas, off, solve, worst_of};
 use crate::integrators::method::{MethodName, RTOL_DEFAULT};
 use crate::integrators::{Detail, Energy, Flight, Taylor};
 use crate::physics::{Outcome, Problem, Scene, Stage};
-use crate::suite::claim::{Measurement, NotMeasured};
+use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 pub use self::{critical::*, events::*, steps::*};
 
 impl Subject<'_> {
     /// Solution of `problem` at the method's default tolerance.
-    fn flight(&self, problem: &Problem) -> Result<Flight, NotMeasured> {
+    fn flight(&self, problem: &Problem) -> Found<Flight> {
         solve(&self.method(None)?, problem, Detail::Events)
     }
 
     /// The method's solution of `problem`, and the exact one of the same outcome, rounded from double-double.
-    fn beside_exact(&self, problem: &Problem) -> Result<(Flight, Flight), NotMeasured> {
+    fn beside_exact(&self, problem: &Problem) -> Found<(Flight, Flight)> {
         let (flight, exact) = (self.flight(problem)?, exact(problem)?.values());
         holds!(flight.outcome.agrees_with(exact.outcome), "{} is {}", exact.outcome, flight.outcome);
         Ok((flight, exact))
@@ -71,12 +71,12 @@ impl Violations {
 }
 
 /// The solution in double-double.
-fn exact(problem: &Problem) -> Result<Flight<TwoFloat>, NotMeasured> {
+fn exact(problem: &Problem) -> Found<Flight<TwoFloat>> {
     Ok(Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events)?)
 }
 
 /// The exit margin in double-double, rounded: its sign is the outcome.
-fn exact_margin(problem: &Problem) -> Result<f64, NotMeasured> {
+fn exact_margin(problem: &Problem) -> Found<f64> {
     let margin = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>())?;
     margin.map(|(value, ..)| value.hi()).ok_or_else(|| NotMeasured::broken("the problem has no exit"))
 }
@@ -107,7 +107,7 @@ fn slab(drag: bool) -> Scene {
 }
 
 /// The same without a far side, at 400 m/s: it comes to rest in the tunnel.
-fn stop(drag: bool) -> Result<Problem, NotMeasured> {
+fn stop(drag: bool) -> Found<Problem> {
     Ok(Scene { thickness: None, ..slab(drag) }.resolve(400.0)?)
 }
 

@@ -73,7 +73,7 @@ fn growth(_: &Subject<'_>) -> Found {
 
 fn stated_step_limits(_: &Subject<'_>) -> Found {
     let mut seen = Violations::default();
-    let limit = |problem: &Problem, dt, velocity| -> Result<Option<StepLimit>, NotMeasured> {
+    let limit = |problem: &Problem, dt, velocity| -> Found<Option<StepLimit>> {
         let scheme = CentralDifference::uniform(dt, velocity, Boundaries::StepEnd);
         Ok(scheme.solve(problem, Detail::Events)?.step_limit)
     };
@@ -139,12 +139,7 @@ fn slab_rounding(_: &Subject<'_>) -> Found {
 }
 
 /// Fitted order of `quantity` over the steps `sizes`.
-fn fitted(
-    problem: &Problem,
-    scheme: (VelocityAt, Boundaries),
-    quantity: Quantity,
-    sizes: &[f64],
-) -> Result<OrderFit, NotMeasured> {
+fn fitted(problem: &Problem, scheme: (VelocityAt, Boundaries), quantity: Quantity, sizes: &[f64]) -> Found<OrderFit> {
     let exact = Taylor::default().solve(problem, Detail::Events)?;
     let mut points = Vec::with_capacity(sizes.len());
     for &dt in sizes {
@@ -161,7 +156,7 @@ fn order_of(fit: &OrderFit) -> f64 {
 }
 
 /// `count` random steps over two decades of the duration of the motion of `problem`, up to the share `to` of it.
-fn random_steps(mut random: Random, problem: &Problem, to: f64, count: usize) -> Result<Vec<f64>, NotMeasured> {
+fn random_steps(mut random: Random, problem: &Problem, to: f64, count: usize) -> Found<Vec<f64>> {
     let time = exact(problem)?.end.time.hi();
     Ok((0..count).map(|_| time * random.log_uniform(0.01 * to, to)).collect())
 }
