@@ -18,4 +18,4 @@ pub use advice::Advice;
 pub use parameter::Parameter;
 pub use problem::{Event, EventKind, Outcome, Problem, Stage, Stages, State, Target};
 pub use scalar::Scalar;
-pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, ResolveError, Scene};
+pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, ResolveError, Resolved, Scene};

@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use super::advice::Advice;
 use super::problem::Stage;
-use super::scene::{CraterStiffness, Layer, Range, Resistance, ResolveError, Scene};
+use super::scene::{CraterStiffness, Layer, Range, Resistance, ResolveError, Resolved, Scene};
 use super::units::{Dimension, QuantityError, number, quantity};
 use super::{groups, semi_empirical};
 
@@ -210,7 +210,7 @@ impl Parameter {
     /// # Errors
     /// [`ResolveError::Inadmissible`].
     #[inline]
-    pub fn admit(self, value: f64) -> Result<(), ResolveError> {
+    pub fn admit(self, value: f64) -> Resolved<()> {
         if self.entry().range.contains(value) {
             Ok(())
         } else {

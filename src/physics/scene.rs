@@ -148,6 +148,9 @@ impl Range {
     }
 }
 
+/// What follows from the numbers of a scene.
+pub type Resolved<T = Problem> = Result<T, ResolveError>;
+
 /// Why a scene has no equation of motion.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -221,7 +224,7 @@ impl Advice for ResolveError {
 }
 
 /// `number`, unless its value overflowed or is subnormal; zero is accepted where a factor is `zero`.
-fn representable<S: Scalar>(quantity: &'static str, number: S, zero: bool) -> Result<S, ResolveError> {
+fn representable<S: Scalar>(quantity: &'static str, number: S, zero: bool) -> Resolved<S> {
     let value = number.value();
     if value.is_normal() || (zero && value == 0.0) {
         Ok(number)
@@ -231,12 +234,7 @@ fn representable<S: Scalar>(quantity: &'static str, number: S, zero: bool) -> Re
 }
 
 /// [`Stage::continuous_crater`], unless its constant leaves the range of numbers.
-fn continuous_crater<S: Scalar>(
-    depth: S,
-    beyond: &Stage<S>,
-    mass: S,
-    impact_speed: S,
-) -> Result<Stage<S>, ResolveError> {
+fn continuous_crater<S: Scalar>(depth: S, beyond: &Stage<S>, mass: S, impact_speed: S) -> Resolved<Stage<S>> {
     let crater = Stage::continuous_crater(depth, beyond, mass, impact_speed);
     // No force at k d (an air gap there) leaves no force in the crater.
     let force = beyond.static_force + beyond.drag * impact_speed * impact_speed;
@@ -274,7 +272,7 @@ impl Concrete {
     ///
     /// # Errors
     /// [`ResolveError::Inadmissible`] for a strength that is not positive.
-    pub fn usual_static_factor(strength: f64) -> Result<f64, ResolveError> {
+    pub fn usual_static_factor(strength: f64) -> Resolved<f64> {
         Parameter::Strength.admit(strength)?;
         Ok(semi_empirical::static_factor(strength))
     }
@@ -298,7 +296,7 @@ impl Concrete {
         name: impl Fn(LayerNumber) -> Parameter,
         end: S,
         number: &impl Fn(Parameter, f64) -> S,
-    ) -> Result<Stage<S>, ResolveError> {
+    ) -> Resolved<Stage<S>> {
         let of_medium = |which: LayerNumber| number(name(which), which.of(*medium));
         let (d, area) = (number(Parameter::Diameter, self.diameter), S::from_f64(FRAC_PI_4));
         let static_force = area * (of_medium(LayerNumber::StaticFactor) * d) * (of_medium(LayerNumber::Strength) * d);
@@ -320,7 +318,7 @@ impl Concrete {
     ///
     /// Layer ends before k d are no boundaries of the force. A target no thicker than k d is continued by its last
     /// layer, as a homogeneous one is by itself.
-    fn beyond_crater<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Result<Stages<S>, ResolveError> {
+    fn beyond_crater<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Resolved<Stages<S>> {
         let (mut stages, infinite) = (Stages::new(), S::from_f64(f64::INFINITY));
         let Some(first) = layer_beyond(&self.layers, self.crater_depth()) else {
             let medium = Layer {
@@ -351,7 +349,7 @@ impl Concrete {
         mass: S,
         impact_speed: S,
         number: &impl Fn(Parameter, f64) -> S,
-    ) -> Result<(Stages<S>, Option<usize>), ResolveError> {
+    ) -> Resolved<(Stages<S>, Option<usize>)> {
         let mut stages = self.beyond_crater(number)?;
         if self.crater_ratio == 0.0 {
             return Ok((stages, None));
@@ -366,7 +364,7 @@ impl Concrete {
         Ok((stages, Some(0)))
     }
 
-    fn check(&self, thickness: Option<f64>) -> Result<(), ResolveError> {
+    fn check(&self, thickness: Option<f64>) -> Resolved<()> {
         Parameter::Diameter.admit(self.diameter)?;
         Parameter::NoseFactor.admit(self.nose_factor)?;
         Parameter::InertiaFactor.admit(self.inertia_factor)?;
@@ -394,18 +392,14 @@ impl Concrete {
 
 impl Layer {
     /// Checks the layer `index`, its thickness as `thickness`.
-    fn check(&self, index: usize, thickness: f64) -> Result<(), ResolveError> {
+    fn check(&self, index: usize, thickness: f64) -> Resolved<()> {
         let layer = Self { thickness, ..*self };
         LayerNumber::ALL.into_iter().try_for_each(|which| Parameter::Layer(index, which).admit(which.of(layer)))
     }
 }
 
 /// Stages given directly, the last without an end.
-fn given<S: Scalar>(
-    stages: &[Stage],
-    exit_depth: f64,
-    number: &impl Fn(Parameter, f64) -> S,
-) -> Result<Stages<S>, ResolveError> {
+fn given<S: Scalar>(stages: &[Stage], exit_depth: f64, number: &impl Fn(Parameter, f64) -> S) -> Resolved<Stages<S>> {
     let mut previous = 0.0;
     for (index, stage) in stages.iter().enumerate() {
         for which in [StageNumber::StaticForce, StageNumber::Stiffness, StageNumber::Viscosity, StageNumber::Drag] {
@@ -468,7 +462,7 @@ impl Scene {
     /// # Errors
     /// [`ResolveError`]: a number of the scene or the speed is not admissible, or a coefficient leaves the range of
     /// normal `f64` numbers. A problem never holds NaN, nor an infinity other than an absent end.
-    pub fn resolve(&self, impact_speed: f64) -> Result<Problem, ResolveError> {
+    pub fn resolve(&self, impact_speed: f64) -> Resolved {
         self.resolve_in(impact_speed, plain)
     }
 
@@ -482,7 +476,7 @@ impl Scene {
         &self,
         impact_speed: f64,
         number: impl Fn(Parameter, f64) -> S,
-    ) -> Result<Problem<S>, ResolveError> {
+    ) -> Resolved<Problem<S>> {
         Parameter::Velocity.admit(impact_speed)?;
         Parameter::Mass.admit(self.mass)?;
         let mass = representable("the mass M [kg]", number(Parameter::Mass, self.mass), false)?;
@@ -505,7 +499,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::resolve`].
-    pub(crate) fn resolve_from(&self, problem: &Problem, impact_speed: f64) -> Result<Problem, ResolveError> {
+    pub(crate) fn resolve_from(&self, problem: &Problem, impact_speed: f64) -> Resolved {
         Parameter::Velocity.admit(impact_speed)?;
         let mut stages = Stages::from_slice(&problem.stages);
         let continuous = self.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous);
@@ -519,7 +513,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`ResolveError::NoImpactSpeed`] without one; else as [`Scene::resolve`].
-    pub fn problem(&self) -> Result<Problem, ResolveError> {
+    pub fn problem(&self) -> Resolved {
         self.resolve(self.velocity.ok_or(ResolveError::NoImpactSpeed)?)
     }
 
@@ -558,11 +552,11 @@ impl Scene {
     /// # Errors
     /// [`ResolveError`]: the thickness or the diameter is not admissible, the criterion `ndrc` has no diameter to go
     /// by, or the depth leaves the range of `f64`.
-    pub fn exit_depth(&self) -> Result<f64, ResolveError> {
+    pub fn exit_depth(&self) -> Resolved<f64> {
         self.exit_depth_in(&plain)
     }
 
-    fn exit_depth_in<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Result<S, ResolveError> {
+    fn exit_depth_in<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Resolved<S> {
         let diameter = match (self.criterion, &self.resistance) {
             (Criterion::FullDepth, _) => None,
             (Criterion::Ndrc, Resistance::Concrete(concrete)) => Some(concrete.diameter),

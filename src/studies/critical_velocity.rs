@@ -20,7 +20,7 @@ use thiserror::Error;
 use super::error::StudyError;
 use crate::integrators::{Cost, IntegrationError, Integrator, Margin, Taylor};
 use crate::physics::{
-    Advice, Concrete, CraterStiffness, Problem, ResolveError, Scene, Shown, Stage, closed_form, exit_energy,
+    Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, closed_form, exit_energy,
 };
 
 /// Speed (m/s) at which the scene is first resolved, for its exit depth and static work.
@@ -216,7 +216,7 @@ impl Advice for CriticalError {
 /// # Errors
 /// [`CriticalError`]. Each that ends a search shows both ends of the bracket.
 pub fn critical_velocity(
-    resolve: impl Fn(f64) -> Result<Problem, ResolveError>,
+    resolve: impl Fn(f64) -> Resolved,
     integrator: &dyn Integrator,
 ) -> Result<CriticalVelocity, CriticalError> {
     within(FLIGHTS_MAX, resolve, integrator)
@@ -225,7 +225,7 @@ pub fn critical_velocity(
 /// As [`critical_velocity`], in at most `flights_max` flights.
 fn within(
     flights_max: u32,
-    resolve: impl Fn(f64) -> Result<Problem, ResolveError>,
+    resolve: impl Fn(f64) -> Resolved,
     integrator: &dyn Integrator,
 ) -> Result<CriticalVelocity, CriticalError> {
     let probe = resolve(PROBE_SPEED).map_err(|cause| CriticalError::Scene { velocity: PROBE_SPEED, cause })?;
@@ -406,7 +406,7 @@ struct Search<'a, F> {
     tally: RefCell<Tally>,
 }
 
-impl<F: Fn(f64) -> Result<Problem, ResolveError>> Search<'_, F> {
+impl<F: Fn(f64) -> Resolved> Search<'_, F> {
     /// W(exit) at `V0² = u`, a finite number.
     fn at(&self, u: f64) -> Result<Point, CriticalError> {
         let velocity = u.sqrt();
@@ -583,7 +583,7 @@ struct Objective<'a, 'b, F> {
     failure: RefCell<Option<CriticalError>>,
 }
 
-impl<F: Fn(f64) -> Result<Problem, ResolveError>> CostFunction for &Objective<'_, '_, F> {
+impl<F: Fn(f64) -> Resolved> CostFunction for &Objective<'_, '_, F> {
     type Param = f64;
     type Output = f64;
 

@@ -30,7 +30,7 @@ use crate::integrators::{Detail, Energy, IntegrationError, Taylor};
 #[cfg(feature = "diffsol")]
 use crate::physics::EventKind;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError};
-use crate::physics::{Advice, Outcome, Problem, ResolveError, Scene, Stage, State, closed_form};
+use crate::physics::{Advice, Outcome, Problem, Resolved, Scene, Stage, State, closed_form};
 
 /// Derivatives with respect to one number of the scene; `None` where there is no such quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ pub fn elasticity(derivative: Option<f64>, quantity: Option<f64>, value: f64) ->
 }
 
 /// The problem of `scene` at `speed` (m/s) with the derivative in `parameter`.
-fn dual_problem(scene: &Scene, speed: f64, parameter: Parameter) -> Result<Problem<Dual64>, ResolveError> {
+fn dual_problem(scene: &Scene, speed: f64, parameter: Parameter) -> Resolved<Problem<Dual64>> {
     scene.resolve_in(speed, |number, value| Dual64::new(value, slope(scene, number, value, parameter)))
 }
 
