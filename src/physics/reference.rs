@@ -546,7 +546,7 @@ fn solve(model: &Model) -> Result<ExactFlight, ReferenceError> {
             let rests = if is_zero(&now.velocity) {
                 true
             } else {
-                let (next, rests) = through(model, index, law, &now, limit)?;
+                let (next, rests) = through(model, index, &now)?;
                 now = next;
                 solved_last = Some(index);
                 rests
@@ -572,13 +572,8 @@ fn solve(model: &Model) -> Result<ExactFlight, ReferenceError> {
 }
 
 /// One stage: the point at its limit and `false`, or the point of rest and `true`.
-fn through(
-    model: &Model,
-    index: usize,
-    law: &Stage<Big>,
-    from: &Point,
-    limit: Option<&Big>,
-) -> Result<(Point, bool), ReferenceError> {
+fn through(model: &Model, index: usize, from: &Point) -> Result<(Point, bool), ReferenceError> {
+    let (law, limit) = (&model.problem.stages[index], model.limit(index));
     if is_positive(&law.viscosity) {
         if is_positive(&law.drag) {
             return Err(ReferenceError::Unsupported { stage: index, why: "viscosity and drag act together" });

@@ -5,7 +5,7 @@
 //! [`super::order`]; what order to expect is [`super::formal_order`](mod@super::formal_order).
 
 use super::critical_velocity;
-use super::error::{StudyError, Truth, flight_error, free_quantities, signed_error};
+use super::error::{Studied, Truth, flight_error, free_quantities, signed_error};
 use super::formal_order::{Path, formal_order};
 use super::order::{Class, FitError, OrderFit, StepError, fit};
 use super::quantity::Quantity;
@@ -94,7 +94,7 @@ pub struct Convergence {
 /// studied where `with_critical` asks for it and the scene has a thickness.
 ///
 /// # Errors
-/// [`StudyError`].
+/// [`StudyError`](super::error::StudyError).
 pub fn of_fixed_steps(
     scene: &Scene,
     problem: &Problem,
@@ -102,7 +102,7 @@ pub fn of_fixed_steps(
     scheme: &dyn Fn(f64) -> CentralDifference,
     ladder: Ladder,
     with_critical: bool,
-) -> Result<Convergence, StudyError> {
+) -> Studied<Convergence> {
     let sizes = ladder.sizes();
     let CentralDifference { velocity, boundaries, .. } = scheme(ladder.to);
     let study = |quantity, path: &Path, points: &[StepError]| QuantityStudy {
@@ -137,7 +137,7 @@ pub fn of_fixed_steps(
     }
     let critical = scene.resolve(exact)?;
     let path = Path::of(&critical, &Truth::of(&critical)?.flight);
-    let error = |size| -> Result<StepError, StudyError> {
+    let error = |size| -> Studied<StepError> {
         let velocity = critical_velocity::of_scene(scene, &scheme(size))?.velocity;
         Ok(StepError::new(size, signed_error(quantity, velocity, exact, 1.0)))
     };
@@ -149,13 +149,8 @@ pub fn of_fixed_steps(
 /// Convergence of an adaptive method with its tolerance and with its work, against `exact`.
 ///
 /// # Errors
-/// [`StudyError`].
-pub fn of_tolerances(
-    problem: &Problem,
-    exact: &Flight,
-    method: MethodName,
-    ladder: Ladder,
-) -> Result<Convergence, StudyError> {
+/// [`StudyError`](super::error::StudyError).
+pub fn of_tolerances(problem: &Problem, exact: &Flight, method: MethodName, ladder: Ladder) -> Studied<Convergence> {
     let mut flights = Vec::new();
     let mut order = None;
     for rtol in ladder.sizes() {

@@ -17,7 +17,7 @@ use argmin::solver::brent::BrentRoot;
 use smallvec::SmallVec;
 use thiserror::Error;
 
-use super::error::StudyError;
+use super::error::Studied;
 use crate::integrators::{Cost, IntegrationError, Integrator, Margin, Taylor};
 use crate::physics::{
     Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, closed_form, exit_energy,
@@ -94,6 +94,9 @@ impl std::fmt::Display for Point {
         write!(f, "W = {} m²/s² at {} m/s", Shown(self.w), Shown(self.velocity()))
     }
 }
+
+/// What a search for it gives.
+pub type Sought<T = CriticalVelocity> = Result<T, CriticalError>;
 
 /// Why there is no critical velocity.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -215,19 +218,12 @@ impl Advice for CriticalError {
 ///
 /// # Errors
 /// [`CriticalError`]. Each that ends a search shows both ends of the bracket.
-pub fn critical_velocity(
-    resolve: impl Fn(f64) -> Resolved,
-    integrator: &dyn Integrator,
-) -> Result<CriticalVelocity, CriticalError> {
+pub fn critical_velocity(resolve: impl Fn(f64) -> Resolved, integrator: &dyn Integrator) -> Sought {
     within(FLIGHTS_MAX, resolve, integrator)
 }
 
 /// As [`critical_velocity`], in at most `flights_max` flights.
-fn within(
-    flights_max: u32,
-    resolve: impl Fn(f64) -> Resolved,
-    integrator: &dyn Integrator,
-) -> Result<CriticalVelocity, CriticalError> {
+fn within(flights_max: u32, resolve: impl Fn(f64) -> Resolved, integrator: &dyn Integrator) -> Sought {
     let probe = resolve(PROBE_SPEED).map_err(|cause| CriticalError::Scene { velocity: PROBE_SPEED, cause })?;
     if !probe.has_exit() {
         return Err(CriticalError::NoExit);
@@ -296,7 +292,7 @@ fn at_any_speed(error_bar: f64, tally: Tally, note: &'static str) -> CriticalVel
 ///
 /// # Errors
 /// [`CriticalError`].
-pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVelocity, CriticalError> {
+pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Sought {
     let first = OnceCell::new();
     let resolve = |speed| match first.get() {
         Some(problem) => scene.resolve_from(problem, speed),
@@ -309,8 +305,8 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<CriticalVe
 /// Exact critical velocity of `scene` (m/s), where it has a closed form.
 ///
 /// # Errors
-/// [`StudyError::NoClosedForm`]: no far side, a viscous stage, or out of range.
-pub fn exact(scene: &Scene) -> Result<f64, StudyError> {
+/// [`NoClosedForm`](super::error::StudyError::NoClosedForm): no far side, a viscous stage, or out of range.
+pub fn exact(scene: &Scene) -> Studied<f64> {
     let problem = scene.resolve(PROBE_SPEED)?;
     let critical = match scene.concrete() {
         Some(concrete) if concrete.layers.is_empty() => closed_form::critical(&problem, concrete.crater_stiffness)?,
@@ -327,7 +323,7 @@ pub fn exact(scene: &Scene) -> Result<f64, StudyError> {
 /// H <= k d : as in one concrete, that of the layer just beyond k d
 /// H >  k d : V1c² backwards from the exit,  V_c² = (V1c² (M + k d Q) + k d P)/M
 /// ```
-fn of_layers(mut problem: Problem) -> Result<f64, StudyError> {
+fn of_layers(mut problem: Problem) -> Studied<f64> {
     let Some(crater) = problem.crater else { return Ok(closed_form::critical_of_stages(&problem)?.velocity) };
     let (crater_depth, Stage { static_force, drag, .. }) = problem.crater_depth_and_tunnel();
     if problem.exit_depth <= crater_depth {
@@ -344,7 +340,7 @@ fn of_layers(mut problem: Problem) -> Result<f64, StudyError> {
 ///
 /// # Errors
 /// [`CriticalError`].
-pub fn exact_or_refined(scene: &Scene) -> Result<f64, CriticalError> {
+pub fn exact_or_refined(scene: &Scene) -> Sought<f64> {
     exact(scene).or_else(|_| Ok(of_scene(scene, &Taylor::default())?.velocity))
 }
 
@@ -408,7 +404,7 @@ struct Search<'a, F> {
 
 impl<F: Fn(f64) -> Resolved> Search<'_, F> {
     /// W(exit) at `V0² = u`, a finite number.
-    fn at(&self, u: f64) -> Result<Point, CriticalError> {
+    fn at(&self, u: f64) -> Sought<Point> {
         let velocity = u.sqrt();
         let mut tally = self.tally.borrow_mut();
         if tally.flights >= self.flights_max {
@@ -442,7 +438,7 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
     }
 
     /// Two flights with strictly opposite signs; `None` when the target is perforated however slow the projectile.
-    fn bracket(&self, probe: &Problem) -> Result<Option<Bracket>, CriticalError> {
+    fn bracket(&self, probe: &Problem) -> Sought<Option<Bracket>> {
         let first = self.at(lower_bound(probe))?;
         let (mut low, mut high) = (first, first);
         let mut factor = 4.0_f64;
@@ -485,7 +481,7 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
     }
 
     /// A bracket close around the root that the secant predicts, where W is affine enough for that to hold.
-    fn narrow(&self, wide: Bracket, affine: bool) -> Result<Bracket, CriticalError> {
+    fn narrow(&self, wide: Bracket, affine: bool) -> Sought<Bracket> {
         if !affine {
             return Ok(wide);
         }
@@ -511,7 +507,7 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
 
     /// The point at the root within a bracket, by the method of Brent, and dW/du there; `None` if `flights_max` more
     /// flights do not find it.
-    fn refine(&self, bracket: Bracket, flights_max: u32) -> Result<Option<(Point, f64)>, CriticalError> {
+    fn refine(&self, bracket: Bracket, flights_max: u32) -> Sought<Option<(Point, f64)>> {
         let resolution = bracket.resolution();
         let unit = bracket.secant_root();
         let objective = Objective {

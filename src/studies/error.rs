@@ -15,6 +15,9 @@ use crate::physics::parameter::{Parameter, ParameterError};
 use crate::physics::reference::{Conditions, ExactFlight, ReferenceError};
 use crate::physics::{Advice, Outcome, Problem, ResolveError, Scalar, State, closed_form};
 
+/// What the study of a scene gives.
+pub type Studied<T> = Result<T, StudyError>;
+
 /// Why a scene cannot be studied.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum StudyError {

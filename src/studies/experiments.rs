@@ -15,7 +15,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::applicability::model_error;
-use super::error::StudyError;
+use super::error::{Studied, StudyError};
 use super::sensitivity::{Spread, by_closed_form};
 use crate::exchange::tables::{self, Column, Format, Need, Row, TableError};
 use crate::integrators::{ClosedForm, Detail, Integrator};
@@ -291,7 +291,7 @@ fn predict(
     crater_ratio: Option<f64>,
     spreads: &[Spread],
     integrator: &dyn Integrator,
-) -> Result<Comparison, StudyError> {
+) -> Studied<Comparison> {
     let scene = experiment.scene(crater_ratio);
     let problem = scene.problem()?;
     let predicted = integrator.solve(&problem, Detail::End)?.end.depth;

@@ -1,6 +1,6 @@
 //! Random scenes from a seed, and how the closed form fares on a scene.
 
-use super::error::{Errors, StudyError};
+use super::error::{Errors, Studied, StudyError};
 use super::random::Random;
 use crate::integrators::closed_form::solve_crater_and_tunnel;
 use crate::integrators::{ClosedForm, Detail, Flight, Integrator};
@@ -60,7 +60,7 @@ impl Generator {
 ///
 /// # Errors
 /// [`StudyError`].
-pub fn closed_form_errors(scene: &Scene) -> Result<Errors, StudyError> {
+pub fn closed_form_errors(scene: &Scene) -> Studied<Errors> {
     let problem = scene.problem()?;
     errors_of_both_forms(scene, &problem, Source::Scene(scene, problem.impact_speed))
 }
@@ -69,14 +69,14 @@ pub fn closed_form_errors(scene: &Scene) -> Result<Errors, StudyError> {
 ///
 /// # Errors
 /// [`StudyError`].
-pub fn closed_form_errors_at_inputs(scene: &Scene) -> Result<Errors, StudyError> {
+pub fn closed_form_errors_at_inputs(scene: &Scene) -> Studied<Errors> {
     let problem = scene.problem()?;
     errors_of_both_forms(scene, &problem, Source::Problem(&problem))
 }
 
 /// The closed form of the stages against `source`, and for one crater and one tunnel, with the speed in the crater
 /// computed without c, against the scene.
-fn errors_of_both_forms(scene: &Scene, problem: &Problem, source: Source<'_>) -> Result<Errors, StudyError> {
+fn errors_of_both_forms(scene: &Scene, problem: &Problem, source: Source<'_>) -> Studied<Errors> {
     let mut errors = errors_of(source, &ClosedForm.solve(problem, Detail::Events)?)?;
     if let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) {
         let flight = solve_crater_and_tunnel(problem, concrete.crater_stiffness)?;
@@ -91,7 +91,7 @@ fn errors_of_both_forms(scene: &Scene, problem: &Problem, source: Source<'_>) ->
 ///
 /// # Errors
 /// [`StudyError`].
-pub fn errors_of(source: Source<'_>, flight: &Flight) -> Result<Errors, StudyError> {
+pub fn errors_of(source: Source<'_>, flight: &Flight) -> Studied<Errors> {
     let exact = reference::flight(source)?;
     if flight.outcome == Outcome::Undecided {
         return Ok(Errors::default());

@@ -22,11 +22,11 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::critical_velocity;
-use super::error::{StudyError, Truth};
+use super::error::{Studied, StudyError, Truth};
 use super::random::Random;
 #[cfg(feature = "diffsol")]
 use crate::integrators::diffsol_sensitivity;
-use crate::integrators::{Detail, Energy, IntegrationError, Taylor};
+use crate::integrators::{Detail, Energy, Solved, Taylor};
 #[cfg(feature = "diffsol")]
 use crate::physics::EventKind;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError};
@@ -97,7 +97,7 @@ fn slope(scene: &Scene, number: Parameter, value: f64, parameter: Parameter) -> 
 }
 
 /// The quantities of `scene` that have derivatives; `notes` says why one has none.
-fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Result<Quantities, StudyError> {
+fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Studied<Quantities> {
     let mut quantities = Quantities::default();
     if let Some(speed) = scene.velocity {
         let flight = Truth::of(&scene.resolve(speed)?)?.flight;
@@ -132,12 +132,12 @@ fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Result<Quantities, Stud
 /// - `excess`: dg/dp of any function g that is zero at V_c, so that `dV_c/dp = -(dg/dp)/(dg/dV0)`.
 fn differentiate(
     scene: &Scene,
-    end: impl Fn(&Problem<Dual64>, Quantities) -> Result<[Option<f64>; 2], IntegrationError>,
-    excess: impl Fn(Problem<Dual64>) -> Result<Option<f64>, IntegrationError>,
-) -> Result<Sensitivities, StudyError> {
+    end: impl Fn(&Problem<Dual64>, Quantities) -> Solved<[Option<f64>; 2]>,
+    excess: impl Fn(Problem<Dual64>) -> Solved<Option<f64>>,
+) -> Studied<Sensitivities> {
     let mut notes = Vec::new();
     let quantities = quantities(scene, &mut notes)?;
-    let at_critical = |parameter| -> Result<Option<f64>, StudyError> {
+    let at_critical = |parameter| -> Studied<Option<f64>> {
         let Some(critical) = quantities.critical_velocity else { return Ok(None) };
         Ok(excess(dual_problem(scene, critical, parameter)?)?)
     };
@@ -168,7 +168,7 @@ fn squared_speed(problem: &Problem<Dual64>, depth: Dual64) -> Option<Dual64> {
 ///
 /// # Errors
 /// [`StudyError`]: the scene does not resolve, or the projectile neither rests nor leaves.
-pub fn by_closed_form(scene: &Scene) -> Result<Sensitivities, StudyError> {
+pub fn by_closed_form(scene: &Scene) -> Studied<Sensitivities> {
     let end = |problem: &Problem<Dual64>, quantities: Quantities| {
         let half_slope = |depth: Dual64| squared_speed(problem, depth).map(|w| 0.5 * w.eps);
         let depth = quantities.depth.and_then(|depth| {
@@ -185,7 +185,7 @@ pub fn by_closed_form(scene: &Scene) -> Result<Sensitivities, StudyError> {
 ///
 /// # Errors
 /// [`StudyError`].
-pub fn by_taylor(scene: &Scene) -> Result<Sensitivities, StudyError> {
+pub fn by_taylor(scene: &Scene) -> Studied<Sensitivities> {
     by_integration(scene, |problem| Ok(Taylor::default().solve_in(&with_every_term(problem), Detail::End)?.end))
 }
 
@@ -217,10 +217,7 @@ fn with_every_term(problem: &Problem<Dual64>) -> Problem<Dual64> {
 /// Sensitivities by `solve`, which gives the state at the end of a problem in dual numbers.
 ///
 /// V_c is the speed at which the rest depth of the target, continued beyond H, is H.
-fn by_integration(
-    scene: &Scene,
-    solve: impl Fn(&Problem<Dual64>) -> Result<State<Dual64>, IntegrationError>,
-) -> Result<Sensitivities, StudyError> {
+fn by_integration(scene: &Scene, solve: impl Fn(&Problem<Dual64>) -> Solved<State<Dual64>>) -> Studied<Sensitivities> {
     let end = |problem: &Problem<Dual64>, quantities: Quantities| {
         let State { depth, velocity, .. } = solve(problem)?;
         let residual = quantities.velocity.filter(|v| *v > 0.0);
@@ -237,7 +234,7 @@ fn by_integration(
 /// Taylor says when each stage ends. The library integrates state and sensitivities up to that instant at fixed time;
 /// then the movement of the event with the parameter is added, `d tau = (d xi_end - d xi)/u`.
 #[cfg(feature = "diffsol")]
-fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Result<State<Dual64>, IntegrationError> {
+fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Solved<State<Dual64>> {
     let flight = Taylor::default().solve_in(&problem.cast::<f64>(), Detail::Events)?;
     let unit_velocity = problem.impact_speed.re;
     let mut entry = State::at_impact(problem);
@@ -286,7 +283,7 @@ fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Result<State<Dual64
 /// # Errors
 /// [`StudyError`].
 #[cfg(feature = "diffsol")]
-pub fn by_diffsol(scene: &Scene, rtol: f64) -> Result<Sensitivities, StudyError> {
+pub fn by_diffsol(scene: &Scene, rtol: f64) -> Studied<Sensitivities> {
     by_integration(scene, |problem| solve_by_diffsol(problem, rtol))
 }
 
@@ -425,7 +422,7 @@ const CHUNK: usize = 4096;
 /// # Errors
 /// [`StudyError`]: no critical velocity, a number that the scene lacks or that V_c does not depend on, or no
 /// admissible sample at all.
-pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64) -> Result<Uncertainty, StudyError> {
+pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64) -> Studied<Uncertainty> {
     if spreads.iter().any(|spread| spread.parameter == Parameter::Velocity) {
         return Err(StudyError::NoInput);
     }
