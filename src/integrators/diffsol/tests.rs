@@ -94,7 +94,10 @@ fn spring_stops_at_its_first_turning_point_even_at_a_tenth_of_accuracy() {
 }
 
 #[test]
-fn no_step_on_a_spring_is_longer_than_the_longest() {
+fn no_step_on_an_underdamped_spring_is_longer_than_the_longest() {
+    for (s, r, longest) in [(4.0, 0.0, 0.5), (4.0, 3.9, 0.5), (4.0, 4.0, INF), (0.0, 0.0, INF)] {
+        assert_eq!(law(1.0, s, r, 0.0).longest_step(), longest, "{s}, {r}");
+    }
     // w = 5/s, driven: half a period lies before the turning point.
     let problem = of_stages(2.0, 0.01, 1e4, &[stage(-25.0, 50.0, 0.0, 0.0, f64::INFINITY)]);
     for scheme in Scheme::ALL {
@@ -103,15 +106,6 @@ fn no_step_on_a_spring_is_longer_than_the_longest() {
         assert!(longest.fold(0.0, f64::max) <= 0.2 * (1.0 + 1e-12), "{scheme:?}");
         assert!(flight.outcome.is_stop() || flight.outcome == Outcome::Undecided, "{scheme:?}: {flight:?}");
     }
-}
-
-#[test]
-fn longest_step_holds_for_underdamped_springs_alone() {
-    let law = |s, r| Law { p: 1.0, s, r, q: 0.0 };
-    assert_eq!(law(4.0, 0.0).longest_step(), 0.5);
-    assert_eq!(law(4.0, 3.9).longest_step(), 0.5);
-    assert_eq!(law(4.0, 4.0).longest_step(), f64::INFINITY);
-    assert_eq!(law(0.0, 0.0).longest_step(), f64::INFINITY);
 }
 
 #[test]
