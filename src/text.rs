@@ -142,11 +142,13 @@ pub fn one_line(text: &str) -> String {
 
 /// A cell or key as a message may quote it: [`harmless`], and forty characters.
 pub fn shortened(text: &str) -> String {
-    let mut short = harmless(&text.chars().take(40).collect::<String>());
-    if text.chars().count() > 40 {
-        short.push('…');
-    }
-    short
+    harmless(&clipped(text, 40))
+}
+
+/// The first `most` characters of `text`, with `…` behind them where it is longer.
+pub fn clipped(text: &str, most: usize) -> String {
+    let (first, rest) = text.char_indices().nth(most).map_or((text, ""), |(end, _)| text.split_at(end));
+    if rest.is_empty() { first.to_owned() } else { format!("{first}…") }
 }
 
 /// `text` in lines of `most` characters, broken at spaces; a longer word, such as a path, stays whole.

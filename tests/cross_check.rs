@@ -231,7 +231,7 @@ fn says_that_the_network_is_missing() -> Check {
     // Port 9 of this machine answers nobody.
     let unreachable = "--index-url http://127.0.0.1:9/simple\nno-such-package==1.0\n";
     match Environment::ensure_in(cache.path(), "python3", unreachable, &mut |_| ()) {
-        Err(error @ PeerSetupError::NoPackages { .. }) => {
+        Err(error @ PeerSetupError::NoPackages(_)) => {
             let left: Vec<_> = std::fs::read_dir(cache.path())?.filter_map(Result::ok).map(|e| e.file_name()).collect();
             let message = error.to_string();
             ensure!(
@@ -241,7 +241,7 @@ fn says_that_the_network_is_missing() -> Check {
             Ok(())
         }
         // Without Python there is nothing to install from; the other tests say so.
-        Err(PeerSetupError::NoPython { .. } | PeerSetupError::NoVirtualEnvironment { .. }) => Ok(()),
+        Err(PeerSetupError::NoPython { .. } | PeerSetupError::NoVirtualEnvironment(_)) => Ok(()),
         other => Err(format!("{other:?}").into()),
     }
 }

@@ -138,7 +138,7 @@ fn summary(tally: &Tally) -> String {
 /// Results of a chunk, part by part; `first` is the number of its first row.
 fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parquet: bool) -> (Tally, Vec<Block>) {
     let total = scenes.len();
-    let parts: Vec<(Tally, Block)> = (0..total.div_ceil(PART))
+    let (tallies, blocks): (Vec<Tally>, Vec<Block>) = (0..total.div_ceil(PART))
         .into_par_iter()
         // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
         .with_max_len(1)
@@ -147,13 +147,9 @@ fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parque
             let answers = answers(scenes.scenes(from..total.min(from + PART)), method, critical);
             (Tally::of(&answers), scenes.results(from, first + from as u64, &answers, is_parquet))
         })
-        .collect();
+        .unzip();
     let mut tally = Tally::default();
-    let blocks = parts.into_iter().map(|(counted, block)| {
-        tally += counted;
-        block
-    });
-    let blocks = blocks.collect();
+    tallies.into_iter().for_each(|counted| tally += counted);
     (tally, blocks)
 }
 

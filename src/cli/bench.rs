@@ -15,8 +15,11 @@ use crate::report::bench::{BenchJson, CaseJson, files};
 use crate::report::{Environment, folder};
 use crate::studies::bench::growth::{self, Growth};
 use crate::studies::bench::step_size::{self, Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
-use crate::studies::bench::work_precision::{self, Case, Contender, LEVELS, Run, RunState, fastest};
+use crate::studies::bench::work_precision::{
+    self, Case, Contender, LEVELS, Run, RunState, by_method, fastest, fastest_of, least_error,
+};
 use crate::studies::bench::{Effort, peers};
+use crate::suite::grouped;
 use crate::text::{number, or_dash, prefixed};
 
 /// Scenes that are measured where none is given: those of the comparison with other solvers, and the stiff one.
@@ -94,12 +97,8 @@ impl BenchArgs {
     /// The scenes under names of their own.
     fn scenes(&self) -> Result<Vec<(String, Scene)>, CliError> {
         if self.scenes.is_empty() {
-            let shipped = SHIPPED.iter().filter(|(name, _)| DEFAULT_SCENES.contains(name));
-            let mut scenes = shipped
-                .map(|(name, text)| Ok(((*name).to_owned(), Scene::from_toml(text, name)?)))
-                .collect::<Result<Vec<_>, CliError>>()?;
-            scenes.sort_by_key(|(name, _)| DEFAULT_SCENES.iter().position(|known| known == name));
-            return Ok(scenes);
+            let shipped = DEFAULT_SCENES.iter().filter_map(|wanted| SHIPPED.iter().find(|(name, _)| name == wanted));
+            return shipped.map(|(name, text)| Ok(((*name).to_owned(), Scene::from_toml(text, name)?))).collect();
         }
         let mut scenes: Vec<(String, Scene)> = Vec::new();
         for path in &self.scenes {
@@ -258,16 +257,12 @@ fn add_case(text: &mut Text, report: &BenchJson, case: &CaseJson) {
     if case.exact < case.problems {
         text.line("  no closed form: errors against a Taylor series to round-off");
     }
-    let methods = report.runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method);
-    let methods: Vec<_> = methods.filter(|runs| runs[0].scene == case.name).collect();
+    let methods: Vec<_> = by_method(&report.runs).filter(|runs| runs[0].scene == case.name).collect();
     let row = |runs: &&[Run]| {
         let fastest = LEVELS.map(|level| {
-            let mut found = report.fastest.iter().filter(|f| f.scene == case.name && f.method == runs[0].method);
-            let best = found.find(|f| f.level == level).and_then(|f| f.time_ns.zip(f.setting.as_ref()));
-            best.map_or("-".to_owned(), |(ns, setting)| format!("{} {setting}", micro(ns)))
+            fastest_of(runs, level).map_or("-".to_owned(), |(run, ns)| format!("{} {}", micro(ns), run.setting))
         });
-        let right = runs.iter().filter(|run| run.state == RunState::Right);
-        let least = error_text(right.filter_map(|run| run.error).min_by(f64::total_cmp));
+        let least = error_text(least_error(runs));
         [clipped(&runs[0].method, 16)].into_iter().chain(fastest).chain([least]).collect::<Vec<_>>()
     };
     text.table(&["method", "1e-3", "1e-6", "1e-9", "1e-12", "least"], methods.iter().map(row));
@@ -278,15 +273,9 @@ fn add_case(text: &mut Text, report: &BenchJson, case: &CaseJson) {
 
 /// What was not right, one paragraph for each reason of a method.
 fn notes_of(runs: &[Run]) -> Vec<String> {
-    let mut groups: Vec<(RunState, &str, Vec<&Run>)> = Vec::new();
-    for run in runs.iter().filter(|run| run.state != RunState::Right) {
-        let reason = run.reason.as_deref().unwrap_or_default();
-        match groups.iter_mut().find(|(state, known, _)| *state == run.state && *known == reason) {
-            Some((.., members)) => members.push(run),
-            None => groups.push((run.state, reason, vec![run])),
-        }
-    }
-    let paragraph = |(state, reason, members): (RunState, &str, Vec<&Run>)| {
+    let not_right = runs.iter().filter(|run| run.state != RunState::Right);
+    let groups = grouped(not_right, |run| (run.state, run.reason.as_deref().unwrap_or_default()));
+    let paragraph = |((state, reason), members): ((RunState, &str), Vec<&Run>)| {
         let settings = members.iter().map(|run| {
             let lost = if state == RunState::Failed { run.failed } else { run.undecided };
             if flights_of(run) > 1 { format!("{} ({lost})", run.setting) } else { run.setting.clone() }
@@ -296,7 +285,7 @@ fn notes_of(runs: &[Run]) -> Vec<String> {
         } else {
             settings.collect::<Vec<_>>().join(", ")
         };
-        let text = format!("{}: {} at {settings}: {reason}", state.name(), members[0].method);
+        let text = format!("{state}: {} at {settings}: {reason}", members[0].method);
         // Further lines are indented by four.
         wrapped("    ", &escape_terminal(&text)).replacen("    ", "  ", 1)
     };

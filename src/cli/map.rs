@@ -10,6 +10,7 @@ use super::output::{Text, check_table, significant, write_table};
 use super::{Answer, Ask, CliError, Exit};
 use crate::exchange::tables::{Value, push_line};
 use crate::physics::Shown;
+use crate::report::chart::extremes;
 use crate::report::sweep_figures;
 use crate::studies::applicability::{self, LEVELS, Line};
 use crate::studies::experiments::{self, MarkedScene};
@@ -80,17 +81,15 @@ impl MapJson {
         text.table(&["I", "1 %", "5 %", "20 %"], impacts.map(row));
         text.gap();
         let sets = self.scenes.chunk_by(|a, b| a.set == b.set).map(|of_set| {
-            let range = |get: fn(&MarkedScene) -> f64| {
-                of_set.iter().map(get).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
-            };
-            let (impact, geometry, error) = (range(|s| s.impact), range(|s| s.geometry), range(|s| s.error));
+            let range = |get: fn(&MarkedScene) -> f64| extremes(of_set.iter().map(get)).unwrap_or_default();
+            let [impact, geometry, error] = [range(|s| s.impact), range(|s| s.geometry), range(|s| s.error)];
             let within = of_set.iter().filter(|s| s.error.abs() <= applicability::ERROR_ALLOWED).count();
             [
                 of_set[0].set.clone(),
                 of_set.len().to_string(),
-                format!("{:.2} to {:.1}", impact.0, impact.1),
-                format!("{:.1} to {:.1}", geometry.0, geometry.1),
-                format!("{:+.1} to {:+.1}", 100.0 * error.0, 100.0 * error.1),
+                format!("{:.2} to {:.1}", impact[0], impact[1]),
+                format!("{:.1} to {:.1}", geometry[0], geometry[1]),
+                format!("{:+.1} to {:+.1}", 100.0 * error[0], 100.0 * error[1]),
                 within.to_string(),
             ]
         });

@@ -119,18 +119,6 @@ impl RelativeErrorJson {
     }
 }
 
-impl From<&Flight> for ClosedFormJson {
-    fn from(exact: &Flight) -> Self {
-        let crater_end = exact.crater_end();
-        Self {
-            outcome: exact.outcome,
-            end: exact.end,
-            crater_end_time_s: crater_end.map(|s| s.time),
-            crater_end_velocity_m_s: crater_end.map(|s| s.velocity),
-        }
-    }
-}
-
 impl GroupsJson {
     fn new(scene: &Scene, impact_speed: f64, depth: f64) -> Self {
         let groups = Groups::of(scene, impact_speed);
@@ -187,7 +175,12 @@ impl Ask for SolveArgs {
             exit_margin_error: flight.exit_margin_error,
             events: flight.events.iter().map(EventJson::from).collect(),
             cost: CostJson { cost: flight.cost, wall_ns },
-            closed_form: exact.as_ref().map(ClosedFormJson::from),
+            closed_form: exact.as_ref().map(|exact| ClosedFormJson {
+                outcome: exact.outcome,
+                end: exact.end,
+                crater_end_time_s: exact.crater_end().map(|s| s.time),
+                crater_end_velocity_m_s: exact.crater_end().map(|s| s.velocity),
+            }),
             relative_error: exact.and_then(|exact| RelativeErrorJson::new(&flight, &exact, problem.impact_speed)),
             skipped,
             sensitivities,
@@ -268,14 +261,14 @@ impl SolveJson {
             return text.line("  no closed form for these stages: compare methods, or refine with `converge`");
         };
         let errors = self.relative_error.as_ref();
+        let (ours, theirs) = (self.end, exact.end);
         let rows = [
-            ("depth", "m", (|s| s.depth) as fn(&State) -> f64, errors.and_then(|e| e.depth)),
-            ("time", "s", |s| s.time, errors.and_then(|e| e.time)),
-            ("velocity", "m/s", |s| s.velocity, errors.and_then(|e| e.velocity)),
+            ("depth", "m", ours.depth, theirs.depth, errors.and_then(|e| e.depth)),
+            ("time", "s", ours.time, theirs.time, errors.and_then(|e| e.time)),
+            ("velocity", "m/s", ours.velocity, theirs.velocity, errors.and_then(|e| e.velocity)),
         ];
-        let rows = rows.map(|(name, unit, get, error)| {
-            let of = |state| engineering(get(state), unit);
-            [name.to_owned(), of(&self.end), of(&exact.end), error_text(error)]
+        let rows = rows.map(|(name, unit, ours, theirs, error)| {
+            [name.to_owned(), engineering(ours, unit), engineering(theirs, unit), error_text(error)]
         });
         text.table(&["at the end", self.method.name, "closed form", "error"], rows);
         text.lines(errors.is_none().then(|| format!("  the closed form says {}", exact.outcome)));

@@ -123,16 +123,16 @@ impl VerifyArgs {
 
     /// The command that remakes this run.
     fn command(&self) -> String {
-        let mut words = vec!["penetrode verify".to_owned()];
-        words.extend(self.suite.as_deref().map(quoted));
-        words.extend(self.only.as_deref().map(|pattern| format!("--only {}", quoted(pattern))));
-        words.push(format!("--seed {}", self.seed));
-        if self.live_peers {
-            words.push("--live-peers".to_owned());
-        }
-        words.extend(self.data.as_deref().map(|path| format!("--data {}", quoted(&path.to_string_lossy()))));
-        words.extend(self.peer.as_deref().map(|command| format!("--peer {}", quoted(command))));
-        words.join(" ")
+        let words = [
+            Some("penetrode verify".to_owned()),
+            self.suite.as_deref().map(quoted),
+            self.only.as_deref().map(|pattern| format!("--only {}", quoted(pattern))),
+            Some(format!("--seed {}", self.seed)),
+            self.live_peers.then(|| "--live-peers".to_owned()),
+            self.data.as_deref().map(|path| format!("--data {}", quoted(&path.to_string_lossy()))),
+            self.peer.as_deref().map(|command| format!("--peer {}", quoted(command))),
+        ];
+        words.into_iter().flatten().collect::<Vec<_>>().join(" ")
     }
 }
 

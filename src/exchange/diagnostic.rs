@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::input::{self, Unread};
-use crate::text::steers;
+use crate::text::{clipped, steers};
 
 /// Largest scene file that is read, 1 MiB. A scene takes about one KiB; more is a mistaken path.
 pub const SIZE_MAX: u64 = 1 << 20;
@@ -118,11 +118,7 @@ pub(super) fn printable(text: &str) -> String {
 
 /// A piece of the file within a message: one line, bounded, in backticks.
 pub(crate) fn quoted(text: &str) -> String {
-    let mut piece: String = printable(text).replace(['\n', '\r', '\t'], " ").chars().take(QUOTE_LENGTH_MAX).collect();
-    if text.chars().count() > QUOTE_LENGTH_MAX {
-        piece.push('…');
-    }
-    format!("`{piece}`")
+    format!("`{}`", clipped(&printable(text).replace(['\n', '\r', '\t'], " "), QUOTE_LENGTH_MAX))
 }
 
 /// What is wrong with a text, before it is known which file it is from.
@@ -174,21 +170,19 @@ impl Fault {
 pub fn read_text(path: &Path) -> Result<(String, String), Box<SceneError>> {
     let file = input::name_of(path);
     let bytes = input::read(path, SIZE_MAX).map_err(|cause| {
-        let (message, allowed, help) = match cause {
-            Unread::Folder => {
-                ("this is a directory".to_owned(), "a file, or `-` for standard input", "name a file in it")
-            }
+        let refuse = |message: &str, allowed: &str, help: &str| Fault::new(0..0, message, allowed, help);
+        let fault = match cause {
+            Unread::Folder => refuse("this is a directory", "a file, or `-` for standard input", "name a file in it"),
             Unread::TooLarge => {
-                let message = "the file is larger than 1 MiB, and was not read".to_owned();
-                (message, "a file of at most 1 MiB", "check that this is the file you mean")
+                let message = "the file is larger than 1 MiB, and was not read";
+                refuse(message, "a file of at most 1 MiB", "check that this is the file you mean")
             }
             Unread::System(error) => {
                 let message = format!("the file cannot be read: {error}");
-                (message, "a readable file, or `-` for standard input", "check the path")
+                refuse(&message, "a readable file, or `-` for standard input", "check the path")
             }
         };
-        let (allowed, help) = (allowed.to_owned(), help.to_owned());
-        Box::new(SceneError { file: file.clone(), place: None, message, allowed, help, text: String::new() })
+        Box::new(SceneError { place: None, ..*fault.in_file(&file, "") })
     })?;
     text_of(bytes, &file).map(|text| (file, text))
 }

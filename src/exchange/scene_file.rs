@@ -11,7 +11,9 @@ use strum::VariantNames;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::diagnostic::{Dialect, Fault, SceneError, Span, did_you_mean, nearest, parse, quoted, read_text, type_of};
+use super::diagnostic::{
+    Dialect, Fault, SceneError, Span, did_you_mean, key_of, nearest, parse, quoted, read_text, type_of,
+};
 use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, LayerNumber, Parameter, StageNumber};
 use crate::physics::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene, layer_beyond};
@@ -362,7 +364,7 @@ impl<'t> Reader<'t> {
         match given.min_by_key(|(_, span)| span.start) {
             None => Ok(()),
             Some((path, span)) => {
-                let key = path.rsplit('.').next().unwrap_or(path);
+                let key = key_of(path);
                 let message = format!("`{key}` has no place in {section} here");
                 Err(Fault::new(span, message, why, format!("remove `{key}`")))
             }
@@ -462,8 +464,7 @@ impl<'t> Reader<'t> {
         if count > 0 {
             return Ok(count);
         }
-        let key = path.rsplit('.').next().unwrap_or(path);
-        let message = format!("`{key}` is empty");
+        let message = format!("`{}` is empty", key_of(path));
         Err(Fault::new(self.place(path), message, "at least one table", (DIALECT.remedy)(path)))
     }
 
@@ -603,7 +604,7 @@ impl<'t> Reader<'t> {
             return Err(Fault::new(span, message, format!("one of {}", known.join(", ")), help));
         };
         let ((_, range, of), path) = (SHAPES[index], RATIOS[index]);
-        let key = path.rsplit('.').next().unwrap_or(path);
+        let key = key_of(path);
         without(Some(index), &format!("the shape `{name}` takes `{key}`"))?;
         let (_, number) = self.at(path).ok_or_else(|| self.missing(path, "3.0"))?;
         Ok(of(self.quantity(key, None, range, number)?.value).factor())

@@ -123,6 +123,14 @@ impl Format {
         }
         text
     }
+
+    /// The column whose name `name` resembles, if it is a word at all.
+    fn resembling(&self, name: &str) -> Option<&'static str> {
+        let is_word = name.chars().all(|c| c.is_alphanumeric() || "_ ()/".contains(c));
+        let likeness = |known: &str| strsim::jaro_winkler(&known.to_lowercase(), &name.to_lowercase());
+        let known = self.columns.iter().filter(|_| is_word).map(|column| (likeness(column.name), column.name));
+        known.filter(|(likeness, _)| *likeness > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, known)| known)
+    }
 }
 
 /// Where each column of a [`Format`] stands in the table at hand.
@@ -165,16 +173,6 @@ impl Layout {
             Some((column, _)) => refuse(0, Fault::MissingColumn(column.name)),
             None => Ok(Self { columns: format.columns, places, width: names.len(), header: at }),
         }
-    }
-}
-
-impl Format {
-    /// The column whose name `name` resembles, if it is a word at all.
-    fn resembling(&self, name: &str) -> Option<&'static str> {
-        let is_word = name.chars().all(|c| c.is_alphanumeric() || "_ ()/".contains(c));
-        let likeness = |known: &str| strsim::jaro_winkler(&known.to_lowercase(), &name.to_lowercase());
-        let known = self.columns.iter().filter(|_| is_word).map(|column| (likeness(column.name), column.name));
-        known.filter(|(likeness, _)| *likeness > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, known)| known)
     }
 }
 
@@ -222,68 +220,58 @@ impl Rows {
     /// # Errors
     /// [`Fault::Ragged`].
     pub fn row(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
-        let (at, expected) = (self.at(index), self.layout.width);
-        let record = match &self.data {
-            Data::Csv(records, _) if records[index].len() != expected => {
-                return Err(TableError::of_row(at, 0, Fault::Ragged { found: records[index].len(), expected }));
+        let row = Row { rows: self, index };
+        match &self.data {
+            Data::Csv(records, _) if records[index].len() != self.layout.width => {
+                let fault = Fault::Ragged { found: records[index].len(), expected: self.layout.width };
+                Err(TableError::of_row(row.at(), 0, fault))
             }
-            Data::Csv(records, _) => Record::Csv(&records[index]),
-            #[cfg(feature = "parquet")]
-            Data::Parquet(cells, _) => Record::Parquet(cells, index),
-        };
-        Ok(Row { layout: &self.layout, at, record })
+            _ => Ok(row),
+        }
     }
 }
 
 /// A row of a table; columns are counted in the list of its [`Format`].
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
-    layout: &'a Layout,
-    at: At,
-    record: Record<'a>,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Record<'a> {
-    Csv(&'a ByteRecord),
-    #[cfg(feature = "parquet")]
-    Parquet(&'a [Cells], usize),
+    rows: &'a Rows,
+    index: usize,
 }
 
 impl<'a> Row<'a> {
     /// Where it stands.
     pub fn at(&self) -> At {
-        self.at
+        self.rows.at(self.index)
     }
 
     /// Where the columns are named.
     pub fn header(&self) -> At {
-        self.layout.header
+        self.rows.layout.header
     }
 
     /// Position of `column` in the table, from 1; 0 where the table does not have it.
     pub fn position(&self, column: usize) -> usize {
-        self.layout.places[column].map_or(0, |place| place + 1)
+        self.rows.layout.places[column].map_or(0, |place| place + 1)
     }
 
     /// Refuses a cell that is not text, whether it is used or not.
     fn check_text(&self) -> Result<(), Box<TableError>> {
-        let bad = match self.record {
-            Record::Csv(record) => record.iter().position(|cell| std::str::from_utf8(cell).is_err()),
+        let bad = match &self.rows.data {
+            Data::Csv(records, _) => records[self.index].iter().position(|cell| std::str::from_utf8(cell).is_err()),
             #[cfg(feature = "parquet")]
-            Record::Parquet(..) => None,
+            Data::Parquet(..) => None,
         };
-        bad.map_or(Ok(()), |column| Err(TableError::of_row(self.at, column + 1, Fault::NotText)))
+        bad.map_or(Ok(()), |column| Err(TableError::of_row(self.at(), column + 1, Fault::NotText)))
     }
 
     /// `fault` of the cell in `column`.
     fn refuse(&self, column: usize, fault: Fault) -> Box<TableError> {
-        TableError::of_row(self.at, self.position(column), fault)
+        TableError::of_row(self.at(), self.position(column), fault)
     }
 
     /// The cell of `text` in `column` is `reason`.
     pub fn refuse_cell(&self, column: usize, text: &str, reason: impl Into<Cow<'static, str>>) -> Box<TableError> {
-        let (name, text) = (self.layout.columns[column].name, shortened(text));
+        let (name, text) = (self.rows.layout.columns[column].name, shortened(text));
         self.refuse(column, Fault::Cell { name, text, reason: reason.into() })
     }
 
@@ -293,14 +281,14 @@ impl<'a> Row<'a> {
     /// [`Fault::NotText`].
     #[inline]
     pub fn text(&self, column: usize) -> Result<&'a str, Box<TableError>> {
-        let Some(place) = self.layout.places[column] else { return Ok("") };
-        match self.record {
-            Record::Csv(record) => std::str::from_utf8(record.get(place).unwrap_or_default())
+        let Some(place) = self.rows.layout.places[column] else { return Ok("") };
+        match &self.rows.data {
+            Data::Csv(records, _) => std::str::from_utf8(records[self.index].get(place).unwrap_or_default())
                 .map(str::trim)
                 .map_err(|_| self.refuse(column, Fault::NotText)),
             #[cfg(feature = "parquet")]
-            Record::Parquet(columns, index) => Ok(match &columns[column] {
-                Cells::Texts(cells) => cells[index].as_deref().map_or("", str::trim),
+            Data::Parquet(columns, _) => Ok(match &columns[column] {
+                Cells::Texts(cells) => cells[self.index].as_deref().map_or("", str::trim),
                 _ => "",
             }),
         }
@@ -312,7 +300,7 @@ impl<'a> Row<'a> {
     /// [`Fault::Cell`] and [`Fault::EmptyCell`].
     #[inline]
     pub fn optional(&self, column: usize) -> Result<Option<f64>, Box<TableError>> {
-        let Column { need, range, .. } = self.layout.columns[column];
+        let Column { need, range, .. } = self.rows.layout.columns[column];
         let refuse = |text: &str, error: Option<QuantityError>| {
             let reason: Cow<'static, str> = match (range, error) {
                 (Range::Finite, Some(QuantityError::TooSmall)) => "too small for 64 bits".into(),
@@ -322,8 +310,8 @@ impl<'a> Row<'a> {
             };
             Err(self.refuse_cell(column, text, reason))
         };
-        let value = match self.record {
-            Record::Csv(_) => match self.text(column)? {
+        let value = match &self.rows.data {
+            Data::Csv(..) => match self.text(column)? {
                 "" => None,
                 text => match number(text) {
                     Ok(value) if range.contains(value) => return Ok(Some(value)),
@@ -331,8 +319,8 @@ impl<'a> Row<'a> {
                 },
             },
             #[cfg(feature = "parquet")]
-            Record::Parquet(columns, index) => match &columns[column] {
-                Cells::Numbers(cells) => cells.get(index).copied().flatten(),
+            Data::Parquet(columns, _) => match &columns[column] {
+                Cells::Numbers(cells) => cells.get(self.index).copied().flatten(),
                 _ => None,
             },
         };
@@ -356,7 +344,7 @@ impl<'a> Row<'a> {
 
     /// The cell in `column` is empty and must not be.
     pub fn refuse_empty(&self, column: usize) -> Box<TableError> {
-        self.refuse(column, Fault::EmptyCell(self.layout.columns[column].name))
+        self.refuse(column, Fault::EmptyCell(self.rows.layout.columns[column].name))
     }
 }
 
@@ -494,17 +482,13 @@ impl Cells {
     }
 
     /// How many.
-    pub fn len(&self) -> usize {
+    #[cfg(feature = "parquet")]
+    pub(super) fn len(&self) -> usize {
         match self {
             Self::Counts(cells) => cells.len(),
             Self::Numbers(cells) => cells.len(),
             Self::Texts(cells) => cells.len(),
         }
-    }
-
-    /// True if there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Appends `cells`.

@@ -212,12 +212,11 @@ impl Axis {
     /// The axis over `values`, with a margin, and `headroom` as a share of its length above them.
     fn fitted(&self, values: impl Iterator<Item = f64>, headroom: f64) -> Span {
         let all = values.chain(self.included.iter().copied()).filter(|v| self.has(*v)).map(|v| self.drawn(v));
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        let [low, high] = match self.range {
-            Some(range) => range,
-            None if low > high => [0.1, 1.0],
-            None if self.is_log => [low / 1.5, high * 1.5],
-            None => {
+        let [low, high] = match (self.range, extremes(all)) {
+            (Some(range), _) => range,
+            (None, None) => [0.1, 1.0],
+            (None, Some([low, high])) if self.is_log => [low / 1.5, high * 1.5],
+            (None, Some([low, high])) => {
                 let pad = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
                 [if low >= 0.0 && low < 0.2 * high { 0.0 } else { low - pad }, high + pad]
             }
@@ -227,6 +226,11 @@ impl Axis {
         span.high += headroom * span.length();
         span
     }
+}
+
+/// The least and the greatest of `values`.
+pub fn extremes(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
+    values.into_iter().map(|value| [value; 2]).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])
 }
 
 /// An axis with its range, in values or their decimal logarithms.

@@ -472,7 +472,6 @@ fn words_for_event(kind: EventKind, problem: &Problem) -> String {
     match kind {
         EventKind::CraterEnd => "x = k d".to_owned(),
         EventKind::StageEnd(index) => format!("x = {} mm", number(problem.stages[index].end * 1e3, 3)),
-        EventKind::Exit => "exit".to_owned(),
-        EventKind::Rest => "rest".to_owned(),
+        EventKind::Exit | EventKind::Rest => kind.name().to_owned(),
     }
 }

@@ -76,13 +76,9 @@ fn escape(text: &str) -> String {
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
             // A mention would notify its person, a reference another issue.
-            '@' | '#' => {
-                escaped.push(c);
-                escaped.push('\u{2060}');
-            }
+            '@' | '#' => escaped.extend([c, '\u{2060}']),
             '\\' | '`' | '*' | '_' | '{' | '}' | '[' | ']' | '(' | ')' | '|' | '~' | '$' | '!' => {
-                escaped.push('\\');
-                escaped.push(c);
+                escaped.extend(['\\', c]);
             }
             // Bare addresses become links; the scheme is what is looked for.
             ':' => escaped.push_str("&#58;"),

@@ -4,7 +4,7 @@
 
 use std::fmt::Display;
 
-use super::chart::{Anchor, Axis, Ink, Panel, Point, Style};
+use super::chart::{Anchor, Axis, Ink, Panel, Point, Style, extremes};
 use super::figure::Figure;
 use super::text::{count, number};
 use crate::exchange::tables::{Value, push_line};
@@ -29,9 +29,8 @@ fn along(rows: &[Row], value: impl Fn(&Row) -> Option<f64>) -> Vec<Point> {
 }
 
 /// Least and greatest ordinate.
-fn extremes(points: &[Point]) -> Option<[f64; 2]> {
-    let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.1), h.max(p.1)));
-    (low <= high).then_some([low, high])
+fn heights(points: &[Point]) -> Option<[f64; 2]> {
+    extremes(points.iter().map(|point| point.1))
 }
 
 /// `+12.3`.
@@ -52,11 +51,10 @@ fn difference(rows: &[Row], energy: impl Fn(&Row) -> Option<f64>, formula: impl 
 pub fn critical_energy(rows: &[Row], points: &[Point], judged: &[&Judged]) -> Option<Figure> {
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_unrounded);
     let ndrc = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
-    let range =
-        |points: &[Point]| extremes(points).map_or_else(|| "—".to_owned(), |ends| ends.map(signed).join(" to "));
+    let range = |points: &[Point]| heights(points).map_or_else(|| "—".to_owned(), |ends| ends.map(signed).join(" to "));
     let (full, ndrc) = (range(&full), range(&ndrc));
     let energies = along(rows, |row| row.energy_full_depth);
-    extremes(&energies)?;
+    heights(&energies)?;
     let origin = |title| Axis::linear(title, "").including([0.0]);
     let panel = Panel::new("critical impact energy", origin("H/d"), origin("E_c/(d³ f_c)"))
         .series("simulation, full depth x = H", Style::line(0), energies)
@@ -76,8 +74,8 @@ pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Fi
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_printed);
     let printed = difference(rows, |row| row.energy_ndrc, |row| row.eq15_printed);
     let unrounded = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
-    let [least, _] = extremes(&full)?;
-    let [low, high] = extremes(&unrounded).unwrap_or([0.0, 0.0]);
+    let [least, _] = heights(&full)?;
+    let [low, high] = heights(&unrounded).unwrap_or([0.0, 0.0]);
     let geometry =
         rows.iter().find(|row| row.thickness_ratio.is_some()).and_then(|row| row.geometry).unwrap_or(f64::INFINITY);
     let panel = |title| Panel::new(title, Axis::linear("H/d", ""), Axis::linear("difference", "%").including([0.0]));
@@ -155,7 +153,7 @@ pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene], 
 /// `None` without a test.
 pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option<Figure> {
     let depths = comparisons.iter().flat_map(|c| [c.experiment.depth, c.predicted]).filter(|depth| *depth > 0.0);
-    let [low, high] = extremes(&depths.map(|depth| (0.0, depth)).collect::<Vec<_>>())?;
+    let [low, high] = extremes(depths)?;
     let ends = [low / 1.5, high * 1.5];
     let axis = |title| Axis::log(title, "m").over(ends);
     let [lower, upper] = [1.0 - BAND, 1.0 + BAND].map(|factor| ends.map(|depth| (depth, factor * depth)));

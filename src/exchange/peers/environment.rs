@@ -64,10 +64,7 @@ impl BundledPeer {
 
     /// The packages it needs, a line each, in the format of pip.
     pub fn requirements(self) -> &'static str {
-        match self {
-            Self::SundaeAdams | Self::SundaeBdf | Self::SundaeIda | Self::Scipy => REQUIREMENTS,
-            Self::Heyoka => REQUIREMENTS_HEYOKA,
-        }
+        if self == Self::Heyoka { REQUIREMENTS_HEYOKA } else { REQUIREMENTS }
     }
 }
 
@@ -86,18 +83,12 @@ pub enum PeerSetupError {
         /// What came of it.
         answer: String,
     },
-    /// The `venv` module fails; some systems package it apart.
-    #[error("Python cannot make a virtual environment (is its `venv` module installed?): {cause}")]
-    NoVirtualEnvironment {
-        /// Its last line.
-        cause: String,
-    },
-    /// pip fails, mostly for want of a network.
-    #[error("the packages of the peers cannot be installed (is there a network?): {cause}")]
-    NoPackages {
-        /// Its last line.
-        cause: String,
-    },
+    /// The `venv` module fails with this last line; some systems package it apart.
+    #[error("Python cannot make a virtual environment (is its `venv` module installed?): {0}")]
+    NoVirtualEnvironment(String),
+    /// pip fails, mostly for want of a network, with this last line.
+    #[error("the packages of the peers cannot be installed (is there a network?): {0}")]
+    NoPackages(String),
     /// The cache folder cannot be written.
     #[error("cannot write `{path}`: {cause}")]
     Unwritable {
@@ -249,7 +240,7 @@ fn make_environment(
 ) -> Result<(), PeerSetupError> {
     let mut venv = Command::new(python);
     venv.args(["-m", "venv"]).arg(folder);
-    run_to_end(venv, STEP_LIMIT, progress).map_err(|cause| PeerSetupError::NoVirtualEnvironment { cause })?;
+    run_to_end(venv, STEP_LIMIT, progress).map_err(PeerSetupError::NoVirtualEnvironment)?;
     let list = folder.join("requirements.txt");
     fs::write(&list, requirements).map_err(|error| unwritable(&list, &error))?;
     let mut pip = Command::new(interpreter(folder));
@@ -257,15 +248,13 @@ fn make_environment(
     pip.args(["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--progress-bar", "off"])
         .args(["--retries", "1", "--timeout", "20", "--only-binary", ":all:", "-r"])
         .arg(&list);
-    run_to_end(pip, STEP_LIMIT, progress).map_err(|cause| PeerSetupError::NoPackages { cause })
+    run_to_end(pip, STEP_LIMIT, progress).map_err(PeerSetupError::NoPackages)
 }
 
 /// Runs a program within a time limit; its output goes to `progress` a line at a time. An error is its last line.
-fn run_to_end(mut command: Command, limit: Duration, progress: &mut dyn FnMut(&str)) -> Result<(), String> {
+fn run_to_end(command: Command, limit: Duration, progress: &mut dyn FnMut(&str)) -> Result<(), String> {
     let deadline = Instant::now() + limit;
-    let (output, mut child) = with_one_output(&mut command).map_err(|error| error.to_string())?;
-    // It holds the other end of the pipe.
-    drop(command);
+    let (output, mut child) = with_one_output(command).map_err(|error| error.to_string())?;
     let (send, lines) = channel();
     thread::spawn(move || {
         let lines = BufReader::new(output).split(b'\n').map_while(Result::ok);
@@ -297,8 +286,9 @@ fn run_to_end(mut command: Command, limit: Duration, progress: &mut dyn FnMut(&s
     }
 }
 
-/// Starts a program whose standard output and standard error are one pipe.
-fn with_one_output(command: &mut Command) -> io::Result<(io::PipeReader, Child)> {
+/// Starts a program whose standard output and standard error are one pipe. The command, which holds the other end of the
+/// pipe, is dropped.
+fn with_one_output(mut command: Command) -> io::Result<(io::PipeReader, Child)> {
     let (output, input) = io::pipe()?;
     let child = command.stdin(Stdio::null()).stdout(input.try_clone()?).stderr(input).spawn()?;
     Ok((output, child))
@@ -344,7 +334,7 @@ mod tests {
     #[test]
     fn an_interrupted_set_up_leaves_nothing() {
         let cache = tempfile::tempdir().unwrap();
-        let failure = PeerSetupError::NoPackages { cause: "no route to host".to_owned() };
+        let failure = PeerSetupError::NoPackages("no route to host".to_owned());
         let error = published(cache.path(), "thing", &[], |folder| {
             fs::write(folder.join("half"), "").map_err(|error| unwritable(folder, &error))?;
             Err(failure.clone())

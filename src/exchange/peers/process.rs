@@ -68,24 +68,15 @@ impl std::fmt::Display for PeerIdentity {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PeerFault {
-    /// It answered that it cannot solve this; other questions may follow.
-    #[error("reports an error: {message}")]
-    Reported {
-        /// Its words, bounded.
-        message: String,
-    },
-    /// It ended, or closed its output.
-    #[error("ended without an answer ({status})")]
-    Died {
-        /// Exit status in words.
-        status: String,
-    },
-    /// No line within the time limit.
-    #[error("was silent for {} s", silence.as_secs_f64())]
-    Silent {
-        /// The time limit.
-        silence: Duration,
-    },
+    /// It answered that it cannot solve this, in these words, bounded; other questions may follow.
+    #[error("reports an error: {0}")]
+    Reported(String),
+    /// It ended, or closed its output; with this exit status in words.
+    #[error("ended without an answer ({0})")]
+    Died(String),
+    /// No line within this time limit.
+    #[error("was silent for {} s", .0.as_secs_f64())]
+    Silent(Duration),
     /// A line that is no answer to the question.
     #[error("answers nonsense: {why}{}", quote("; it printed ", printed))]
     Nonsense {
@@ -117,7 +108,7 @@ pub struct PeerFailure {
 impl PeerFailure {
     /// Whether the peer may be asked something else: it followed the protocol and only could not solve this.
     pub fn is_reported(&self) -> bool {
-        matches!(self.fault, PeerFault::Reported { .. })
+        matches!(self.fault, PeerFault::Reported(_))
     }
 }
 
@@ -213,7 +204,7 @@ impl Peer {
             Err(fault) => {
                 let code = line.end().and_then(|status| status.code());
                 let failure = PeerFailure { peer: format!("`{command}`"), fault, stderr: line.stderr_text() };
-                if code == Some(EXIT_CODE_MISSING) && matches!(failure.fault, PeerFault::Died { .. }) {
+                if code == Some(EXIT_CODE_MISSING) && matches!(failure.fault, PeerFault::Died(_)) {
                     return Err(missing(format!("lacks what it needs: {}", last_line(&failure.stderr))));
                 }
                 Err(failure.into())
@@ -250,12 +241,10 @@ impl Peer {
         question["id"] = json!(self.questions_asked);
         let answer = self.line.exchange(&question).and_then(|line| answer(&line, self.questions_asked, request));
         answer.map_err(|fault| {
-            let is_reported = matches!(fault, PeerFault::Reported { .. });
-            if !is_reported {
+            let mut failure = PeerFailure { peer: self.identity.to_string(), fault, stderr: self.stderr() };
+            if !failure.is_reported() {
                 self.line.end();
-            }
-            let failure = PeerFailure { peer: self.identity.to_string(), fault, stderr: self.stderr() };
-            if !is_reported {
+                failure.stderr = self.stderr();
                 self.failure = Some(failure.clone());
             }
             failure
@@ -293,8 +282,8 @@ impl Line {
                 Err(PeerFault::nonsense(&format!("a line longer than {line_bytes} bytes"), &line))
             }
             Ok(line) => Ok(line),
-            Err(RecvTimeoutError::Disconnected) => Err(PeerFault::Died { status: self.status_in_words() }),
-            Err(RecvTimeoutError::Timeout) => Err(PeerFault::Silent { silence }),
+            Err(RecvTimeoutError::Disconnected) => Err(PeerFault::Died(self.status_in_words())),
+            Err(RecvTimeoutError::Timeout) => Err(PeerFault::Silent(silence)),
         }
     }
 
@@ -385,8 +374,7 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Pee
         return Err(PeerFault::nonsense(&why, line));
     }
     if let Some(message) = head.error {
-        let message = excerpt(message.as_bytes());
-        return Err(PeerFault::Reported { message });
+        return Err(PeerFault::Reported(excerpt(message.as_bytes())));
     }
     let mut answer: PeerAnswer = serde_json::from_slice(line).map_err(nonsense)?;
     if head.outcome.is_none() {

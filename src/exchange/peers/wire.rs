@@ -5,11 +5,6 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::integrators::{Cost, Flight};
 use crate::physics::{Event, EventKind, Outcome, Problem, Stage, State, Target};
 
-/// JSON has no infinity: a depth that does not exist is `null`.
-fn finite(depth: f64) -> Option<f64> {
-    depth.is_finite().then_some(depth)
-}
-
 /// What an event is called in JSON.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
@@ -90,7 +85,7 @@ impl PeerRequest {
         Self {
             mass_kg: problem.mass,
             velocity_m_s: problem.impact_speed,
-            exit_depth_m: finite(problem.exit_depth),
+            exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
             rtol,
             atol: [rtol * depth_scale(problem), rtol * problem.impact_speed],
             repeats: 1,

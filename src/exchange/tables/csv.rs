@@ -1,8 +1,7 @@
 //! Rows of a CSV table, some thousands at a time.
 
-use std::io::{self, Read};
+use std::io::Read;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
@@ -13,37 +12,10 @@ use super::{Data, Format, Layout, Rows};
 /// Longest line (bytes): without a limit one open quote, or a file that is no table, would fill the memory.
 const LINE_MAX: u64 = 1 << 20;
 
-/// What a limited reader says when a line is too long.
-const TOO_LONG: &str = "line longer than 1 MiB";
-
-/// Bytes that may still be read for the line at hand.
-#[derive(Clone, Debug)]
-struct Allowance(Arc<AtomicU64>);
-
-/// A reader that stops when a line outgrows its allowance.
-struct Limited<R> {
-    inner: R,
-    allowance: Allowance,
-}
-
-impl<R: Read> Read for Limited<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let left = self.allowance.0.load(Ordering::Relaxed);
-        if left == 0 {
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, TOO_LONG));
-        }
-        let room = buffer.len().min(usize::try_from(left).unwrap_or(usize::MAX));
-        let count = self.inner.read(&mut buffer[..room])?;
-        self.allowance.0.store(left - count as u64, Ordering::Relaxed);
-        Ok(count)
-    }
-}
-
 /// A CSV table that is being read.
 pub struct CsvTable<R> {
     file: String,
-    reader: Reader<LineEnds<Limited<R>>>,
-    allowance: Allowance,
+    reader: Reader<LineEnds<R>>,
     layout: Arc<Layout>,
     format: &'static Format,
 }
@@ -54,16 +26,15 @@ impl<R: Read> CsvTable<R> {
     /// # Errors
     /// [`TableError`] for a first line that does not name the columns of `format`.
     pub fn new(file: &str, input: R, format: &'static Format) -> Result<Self, Box<TableError>> {
-        let allowance = Allowance(Arc::new(AtomicU64::new(LINE_MAX)));
         let mut reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .comment(format.has_comments.then_some(b'#'))
             .buffer_capacity(1 << 16)
-            .from_reader(LineEnds::new(Limited { inner: input, allowance: allowance.clone() }));
+            .from_reader(LineEnds::new(input));
         let mut header = ByteRecord::new();
         let refuse = |at, column, fault| TableError::new(Place { file: file.to_owned(), at, column }, fault, format);
-        if !reader.read_byte_record(&mut header).map_err(|error| failure(file, 1, &error, format))? {
+        if !read_record(&mut reader, &mut header, file, format)? {
             return Err(refuse(At::Table, 0, Fault::Empty));
         }
         let at = At::Line(line_of(&reader, header.as_slice()));
@@ -76,7 +47,7 @@ impl<R: Read> CsvTable<R> {
         };
         let names = header.iter().enumerate().map(text_of).collect::<Result<Vec<_>, _>>()?;
         let layout = Arc::new(Layout::new(&names, file, at, format)?);
-        Ok(Self { file: file.to_owned(), reader, allowance, layout, format })
+        Ok(Self { file: file.to_owned(), reader, layout, format })
     }
 
     /// At most `count` rows, none at the end; `used` is an earlier chunk whose memory is reused.
@@ -95,10 +66,7 @@ impl<R: Read> CsvTable<R> {
                 records.push(ByteRecord::new());
             }
             let record = &mut records[index];
-            self.allowance.0.store(LINE_MAX, Ordering::Relaxed);
-            let line = self.reader.position().line();
-            let is_read = self.reader.read_byte_record(record);
-            if !is_read.map_err(|error| failure(&self.file, line, &error, self.format))? {
+            if !read_record(&mut self.reader, record, &self.file, self.format)? {
                 break;
             }
             let has_break = record.as_slice().contains(&b'\n');
@@ -114,16 +82,21 @@ impl<R: Read> CsvTable<R> {
     }
 }
 
-/// A reader's `error` in the record that begins in `line`.
-fn failure(file: &str, line: u64, error: &::csv::Error, format: &Format) -> Box<TableError> {
-    let (at, fault) = match error.kind() {
-        ::csv::ErrorKind::Io(cause) if cause.kind() == io::ErrorKind::FileTooLarge => {
-            (At::Line(line), Fault::LineTooLong)
-        }
-        ::csv::ErrorKind::Io(cause) => (At::Table, Fault::Unreadable(cause.to_string())),
-        _ => (At::Table, Fault::Unreadable(error.to_string())),
+/// Reads the next record of `reader`; false at the end. The record may have [`LINE_MAX`] bytes.
+fn read_record<R: Read>(
+    reader: &mut Reader<LineEnds<R>>,
+    record: &mut ByteRecord,
+    file: &str,
+    format: &Format,
+) -> Result<bool, Box<TableError>> {
+    let at = At::Line(reader.position().line());
+    reader.get_mut().allow(LINE_MAX);
+    let (at, fault) = match reader.read_byte_record(record) {
+        _ if reader.get_ref().is_spent() => (at, Fault::LineTooLong),
+        Ok(is_read) => return Ok(is_read),
+        Err(error) => (At::Table, Fault::Unreadable(error.to_string())),
     };
-    TableError::new(Place { file: file.to_owned(), at, column: 0 }, fault, format)
+    Err(TableError::new(Place { file: file.to_owned(), at, column: 0 }, fault, format))
 }
 
 #[cfg(test)]

@@ -4,14 +4,14 @@
 //! editor's. Behind [`LineEnds`] every line ends with one `\n`. A record without a line break inside then ends one line
 //! before the reader's position: [`line_of`].
 
-use std::io::{self, Read};
+use std::io::{self, Read, Take};
 
 use ::csv::Reader;
 
 /// A reader that gives each line end, `\n`, `\r\n` or `\r`, as one `\n`, and one to a last line that has none.
 #[derive(Debug)]
 pub struct LineEnds<R> {
-    inner: R,
+    inner: Take<R>,
     /// The byte given last was a `\n` made of a `\r`: a `\n` behind it belongs to it.
     after_return: bool,
     /// The byte given last, a line end at the start.
@@ -21,7 +21,18 @@ pub struct LineEnds<R> {
 impl<R: Read> LineEnds<R> {
     /// Reads from `inner`.
     pub fn new(inner: R) -> Self {
-        Self { inner, after_return: false, last: b'\n' }
+        Self { inner: inner.take(u64::MAX), after_return: false, last: b'\n' }
+    }
+
+    /// Lets `most` more bytes be read.
+    pub(super) fn allow(&mut self, most: u64) {
+        // One more: what uses up all of them is longer.
+        self.inner.set_limit(most + 1);
+    }
+
+    /// Whether more was read than allowed.
+    pub(super) fn is_spent(&self) -> bool {
+        self.inner.limit() == 0
     }
 }
 

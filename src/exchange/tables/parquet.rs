@@ -282,12 +282,12 @@ impl<W: Write + Send> ParquetWriter<W> {
         for (waiting, cells) in self.waiting.iter_mut().zip(columns) {
             waiting.append(cells);
         }
-        if self.waiting.first().is_some_and(|cells| cells.len() >= ROW_GROUP) { self.flush() } else { Ok(()) }
+        if self.waiting.first().map_or(0, Cells::len) >= ROW_GROUP { self.flush() } else { Ok(()) }
     }
 
     /// Writes what waits as a row group.
     fn flush(&mut self) -> io::Result<()> {
-        if self.waiting.first().is_none_or(Cells::is_empty) {
+        if self.waiting.first().map_or(0, Cells::len) == 0 {
             return Ok(());
         }
         let mut group = self.writer.next_row_group()?;

@@ -8,10 +8,10 @@ use crate::report::Environment;
 use crate::report::figure::{Figure, name_of};
 use crate::report::figures::words_for;
 use crate::report::page::{Page, Table, cell, figure, folded, number_cell, reproduction};
-use crate::report::text::{count, number, one_line};
+use crate::report::text::{clipped, count, number, one_line};
 use crate::studies::Quantity;
 use crate::studies::bench::step_size::{Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
-use crate::studies::bench::work_precision::{LEVELS, Run, RunState};
+use crate::studies::bench::work_precision::{LEVELS, Run, RunState, by_method, fastest_of, least_error};
 
 /// The page of `report` with its figures.
 pub(super) fn to_html(report: &BenchJson, figures: &[Figure]) -> String {
@@ -55,9 +55,8 @@ fn fastest(report: &BenchJson, case: &CaseJson, figures: &[Figure]) -> Markup {
     let levels = LEVELS.map(|level| format!("error ≤ {}", number(level, 1)));
     let header = ["method".to_owned()].into_iter().chain(levels);
     let header = header.chain(["least error".to_owned(), "not right".to_owned()]);
-    let runs = report.runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method);
-    let table = Table::grid(format!("Fastest runs, {}", one_line(&case.name)), header)
-        .rows(runs.filter(|runs| runs[0].scene == case.name), |runs| fastest_row(report, runs));
+    let methods = by_method(&report.runs).filter(|runs| runs[0].scene == case.name);
+    let table = Table::grid(format!("Fastest runs, {}", one_line(&case.name)), header).rows(methods, fastest_row);
     html! {
         h3 { (one_line(&case.name)) @if let Some(title) = &case.title { ": " (one_line(title)) } }
         @if case.exact < case.problems {
@@ -70,19 +69,16 @@ fn fastest(report: &BenchJson, case: &CaseJson, figures: &[Figure]) -> Markup {
     }
 }
 
-fn fastest_row(report: &BenchJson, runs: &[Run]) -> Vec<Markup> {
-    let right = || runs.iter().filter(|run| run.state == RunState::Right);
-    let least = right().filter_map(|run| run.error).min_by(f64::total_cmp);
-    let wrong = runs.len() - right().count();
-    let mine = |level: f64| {
-        report.fastest.iter().find(|f| f.scene == runs[0].scene && f.method == runs[0].method && f.level == level)
-    };
+fn fastest_row(runs: &[Run]) -> Vec<Markup> {
+    let wrong = runs.iter().filter(|run| run.state != RunState::Right).count();
     let mut cells = vec![cell(&runs[0].method)];
     cells.extend(LEVELS.map(|level| {
-        let best = mine(level).and_then(|best| best.time_ns.zip(best.setting.as_ref()));
-        html! { @if let Some((ns, setting)) = best { (micro(ns)) " " span.quiet { "at " (setting) } } @else { "—" } }
+        html! {
+            @if let Some((run, ns)) = fastest_of(runs, level) { (micro(ns)) " " span.quiet { "at " (run.setting) } }
+            @else { "—" }
+        }
     }));
-    cells.push(number_cell(least, 2));
+    cells.push(number_cell(least_error(runs), 2));
     cells.push(html! { @if wrong > 0 { span.failed { (wrong) " of " (runs.len()) } } @else { "none" } });
     cells
 }
@@ -112,18 +108,12 @@ fn state_cell(run: &Run) -> Markup {
     let class = if run.state == RunState::Failed { "failed" } else { "undecided" };
     html! {
         @if run.state == RunState::Right { "right" } @else {
-            span.(class) { (run.state.name()) }
+            span.(class) { (run.state) }
             @if all > 1 { " (" (run.failed) " failed, " (run.undecided) " undecided of " (all) ")" }
-            @if let Some(reason) = &run.reason { ": " (short(reason)) }
+            // A reason that fits a cell: the whole one is in the JSON.
+            @if let Some(reason) = &run.reason { ": " (clipped(&one_line(reason), 60)) }
         }
     }
-}
-
-/// A reason that fits a cell; the whole one is in the JSON.
-fn short(reason: &str) -> String {
-    const MOST: usize = 60;
-    let line = one_line(reason);
-    if line.chars().count() <= MOST { line } else { line.chars().take(MOST).chain(['…']).collect() }
 }
 
 fn step_size(study: &StepStudy, figures: &[Figure]) -> Markup {

@@ -113,32 +113,24 @@ fn repeated(
 /// Runs `command` to its end: time (s) and peak memory (bytes).
 fn run(command: &mut Command, scenes: u64) -> io::Result<(f64, Option<u64>)> {
     let failed = during("penetrode batch");
-    let mut complaints = tempfile::tempfile().map_err(failed)?;
     let started = Instant::now();
-    let mut child = command
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(complaints.try_clone().map_err(failed)?)
-        .spawn()
-        .map_err(failed)?;
+    let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(failed)?;
     // A thread waits, so that the time is that of the process and not of the next look at its memory.
     let id = child.id();
-    let waiter = thread::spawn(move || (child.wait(), started.elapsed().as_secs_f64()));
+    let waiter = thread::spawn(move || (child.wait_with_output(), started.elapsed().as_secs_f64()));
     let mut peak = None;
     while !waiter.is_finished() {
         peak = peak.max(peak_bytes(id));
         thread::sleep(PAUSE);
     }
-    let (status, seconds) = waiter.join().map_err(|_| failed(io::Error::other("the wait for it failed")))?;
-    let status = status.map_err(failed)?;
-    if status.success() {
+    let (ended, seconds) = waiter.join().map_err(|_| failed(io::Error::other("the wait for it failed")))?;
+    let ended = ended.map_err(failed)?;
+    if ended.status.success() {
         return Ok((seconds, peak));
     }
-    let mut said = String::new();
-    // Without its words the status says what there is to say.
-    let _ = io::Seek::rewind(&mut complaints).and_then(|()| io::Read::read_to_string(&mut complaints, &mut said));
+    let said = String::from_utf8_lossy(&ended.stderr);
     let said: String = said.lines().last().unwrap_or("").chars().take(200).collect();
-    Err(io::Error::other(format!("batch of {scenes} scenes ended with {status}: {said}")))
+    Err(io::Error::other(format!("batch of {scenes} scenes ended with {}: {said}", ended.status)))
 }
 
 /// High-water mark of the resident memory of process `id` (bytes), where the system has one to read.

@@ -58,8 +58,6 @@ pub struct Walk {
 pub type Tried = Vec<(f64, Option<f64>)>;
 
 impl Walk {
-    /// Part of a decade that must hold the finest level before the walk ends.
-    const BELOW: f64 = 1.0;
     /// Width to which a crossing is halved down, relative.
     const WIDTH: f64 = 1e-3;
     /// Rounds of probes at most.
@@ -78,9 +76,8 @@ impl Walk {
     fn down(self, finest: f64, error: &mut dyn FnMut(f64) -> Option<f64>) -> Tried {
         let mut random = Random::for_part(self.seed, "walk");
         let ratio = 10f64.powf(1.0 / self.per_decade as f64);
-        let below = (Self::BELOW * self.per_decade as f64).ceil() as usize;
         let (mut tried, mut size, mut holding) = (Tried::new(), self.from, 0);
-        while size >= self.to && holding < below {
+        while size >= self.to && holding < self.per_decade {
             let found = error(size);
             holding = if holds(found, finest) { holding + 1 } else { 0 };
             tried.push((size, found));
@@ -263,15 +260,19 @@ pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<
     let exact = Truth::of(&problem)?.flight;
     let plain = MethodOptions::default();
     let mut studies = Vec::new();
-    for quantity in questions(scene, &problem, &exact) {
+    // At rest at once, nothing is free.
+    let free = |quantity: &Quantity| exact.end.time > 0.0 && !is_fixed(*quantity, &exact);
+    for quantity in QUANTITIES.into_iter().filter(free) {
         let critical = match quantity {
-            // A target that never stops the projectile has none; the other quantities go on.
-            Quantity::CriticalVelocity => critical_velocity::exact_or_refined(scene).ok(),
+            Quantity::CriticalVelocity => {
+                let is_thick = problem.has_exit() && scene.thickness.is_some_and(|thickness| thickness > 0.0);
+                let critical = is_thick.then(|| critical_velocity::exact_or_refined(scene).ok()).flatten();
+                // A target that never stops the projectile has none; the other quantities go on.
+                let Some(critical) = critical.filter(|velocity| *velocity > 0.0) else { continue };
+                Some(critical)
+            }
             _ => None,
         };
-        if quantity == Quantity::CriticalVelocity && critical.is_none_or(|v| v <= 0.0) {
-            continue;
-        }
         let question = Question { scene, problem: &problem, exact: &exact, critical, quantity };
         let steps_max = if critical.is_some() { STEPS_MAX_CRITICAL } else { STEPS_MAX };
         let time = exact.end.time;
@@ -293,18 +294,6 @@ pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<
         studies.push(StepStudy { scene: name.to_owned(), quantity, flight_time_s: time, curves });
     }
     Ok(studies)
-}
-
-/// The quantities of [`QUANTITIES`] that `exact` leaves free.
-fn questions(scene: &Scene, problem: &Problem, exact: &Flight) -> Vec<Quantity> {
-    let at_rest_at_once = exact.end.time <= 0.0;
-    QUANTITIES
-        .into_iter()
-        .filter(|&quantity| {
-            let has_critical = problem.has_exit() && scene.thickness.is_some_and(|thickness| thickness > 0.0);
-            !at_rest_at_once && !is_fixed(quantity, exact) && (quantity != Quantity::CriticalVelocity || has_critical)
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -262,8 +262,9 @@ pub fn variant_name(velocity: VelocityAt, boundaries: Boundaries) -> String {
 }
 
 /// The judgement on all solutions of a run: the worst.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema, strum::Display)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "lowercase")]
 pub enum RunState {
     /// Every flight has the right outcome.
     #[default]
@@ -273,19 +274,8 @@ pub enum RunState {
     /// A flight has a wrong outcome or none.
     Failed,
     /// Not tried, because a coarser setting already took too long.
+    #[strum(to_string = "not run")]
     NotRun,
-}
-
-impl RunState {
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Right => "right",
-            Self::Undecided => "undecided",
-            Self::Failed => "failed",
-            Self::NotRun => "not run",
-        }
-    }
 }
 
 /// One contender at one setting on one case.
@@ -473,25 +463,36 @@ pub struct Fastest {
 
 /// The fastest run of each method on each case at each of [`LEVELS`]; only runs whose flights are all right count.
 pub fn fastest(runs: &[Run]) -> Vec<Fastest> {
-    runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method)
-        .flat_map(|runs| LEVELS.into_iter().map(move |level| fastest_of(runs, level)))
-        .collect()
+    let of_method = |runs: &[Run], level| {
+        let best = fastest_of(runs, level);
+        Fastest {
+            scene: runs[0].scene.clone(),
+            method: runs[0].method.clone(),
+            level,
+            time_ns: best.map(|(_, time)| time),
+            setting: best.map(|(run, _)| run.setting.clone()),
+            force_evaluations: best.and_then(|(run, _)| run.force_evaluations),
+        }
+    };
+    by_method(runs).flat_map(|runs| LEVELS.map(|level| of_method(runs, level))).collect()
 }
 
-fn fastest_of(runs: &[Run], level: f64) -> Fastest {
-    let best = runs
-        .iter()
-        .filter(|run| run.state == RunState::Right && run.error.is_some_and(|error| error <= level))
-        .filter_map(|run| run.time.map(|time| (time.median_ns, run)))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    Fastest {
-        scene: runs[0].scene.clone(),
-        method: runs[0].method.clone(),
-        level,
-        time_ns: best.map(|(time, _)| time),
-        setting: best.map(|(_, run)| run.setting.clone()),
-        force_evaluations: best.and_then(|(_, run)| run.force_evaluations),
-    }
+/// The runs of each method on each case.
+pub fn by_method(runs: &[Run]) -> impl Iterator<Item = &[Run]> {
+    runs.chunk_by(|a, b| a.scene == b.scene && a.method == b.method)
+}
+
+/// The least error of those of `runs` whose flights are all right.
+pub fn least_error(runs: &[Run]) -> Option<f64> {
+    let right = runs.iter().filter(|run| run.state == RunState::Right);
+    right.filter_map(|run| run.error).min_by(f64::total_cmp)
+}
+
+/// The fastest of `runs`, all of one method, within the error `level`, and its median time (ns).
+pub fn fastest_of(runs: &[Run], level: f64) -> Option<(&Run, f64)> {
+    let is_within = |run: &&Run| run.state == RunState::Right && run.error.is_some_and(|error| error <= level);
+    let timed = runs.iter().filter(is_within).filter_map(|run| Some((run, run.time?.median_ns)));
+    timed.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 #[cfg(test)]

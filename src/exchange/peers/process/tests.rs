@@ -110,7 +110,7 @@ fn a_peer_that_hangs_is_ended_after_the_time_limit_and_not_asked_again() {
 #[test]
 fn a_peer_that_closes_its_output_and_runs_on_has_died() {
     let failure = peer("read q; exec 1>&-; exec sleep 60").ask(&request()).unwrap_err();
-    let PeerFault::Died { status } = &failure.fault else { unreachable!("{failure}") };
+    let PeerFault::Died(status) = &failure.fault else { unreachable!("{failure}") };
     assert_eq!(status, "it closed its output and runs on");
 }
 
@@ -178,7 +178,7 @@ fn megabytes_on_standard_error_block_nothing_and_only_the_end_is_kept() {
 fn a_peer_that_does_not_read_a_long_question_is_silent_and_blocks_nothing() {
     let mut peer = peer_within("exec sleep 60", impatient());
     let long = PeerRequest { stages: vec![request().stages[0]; 20_000], ..request() };
-    assert!(matches!(peer.ask(&long).unwrap_err().fault, PeerFault::Silent { .. }));
+    assert!(matches!(peer.ask(&long).unwrap_err().fault, PeerFault::Silent(_)));
 }
 
 #[test]
