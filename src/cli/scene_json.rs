@@ -55,8 +55,8 @@ impl SceneJson {
             crater_ratio: of(|c| c.crater_ratio),
             velocity_m_s: problem.impact_speed,
             crater_stiffness_n_m: problem.crater.map(|i| problem.stages[i].stiffness).or(given_stiffness),
-            static_force_n: homogeneous.and(scene.static_force()),
-            drag_kg_m: homogeneous.and(scene.drag()),
+            static_force_n: homogeneous.and(scene.tunnel()).map(|law| law.static_force),
+            drag_kg_m: homogeneous.and(scene.tunnel()).map(|law| law.drag),
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
             stages: problem.stages.to_vec(),
         }

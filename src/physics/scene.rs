@@ -537,14 +537,9 @@ impl Scene {
         self.concrete().map(|concrete| concrete.diameter)
     }
 
-    /// Static force P (N) just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
-    pub fn static_force(&self) -> Option<f64> {
-        Some(self.concrete()?.beyond_crater(&plain).ok()?[0].static_force)
-    }
-
-    /// Drag Q (kg/m) just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
-    pub fn drag(&self) -> Option<f64> {
-        Some(self.concrete()?.beyond_crater(&plain).ok()?[0].drag)
+    /// The law just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
+    pub fn tunnel(&self) -> Option<Stage> {
+        Some(self.concrete()?.beyond_crater(&plain).ok()?[0])
     }
 
     /// Depth that perforates (m): H, or `x_p(H)` by the ACE/NDRC relation; infinite for a semi-infinite target.
@@ -552,10 +547,6 @@ impl Scene {
     /// # Errors
     /// [`ResolveError`]: the thickness or the diameter is not admissible, the criterion `ndrc` has no diameter to go
     /// by, or the depth leaves the range of `f64`.
-    pub fn exit_depth(&self) -> Resolved<f64> {
-        self.exit_depth_in(&plain)
-    }
-
     fn exit_depth_in<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Resolved<S> {
         let diameter = match (self.criterion, &self.resistance) {
             (Criterion::FullDepth, _) => None,
@@ -641,8 +632,8 @@ mod tests {
         let v1 = (277.0_f64.powi(2) - crater.stiffness * 0.0538 * 0.0538 / 0.906).sqrt();
         assert_relative_eq!(crater.force(0.0538, v1), tunnel.force(0.0538, v1), max_relative = 1e-15);
         assert_relative_eq!(tunnel.static_force, layer_force(35.2e6), max_relative = 5e-16);
-        assert_eq!(scene().static_force(), Some(tunnel.static_force));
-        assert_eq!(scene().drag(), Some(tunnel.drag));
+        assert_eq!(scene().tunnel().unwrap().static_force, tunnel.static_force);
+        assert_eq!(scene().tunnel().unwrap().drag, tunnel.drag);
     }
 
     #[test]
@@ -722,7 +713,7 @@ mod tests {
             Concrete { inertia_factor: 0.0, ..concrete() },
             Concrete { density: 0.0, ..concrete() },
         ] {
-            assert_eq!(scene_of(frictionless).drag(), Some(0.0));
+            assert_eq!(scene_of(frictionless).tunnel().unwrap().drag, 0.0);
         }
     }
 
@@ -755,15 +746,15 @@ mod tests {
     #[test]
     fn ndrc_ends_the_flight_at_the_perforating_depth() {
         let slab = Scene { thickness: Some(0.269), criterion: Criterion::Ndrc, ..scene() };
-        assert_relative_eq!(slab.exit_depth().unwrap(), 0.0269 * 7.0, max_relative = 1e-15);
+        assert_relative_eq!(slab.exit_depth_in(&plain).unwrap(), 0.0269 * 7.0, max_relative = 1e-15);
         assert_eq!(slab.exit_depth_warning(), None);
         let thick = Scene { thickness: Some(0.538), ..slab.clone() };
         assert!(thick.exit_depth_warning().unwrap().contains("18.06"));
         let open = Scene { thickness: None, ..slab.clone() };
-        assert_eq!(open.exit_depth(), Ok(f64::INFINITY));
+        assert_eq!(open.exit_depth_in(&plain), Ok(f64::INFINITY));
         let of_diameter = |diameter: f64, thickness: f64| {
             let scene = scene_of(Concrete { diameter, ..concrete() });
-            Scene { thickness: Some(thickness), criterion: Criterion::Ndrc, ..scene }.exit_depth()
+            Scene { thickness: Some(thickness), criterion: Criterion::Ndrc, ..scene }.exit_depth_in(&plain)
         };
         assert!(matches!(of_diameter(0.0, 0.269), Err(ResolveError::Inadmissible { .. })));
         assert_eq!(of_diameter(0.0269, 0.0), Ok(0.0));
@@ -773,7 +764,7 @@ mod tests {
             assert!(matches!(of_diameter(diameter, thickness), Err(ResolveError::OutOfRange { .. })), "{thickness:e}");
         }
         let stages = Scene { resistance: Resistance::Stages(vec![Stage::tunnel(1.0, 0.0)]), ..slab };
-        assert_eq!(stages.exit_depth(), Err(ResolveError::NoDiameter));
+        assert_eq!(stages.exit_depth_in(&plain), Err(ResolveError::NoDiameter));
     }
 
     #[test]

@@ -315,10 +315,8 @@ impl ExactValues {
     /// latter is zero.
     fn of(&self, quantity: Quantity) -> Option<(f64, f64)> {
         let value = self.values[quantity as usize]?;
-        let scale = match quantity {
-            Quantity::Depth | Quantity::Time | Quantity::CraterEndTime => value,
-            Quantity::Velocity | Quantity::CraterEndVelocity | Quantity::CriticalVelocity => self.impact_velocity,
-        };
+        let is_velocity = quantity.is_over_impact_speed() || quantity == Quantity::CriticalVelocity;
+        let scale = if is_velocity { self.impact_velocity } else { value };
         (value.is_finite() && scale.is_finite() && scale != 0.0).then_some((value, scale.abs()))
     }
 }
@@ -419,8 +417,8 @@ pub fn audit(table: &Table, expectation: &Expectation) -> Result<Audit, AuditErr
     }
     let mut findings = table.findings.clone();
     let mut quantities = Vec::new();
-    for index in 0..table.columns.len() {
-        let (judged, remarks) = judge(table, index, expectation);
+    for column in &table.columns {
+        let (judged, remarks) = judge(table, column, expectation);
         findings.extend(remarks);
         quantities.push(judged);
     }
@@ -440,15 +438,14 @@ impl QuantityAudit {
 }
 
 /// A column before anything is known of it: failed until shown otherwise.
-fn unjudged(table: &Table, index: usize, expectation: &Expectation) -> QuantityAudit {
-    let quantity = table.columns[index].quantity;
+fn unjudged(table: &Table, quantity: Quantity, formal_order: Option<f64>) -> QuantityAudit {
     let points = table.rows.iter().map(|row| {
         let (dt_s, value) = (row.step, row.value(quantity));
         AuditPoint { dt_s, value, error: None, used: false, excluded: None }
     });
     QuantityAudit {
         quantity,
-        formal_order: expectation.order,
+        formal_order,
         observed_order: None,
         interval: None,
         verdict_band: None,
@@ -468,30 +465,28 @@ fn unjudged(table: &Table, index: usize, expectation: &Expectation) -> QuantityA
     }
 }
 
-/// One column of a table as grids, with the rounding of its digits.
-fn grids_of(table: &Table, index: usize) -> Vec<GridValue> {
-    let ResultColumn { quantity, rounding, .. } = table.columns[index];
-    let grid = |row: &StepRow| {
-        let value = row.value(quantity);
-        GridValue { step: row.step, value, round_off: rounding.max(0.5 * f64::EPSILON * value.abs()) }
-    };
-    table.rows.iter().map(grid).collect()
-}
-
-fn judge(table: &Table, index: usize, expectation: &Expectation) -> (QuantityAudit, Vec<Finding>) {
-    let quantity = table.columns[index].quantity;
+fn judge(
+    table: &Table,
+    &ResultColumn { quantity, rounding, .. }: &ResultColumn,
+    expectation: &Expectation,
+) -> (QuantityAudit, Vec<Finding>) {
     let mut findings = Vec::new();
     let mut remark = |kind, message: &str| {
         findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
     };
-    let mut judged = unjudged(table, index, expectation);
+    let mut judged = unjudged(table, quantity, expectation.order);
     if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.value(quantity).is_finite()) {
         judged.reason =
             format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.value(quantity), row.step);
         remark(FindingKind::NotFinite, &judged.reason);
         return (judged, findings);
     }
-    let grids = grids_of(table, index);
+    // The values round by the digits printed, and by the arithmetic at least.
+    let grid = |row: &StepRow| {
+        let value = row.value(quantity);
+        GridValue { step: row.step, value, round_off: rounding.max(0.5 * f64::EPSILON * value.abs()) }
+    };
+    let grids: Vec<GridValue> = table.rows.iter().map(grid).collect();
     let (Ok(own), Ok(least_squares)) = (self_convergence(&grids, AUDIT_LEVEL), eca_hoekstra(&grids)) else {
         // Reading has already refused every table that these refuse.
         "the table cannot be fitted".clone_into(&mut judged.reason);

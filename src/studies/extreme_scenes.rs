@@ -349,7 +349,7 @@ fn examine_critical(index: u64, scene: &Scene, seen: &mut Summary) -> Result<(),
     };
     seen.critical_found = 1;
     // The drag over the thickness stands in an exponent, whose digits it takes.
-    let condition = scene.drag().map_or(2.0, |drag| 2.0 + 2.0 * drag * thickness / scene.mass);
+    let condition = scene.tunnel().map_or(2.0, |law| 2.0 + 2.0 * law.drag * thickness / scene.mass);
     let (off, bar) = ((found.velocity - exact).abs(), found.error_bar.unwrap_or(f64::NAN));
     let units = (off / exact / f64::EPSILON / condition).min(off / bar * ULPS_MAX);
     let mut units = if off == 0.0 { 0.0 } else { units };
