@@ -13,7 +13,7 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::integrators::lanes::Batch;
-use penetrode::integrators::{Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor};
+use penetrode::integrators::{Accuracy, Detail, Flight, Integrator, Method, MethodName, MethodOptions, Taylor};
 use penetrode::physics::reference::Source;
 use penetrode::physics::{Outcome, Problem, Scene};
 use penetrode::studies::critical_velocity;
@@ -48,7 +48,7 @@ fn assert_right(method: &dyn Integrator, problem: &Problem, limit: f64) {
 }
 
 fn flights(criterion: &mut Criterion) {
-    for name in MethodName::ALL.iter().copied().filter(|m| m.is_built()) {
+    for name in MethodName::built() {
         let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         for scene in SCENES {
             // The paper's scheme takes the millionth left to the far side for a stop, and that is its answer.
@@ -56,11 +56,11 @@ fn flights(criterion: &mut Criterion) {
                 continue;
             }
             let problem = problem(scene);
-            let limit = match (name, scene) {
-                (MethodName::CentralDifference, _) => 1e-2,
+            let limit = match (name.accuracy(), scene) {
+                (Accuracy::Step, _) => 1e-2,
                 (_, "graze") => 1e-1,
-                (MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm, _) => 1e-12,
-                _ => 1e-6,
+                (Accuracy::RoundOff | Accuracy::Exact, _) => 1e-12,
+                (Accuracy::Tolerance, _) => 1e-6,
             };
             assert_right(method.integrator(), &problem, limit);
             criterion.bench_function(&format!("{name}/{scene}"), |bencher| {
@@ -104,12 +104,9 @@ fn varied(criterion: &mut Criterion) {
     assert_eq!(problems.len(), 1000);
     let mut group = criterion.benchmark_group("varied-1000");
     group.throughput(Throughput::Elements(1000));
-    for name in MethodName::ALL.iter().copied().filter(|m| m.is_built() && *m != MethodName::CentralDifference) {
+    for name in MethodName::built().filter(|name| name.accuracy() != Accuracy::Step) {
         let method = Method::new(name, &MethodOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-        let limit = match name {
-            MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm => 1e-12,
-            _ => 1e-6,
-        };
+        let limit = if name.accuracy() == Accuracy::Tolerance { 1e-6 } else { 1e-12 };
         let reused = method.integrator().reusing();
         let integrator = reused.as_deref().unwrap_or(method.integrator());
         let solve = |p| integrator.solve(p, Detail::Events).unwrap_or_else(|e| panic!("{name}: {e}"));

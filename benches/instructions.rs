@@ -13,7 +13,7 @@ use std::process::Command;
 
 use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::integrators::lanes::Batch;
-use penetrode::integrators::{Detail, Method, MethodName, MethodOptions};
+use penetrode::integrators::{Accuracy, Detail, Method, MethodName, MethodOptions};
 use penetrode::physics::{Problem, Scene, Stage, Target};
 use penetrode::studies::critical_velocity;
 use penetrode::studies::error::Truth;
@@ -142,12 +142,12 @@ fn cases() -> Vec<(String, Case)> {
     for &name in MethodName::ALL {
         for scene in ["crater", "tunnel", "perforate", "graze"] {
             // The paper's scheme takes the millionth left to the far side of `graze` for a stop.
-            let limit = match (name, scene) {
-                (MethodName::CentralDifference, "graze") => continue,
-                (MethodName::CentralDifference, _) => 1e-2,
+            let limit = match (name.accuracy(), scene) {
+                (Accuracy::Step, "graze") => continue,
+                (Accuracy::Step, _) => 1e-2,
                 (_, "graze") => 1e-1,
-                (MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm, _) => 1e-12,
-                _ => 1e-6,
+                (Accuracy::RoundOff | Accuracy::Exact, _) => 1e-12,
+                (Accuracy::Tolerance, _) => 1e-6,
             };
             let case = flights(name, vec![problem(scene)], Detail::Events, limit);
             cases.push((format!("{name}, {scene}"), case));

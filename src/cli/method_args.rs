@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::CliError;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
-use crate::integrators::method::{Method, MethodName, MethodOptions, RTOL_DEFAULT};
+use crate::integrators::method::{Accuracy, Method, MethodName, MethodOptions, RTOL_DEFAULT};
 use crate::integrators::{Flight, IntegrationError, StepLimit};
 use crate::physics::Problem;
 use crate::physics::units::{Dimension, quantity};
@@ -18,8 +18,8 @@ pub struct MethodArgs {
     /// Method of integration.
     #[arg(long, value_enum, default_value_t = MethodName::Taylor)]
     pub method: MethodName,
-    /// Relative tolerance (diffsol methods and adaptive: 1e-10; taylor and energy: round-off).
-    #[arg(long, value_name = "R", allow_hyphen_values = true)]
+    /// Relative tolerance, of methods that have one.
+    #[arg(long, help = rtol_help(), value_name = "R", allow_hyphen_values = true)]
     pub rtol: Option<f64>,
     /// Time step of central-difference, such as "1 us" or seconds; from the stages when left out.
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
@@ -30,6 +30,17 @@ pub struct MethodArgs {
     /// Where central-difference sees boundaries and rest [default: step-end, as in the paper].
     #[arg(long, value_enum)]
     pub events: Option<Boundaries>,
+}
+
+/// Which methods have a tolerance, and what it is by default.
+fn rtol_help() -> String {
+    let names = |accuracy| {
+        let is_own = |name: MethodName| !name.needs_diffsol() || name == MethodName::Adaptive;
+        let of = |name: &&MethodName| name.accuracy() == accuracy && is_own(**name);
+        MethodName::ALL.iter().filter(of).map(|name| name.name()).collect::<Vec<_>>().join(" and ")
+    };
+    let [to_tolerance, to_round_off] = [Accuracy::Tolerance, Accuracy::RoundOff].map(names);
+    format!("Relative tolerance (diffsol methods and {to_tolerance}: {RTOL_DEFAULT:e}; {to_round_off}: round-off)")
 }
 
 impl MethodArgs {
@@ -96,16 +107,16 @@ impl MethodJson {
     /// What was used for `problem`, and what `flight` says of its stability.
     pub fn new(name: MethodName, options: &MethodOptions, problem: Option<&Problem>, flight: Option<&Flight>) -> Self {
         let mut json = Self { name: name.name(), ..Self::default() };
-        match name {
-            MethodName::CentralDifference => {
+        match name.accuracy() {
+            Accuracy::Step => {
                 json.dt_s = problem.map(|p| options.central_difference().time_step(p)).or(options.dt);
                 json.velocity = Some(options.velocity.unwrap_or_default().name());
                 json.events = Some(options.events.unwrap_or_default().name());
                 json.stability = flight.and_then(|f| f.step_limit);
             }
-            MethodName::Taylor | MethodName::Energy => json.rtol = Some(options.rtol),
-            MethodName::ClosedForm => {}
-            _ => json.rtol = Some(Some(options.rtol.unwrap_or(RTOL_DEFAULT))),
+            Accuracy::RoundOff => json.rtol = Some(options.rtol),
+            Accuracy::Exact => {}
+            Accuracy::Tolerance => json.rtol = Some(Some(options.rtol.unwrap_or(RTOL_DEFAULT))),
         }
         json
     }

@@ -199,6 +199,34 @@ impl<'a, S: Scalar> Course<'a, S> {
         Bounded { value, bound: self.error_bound + 8.0 * f64::EPSILON * value.abs() }
     }
 
+    /// Whether the projectile needs more speed than it has to reach `limit` through a stage that only slows it.
+    ///
+    /// `dV/dx = -(r + q V)/M`: V vanishes at the depth `(M/q) ln(1 + q V/r)`, which is only approached.
+    #[cold]
+    pub(crate) fn is_only_approached(&self, limit: f64) -> bool {
+        let law = self.problem.stages[self.stage].values();
+        speed_missing(&law, self.problem.mass.value(), self.state.values(), limit).is_some()
+    }
+
+    /// Error where an overdamped driven stage has trapped the projectile before its equilibrium `x = -p/s`.
+    ///
+    /// With `u = x + p/s < 0` and `l = r/(2M) + sqrt((r/(2M))² - s/M)`, the lines `V = 0` and `V = -l u` cannot be
+    /// crossed outwards (drag only helps), so from between them u = 0 is approached for ever.
+    #[cold]
+    pub(crate) fn refuse_creep(&self, limit: f64) -> Result<(), IntegrationError> {
+        let law = self.problem.stages[self.stage].values();
+        let (mass, last) = (self.problem.mass.value(), self.state.values());
+        let equilibrium = -law.static_force / law.stiffness;
+        let missing = equilibrium - last.depth;
+        let half = 0.5 * law.viscosity / mass;
+        let rate = half + (half * half - law.stiffness / mass).max(0.0).sqrt();
+        if limit >= equilibrium && missing > 0.0 && last.velocity <= rate * missing {
+            let why = "viscosity lets it only creep towards the depth where the spring balances the drive";
+            return Err(IntegrationError::NeverEnds { why, last });
+        }
+        Ok(())
+    }
+
     /// The state at the limit, without speed, where the error bound leaves open whether an approach gets there.
     ///
     /// The margin is then zero within its bound, so the outcome becomes `Undecided`.

@@ -56,6 +56,19 @@ pub enum MethodName {
     ClosedForm,
 }
 
+/// How accurate a method is, and which option says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Accuracy {
+    /// As good as the numbers allow, or within `--rtol` if one is given.
+    RoundOff,
+    /// As good as the numbers allow: a formula.
+    Exact,
+    /// Within `--rtol`, by default [`RTOL_DEFAULT`].
+    Tolerance,
+    /// As good as the time step allows.
+    Step,
+}
+
 impl MethodName {
     /// Every method, in the order of the help texts.
     pub const ALL: &'static [Self] = Self::VARIANTS;
@@ -63,6 +76,32 @@ impl MethodName {
     /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         self.into()
+    }
+
+    /// How accurate the method is: what the options, the tests of every method, the suite and the benches ask.
+    pub const fn accuracy(self) -> Accuracy {
+        match self {
+            Self::Taylor | Self::Energy => Accuracy::RoundOff,
+            Self::ClosedForm => Accuracy::Exact,
+            Self::Tsit45 | Self::Bdf | Self::Esdirk34 | Self::TrBdf2 | Self::Adaptive => Accuracy::Tolerance,
+            Self::CentralDifference => Accuracy::Step,
+        }
+    }
+
+    /// The methods of this build, in the order of the help texts.
+    pub fn built() -> impl Iterator<Item = Self> {
+        Self::ALL.iter().copied().filter(|name| name.is_built())
+    }
+
+    /// The relative error that the method promises without options: round-off, or a multiple of its tolerance per step.
+    ///
+    /// The multiples are those by which the adapter widens the library's local tolerance into an error bound.
+    pub fn promise(self) -> f64 {
+        match (self, self.accuracy()) {
+            (Self::TrBdf2, _) => 3.0 * RTOL_DEFAULT.powf(2.0 / 3.0),
+            (_, Accuracy::Tolerance) => 10.0 * RTOL_DEFAULT,
+            _ => f64::EPSILON,
+        }
     }
 
     /// Whether the method comes from the diffsol library.
@@ -79,7 +118,7 @@ impl MethodName {
 /// Options of a method; each is refused by the methods that do not use it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MethodOptions {
-    /// Relative tolerance, for the diffsol methods and `adaptive` (1e-10), `taylor` and `energy` (round-off).
+    /// Relative tolerance, for methods whose [`Accuracy`] is `RoundOff` or `Tolerance`.
     pub rtol: Option<f64>,
     /// Time step (s), for `central-difference`; chosen from the stages when absent.
     pub dt: Option<f64>,
@@ -101,7 +140,7 @@ impl MethodOptions {
     }
 }
 
-/// Default relative tolerance of the diffsol methods and of `adaptive`.
+/// Relative tolerance of a method that works to one, unless another is given.
 pub const RTOL_DEFAULT: f64 = 1e-10;
 
 /// Tolerances that any method is asked for.
@@ -122,12 +161,12 @@ impl Method {
     /// [`IntegrationError::Refused`] for a method that this build lacks.
     pub fn new(name: MethodName, options: &MethodOptions) -> Result<Self, IntegrationError> {
         let &MethodOptions { rtol, dt, velocity, events } = options;
-        let is_fixed_step = name == MethodName::CentralDifference;
+        let is_fixed_step = name.accuracy() == Accuracy::Step;
         refuse_unless(is_fixed_step, "--dt", dt.map(Shown), "only central-difference has a fixed step")?;
         refuse_unless(is_fixed_step, "--velocity", velocity, "only central-difference has this choice")?;
         refuse_unless(is_fixed_step, "--events", events, "only central-difference has this choice")?;
-        let has_tolerance = !matches!(name, MethodName::CentralDifference | MethodName::ClosedForm);
-        refuse_unless(has_tolerance, "--rtol", rtol.map(Shown), "only adaptive methods have a tolerance")?;
+        let is_adaptive = matches!(name.accuracy(), Accuracy::RoundOff | Accuracy::Tolerance);
+        refuse_unless(is_adaptive, "--rtol", rtol.map(Shown), "only adaptive methods have a tolerance")?;
         let is_tolerance = rtol.is_none_or(|rtol| RTOL_ALLOWED.contains(&rtol));
         refuse_unless(is_tolerance, "--rtol", rtol.map(Shown), "a number from 1e-15 to 0.1")?;
         let is_time = dt.is_none_or(|dt| dt.is_finite() && dt > 0.0);
@@ -175,26 +214,16 @@ impl Method {
 
 /// The table of methods: the integrator of each name.
 fn integrator(name: MethodName, options: &MethodOptions) -> Result<Box<dyn Integrator + Sync>, IntegrationError> {
-    #[cfg(feature = "diffsol")]
-    let library = |scheme| {
-        let method = Diffsol::adaptive(options.rtol.unwrap_or(RTOL_DEFAULT));
-        Box::new(Diffsol { scheme, ..method })
-    };
     Ok(match name {
         MethodName::Taylor => Box::new(options.rtol.map_or_else(|| Ok(Taylor::default()), Taylor::with_rtol)?),
         MethodName::Energy => Box::new(options.rtol.map_or_else(|| Ok(Energy::default()), Energy::with_rtol)?),
         MethodName::ClosedForm => Box::new(ClosedForm),
         MethodName::CentralDifference => Box::new(options.central_difference()),
         #[cfg(feature = "diffsol")]
-        MethodName::Adaptive => library(None),
-        #[cfg(feature = "diffsol")]
-        MethodName::Tsit45 => library(Some(Scheme::Tsit45)),
-        #[cfg(feature = "diffsol")]
-        MethodName::Bdf => library(Some(Scheme::Bdf)),
-        #[cfg(feature = "diffsol")]
-        MethodName::Esdirk34 => library(Some(Scheme::Esdirk34)),
-        #[cfg(feature = "diffsol")]
-        MethodName::TrBdf2 => library(Some(Scheme::TrBdf2)),
+        MethodName::Adaptive | MethodName::Tsit45 | MethodName::Bdf | MethodName::Esdirk34 | MethodName::TrBdf2 => {
+            let scheme = Scheme::ALL.into_iter().find(|scheme| scheme.name() == name.name());
+            Box::new(Diffsol { scheme, ..Diffsol::adaptive(options.rtol.unwrap_or(RTOL_DEFAULT)) })
+        }
         #[cfg(not(feature = "diffsol"))]
         _ => {
             let why = "this build leaves out the diffsol library; build with `--features diffsol`".to_owned();
@@ -237,7 +266,8 @@ mod tests {
             let from_diffsol = ["tsit45", "bdf", "esdirk34", "tr-bdf2", "adaptive"].contains(&name.name());
             assert_eq!(name.needs_diffsol(), from_diffsol);
             assert_eq!(name.is_built(), cfg!(feature = "diffsol") || !from_diffsol);
-            assert_eq!(Method::new(name, &MethodOptions::default()).is_ok(), name.is_built());
+            let method = Method::new(name, &MethodOptions::default()).ok();
+            assert_eq!(method.map(|method| method.integrator().name()), name.is_built().then_some(name.name()));
         }
         assert!("euler".parse::<MethodName>().is_err());
     }

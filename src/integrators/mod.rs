@@ -27,6 +27,6 @@ pub use closed_form::ClosedForm;
 #[cfg(feature = "diffsol")]
 pub use diffsol::{Diffsol, Scheme};
 pub use energy::Energy;
-pub use method::{Method, MethodName, MethodOptions};
+pub use method::{Accuracy, Method, MethodName, MethodOptions};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, Solved, StepLimit};
 pub use taylor::Taylor;

@@ -338,7 +338,7 @@ impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> 
         let law = &course.problem.stages[course.stage];
         let limit = course.limit()?;
         // A spring stops everything but a creep, which is judged while it goes on.
-        if law.static_force.value() <= 0.0 && law.stiffness.value() <= 0.0 && is_only_approached(course, limit) {
+        if law.static_force.value() <= 0.0 && law.stiffness.value() <= 0.0 && course.is_only_approached(limit.value()) {
             let why = "a resistance that vanishes with the velocity brings it to nothing before the boundary";
             return Ok(StageEnd::Approach(course.state, why));
         }
@@ -389,7 +389,7 @@ impl<const K: usize, const L: usize> Orders<K, L> {
                 end: (limit - depth) * S::from_f64(1.0 / unit_depth),
             };
             if may_creep {
-                refuse_creep(course, limit.value())?;
+                course.refuse_creep(limit.value())?;
             }
             let start =
                 State { time: S::zero(), depth: S::zero(), velocity: velocity * S::from_f64(1.0 / unit_velocity) };
@@ -466,34 +466,6 @@ impl<const K: usize, const L: usize> Orders<K, L> {
             / exit_energy::exp_from_below(r * end.time.value() + 2.0 * q * distance)
             + relative * relative * added;
     }
-}
-
-/// Whether the projectile needs more speed than it has to reach `limit` through a stage that only slows it.
-///
-/// `dV/dx = -(r + q V)/M`: V vanishes at the depth `(M/q) ln(1 + q V/r)`, which is only approached.
-#[cold]
-fn is_only_approached<S: Scalar>(course: &Course<'_, S>, limit: S) -> bool {
-    let law = course.problem.stages[course.stage].values();
-    exit_energy::speed_missing(&law, course.problem.mass.value(), course.state.values(), limit.value()).is_some()
-}
-
-/// Error where an overdamped driven stage has trapped the projectile before its equilibrium `x = -p/s`.
-///
-/// With `u = x + p/s < 0` and `l = r/(2M) + sqrt((r/(2M))² - s/M)`, the lines `V = 0` and `V = -l u` cannot be
-/// crossed outwards (drag only helps), so from between them u = 0 is approached for ever.
-#[cold]
-fn refuse_creep<S: Scalar>(course: &Course<'_, S>, limit: f64) -> Result<(), IntegrationError> {
-    let law = course.problem.stages[course.stage].values();
-    let (mass, last) = (course.problem.mass.value(), course.state.values());
-    let equilibrium = -law.static_force / law.stiffness;
-    let missing = equilibrium - last.depth;
-    let half = 0.5 * law.viscosity / mass;
-    let rate = half + (half * half - law.stiffness / mass).max(0.0).sqrt();
-    if limit >= equilibrium && missing > 0.0 && last.velocity <= rate * missing {
-        let why = "viscosity lets it only creep towards the depth where the spring balances the drive";
-        return Err(IntegrationError::NeverEnds { why, last });
-    }
-    Ok(())
 }
 
 /// The event of a step on which the sign of V at the end shows whether V vanished (proofs 2 and 3 of `locate`).

@@ -26,7 +26,7 @@ use super::random::Random;
 use super::random_scenes::errors_of;
 use serde::Serialize;
 
-use crate::integrators::{ClosedForm, Detail, Energy, Integrator, MethodName, Taylor};
+use crate::integrators::{Detail, Energy, Method, MethodName, MethodOptions, Taylor};
 use crate::physics::reference::{self, Source};
 use crate::physics::{Advice, Concrete, CraterStiffness, Outcome, Problem, Resistance, Scalar, Scene, groups};
 
@@ -247,11 +247,8 @@ fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) -> Result<
     let mut conditions = None;
     let jump = near_jump(problem);
     for method in METHODS {
-        let solved = match method {
-            MethodName::ClosedForm => ClosedForm.solve(problem, Detail::Events),
-            MethodName::Taylor => Taylor::default().solve(problem, Detail::Events),
-            _ => Energy::new().solve(problem, Detail::Events),
-        };
+        let solved = Method::new(method, &MethodOptions::default())
+            .and_then(|method| method.integrator().solve(problem, Detail::Events));
         let tally = seen.tallies.entry(method).or_default();
         let flight = match solved {
             Ok(flight) => flight,
@@ -503,6 +500,7 @@ pub fn scene_text(scene: &Scene, title: &str) -> Option<String> {
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
+    use crate::integrators::Integrator;
 
     #[test]
     fn a_scene_is_a_function_of_seed_and_number_and_reads_back_from_its_text() {

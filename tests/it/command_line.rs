@@ -5,18 +5,10 @@
 use std::fs;
 use std::path::Path;
 
+use penetrode::integrators::{Accuracy, MethodName};
 use serde_json::Value;
 
 use crate::program::{Said, conforms, json, names, run, run_in, run_with, scene};
-
-/// Methods of this build that adapt their steps.
-fn adaptive_methods() -> Vec<&'static str> {
-    let mut methods = vec!["taylor", "energy"];
-    if cfg!(feature = "diffsol") {
-        methods.extend(["tsit45", "bdf", "esdirk34", "tr-bdf2", "adaptive"]);
-    }
-    methods
-}
 
 #[test]
 fn forrestal_shot_14_reaches_its_published_depth_with_events_in_order() {
@@ -40,16 +32,20 @@ fn a_table_to_audit_may_come_from_standard_input_and_the_scene_not_as_well() {
 
 #[test]
 fn every_method_finds_the_critical_velocity_of_the_slab() {
-    let mut limits = vec![("taylor", 1e-13), ("energy", 1e-13), ("closed-form", 1e-13), ("central-difference", 1e-2)];
-    if cfg!(feature = "diffsol") {
-        limits.extend([("tsit45", 1e-9), ("bdf", 1e-8), ("esdirk34", 1e-7), ("tr-bdf2", 1e-6), ("adaptive", 1e-8)]);
-    }
-    for (method, limit) in limits {
+    for method in MethodName::built() {
+        let limit = match (method, method.accuracy()) {
+            (MethodName::Tsit45, _) => 1e-9,
+            (MethodName::Bdf | MethodName::Adaptive, _) => 1e-8,
+            (MethodName::Esdirk34, _) => 1e-7,
+            (_, Accuracy::Tolerance) => 1e-6,
+            (_, Accuracy::RoundOff | Accuracy::Exact) => 1e-13,
+            (_, Accuracy::Step) => 1e-2,
+        };
         let answer = json(&format!("critical @paper-slab --method {method}"));
         let error = answer["relative_error"].as_f64().unwrap();
         assert!(error <= limit, "{method}: {error:e}");
         let flights = answer["evaluations"].as_u64().unwrap();
-        assert!(method == "central-difference" || flights <= 12, "{method}: {flights} flights");
+        assert!(method.accuracy() == Accuracy::Step || flights <= 12, "{method}: {flights} flights");
         assert!(answer["eq15"]["valid"].as_bool().unwrap());
     }
 }
@@ -255,7 +251,7 @@ fn commands_for_people() -> Vec<String> {
     .to_vec();
     for name in names(&Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes")) {
         let scene = name.trim_end_matches(".toml");
-        for method in adaptive_methods().into_iter().chain(["central-difference", "closed-form"]) {
+        for method in MethodName::built() {
             commands.push(format!("solve @{scene} --explain --method {method}"));
         }
         commands.extend([

@@ -128,7 +128,7 @@ fn a_creep_begins_at_the_line_of_the_fast_rate_and_only_before_the_equilibrium()
         (0.5, 6.0, 2.0_f64.next_down(), false),
         (2.0, 0.0, f64::INFINITY, false),
     ] {
-        let refused = refuse_creep(&course_at(&problem, depth, velocity), limit);
+        let refused = course_at(&problem, depth, velocity).refuse_creep(limit);
         assert_eq!(refused.is_err(), creeps, "{depth}, {velocity}, {limit}");
     }
 }

@@ -15,16 +15,16 @@ use crate::testing::{Random, continuous, kinds, of_stages, random_concrete, stag
 
 const INF: f64 = f64::INFINITY;
 
-/// The methods at `rtol`; those that work to round-off by default, unless `rtol` is loose, do so.
+/// The methods: to round-off where they can, and to `rtol` where not.
 fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
-    let built =
-        MethodName::ALL.iter().copied().filter(|name| name.is_built() && *name != MethodName::CentralDifference);
-    let options = |name| MethodOptions { rtol: is_library(name).then_some(rtol), ..MethodOptions::default() };
-    built.map(|name| (name, Method::new(name, &options(name)).unwrap())).collect()
+    let options = |name| MethodOptions { rtol: is_tolerant(name).then_some(rtol), ..MethodOptions::default() };
+    let names = MethodName::built().filter(|name| name.accuracy() != Accuracy::Step);
+    names.map(|name| (name, Method::new(name, &options(name)).unwrap())).collect()
 }
 
-fn is_library(name: MethodName) -> bool {
-    name.needs_diffsol()
+/// Whether the method works to a tolerance only.
+fn is_tolerant(name: MethodName) -> bool {
+    name.accuracy() == Accuracy::Tolerance
 }
 
 /// The answer, unless the method refuses the problem.
@@ -89,7 +89,7 @@ fn the_tunnel_scene_has_the_depth_and_times_of_fifty_digits() {
     for (name, method) in methods(1e-12) {
         let limit = match name {
             MethodName::Tsit45 | MethodName::Adaptive => 1e-10,
-            name if is_library(name) => 1e-8,
+            name if is_tolerant(name) => 1e-8,
             _ => 1e-14,
         };
         let flight = method.integrator().solve(&tunnel(INF), Detail::Events).unwrap();
@@ -116,7 +116,7 @@ fn random_flights_end_where_when_and_as_fast_as_the_closed_form_says() {
     for (name, method) in methods(1e-12) {
         let ([depth_limit, time_limit, energy_limit], count) = match name {
             MethodName::Tsit45 | MethodName::Adaptive => ([1e-11, 1e-10, 1e-10], 40),
-            name if is_library(name) => ([1e-9, 1e-8, 1e-8], 20),
+            name if is_tolerant(name) => ([1e-9, 1e-8, 1e-8], 20),
             _ => ([5e-15, 1e-13, 2e-14], problems.len()),
         };
         let mut compared = 0;
@@ -164,8 +164,8 @@ fn a_stage_of_each_family_ends_where_when_and_as_fast_as_its_closed_form_says() 
         let exact = ClosedForm.solve(&problem, Detail::End).unwrap();
         for (name, flight) in flights(&problem) {
             assert_eq!(flight.outcome, exact.outcome, "{name}, {law:?}");
-            let limit = if is_library(name) { 1e-6 } else { limit };
-            let scale = if is_library(name) || flight.outcome.is_stop() { speed } else { exact.end.velocity };
+            let limit = if is_tolerant(name) { 1e-6 } else { limit };
+            let scale = if is_tolerant(name) || flight.outcome.is_stop() { speed } else { exact.end.velocity };
             let errors = [
                 flight.end.depth / exact.end.depth - 1.0,
                 flight.end.time / exact.end.time - 1.0,
@@ -181,7 +181,7 @@ fn a_stage_of_each_family_ends_where_when_and_as_fast_as_its_closed_form_says() 
 fn rest_near_the_crater_end_is_continuous_and_cheap() {
     let law = tunnel(INF);
     let touching = (law.stages[0].end * law.stages[1].static_force / law.mass).sqrt();
-    for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_library(*name)) {
+    for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_tolerant(*name)) {
         for (power, sign) in (1..=17).flat_map(|power| [1.0, -1.0].map(|sign| (power, sign))) {
             let speed = touching * (1.0 + sign * 10.0_f64.powi(-power));
             let problem = Problem::continuous(law.mass, speed, law.stages[0].end, law.stages[1]);
@@ -200,7 +200,7 @@ fn a_tolerance_is_kept_at_less_work_the_looser_it_is_and_refused_outside_its_ran
     let mut random = Random::new(5);
     let mut problems: Vec<_> = (0..200).map(|_| random_concrete(&mut random).with_exit(INF)).collect();
     problems.push(continuous(2.0, 848_230.0, 3.25, 0.1, 900.0, 0.4));
-    for name in [MethodName::Taylor, MethodName::Energy] {
+    for name in MethodName::built().filter(|name| name.accuracy() == Accuracy::RoundOff) {
         let with = |rtol| Method::new(name, &MethodOptions { rtol, ..MethodOptions::default() });
         for bad in [0.0, -1e-6, 0.2, 0.5, f64::NAN] {
             assert!(with(Some(bad)).is_err_and(|error| error.is_usage()), "{name}: {bad}");
@@ -231,7 +231,7 @@ fn units_are_free_to_the_bit() {
     let mut random = Random::new(8);
     for _ in 0..200 {
         let problem = random_stages(&mut random, true);
-        for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_library(*name)) {
+        for (name, method) in methods(1e-10).into_iter().filter(|(name, _)| !is_tolerant(*name)) {
             let Some(Ok(flight)) = answer(&method, &problem, Detail::Events) else { continue };
             for (length, mass, time) in
                 [(67, 60, 67), (-67, -60, -67), (-100, -100, -100), (30, 40, -40), (-40, -30, 20)]
@@ -270,7 +270,7 @@ fn the_error_bound_of_the_margin_holds_and_is_not_idle() {
     for rtol in [1e-4, 1e-7, 1e-9] {
         for (name, method) in methods(rtol) {
             let mut worst = 0.0_f64;
-            let scenes = if is_library(name) { &scenes } else { &scenes[..dry] };
+            let scenes = if is_tolerant(name) { &scenes } else { &scenes[..dry] };
             let reused = method.integrator().reusing();
             let integrator = reused.as_deref().unwrap_or(method.integrator());
             for (problem, exact) in scenes {
@@ -326,7 +326,7 @@ fn near_the_critical_velocity_the_outcome_is_right_or_undecided() {
                     }
                 }
             }
-            let most = if is_library(name) { 28 } else { 16 };
+            let most = if is_tolerant(name) { 28 } else { 16 };
             assert!(undecided > 0 && undecided <= most, "{name}: {undecided} undecided of {problem:?}");
         }
     }
@@ -487,7 +487,7 @@ fn events_at_one_place_are_listed_in_order() {
     }
 }
 
-/// Powers of two: 8 N stop 1 kg at 4 m/s after 1 m and 0.5 s. A library method has that within its tolerance only.
+/// Powers of two: 8 N stop 1 kg at 4 m/s after 1 m and 0.5 s. A tolerance is all that some methods have.
 #[test]
 fn a_place_that_is_touched_is_reached() {
     let wall = |end| constant(8.0, end);
@@ -499,7 +499,7 @@ fn a_place_that_is_touched_is_reached() {
     (at_crater_end.crater, at_crater_end.target) = (Some(0), Target::CraterAndTunnel);
     for (name, flight) in flights(&at_exit) {
         assert_eq!((flight.outcome, flight.stage), (Outcome::Undecided, 1), "{name}");
-        if !is_library(name) {
+        if !is_tolerant(name) {
             let all = [0, 1, 2].map(EventKind::StageEnd).into_iter().chain([EventKind::Exit, EventKind::Rest]);
             assert_eq!((kinds(&flight.events), flight.exit_margin), (all.collect(), Some(0.0)), "{name}");
             assert_eq!(flight.end, State { time: 0.625, depth: 1.5, velocity: 0.0 }, "{name}");
@@ -507,9 +507,9 @@ fn a_place_that_is_touched_is_reached() {
     }
     for (name, flight) in flights(&before_a_drive) {
         assert_eq!(flight.outcome, Outcome::Undecided, "{name}");
-        assert!(is_library(name) || (flight.exit_margin, flight.end.depth) == (Some(0.0), 1.0), "{name}");
+        assert!(is_tolerant(name) || (flight.exit_margin, flight.end.depth) == (Some(0.0), 1.0), "{name}");
     }
-    for (name, flight) in flights(&at_crater_end).into_iter().filter(|(name, _)| !is_library(*name)) {
+    for (name, flight) in flights(&at_crater_end).into_iter().filter(|(name, _)| !is_tolerant(*name)) {
         assert_eq!((flight.outcome, flight.stage), (Outcome::StoppedInCrater, 0), "{name}");
         assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest], "{name}");
         assert_eq!(flight.end, State { time: 0.5, depth: 1.0, velocity: 0.0 }, "{name}");
@@ -626,7 +626,7 @@ fn detail_changes_what_is_listed_and_no_number_and_a_trajectory_keeps_the_energy
             assert_eq!(rows.last().unwrap().state, end.end, "{name}");
             for (before, after) in rows.windows(2).map(|rows| (rows[0].state, rows[1].state)) {
                 assert!(before.time < after.time && before.depth < after.depth, "{name}: {before} {after}");
-                let limit = if is_library(name) { 1e-8 } else { 2e-15 };
+                let limit = if is_tolerant(name) { 1e-8 } else { 2e-15 };
                 let law = problem.stages.iter().find(|law| after.depth <= law.end).unwrap();
                 let w = propagate(law, problem.mass, before.velocity.powi(2), before.depth, after.depth);
                 let off = (w - after.velocity.powi(2)).abs() / 9e4;
@@ -645,7 +645,7 @@ fn a_method_that_reuses_its_solver_has_the_same_name_order_and_answers() {
     for (name, method) in methods(1e-7) {
         let integrator = method.integrator();
         let Some(reused) = integrator.reusing() else {
-            assert!(!is_library(name), "{name}");
+            assert!(!name.needs_diffsol(), "{name}");
             continue;
         };
         assert_eq!((reused.name(), reused.order()), (integrator.name(), integrator.order()));

@@ -14,7 +14,8 @@ use super::timing::{Effort, Timing};
 use crate::integrators::central_difference::default_time_step;
 use crate::integrators::lanes::Batch;
 use crate::integrators::{
-    Boundaries, CentralDifference, Detail, Flight, IntegrationError, Method, MethodName, MethodOptions, VelocityAt,
+    Accuracy, Boundaries, CentralDifference, Detail, Flight, IntegrationError, Method, MethodName, MethodOptions,
+    VelocityAt,
 };
 use crate::physics::reference::{self, Conditions, ExactFlight, Source};
 use crate::physics::{Outcome, Problem, Scene};
@@ -199,12 +200,8 @@ type SolveOne = dyn Fn(&Problem) -> Result<Flight, IntegrationError>;
 impl Contender {
     /// Every contender of this build: each method, the paper's variant of its scheme and the most accurate one.
     pub fn all() -> Vec<Self> {
-        let mut all: Vec<_> = MethodName::ALL
-            .iter()
-            .copied()
-            .filter(|name| name.is_built() && *name != MethodName::CentralDifference)
-            .map(Self::Method)
-            .collect();
+        let mut all: Vec<_> =
+            MethodName::built().filter(|name| name.accuracy() != Accuracy::Step).map(Self::Method).collect();
         all.insert(1, Self::Batch);
         all.push(Self::Scheme(VelocityAt::LaggedHalfStep, Boundaries::StepEnd));
         all.push(Self::Scheme(VelocityAt::Centred, Boundaries::Landed));
@@ -224,12 +221,13 @@ impl Contender {
     pub fn settings(self) -> Vec<Setting> {
         let tolerances = |finest: i32| (2..=finest).map(|digits| Setting::Tolerance(10f64.powi(-digits)));
         match self {
-            Self::Batch | Self::Method(MethodName::ClosedForm) => vec![Setting::RoundOff],
-            Self::Method(MethodName::Taylor | MethodName::Energy) => {
-                tolerances(15).chain([Setting::RoundOff]).collect()
-            }
-            Self::Method(_) => tolerances(14).collect(),
+            Self::Batch => vec![Setting::RoundOff],
             Self::Scheme(..) => STEPS_OVER_DEFAULT.into_iter().map(Setting::Step).collect(),
+            Self::Method(name) => match name.accuracy() {
+                Accuracy::Exact => vec![Setting::RoundOff],
+                Accuracy::RoundOff => tolerances(15).chain([Setting::RoundOff]).collect(),
+                Accuracy::Tolerance | Accuracy::Step => tolerances(14).collect(),
+            },
         }
     }
 

@@ -10,7 +10,6 @@ mod steps;
 use twofloat::TwoFloat;
 
 use super::{Subject, formulas, off, solve, worst_of};
-use crate::integrators::method::{MethodName, RTOL_DEFAULT};
 use crate::integrators::{Detail, Energy, Flight, Taylor};
 use crate::physics::{Outcome, Problem, Scene, Stage};
 use crate::suite::claim::{Found, Measurement, NotMeasured};
@@ -30,15 +29,9 @@ impl Subject<'_> {
         Ok((flight, exact))
     }
 
-    /// The relative error that the method promises: round-off, or a multiple of its tolerance per step.
-    ///
-    /// The multiples are those by which the adapter widens the library's local tolerance into an error bound.
+    /// The relative error that the method promises.
     fn promise(&self) -> f64 {
-        match self.method_name() {
-            MethodName::TrBdf2 => 3.0 * RTOL_DEFAULT.powf(2.0 / 3.0),
-            method if method.needs_diffsol() => 10.0 * RTOL_DEFAULT,
-            _ => f64::EPSILON,
-        }
+        self.method_name().promise()
     }
 }
 
