@@ -149,7 +149,9 @@ fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parque
         })
         .unzip();
     let mut tally = Tally::default();
-    tallies.into_iter().for_each(|counted| tally += counted);
+    for counted in tallies {
+        tally += counted;
+    }
     (tally, blocks)
 }
 

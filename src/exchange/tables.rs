@@ -226,7 +226,9 @@ impl Rows {
                 let fault = Fault::Ragged { found: records[index].len(), expected: self.layout.width };
                 Err(TableError::of_row(row.at(), 0, fault))
             }
-            _ => Ok(row),
+            Data::Csv(..) => Ok(row),
+            #[cfg(feature = "parquet")]
+            Data::Parquet(..) => Ok(row),
         }
     }
 }
