@@ -1,11 +1,13 @@
-//! Every document of ours that is cited is in the repository, with the heading that is named.
+//! Every document of ours that is cited is in the repository, with the heading that is named; every file can be checked out
+//! on every system.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Folders and files in which a document may be cited.
-const PLACES: [&str; 13] = [
+const PLACES: [&str; 17] = [
     "src",
     "tests",
     "benches",
@@ -19,36 +21,41 @@ const PLACES: [&str; 13] = [
     "CONTRIBUTING.md",
     "CITATION.cff",
     ".ci",
+    ".github",
+    "justfile",
+    "deny.toml",
+    "SECURITY.md",
 ];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn texts(path: &Path, found: &mut Vec<(PathBuf, String)>) -> io::Result<()> {
-    if path.is_dir() {
+/// Every file in `path`, but for what is built.
+fn files(path: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
+    if !path.is_dir() {
+        found.push(path.to_owned());
+    } else if ![".git", "target"].iter().any(|left_out| path.ends_with(left_out)) {
         for entry in fs::read_dir(path)? {
-            let path = entry?.path();
-            if !path.ends_with("target") && !path.ends_with("hostile") {
-                texts(&path, found)?;
-            }
+            files(&entry?.path(), found)?;
         }
-    } else if let Ok(text) = fs::read_to_string(path) {
-        found.push((path.to_owned(), text));
     }
     Ok(())
 }
 
 /// All text in which a document may be cited; comment marks and line breaks are spaces, for a citation may wrap.
 fn citing() -> io::Result<Vec<(PathBuf, String)>> {
-    let mut found = Vec::new();
+    let mut paths = Vec::new();
     for place in PLACES {
-        texts(&root().join(place), &mut found)?;
+        files(&root().join(place), &mut paths)?;
     }
-    found.retain(|(path, _)| !path.ends_with("documents.rs"));
-    for (_, text) in &mut found {
+    paths.retain(|path| !path.ends_with("documents.rs") && !path.starts_with(root().join("tests/hostile")));
+    let mut found = Vec::new();
+    for path in paths {
+        let Ok(text) = fs::read_to_string(&path) else { continue };
         let bare = text.lines().map(|line| line.trim_start().trim_start_matches(['/', '!', '#', '>', '*', ' ']));
-        *text = bare.collect::<Vec<_>>().join(" ");
+        let text = bare.collect::<Vec<_>>().join(" ");
+        found.push((path, text));
     }
     Ok(found)
 }
@@ -107,6 +114,43 @@ fn no_document_is_cited_that_is_not_here() -> io::Result<()> {
                 assert!(path.with_file_name(file).exists(), "{} links to {link}", path.display());
             }
         }
+    }
+    Ok(())
+}
+
+/// A device of Windows, with or without an extension: `nul.toml` cannot be checked out there.
+#[test]
+fn no_file_name_is_refused_by_windows() -> io::Result<()> {
+    let mut paths = Vec::new();
+    files(root(), &mut paths)?;
+    assert!(paths.len() > 300, "only {} files", paths.len());
+    let mut seen = BTreeSet::new();
+    for path in paths.iter().filter_map(|path| path.strip_prefix(root()).ok()) {
+        for name in path.iter().map(|name| name.to_string_lossy().to_lowercase()) {
+            let stem = name.split('.').next().unwrap_or_default();
+            let numbered = ["com", "lpt"].iter().find_map(|device| stem.strip_prefix(device));
+            let is_device = ["con", "prn", "aux", "nul"].contains(&stem)
+                || numbered.is_some_and(|number| number.len() == 1 && number.chars().all(|c| c.is_ascii_digit()));
+            assert!(!is_device, "{}: a device of Windows", path.display());
+            assert!(!name.ends_with(['.', ' ']), "{}: Windows drops the last character", path.display());
+            let refused = |c: char| c.is_control() || "<>:\"/\\|?*".contains(c);
+            assert!(!name.contains(refused), "{}: a character that Windows refuses", path.display());
+        }
+        assert!(seen.insert(path.to_string_lossy().to_lowercase()), "{}: two names in one", path.display());
+    }
+    Ok(())
+}
+
+/// `justfile` runs what CONTRIBUTING.md says, to the letter.
+#[test]
+fn every_recipe_of_the_justfile_is_a_command_of_contributing() -> io::Result<()> {
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let contributing = words(&fs::read_to_string(root().join("CONTRIBUTING.md"))?);
+    let recipes = fs::read_to_string(root().join("justfile"))?;
+    let commands: Vec<_> = recipes.replace("\\\n", "").lines().filter(|l| l.starts_with("    ")).map(words).collect();
+    assert!(commands.len() > 10, "{commands:?}");
+    for command in commands {
+        assert!(contributing.contains(&format!("`{command}`")), "CONTRIBUTING.md has no `{command}`");
     }
     Ok(())
 }
