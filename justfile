@@ -33,7 +33,7 @@ fuzz-corpus:
 
 # Renew what is said of hostile files, and show what changed
 messages:
-    INSTA_UPDATE=always cargo test --test it hostile_input
+    SNAPSHOTS=overwrite cargo test --test it hostile_input
     git diff tests/it/snapshots
 
 # One change of the code at a time, each of which must turn a test red (hours)
@@ -63,7 +63,7 @@ parquet:
 
 # Times of every method
 bench:
-    cargo bench --bench flights
+    cargo bench --manifest-path benches/flights/Cargo.toml
 
 # Instruction counts, by valgrind
 instructions:

@@ -127,6 +127,8 @@ fn build(faults: &[Fault]) -> Result<PathBuf, Box<dyn Error>> {
     let built = Command::new(env!("CARGO"))
         .args(["build", "--locked", "--bin", "penetrode-faults", "--no-default-features"])
         .args(["--features", features, "--profile", profile])
+        // Compiled in half the time, and no claim measures speed.
+        .args(["--config", "profile.release.package.penetrode-faults.opt-level=1"])
         .env("CARGO_TARGET_DIR", &target)
         .current_dir(&copy)
         .output()?;

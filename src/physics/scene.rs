@@ -835,7 +835,7 @@ mod tests {
         ] {
             shown += &format!("usage: {}\n{error}\n{}\n\n", error.is_usage(), error.help());
         }
-        insta::assert_snapshot!("errors", shown);
+        snapbox::assert_data_eq!(shown, snapbox::file!["snapshots/errors.txt"].raw());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! memory, and nothing is written.
 //!
 //! The files are in `tests/hostile/`, one folder a kind; their messages are in `tests/it/snapshots/`. Review a change
-//! with `INSTA_UPDATE=always cargo test --test it hostile_input` and `git diff`.
+//! with `SNAPSHOTS=overwrite cargo test --test it hostile_input` and `git diff`.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
@@ -11,8 +11,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use insta::assert_snapshot;
 use penetrode::integrators::MethodName;
+use snapbox::{Data, assert_data_eq};
 
 use crate::program::{Said, names, program, scene};
 
@@ -21,6 +21,12 @@ const MEMORY_KIB: u32 = 1 << 20;
 
 /// Processor time (s), which is no less than the wall's on one thread, and does not depend on who else is at work.
 const SECONDS: u32 = 1;
+
+#[track_caller]
+fn assert_snapshot(name: &str, text: String) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/it/snapshots/{name}.txt"));
+    assert_data_eq!(text, Data::read_from(&path, None).raw());
+}
 
 fn corpus() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile")
@@ -81,7 +87,7 @@ fn a_bad_file_is_refused_at_its_place() {
         ("measured_points", "points", "sweep slab.toml --vary H/d=1:5:3 --data {} --out out.csv"),
         ("experiments", "experiments", "experiments {} --out out.csv"),
     ] {
-        assert_snapshot!(snapshot, refusals(kind, line).replace(&every_method, "(every method)"));
+        assert_snapshot(snapshot, refusals(kind, line).replace(&every_method, "(every method)"));
     }
 }
 
@@ -106,7 +112,7 @@ fn a_bad_row_is_reported_in_its_own_line_of_the_results() {
         }
         all.push('\n');
     }
-    assert_snapshot!("batch_rows", all);
+    assert_snapshot("batch_rows", all);
 }
 
 #[test]
@@ -136,7 +142,7 @@ fn a_hundred_megabytes_are_refused_and_not_read() {
         writeln!(all, "== {shown}\n{}", said.err).unwrap();
     }
     assert_eq!(names(folder.path()), ["big.csv", "big.toml", "long.csv"]);
-    assert_snapshot!("large_files", all);
+    assert_snapshot("large_files", all);
 }
 
 #[test]
@@ -155,5 +161,5 @@ fn what_is_no_file_is_refused() {
         }
     }
     assert_eq!(names(folder.path()), ["folder", "slab.toml"]);
-    assert_snapshot!("no_files", all);
+    assert_snapshot("no_files", all);
 }

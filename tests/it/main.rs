@@ -6,6 +6,7 @@
 mod batch;
 mod bench;
 mod command_line;
+mod dependencies;
 mod documents;
 mod fuzz_corpus;
 mod hostile_input;

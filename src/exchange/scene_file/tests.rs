@@ -241,7 +241,7 @@ fn every_other_refusal_names_its_place_its_cause_and_a_remedy() {
         assert!(error.place.is_some() && !error.allowed.is_empty() && !error.help.is_empty(), "{error}");
         shown += &error.render(false);
     }
-    insta::assert_snapshot!("refusals", shown);
+    snapbox::assert_data_eq!(shown, snapbox::file!["snapshots/refusals.txt"].raw());
 }
 
 /// `text` with `value` in place of what it gives for `parameter`.

@@ -72,7 +72,7 @@ fn course_at(problem: &Problem, depth: f64, velocity: f64) -> Course<'_> {
 }
 
 fn orders() -> Orders<22, 24> {
-    Orders::new(f64::EPSILON)
+    Orders(Steps::new(f64::EPSILON))
 }
 
 /// `V' = -V²` from V = 1 is `1/(1 + t)`: coefficients 1, -1, 1, ... of V and of x over its order.
@@ -105,7 +105,7 @@ fn a_step_adds_its_roundings_to_a_bar_that_fades() {
     let law = Stage { static_force: -1.1, stiffness: 0.7, viscosity: 0.3, drag: 0.9, end: 1.0 };
     let start = State { time: 0.0, depth: 0.0, velocity: 1.5 };
     let end = State { time: 0.4, depth: 0.6, velocity: 1.2 };
-    orders().widen_bound(&mut course, &law, &start, &end, 30.0, 0.8);
+    orders().0.widen_bound(&mut course, &law, &start, &end, 30.0, 0.8);
     // Force 1.1 + 0.42 + 2.475; roundings 6 V² + 3 F (0.8 + 1.2), truncation 2 V²; a hundredth of it, for V/V0 = 0.1.
     let added = 0.01 * (6.0 * 2.25 + 3.0 * 3.995 * 2.0 + 2.0 * 2.25);
     let fading = (1.0_f64 + (0.3 * 0.4 + 2.0 * 0.9 * 0.6) / 8.0).powi(8);

@@ -1,7 +1,7 @@
 //! Time of a flight by every method, in lanes, of a critical velocity and of the closed form, each with its answer
 //! asserted first.
 //!
-//! `cargo bench --bench flights` runs them; ids are `method/scene`. Besides the shipped scenes, 1,000 varied scenes from a
+//! `cargo bench --manifest-path benches/flights/Cargo.toml` runs them; ids are `method/scene`. Besides the shipped scenes, 1,000 varied scenes from a
 //! seed: one scene repeated flatters small solvers, whose branches the processor then knows. No accuracy is given up for
 //! speed: the same run reports the worst error over the varied scenes against 50 digits.
 
