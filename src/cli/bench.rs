@@ -6,13 +6,13 @@ use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
 
 use super::output::{Text, error_text, escape_terminal, say_line, show_progress, wrapped};
-use super::verify::{quoted, report_line};
-use super::{Answer, Ask, CliError, Exit, read_scene};
+use super::verify::report_line;
+use super::{Answer, Ask, CliError, Exit, command_typed, read_scene};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
 use crate::exchange::scene_file::SHIPPED;
 use crate::physics::Scene;
 use crate::report::bench::{BenchJson, CaseJson, files};
-use crate::report::{Environment, folder};
+use crate::report::{Environment, cells, folder};
 use crate::studies::bench::growth::{self, Growth};
 use crate::studies::bench::step_size::{self, Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
 use crate::studies::bench::work_precision::{
@@ -20,7 +20,7 @@ use crate::studies::bench::work_precision::{
 };
 use crate::studies::bench::{Effort, peers};
 use crate::suite::grouped;
-use crate::text::{number, or_dash, prefixed};
+use crate::text::{clipped, number, prefixed};
 
 /// Scenes that are measured where none is given: those of the comparison with other solvers, and the stiff one.
 const DEFAULT_SCENES: [&str; 5] = ["crater", "tunnel", "perforate", "graze", "stiff"];
@@ -76,15 +76,11 @@ impl Ask for BenchArgs {
     type Answer = BenchJson;
 
     fn ask(&self) -> Result<Answer<BenchJson>, CliError> {
-        if let Some(folder) = &self.out {
-            folder::check(folder)?;
-        }
+        self.out.as_deref().map(folder::check).transpose()?;
         let scenes = self.scenes()?;
         let mut peers = self.start_peers()?;
         let report = self.measure(&scenes, &mut peers)?;
-        if let Some(folder) = &self.out {
-            folder::write(files(&report), folder)?;
-        }
+        self.out.as_deref().map(|folder| folder::write(files(&report), folder)).transpose()?;
         Ok(Answer { text: self.text(&report), data: Some(report), exit: Exit::Success })
     }
 }
@@ -107,14 +103,9 @@ impl BenchArgs {
             let stem = Path::new(path).file_stem().map_or_else(|| path.clone(), |stem| stem.to_string_lossy().into());
             let stem = if path == "-" { "standard-input".to_owned() } else { stem };
             // Two files of one name in two folders are two scenes.
-            let taken = |name: &str| name == "varied" || scenes.iter().any(|(known, _)| known == name);
-            let name = if taken(&stem) {
-                // Of one number more than there are scenes, one is free.
-                let numbered = (2..=scenes.len() + 2).map(|number| format!("{stem}-{number}"));
-                numbered.into_iter().find(|name| !taken(name)).unwrap_or(stem)
-            } else {
-                stem
-            };
+            let is_free = |name: &String| name != "varied" && scenes.iter().all(|(known, _)| known != name);
+            let numbered = (2..).map(|number| format!("{stem}-{number}"));
+            let name = [stem.clone()].into_iter().chain(numbered).find(is_free).unwrap_or_default();
             scenes.push((name, scene));
         }
         Ok(scenes)
@@ -194,7 +185,7 @@ impl BenchArgs {
             runs,
             step_size: studies,
             growth: growths,
-            environment: Environment::of_scenes(self.seed, self.command(), &understood, peers),
+            environment: Environment::of_scenes(self.seed, command_typed(), &understood, peers),
         })
     }
 
@@ -207,24 +198,6 @@ impl BenchArgs {
         progress.set_message("batches");
         growth::measure(&program, &counts, &THREADS, self.seed, &|| progress.inc(1))
             .map_err(|error| failed(error.to_string()))
-    }
-
-    /// The command that remakes this run.
-    fn command(&self) -> String {
-        let mut words = vec!["penetrode bench".to_owned()];
-        words.extend(self.scenes.iter().map(|path| quoted(path)));
-        let parts = self.parts.iter().filter_map(ValueEnum::to_possible_value);
-        words.push(format!("--parts {}", parts.map(|part| part.get_name().to_owned()).collect::<Vec<_>>().join(",")));
-        if self.peers {
-            words.push("--peers".to_owned());
-        }
-        words.extend(self.peer.iter().map(|command| format!("--peer {}", quoted(command))));
-        words.extend(self.varied.map(|count| format!("--varied {count}")));
-        words.push(format!("--seed {} --repeats {}", self.seed, self.repeats));
-        if self.has(Part::Scaling) {
-            words.push(format!("--most {}", self.most));
-        }
-        words.join(" ")
     }
 
     fn text(&self, report: &BenchJson) -> String {
@@ -242,7 +215,8 @@ impl BenchArgs {
             report.step_size.iter().for_each(|study| add_study(&mut text, study));
         }
         if !report.growth.is_empty() {
-            add_growth(&mut text, &report.growth);
+            text.part("Cost of a batch as work grows");
+            text.table(&cells::GROWTH, cells::growth(&report.growth));
         }
         if let Some(folder) = &self.out {
             text.part(report_line(folder));
@@ -263,7 +237,7 @@ fn add_case(text: &mut Text, report: &BenchJson, case: &CaseJson) {
             fastest_of(runs, level).map_or("-".to_owned(), |(run, ns)| format!("{} {}", micro(ns), run.setting))
         });
         let least = error_text(least_error(runs));
-        [clipped(&runs[0].method, 16)].into_iter().chain(fastest).chain([least]).collect::<Vec<_>>()
+        [clipped(&escape_terminal(&runs[0].method), 15)].into_iter().chain(fastest).chain([least]).collect::<Vec<_>>()
     };
     text.table(&["method", "1e-3", "1e-6", "1e-9", "1e-12", "least"], methods.iter().map(row));
     for runs in methods {
@@ -297,7 +271,7 @@ fn flights_of(run: &Run) -> usize {
 }
 
 fn add_study(text: &mut Text, study: &StepStudy) {
-    text.part(format!("{}: {}", clipped(&study.scene, 40), study.quantity));
+    text.part(format!("{}: {}", clipped(&escape_terminal(&study.scene), 40), study.quantity));
     let levels = STEP_LEVELS.map(|level| format!("{} %", 100.0 * level));
     let header: Vec<_> = ["method"].into_iter().chain(levels.iter().map(String::as_str)).collect();
     let row = |curve: &Curve| {
@@ -318,24 +292,6 @@ fn short_variant(name: &str) -> String {
     name.replace("interpolated", "int.").replace("step-end", "end").replace("landed", "land")
 }
 
-fn add_growth(text: &mut Text, growths: &[Growth]) {
-    text.part("Cost of a batch as work grows");
-    let row = |g: &Growth| {
-        [
-            g.scenes.to_string(),
-            format!("{:?}", g.source).to_lowercase(),
-            g.threads.to_string(),
-            number(g.seconds, 3),
-            micro(g.ns_a_scene),
-            or_dash(g.peak_bytes.map(|bytes| 1e-6 * bytes as f64), |megabytes| number(megabytes, 3)),
-        ]
-    };
-    text.table(
-        &["scenes", "source", "threads", "time [s]", "a scene [µs]", "peak memory [MB]"],
-        growths.iter().map(row),
-    );
-}
-
 /// A time in µs: three digits, two below one, and thousands as `17k`, so that a slow machine widens no table.
 fn micro(ns: f64) -> String {
     let us = 1e-3 * ns;
@@ -352,12 +308,6 @@ fn micro(ns: f64) -> String {
 fn compact(value: f64) -> String {
     let (digits, prefix) = prefixed(value, 2);
     if prefix.is_empty() { digits.trim_end_matches(".0").to_owned() } else { digits + prefix }
-}
-
-/// `text` in at most `most` characters, harmless on a terminal.
-fn clipped(text: &str, most: usize) -> String {
-    let text = escape_terminal(text);
-    if text.chars().count() <= most { text } else { text.chars().take(most - 1).chain(['…']).collect() }
 }
 
 #[cfg(test)]

@@ -7,11 +7,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
-use super::output::{Text, check_table, escape_terminal, significant, write_table};
+use super::output::{Text, check_table, write_table};
 use super::{Answer, Ask, CliError, Exit};
 use crate::exchange::input::name_of;
 use crate::exchange::tables::read_bytes;
-use crate::report::sweep_figures;
+use crate::report::{cells, sweep_figures};
 use crate::studies::experiments::{self, Comparison, EXPERIMENTS, Experiment, SetSummary};
 use crate::studies::sensitivity;
 
@@ -99,38 +99,15 @@ impl ExperimentsJson {
         let mut text = Text::default();
         text.line(format!("Predicted over measured depth, method {}", self.method.name));
         text.gap();
-        let ratios = self.sets.iter().map(|set| {
-            [
-                escape_terminal(&set.group),
-                set.experiments.to_string(),
-                format!("{:.2}", set.median),
-                format!("{:.2}", set.spread),
-                format!("{:.2} to {:.2}", set.least, set.greatest),
-                set.within_band.to_string(),
-            ]
-        });
-        text.table(&["set", "tests", "median", "spread", "range", "within 20 %"], ratios);
+        let ratios = cells::sets(&self.sets).map(|row| row.into_iter().take(6).collect::<Vec<_>>());
+        text.table(&cells::SETS[..6], ratios);
         text.gap();
-        let errors = self.sets.iter().map(|set| {
-            [
-                escape_terminal(&set.group),
-                set.in_range_of_fit.to_string(),
-                format!("{:+.1} %", 100.0 * set.mean_error),
-                set.validation_uncertainty.map_or("not given".to_owned(), |u| format!("{:.1} %", 100.0 * u)),
-            ]
-        });
-        text.table(&["set", "in range of S", "mean E/D", "u_val/D"], errors);
+        let [set, .., in_range, error, uncertainty] = cells::SETS;
+        let errors = cells::sets(&self.sets).map(|[set, .., in_range, error, u]| [set, in_range, error, u]);
+        text.table(&[set, in_range, error, uncertainty], errors);
         text.gap();
-        let given = |get: fn(&Comparison) -> Option<f64>, remedy| match self.comparisons.iter().filter_map(get).count()
-        {
-            0 => format!("not given{remedy}"),
-            count => format!("given for {count} of {} tests", self.comparisons.len()),
-        };
-        let numerical = self.comparisons.iter().map(|c| c.numerical_uncertainty / c.predicted).fold(0.0, f64::max);
         text.line("  after ASME V&V 20: E = S - D, u_val² = u_num² + u_input² + u_D²");
-        text.line(format!("  u_num, numerical   {} of the depth at most", significant(numerical)));
-        text.line(format!("  u_input, inputs    {}", given(|c| c.input_uncertainty, " (--spread states one)")));
-        text.line(format!("  u_D, data          {}", given(|c| c.experiment.depth_uncertainty, " by the sources")));
+        text.lines(cells::uncertainties(&self.comparisons).map(|(name, known)| format!("  {name:<18} {known}")));
         if let Some(meaning) = self.meaning {
             text.gap();
             text.wrapped("  ", meaning);

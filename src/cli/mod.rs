@@ -369,3 +369,10 @@ fn read_scene(path: &str) -> Result<Scene, Box<SceneError>> {
 fn problem_of(scene: &Scene, path: &str) -> Result<Problem, CliError> {
     scene.problem().map_err(|error| CliError::from(error).in_file(path))
 }
+
+/// The command of this run as it was typed, its words quoted as for a shell.
+fn command_typed() -> String {
+    let words: Vec<_> = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+    // A NUL cannot be quoted, and cannot be in an argument either.
+    format!("penetrode {}", shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default())
+}

@@ -12,7 +12,6 @@ use super::output::{Text, check_outputs, engineering, error_text, say, significa
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
 use super::{Answer, Ask, CliError, Exit, problem_of, read_scene};
-use crate::exchange::peers::EventJson;
 use crate::exchange::tables::{Kind, Value, table_of};
 use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Sample};
 use crate::physics::groups::Groups;
@@ -56,7 +55,7 @@ pub struct SolveJson {
     exit_margin: Option<f64>,
     /// Half-width of its error bound.
     exit_margin_error: Option<f64>,
-    events: Vec<EventJson>,
+    events: Vec<Event>,
     cost: CostJson,
     closed_form: Option<ClosedFormJson>,
     relative_error: Option<RelativeErrorJson>,
@@ -173,7 +172,7 @@ impl Ask for SolveArgs {
             end: flight.end,
             exit_margin: flight.exit_margin,
             exit_margin_error: flight.exit_margin_error,
-            events: flight.events.iter().map(EventJson::from).collect(),
+            events: flight.events.to_vec(),
             cost: CostJson { cost: flight.cost, wall_ns },
             closed_form: exact.as_ref().map(|exact| ClosedFormJson {
                 outcome: exact.outcome,

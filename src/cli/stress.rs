@@ -7,11 +7,12 @@ use clap::Args;
 
 use super::output::{Text, error_text, escape_terminal};
 use super::verify::{add_not_passed, counts_text, judge_all, progress_bar, report_line};
-use super::{Answer, Ask, CliError, Exit};
-use crate::report::{self, Environment, Run, StressJson, folder};
+use super::{Answer, Ask, CliError, Exit, command_typed};
+use crate::report::{self, Environment, Run, StressJson, cells, folder};
 use crate::studies::extreme_scenes::{self, Summary, ULPS_MAX};
 use crate::suite::checks::{PeerAnswers, judged_random_scenes};
 use crate::suite::{Counts, Judged, Suite, skipped, tables, worst};
+use crate::text::number;
 
 /// Arguments of `stress`.
 #[derive(Args, Debug)]
@@ -40,9 +41,7 @@ impl Ask for StressArgs {
             let text = extreme_scenes::scene_text(&extreme_scenes::scene(self.seed, index), &title);
             return Ok(Answer { data: None, text: text.unwrap_or_default(), exit: Exit::Success });
         }
-        if let Some(out) = &self.out {
-            folder::check(out)?;
-        }
+        self.out.as_deref().map(folder::check).transpose()?;
         let suite = Suite::edges()?;
         let mut judged = judge_all(&suite, self.seed, &PeerAnswers::default(), "cases");
         let random = self.cases.map(|cases| self.run_random(cases));
@@ -50,13 +49,11 @@ impl Ask for StressArgs {
         let run = Run {
             suite: &suite,
             judged: &judged,
-            environment: Environment::here(self.seed, self.command(), &suite, Vec::new()),
+            environment: Environment::here(self.seed, command_typed(), &suite, Vec::new()),
             points: &[],
             random: random.as_ref().map(|(summary, wall_ms)| (summary, *wall_ms)),
         };
-        if let Some(out) = &self.out {
-            folder::write(report::stress::files(&run), out)?;
-        }
+        self.out.as_deref().map(|folder| folder::write(report::stress::files(&run), folder)).transpose()?;
         let data = StressJson::new(&run);
         Ok(Answer { text: self.text(&run), exit: data.verdict.into(), data: Some(data) })
     }
@@ -69,12 +66,6 @@ impl StressArgs {
         let summary = extreme_scenes::run(cases, self.seed, &|| bar.inc(1));
         bar.finish_and_clear();
         (summary, started.elapsed().as_secs_f64() * 1e3)
-    }
-
-    /// The command that remakes this run.
-    fn command(&self) -> String {
-        let cases = self.cases.map(|cases| format!(" --cases {cases}")).unwrap_or_default();
-        format!("penetrode stress{cases} --seed {}", self.seed)
     }
 
     fn text(&self, run: &Run<'_>) -> String {
@@ -101,14 +92,9 @@ fn case_row(cases: &[Judged]) -> [String; 6] {
         format!("{} of {}", counts.passed, cases.len() - counts.skipped),
         if counts.skipped > 0 { counts.skipped.to_string() } else { String::new() },
         error_text(worst(cases)),
-        limit_text(claim.limit),
+        number(claim.limit, 3),
         claim.unit.to_owned(),
     ]
-}
-
-/// A limit as it was set: few digits, and no exponent where none is needed.
-fn limit_text(limit: f64) -> String {
-    if limit == 0.0 || (1e-3..1e6).contains(&limit) { limit.to_string() } else { format!("{limit:e}") }
 }
 
 fn add_random(text: &mut Text, summary: &Summary) {
@@ -120,16 +106,9 @@ fn add_random(text: &mut Text, summary: &Summary) {
              {critical_refused} out of range; 50 digits asked for {asked_reference}"
         ),
     );
-    let outcomes = summary.tallies.iter().map(|(method, tally)| {
-        let counts = [tally.right, tally.undecided, tally.refused, tally.wrong].map(|count| count.to_string());
-        [method.name().to_owned()].into_iter().chain(counts).collect::<Vec<_>>()
-    });
-    text.table(&["outcomes of", "right", "undecided", "refused", "wrong"], outcomes);
-    let worst = summary.worst.iter().map(|((method, quantity), held)| {
-        let (units, limit) = (format!("{:.1}", held.units), format!("{ULPS_MAX:.0}"));
-        [method.name().to_owned(), quantity.name().to_owned(), units, limit, held.index.to_string()]
-    });
-    text.table(&["worst error", "quantity", "ulp x condition", "limit", "scene"], worst);
+    text.table(&cells::OUTCOMES, cells::outcomes(summary));
+    text.wrapped("  ", &format!("worst errors, limit {ULPS_MAX:.0}:"));
+    text.table(&cells::WORST, cells::worst(summary));
     for defect in &summary.defects {
         text.wrapped("  ", &format!("scene {}: {}", defect.index, escape_terminal(&defect.what)));
     }

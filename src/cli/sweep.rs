@@ -88,9 +88,7 @@ impl Ask for SweepArgs {
     }
 
     fn ask(&self) -> Result<Answer<SweepJson>, CliError> {
-        if let Some(path) = &self.out {
-            check_format(path)?;
-        }
+        self.table().map(check_format).transpose()?;
         let scene = read_scene(&self.scene)?;
         let axes: Vec<Axis> = self.vary.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         if axes.len() > 2 {

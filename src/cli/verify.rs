@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, escape_terminal, say, say_line, show_progress};
 use super::sweep::read_data;
-use super::{Answer, Ask, CliError};
+use super::{Answer, Ask, CliError, command_typed};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
@@ -70,7 +70,7 @@ impl Ask for VerifyArgs {
         let run = Run {
             suite: &suite,
             judged: &judged,
-            environment: Environment::here(self.seed, self.command(), &suite, peers.describe()),
+            environment: Environment::here(self.seed, command_typed(), &suite, peers.describe()),
             points: &points,
             random: None,
         };
@@ -120,20 +120,6 @@ impl VerifyArgs {
         }
         Ok(peers)
     }
-
-    /// The command that remakes this run.
-    fn command(&self) -> String {
-        let words = [
-            Some("penetrode verify".to_owned()),
-            self.suite.as_deref().map(quoted),
-            self.only.as_deref().map(|pattern| format!("--only {}", quoted(pattern))),
-            Some(format!("--seed {}", self.seed)),
-            self.live_peers.then(|| "--live-peers".to_owned()),
-            self.data.as_deref().map(|path| format!("--data {}", quoted(&path.to_string_lossy()))),
-            self.peer.as_deref().map(|command| format!("--peer {}", quoted(command))),
-        ];
-        words.into_iter().flatten().collect::<Vec<_>>().join(" ")
-    }
 }
 
 /// Where the report is.
@@ -172,11 +158,6 @@ pub(super) fn judge_all(suite: &Suite, seed: u64, peers: &PeerAnswers, what: &st
     });
     bar.finish_and_clear();
     judged
-}
-
-/// `text` as a word of a command.
-pub(super) fn quoted(text: &str) -> String {
-    shlex::try_quote(text).map_or_else(|_| text.to_owned(), std::borrow::Cow::into_owned)
 }
 
 /// A bar that counts `what`.

@@ -305,7 +305,9 @@ pub(crate) enum StageEnd<S = f64> {
 }
 
 /// What happened at a place. The order of the variants is the order of events at one place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, strum::IntoStaticStr)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[serde(tag = "event", content = "stage", rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum EventKind {
     /// End of stage `.0` (index from 0) that is not the crater's.
@@ -331,11 +333,14 @@ impl EventKind {
 }
 
 /// An event and the state in which it happened.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Event<S = f64> {
     /// What happened.
+    #[serde(flatten)]
     pub kind: EventKind,
     /// When, where and how fast.
+    #[serde(flatten)]
     pub state: State<S>,
 }
 

@@ -309,7 +309,6 @@ struct Reference {
     name: String,
     slope: f64,
     through: Point,
-    is_shaded: bool,
 }
 
 /// One diagram of a figure.
@@ -353,13 +352,7 @@ impl Panel {
 
     /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands at its left end.
     pub fn slope(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
-        self.references.push(Reference { name: name.into(), slope, through, is_shaded: false });
-        self
-    }
-
-    /// Shades what lies below a line of this slope.
-    pub fn floor(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
-        self.references.push(Reference { name: name.into(), slope, through, is_shaded: true });
+        self.references.push(Reference { name: name.into(), slope, through });
         self
     }
 
@@ -477,25 +470,23 @@ impl Panel {
         let frame = self.frame(legend_rows);
         // Shades stand behind the grid.
         let (shades, others): (Vec<_>, Vec<_>) = self.series.iter().partition(|s| s.style.ink == Ink::Shade);
-        let (shaded, lines): (Vec<_>, Vec<_>) = self.references.iter().partition(|line| line.is_shaded);
         let draw =
             |series: &Series| symbol(&series.style, &self.drawn(series).map(|p| frame.at(p)).collect::<Vec<_>>());
         html! {
             g.plot font-size="11" {
                 @for series in shades { (draw(series)) }
-                @for floor in shaded { (frame.floor(floor)) }
                 (self.grid(&frame))
                 @for (_, x) in &self.uprights {
                     (symbol(&Style::REFERENCE, &[0.0, 1.0].map(|v| frame.inside((frame.x.share(*x), v)))))
                 }
-                @for line in &lines {
+                @for line in &self.references {
                     @if let Some(ends) = line.ends(&frame) { (symbol(&Style::REFERENCE, &ends.map(|p| frame.inside(p)))) }
                 }
                 @for series in others { (draw(series)) }
                 @for (index, (name, x)) in self.uprights.iter().enumerate() {
                     (frame.upright_name(name, *x, index % self.upright_rows()))
                 }
-                @for line in lines {
+                @for line in &self.references {
                     @if let Some(ends) = line.ends(&frame) {
                         @let (x, y) = frame.inside(ends[0]);
                         // At the top of the diagram below its line: above it stands the name of the axis.
@@ -586,16 +577,6 @@ impl Frame {
 
     fn at(&self, point: Point) -> Point {
         self.inside(self.shares(point))
-    }
-
-    fn floor(&self, floor: &Reference) -> Markup {
-        let Some([from, to]) = floor.ends(self) else { return Markup::default() };
-        let corners = [(from.0, 0.0), from, to, (to.0, 0.0)].map(|p| self.inside(p));
-        let (x, y) = self.inside((from.0, 0.0));
-        html! {
-            (symbol(&Style::area(Ink::Shade), &corners))
-            (text((x + 5.0, y - 5.0), &floor.name, Ink::Muted, Anchor::Start))
-        }
     }
 
     /// The name of an upright line, on the side where there is more room.
@@ -704,7 +685,7 @@ mod tests {
         let panel =
             Panel::new("", Axis::log("step", "s").over([1e-8, 1e-5]), Axis::log("error", "").over([1e-12, 1e-3]));
         let frame = panel.slope("slope 2", 2.0, (1e-6, 1e-8)).frame(0);
-        let line = |slope| Reference { name: String::new(), slope, through: (1e-6, 1e-8), is_shaded: false };
+        let line = |slope| Reference { name: String::new(), slope, through: (1e-6, 1e-8) };
         for slope in [-2.0, -1.0, 0.0, 1.0, 2.0, 30.0] {
             let [from, to] = line(slope).ends(&frame).unwrap_or_default();
             for (u, v) in [from, to] {

@@ -158,11 +158,13 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
     let largest = *errors.last()?;
     // Single errors close to a change of sign lie decades below the others. They are drawn at the lower edge.
     let low = errors[errors.len() / 50].min(0.03 * f64::EPSILON * coarsest / finest);
+    // The estimate of the round-off: `eps` times the number of steps.
+    let round_off =
+        [(finest, low), (finest, f64::EPSILON * coarsest / finest), (coarsest, f64::EPSILON), (coarsest, low)];
     let panel = |velocity: VelocityAt| {
         let y = Axis::log("relative error", "").over([low, largest * 6.0]);
         let mut panel = Panel::new(format!("{velocity} velocity in the drag"), Axis::log("step", "s"), y)
-            // The estimate of the round-off: `eps` times the number of steps.
-            .floor("round-off", -1.0, (coarsest, f64::EPSILON))
+            .series("round-off", Style::area(Ink::Shade), round_off)
             .slope("slope 1", 1.0, (coarsest, largest * 3.0))
             .slope("slope 2", 2.0, (coarsest, largest * 3.0));
         for (index, boundaries) in Boundaries::ALL.into_iter().enumerate() {

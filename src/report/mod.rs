@@ -1,6 +1,7 @@
 //! How a run of the suite or of the stress cases is shown: JSON, and a folder with a page, figures and tables.
 
 pub mod bench;
+pub mod cells;
 pub mod chart;
 pub mod environment;
 pub mod figure;

@@ -5,8 +5,8 @@ use std::io;
 use maud::{Markup, html};
 
 use super::folder::{Files, files_of};
-use super::page::{Page, Table, cell, number_cell, slot};
-use super::{Run, StressJson, figures};
+use super::page::{Page, Table, cell, slot};
+use super::{Run, StressJson, cells, figures};
 use crate::studies::extreme_scenes::{Summary, ULPS_MAX};
 
 /// Every file of the report.
@@ -26,29 +26,18 @@ pub fn files(run: &Run<'_>) -> io::Result<Files> {
 }
 
 fn random_scenes(summary: &Summary) -> Markup {
-    let outcomes =
-        Table::cards("Outcomes, over all scenes that resolve", ["method", "right", "undecided", "refused", "wrong"])
-            .numbers(1..5)
-            .rows(&summary.tallies, |(method, tally)| {
-                [cell(method.name()), cell(tally.right), cell(tally.undecided), cell(tally.refused), cell(tally.wrong)]
-            });
-    let worst = Table::cards(
-        format!(
-            "Worst errors in ulp over max(1, condition number), limit {ULPS_MAX}, and the scene that makes each: penetrode \
-             stress --show N"
-        ),
-        ["method", "quantity", "error", "scene"],
-    )
-    .numbers(2..4)
-    .rows(&summary.worst, |((method, quantity), worst)| {
-        [cell(method.name()), cell(quantity.name()), number_cell(Some(worst.units), 3), cell(worst.index)]
-    });
+    let outcomes = Table::cards("Outcomes, over all scenes that resolve", cells::OUTCOMES).numbers(1..5);
+    let caption = format!(
+        "Worst errors in ulp over max(1, condition number), limit {ULPS_MAX}, and the scene that makes each: penetrode \
+         stress --show N"
+    );
+    let worst = Table::cards(caption, cells::WORST).numbers(2..4);
     html! {
         p { (summary.scenes) " scenes over the whole admissible range, every second one aimed at an edge; "
             (summary.unresolved) " of them do not resolve, 50 digits were asked for " (summary.asked_reference)
             ". Critical velocities: " (summary.critical_found) " agree, " (summary.critical_refused)
             " are out of range and refused." }
-        (outcomes)
-        (worst)
+        (outcomes.rows(cells::outcomes(summary), |row| row.map(cell)))
+        (worst.rows(cells::worst(summary), |row| row.map(cell)))
     }
 }

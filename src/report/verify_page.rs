@@ -2,6 +2,7 @@
 
 use maud::{Markup, Render, html};
 
+use super::cells;
 use super::figure::Figure;
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
@@ -9,7 +10,7 @@ use super::text::{count, number, one_line};
 use super::{Environment, Run};
 use crate::integrators::{Boundaries, MethodName, VelocityAt};
 use crate::physics::groups::Groups;
-use crate::studies::experiments::{self, Comparison};
+use crate::studies::experiments;
 use crate::studies::sweep::{WHY, explanation};
 use crate::studies::{Path, Quantity, Stretch, formal_order};
 use crate::suite::checks::{Order, StepPattern};
@@ -181,37 +182,11 @@ fn sets(run: &Run<'_>) -> Markup {
         _ => None,
     });
     let Some(comparisons) = comparisons else { return html! {} };
-    let percent = |share: f64| format!("{} %", number(100.0 * share, 2));
-    let numerical = comparisons.iter().map(|c| c.numerical_uncertainty / c.predicted).fold(0.0, f64::max);
-    let given = |get: fn(&Comparison) -> Option<f64>| match comparisons.iter().filter_map(get).count() {
-        0 => "not given".to_owned(),
-        n => format!("given for {n} of {}", count(comparisons.len(), "test")),
-    };
-    let table = Table::cards(
-        "Predicted over measured depth, set by set; E = S − D is the comparison error after ASME V&V 20",
-        ["set", "tests", "median", "spread", "range", "within ±20 %", "in range of S", "mean E/D", "u_val/D"],
-    )
-    .numbers(1..8)
-    .rows(experiments::summaries(comparisons), |set| {
-        [
-            cell(&set.group),
-            cell(set.experiments),
-            cell(format!("{:.2}", set.median)),
-            cell(format!("{:.2}", set.spread)),
-            cell(format!("{:.2} to {:.2}", set.least, set.greatest)),
-            cell(set.within_band),
-            cell(set.in_range_of_fit),
-            cell(percent(set.mean_error)),
-            cell(set.validation_uncertainty.map_or("not given".to_owned(), percent)),
-        ]
-    });
+    let caption = "Predicted over measured depth, set by set; E = S − D is the comparison error after ASME V&V 20";
+    let sets = experiments::summaries(comparisons);
     html! {
-        (table)
-        (facts([
-            ("u_num, numerical", html! { (number(numerical, 2)) " of the depth at most" }),
-            ("u_input, inputs", cell(given(|c| c.input_uncertainty))),
-            ("u_D, data", html! { (given(|c| c.experiment.depth_uncertainty)) " by the sources" }),
-        ]))
+        (Table::cards(caption, cells::SETS).numbers(1..8).rows(cells::sets(&sets), |row| row.map(cell)))
+        (facts(cells::uncertainties(comparisons).map(|(name, known)| (name, cell(known)))))
     }
 }
 

@@ -15,7 +15,9 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use super::wire::{PeerAnswer, PeerRequest};
+use crate::exchange::diagnostic::printable;
 use crate::physics::{Advice, Outcome};
+use crate::text::clipped;
 
 /// Exit code by which a peer says, before its greeting, that a program it needs is missing.
 pub const EXIT_CODE_MISSING: i32 = 5;
@@ -27,22 +29,12 @@ const NAME_CHARS: usize = 120;
 /// How long a peer that closed its output may take to end, and its last words to arrive.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// What is allowed to a peer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PeerLimits {
-    /// Longest wait for one answer.
-    pub silence: Duration,
-    /// Longest line of an answer (bytes).
-    pub line_bytes: usize,
-    /// Standard error stored (bytes): its end, where the cause is.
-    pub stderr_bytes: usize,
-}
-
-impl Default for PeerLimits {
-    fn default() -> Self {
-        Self { silence: Duration::from_secs(30), line_bytes: 1 << 20, stderr_bytes: 64 << 10 }
-    }
-}
+/// Longest wait for one answer.
+const SILENCE: Duration = Duration::from_secs(30);
+/// Longest line of an answer (bytes).
+const LINE_BYTES: usize = 1 << 20;
+/// Standard error stored (bytes): its end, where the cause is.
+const STDERR_BYTES: usize = 64 << 10;
 
 /// Who a peer says it is; control characters are replaced and lengths bounded.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -176,7 +168,8 @@ struct Line {
     stderr: Arc<Mutex<Vec<u8>>>,
     /// Disconnects when standard error has ended.
     stderr_ended: Receiver<()>,
-    limits: PeerLimits,
+    /// Longest wait for one answer.
+    silence: Duration,
 }
 
 impl Peer {
@@ -185,19 +178,19 @@ impl Peer {
     /// # Errors
     /// [`PeerStartError`]: no command, no such program, something it needs is missing, or no greeting.
     pub fn start(command: &str) -> Result<Self, PeerStartError> {
-        Self::start_within(command, PeerLimits::default())
+        Self::start_within(command, SILENCE)
     }
 
-    /// [`Peer::start`] with limits other than the usual.
+    /// [`Peer::start`] with `silence` as the longest wait for one answer.
     ///
     /// # Errors
     /// As [`Peer::start`].
-    pub fn start_within(command: &str, limits: PeerLimits) -> Result<Self, PeerStartError> {
+    pub fn start_within(command: &str, silence: Duration) -> Result<Self, PeerStartError> {
         let refuse = |why| PeerStartError::Command { command: command.to_owned(), why };
         let missing = |why| PeerStartError::Missing { command: command.to_owned(), why };
         let words = shlex::split(command).ok_or_else(|| refuse("a quote is not closed"))?;
         let (program, arguments) = words.split_first().ok_or_else(|| refuse("it is empty"))?;
-        let mut line = Line::open(Command::new(program).args(arguments), limits)
+        let mut line = Line::open(Command::new(program).args(arguments), silence)
             .map_err(|error| missing(format!("cannot be started: {error}")))?;
         match line.exchange(&json!({"hello": 1})).and_then(|answer| greeting(&answer)) {
             Ok(identity) => Ok(Self { identity, command: command.to_owned(), line, questions_asked: 0, failure: None }),
@@ -253,7 +246,7 @@ impl Peer {
 }
 
 impl Line {
-    fn open(command: &mut Command, limits: PeerLimits) -> io::Result<Self> {
+    fn open(command: &mut Command, silence: Duration) -> io::Result<Self> {
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (to_peer, questions) = channel::<Vec<u8>>();
@@ -261,14 +254,14 @@ impl Line {
         let (heard, from_peer) = sync_channel(1);
         let (alive, stderr_ended) = channel();
         let stderr = Arc::new(Mutex::new(Vec::new()));
-        let line = Self { child, to_peer, from_peer, stderr: Arc::clone(&stderr), stderr_ended, limits };
+        let line = Self { child, to_peer, from_peer, stderr: Arc::clone(&stderr), stderr_ended, silence };
         let (Some(mut input), Some(output), Some(complaints)) = pipes else {
             return Err(io::Error::other("a pipe to the peer is missing"));
         };
         // The threads are not joined: a grandchild may keep a pipe open for as long as it likes.
         thread::Builder::new().spawn(move || questions.iter().try_for_each(|question| input.write_all(&question)))?;
-        thread::Builder::new().spawn(move || read_lines(output, &heard, limits.line_bytes))?;
-        thread::Builder::new().spawn(move || store_tail(complaints, &stderr, limits.stderr_bytes, &alive))?;
+        thread::Builder::new().spawn(move || read_lines(output, &heard))?;
+        thread::Builder::new().spawn(move || store_tail(complaints, &stderr, &alive))?;
         Ok(line)
     }
 
@@ -276,14 +269,13 @@ impl Line {
     fn exchange(&mut self, question: &Value) -> Result<Vec<u8>, PeerFault> {
         // A writer that is gone means a peer that is gone, which the reader reports.
         let _ = self.to_peer.send(format!("{question}\n").into_bytes());
-        let PeerLimits { silence, line_bytes, .. } = self.limits;
-        match self.from_peer.recv_timeout(silence) {
-            Ok(line) if line.len() > line_bytes => {
-                Err(PeerFault::nonsense(&format!("a line longer than {line_bytes} bytes"), &line))
+        match self.from_peer.recv_timeout(self.silence) {
+            Ok(line) if line.len() > LINE_BYTES => {
+                Err(PeerFault::nonsense(&format!("a line longer than {LINE_BYTES} bytes"), &line))
             }
             Ok(line) => Ok(line),
             Err(RecvTimeoutError::Disconnected) => Err(PeerFault::Died(self.status_in_words())),
-            Err(RecvTimeoutError::Timeout) => Err(PeerFault::Silent(silence)),
+            Err(RecvTimeoutError::Timeout) => Err(PeerFault::Silent(self.silence)),
         }
     }
 
@@ -323,24 +315,24 @@ impl Drop for Line {
 }
 
 /// Passes lines on until the asker is gone, the output ends, or a line is too long.
-fn read_lines(output: ChildStdout, lines: &SyncSender<Vec<u8>>, line_bytes: usize) {
+fn read_lines(output: ChildStdout, lines: &SyncSender<Vec<u8>>) {
     let mut output = BufReader::new(output);
     let mut line = Vec::new();
-    while let Ok(1..) = output.by_ref().take(line_bytes as u64 + 1).read_until(b'\n', &mut line) {
-        let is_too_long = line.len() > line_bytes;
+    while let Ok(1..) = output.by_ref().take(LINE_BYTES as u64 + 1).read_until(b'\n', &mut line) {
+        let is_too_long = line.len() > LINE_BYTES;
         if lines.send(std::mem::take(&mut line)).is_err() || is_too_long {
             return;
         }
     }
 }
 
-/// Reads standard error to its end and stores the last `limit` bytes. `_alive` is dropped at the end.
-fn store_tail(mut complaints: ChildStderr, tail: &Mutex<Vec<u8>>, limit: usize, _alive: &Sender<()>) {
+/// Reads standard error to its end and stores the last [`STDERR_BYTES`]. `_alive` is dropped at the end.
+fn store_tail(mut complaints: ChildStderr, tail: &Mutex<Vec<u8>>, _alive: &Sender<()>) {
     let mut chunk = [0; 4096];
     while let Ok(count @ 1..) = complaints.read(&mut chunk) {
         let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
         tail.extend_from_slice(&chunk[..count]);
-        let excess = tail.len().saturating_sub(limit);
+        let excess = tail.len().saturating_sub(STDERR_BYTES);
         tail.drain(..excess);
     }
 }
@@ -353,7 +345,7 @@ fn greeting(line: &[u8]) -> Result<PeerIdentity, PeerFault> {
         return Err(PeerFault::nonsense("a greeting without a name", line));
     }
     for text in [&mut identity.name, &mut identity.version, &mut identity.method] {
-        *text = escaped(&text.chars().take(NAME_CHARS).collect::<String>());
+        *text = escaped(&clipped(text, NAME_CHARS));
     }
     Ok(identity)
 }
@@ -394,24 +386,12 @@ fn outcome_of_depth(depth: f64, request: &PeerRequest) -> Outcome {
 
 /// The beginning of what was printed, on one line and harmless on a terminal.
 fn excerpt(printed: &[u8]) -> String {
-    let start = &printed[..printed.len().min(4 * QUOTED_CHARS)];
-    let text = String::from_utf8_lossy(start);
-    let text = text.trim_end();
-    let mut quoted = escaped(&text.chars().take(QUOTED_CHARS).collect::<String>());
-    if printed.len() > start.len() || text.chars().count() > QUOTED_CHARS {
-        quoted.push('…');
-    }
-    quoted
+    escaped(&clipped(String::from_utf8_lossy(printed).trim_end(), QUOTED_CHARS))
 }
 
 /// Control characters as escapes, everything else as it is.
 fn escaped(text: &str) -> String {
     text.chars().flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
-}
-
-/// Several lines, harmless on a terminal.
-fn printable(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() && c != '\n' { '\u{FFFD}' } else { c }).collect()
 }
 
 /// The last line of `text` that is not blank, bounded: a peer may write a line of megabytes.

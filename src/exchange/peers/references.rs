@@ -120,7 +120,7 @@ mod tests {
         for other in others {
             let limit = heyoka.trusted_to() + other.trusted_to();
             for (reference, flight) in heyoka.flights.iter().zip(&other.flights) {
-                let kinds = |answer: &PeerAnswer| answer.events.iter().map(|e| (e.event, e.stage)).collect::<Vec<_>>();
+                let kinds = |answer: &PeerAnswer| answer.events.iter().map(|e| e.kind).collect::<Vec<_>>();
                 assert_eq!(kinds(&flight.answer), kinds(&reference.answer));
                 let exact = reference.answer.flight(&reference.problem());
                 let differences = flight.answer.differences_from(&exact, &reference.problem()).unwrap();

@@ -5,60 +5,6 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::integrators::{Cost, Flight};
 use crate::physics::{Event, EventKind, Outcome, Problem, Stage, State, Target};
 
-/// What an event is called in JSON.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum EventName {
-    /// x = k d.
-    CraterEnd,
-    /// End of the stage whose index is in `stage`.
-    StageEnd,
-    /// Velocity zero.
-    Rest,
-    /// Exit depth.
-    Exit,
-}
-
-/// An event as it is written in JSON.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
-pub struct EventJson {
-    /// What happened.
-    pub event: EventName,
-    /// Index from 0 of the stage that ended; with `stage-end` only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stage: Option<usize>,
-    /// When, where and how fast.
-    #[serde(flatten)]
-    pub state: State,
-}
-
-impl EventJson {
-    /// What happened in `problem`. A peer does not know which stage is the crater: its `stage-end` there is the same
-    /// event as `crater-end`. `None` when the answer names a stage end without its stage.
-    pub fn kind(&self, problem: &Problem) -> Option<EventKind> {
-        match self.event {
-            EventName::Exit => Some(EventKind::Exit),
-            EventName::Rest => Some(EventKind::Rest),
-            EventName::CraterEnd => Some(EventKind::CraterEnd),
-            EventName::StageEnd => self.stage.map(|index| EventKind::boundary(problem, index)),
-        }
-    }
-}
-
-impl From<&Event> for EventJson {
-    fn from(event: &Event) -> Self {
-        let (name, stage) = match event.kind {
-            EventKind::CraterEnd => (EventName::CraterEnd, None),
-            EventKind::StageEnd(index) => (EventName::StageEnd, Some(index)),
-            EventKind::Exit => (EventName::Exit, None),
-            EventKind::Rest => (EventName::Rest, None),
-        };
-        Self { event: name, stage, state: event.state }
-    }
-}
-
 /// A flight that a peer is asked for. The client numbers the questions, so there is no `id` here.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeerRequest {
@@ -137,7 +83,7 @@ pub struct PeerAnswer {
     pub velocity_m_s: f64,
     /// Events in time order, as far as the peer lists them.
     #[serde(default, deserialize_with = "none_if_null")]
-    pub events: Vec<EventJson>,
+    pub events: Vec<Event>,
     /// Evaluations of the force, where the peer counts them.
     pub force_evaluations: Option<u64>,
     /// Time of one flight (ns), the median of the repeats.
@@ -162,12 +108,16 @@ pub struct Difference {
 impl PeerAnswer {
     /// The answer as a flight through `problem`, with the events that the peer lists.
     pub fn flight(&self, problem: &Problem) -> Flight {
-        let event = |event: &EventJson| Some(Event { kind: event.kind(problem)?, state: event.state });
+        // A peer does not know which stage is the crater: its `stage-end` there is the same event as `crater-end`.
+        let event = |event: &Event| match event.kind {
+            EventKind::StageEnd(index) => Event { kind: EventKind::boundary(problem, index), ..*event },
+            _ => *event,
+        };
         Flight {
             outcome: self.outcome,
             stage: 0,
             end: State { time: self.time_s, depth: self.depth_m, velocity: self.velocity_m_s },
-            events: self.events.iter().filter_map(event).collect(),
+            events: self.events.iter().map(event).collect(),
             exit_margin: None,
             exit_margin_error: None,
             cost: Cost { force_evaluations: self.force_evaluations.unwrap_or(0), ..Cost::default() },
@@ -237,7 +187,7 @@ fn by_name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Outcome, D::Err
     Ok(Option::deserialize(deserializer)?.unwrap_or_else(not_named))
 }
 
-fn none_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<EventJson>, D::Error> {
+fn none_if_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Event>, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or_default())
 }
 

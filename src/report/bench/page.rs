@@ -4,11 +4,11 @@ use maud::{Markup, html};
 
 use super::figures::step_figure_of;
 use super::{BenchJson, CaseJson};
-use crate::report::Environment;
 use crate::report::figure::{Figure, name_of};
 use crate::report::figures::words_for;
 use crate::report::page::{Page, Table, cell, figure, folded, number_cell, reproduction};
 use crate::report::text::{clipped, count, number, one_line};
+use crate::report::{Environment, cells};
 use crate::studies::Quantity;
 use crate::studies::bench::step_size::{Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
 use crate::studies::bench::work_precision::{LEVELS, Run, RunState, by_method, fastest_of, least_error};
@@ -137,16 +137,7 @@ fn held_cell(curve: &Curve, held: &Held) -> Markup {
 }
 
 fn growth(report: &BenchJson, figures: &[Figure]) -> Markup {
-    let header = ["scenes", "source", "threads", "time [s]", "a scene [µs]", "peak memory [MB]"];
-    let table = Table::grid("Cost as work grows, batch by batch", header).rows(&report.growth, |g| {
-        [
-            cell(g.scenes),
-            cell(format!("{:?}", g.source).to_lowercase()),
-            cell(g.threads),
-            number_cell(Some(g.seconds), 3),
-            cell(micro(g.ns_a_scene)),
-            number_cell(g.peak_bytes.map(|bytes| 1e-6 * bytes as f64), 3),
-        ]
-    });
+    let table = Table::grid("Cost as work grows, batch by batch", cells::GROWTH);
+    let table = table.rows(cells::growth(&report.growth), |row| row.map(cell));
     html! { (table) (figure_named(figures, "growth", "")) }
 }

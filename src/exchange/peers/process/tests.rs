@@ -26,16 +26,14 @@ fn request() -> PeerRequest {
 
 /// A peer that greets and then does `script`; the first question is in its pipe.
 fn peer(script: &str) -> Peer {
-    peer_within(script, PeerLimits::default())
+    peer_within(script, SILENCE)
 }
 
-fn peer_within(script: &str, limits: PeerLimits) -> Peer {
-    Peer::start_within(&sh(&format!("{GREETING}; {script}")), limits).unwrap()
+fn peer_within(script: &str, silence: Duration) -> Peer {
+    Peer::start_within(&sh(&format!("{GREETING}; {script}")), silence).unwrap()
 }
 
-fn impatient() -> PeerLimits {
-    PeerLimits { silence: Duration::from_millis(400), ..PeerLimits::default() }
-}
+const IMPATIENT: Duration = Duration::from_millis(400);
 
 /// The failure of a peer that prints `line` as its answer.
 fn failure_of_answer(line: &str) -> PeerFailure {
@@ -62,7 +60,7 @@ fn an_answer_is_heard_to_the_last_digit() {
 #[test]
 fn a_question_carries_its_number_and_every_field_of_the_contract() {
     let mut peer = peer(r#"read q; echo "$q" >&2; read q"#);
-    peer.line.limits = impatient();
+    peer.line.silence = IMPATIENT;
     let failure = peer.ask(&request()).unwrap_err();
     let question: Value = serde_json::from_str(failure.stderr.lines().last().unwrap()).unwrap();
     let stage =
@@ -98,7 +96,7 @@ fn a_peer_that_dies_is_named_with_its_status_and_last_words_and_not_asked_again(
 
 #[test]
 fn a_peer_that_hangs_is_ended_after_the_time_limit_and_not_asked_again() {
-    let mut peer = peer_within("exec sleep 60", impatient());
+    let mut peer = peer_within("exec sleep 60", IMPATIENT);
     let started = Instant::now();
     let failure = peer.ask(&request()).unwrap_err();
     assert_eq!(failure.to_string(), "fake 1 none was silent for 0.4 s");
@@ -170,13 +168,13 @@ fn megabytes_on_standard_error_block_nothing_and_only_the_end_is_kept() {
     let mut peer = peer(&format!("read q; {flood}; echo '{ANSWER}'; exit 0"));
     peer.ask(&request()).unwrap();
     let failure = peer.ask(&request()).unwrap_err();
-    assert_eq!(failure.stderr.len(), PeerLimits::default().stderr_bytes);
+    assert_eq!(failure.stderr.len(), STDERR_BYTES);
     assert_eq!(last_line(&failure.stderr), "the end");
 }
 
 #[test]
 fn a_peer_that_does_not_read_a_long_question_is_silent_and_blocks_nothing() {
-    let mut peer = peer_within("exec sleep 60", impatient());
+    let mut peer = peer_within("exec sleep 60", IMPATIENT);
     let long = PeerRequest { stages: vec![request().stages[0]; 20_000], ..request() };
     assert!(matches!(peer.ask(&long).unwrap_err().fault, PeerFault::Silent(_)));
 }
@@ -185,7 +183,7 @@ fn a_peer_that_does_not_read_a_long_question_is_silent_and_blocks_nothing() {
 fn a_grandchild_that_keeps_the_pipes_open_blocks_nothing() {
     let started = Instant::now();
     let mut peer = peer("read q; sleep 8 & exit 3");
-    peer.line.limits = impatient();
+    peer.line.silence = IMPATIENT;
     assert!(peer.ask(&request()).is_err());
     drop(peer);
     assert!(started.elapsed() < Duration::from_secs(7), "{:?}", started.elapsed());

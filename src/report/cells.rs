@@ -1,0 +1,80 @@
+//! Tables that a terminal and a page both show: the same cells, laid out by either.
+
+use super::text::{count, number, one_line, or_dash};
+use crate::studies::bench::growth::Growth;
+use crate::studies::experiments::{Comparison, SetSummary};
+use crate::studies::extreme_scenes::Summary;
+
+/// Columns of [`sets`].
+pub const SETS: [&str; 9] =
+    ["set", "tests", "median", "spread", "range", "within ±20 %", "in range of S", "mean E/D", "u_val/D"];
+
+/// Predicted over measured depth and the comparison error E/D, set by set.
+pub fn sets(sets: &[SetSummary]) -> impl Iterator<Item = [String; 9]> {
+    sets.iter().map(|set| {
+        [
+            one_line(&set.group),
+            set.experiments.to_string(),
+            format!("{:.2}", set.median),
+            format!("{:.2}", set.spread),
+            format!("{:.2} to {:.2}", set.least, set.greatest),
+            set.within_band.to_string(),
+            set.in_range_of_fit.to_string(),
+            format!("{:+.1} %", 100.0 * set.mean_error),
+            set.validation_uncertainty.map_or("not given".to_owned(), |u| format!("{:.1} %", 100.0 * u)),
+        ]
+    })
+}
+
+/// The terms of the validation uncertainty after ASME V&V 20, and what is known of each.
+pub fn uncertainties(comparisons: &[Comparison]) -> [(&'static str, String); 3] {
+    let numerical = comparisons.iter().map(|c| c.numerical_uncertainty / c.predicted).fold(0.0, f64::max);
+    let given = |get: fn(&Comparison) -> Option<f64>, remedy| match comparisons.iter().filter_map(get).count() {
+        0 => format!("not given{remedy}"),
+        some => format!("given for {some} of {}", count(comparisons.len(), "test")),
+    };
+    [
+        ("u_num, numerical", format!("{} of the depth at most", number(numerical, 2))),
+        ("u_input, inputs", given(|c| c.input_uncertainty, " (`experiments --spread` states one)")),
+        ("u_D, data", given(|c| c.experiment.depth_uncertainty, " by the sources")),
+    ]
+}
+
+/// Columns of [`outcomes`].
+pub const OUTCOMES: [&str; 5] = ["outcomes of", "right", "undecided", "refused", "wrong"];
+
+/// The outcomes of each method over random scenes.
+pub fn outcomes(summary: &Summary) -> impl Iterator<Item = [String; 5]> {
+    summary.tallies.iter().map(|(method, tally)| {
+        let [right, undecided, refused, wrong] =
+            [tally.right, tally.undecided, tally.refused, tally.wrong].map(|count| count.to_string());
+        [method.name().to_owned(), right, undecided, refused, wrong]
+    })
+}
+
+/// Columns of [`worst`].
+pub const WORST: [&str; 4] = ["worst error", "quantity", "ulp x condition", "scene"];
+
+/// The worst errors over random scenes and the scenes that make them.
+pub fn worst(summary: &Summary) -> impl Iterator<Item = [String; 4]> {
+    summary.worst.iter().map(|((method, quantity), worst)| {
+        [method.name().to_owned(), quantity.name().to_owned(), number(worst.units, 3), worst.index.to_string()]
+    })
+}
+
+/// Columns of [`growth`].
+pub const GROWTH: [&str; 6] = ["scenes", "source", "threads", "time [s]", "a scene [µs]", "peak memory [MB]"];
+
+/// Time and memory of `batch` as work grows.
+pub fn growth(growth: &[Growth]) -> impl Iterator<Item = [String; 6]> {
+    growth.iter().map(|g| {
+        [
+            g.scenes.to_string(),
+            format!("{:?}", g.source).to_lowercase(),
+            g.threads.to_string(),
+            number(g.seconds, 3),
+            number(1e-3 * g.ns_a_scene, 3),
+            or_dash(g.peak_bytes.map(|bytes| 1e-6 * bytes as f64), |megabytes| number(megabytes, 3)),
+        ]
+    })
+}
