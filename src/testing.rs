@@ -40,7 +40,7 @@ pub(crate) fn concrete() -> Concrete {
 
 /// Forrestal 1994, experiment 14, into a semi-infinite target.
 pub(crate) fn scene() -> Scene {
-    Scene::of_concrete(0.906, concrete()).with_velocity(277.0)
+    Scene { velocity: Some(277.0), ..Scene::of_concrete(0.906, concrete()) }
 }
 
 /// The stages in a row, with an exit depth.

@@ -131,7 +131,7 @@ fn a_critical_velocity_allocates_what_the_root_finder_of_argmin_does_and_nothing
     };
     let library = allocations(alone).0;
     for (name, velocity) in [("perforate", 400.0), ("graze", 300.0), ("paper-slab", 200.0)] {
-        let scene = shipped(name).with_velocity(velocity);
+        let scene = Scene { velocity: Some(velocity), ..shipped(name) };
         for method in [&Taylor::default() as &dyn Integrator, &Energy::default(), &ClosedForm] {
             let (count, critical) = allocations(|| critical_velocity::of_scene(&scene, method).unwrap());
             // More flights than one, or a count of none would say nothing of them.

@@ -125,7 +125,7 @@ impl GroupsJson {
             I: groups.map(|g| g.impact),
             N: groups.and_then(|g| g.geometry),
             H_over_d: groups.and_then(|g| g.thickness_ratio),
-            X_over_d: scene.diameter().map(|d| depth / d),
+            X_over_d: scene.concrete().map(|concrete| depth / concrete.diameter),
         }
     }
 }

@@ -70,14 +70,11 @@ impl Choice {
         let name = self.scheme.name();
         match self.stiffness {
             None => format!("stage {stage} by {name}: its static force resists, and such a stage is never stiff"),
-            Some(z) if self.scheme.is_implicit() => format!(
-                "stage {stage} by {name}: it drives and is stiff, with {z:.3e} relaxation times after the transient \
-                 (limit {STIFFNESS_LIMIT})"
-            ),
-            Some(z) => format!(
-                "stage {stage} by {name}: it drives but is not stiff, with {z:.3e} relaxation times after the \
-                 transient (limit {STIFFNESS_LIMIT})"
-            ),
+            Some(z) => {
+                let verdict = if self.scheme.is_implicit() { "and is stiff" } else { "but is not stiff" };
+                let limit = format!("after the transient (limit {STIFFNESS_LIMIT})");
+                format!("stage {stage} by {name}: it drives {verdict}, with {z:.3e} relaxation times {limit}")
+            }
         }
     }
 }

@@ -38,7 +38,7 @@ use self_cell::self_cell;
 use super::adaptive::{Choice, EXPLICIT, IMPLICIT};
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Cost, Detail, IntegrationError, Integrator, Solved};
-use crate::physics::{Problem, State};
+use crate::physics::{Problem, Stage, State};
 
 type Matrix = NalgebraMat<f64>;
 type Pair = NalgebraVec<f64>;
@@ -152,7 +152,11 @@ impl Diffsol {
     }
 
     fn solver(&self) -> Solved<Reusing> {
-        check_rtol(self.scheme.unwrap_or(IMPLICIT), self.rtol)?;
+        let strictest = self.scheme.unwrap_or(IMPLICIT);
+        if !(strictest.rtol_min()..=0.1).contains(&self.rtol) {
+            let allowed = if strictest.is_implicit() { "1e-14 to 0.1" } else { "1e-15 to 0.1" };
+            return Err(IntegrationError::bad_option("rtol", &format!("{:e}", self.rtol), allowed));
+        }
         let schemes = self.scheme.map_or(vec![EXPLICIT, IMPLICIT], |scheme| vec![scheme]);
         let solvers = schemes.into_iter().map(|scheme| Solver::of(scheme, self.rtol)).collect::<Result<_, _>>()?;
         Ok(Reusing { of: *self, solvers: RefCell::new(solvers) })
@@ -170,10 +174,6 @@ impl Integrator for Diffsol {
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
         self.solver()?.solve(problem, detail)
-    }
-
-    fn has_jacobian(&self) -> bool {
-        self.scheme.is_none_or(Scheme::is_implicit)
     }
 
     fn reusing(&self) -> Option<Box<dyn Integrator>> {
@@ -201,23 +201,16 @@ impl Integrator for Reusing {
     }
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
-        flight::solve(problem, detail, &mut Stages { method: self, length: length_of(problem) })
+        let mut method = self;
+        flight::solve(problem, detail, &mut method)
     }
 }
 
-/// A method as the loop sees it.
-struct Stages<'m> {
-    method: &'m Reusing,
-    /// Unit of depth L (m) of the problem.
-    length: f64,
-}
-
-impl StageSolver<f64> for Stages<'_> {
+impl StageSolver<f64> for &Reusing {
     fn solve_stage(&mut self, course: &mut Course<'_>) -> Solved<StageEnd> {
-        let Reusing { of, solvers } = self.method;
-        let stage = Reduced::of(course, self.length)?;
-        let index = if of.scheme.is_some() { 0 } else { usize::from(Choice::note(course).is_implicit()) };
-        solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, of, course))
+        let stage = Reduced::of(course)?;
+        let index = if self.of.scheme.is_some() { 0 } else { usize::from(Choice::note(course).is_implicit()) };
+        self.solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, &self.of, course))
     }
 
     fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
@@ -230,58 +223,31 @@ impl StageSolver<f64> for Stages<'_> {
     }
 }
 
-/// Refuses a tolerance outside the range of `scheme`, NaN included.
-fn check_rtol(scheme: Scheme, rtol: f64) -> Solved<()> {
-    if (scheme.rtol_min()..=0.1).contains(&rtol) {
-        return Ok(());
-    }
-    let allowed = if scheme.is_implicit() { "1e-14 to 0.1" } else { "1e-15 to 0.1" };
-    Err(IntegrationError::bad_option("rtol", &format!("{rtol:e}"), allowed))
-}
-
-/// The law of a stage in its own units: `du/dtau = -(p + s xi + r u + q u²)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Law {
-    /// Static deceleration at the start of the stage.
-    p: f64,
-    /// Stiffness over mass.
-    s: f64,
-    /// Viscosity over mass.
-    r: f64,
-    /// Drag over mass.
-    q: f64,
-}
-
-impl Law {
-    fn is_finite(&self) -> bool {
-        self.p.is_finite() && self.s.is_finite() && self.r.is_finite() && self.q.is_finite()
-    }
-
-    #[inline]
-    fn rate(&self, xi: f64, u: f64) -> f64 {
-        -(self.p + self.s * xi + (self.r + self.q * u) * u)
-    }
-
+/// A stage of mass one in its own units: its force is `-du/dtau`, its end the distance to the limit.
+impl Stage {
     /// The longest step that cannot hide two zeros of u: `1/w` for an underdamped spring, else none is needed.
     ///
     /// Between two zeros of u lies half a period, `pi/w` at least. Without a spring, or with an overdamped one, the
     /// static force at rest has one sign and u has one zero at most.
     fn longest_step(&self) -> f64 {
-        if self.s > 0.0 && self.r * self.r < 4.0 * self.s { 1.0 / self.s.sqrt() } else { f64::INFINITY }
+        let Self { stiffness: s, viscosity: r, .. } = *self;
+        if s > 0.0 && r * r < 4.0 * s { 1.0 / s.sqrt() } else { f64::INFINITY }
     }
 
     /// Whether nothing opposes a standstill at the place where the static force is zero, so that speed may run out
     /// with no force to end it: a static force of zero at the start of the stage, or a drive that fades and is overdamped.
     fn may_hang(&self) -> bool {
-        self.p == 0.0 || (self.p < 0.0 && self.s > 0.0 && self.r * self.r >= 4.0 * self.s)
+        let Self { static_force: p, stiffness: s, viscosity: r, .. } = *self;
+        p == 0.0 || (p < 0.0 && s > 0.0 && r * r >= 4.0 * s)
     }
 
     /// How far the projectile can still creep [L] where the static force does not stop it.
     fn reach(&self, at: Node) -> f64 {
-        if self.p < 0.0 {
-            if self.s > 0.0 { (-self.p / self.s - at.depth).max(0.0) } else { f64::INFINITY }
-        } else if self.r > 0.0 {
-            at.velocity / self.r
+        let Self { static_force: p, stiffness: s, viscosity: r, .. } = *self;
+        if p < 0.0 {
+            if s > 0.0 { (-p / s - at.depth).max(0.0) } else { f64::INFINITY }
+        } else if r > 0.0 {
+            at.velocity / r
         } else {
             f64::INFINITY
         }
@@ -292,10 +258,11 @@ impl Law {
     /// Where the static force resists, it is a rest. Elsewhere the speed was lost in the tolerance. If the boundary is
     /// within reach, it counts as reached with u = 0, so that the margin is zero within its error bound (`Undecided`).
     /// If not, the place is approached for ever.
-    fn meaning_of_standstill(&self, at: Node, distance: f64, noise: f64) -> StageEnd {
-        let resists = self.p > 0.0 || (self.p == 0.0 && self.s > 0.0);
-        let least_brake = if self.may_hang() { noise * (self.p.abs() + self.s * at.depth.abs()) } else { 0.0 };
-        if resists || self.p + self.s * at.depth > least_brake {
+    fn meaning_of_standstill(&self, at: Node, noise: f64) -> StageEnd {
+        let Self { static_force: p, stiffness: s, end: distance, .. } = *self;
+        let resists = p > 0.0 || (p == 0.0 && s > 0.0);
+        let least_brake = if self.may_hang() { noise * (p.abs() + s * at.depth.abs()) } else { 0.0 };
+        if resists || p + s * at.depth > least_brake {
             return StageEnd::Rest(Node { depth: at.depth.max(0.0), velocity: 0.0, ..at });
         }
         let in_reach = distance - at.depth <= self.reach(at) + noise * (1.0 + at.depth.abs());
@@ -306,13 +273,13 @@ impl Law {
     }
 
     /// The shortest time in which something happens at speed `u` [L/V0].
-    fn shortest_time(&self, u: f64, distance: f64) -> f64 {
+    fn shortest_time(&self, u: f64) -> f64 {
         let rates = [
-            u / distance.max(f64::MIN_POSITIVE),
-            self.rate(0.0, u).abs() / u.max(f64::MIN_POSITIVE),
-            self.p.abs(),
-            self.s.sqrt(),
-            self.r + 2.0 * self.q * u,
+            u / self.end.max(f64::MIN_POSITIVE),
+            self.force(0.0, u).abs() / u.max(f64::MIN_POSITIVE),
+            self.static_force.abs(),
+            self.stiffness.sqrt(),
+            self.viscosity + 2.0 * self.drag * u,
         ];
         let fastest = rates.into_iter().fold(0.0, f64::max);
         if fastest > 0.0 { (1.0 / fastest).max(f64::MIN_POSITIVE) } else { 1.0 }
@@ -344,7 +311,7 @@ fn length_of(problem: &Problem) -> f64 {
 
 /// One stage in its own units.
 struct Reduced {
-    law: Law,
+    law: Stage,
     /// Unit of depth L (m).
     length: f64,
     /// Unit of speed V0 (m/s).
@@ -353,29 +320,28 @@ struct Reduced {
     start: State,
     /// Speed at the start [V0].
     speed: f64,
-    /// Distance to the limit [L]; infinite without one.
-    distance: f64,
 }
 
 impl Reduced {
-    fn of(course: &Course<'_>, length: f64) -> Solved<Self> {
+    fn of(course: &Course<'_>) -> Solved<Self> {
         let (problem, start) = (course.problem, course.state);
         let limit = problem.limit_of(course.stage);
         // What the tolerance leaves open in x must be little beside the stage: a thin rest of a slab is its own unit.
-        let (length, speed) = (length.min(limit - start.depth), problem.impact_speed);
+        let (length, speed) = (length_of(problem).min(limit - start.depth), problem.impact_speed);
         let (stage, mass) = (&problem.stages[course.stage], problem.mass);
-        let law = Law {
-            p: (stage.static_force + stage.stiffness * start.depth) / mass * length / speed / speed,
-            s: stage.stiffness / mass * (length / speed) * (length / speed),
-            r: stage.viscosity / mass * (length / speed),
-            q: stage.drag / mass * length,
+        let law = Stage {
+            static_force: (stage.static_force + stage.stiffness * start.depth) / mass * length / speed / speed,
+            stiffness: stage.stiffness / mass * (length / speed) * (length / speed),
+            viscosity: stage.viscosity / mass * (length / speed),
+            drag: stage.drag / mass * length,
+            end: (limit - start.depth) / length,
         };
-        let distance = (limit - start.depth) / length;
-        if !law.is_finite() || distance.is_nan() {
+        let numbers = [law.static_force, law.stiffness, law.viscosity, law.drag];
+        if !numbers.iter().all(|number| number.is_finite()) || law.end.is_nan() {
             return Err(IntegrationError::NotFinite { what: "the force over the mass", last: start });
         }
         course.limit()?;
-        Ok(Self { law, length, unit_speed: speed, start, speed: start.velocity / speed, distance })
+        Ok(Self { law, length, unit_speed: speed, start, speed: start.velocity / speed })
     }
 
     /// The state at `node`.
@@ -389,9 +355,8 @@ impl Reduced {
 }
 
 /// The law that the library's closures read, and what they count.
-#[derive(Default)]
 struct Force {
-    law: Cell<Law>,
+    law: Cell<Stage>,
     start: Cell<(f64, f64)>,
     evaluations: Cell<u64>,
 }
@@ -401,14 +366,14 @@ impl Force {
     fn rate(&self, y: &[f64], dy: &mut [f64]) {
         self.evaluations.set(self.evaluations.get() + 1);
         dy[0] = y[1];
-        dy[1] = self.law.get().rate(y[0], y[1]);
+        dy[1] = -self.law.get().force(y[0], y[1]);
     }
 
     #[inline]
     fn jacobian_product(&self, y: &[f64], v: &[f64], jv: &mut [f64]) {
         let law = self.law.get();
         jv[0] = v[1];
-        jv[1] = -(law.s * v[0] + (law.r + 2.0 * law.q * y[1]) * v[1]);
+        jv[1] = -(law.stiffness * v[0] + (law.viscosity + 2.0 * law.drag * y[1]) * v[1]);
     }
 
     fn start(&self, y: &mut [f64]) {
@@ -436,7 +401,8 @@ self_cell! {
 impl Solver {
     /// A solver by `scheme`, for tolerance `rtol`.
     fn of(scheme: Scheme, rtol: f64) -> Solved<Self> {
-        let force = Rc::new(Force::default());
+        let force =
+            Rc::new(Force { law: Cell::new(Stage::free()), start: Cell::default(), evaluations: Cell::default() });
         let [of_rate, of_jacobian, of_start] = [&force, &force, &force].map(Rc::clone);
         let tolerance = scheme.library_rtol(rtol);
         let mut problem = OdeBuilder::<Matrix>::new()
@@ -553,7 +519,7 @@ where
         force.law.set(law);
         force.evaluations.set(0);
         let longest_step = law.longest_step();
-        let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed, stage.distance);
+        let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed);
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
         let mut before = Node { time: 0.0, depth: 0.0, velocity: stage.speed };
@@ -603,9 +569,9 @@ where
                 continue;
             }
             cost.steps += 1;
-            if after.velocity <= 0.0 || after.depth >= stage.distance {
+            if after.velocity <= 0.0 || after.depth >= law.end {
                 let scratch = &mut self.scratch;
-                let end = locate(&law, before, after, stage.distance, |t| {
+                let end = locate(&law, before, after, |t| {
                     solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]))
                 })
                 .map_err(|e| failure(e, epoch, before))?;
@@ -632,7 +598,7 @@ where
         course.cost = course.cost + cost;
         course.error_bound += (noise + round_off) * energy_max;
         let end = match end {
-            StageEnd::Rest(place) => law.meaning_of_standstill(place, stage.distance, noise),
+            StageEnd::Rest(place) => law.meaning_of_standstill(place, noise),
             reached => reached,
         };
         Ok(match end {
@@ -657,14 +623,13 @@ fn rejected_by<'a, Eqn: OdeEquations + 'a, S: OdeSolverMethod<'a, Eqn>>(solver: 
     (statistics.number_of_error_test_failures + statistics.number_of_nonlinear_solver_fails) as u64
 }
 
-/// Where a step that ends with `u <= 0` or past `distance` meets its event, on the library's interpolant `at`.
+/// Where a step that ends with `u <= 0` or past the end of `law` meets its event, on the library's interpolant `at`.
 ///
 /// Rest is sought first. Up to there u > 0 and xi rises, so a boundary before it is crossed exactly once.
 fn locate(
-    law: &Law,
+    law: &Stage,
     before: Node,
     after: Node,
-    distance: f64,
     mut at: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
 ) -> Result<StageEnd, DiffsolError> {
     let mut node_at = |time| at(time).map(|(xi, u)| Node { time, depth: xi, velocity: u });
@@ -674,11 +639,12 @@ fn locate(
             before,
             after,
             before.velocity,
-            |node| (node.velocity, law.rate(node.depth, node.velocity)),
+            |node| (node.velocity, -law.force(node.depth, node.velocity)),
             &mut node_at,
         )?;
         last = Node { velocity: 0.0, ..rest };
     }
+    let distance = law.end;
     if last.depth < distance {
         return Ok(StageEnd::Rest(last));
     }

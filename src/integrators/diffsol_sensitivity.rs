@@ -23,14 +23,11 @@ use crate::physics::State;
 /// # Errors
 /// [`IntegrationError::SolverFailed`].
 pub fn cross_stage(law: [Dual64; 5], rtol: f64) -> Solved<[Dual64; 2]> {
-    integrate(law, rtol).map_err(|cause| IntegrationError::SolverFailed {
+    let failed = |cause: DiffsolError| IntegrationError::SolverFailed {
         method: "tsit45",
         cause: cause.to_string(),
         last: State { time: 0.0, depth: 0.0, velocity: law[4].re },
-    })
-}
-
-fn integrate(law: [Dual64; 5], rtol: f64) -> Result<[Dual64; 2], DiffsolError> {
+    };
     let problem = OdeBuilder::<NalgebraMat<f64>>::new()
         .rtol(rtol)
         .atol([rtol])
@@ -62,8 +59,10 @@ fn integrate(law: [Dual64; 5], rtol: f64) -> Result<[Dual64; 2], DiffsolError> {
             },
             2,
         )
-        .build()?;
-    let (states, sensitivities, _) = problem.tsit45_sens()?.solve_dense_sensitivities(&[1.0])?;
+        .build()
+        .map_err(failed)?;
+    let mut solver = problem.tsit45_sens().map_err(failed)?;
+    let (states, sensitivities, _) = solver.solve_dense_sensitivities(&[1.0]).map_err(failed)?;
     let last = |matrix: &NalgebraMat<f64>, row| matrix[(row, matrix.ncols() - 1)];
     Ok([0, 1].map(|row| {
         // The chain rule from the five numbers to the parameter.

@@ -588,11 +588,8 @@ fn value<S: Scalar>(series: &[S], z: S) -> S {
 
 /// `Σ c_n z^(n+1)/(n+1)`.
 fn integral<S: Scalar>(series: &[S], z: S) -> S {
-    let mut sum = S::zero();
-    for (n, &c) in series.iter().enumerate().rev() {
-        sum = sum * z + c.over(S::from_f64((n + 1) as f64));
-    }
-    sum * z
+    let mean = |sum: S, (n, &c): (usize, &S)| sum * z + c.over(S::from_f64((n + 1) as f64));
+    series.iter().enumerate().rev().fold(S::zero(), mean) * z
 }
 
 #[cfg(test)]

@@ -106,11 +106,10 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[inline(always)]
     pub(crate) fn limit(&self) -> Solved<S> {
         let limit = self.problem.limit_of(self.stage);
-        let law = &self.problem.stages[self.stage];
-        if limit.value() == f64::INFINITY && !stops_far_out(law) {
-            return self.never_ends();
-        }
-        Ok(limit)
+        let Stage { static_force, stiffness, .. } = self.problem.stages[self.stage];
+        // A static force that is positive far out brings every projectile to rest.
+        let stops_far_out = stiffness.value() > 0.0 || static_force.value() > 0.0;
+        if limit.value() == f64::INFINITY && !stops_far_out { self.never_ends() } else { Ok(limit) }
     }
 
     #[cold]
@@ -273,12 +272,6 @@ impl<'a, S: Scalar> Course<'a, S> {
             notes: self.notes,
         }
     }
-}
-
-/// Whether a stage without an end brings every projectile to rest: its static force is positive far out.
-#[inline(always)]
-fn stops_far_out<S: Scalar>(law: &Stage<S>) -> bool {
-    law.stiffness.value() > 0.0 || law.static_force.value() > 0.0
 }
 
 /// A flight that never starts: at rest on the face (`V0 = 0`), or no target at all (exit depth 0).

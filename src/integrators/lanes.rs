@@ -129,7 +129,7 @@ impl Summary {
 
 /// What the processor offers for a loop over lanes. Results are the same bits on each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Instructions {
+enum Instructions {
     /// What every processor of this architecture has.
     Baseline,
     /// 256-bit vectors (x86-64).
@@ -140,15 +140,15 @@ pub enum Instructions {
 
 impl Instructions {
     /// Every kind, narrow to wide.
-    pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+    const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
     /// The widest that this processor has.
-    pub fn detect() -> Self {
+    fn detect() -> Self {
         Self::ALL.into_iter().rev().find(|kind| kind.is_available()).unwrap_or(Self::Baseline)
     }
 
     /// Whether this processor has them.
-    pub fn is_available(self) -> bool {
+    fn is_available(self) -> bool {
         match self {
             Self::Baseline => true,
             #[cfg(target_arch = "x86_64")]
@@ -193,11 +193,6 @@ impl Batch {
         Self { instructions: Instructions::detect() }
     }
 
-    /// With `instructions`, to compare; `None` where the processor lacks them.
-    pub fn with_instructions(instructions: Instructions) -> Option<Self> {
-        instructions.is_available().then_some(Self { instructions })
-    }
-
     /// Solves `problems`; answers come in their order, one each.
     ///
     /// The error of an answer is the one that [`Taylor`] gives for that problem; it stops no other.
@@ -220,9 +215,9 @@ impl Batch {
             Instructions::Baseline => solve_block(block),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the one thing that a function with `target_feature` asks for is a processor that has its features.
-            // The field is private to this file, and here only `new` and `with_instructions` set it: `new` to what
-            // `detect` found, `with_instructions` to what `is_available` allows; both ask the processor for every
-            // feature that the function names, and no processor loses one. The argument is a reference and the
+            // The field is private to this file, and here only `new` sets it, to what `detect` found: that asks the
+            // processor for every feature that the function names, and no processor loses one (the tests set it to what
+            // `is_available` allows, which asks the same). The argument is a reference and the
             // function returns nothing, so no vector crosses a border between calling conventions. The function
             // itself is safe code. CONTRIBUTING.md, "Tests", has the command that runs it under a sanitizer.
             Instructions::Avx512 => unsafe { solve_block_avx512(block) },
@@ -308,9 +303,7 @@ impl Block {
             let (crater, tunnel) = match (&problem.stages[..], problem.crater) {
                 ([tunnel], None) => (None, tunnel),
                 ([crater, tunnel], Some(0)) => (Some(crater), tunnel),
-                ([first, ..], _) => (Some(first), first),
-                // A problem has a stage; one without would be the scalar integrator's to refuse.
-                ([], _) => {
+                _ => {
                     self.status.0[i] = status::GIVEN_UP;
                     continue;
                 }

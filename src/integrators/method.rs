@@ -199,7 +199,7 @@ impl Method {
         if detail < Detail::Trajectory {
             notes.push("trajectory not kept: not asked for".to_owned());
         }
-        if !self.integrator.has_jacobian() {
+        if !self.name.needs_diffsol() || self.name == MethodName::Tsit45 {
             notes.push("Jacobian not built: the method is explicit or needs none".to_owned());
         }
         notes.push("sensitivities not computed: not asked for".to_owned());

@@ -264,11 +264,6 @@ pub trait Integrator {
         Vec::new()
     }
 
-    /// Whether the method builds the Jacobian of the force.
-    fn has_jacobian(&self) -> bool {
-        false
-    }
-
     /// The same method, reusing its solver between calls, for many problems; `None` where a method has no such state.
     ///
     /// The answers are the same. Also `None` for a method that cannot start: each of its solutions says why.

@@ -61,11 +61,9 @@ fn passes(entry: State, limit: f64, time: f64, velocity: f64) -> StageEnd {
     StageEnd::Limit(State { time: entry.time + time, depth: limit, velocity })
 }
 
-/// Rest, `time` (s) and `distance` (m) after `entry`. Its depth may round to beyond the limit, which was not reached.
-fn rests(entry: State, limit: f64, time: f64, distance: f64) -> StageEnd {
-    let depth = entry.depth + distance;
-    let depth = if depth > limit { limit } else { depth };
-    StageEnd::Rest(State { time: entry.time + time, depth, velocity: 0.0 })
+/// Rest, `time` (s) and `distance` (m) after `entry`.
+fn rests(entry: State, time: f64, distance: f64) -> StageEnd {
+    StageEnd::Rest(State { time: entry.time + time, depth: entry.depth + distance, velocity: 0.0 })
 }
 
 /// One stage from `entry` (V > 0) to `limit` (beyond it, possibly infinite).
@@ -98,7 +96,7 @@ fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
         let tau = mass * v0 / p;
         // Below 1e-200 the logarithm equals u, and u may have lost its digits.
         let distance = if u > 1e-200 { 0.5 * mass / q * u.ln_1p() } else { 0.5 * tau * v0 };
-        return rests(entry, limit, tau * atan_over(u.sqrt()), distance);
+        return rests(entry, tau * atan_over(u.sqrt()), distance);
     }
     let why = match (p < 0.0, q > 0.0) {
         (true, _) => "the last stage drives the projectile",
@@ -180,7 +178,7 @@ fn cross_spring(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd 
     }
     let reach = f0.hypot(w * v0);
     let distance = if f0 > 0.0 { v0 * (v0 / (f0 + reach)) } else { (reach - f0) / (w * w) };
-    rests(entry, limit, (w * v0).atan2(f0) / w, distance)
+    rests(entry, (w * v0).atan2(f0) / w, distance)
 }
 
 /// A spring of frequency `w` from its slack end, with V² `squared_speed` at `limit`, continued below zero.
@@ -191,7 +189,7 @@ fn cross_slack_spring(w: f64, entry: State, limit: f64, squared_speed: f64) -> S
         let v = squared_speed.sqrt();
         passes(entry, limit, (w * xi).atan2(v) / w, v)
     } else {
-        rests(entry, limit, std::f64::consts::FRAC_PI_2 / w, entry.velocity / w)
+        rests(entry, std::f64::consts::FRAC_PI_2 / w, entry.velocity / w)
     }
 }
 
@@ -215,7 +213,7 @@ fn cross_viscous(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd
     if let Some(time) = rest {
         let (distance, _) = motion.after(time);
         if distance < to_limit {
-            return rests(entry, limit, time, distance);
+            return rests(entry, time, distance);
         }
     }
     if limit.is_infinite() {

@@ -14,7 +14,8 @@ use thiserror::Error;
 
 use super::advice::Advice;
 use super::problem::Stage;
-use super::scene::{CraterStiffness, Layer, Range, Resistance, ResolveError, Resolved, Scene};
+use super::scene::Resistance::{Concrete, Stages};
+use super::scene::{CraterStiffness, Layer, Range, ResolveError, Resolved, Scene};
 use super::units::{Dimension, QuantityError, number, quantity};
 use super::{groups, semi_empirical};
 
@@ -218,11 +219,6 @@ impl Parameter {
         }
     }
 
-    /// Dimension of its values; `None` for a plain number.
-    pub fn dimension(self) -> Option<Dimension> {
-        self.entry().dimension
-    }
-
     /// The number whose value this one sets: that of a group, and itself for any other.
     #[must_use]
     pub fn moves(self) -> Self {
@@ -240,7 +236,7 @@ impl Parameter {
     /// [`ParameterError::Value`].
     pub fn parse_value(self, text: &str) -> Result<f64, ParameterError> {
         let text = text.trim();
-        let read = match (number(text), self.dimension()) {
+        let read = match (number(text), self.entry().dimension) {
             // A bare number is SI; anything else must have a unit of the dimension.
             (Err(QuantityError::NoNumber), Some(dimension)) => quantity(text, dimension),
             (bare, _) => bare,
@@ -252,10 +248,10 @@ impl Parameter {
     pub fn all_of(scene: &Scene) -> Vec<Self> {
         let plain = Self::PLAIN.into_iter().filter(|parameter| parameter.moves() == *parameter);
         let listed = match &scene.resistance {
-            Resistance::Concrete(concrete) => (0..concrete.layers.len())
+            Concrete(concrete) => (0..concrete.layers.len())
                 .flat_map(|index| LayerNumber::ALL.map(|which| Self::Layer(index, which)))
                 .collect::<Vec<_>>(),
-            Resistance::Stages(stages) => {
+            Stages(stages) => {
                 (0..stages.len()).flat_map(|index| StageNumber::ALL.map(|which| Self::Stage(index, which))).collect()
             }
         };
@@ -265,20 +261,20 @@ impl Parameter {
     /// Why a scene of this kind cannot have the number; `None` if it has it, or leaves it out.
     fn obstacle(self, scene: &Scene) -> Option<&'static str> {
         match (self, &scene.resistance) {
-            (Self::Mass | Self::Velocity, _) | (Self::Thickness, Resistance::Stages(_)) => None,
-            (Self::Stage(index, _), Resistance::Stages(stages)) => {
+            (Self::Mass | Self::Velocity, _) | (Self::Thickness, Stages(_)) => None,
+            (Self::Stage(index, _), Stages(stages)) => {
                 (index >= stages.len()).then_some("it has fewer stages, counted from 0")
             }
             (Self::Stage(..), _) => Some("it gives no stages"),
-            (_, Resistance::Stages(_)) => Some("it gives its stages outright"),
-            (Self::Layer(index, _), Resistance::Concrete(concrete)) => {
+            (_, Stages(_)) => Some("it gives its stages outright"),
+            (Self::Layer(index, _), Concrete(concrete)) => {
                 (index >= concrete.layers.len()).then_some("it has fewer layers, counted from 0")
             }
             (
                 Self::Diameter | Self::NoseFactor | Self::InertiaFactor | Self::CraterRatio | Self::CraterStiffness,
                 _,
             ) => None,
-            (_, Resistance::Concrete(concrete)) => {
+            (_, Concrete(concrete)) => {
                 (!concrete.layers.is_empty()).then_some("its layers have their own, such as target.layer.0.strength")
             }
         }
@@ -295,32 +291,29 @@ impl Parameter {
         }
         let velocity = || scene.velocity.ok_or(absent("it gives no impact velocity"));
         let thickness = || scene.thickness.ok_or(absent("its target is semi-infinite"));
-        let concrete = match (self, &scene.resistance) {
-            (Self::Mass, _) => return Ok(scene.mass),
-            (Self::Velocity, _) => return velocity(),
-            (Self::Stage(index, which), Resistance::Stages(stages)) => return Ok(which.of(stages[index])),
-            (Self::Thickness, _) | (_, Resistance::Stages(_)) => return thickness(),
-            (_, Resistance::Concrete(concrete)) => concrete,
-        };
-        Ok(match self {
-            Self::Diameter => concrete.diameter,
-            Self::NoseFactor => concrete.nose_factor,
-            Self::Strength => concrete.strength,
-            Self::Density => concrete.density,
-            Self::StaticFactor => concrete.static_factor,
-            Self::InertiaFactor => concrete.inertia_factor,
-            Self::CraterRatio => concrete.crater_ratio,
-            Self::CraterStiffness => match concrete.crater_stiffness {
+        Ok(match (self, &scene.resistance) {
+            (Self::Mass, _) => scene.mass,
+            (Self::Velocity, _) => velocity()?,
+            (Self::Stage(index, which), Stages(stages)) => which.of(stages[index]),
+            // No other number gets past its obstacle.
+            (Self::Thickness | Self::Stage(..), _) | (_, Stages(_)) => thickness()?,
+            (Self::Diameter, Concrete(concrete)) => concrete.diameter,
+            (Self::NoseFactor, Concrete(concrete)) => concrete.nose_factor,
+            (Self::Strength, Concrete(concrete)) => concrete.strength,
+            (Self::Density, Concrete(concrete)) => concrete.density,
+            (Self::StaticFactor, Concrete(concrete)) => concrete.static_factor,
+            (Self::InertiaFactor, Concrete(concrete)) => concrete.inertia_factor,
+            (Self::CraterRatio, Concrete(concrete)) => concrete.crater_ratio,
+            (Self::CraterStiffness, Concrete(concrete)) => match concrete.crater_stiffness {
                 CraterStiffness::Given(stiffness) => stiffness,
                 CraterStiffness::Continuous => return Err(absent("its c follows from the continuous force")),
             },
-            Self::Layer(index, which) => which.of(concrete.layers[index]),
-            Self::ThicknessRatio => thickness()? / concrete.diameter,
-            Self::Geometry => groups::Groups::of(scene, 1.0)
+            (Self::Layer(index, which), Concrete(concrete)) => which.of(concrete.layers[index]),
+            (Self::ThicknessRatio, Concrete(concrete)) => thickness()? / concrete.diameter,
+            (Self::Geometry, _) => groups::Groups::of(scene, 1.0)
                 .and_then(|groups| groups.geometry)
                 .ok_or(absent("it has no drag, and N is infinite"))?,
-            Self::Impact => groups::Groups::of(scene, velocity()?).map_or(f64::NAN, |groups| groups.impact),
-            Self::Mass | Self::Velocity | Self::Thickness | Self::Stage(..) => f64::NAN,
+            (Self::Impact, _) => groups::Groups::of(scene, velocity()?).map_or(f64::NAN, |groups| groups.impact),
         })
     }
 
@@ -336,32 +329,26 @@ impl Parameter {
             return Err(ParameterError::Absent { parameter: self, why });
         }
         let (mass, follows_eq14) = (scene.mass, self.moves_static_factor(scene));
-        let concrete = match (self, &mut scene.resistance) {
-            (Self::Stage(index, which), Resistance::Stages(stages)) => {
-                *which.field(&mut stages[index]) = value;
-                return Ok(());
-            }
-            (_, Resistance::Stages(_)) => None,
-            (_, Resistance::Concrete(concrete)) => Some(concrete),
-        };
-        match (self, concrete) {
+        match (self, &mut scene.resistance) {
             (Self::Mass, _) => scene.mass = value,
             (Self::Velocity, _) => scene.velocity = Some(value),
-            (Self::Thickness | Self::Stage(..), _) | (_, None) => scene.thickness = Some(value),
-            (Self::Diameter, Some(concrete)) => concrete.diameter = value,
-            (Self::NoseFactor, Some(concrete)) => concrete.nose_factor = value,
-            (Self::Strength, Some(concrete)) => {
+            (Self::Stage(index, which), Stages(stages)) => *which.field(&mut stages[index]) = value,
+            // No other number gets past its obstacle.
+            (Self::Thickness | Self::Stage(..), _) | (_, Stages(_)) => scene.thickness = Some(value),
+            (Self::Diameter, Concrete(concrete)) => concrete.diameter = value,
+            (Self::NoseFactor, Concrete(concrete)) => concrete.nose_factor = value,
+            (Self::Strength, Concrete(concrete)) => {
                 concrete.strength = value;
                 if follows_eq14 {
                     concrete.static_factor = semi_empirical::static_factor(value);
                 }
             }
-            (Self::Density, Some(concrete)) => concrete.density = value,
-            (Self::StaticFactor, Some(concrete)) => concrete.static_factor = value,
-            (Self::InertiaFactor, Some(concrete)) => concrete.inertia_factor = value,
-            (Self::CraterRatio, Some(concrete)) => concrete.crater_ratio = value,
-            (Self::CraterStiffness, Some(concrete)) => concrete.crater_stiffness = CraterStiffness::Given(value),
-            (Self::Layer(index, which), Some(concrete)) => {
+            (Self::Density, Concrete(concrete)) => concrete.density = value,
+            (Self::StaticFactor, Concrete(concrete)) => concrete.static_factor = value,
+            (Self::InertiaFactor, Concrete(concrete)) => concrete.inertia_factor = value,
+            (Self::CraterRatio, Concrete(concrete)) => concrete.crater_ratio = value,
+            (Self::CraterStiffness, Concrete(concrete)) => concrete.crater_stiffness = CraterStiffness::Given(value),
+            (Self::Layer(index, which), Concrete(concrete)) => {
                 let layer = &mut concrete.layers[index];
                 *which.field(layer) = value;
                 if follows_eq14 {
@@ -370,9 +357,9 @@ impl Parameter {
                 let sum = concrete.layers.iter().fold(0.0, |sum, layer| sum + layer.thickness);
                 scene.thickness = sum.is_finite().then_some(sum);
             }
-            (Self::ThicknessRatio, Some(concrete)) => scene.thickness = Some(value * concrete.diameter),
-            (Self::Geometry, Some(concrete)) => concrete.density = groups::density_for(value, mass, concrete),
-            (Self::Impact, Some(concrete)) => {
+            (Self::ThicknessRatio, Concrete(concrete)) => scene.thickness = Some(value * concrete.diameter),
+            (Self::Geometry, Concrete(concrete)) => concrete.density = groups::density_for(value, mass, concrete),
+            (Self::Impact, Concrete(concrete)) => {
                 scene.velocity = Some(groups::impact_speed_for(value, mass, concrete));
             }
         }
@@ -490,7 +477,7 @@ impl Advice for ParameterError {
                 format!("choose from {names}, target.layer.0.strength and its like, stage.0.drag and its like")
             }
             Self::Absent { .. } => "vary a number that the scene file gives".to_owned(),
-            Self::Value { parameter, .. } => match parameter.dimension() {
+            Self::Value { parameter, .. } => match parameter.entry().dimension {
                 Some(dimension) => format!("write {} with its unit, or a bare SI number", dimension.noun()),
                 None => "write a plain number".to_owned(),
             },

@@ -543,14 +543,11 @@ fn solve(model: &Model) -> Result<ExactFlight, ReferenceError> {
     for (index, law) in problem.stages.iter().enumerate() {
         let limit = model.limit(index);
         if limit.is_none_or(|limit| *limit > now.depth) {
-            let rests = if is_zero(&now.velocity) {
-                true
-            } else {
-                let (next, rests) = through(model, index, &now)?;
-                now = next;
+            let mut rests = is_zero(&now.velocity);
+            if !rests {
+                (now, rests) = through(model, index, &now)?;
                 solved_last = Some(index);
-                rests
-            };
+            }
             if rests {
                 events.push(Event { kind: EventKind::Rest, state: exact(&now) });
                 let stage = solved_last.unwrap_or(index);
@@ -612,6 +609,12 @@ fn squared_speed_terms(law: &Stage<Big>, mass: &Big, w: &Big, from: &Big, to: &B
     (w * &decay, particular(from) * decay - particular(to))
 }
 
+/// W at `to`, of the terms of [`squared_speed_terms`].
+fn squared_speed(law: &Stage<Big>, mass: &Big, w: &Big, from: &Big, to: &Big, bits: usize) -> Big {
+    let (gain, loss) = squared_speed_terms(law, mass, w, from, to, bits);
+    gain - loss
+}
+
 /// Depth of rest in a stage without viscosity and without a limit.
 fn rest_depth(model: &Model, law: &Stage<Big>, from: &Point) -> Result<Big, ReferenceError> {
     let Stage { static_force: p, stiffness: s, drag: q, .. } = law;
@@ -620,24 +623,17 @@ fn rest_depth(model: &Model, law: &Stage<Big>, from: &Point) -> Result<Big, Refe
         (false, _) if !is_positive(p) => Err(ReferenceError::NeverEnds),
         (false, false) => Ok(&from.depth + mass * w0 / twice(p.clone())),
         (false, true) => Ok(&from.depth + mass / twice(q.clone()) * ln(&(int(1, bits) + q * w0 / p))),
-        (true, false) => {
+        (true, drags) => {
             let u0 = &from.depth + p / s;
-            Ok((square(&u0) + w0 * mass / s).sqrt() - p / s)
-        }
-        (true, true) => {
-            let w = |x: &Big| {
-                let (gain, loss) = squared_speed_terms(law, mass, &w0, &from.depth, x, bits);
-                gain - loss
-            };
-            // Without the drag it would get further: the bracket.
-            let u0 = &from.depth + p / s;
-            let far = (square(&u0) + &w0 * mass / s).sqrt() - p / s;
-            let slope = |x: &Big, w: &Big| -(twice(p + s * x + q * w) / mass);
-            Ok(root(&from.depth, &far, bits, |x| {
-                let value = w(x);
-                let slope = slope(x, &value);
-                // Falling through zero: turned over to rise.
-                (-value, -slope)
+            let without_drag = (square(&u0) + &w0 * mass / s).sqrt() - p / s;
+            if !drags {
+                return Ok(without_drag);
+            }
+            Ok(root(&from.depth, &without_drag, bits, |x| {
+                let w = squared_speed(law, mass, &w0, &from.depth, x, bits);
+                let slope = twice(p + s * x + q * &w) / mass;
+                // W falls through zero: turned over to rise.
+                (-w, slope)
             }))
         }
     }
@@ -699,8 +695,7 @@ fn quadrature(model: &Model, law: &Stage<Big>, from: &Point, to: &Big) -> Big {
         let near_end = &one / (&one + &far);
         let z = &far / (&one + &far);
         let x = &from.depth + &length * &z;
-        let (gain, loss) = squared_speed_terms(law, &model.problem.mass, &squared, &from.depth, &x, bits);
-        let w = gain - loss;
+        let w = squared_speed(law, &model.problem.mass, &squared, &from.depth, &x, bits);
         if !is_positive(&w) {
             continue;
         }
@@ -880,8 +875,7 @@ fn margin(model: &Model, outcome: Outcome, stage: usize, end: &Point, events: &[
                 let work = &law.static_force * (&to - &from) + half(&law.stiffness * (square(&to) - square(&from)));
                 w -= twice(work) / mass;
             } else {
-                let (gain, loss) = squared_speed_terms(law, mass, &w, &from, &to, model.bits);
-                w = gain - loss;
+                w = squared_speed(law, mass, &w, &from, &to, model.bits);
             }
             take(w.clone());
             from = to;
@@ -917,10 +911,7 @@ fn squared_critical(source: Source<'_>, bits: usize, moved: Option<usize>) -> Re
             if is_positive(&law.viscosity) {
                 return Err(ReferenceError::NoCritical);
             }
-            let beyond = |law: &Stage<Big>, w: &Big| {
-                let (gain, loss) = squared_speed_terms(law, mass, w, &from, to, bits);
-                gain - loss
-            };
+            let beyond = |law: &Stage<Big>, w: &Big| squared_speed(law, mass, w, &from, to, bits);
             // Only the continuous crater needs the difference, in which a slope of e^{-y} would drown.
             slope = if law.stiffness == moved_law.stiffness {
                 slope * (-(twice(&law.drag * (to - &from)) / mass)).exp()

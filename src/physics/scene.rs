@@ -517,24 +517,12 @@ impl Scene {
         self.resolve(self.velocity.ok_or(ResolveError::NoImpactSpeed)?)
     }
 
-    /// The same scene with impact velocity `velocity` (m/s).
-    #[must_use]
-    pub fn with_velocity(mut self, velocity: f64) -> Self {
-        self.velocity = Some(velocity);
-        self
-    }
-
     /// The concrete of the scene; `None` for a scene of stages.
     pub fn concrete(&self) -> Option<&Concrete> {
         match &self.resistance {
             Resistance::Concrete(concrete) => Some(concrete),
             Resistance::Stages(_) => None,
         }
-    }
-
-    /// Projectile diameter d (m); `None` for a scene of stages.
-    pub fn diameter(&self) -> Option<f64> {
-        self.concrete().map(|concrete| concrete.diameter)
     }
 
     /// The law just beyond the crater; `None` for a scene of stages, or beyond the range of numbers.
@@ -548,10 +536,9 @@ impl Scene {
     /// [`ResolveError`]: the thickness or the diameter is not admissible, the criterion `ndrc` has no diameter to go
     /// by, or the depth leaves the range of `f64`.
     fn exit_depth_in<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Resolved<S> {
-        let diameter = match (self.criterion, &self.resistance) {
-            (Criterion::FullDepth, _) => None,
-            (Criterion::Ndrc, Resistance::Concrete(concrete)) => Some(concrete.diameter),
-            (Criterion::Ndrc, Resistance::Stages(_)) => return Err(ResolveError::NoDiameter),
+        let diameter = match self.criterion {
+            Criterion::FullDepth => None,
+            Criterion::Ndrc => Some(self.concrete().ok_or(ResolveError::NoDiameter)?.diameter),
         };
         let Some(given) = self.thickness else { return Ok(S::from_f64(f64::INFINITY)) };
         Parameter::Thickness.admit(given)?;
@@ -568,7 +555,7 @@ impl Scene {
         if self.criterion != Criterion::Ndrc {
             return None;
         }
-        let validity = semi_empirical::perforation_validity(self.thickness? / self.diameter()?);
+        let validity = semi_empirical::perforation_validity(self.thickness? / self.concrete()?.diameter);
         (!validity.valid).then_some(validity.note)
     }
 }
@@ -582,7 +569,7 @@ mod tests {
     use crate::testing::{concrete, scene, stage};
 
     fn scene_of(concrete: Concrete) -> Scene {
-        Scene::of_concrete(0.906, concrete).with_velocity(277.0)
+        Scene { velocity: Some(277.0), ..Scene::of_concrete(0.906, concrete) }
     }
 
     fn stages_scene(stages: Vec<Stage>) -> Scene {
@@ -809,7 +796,7 @@ mod tests {
         }
         let no_speed = Scene { velocity: None, ..scene() };
         assert_eq!(no_speed.problem(), Err(ResolveError::NoImpactSpeed));
-        assert_eq!(no_speed.with_velocity(3.0).problem().unwrap().impact_speed, 3.0);
+        assert_eq!(Scene { velocity: Some(3.0), ..no_speed }.problem().unwrap().impact_speed, 3.0);
     }
 
     #[test]

@@ -103,7 +103,7 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Option<Figure> {
     let [first, rest @ ..] = plan.axes() else { return None };
     let inner = rest.first().map_or(1, |axis| axis.count);
     let shown = inner.min(LINES_MAX);
-    let unit = first.parameter.dimension().map_or("", |dimension| dimension.units()[0]);
+    let unit = first.parameter.entry().dimension.map_or("", |dimension| dimension.units()[0]);
     let x = Axis::linear(&first.parameter.to_string(), unit);
     let mut panel = Panel::new("critical velocity", x, Axis::linear("V_c", "m/s")).tall(TALL);
     for index in 0..shown {

@@ -79,7 +79,6 @@ impl<'a, S: Scalar> Run<'a, S> {
         let mut run = Self { stepper: Stepper::new(options, problem), course: Course::new(problem, detail) };
         // Ends at the face are reached at once; `Stepper::new` has passed them.
         run.pass_ends(0..run.stepper.stage, State::at_impact(problem));
-        run.record_node();
         run.run_to_end()
     }
 
@@ -90,14 +89,17 @@ impl<'a, S: Scalar> Run<'a, S> {
         // Steps up to the last change of x or V.
         let mut moved = 0;
         loop {
-            self.refuse_endless()?;
-            let (before, steps) = (self.stepper.state(), self.stepper.cost.steps);
+            (self.course.stage, self.course.state) = (self.stepper.stage, self.stepper.state());
+            let limit = self.course.limit()?.value();
+            if self.course.detail == Detail::Trajectory {
+                self.course.push_sample(self.course.state, self.stepper.node.d * problem.mass);
+            }
+            let (before, steps) = (self.course.state, self.stepper.cost.steps);
             let left = max_steps - steps;
             if left == 0 || is_hopeless && steps >= STUCK_STEPS {
                 return Err(IntegrationError::StepBudgetSpent { max_steps, last: before.values() });
             }
             let allowance = if self.course.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
-            let limit = problem.limit_of(self.stepper.stage).value();
             let has_ended = match self.stepper.cruise(limit, allowance) {
                 Pause::Allowance => false,
                 Pause::Crossing { x, u } => self.cross(x, u)?,
@@ -106,7 +108,6 @@ impl<'a, S: Scalar> Run<'a, S> {
             if has_ended {
                 return Ok(self.finish());
             }
-            self.record_node();
             let (after, steps) = (self.stepper.state(), self.stepper.cost.steps);
             if (after.depth.value(), after.velocity.value()) != (before.depth.value(), before.velocity.value()) {
                 moved = steps;
@@ -115,16 +116,6 @@ impl<'a, S: Scalar> Run<'a, S> {
                 return self.never_ends("a step no longer changes depth or velocity, which only approach their limits");
             }
         }
-    }
-
-    /// Without a far side, a last stage that does not resist at rest never stops the projectile.
-    fn refuse_endless(&self) -> Solved<()> {
-        let stage = &self.stepper.problem.stages[self.stepper.stage];
-        let resists = stage.stiffness.value() > 0.0 || stage.static_force.value() > 0.0;
-        if resists || self.stepper.problem.has_exit() || stage.end.value().is_finite() {
-            return Ok(());
-        }
-        self.never_ends("no exit depth, and the last stage has no static force that resists")
     }
 
     fn never_ends<T>(&self, why: &'static str) -> Solved<T> {
@@ -263,14 +254,6 @@ impl<'a, S: Scalar> Run<'a, S> {
         for index in stages {
             self.course.stage = index;
             self.course.pass_end();
-        }
-    }
-
-    fn record_node(&mut self) {
-        if self.course.detail == Detail::Trajectory {
-            self.course.stage = self.stepper.stage;
-            let force = self.stepper.node.d * self.stepper.problem.mass;
-            self.course.push_sample(self.stepper.state(), force);
         }
     }
 

@@ -302,13 +302,13 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// [`CentralDifference::free_states`].
     pub(super) fn free(mut self, count: usize) -> Vec<State<S>> {
-        let mut states = Vec::with_capacity(count);
-        for _ in 0..count {
-            states.push(self.state());
+        let next = |_| {
+            let state = self.state();
             self.advance(self.clock.step());
             self.clock.tick();
-        }
-        states
+            state
+        };
+        (0..count).map(next).collect()
     }
 
     /// [`CentralDifference::forced_states`].
@@ -323,14 +323,15 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             let start = self.state();
             self.law = law_at(start.time);
             self.start(start);
-            loop {
+            let mut lands = false;
+            while !lands {
                 if states.len() as u64 > self.options.max_steps {
                     let (max_steps, last) = (self.options.max_steps, self.state().values());
                     return Err(IntegrationError::StepBudgetSpent { max_steps, last });
                 }
                 let (now, h) = (self.clock.now(), self.clock.step());
                 let left = S::from_f64(end) - now;
-                let lands = left.value() <= h.value();
+                lands = left.value() <= h.value();
                 let h = if lands { left } else { h };
                 self.law = law_at(now + h);
                 self.advance(h);
@@ -340,9 +341,6 @@ impl<'a, S: Scalar> Stepper<'a, S> {
                     self.clock.tick();
                 }
                 states.push(self.state());
-                if lands {
-                    break;
-                }
             }
         }
         Ok(states)

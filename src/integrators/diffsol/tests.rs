@@ -14,18 +14,18 @@ fn kind_and_place(end: StageEnd) -> (&'static str, Node) {
 #[test]
 fn boundary_crossed_twice_within_a_step_is_found_at_its_first_crossing() {
     // xi = 2 t - t², u = 2 - 2 t: past 0.75 at t = 0.5, at rest past it at t = 1, back before it at t = 1.5.
-    let law = Law { p: 2.0, ..Law::default() };
+    let law = |distance: f64| Stage::tunnel(2.0, 0.0).until(distance);
     let at = |t: f64| Ok((2.0 * t - t * t, 2.0 - 2.0 * t));
     let before = Node { time: 0.0, depth: 0.0, velocity: 2.0 };
     let after = Node { time: 1.9, depth: 0.19, velocity: -1.8 };
-    let (end, place) = kind_and_place(locate(&law, before, after, 0.75, at).unwrap());
+    let (end, place) = kind_and_place(locate(&law(0.75), before, after, at).unwrap());
     assert_eq!((end, place.depth), ("limit", 0.75));
     assert!((place.time - 0.5).abs() < 1e-15 && (place.velocity - 1.0).abs() < 1e-15, "{place:?}");
-    let (end, place) = kind_and_place(locate(&law, before, after, 1.25, at).unwrap());
+    let (end, place) = kind_and_place(locate(&law(1.25), before, after, at).unwrap());
     assert_eq!((end, place.velocity), ("rest", 0.0));
     assert!((place.time - 1.0).abs() < 1e-15 && (place.depth - 1.0).abs() < 1e-15, "{place:?}");
     // Touching counts as reached.
-    let (end, place) = kind_and_place(locate(&law, before, after, 1.0, at).unwrap());
+    let (end, place) = kind_and_place(locate(&law(1.0), before, after, at).unwrap());
     assert_eq!(end, "limit");
     assert!(place.velocity.abs() < 1e-7, "{place:?}");
 }
@@ -58,7 +58,7 @@ fn bracketed_root_is_exact_for_flat_and_steep_functions_whatever_the_slopes() {
 #[test]
 fn an_event_takes_few_evaluations_of_the_interpolant() {
     // u' = -(p + q u²) from u = 1 in one step past rest, and in one to a depth before it.
-    let law = Law { p: 1.0, q: 0.5, ..Law::default() };
+    let law = Stage::tunnel(1.0, 0.5);
     let (root, speed) = (0.5_f64.sqrt(), 0.5_f64.sqrt().atan());
     let u = |t: f64| (speed - root * t).tan() / root;
     let xi = |t: f64| 2.0 * ((speed - root * t).cos() / speed.cos()).ln();
@@ -71,7 +71,7 @@ fn an_event_takes_few_evaluations_of_the_interpolant() {
             evaluations += 1;
             Ok((xi(t), u(t)))
         };
-        let (end, place) = kind_and_place(locate(&law, node(0.8), node(after), distance, at).unwrap());
+        let (end, place) = kind_and_place(locate(&law.until(distance), node(0.8), node(after), at).unwrap());
         assert_eq!(end, if distance == 1.0 { "rest" } else { "limit" });
         let f = if distance == 1.0 { u(place.time) } else { xi(place.time) - distance };
         assert!(f.abs() < 1e-15, "{place:?}");
@@ -201,18 +201,21 @@ fn exact_margin(problem: &Problem) -> f64 {
     Energy::new().exit_margin_in(problem).unwrap().unwrap().0
 }
 
-fn law(p: f64, s: f64, r: f64, q: f64) -> Law {
-    Law { p, s, r, q }
+fn law(p: f64, s: f64, r: f64, q: f64) -> Stage {
+    stage(p, s, r, q, INF)
 }
 
 #[test]
-fn law_gives_force_per_mass_and_is_finite_only_as_a_whole() {
-    assert_eq!(law(1.0, 2.0, 4.0, 5.0).rate(3.0, 6.0), -211.0);
-    assert!(law(1.0, 2.0, 4.0, 5.0).is_finite());
-    for place in 0..4 {
-        let mut c = [1.0; 4];
-        c[place] = INF;
-        assert!(!law(c[0], c[1], c[2], c[3]).is_finite(), "{c:?}");
+fn a_stage_without_finite_numbers_in_its_units_is_not_solved() {
+    for law in
+        [law(1e300, 0.0, 0.0, 0.0), law(0.0, 1e300, 0.0, 0.0), law(0.0, 0.0, 1e300, 0.0), law(0.0, 0.0, 0.0, 1e300)]
+    {
+        let problem = of_stages(1e-10, 1.0, 1.0, &[law]);
+        let error = Diffsol::new(Scheme::Tsit45, 1e-6).solve(&problem, Detail::End).unwrap_err();
+        assert!(
+            matches!(error, IntegrationError::NotFinite { what: "the force over the mass", .. }),
+            "{law:?}: {error}"
+        );
     }
 }
 
@@ -247,7 +250,7 @@ fn first_step_is_a_share_of_the_fastest_time_that_keeps_its_local_error_at_the_t
         (law(0.0, 0.0, 1.0, 2.0), 3.0, INF, 1.0 / 13.0),
         (law(0.0, 0.0, 0.0, 0.0), 0.0, 1.0, 1.0),
     ] {
-        assert_eq!(law.shortest_time(u, distance), time, "{law:?}, {u}");
+        assert_eq!(law.until(distance).shortest_time(u), time, "{law:?}, {u}");
     }
     // Orders 5, 1, 3 and 2, at the tolerance asked of the library.
     for (scheme, rtol, share) in [
@@ -282,7 +285,7 @@ fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
     let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
     assert!((length_of(&light) - 1.0).abs() < 1e-15);
     let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
-    let stage = Reduced { law: Law::default(), length: 2.0, unit_speed: 4.0, start, speed: 1.75, distance: INF };
+    let stage = Reduced { law: still, length: 2.0, unit_speed: 4.0, start, speed: 1.75 };
     let state = stage.state(Node { time: 3.0, depth: 5.0, velocity: 6.0 });
     assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
 }
@@ -312,7 +315,7 @@ fn standstill_is_a_rest_where_a_force_above_the_noise_holds_it() {
         (law(-8.0, 0.0, 1.0, 0.0), 1.0, 9.0, boundary),
         (law(-8.0, 0.0, 1.0, 0.0), 1.0, INF, approach),
     ] {
-        let (found, place) = kind_and_place(law.meaning_of_standstill(at(xi), distance, noise));
+        let (found, place) = kind_and_place(law.until(distance).meaning_of_standstill(at(xi), noise));
         assert_eq!(found, end, "{law:?}, {xi}, {distance}");
         let (depth, speed) = match end {
             "limit" => (distance, 0.0),
