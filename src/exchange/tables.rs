@@ -439,6 +439,10 @@ pub fn push_number(text: &mut String, value: f64) {
 ///
 /// One that begins like a formula has a `'` in front, as spreadsheets have it; the text of a number keeps its sign.
 fn push_text(line: &mut String, text: &str) {
+    // Nearly all texts: no message, or an outcome.
+    if text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
+        return line.push_str(text);
+    }
     let is_formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
     if is_formula {
         return push_text(line, &format!("'{text}"));
