@@ -6,6 +6,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use penetrode::physics::Range;
+use penetrode::physics::parameter::{Absence, Entry, Parameter};
+
 /// Folders and files in which a document may be cited.
 const PLACES: [&str; 17] = [
     "src",
@@ -151,6 +154,27 @@ fn every_recipe_of_the_justfile_is_a_command_of_contributing() -> io::Result<()>
     assert!(commands.len() > 10, "{commands:?}");
     for command in commands {
         assert!(contributing.contains(&format!("`{command}`")), "CONTRIBUTING.md has no `{command}`");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_reference_gives_each_key_of_a_scene_the_range_and_the_default_of_the_parameter_table() -> io::Result<()> {
+    let reference = fs::read_to_string(root().join("docs/reference.md"))?;
+    for Entry { path, range, absence, .. } in Parameter::PLAIN.map(Parameter::entry) {
+        // A group is no key, and the factor of a nose stands in a table of its own.
+        let Some((_, row)) = reference.split_once(&format!("| `{path}` |")) else {
+            assert!(!path.contains('.') || path == "projectile.nose.factor", "{path} is missing");
+            continue;
+        };
+        let cells: Vec<_> = row.lines().next().unwrap_or_default().split('|').map(str::trim).collect();
+        assert_eq!(cells[1], if range == Range::Positive { "> 0" } else { ">= 0" }, "{path}");
+        let is_as_in_the_table = match absence {
+            Absence::Refused(_) => cells[2].starts_with("required"),
+            Absence::Is(value) => cells[2] == value.to_string(),
+            Absence::Means(_) => !cells[2].is_empty() && !cells[2].starts_with("required"),
+        };
+        assert!(is_as_in_the_table, "{path}: {}", cells[2]);
     }
     Ok(())
 }
