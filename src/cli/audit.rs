@@ -9,7 +9,7 @@ use super::{Answer, Ask, CliError, problem_of, read_scene};
 use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::tables::read_bytes;
 use crate::physics::Problem;
-use crate::studies::audit::{Audit, ExactValues, Expectation, QuantityAudit, RESULTS, Table, audit};
+use crate::studies::audit::{Audit, ExactValues, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::critical_velocity;
 use crate::studies::error::Truth;
 use crate::studies::error::{is_fixed, value_of};
@@ -44,7 +44,7 @@ impl Ask for AuditArgs {
         let file = name_of(&self.results);
         let results = Table::read(&file, &read_bytes(&self.results, &RESULTS)?)?;
         let exact = self.scene.as_deref().map(exact_values).transpose()?;
-        let judged = audit(&results, &Expectation { order: self.order, exact })?;
+        let judged = audit(&results, self.order, exact)?;
         Ok(Answer { text: text(&file, &judged), exit: judged.verdict.into(), data: Some(judged) })
     }
 }

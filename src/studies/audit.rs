@@ -14,7 +14,7 @@ use super::grid_convergence::{
     Behaviour, EcaHoekstra, GridValue, SelfConvergence, ThreeGrids, Uncertainty, eca_hoekstra, roache,
     self_convergence, three_grids, xing_stern,
 };
-use super::order::{Class, Exclusion, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
+use super::order::{Class, Exclusion, PowerLaw, ROUND_OFF_ALLOWANCE, STEPS_MIN, StepError, fit_at_level};
 use super::quantity::Quantity;
 use super::verdict::Verdict;
 use crate::exchange::tables::{self, At, Column, Fault, Format, Need, Place, Row, TableError};
@@ -321,15 +321,6 @@ impl ExactValues {
     }
 }
 
-/// What to compare a table with.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Expectation {
-    /// Formal order of the other scheme, for every column.
-    pub order: Option<f64>,
-    /// Exact values, if a scene is given.
-    pub exact: Option<ExactValues>,
-}
-
 /// One row of one column.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
@@ -349,7 +340,7 @@ pub struct AuditPoint {
 }
 
 /// The judgement of one column.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct QuantityAudit {
     /// Which quantity.
@@ -404,82 +395,62 @@ pub struct Audit {
     pub quantities: Vec<QuantityAudit>,
 }
 
-/// Judges a table.
+/// Judges a table, by the formal `order` of the other scheme and the `exact` values where they are known.
 ///
 /// Against exact values the order is fitted to the errors ([`super::order`]), and the limit of the values must agree;
 /// without, order and limit are fitted together ([`self_convergence`]).
 ///
 /// # Errors
 /// [`AuditError::BadOrder`] for an expected order outside [`ORDER_MIN`] to [`ORDER_MAX`].
-pub fn audit(table: &Table, expectation: &Expectation) -> Result<Audit, AuditError> {
-    if let Some(order) = expectation.order.filter(|order| !(ORDER_MIN..=ORDER_MAX).contains(order)) {
+pub fn audit(table: &Table, order: Option<f64>, exact: Option<ExactValues>) -> Result<Audit, AuditError> {
+    if let Some(order) = order.filter(|order| !(ORDER_MIN..=ORDER_MAX).contains(order)) {
         return Err(AuditError::BadOrder(order));
     }
     let mut findings = table.findings.clone();
-    let mut quantities = Vec::new();
-    for column in &table.columns {
-        let (judged, remarks) = judge(table, column, expectation);
-        findings.extend(remarks);
-        quantities.push(judged);
-    }
+    let judged = table.columns.iter().map(|column| {
+        let exact = exact.and_then(|exact| exact.of(column.quantity));
+        judge(table, column, order, exact, &mut findings)
+    });
+    let quantities: Vec<QuantityAudit> = judged.collect();
     // A table always has a column.
     let verdict = quantities.iter().map(|column| column.verdict).max().unwrap_or(Verdict::Undecided);
     Ok(Audit { schema: "penetrode/audit/1", verdict, findings, quantities })
 }
 
 impl QuantityAudit {
-    /// Takes the order found, its 95 % interval and its band, and the constant of the relative error.
-    fn observe(&mut self, order: f64, interval: [f64; 2], band: [f64; 2], constant: f64) {
+    /// Takes the law of the relative error.
+    fn observe(&mut self, PowerLaw { order, interval95, verdict_band, error_constant }: PowerLaw) {
         self.observed_order = Some(order);
-        self.interval = Some(interval);
-        self.verdict_band = Some(band);
-        self.error_constant = Some(constant);
+        self.interval = Some(interval95);
+        self.verdict_band = Some(verdict_band);
+        self.error_constant = Some(error_constant);
     }
 }
 
-/// A column before anything is known of it: failed until shown otherwise.
-fn unjudged(table: &Table, quantity: Quantity, formal_order: Option<f64>) -> QuantityAudit {
+/// The judgement of a column, with the exact value and the scale of its errors where they are known; remarks join
+/// `findings`.
+fn judge(
+    table: &Table,
+    &ResultColumn { quantity, rounding, .. }: &ResultColumn,
+    formal_order: Option<f64>,
+    exact: Option<(f64, f64)>,
+    findings: &mut Vec<Finding>,
+) -> QuantityAudit {
+    let mut remark = |kind, message: &str| {
+        findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
+    };
     let points = table.rows.iter().map(|row| {
         let (dt_s, value) = (row.step, row.value(quantity));
         AuditPoint { dt_s, value, error: None, used: false, excluded: None }
     });
-    QuantityAudit {
-        quantity,
-        formal_order,
-        observed_order: None,
-        interval: None,
-        verdict_band: None,
-        error_constant: None,
-        class: Class::Undecided,
-        verdict: Verdict::Failed,
-        reason: String::new(),
-        rule: "none",
-        limit: None,
-        limit_band: None,
-        exact: None,
-        agrees_with_exact: None,
-        error_bands: Vec::new(),
-        three_grids: None,
-        least_squares: None,
-        points: points.collect(),
-    }
-}
-
-fn judge(
-    table: &Table,
-    &ResultColumn { quantity, rounding, .. }: &ResultColumn,
-    expectation: &Expectation,
-) -> (QuantityAudit, Vec<Finding>) {
-    let mut findings = Vec::new();
-    let mut remark = |kind, message: &str| {
-        findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
-    };
-    let mut judged = unjudged(table, quantity, expectation.order);
+    // Failed until shown otherwise.
+    let mut judged =
+        QuantityAudit { quantity, formal_order, rule: "none", points: points.collect(), ..QuantityAudit::default() };
     if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.value(quantity).is_finite()) {
         judged.reason =
             format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.value(quantity), row.step);
         remark(FindingKind::NotFinite, &judged.reason);
-        return (judged, findings);
+        return judged;
     }
     // The values round by the digits printed, and by the arithmetic at least.
     let grid = |row: &StepRow| {
@@ -490,14 +461,13 @@ fn judge(
     let (Ok(own), Ok(least_squares)) = (self_convergence(&grids, AUDIT_LEVEL), eca_hoekstra(&grids)) else {
         // Reading has already refused every table that these refuse.
         "the table cannot be fitted".clone_into(&mut judged.reason);
-        return (judged, findings);
+        return judged;
     };
     let converges = own.behaviour == Behaviour::MonotoneConverging;
     if converges {
         judged.limit = Some(own.limit);
         judged.limit_band = own.limit_band.iter().all(|end| end.is_finite()).then_some(own.limit_band);
     }
-    let exact = expectation.exact.and_then(|exact| exact.of(quantity));
     judged.exact = exact.map(|(value, _)| value);
     match exact {
         Some((exact, scale)) => against_exact(&mut judged, &grids, exact, scale),
@@ -511,7 +481,8 @@ fn judge(
             (finest.value - exact).abs() <= bar || (low - finest.round_off..=high + finest.round_off).contains(&exact),
         );
     }
-    if own.behaviour == Behaviour::Constant && judged.class != Class::AtFloor {
+    let constant = own.behaviour == Behaviour::Constant;
+    if constant && judged.class != Class::AtFloor {
         judged.class = Class::Undecided;
         judged.reason = own.reason;
     } else if judged.class == Class::Undecided && own.behaviour.class() == Class::Oscillating {
@@ -519,7 +490,6 @@ fn judge(
         judged.class = Class::Oscillating;
         judged.reason = own.reason;
     }
-    let constant = own.behaviour == Behaviour::Constant;
     let (verdict, finding) = verdict_of(&judged, constant);
     judged.verdict = verdict;
     if let Some((kind, message)) = finding {
@@ -531,8 +501,8 @@ fn judge(
         remark(FindingKind::WrongLimit, &text);
         judged.verdict = Verdict::Failed;
     }
-    add_bands(&mut judged, &grids, least_squares, expectation.order);
-    (judged, findings)
+    add_bands(&mut judged, &grids, least_squares);
+    judged
 }
 
 /// The verdict that follows from the class and, for a converging column, from the order; and what to say about it.
@@ -596,7 +566,7 @@ fn against_exact(judged: &mut QuantityAudit, grids: &[GridValue], exact: f64, sc
     judged.class = fit.class;
     judged.reason.clone_from(&fit.reason);
     if let Some(line) = fit.line {
-        judged.observe(line.order, line.interval95, line.verdict_band, line.error_constant);
+        judged.observe(line);
     }
 }
 
@@ -612,12 +582,12 @@ fn against_limit(judged: &mut QuantityAudit, own: &SelfConvergence) {
         point.error = converges.then_some((point.value - own.limit).abs() / scale);
     }
     if own.behaviour != Behaviour::Constant {
-        judged.observe(own.order, own.interval95, own.verdict_band, own.error_constant.abs() / scale);
+        judged.observe(PowerLaw { error_constant: own.law.error_constant.abs() / scale, ..own.law });
     }
 }
 
 /// Adds the error bars of the finest value, for columns that converge only: a diverging one has none.
-fn add_bands(judged: &mut QuantityAudit, grids: &[GridValue], least_squares: EcaHoekstra, formal: Option<f64>) {
+fn add_bands(judged: &mut QuantityAudit, grids: &[GridValue], least_squares: EcaHoekstra) {
     let apart = |from: &GridValue| grids.iter().copied().find(|grid| grid.step >= RATIO_MIN * from.step);
     let second = apart(&grids[0]);
     judged.three_grids =
@@ -625,6 +595,7 @@ fn add_bands(judged: &mut QuantityAudit, grids: &[GridValue], least_squares: Eca
     if judged.class == Class::Converging {
         judged.error_bands.extend(judged.three_grids.and_then(|three| three.uncertainty));
         if let (Some(coarse), Some(observed)) = (second, judged.observed_order) {
+            let formal = judged.formal_order;
             judged.error_bands.extend(roache(grids[0], coarse, Some(observed), formal));
             judged.error_bands.extend(formal.and_then(|formal| xing_stern(grids[0], coarse, observed, formal)));
         }
@@ -657,7 +628,7 @@ mod tests {
             values[Quantity::Depth as usize] = Some(depth);
             ExactValues { impact_velocity: 300.0, values }
         });
-        audit(&Table::read("run.csv", text.as_bytes()).unwrap(), &Expectation { order, exact }).unwrap()
+        audit(&Table::read("run.csv", text.as_bytes()).unwrap(), order, exact).unwrap()
     }
 
     fn refused(text: &str) -> AuditError {

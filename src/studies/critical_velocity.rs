@@ -516,7 +516,6 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
             scale: bracket.low.w.abs().max(bracket.high.w),
             known: [bracket.low, bracket.high],
             points: RefCell::default(),
-            failure: RefCell::new(None),
         };
         // The solver stops at a half-width of 2 eps |b| + tol/2.
         let tolerance = 2.0 * resolution / unit - 4.0 * f64::EPSILON;
@@ -529,13 +528,12 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
             .timer(false)
             .run();
         let failed = |reason: String| self.not_converged(reason, bracket);
-        if let Some(failure) = objective.failure.take() {
-            return Err(match failure {
-                CriticalError::NotConverged { reason, .. } => failed(reason),
-                other => other,
-            });
-        }
-        let state = run.map_err(|error| failed(error.to_string()))?.state;
+        let run = run.map_err(|error| match error.downcast() {
+            Ok(CriticalError::NotConverged { reason, .. }) => failed(reason),
+            Ok(of_a_flight) => of_a_flight,
+            Err(error) => failed(error.to_string()),
+        });
+        let state = run?.state;
         match state.get_termination_status() {
             TerminationStatus::Terminated(TerminationReason::SolverConverged) => {}
             TerminationStatus::Terminated(TerminationReason::MaxItersReached) => return Ok(None),
@@ -543,24 +541,15 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
         }
         // The last value and not the best one. At a root they are the same. Where W jumps, the best may be the first
         // point on the lower side, while the last lies at the jump.
-        let Some(&root) = state.get_param() else {
-            return Err(failed("no value".to_owned()));
-        };
         let points = objective.points.borrow();
-        let Some(&point) = points.iter().find(|point| point.u == root * unit) else {
-            return Err(failed(format!("{root} was never tried")));
-        };
+        let found = state.get_param().and_then(|root| points.iter().find(|point| point.u == root * unit));
+        let point = *found.ok_or_else(|| failed("its last value was never tried".to_owned()))?;
         // The secant to the nearest flight that is far against the error bound: local against every curvature.
         let far = (256.0 * resolution).max(0.25 * PREDICTION_WIDTH * point.u);
-        let mut slope = bracket.slope();
-        let mut nearest = f64::INFINITY;
-        for other in points.iter() {
-            let distance = (other.u - point.u).abs();
-            if distance >= far && distance < nearest {
-                nearest = distance;
-                slope = (other.w - point.w) / (other.u - point.u);
-            }
-        }
+        let distance = |other: &Point| (other.u - point.u).abs();
+        let all_far = points.iter().filter(|other| distance(other) >= far);
+        let nearest = all_far.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let slope = nearest.map_or(bracket.slope(), |other| (other.w - point.w) / (other.u - point.u));
         Ok(Some((point, slope)))
     }
 }
@@ -576,7 +565,6 @@ struct Objective<'a, 'b, F> {
     /// The ends, known already.
     known: [Point; 2],
     points: RefCell<SmallVec<[Point; FLIGHTS_INLINE]>>,
-    failure: RefCell<Option<CriticalError>>,
 }
 
 impl<F: Fn(f64) -> Resolved> CostFunction for &Objective<'_, '_, F> {
@@ -587,11 +575,7 @@ impl<F: Fn(f64) -> Resolved> CostFunction for &Objective<'_, '_, F> {
         let u = param * self.unit;
         let point = match self.known.iter().find(|point| point.u / self.unit == *param) {
             Some(known) => *known,
-            None => self.search.at(u).map_err(|error| {
-                let message = error.to_string();
-                *self.failure.borrow_mut() = Some(error);
-                argmin::core::Error::msg(message)
-            })?,
+            None => self.search.at(u)?,
         };
         self.points.borrow_mut().push(Point { u, ..point });
         Ok(point.w / self.scale)

@@ -13,6 +13,7 @@
 //! - **critical velocity**: the closed form and the search through the energy formulation, within the error bound of the
 //!   latter and the same units; one that leaves the range of 64-bit numbers must be refused with that cause.
 
+use std::cell::LazyCell;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -195,25 +196,20 @@ pub struct Defect {
 ///
 /// A panic anywhere is a defect of the scene, not the end of the study.
 pub fn examine(index: u64, scene: &Scene) -> Summary {
-    catch_unwind(AssertUnwindSafe(|| examine_unguarded(index, scene))).unwrap_or_else(|cause| {
-        let text = cause
-            .downcast_ref::<String>()
-            .cloned()
-            .or_else(|| cause.downcast_ref::<&str>().map(|s| (*s).to_owned()))
-            .unwrap_or_default();
-        let mut seen = Summary { scenes: 1, ..Summary::default() };
-        seen.defect(index, format!("panic: {text}"));
-        seen
-    })
+    let mut seen = Summary { scenes: 1, ..Summary::default() };
+    if let Err(cause) = catch_unwind(AssertUnwindSafe(|| examine_unguarded(index, scene, &mut seen))) {
+        let text = cause.downcast_ref::<String>().map(String::as_str).or(cause.downcast_ref::<&str>().copied());
+        seen.defect(index, format!("panic: {}", text.unwrap_or_default()));
+    }
+    seen
 }
 
-fn examine_unguarded(index: u64, scene: &Scene) -> Summary {
-    let mut seen = Summary { scenes: 1, ..Summary::default() };
+fn examine_unguarded(index: u64, scene: &Scene, seen: &mut Summary) {
     match scene.problem() {
         Ok(problem) => {
-            let examined = examine_problem(index, &problem, &mut seen);
+            let examined = examine_problem(index, &problem, seen);
             examined.unwrap_or_else(|what| seen.defect(index, what));
-            let examined = examine_critical(index, scene, &mut seen);
+            let examined = examine_critical(index, scene, seen);
             examined.unwrap_or_else(|what| seen.defect(index, what));
         }
         Err(error) => {
@@ -223,7 +219,6 @@ fn examine_unguarded(index: u64, scene: &Scene) -> Summary {
             seen.unresolved = 1;
         }
     }
-    seen
 }
 
 /// Adds what the methods make of `problem`; the error says why there is nothing to judge them by.
@@ -244,7 +239,7 @@ fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) -> Result<
         }
         None => exact.outcome == Outcome::Perforated,
     };
-    let mut conditions = None;
+    let conditions = LazyCell::new(|| conditions_in_dual_numbers(problem).ok());
     let jump = near_jump(problem);
     for method in METHODS {
         let solved = Method::new(method, &MethodOptions::default())
@@ -281,10 +276,7 @@ fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) -> Result<
         }
         let mut errors = excused(Errors::in_double_double(&flight, &exact, problem.impact_speed), jump);
         if errors.exceed(ULPS_UNCONDITIONED) {
-            if conditions.is_none() {
-                conditions = conditions_in_dual_numbers(problem).ok();
-            }
-            if let Some(conditions) = &conditions {
+            if let Some(conditions) = &*conditions {
                 errors = errors.over(conditions);
             }
             if errors.exceed(ULPS_MAX) {

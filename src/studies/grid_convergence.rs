@@ -20,7 +20,7 @@
 
 use serde::Serialize;
 
-use super::order::{Class, FitError, ORDER_RESOLUTION, alternates, bisect, student_t};
+use super::order::{Class, FitError, ORDER_RESOLUTION, PowerLaw, alternates, bisect, student_t};
 
 /// A value at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl GridValue {
 }
 
 /// What the values do as the step shrinks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Behaviour {
@@ -56,6 +56,7 @@ pub enum Behaviour {
     /// They do not depend on the step.
     Constant,
     /// None of this can be decided.
+    #[default]
     Undecided,
 }
 
@@ -86,7 +87,7 @@ pub struct Uncertainty {
 }
 
 /// The result of [`three_grids`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct ThreeGrids {
     /// What the three values do.
@@ -147,17 +148,10 @@ pub fn three_grids(grids: [GridValue; 3]) -> Result<ThreeGrids, FitError> {
     let [f1, f2, f3] = [0, 1, 2].map(|i| sorted[i].value);
     let (l21, l32) = ((sorted[1].step / sorted[0].step).ln(), (sorted[2].step / sorted[1].step).ln());
     let (e21, e32) = (f2 - f1, f3 - f2);
-    let mut result = ThreeGrids {
-        behaviour: if e21 == 0.0 && e32 == 0.0 { Behaviour::Constant } else { Behaviour::Undecided },
-        order: None,
-        sign: 0,
-        extrapolated: None,
-        uncertainty: None,
-        asymptotic_ratio: None,
-        rule: "Celik et al. 2008, three grids, sign kept",
-    };
+    let mut result = ThreeGrids { rule: "Celik et al. 2008, three grids, sign kept", ..ThreeGrids::default() };
     if e21 == 0.0 || e32 == 0.0 {
-        return Ok(result);
+        let behaviour = if e21 == e32 { Behaviour::Constant } else { Behaviour::Undecided };
+        return Ok(ThreeGrids { behaviour, ..result });
     }
     let oscillating = (e21 > 0.0) != (e32 > 0.0);
     result.sign = if oscillating { -1 } else { 1 };
@@ -352,25 +346,19 @@ pub fn eca_hoekstra(grids: &[GridValue]) -> Result<EcaHoekstra, FitError> {
 }
 
 /// The result of [`self_convergence`].
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SelfConvergence {
     /// What the values do.
     pub behaviour: Behaviour,
     /// Why, in one clause with its numbers.
     pub reason: String,
-    /// Order p.
-    pub order: f64,
-    /// 95 % interval of the order; ends at ±10 where the table sets no bound.
-    pub interval95: [f64; 2],
-    /// Interval of the order at the level asked for; verdicts rest on it.
-    pub verdict_band: [f64; 2],
+    /// Order p and the constant C, signed, in the unit of the value per `step^p`. The interval of the order ends at ±10
+    /// where the table sets no bound.
+    pub law: PowerLaw,
     /// Limit f0; without meaning unless converging.
     pub limit: f64,
     /// Interval of the limit at the level asked for.
     pub limit_band: [f64; 2],
-    /// Constant C, signed, in the unit of the value per `step^p`.
-    pub error_constant: f64,
     /// Name of the rule.
     pub rule: &'static str,
 }
@@ -431,12 +419,9 @@ pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergen
     Ok(SelfConvergence {
         behaviour,
         reason,
-        order: p,
-        interval95,
-        verdict_band,
+        law: PowerLaw { order: p, interval95, verdict_band, error_constant: best.constant },
         limit: best.limit,
         limit_band,
-        error_constant: best.constant,
         rule: "f0 + C h^p by separable least squares, profile interval",
     })
 }
@@ -833,10 +818,10 @@ mod tests {
                 (0..7).map(|i| 1e-5 * 0.6_f64.powi(i)).map(|h| (h, 0.17 - (1e3 * h).powf(order))).collect();
             let result = self_convergence(&grids(&rows), 1e-3).unwrap();
             assert_eq!(result.behaviour, Behaviour::MonotoneConverging, "{result:?}");
-            assert!((result.order - order).abs() < 1e-3, "{result:?}");
+            assert!((result.law.order - order).abs() < 1e-3, "{result:?}");
             assert!((result.limit - 0.17).abs() < 1e-6, "{result:?}");
             assert!(result.limit_band[0] <= 0.17 && 0.17 <= result.limit_band[1], "{result:?}");
-            assert!(result.error_constant < 0.0);
+            assert!(result.law.error_constant < 0.0);
         }
     }
 
@@ -851,8 +836,8 @@ mod tests {
                 .collect();
             let result = self_convergence(&grids(&rows), 1e-3).unwrap();
             let holds = |band: [f64; 2]| usize::from(band[0] <= 2.0 && 2.0 <= band[1]);
-            within += holds(result.interval95);
-            strictly += holds(result.verdict_band);
+            within += holds(result.law.interval95);
+            strictly += holds(result.law.verdict_band);
         }
         assert!(within >= 180 && strictly >= 199, "{within} and {strictly} of {tables}");
     }

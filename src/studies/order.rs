@@ -98,7 +98,7 @@ impl StepError {
 }
 
 /// What the errors do as the step shrinks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, strum::IntoStaticStr)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -112,6 +112,7 @@ pub enum Class {
     /// They are round-off.
     AtFloor,
     /// None of this can be decided.
+    #[default]
     Undecided,
 }
 
@@ -136,7 +137,7 @@ pub enum Exclusion {
 }
 
 /// One point, and whether the fit uses it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedPoint {
     /// Step h.
     pub step: f64,
@@ -148,8 +149,8 @@ pub struct FittedPoint {
     pub excluded: Option<Exclusion>,
 }
 
-/// A fitted `|e| = C h^p`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// A law `|e| = C h^p`, from errors or from the values themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLaw {
     /// Order p.
     pub order: f64,
@@ -159,14 +160,10 @@ pub struct PowerLaw {
     pub verdict_band: [f64; 2],
     /// Constant C: geometric mean of `|e| h^-p` with the fitted p, in the error's unit per `step^p`.
     pub error_constant: f64,
-    /// 95 % interval of the constant.
-    pub constant_interval: [f64; 2],
-    /// Standard deviation of `ln|e|` about the line.
-    pub residual_scatter: f64,
 }
 
 /// The result of [`fit`].
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct OrderFit {
     /// The fitted line; `None` when fewer than [`STEPS_MIN`] points are left.
     pub line: Option<PowerLaw>,
@@ -421,19 +418,13 @@ impl Line {
     }
 
     fn power_law(&self, level: f64) -> PowerLaw {
-        let t = student_t(0.05, self.dof);
-        let half = t * self.scatter / self.spread.sqrt();
+        let half = student_t(0.05, self.dof) * self.scatter / self.spread.sqrt();
         let [x, y] = self.centre;
-        let log_constant = y - self.slope * x;
-        let n = (self.dof + 2) as f64;
-        let log_half = t * self.scatter * (1.0 / n + x * x / self.spread).sqrt();
         PowerLaw {
             order: self.slope,
             interval95: [self.slope - half, self.slope + half],
             verdict_band: self.slope_band(level),
-            error_constant: log_constant.exp(),
-            constant_interval: [(log_constant - log_half).exp(), (log_constant + log_half).exp()],
-            residual_scatter: self.scatter,
+            error_constant: (y - self.slope * x).exp(),
         }
     }
 }

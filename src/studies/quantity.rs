@@ -1,25 +1,18 @@
 //! The quantities whose error is studied, and their names (`docs/reference.md`, "Words").
 
+use serde::{Deserialize, Serialize};
+use strum::{Display, IntoStaticStr};
+
 /// A number that a flight, or a search over flights, gives.
 #[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    serde::Serialize,
-    serde::Deserialize,
-    strum::Display,
-    strum::IntoStaticStr,
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Display, IntoStaticStr,
 )]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Quantity {
     /// Depth at the end of the flight (m).
+    #[default]
     Depth,
     /// Time of the end of the flight (s).
     Time,

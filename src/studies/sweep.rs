@@ -11,6 +11,7 @@ use smallvec::SmallVec;
 use thiserror::Error;
 
 use super::critical_velocity;
+use super::error::{Studied, StudyError};
 use crate::exchange::tables::{self, Column, Format, Kind, TableError, Value};
 use crate::integrators::{Detail, Integrator};
 use crate::physics::groups::{Groups, dimensionless_energy};
@@ -324,25 +325,25 @@ impl Plan {
     fn row(&self, index: usize, integrator: &dyn Integrator) -> Row {
         let (values, scene) = self.point(index);
         let mut row = Row { values, ..Row::default() };
-        let solved = scene.map_err(|error| error.to_string()).and_then(|scene| {
-            solve(&scene, integrator, &mut row)?;
-            Ok(scene)
-        });
-        let scene = match solved {
-            Ok(scene) => scene,
-            Err(error) => return Row { error, ..row },
-        };
-        if scene.thickness.is_some() {
-            match critical_velocity::of_scene(&scene, integrator) {
-                Ok(found) => {
-                    row.critical_velocity = Some(found.velocity);
-                    row.critical_energy = Some(found.energy);
-                }
-                Err(error) => row.error = error.to_string(),
-            }
-        }
-        self.compare(&scene, integrator, &mut row);
+        let filled = scene.map_err(StudyError::from).and_then(|scene| self.fill(&mut row, &scene, integrator));
+        row.error = filled.err().map_or_else(String::new, |error| error.to_string());
         row
+    }
+
+    /// Solves `scene` where it has an impact velocity, finds V_c where it has a thickness, and compares.
+    fn fill(&self, row: &mut Row, scene: &Scene, integrator: &dyn Integrator) -> Studied<()> {
+        if let Some(speed) = scene.velocity {
+            let flight = integrator.solve(&scene.resolve(speed)?, Detail::End)?;
+            row.outcome = Some(flight.outcome);
+            (row.depth, row.velocity) = (Some(flight.end.depth), Some(flight.end.velocity));
+        }
+        let critical = scene.thickness.map(|_| critical_velocity::of_scene(scene, integrator)).transpose();
+        if let Ok(Some(found)) = &critical {
+            (row.critical_velocity, row.critical_energy) = (Some(found.velocity), Some(found.energy));
+        }
+        self.compare(scene, integrator, row);
+        critical?;
+        Ok(())
     }
 
     /// What a slab of one concrete has beyond its critical velocity: dimensionless energies and Eq. 15.
@@ -373,16 +374,6 @@ impl Plan {
     }
 }
 
-/// Solves `scene` where it has an impact velocity.
-fn solve(scene: &Scene, integrator: &dyn Integrator, row: &mut Row) -> Result<(), String> {
-    let Some(speed) = scene.velocity else { return Ok(()) };
-    let problem = scene.resolve(speed).map_err(|error| error.to_string())?;
-    let flight = integrator.solve(&problem, Detail::End).map_err(|error| error.to_string())?;
-    row.outcome = Some(flight.outcome);
-    (row.depth, row.velocity) = (Some(flight.end.depth), Some(flight.end.velocity));
-    Ok(())
-}
-
 /// A table of measured points; columns of other names are ignored.
 pub static POINTS: Format = Format {
     columns: &[Column::number("H/d").within(Range::Positive), Column::number("E_c/(d3 fc)").within(Range::Positive)],
@@ -408,41 +399,35 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
     if !plan.is_along_thickness() {
         return String::new();
     }
-    let both = |row: &&Row| row.energy_full_depth.is_some() && row.eq15_unrounded.is_some_and(|e| e > 0.0);
-    let (Some(first), Some(last)) = (rows.iter().find(both), rows.iter().rfind(both)) else { return String::new() };
-    let over = |row: &Row, energy: Option<f64>| {
-        100.0 * (energy.unwrap_or(f64::NAN) / row.eq15_unrounded.unwrap_or(f64::NAN) - 1.0)
-    };
-    let at = |row: &Row| {
-        format!("{:+.1} % at H/d = {:.4}", over(row, row.energy_full_depth), row.thickness_ratio.unwrap_or(f64::NAN))
-    };
-    let least = rows.iter().filter(both).fold(first, |least, row| {
-        if over(row, row.energy_full_depth) < over(least, least.energy_full_depth) { row } else { least }
-    });
+    let over =
+        |row: &Row, energy: Option<f64>| Some(100.0 * (energy? / row.eq15_unrounded.filter(|e| *e > 0.0)? - 1.0));
+    // The simulation over Eq. 15 (%), where both are known.
+    let gaps: Vec<(f64, &Row)> = rows.iter().filter_map(|row| Some((over(row, row.energy_full_depth)?, row))).collect();
+    let least = gaps.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(first), Some(last), Some(least)) = (gaps.first(), gaps.last(), least) else { return String::new() };
+    let at = |(gap, row): &(f64, &Row)| format!("{gap:+.1} % at H/d = {:.4}", row.thickness_ratio.unwrap_or(f64::NAN));
     let ndrc = rows
         .iter()
         .filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > 0.0))
-        .filter_map(|row| Some(over(row, Some(row.energy_ndrc?)).abs()))
+        .filter_map(|row| Some(over(row, row.energy_ndrc)?.abs()))
         .fold(0.0, f64::max);
-    let (remainder, finite_n) = match first.geometry {
+    let (remainder, finite_n) = match first.1.geometry {
         Some(n) => (
             format!("here N = {n:.4}, and it is what finite N (and another k or a given c) adds"),
             " At finite N it grows again where drag gains on strength.",
         ),
         None => ("here there is no drag, and another k or a given c is all that adds to it".to_owned(), ""),
     };
-    format!(
-        "{WHY}. The simulation counts a slab as perforated when the projectile has come \
-         through the whole thickness, x = H. Eq. 15 is Eq. 11-12 with k = 2 and the ACE/NDRC relation, by which a \
-         penetration x_p < H is enough: the rest of the slab fails by itself. Against unrounded Eq. 15 the simulation \
-         stands {} and {}, and is least {}. The same equation of motion with the criterion `ndrc`, exit at x_p(H), \
-         differs by at most {ndrc:.1} %. Without drag and with k = 2 that remainder is nil; {remainder}. For N infinite \
-         the gap falls with H/d but not to zero: the ratio of the two lines tends to 1.24, the slope of the relation, \
-         never to 1.{finite_n}",
-        at(first),
-        at(last),
-        at(least),
-    )
+    let values = [
+        ("{first}", at(first)),
+        ("{last}", at(last)),
+        ("{least}", at(least)),
+        ("{ndrc}", format!("{ndrc:.1}")),
+        ("{remainder}", remainder),
+        ("{finite N}", finite_n.to_owned()),
+    ];
+    let text = include_str!("sweep/why.txt").trim_ascii_end();
+    values.iter().fold(format!("{WHY}. {text}"), |text, (slot, value)| text.replace(slot, value))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// What a claim, a fit or a table can come to. The order of the variants is the order of severity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::IntoStaticStr)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -15,6 +15,7 @@ pub enum Verdict {
     /// Cannot be decided: noise, round-off floor, inside an error bound.
     Undecided,
     /// Beyond its limit, not a number, or not as expected.
+    #[default]
     Failed,
 }
 

@@ -260,19 +260,17 @@ pub fn of_scene(name: &str, scene: &Scene, effort: Effort, seed: u64) -> Result<
     let exact = Truth::of(&problem)?.flight;
     let plain = MethodOptions::default();
     let mut studies = Vec::new();
-    // At rest at once, nothing is free.
-    let free = |quantity: &Quantity| exact.end.time > 0.0 && !is_fixed(*quantity, &exact);
+    let is_thick = problem.has_exit() && scene.thickness.is_some_and(|thickness| thickness > 0.0);
+    let critical = is_thick.then(|| critical_velocity::exact_or_refined(scene).ok()).flatten();
+    // A target that never stops the projectile has none; the other quantities go on. At rest at once, nothing is free.
+    let critical = critical.filter(|velocity| *velocity > 0.0);
+    let free = |quantity: &Quantity| match quantity {
+        _ if exact.end.time <= 0.0 || is_fixed(*quantity, &exact) => false,
+        Quantity::CriticalVelocity => critical.is_some(),
+        _ => true,
+    };
     for quantity in QUANTITIES.into_iter().filter(free) {
-        let critical = match quantity {
-            Quantity::CriticalVelocity => {
-                let is_thick = problem.has_exit() && scene.thickness.is_some_and(|thickness| thickness > 0.0);
-                let critical = is_thick.then(|| critical_velocity::exact_or_refined(scene).ok()).flatten();
-                // A target that never stops the projectile has none; the other quantities go on.
-                let Some(critical) = critical.filter(|velocity| *velocity > 0.0) else { continue };
-                Some(critical)
-            }
-            _ => None,
-        };
+        let critical = critical.filter(|_| quantity == Quantity::CriticalVelocity);
         let question = Question { scene, problem: &problem, exact: &exact, critical, quantity };
         let steps_max = if critical.is_some() { STEPS_MAX_CRITICAL } else { STEPS_MAX };
         let time = exact.end.time;
