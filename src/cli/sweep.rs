@@ -191,13 +191,13 @@ type Column = (&'static str, fn(&Row) -> Option<String>);
 
 /// The columns behind the varied numbers.
 const TEXT_COLUMNS: [Column; 7] = [
-    ("V_c", |row| row.critical_velocity.map(significant)),
+    ("V_c", |row| row.critical_velocity_m_s.map(significant)),
     ("E_c", |row| row.dimensionless_energy.map(significant)),
     ("Eq. 15", |row| row.eq15_printed.map(significant)),
     ("over it", |row| row.difference_printed.map(|d| format!("{:+.1} %", 100.0 * d))),
     ("ends", |row| row.outcome.map(|outcome| outcome.name().replace("stopped-in-", "in "))),
-    ("X", |row| row.depth.map(significant)),
-    ("V", |row| row.velocity.map(significant)),
+    ("X", |row| row.depth_m.map(significant)),
+    ("V", |row| row.velocity_m_s.map(significant)),
 ];
 
 /// The lines of the table of `rows`, and the columns behind the varied numbers for which there is no room: a number

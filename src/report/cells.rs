@@ -13,14 +13,14 @@ pub const SETS: [&str; 9] =
 pub fn sets(sets: &[SetSummary]) -> impl Iterator<Item = [String; 9]> {
     sets.iter().map(|set| {
         [
-            one_line(&set.group),
+            one_line(&set.set),
             set.experiments.to_string(),
             format!("{:.2}", set.median),
             format!("{:.2}", set.spread),
             format!("{:.2} to {:.2}", set.least, set.greatest),
-            set.within_band.to_string(),
+            set.within_20_percent.to_string(),
             set.in_range_of_fit.to_string(),
-            format!("{:+.1} %", 100.0 * set.mean_error),
+            format!("{:+.1} %", 100.0 * set.mean_comparison_error),
             set.validation_uncertainty.map_or("not given".to_owned(), |u| format!("{:.1} %", 100.0 * u)),
         ]
     })
@@ -28,15 +28,15 @@ pub fn sets(sets: &[SetSummary]) -> impl Iterator<Item = [String; 9]> {
 
 /// The terms of the validation uncertainty after ASME V&V 20, and what is known of each.
 pub fn uncertainties(comparisons: &[Comparison]) -> [(&'static str, String); 3] {
-    let numerical = comparisons.iter().map(|c| c.numerical_uncertainty / c.predicted).fold(0.0, f64::max);
+    let numerical = comparisons.iter().map(|c| c.numerical_uncertainty_m / c.predicted_depth_m).fold(0.0, f64::max);
     let given = |get: fn(&Comparison) -> Option<f64>, remedy| match comparisons.iter().filter_map(get).count() {
         0 => format!("not given{remedy}"),
         some => format!("given for {some} of {}", count(comparisons.len(), "test")),
     };
     [
         ("u_num, numerical", format!("{} of the depth at most", number(numerical, 2))),
-        ("u_input, inputs", given(|c| c.input_uncertainty, " (`experiments --spread` states one)")),
-        ("u_D, data", given(|c| c.experiment.depth_uncertainty, " by the sources")),
+        ("u_input, inputs", given(|c| c.input_uncertainty_m, " (`experiments --spread` states one)")),
+        ("u_D, data", given(|c| c.experiment.data_uncertainty_m, " by the sources")),
     ]
 }
 

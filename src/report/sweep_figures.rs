@@ -110,7 +110,7 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Option<Figure> {
         let column = if shown == 1 { 0 } else { index * (inner - 1) / (shown - 1) };
         let points = (0..first.count).filter_map(|i| {
             let row = &rows[i * inner + column];
-            Some((row.values[0], row.critical_velocity?))
+            Some((row.values[0], row.critical_velocity_m_s?))
         });
         let name = |axis: &sweep::Axis| format!("{} = {}", axis.parameter, number(axis.value(column), 4));
         panel = panel.series(rest.first().map_or_else(String::new, name), Style::line(index), points);
@@ -152,7 +152,10 @@ pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene], 
 ///
 /// `None` without a test.
 pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option<Figure> {
-    let depths = comparisons.iter().flat_map(|c| [c.experiment.depth, c.predicted]).filter(|depth| *depth > 0.0);
+    let depths = comparisons
+        .iter()
+        .flat_map(|c| [c.experiment.measured_depth_m, c.predicted_depth_m])
+        .filter(|depth| *depth > 0.0);
     let [low, high] = extremes(depths)?;
     let ends = [low / 1.5, high * 1.5];
     let axis = |title| Axis::log(title, "m").over(ends);
@@ -162,10 +165,10 @@ pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option
         .series("equal", Style::REFERENCE, ends.map(|depth| (depth, depth)))
         .tall(290.0);
     for (index, (set, members)) in grouped(comparisons, |c| c.group()).into_iter().enumerate() {
-        let points = members.iter().map(|c| (c.experiment.depth, c.predicted));
+        let points = members.iter().map(|c| (c.experiment.measured_depth_m, c.predicted_depth_m));
         panel = panel.series(set, Style::marks(index).radius(2.5), points);
     }
-    let within: usize = summaries(comparisons).iter().map(|set| set.within_band).sum();
+    let within: usize = summaries(comparisons).iter().map(|set| set.within_20_percent).sum();
     let values = [&number(100.0 * BAND, 2) as &dyn Display, &within, &count(comparisons.len(), "test")];
     Figure::new("measured-depths", "", judged, &values, vec![panel])
 }
@@ -174,9 +177,11 @@ pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option
 pub fn measured_table(comparisons: &[Comparison]) -> String {
     let mut csv = "test_set,line,velocity_m_s,measured_depth_m,predicted_depth_m,ratio,I,N,k,comparison_error_m,numerical_uncertainty_m,input_uncertainty_m,data_uncertainty_m,validation_uncertainty_m\n".to_owned();
     for c in comparisons {
-        let measured = [c.experiment.velocity, c.experiment.depth, c.predicted, c.ratio, c.impact].map(Some);
-        let computed = [c.geometry, Some(c.crater_ratio), Some(c.comparison_error), Some(c.numerical_uncertainty)];
-        let uncertain = [c.input_uncertainty, c.experiment.depth_uncertainty, c.validation_uncertainty];
+        let measured =
+            [c.experiment.velocity_m_s, c.experiment.measured_depth_m, c.predicted_depth_m, c.ratio, c.impact]
+                .map(Some);
+        let computed = [c.geometry, Some(c.crater_ratio), Some(c.comparison_error_m), Some(c.numerical_uncertainty_m)];
+        let uncertain = [c.input_uncertainty_m, c.experiment.data_uncertainty_m, c.validation_uncertainty_m];
         let mut row = vec![Value::Text(&c.experiment.set), Value::Count(c.experiment.line)];
         row.extend(measured.into_iter().chain(computed).chain(uncertain).map(Value::Number));
         push_line(&mut csv, &row);

@@ -244,7 +244,7 @@ fn within(flights_max: u32, resolve: impl Fn(f64) -> Resolved, integrator: &dyn 
     let (bracket, (root, slope)) = if let Some(found) = at_once {
         (bracket, found)
     } else {
-        let bracket = search.narrow(bracket, affine)?;
+        let bracket = if affine { search.narrow(bracket)? } else { bracket };
         let found = search.refine(bracket, flights_max)?;
         (bracket, found.ok_or_else(|| search.not_converged(SPENT.to_owned(), bracket))?)
     };
@@ -481,10 +481,7 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
     }
 
     /// A bracket close around the root that the secant predicts, where W is affine enough for that to hold.
-    fn narrow(&self, wide: Bracket, affine: bool) -> Sought<Bracket> {
-        if !affine {
-            return Ok(wide);
-        }
+    fn narrow(&self, wide: Bracket) -> Sought<Bracket> {
         let root = wide.secant_root();
         // The bracket must be wide against the error bounds at its ends, else their signs mean nothing.
         let bar = 64.0 * wide.resolution() / root;

@@ -56,27 +56,15 @@ pub struct Experiment {
     /// Projectile mass (kg).
     #[serde(skip)]
     pub mass: f64,
-    /// Projectile diameter (m).
+    /// Projectile and target, S of Eq. 14, k = 0.707 + h/d of the nose, B = 1.
     #[serde(skip)]
-    pub diameter: f64,
-    /// Nose.
-    #[serde(skip)]
-    pub nose: NoseShape,
-    /// Unconfined compressive strength (Pa).
-    #[serde(skip)]
-    pub strength: f64,
-    /// Target density (kg/m³).
-    #[serde(skip)]
-    pub density: f64,
+    pub concrete: Concrete,
     /// Impact velocity (m/s).
-    #[serde(rename = "velocity_m_s")]
-    pub velocity: f64,
+    pub velocity_m_s: f64,
     /// Measured depth (m).
-    #[serde(rename = "measured_depth_m")]
-    pub depth: f64,
+    pub measured_depth_m: f64,
     /// Standard uncertainty of the measured depth u_D (m), where the source gives it.
-    #[serde(rename = "data_uncertainty_m")]
-    pub depth_uncertainty: Option<f64>,
+    pub data_uncertainty_m: Option<f64>,
 }
 
 /// A table of experiments; columns of other names are ignored.
@@ -114,17 +102,25 @@ fn experiment_of(row: &Row<'_>, name: &str) -> Result<Experiment, Box<TableError
         }
     };
     let set = row.text(8)?;
+    let (mass, diameter, strength) = (row.number(0)?, row.number(1)? / 1e3, row.number(4)? * 1e6);
     Ok(Experiment {
         set: if set.is_empty() { name } else { set }.to_owned(),
         line: row.at().number(),
-        mass: row.number(0)?,
-        diameter: row.number(1)? / 1e3,
-        nose,
-        strength: row.number(4)? * 1e6,
-        density: row.number(5)?,
-        velocity: row.number(6)?,
-        depth: row.number(7)? / 1e3,
-        depth_uncertainty: row.optional(9)?.map(|uncertainty| uncertainty / 1e3),
+        mass,
+        concrete: Concrete {
+            diameter,
+            nose_factor: nose.factor(),
+            strength,
+            density: row.number(5)?,
+            static_factor: semi_empirical::static_factor(strength),
+            inertia_factor: 1.0,
+            crater_ratio: nose.crater_ratio(),
+            crater_stiffness: CraterStiffness::Continuous,
+            layers: Vec::new(),
+        },
+        velocity_m_s: row.number(6)?,
+        measured_depth_m: row.number(7)? / 1e3,
+        data_uncertainty_m: row.optional(9)?.map(|uncertainty| uncertainty / 1e3),
     })
 }
 
@@ -141,25 +137,17 @@ pub fn shipped() -> Result<Vec<Experiment>, Box<TableError>> {
 }
 
 impl Experiment {
-    /// Its scene: S of Eq. 14, k = 0.707 + h/d unless `crater_ratio` is given, B = 1.
+    /// Its scene, with another k where `crater_ratio` is given.
     pub fn scene(&self, crater_ratio: Option<f64>) -> Scene {
-        let concrete = Concrete {
-            diameter: self.diameter,
-            nose_factor: self.nose.factor(),
-            strength: self.strength,
-            density: self.density,
-            static_factor: semi_empirical::static_factor(self.strength),
-            inertia_factor: 1.0,
-            crater_ratio: crater_ratio.unwrap_or_else(|| self.nose.crater_ratio()),
-            crater_stiffness: CraterStiffness::Continuous,
-            layers: Vec::new(),
-        };
-        Scene { velocity: Some(self.velocity), ..Scene::of_concrete(self.mass, concrete) }
+        let crater_ratio = crater_ratio.unwrap_or(self.concrete.crater_ratio);
+        let concrete = Concrete { crater_ratio, ..self.concrete.clone() };
+        Scene { velocity: Some(self.velocity_m_s), ..Scene::of_concrete(self.mass, concrete) }
     }
 
     /// True if it lies in the range to which S was fitted.
     pub fn is_in_range_of_fit(&self) -> bool {
-        semi_empirical::static_factor_validity(self.strength).valid && self.diameter < 0.0762 && self.velocity < 1200.0
+        let Concrete { strength, diameter, .. } = self.concrete;
+        semi_empirical::static_factor_validity(strength).valid && diameter < 0.0762 && self.velocity_m_s < 1200.0
     }
 }
 
@@ -185,8 +173,8 @@ pub struct MarkedScene {
 /// Where `experiments` stand on the map; those without drag, whose N is infinite, are left out.
 pub fn marked(experiments: &[Experiment]) -> Vec<MarkedScene> {
     let place = |experiment: &Experiment| {
-        let groups = Groups::of(&experiment.scene(None), experiment.velocity)?;
-        let (impact, geometry, crater_ratio) = (groups.impact, groups.geometry?, experiment.nose.crater_ratio());
+        let groups = Groups::of(&experiment.scene(None), experiment.velocity_m_s)?;
+        let (impact, geometry, crater_ratio) = (groups.impact, groups.geometry?, experiment.concrete.crater_ratio);
         let error = model_error(impact, Some(geometry), crater_ratio);
         Some(MarkedScene { set: experiment.set.clone(), impact, geometry, crater_ratio, error })
     };
@@ -201,8 +189,7 @@ pub struct Comparison {
     #[serde(flatten)]
     pub experiment: Experiment,
     /// Predicted depth (m).
-    #[serde(rename = "predicted_depth_m")]
-    pub predicted: f64,
+    pub predicted_depth_m: f64,
     /// Predicted over measured depth.
     pub ratio: f64,
     /// Impact function I.
@@ -215,23 +202,19 @@ pub struct Comparison {
     #[serde(rename = "k")]
     pub crater_ratio: f64,
     /// Comparison error E = S - D (m).
-    #[serde(rename = "comparison_error_m")]
-    pub comparison_error: f64,
+    pub comparison_error_m: f64,
     /// Numerical uncertainty u_num (m): the method's difference from the closed form, at least its last bit.
-    #[serde(rename = "numerical_uncertainty_m")]
-    pub numerical_uncertainty: f64,
+    pub numerical_uncertainty_m: f64,
     /// Uncertainty of the prediction from the stated input spreads u_input (m); `None` where none is stated.
-    #[serde(rename = "input_uncertainty_m")]
-    pub input_uncertainty: Option<f64>,
+    pub input_uncertainty_m: Option<f64>,
     /// Validation uncertainty u_val (m); `None`, not given, unless the source gives u_D and the inputs have spreads.
-    #[serde(rename = "validation_uncertainty_m")]
-    pub validation_uncertainty: Option<f64>,
+    pub validation_uncertainty_m: Option<f64>,
 }
 
 impl Comparison {
     /// True if the measured depth is below half a diameter.
     pub fn is_shallow(&self) -> bool {
-        self.experiment.depth < SHALLOW * self.experiment.diameter
+        self.experiment.measured_depth_m < SHALLOW * self.experiment.concrete.diameter
     }
 
     /// Set, shallow experiments apart.
@@ -294,10 +277,10 @@ fn predict(
 ) -> Studied<Comparison> {
     let scene = experiment.scene(crater_ratio);
     let problem = scene.problem()?;
-    let predicted = integrator.solve(&problem, Detail::End)?.end.depth;
+    let predicted_depth_m = integrator.solve(&problem, Detail::End)?.end.depth;
     let exact = ClosedForm.solve(&problem, Detail::End)?.end.depth;
-    let groups = Groups::of(&scene, experiment.velocity);
-    let input_uncertainty = if spreads.is_empty() {
+    let groups = Groups::of(&scene, experiment.velocity_m_s);
+    let input_uncertainty_m = if spreads.is_empty() {
         None
     } else {
         let derivatives = by_closed_form(&scene)?;
@@ -307,18 +290,18 @@ fn predict(
         };
         Some(spreads.iter().map(|spread| part(spread).powi(2)).sum::<f64>().sqrt())
     };
-    let numerical_uncertainty = (predicted - exact).abs().max(f64::EPSILON * exact);
-    let others = experiment.depth_uncertainty.zip(input_uncertainty);
+    let numerical_uncertainty_m = (predicted_depth_m - exact).abs().max(f64::EPSILON * exact);
+    let others = experiment.data_uncertainty_m.zip(input_uncertainty_m);
     Ok(Comparison {
-        predicted,
-        ratio: predicted / experiment.depth,
+        predicted_depth_m,
+        ratio: predicted_depth_m / experiment.measured_depth_m,
         impact: groups.map_or(f64::NAN, |groups| groups.impact),
         geometry: groups.and_then(|groups| groups.geometry),
         crater_ratio: Parameter::CraterRatio.get(&scene).unwrap_or(f64::NAN),
-        comparison_error: predicted - experiment.depth,
-        numerical_uncertainty,
-        input_uncertainty,
-        validation_uncertainty: others.map(|(data, input)| numerical_uncertainty.hypot(data).hypot(input)),
+        comparison_error_m: predicted_depth_m - experiment.measured_depth_m,
+        numerical_uncertainty_m,
+        input_uncertainty_m,
+        validation_uncertainty_m: others.map(|(data, input)| numerical_uncertainty_m.hypot(data).hypot(input)),
         experiment: experiment.clone(),
     })
 }
@@ -328,8 +311,7 @@ fn predict(
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct SetSummary {
     /// Set, shallow experiments apart.
-    #[serde(rename = "set")]
-    pub group: String,
+    pub set: String,
     /// Number of experiments.
     #[serde(rename = "shots")]
     pub experiments: usize,
@@ -342,13 +324,11 @@ pub struct SetSummary {
     /// Greatest of predicted over measured depth.
     pub greatest: f64,
     /// Experiments within ±20 %.
-    #[serde(rename = "within_20_percent")]
-    pub within_band: usize,
+    pub within_20_percent: usize,
     /// Experiments in the range to which S was fitted.
     pub in_range_of_fit: usize,
     /// Mean of E/D, the comparison error E = S - D relative to the measured depth (ASME V&V 20).
-    #[serde(rename = "mean_comparison_error")]
-    pub mean_error: f64,
+    pub mean_comparison_error: f64,
     /// Root mean square of u_val/D; `null`, not given, unless every experiment has it.
     pub validation_uncertainty: Option<f64>,
 }
@@ -373,7 +353,7 @@ pub fn grouped<T: Copy, K: PartialEq>(items: impl IntoIterator<Item = T>, key: i
 }
 
 /// `of_group` has at least one comparison.
-fn summary(group: String, of_group: &[&Comparison]) -> SetSummary {
+fn summary(set: String, of_group: &[&Comparison]) -> SetSummary {
     let mut ratios: Vec<f64> = of_group.iter().map(|c| c.ratio).collect();
     ratios.sort_by(f64::total_cmp);
     let experiments = ratios.len();
@@ -381,17 +361,17 @@ fn summary(group: String, of_group: &[&Comparison]) -> SetSummary {
     let mean = ratios.iter().sum::<f64>() / count;
     let squares: f64 = ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum();
     let relative: Option<Vec<f64>> =
-        of_group.iter().map(|c| Some(c.validation_uncertainty? / c.experiment.depth)).collect();
+        of_group.iter().map(|c| Some(c.validation_uncertainty_m? / c.experiment.measured_depth_m)).collect();
     SetSummary {
-        group,
+        set,
         experiments,
         median: 0.5 * (ratios[(experiments - 1) / 2] + ratios[experiments / 2]),
         spread: (squares / count).sqrt(),
         least: ratios[0],
         greatest: ratios[experiments - 1],
-        within_band: ratios.iter().filter(|ratio| (*ratio - 1.0).abs() <= BAND).count(),
+        within_20_percent: ratios.iter().filter(|ratio| (*ratio - 1.0).abs() <= BAND).count(),
         in_range_of_fit: of_group.iter().filter(|c| c.experiment.is_in_range_of_fit()).count(),
-        mean_error: mean - 1.0,
+        mean_comparison_error: mean - 1.0,
         validation_uncertainty: relative.map(|all| (all.iter().map(|u| u * u).sum::<f64>() / count).sqrt()),
     }
 }
@@ -407,7 +387,7 @@ mod tests {
     }
 
     fn of(summaries: &[SetSummary], group: &str) -> SetSummary {
-        summaries.iter().find(|s| s.group == group).unwrap().clone()
+        summaries.iter().find(|s| s.set == group).unwrap().clone()
     }
 
     #[test]
@@ -465,16 +445,16 @@ mod tests {
         let experiments = read("own.csv", table.as_bytes(), "own").unwrap();
         let spreads = ["projectile.mass=1%".parse().unwrap()];
         let with = compare(&experiments, None, &spreads, &Taylor::default()).unwrap();
-        let input = with[0].input_uncertainty.unwrap();
-        let total = with[0].validation_uncertainty.unwrap();
+        let input = with[0].input_uncertainty_m.unwrap();
+        let total = with[0].validation_uncertainty_m.unwrap();
         assert!(input > 0.0 && (total * total - input * input - 25e-6).abs() < 1e-12, "{input} {total}");
-        assert!(compare(&experiments, None, &[], &Taylor::default()).unwrap()[0].validation_uncertainty.is_none());
+        assert!(compare(&experiments, None, &[], &Taylor::default()).unwrap()[0].validation_uncertainty_m.is_none());
     }
 
     #[test]
     fn numerical_uncertainty_is_round_off() {
         for c in compared(None) {
-            assert!(c.numerical_uncertainty / c.predicted < 1e-13, "{c:?}");
+            assert!(c.numerical_uncertainty_m / c.predicted_depth_m < 1e-13, "{c:?}");
         }
     }
 

@@ -394,7 +394,9 @@ pub fn self_convergence(grids: &[GridValue], level: f64) -> Result<SelfConvergen
     let limit_band = model.limit_band(&best, verdict_band, model.drop_at(level));
     let rounding: f64 = (0..table.len()).map(|i| model.rounding(i).powi(2)).sum();
     // Likelihood ratio to the constant, as the tail of F with 2 and n - 3 degrees of freedom.
-    let constant = -0.5 * n * ((model.constant_sum() + rounding) / n).ln();
+    let mean = table.iter().map(|grid| grid.value).sum::<f64>() / n;
+    let squares: f64 = table.iter().map(|grid| (grid.value - mean).powi(2)).sum();
+    let constant = -0.5 * n * ((squares + rounding) / n).ln();
     let chance = ((constant - best.likelihood) * (n - 3.0) / n).exp();
     let trend = trend_chance(&table.iter().map(|grid| grid.value).collect::<Vec<_>>());
     let [low, high] = interval95;
@@ -598,25 +600,15 @@ impl<'a> Separable<'a> {
     /// The best of a scan over the orders, refined between its neighbours.
     fn search(fit: impl Fn(f64) -> Fit, worse: impl Fn(&Fit, &Fit) -> bool) -> Fit {
         let grid = |i: usize| ORDER_MAX * (i as f64 / 100.0 - 1.0) + 1e-9;
-        let mut best = fit(grid(0));
-        for i in 1..=200 {
-            let next = fit(grid(i));
-            if worse(&best, &next) {
-                best = next;
-            }
-        }
+        let better = |best: Fit, next: Fit| if worse(&best, &next) { next } else { best };
+        let best = (1..=200).map(|i| fit(grid(i))).fold(fit(grid(0)), &better);
         let (mut low, mut high) = (best.order - 0.1, best.order + 0.1);
         let golden = 0.618_033_988_749_894_9;
         for _ in 0..60 {
             let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-            if worse(&fit(a), &fit(b)) {
-                low = a;
-            } else {
-                high = b;
-            }
+            (low, high) = if worse(&fit(a), &fit(b)) { (a, high) } else { (low, b) };
         }
-        let refined = fit(0.5 * (low + high));
-        if worse(&best, &refined) { refined } else { best }
+        better(best, fit(0.5 * (low + high)))
     }
 
     fn least(&self, weights: Weights) -> Fit {
@@ -683,11 +675,6 @@ impl<'a> Separable<'a> {
     fn monotone(&self) -> bool {
         let differences = self.differences();
         differences.iter().all(|d| *d > 0.0) || differences.iter().all(|d| *d < 0.0)
-    }
-
-    fn constant_sum(&self) -> f64 {
-        let mean = self.table.iter().map(|grid| grid.value).sum::<f64>() / self.table.len() as f64;
-        self.table.iter().map(|grid| (grid.value - mean).powi(2)).sum()
     }
 
     fn range(&self) -> f64 {

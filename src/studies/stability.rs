@@ -35,13 +35,10 @@ pub fn growth_in_theory(velocity: VelocityAt, w_dt: f64, drag_dt: f64) -> f64 {
 }
 
 /// The free linear motion at unit frequency scale: M = 1, dt = 1, so that s = a² and r = g; V0 = 1.
-fn motion(w_dt: f64, drag_dt: f64) -> Problem {
-    let law = Stage { static_force: 0.0, stiffness: w_dt * w_dt, viscosity: drag_dt, drag: 0.0, end: f64::INFINITY };
-    Problem::of_stages(1.0, 1.0, [law])
-}
-
 fn states(velocity: VelocityAt, w_dt: f64, drag_dt: f64, count: usize) -> Result<Vec<State>, IntegrationError> {
-    CentralDifference::uniform(1.0, velocity, Boundaries::StepEnd).free_states(&motion(w_dt, drag_dt), count)
+    let law = Stage { stiffness: w_dt * w_dt, viscosity: drag_dt, ..Stage::free() };
+    let motion = Problem::of_stages(1.0, 1.0, [law]);
+    CentralDifference::uniform(1.0, velocity, Boundaries::StepEnd).free_states(&motion, count)
 }
 
 /// Growth per step, measured: of the largest of depth and velocity, between the second and the last fifth of a run.

@@ -173,17 +173,13 @@ pub struct Row {
     #[cfg_attr(feature = "report", schemars(with = "Option<String>"))]
     pub outcome: Option<Outcome>,
     /// Depth at the end (m).
-    #[serde(rename = "depth_m")]
-    pub depth: Option<f64>,
+    pub depth_m: Option<f64>,
     /// Velocity at the end (m/s).
-    #[serde(rename = "velocity_m_s")]
-    pub velocity: Option<f64>,
+    pub velocity_m_s: Option<f64>,
     /// V_c (m/s), where the target has a far side.
-    #[serde(rename = "critical_velocity_m_s")]
-    pub critical_velocity: Option<f64>,
+    pub critical_velocity_m_s: Option<f64>,
     /// E_c (J).
-    #[serde(rename = "critical_energy_j")]
-    pub critical_energy: Option<f64>,
+    pub critical_energy_j: Option<f64>,
     /// `E_c/(d³ fc)` by the criterion of the scene.
     pub dimensionless_energy: Option<f64>,
     /// Eq. 15 as printed, `E_c/(d³ fc)`.
@@ -214,10 +210,10 @@ pub type RowColumn = (&'static str, Kind, fn(&Row) -> Value<'_>);
 /// The columns of the table behind the varied numbers.
 pub const COLUMNS: [RowColumn; 13] = [
     ("outcome", Kind::Text, |row| Value::Text(row.outcome.map_or("", Outcome::name))),
-    ("depth_m", Kind::Number, |row| Value::Number(row.depth)),
-    ("velocity_m_s", Kind::Number, |row| Value::Number(row.velocity)),
-    ("critical_velocity_m_s", Kind::Number, |row| Value::Number(row.critical_velocity)),
-    ("critical_energy_j", Kind::Number, |row| Value::Number(row.critical_energy)),
+    ("depth_m", Kind::Number, |row| Value::Number(row.depth_m)),
+    ("velocity_m_s", Kind::Number, |row| Value::Number(row.velocity_m_s)),
+    ("critical_velocity_m_s", Kind::Number, |row| Value::Number(row.critical_velocity_m_s)),
+    ("critical_energy_j", Kind::Number, |row| Value::Number(row.critical_energy_j)),
     ("dimensionless_energy", Kind::Number, |row| Value::Number(row.dimensionless_energy)),
     ("eq15_printed", Kind::Number, |row| Value::Number(row.eq15_printed)),
     ("eq15_unrounded", Kind::Number, |row| Value::Number(row.eq15_unrounded)),
@@ -335,11 +331,11 @@ impl Plan {
         if let Some(speed) = scene.velocity {
             let flight = integrator.solve(&scene.resolve(speed)?, Detail::End)?;
             row.outcome = Some(flight.outcome);
-            (row.depth, row.velocity) = (Some(flight.end.depth), Some(flight.end.velocity));
+            (row.depth_m, row.velocity_m_s) = (Some(flight.end.depth), Some(flight.end.velocity));
         }
         let critical = scene.thickness.map(|_| critical_velocity::of_scene(scene, integrator)).transpose();
         if let Ok(Some(found)) = &critical {
-            (row.critical_velocity, row.critical_energy) = (Some(found.velocity), Some(found.energy));
+            (row.critical_velocity_m_s, row.critical_energy_j) = (Some(found.velocity), Some(found.energy));
         }
         self.compare(scene, integrator, row);
         critical?;
@@ -349,7 +345,7 @@ impl Plan {
     /// What a slab of one concrete has beyond its critical velocity: dimensionless energies and Eq. 15.
     fn compare(&self, scene: &Scene, integrator: &dyn Integrator, row: &mut Row) {
         let Some(concrete) = scene.concrete().filter(|concrete| concrete.layers.is_empty()) else { return };
-        row.dimensionless_energy = row.critical_energy.map(|energy| dimensionless_energy(energy, concrete));
+        row.dimensionless_energy = row.critical_energy_j.map(|energy| dimensionless_energy(energy, concrete));
         row.geometry = Groups::of(scene, 0.0).and_then(|groups| groups.geometry);
         let Some(thickness) = scene.thickness else { return };
         let ratio = thickness / concrete.diameter;
@@ -529,18 +525,18 @@ mod tests {
         Parameter::Strength.set(&mut scene, 40e6).unwrap();
         scene.thickness = Some(4.0 * 0.06);
         assert_eq!(
-            rows[3].critical_velocity.unwrap(),
+            rows[3].critical_velocity_m_s.unwrap(),
             critical_velocity::of_scene(&scene, &Taylor::default()).unwrap().velocity
         );
         let exact = critical_velocity::exact(&scene).unwrap();
-        assert!((rows[3].critical_velocity.unwrap() / exact - 1.0).abs() < 1e-13);
+        assert!((rows[3].critical_velocity_m_s.unwrap() / exact - 1.0).abs() < 1e-13);
     }
 
     #[test]
     fn order_of_the_axes_does_not_matter_to_a_point() {
         let a = plan(&["projectile.diameter=50mm:70mm:2", "H/d=3:5:2"]).run(&Energy::new());
         let b = plan(&["H/d=3:5:2", "projectile.diameter=50mm:70mm:2"]).run(&Energy::new());
-        assert_eq!(a[1].critical_velocity, b[2].critical_velocity);
+        assert_eq!(a[1].critical_velocity_m_s, b[2].critical_velocity_m_s);
         assert_eq!(a[1].thickness_ratio.map(|r| (r * 1e9).round()), Some(5e9));
     }
 
@@ -549,13 +545,13 @@ mod tests {
         let rows = plan(&["projectile.mass=-1:1:3"]).run(&Taylor::default());
         assert!(rows[0].error.contains("mass"), "{}", rows[0].error);
         assert!(rows[1].error.contains("mass"), "{}", rows[1].error);
-        assert!(rows[2].error.is_empty() && rows[2].critical_velocity.is_some());
+        assert!(rows[2].error.is_empty() && rows[2].critical_velocity_m_s.is_some());
     }
 
     #[test]
     fn an_impact_function_moves_the_flight_and_not_the_critical_velocity() {
         let rows = plan(&["I=1:100:5:log"]).run(&Taylor::default());
-        assert!(rows.windows(2).all(|pair| pair[0].critical_velocity == pair[1].critical_velocity));
+        assert!(rows.windows(2).all(|pair| pair[0].critical_velocity_m_s == pair[1].critical_velocity_m_s));
         assert_eq!(rows[0].outcome, Some(Outcome::StoppedInCrater));
         assert_eq!(rows[4].outcome, Some(Outcome::Perforated));
     }

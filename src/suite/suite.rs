@@ -15,12 +15,6 @@ use crate::exchange::diagnostic::{Dialect, Fault, did_you_mean, nearest, read_te
 use crate::exchange::scene_file::SHIPPED;
 use crate::physics::{Problem, Scene, Shown};
 
-/// The suite that ships.
-pub const EMBEDDED: &str = include_str!("../../verification/suite.toml");
-
-/// The suite of the edge cases, which `stress` runs.
-pub const EDGES: &str = include_str!("../../verification/edges.toml");
-
 /// Scenes by the name that claims use, each resolved once.
 #[derive(Clone, Debug, Default)]
 pub struct Scenes(BTreeMap<String, (Scene, Result<Problem, String>)>);
@@ -89,7 +83,7 @@ impl Suite {
     /// # Errors
     /// Only if the shipped files are broken, which a test excludes.
     pub fn embedded() -> Result<Self, Box<SceneError>> {
-        Self::from_toml(EMBEDDED, "verification/suite.toml", None).map(|suite| Self { is_embedded: true, ..suite })
+        Self::from_toml(include_str!("../../verification/suite.toml"), "verification/suite.toml", None)
     }
 
     /// The edge cases: events, step sizes and range, the search for the critical velocity.
@@ -97,7 +91,7 @@ impl Suite {
     /// # Errors
     /// Only if the shipped file is broken, which a test excludes.
     pub fn edges() -> Result<Self, Box<SceneError>> {
-        Self::from_toml(EDGES, "verification/edges.toml", None).map(|suite| Self { is_embedded: true, ..suite })
+        Self::from_toml(include_str!("../../verification/edges.toml"), "verification/edges.toml", None)
     }
 
     /// The suite in the file at `path`; its scenes are files beside it, or shipped ones by name.
@@ -171,7 +165,7 @@ impl Suite {
             }
             claims.extend(spec.expand());
         }
-        Ok(Self { title: read.title, is_embedded: false, text: text.to_owned(), scenes, claims })
+        Ok(Self { title: read.title, is_embedded: folder.is_none(), text: text.to_owned(), scenes, claims })
     }
 
     /// Keeps the claims whose id contains `pattern`.

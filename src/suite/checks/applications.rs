@@ -55,7 +55,7 @@ fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
         let (full, ndrc) = (by(Criterion::FullDepth)?, by(Criterion::Ndrc)?);
         let own = if scene.criterion == Criterion::Ndrc { ndrc } else { full };
         for (found, exact) in [
-            (row.critical_velocity, own.0),
+            (row.critical_velocity_m_s, own.0),
             (row.dimensionless_energy, own.1),
             (row.energy_full_depth, full.1),
             (row.energy_ndrc, ndrc.1),
@@ -89,7 +89,7 @@ fn measured_depth(subject: &Subject<'_>) -> Found {
     let deep: Vec<_> = comparisons.iter().filter(|c| !c.is_shallow()).cloned().collect();
     let mut worst = Worst::default();
     for set in experiments::summaries(&deep) {
-        let place = || format!("in {}: median {:.3} of {} tests", set.group, set.median, set.experiments);
+        let place = || format!("in {}: median {:.3} of {} tests", set.set, set.median, set.experiments);
         worst.take((set.median - 1.0).abs(), place);
     }
     Ok(worst.measurement().evidence(Evidence::Depths(comparisons)))

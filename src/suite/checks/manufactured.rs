@@ -67,41 +67,39 @@ impl ManufacturedPath {
             Self::Kink => &[KINK, END],
         }
     }
+}
 
-    /// x_m(t) (m) in stage `stage`: always forward, at a speed that swings between 0.4 and 1.6 m/s.
-    ///
-    /// Behind the kink a term in (t - t_k)² joins it: x_m' has a kink there and x_m'' a jump, so that a step around it
-    /// with the acceleration of one side alone shows.
-    #[expect(clippy::unused_self, reason = "the path is the manufactured problem's, whatever its law")]
-    fn depth(self, stage: usize, t: Dual2_64) -> Dual2_64 {
+/// x_m(t) (m) in stage `stage`, its velocity and its acceleration: always forward, at a speed that swings between 0.4
+/// and 1.6 m/s.
+///
+/// Behind the kink a term in (t - t_k)² joins it: x_m' has a kink there and x_m'' a jump, so that a step around it
+/// with the acceleration of one side alone shows.
+fn path_at(stage: usize, t: f64) -> (f64, f64, f64) {
+    let depth = |t: Dual2_64| {
         let path = t + (t * 3.0).sin() * 0.2;
         if stage == 0 { path } else { path + (t - KINK).powi(2) * 0.8 }
-    }
+    };
+    second_derivative(depth, t)
+}
 
-    /// The path's depth, velocity and acceleration at `t`.
-    fn at(self, stage: usize, t: f64) -> (f64, f64, f64) {
-        second_derivative(|t| self.depth(stage, t), t)
-    }
-
-    /// S(t) (N) in stage `stage`.
-    fn source(self, problem: &Problem, stage: usize, t: f64) -> f64 {
-        let (x, v, a) = self.at(stage, t);
-        problem.mass * a + problem.stages[stage].force(x, v)
-    }
+/// S(t) (N) in stage `stage`.
+fn source(problem: &Problem, stage: usize, t: f64) -> f64 {
+    let (x, v, a) = path_at(stage, t);
+    problem.mass * a + problem.stages[stage].force(x, v)
 }
 
 fn order(&Manufactured { path, order: expected }: &Manufactured, subject: &Subject<'_>) -> Found {
-    let (_, impact_speed, _) = path.at(0, 0.0);
+    let (_, impact_speed, _) = path_at(0, 0.0);
     let problem = Problem::of_stages(MASS, impact_speed, [FIRST, SECOND]);
     let ends = path.ends();
-    let (amplitude, ..) = path.at(ends.len() - 1, END);
+    let (amplitude, ..) = path_at(ends.len() - 1, END);
     let error =
         |size: f64| -> Found<StepError> {
             let states = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries)
-                .forced_states(&problem, |stage, t| path.source(&problem, stage, t), ends)?;
+                .forced_states(&problem, |stage, t| source(&problem, stage, t), ends)?;
             let off = |state: &State| {
                 let stage = ends.iter().take_while(|&&end| end < state.time).count().min(ends.len() - 1);
-                state.depth - path.at(stage, state.time).0
+                state.depth - path_at(stage, state.time).0
             };
             // `f64::max` would drop a NaN.
             let worst = states.iter().map(off).fold(0.0, |a: f64, b| if b.abs() <= a.abs() { a } else { b });
@@ -126,15 +124,14 @@ mod tests {
             let v = 1.0 + 0.6 * (3.0 * t).cos() + 2.0 * bend * (t - KINK);
             let a = -1.8 * (3.0 * t).sin() + 2.0 * bend;
             let by_hand = MASS * a + problem.stages[stage].force(x, v);
-            let error = ManufacturedPath::Kink.source(&problem, stage, t) - by_hand;
+            let error = source(&problem, stage, t) - by_hand;
             assert!(error.abs() < 1e-14 * by_hand.abs().max(1.0), "stage {stage}, t = {t}: {error:e}");
         }
     }
 
     #[test]
     fn depth_and_velocity_are_continuous_through_the_kink_and_acceleration_and_source_jump() {
-        let path = ManufacturedPath::Kink;
-        let (before, after) = (path.at(0, KINK), path.at(1, KINK));
+        let (before, after) = (path_at(0, KINK), path_at(1, KINK));
         assert_eq!((before.0, before.1), (after.0, after.1));
         assert!((after.2 - before.2 - 1.6).abs() < 1e-14);
     }

@@ -5,10 +5,11 @@
 
 /// Declares checks: `Name { fields } in Section, "unit", by function;`.
 ///
-/// The function is called with the subject, after the check itself where that has fields.
+/// The function is called with the subject, after the check itself where that has fields. One that is declared with
+/// `counting` in place of `by` counts violations.
 macro_rules! check {
     ($($(#[$about:meta])* $name:ident { $($(#[$of:meta])* $field:ident: $type:ty),* $(,)? }
-        in $section:ident, $unit:literal, by $measure:ident;)*) => {$(
+        in $section:ident, $unit:literal, $how:ident $measure:ident;)*) => {$(
         $(#[$about])*
         #[doc = concat!("\n\nUnit: ", $unit, ".")]
         #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
@@ -25,12 +26,16 @@ macro_rules! check {
                 &self,
                 subject: &$crate::suite::checks::Subject<'_>,
             ) -> $crate::suite::claim::Found {
-                check!(@call self, subject, $measure, $($field)*)
+                check!(@$how self, subject, $measure, $($field)*)
             }
         }
     )*};
-    (@call $self:ident, $subject:ident, $measure:ident,) => { $measure($subject) };
-    (@call $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => { $measure($self, $subject) };
+    (@by $self:ident, $subject:ident, $measure:ident,) => { $measure($subject) };
+    (@by $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => { $measure($self, $subject) };
+    (@counting $self:ident, $subject:ident, $measure:ident,) => { super::counted(|seen| $measure($subject, seen)) };
+    (@counting $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => {
+        super::counted(|seen| $measure($self, $subject, seen))
+    };
 }
 
 /// Skips the claim with a reason where it does not apply.

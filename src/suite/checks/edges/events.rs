@@ -15,30 +15,30 @@ use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 check! {
     /// E1 of `verification/edges.toml`.
-    GrazingLadder {} in Events, "violations", by grazing_ladder;
+    GrazingLadder {} in Events, "violations", counting grazing_ladder;
     /// E2 of `verification/edges.toml`.
-    Scan {} in Events, "violations", by scan;
+    Scan {} in Events, "violations", counting scan;
     /// E3 of `verification/edges.toml`.
-    BothCrossings {} in Events, "violations", by both_crossings;
+    BothCrossings {} in Events, "violations", counting both_crossings;
     /// E4 of `verification/edges.toml`.
-    ExactlyCritical {} in Events, "violations", by exactly_critical;
+    ExactlyCritical {} in Events, "violations", counting exactly_critical;
     /// E5 of `verification/edges.toml`.
-    TripleCoincidence {} in Events, "violations", by triple_coincidence;
+    TripleCoincidence {} in Events, "violations", counting triple_coincidence;
     /// E6 of `verification/edges.toml`.
-    ThinTargets {} in Events, "violations", by thin_targets;
+    ThinTargets {} in Events, "violations", counting thin_targets;
     /// E7 to E9 of `verification/edges.toml`: a constant force over 1 m from 10 m/s, in stages that end at `ends`.
     StageEnds {
         /// Depths (m), ascending.
         ends: Vec<f64>,
         /// How many events there are.
         events: usize,
-    } in Events, "violations", by stage_ends;
+    } in Events, "violations", counting stage_ends;
     /// E10 of `verification/edges.toml`.
     ScaledForces {} in Events, "promises", by scaled_forces;
     /// E11 of `verification/edges.toml`.
-    Plateau {} in Events, "violations", by plateau;
+    Plateau {} in Events, "violations", counting plateau;
     /// E12 of `verification/edges.toml`.
-    AtAStepEnd {} in Events, "violations", by at_a_step_end;
+    AtAStepEnd {} in Events, "violations", counting at_a_step_end;
     /// E13 of `verification/edges.toml`.
     SmallTimesAndFarStarts {} in Events, "promises", by small_times_and_far_starts;
     /// E14 of `verification/edges.toml`.
@@ -52,7 +52,7 @@ check! {
     /// E18 of `verification/edges.toml`.
     AcrossTheCraterEnd {} in Events, "promises", by across_the_crater_end;
     /// E19 of `verification/edges.toml`.
-    ApproachedForEver {} in Events, "violations", by approached_for_ever;
+    ApproachedForEver {} in Events, "violations", counting approached_for_ever;
 }
 
 /// Widest |margin| at which a method may still be undecided.
@@ -76,8 +76,7 @@ fn check_outcome(subject: &Subject<'_>, problem: &Problem, seen: &mut Violations
     Ok(flight.outcome)
 }
 
-fn grazing_ladder(subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn grazing_ladder(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     for drag in [false, true] {
         let scene = slab(drag);
         let critical = critical_velocity::exact(&scene)?;
@@ -86,21 +85,20 @@ fn grazing_ladder(subject: &Subject<'_>) -> Found {
             let mut both = true;
             for sign in [-1.0, 1.0] {
                 let problem = scene.resolve(critical * (1.0 + sign * 10f64.powi(-j)))?;
-                both &= check_outcome(subject, &problem, &mut seen)? != Outcome::Undecided;
+                both &= check_outcome(subject, &problem, seen)? != Outcome::Undecided;
             }
             if both {
                 decided = j;
             }
         }
-        check_outcome(subject, &scene.resolve(critical)?, &mut seen)?;
+        check_outcome(subject, &scene.resolve(critical)?, seen)?;
         seen.notes.push(format!("decided to 1e-{decided} {}", if drag { "with drag" } else { "without drag" }));
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn scan(subject: &Subject<'_>) -> Found {
+fn scan(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     const SIDE: i32 = 250;
-    let mut seen = Violations::default();
     for drag in [false, true] {
         let scene = slab(drag);
         let critical = critical_velocity::exact(&scene)?;
@@ -123,24 +121,22 @@ fn scan(subject: &Subject<'_>) -> Found {
         seen.expect(flips == 1, || format!("{flips} flips"));
         seen.notes.push(format!("{flips} flip, {undecided} undecided"));
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn both_crossings(subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn both_crossings(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     for j in 1..=14 {
         for side in [-1.0, 1.0] {
             // X = M V0²/(2 P) = 0.5 m.
             let exit = 0.5 * (1.0 + side * 10f64.powi(-j));
             let problem = Problem::of_stages(1.0, 10.0, [Stage::tunnel(100.0, 0.0)]).with_exit(exit);
-            check_outcome(subject, &problem, &mut seen)?;
+            check_outcome(subject, &problem, seen)?;
         }
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn exactly_critical(subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn exactly_critical(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     // Sums and products of powers of two are exact: X = H to the last bit.
     for scale in [1.0, 2f64.powi(-20), 2f64.powi(20)] {
         let problem = Problem::of_stages(2.0, 16.0 * scale, [Stage::tunnel(256.0, 0.0)]).with_exit(scale * scale);
@@ -153,7 +149,7 @@ fn exactly_critical(subject: &Subject<'_>) -> Found {
         let left = flight.end.velocity / problem.impact_speed;
         seen.expect(left * left <= 1e3 * subject.promise(), || format!("leaves at {left:e} V0"));
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
 fn kinds(flight: &Flight) -> Vec<EventKind> {
@@ -171,15 +167,14 @@ fn check_order(flight: &Flight, seen: &mut Violations) {
     }
 }
 
-fn triple_coincidence(subject: &Subject<'_>) -> Found {
+fn triple_coincidence(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     use EventKind::{CraterEnd, Exit, Rest};
-    let mut seen = Violations::default();
     for offset in [-1e-6, -1e-12, 0.0, 1e-12, 1e-6] {
         // c = P/(k d), Q = 0: V0 = 1 comes to rest at 1 m = k d = H.
         let problem = concrete(1.0, 1.0 + offset, [1.0, 1.0], [1.0, 0.0]).with_exit(1.0);
         let flight = subject.flight(&problem)?;
         let found = kinds(&flight);
-        check_order(&flight, &mut seen);
+        check_order(&flight, seen);
         let allowed: &[&[EventKind]] = match flight.outcome {
             Outcome::Perforated => &[&[CraterEnd, Exit], &[CraterEnd, Exit, Rest]],
             Outcome::StoppedInCrater | Outcome::StoppedInTunnel => &[&[Rest]],
@@ -193,11 +188,10 @@ fn triple_coincidence(subject: &Subject<'_>) -> Found {
         };
         seen.expect(right, || format!("{} at {offset:e}", flight.outcome));
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn thin_targets(subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn thin_targets(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let scene = slab(true);
     let problem = scene.resolve(400.0)?;
     let depth = problem.stages[0].end;
@@ -230,13 +224,12 @@ fn thin_targets(subject: &Subject<'_>) -> Found {
             let error = (flight.end.velocity - exact(&thin)?.end.velocity.hi()).abs() / 400.0;
             seen.expect(error <= 1e3 * subject.promise(), || format!("V_r off by {error:e} at H = {exit:e}"));
         }
-        check_order(&flight, &mut seen);
+        check_order(&flight, seen);
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     holds!(ends.is_sorted(), "the stages do not end one behind the other");
     let stages = ends.iter().chain([&f64::INFINITY]).map(|end| Stage::tunnel(20.0, 0.0).until(*end));
     let problem = Problem::of_stages(1.0, 10.0, stages).with_exit(1.0);
@@ -245,7 +238,7 @@ fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>) -> 
     let (found, expected) = (kinds(&flight), kinds(&exact));
     seen.expect(expected.len() == *events, || format!("the case itself has {} events", expected.len()));
     seen.expect(found == expected, || format!("{found:?}"));
-    check_order(&flight, &mut seen);
+    check_order(&flight, seen);
     for (event, exact) in flight.events.iter().zip(&exact.events) {
         let time = (event.state.time - exact.state.time).abs() / exact.state.time.max(f64::MIN_POSITIVE);
         let speed = (event.state.velocity - exact.state.velocity).abs() / problem.impact_speed;
@@ -254,7 +247,7 @@ fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>) -> 
         });
     }
     seen.expect(flight.cost.steps < 10_000, || format!("{} steps", flight.cost.steps));
-    Ok(seen.measurement())
+    Ok(())
 }
 
 fn scaled_forces(subject: &Subject<'_>) -> Found {
@@ -279,8 +272,7 @@ fn scaled_forces(subject: &Subject<'_>) -> Found {
 }
 
 /// A spring of 1 kN/m over half a metre, then 1 kg/s over another, 1 kg: V_c² = s (1/2)² + (r/2)².
-fn approached_for_ever(subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn approached_for_ever(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let spring = Stage { stiffness: 1e3, end: 0.5, ..Stage::free() };
     let slowing = Stage { viscosity: 1.0, ..Stage::free() };
     let at = |speed| Problem::of_stages(1.0, speed, [spring, slowing]).with_exit(1.0);
@@ -302,11 +294,10 @@ fn approached_for_ever(subject: &Subject<'_>) -> Found {
     seen.expect((found.velocity - critical).abs() <= found.error_bar.unwrap_or(0.0), || {
         format!("V_c {} +- {:?}", found.velocity, found.error_bar)
     });
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn plateau(subject: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn plateau(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let gap = Stage::free().until(1.0);
     let open = Stage::free();
     let flight = subject.flight(&Problem::of_stages(1.0, 3.0, [gap, open]).with_exit(2.0))?;
@@ -321,11 +312,10 @@ fn plateau(subject: &Subject<'_>) -> Found {
     let flight = subject.flight(&Problem::of_stages(1.0, 3.0, [gap, Stage::tunnel(9.0, 0.0)]))?;
     let error = off(flight.end.depth, 1.5);
     seen.expect(error <= 1e3 * subject.promise(), || format!("stops off by {error:e}"));
-    Ok(seen.measurement())
+    Ok(())
 }
 
-fn at_a_step_end(_: &Subject<'_>) -> Found {
-    let mut seen = Violations::default();
+fn at_a_step_end(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let dt = 2f64.powi(-10);
     for velocity in VelocityAt::ALL {
         for boundaries in Boundaries::ALL {
@@ -351,7 +341,7 @@ fn at_a_step_end(_: &Subject<'_>) -> Found {
             seen.expect((flight.end.time, flight.end.depth) == (0.5, 0.25), || format!("{name}: {}", flight.end));
         }
     }
-    Ok(seen.measurement())
+    Ok(())
 }
 
 fn small_times_and_far_starts(subject: &Subject<'_>) -> Found {

@@ -63,6 +63,13 @@ impl Violations {
     }
 }
 
+/// What `check` counts.
+fn counted(check: impl FnOnce(&mut Violations) -> Found<()>) -> Found {
+    let mut seen = Violations::default();
+    check(&mut seen)?;
+    Ok(seen.measurement())
+}
+
 /// The solution in double-double.
 fn exact(problem: &Problem) -> Found<Flight<TwoFloat>> {
     Ok(Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events)?)
