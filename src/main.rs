@@ -5,5 +5,5 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    penetrode::cli::Cli::parse().run().into()
+    ExitCode::from(penetrode::cli::Cli::parse().run() as u8)
 }

@@ -114,7 +114,7 @@ fn times_itself(peer: BundledPeer, environment: &Environment) -> Check {
     let request = flight("perforate")?.request;
     for options in if peer == BundledPeer::Heyoka { &["", " --lanes 4"][..] } else { &[""] } {
         let mut live = Peer::start(&format!("{}{options}", environment.command(peer)))?;
-        let (plain, timed) = (live.ask(&request)?, live.ask(&request.clone().timed(20))?);
+        let (plain, timed) = (live.ask(&request)?, live.ask(&PeerRequest { repeats: 20, ..request.clone() })?);
         ensure!(
             !((plain.depth_m, plain.time_s, plain.velocity_m_s) != (timed.depth_m, timed.time_s, timed.velocity_m_s)),
             "{timed:?} is not {plain:?}"

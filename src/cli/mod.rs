@@ -20,7 +20,6 @@ pub mod verify;
 
 use std::io::{self, IsTerminal};
 use std::path::Path;
-use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use schemars::{JsonSchema, Schema, schema_for};
@@ -48,12 +47,6 @@ pub enum Exit {
     Undecided = 4,
     /// A required peer program is missing.
     PeerMissing = 5,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        Self::from(exit as u8)
-    }
 }
 
 impl From<Verdict> for Exit {
@@ -334,15 +327,12 @@ commands! {
 /// M dV/dt = -F(x, V); F = c x in the crater, P + Q V² in the tunnel, until rest or the far side. Every method's
 /// answer stands beside the exact one.
 #[derive(Parser, Debug)]
-#[command(name = "penetrode", version, max_term_width = 80, arg_required_else_help = true, after_help = AFTER_HELP)]
+#[command(name = "penetrode", version, max_term_width = 80, arg_required_else_help = true, after_help = include_str!("help/penetrode.txt"))]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
 }
-
-const AFTER_HELP: &str = "Example: penetrode solve scene.toml\n\nExit codes: 0 all is well, 1 the run failed, 2 usage or \
-                          input, 3 a criterion failed, 4 undecided, 5 a required peer program is missing.";
 
 impl Cli {
     /// Runs the command, reports an error on standard error, and says how it ended.

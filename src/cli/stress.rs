@@ -12,7 +12,7 @@ use crate::report::{self, Environment, Run, StressJson, cells, folder};
 use crate::studies::extreme_scenes::{self, Summary, ULPS_MAX};
 use crate::suite::checks::{PeerAnswers, judged_random_scenes};
 use crate::suite::{Counts, Judged, Suite, skipped, tables, worst};
-use crate::text::number;
+use crate::text::Shown;
 
 /// Arguments of `stress`.
 #[derive(Args, Debug)]
@@ -92,7 +92,7 @@ fn case_row(cases: &[Judged]) -> [String; 6] {
         format!("{} of {}", counts.passed, cases.len() - counts.skipped),
         if counts.skipped > 0 { counts.skipped.to_string() } else { String::new() },
         error_text(worst(cases)),
-        number(claim.limit, 3),
+        Shown(claim.limit).to_string(),
         claim.unit.to_owned(),
     ]
 }

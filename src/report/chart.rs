@@ -565,18 +565,14 @@ struct Frame {
 }
 
 impl Frame {
-    /// A point as shares of the axes; what lies beyond an axis stands at its end.
-    fn shares(&self, (x, y): Point) -> Point {
-        (self.x.share(x).clamp(0.0, 1.0), self.y.share(y).clamp(0.0, 1.0))
-    }
-
     /// Shares of the axes in pixels.
     fn inside(&self, (u, v): Point) -> Point {
         (self.left + u * self.width, self.top + (1.0 - v) * self.height)
     }
 
-    fn at(&self, point: Point) -> Point {
-        self.inside(self.shares(point))
+    /// A point in pixels; what lies beyond an axis stands at its end.
+    fn at(&self, (x, y): Point) -> Point {
+        self.inside((self.x.share(x).clamp(0.0, 1.0), self.y.share(y).clamp(0.0, 1.0)))
     }
 
     /// The name of an upright line, on the side where there is more room.

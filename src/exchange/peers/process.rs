@@ -215,11 +215,6 @@ impl Peer {
         &self.command
     }
 
-    /// The end of what it wrote on standard error so far, control characters replaced.
-    pub fn stderr(&self) -> String {
-        self.line.stderr_text()
-    }
-
     /// Asks for one flight and waits for the answer.
     ///
     /// # Errors
@@ -234,10 +229,10 @@ impl Peer {
         question["id"] = json!(self.questions_asked);
         let answer = self.line.exchange(&question).and_then(|line| answer(&line, self.questions_asked, request));
         answer.map_err(|fault| {
-            let mut failure = PeerFailure { peer: self.identity.to_string(), fault, stderr: self.stderr() };
+            let mut failure = PeerFailure { peer: self.identity.to_string(), fault, stderr: self.line.stderr_text() };
             if !failure.is_reported() {
                 self.line.end();
-                failure.stderr = self.stderr();
+                failure.stderr = self.line.stderr_text();
                 self.failure = Some(failure.clone());
             }
             failure

@@ -39,13 +39,6 @@ impl PeerRequest {
         }
     }
 
-    /// The same question for the time of one flight, as the median of `repeats`.
-    #[must_use]
-    pub fn timed(mut self, repeats: u32) -> Self {
-        self.repeats = repeats;
-        self
-    }
-
     /// The problem that this asks for; `crater` is the stage that ends at k d, if there is one.
     ///
     /// Takes the numbers as they are: meant for requests of ours, not for input from outside.

@@ -76,7 +76,7 @@ fn ask(
     let wanted = if of_many { REPEATS_OF_MANY } else { (effort.samples as u32).saturating_mul(100) };
     // Two at least: the first flight of a question is not warm.
     let repeats = wanted.min(fitting).clamp(2, REPEATS_MAX);
-    let answer = peer.ask(&request.clone().timed(repeats))?;
+    let answer = peer.ask(&PeerRequest { repeats, ..request.clone() })?;
     let timing = answer.wall_ns.map(|median_ns| {
         let [low_ns, high_ns] = answer.wall_ns_quartiles.unwrap_or([median_ns; 2]);
         Timing { median_ns, low_ns, high_ns, samples: repeats as usize }
