@@ -62,17 +62,7 @@ impl Exact {
 
     /// `|value - exact|/|scale|`, as [`Exact::relative_error`] with a scale of its own: velocities are judged by V0.
     pub fn error_over(&self, value: f64, scale: &Self) -> f64 {
-        if !value.is_finite() {
-            return f64::INFINITY;
-        }
-        let difference = magnitude(big(value, FIRST_BITS) - &self.0);
-        if is_zero(&difference) {
-            0.0
-        } else if is_zero(&scale.0) {
-            f64::INFINITY
-        } else {
-            (difference / magnitude(scale.0.clone())).to_f64().value()
-        }
+        if value.is_finite() { quotient(big(value, FIRST_BITS) - &self.0, &scale.0, 0) } else { f64::INFINITY }
     }
 
     /// Decimal digits, `digits` significant ones.
@@ -251,7 +241,7 @@ pub fn conditions(source: Source<'_>) -> Result<Conditions, ReferenceError> {
 
 /// The terms of [`Conditions`] for one input, in its order; zero for what the flights do not have.
 fn quotients(moved: &ExactFlight, base: &ExactFlight, bits: usize) -> [f64; 6] {
-    let of = |moved: &Exact, base: &Exact, scale: &Exact| quotient(&moved.0, &base.0, &scale.0);
+    let of = |moved: &Exact, base: &Exact, scale: &Exact| quotient(&moved.0 - &base.0, &scale.0, STEP_BITS);
     let at = |moved: &ExactState, state: &ExactState| {
         let velocity = of(&moved.velocity, &state.velocity, &base.impact_speed);
         [of(&moved.depth, &state.depth, &state.depth), of(&moved.time, &state.time, &state.time), velocity]
@@ -260,7 +250,7 @@ fn quotients(moved: &ExactFlight, base: &ExactFlight, bits: usize) -> [f64; 6] {
     let crater_ends = moved.crater_end().zip(base.crater_end());
     let [_, crater_end_time, crater_end_velocity] = crater_ends.map_or([0.0; 3], |(moved, base)| at(moved, base));
     let margins = moved.exit_margin.as_ref().zip(base.exit_margin.as_ref());
-    let exit_margin = margins.map_or(0.0, |(moved, base)| quotient(&moved.0, &base.0, &int(1, bits)));
+    let exit_margin = margins.map_or(0.0, |(moved, base)| quotient(&moved.0 - &base.0, &int(1, bits), STEP_BITS));
     [depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin]
 }
 
@@ -273,21 +263,20 @@ pub fn critical_condition(source: Source<'_>) -> Result<f64, ReferenceError> {
     let (base, bits) = settled(|bits| velocity(bits, None), agree)?;
     let mut sum = 0.0;
     for input in source.moving_inputs()? {
-        sum += quotient(&velocity(bits, Some(input))?, &base, &base);
+        sum += quotient(velocity(bits, Some(input))? - &base, &base, STEP_BITS);
     }
     Ok(sum)
 }
 
-/// `|moved - base|/(2^-80 |scale|)`.
-fn quotient(moved: &Big, base: &Big, scale: &Big) -> f64 {
-    let difference = magnitude(moved - base);
+/// `2^bits |difference/scale|`: zero without a difference, else infinite without a scale.
+fn quotient(difference: Big, scale: &Big, bits: isize) -> f64 {
     if is_zero(&difference) {
-        return 0.0;
+        0.0
+    } else if is_zero(scale) {
+        f64::INFINITY
+    } else {
+        ((magnitude(difference) / magnitude(scale.clone())) << bits).to_f64().value()
     }
-    if is_zero(scale) {
-        return f64::INFINITY;
-    }
-    ((difference / magnitude(scale.clone())) << STEP_BITS).to_f64().value()
 }
 
 /// Raises the precision until two attempts agree; also gives the bits of the one returned.

@@ -27,12 +27,6 @@ pub struct Validity {
     pub note: String,
 }
 
-impl Validity {
-    fn new(valid: bool, note: impl Into<String>) -> Self {
-        Self { valid, note: note.into() }
-    }
-}
-
 /// Crater depth in diameters that Eq. 15 assumes.
 pub const CRATER_RATIO_OF_EQ15: f64 = 2.0;
 
@@ -65,10 +59,8 @@ pub fn static_factor(strength: f64) -> f64 {
 
 /// Range of the experiments to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
 pub fn static_factor_validity(strength: f64) -> Validity {
-    Validity::new(
-        (13.5e6..=96.7e6).contains(&strength),
-        format!("Eq. 14 was fitted to strengths from 13.5 to 96.7 MPa; this one is {} MPa", strength / 1e6),
-    )
+    let note = format!("Eq. 14 was fitted to strengths from 13.5 to 96.7 MPa; this one is {} MPa", strength / 1e6);
+    Validity { valid: (13.5e6..=96.7e6).contains(&strength), note }
 }
 
 /// Depth X/d of Eq. 11-12 at impact function `impact`, for crater depth `crater_ratio` = k > 0.
@@ -130,18 +122,18 @@ pub fn eq15_printed_validity(thickness_ratio: f64) -> Validity {
 }
 
 fn range_validity(thickness_ratio: f64, below_end: bool, end: &str) -> Validity {
-    if thickness_ratio.is_nan() || thickness_ratio <= 0.0 {
-        Validity::new(false, "there is nothing to perforate: H/d must be above 0")
+    let h = thickness_ratio;
+    let is_target = h > 0.0;
+    let note = if !is_target {
+        "there is nothing to perforate: H/d must be above 0".to_owned()
     } else if !below_end {
-        Validity::new(false, format!("H/d = {thickness_ratio} lies beyond the end of the relation, {end}"))
-    } else if thickness_ratio < NDRC_DATA_BEGIN {
-        Validity::new(
-            true,
-            format!("H/d = {thickness_ratio} lies below {NDRC_DATA_BEGIN}, where the relation extrapolates its data"),
-        )
+        format!("H/d = {h} lies beyond the end of the relation, {end}")
+    } else if h < NDRC_DATA_BEGIN {
+        format!("H/d = {h} lies below {NDRC_DATA_BEGIN}, where the relation extrapolates its data")
     } else {
-        Validity::new(true, format!("H/d lies between 0 and {end}"))
-    }
+        format!("H/d lies between 0 and {end}")
+    };
+    Validity { valid: is_target && below_end, note }
 }
 
 /// Critical energy `E_c/(S d³ fc)` of Eq. 15 as printed, three branches with rounded coefficients.

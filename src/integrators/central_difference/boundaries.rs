@@ -79,41 +79,36 @@ impl<'a, S: Scalar> Run<'a, S> {
         let mut run = Self { stepper: Stepper::new(options, problem), course: Course::new(problem, detail) };
         // Ends at the face are reached at once; `Stepper::new` has passed them.
         run.pass_ends(0..run.stepper.stage, State::at_impact(problem));
-        run.run_to_end()
-    }
-
-    fn run_to_end(mut self) -> Solved<Flight<S>> {
-        let (problem, max_steps) = (self.stepper.problem, self.stepper.options.max_steps);
-        let is_hopeless =
-            matches!(self.stepper.options.steps, Steps::Uniform(h) if cannot_end(problem, h * max_steps as f64));
+        let max_steps = options.max_steps;
+        let is_hopeless = matches!(options.steps, Steps::Uniform(h) if cannot_end(problem, h * max_steps as f64));
         // Steps up to the last change of x or V.
         let mut moved = 0;
         loop {
-            (self.course.stage, self.course.state) = (self.stepper.stage, self.stepper.state());
-            let limit = self.course.limit()?.value();
-            if self.course.detail == Detail::Trajectory {
-                self.course.push_sample(self.course.state, self.stepper.node.d * problem.mass);
+            (run.course.stage, run.course.state) = (run.stepper.stage, run.stepper.state());
+            let limit = run.course.limit()?.value();
+            if run.course.detail == Detail::Trajectory {
+                run.course.push_sample(run.course.state, run.stepper.node.d * problem.mass);
             }
-            let (before, steps) = (self.course.state, self.stepper.cost.steps);
+            let (before, steps) = (run.course.state, run.stepper.cost.steps);
             let left = max_steps - steps;
             if left == 0 || is_hopeless && steps >= STUCK_STEPS {
                 return Err(IntegrationError::StepBudgetSpent { max_steps, last: before.values() });
             }
-            let allowance = if self.course.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
-            let has_ended = match self.stepper.cruise(limit, allowance) {
+            let allowance = if run.course.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
+            let has_ended = match run.stepper.cruise(limit, allowance) {
                 Pause::Allowance => false,
-                Pause::Crossing { x, u } => self.cross(x, u)?,
-                Pause::Rest(next) => self.come_to_rest(next)?,
+                Pause::Crossing { x, u } => run.cross(x, u)?,
+                Pause::Rest(next) => run.come_to_rest(next)?,
             };
             if has_ended {
-                return Ok(self.finish());
+                return Ok(run.finish());
             }
-            let (after, steps) = (self.stepper.state(), self.stepper.cost.steps);
+            let (after, steps) = (run.stepper.state(), run.stepper.cost.steps);
             if (after.depth.value(), after.velocity.value()) != (before.depth.value(), before.velocity.value()) {
                 moved = steps;
             }
             if steps - moved >= STUCK_STEPS {
-                return self.never_ends("a step no longer changes depth or velocity, which only approach their limits");
+                return run.never_ends("a step no longer changes depth or velocity, which only approach their limits");
             }
         }
     }
