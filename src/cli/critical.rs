@@ -136,8 +136,7 @@ impl Ask for CriticalArgs {
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let exact = critical_velocity::exact(&scene).ok();
         let problem = scene.resolve(found.velocity)?;
-        let exit_depth_warning = scene.exit_depth_warning();
-        for warning in exit_depth_warning.into_iter().chain(applicability::warnings(&scene, found.velocity)) {
+        for warning in scene.exit_depth_warning().into_iter().chain(applicability::warnings(&scene, found.velocity)) {
             say("warning: ", &warning);
         }
         let is_zero = exact == Some(0.0) || found.velocity == 0.0;

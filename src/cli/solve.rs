@@ -148,14 +148,12 @@ impl Ask for SolveArgs {
         let started = Instant::now();
         let flight = method.integrator().solve(&problem, detail)?;
         let wall_ns = u64::try_from(started.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        if let Some(warning) = scene.exit_depth_warning() {
-            say("warning: ", &warning);
-        }
         if let Some(path) = &self.trajectory {
             let table = table_of(&TRAJECTORY, false, flight.trajectory.iter().map(trajectory_row));
             write_table(path, table, &[], [])?;
         }
-        for warning in applicability::warnings(&scene, problem.impact_speed) {
+        let outside = applicability::warnings(&scene, problem.impact_speed);
+        for warning in scene.exit_depth_warning().into_iter().chain(outside) {
             say("warning: ", &warning);
         }
         let sensitivities = self.sensitivities.then(|| SensitivitiesJson::new(&scene)).transpose()?;

@@ -285,10 +285,9 @@ fn say_notes(plan: &Plan, data: &SweepJson) {
     if undecided > 0 {
         say("note: ", &format!("{undecided} of {count} outcomes are undecided"));
     }
-    let end = NDRC_END;
-    let beyond = rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > end)).count();
+    let beyond = rows.iter().filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > NDRC_END)).count();
     if beyond > 0 && (plan.scene().criterion == Criterion::Ndrc || plan.is_along_thickness()) {
         let what = "points lie beyond the end of the perforation relation";
-        say("warning: ", &format!("{beyond} {what}, H/d = {end}"));
+        say("warning: ", &format!("{beyond} {what}, H/d = {NDRC_END}"));
     }
 }
