@@ -137,7 +137,7 @@ pub enum Exclusion {
 }
 
 /// One point, and whether the fit uses it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FittedPoint {
     /// Step h.
     pub step: f64,
@@ -150,7 +150,7 @@ pub struct FittedPoint {
 }
 
 /// A law `|e| = C h^p`, from errors or from the values themselves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PowerLaw {
     /// Order p.
     pub order: f64,
@@ -163,10 +163,12 @@ pub struct PowerLaw {
 }
 
 /// The result of [`fit`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OrderFit {
     /// The fitted line; `None` when fewer than [`STEPS_MIN`] points are left.
     pub line: Option<PowerLaw>,
+    /// 95 % interval of the constant of the line.
+    pub constant_interval: Option<[f64; 2]>,
     /// What the errors do.
     pub class: Class,
     /// Why this class: one clause with its numbers.
@@ -277,7 +279,8 @@ pub fn fit_at_level(points: &[StepError], level: f64) -> Result<OrderFit, FitErr
     let used: Vec<usize> = (0..sorted.len()).filter(|&i| excluded[i].is_none()).collect();
     let x: Vec<f64> = used.iter().map(|&i| sorted[i].step.ln()).collect();
     let y: Vec<f64> = used.iter().map(|&i| sorted[i].error.abs().ln()).collect();
-    let line = line(&x, &y).map(|raw| raw.power_law(level));
+    let raw = line(&x, &y);
+    let (line, constant_interval) = (raw.map(|raw| raw.power_law(level)), raw.map(|raw| raw.constant_interval()));
     let signs: Vec<bool> = used.iter().map(|&i| sorted[i].error < 0.0).collect();
     // How far above round-off the bulk of all points lies: the median, so that single zeros and outliers do not decide.
     let mut heights: Vec<f64> = (0..sorted.len()).map(|i| sorted[i].error.abs() / round_off[i]).collect();
@@ -292,7 +295,7 @@ pub fn fit_at_level(points: &[StepError], level: f64) -> Result<OrderFit, FitErr
             excluded: excluded[i],
         })
         .collect();
-    Ok(OrderFit { line, class, reason, points })
+    Ok(OrderFit { line, constant_interval, class, reason, points })
 }
 
 /// Round-off of each point, never zero so that ratios exist.
@@ -415,6 +418,12 @@ impl Line {
     fn slope_band(&self, level: f64) -> [f64; 2] {
         let half = (student_t(level, self.dof) * self.scatter / self.spread.sqrt()).max(ORDER_RESOLUTION);
         [self.slope - half, self.slope + half]
+    }
+
+    fn constant_interval(&self) -> [f64; 2] {
+        let ([x, y], n) = (self.centre, (self.dof + 2) as f64);
+        let half = student_t(0.05, self.dof) * self.scatter * (1.0 / n + x * x / self.spread).sqrt();
+        [-half, half].map(|half| (y - self.slope * x + half).exp())
     }
 
     fn power_law(&self, level: f64) -> PowerLaw {

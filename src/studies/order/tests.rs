@@ -235,7 +235,7 @@ fn excluded_for(reason: Exclusion, points: &[StepError]) -> usize {
 }
 
 #[test]
-fn order_its_intervals_and_the_constant_are_those_of_the_normal_equations() {
+fn order_constant_and_their_intervals_are_those_of_the_normal_equations() {
     // The uncentred normal equations of five points and their covariance, t by the incomplete beta function: 50 digits.
     let errors = [0.5, -1.0, 3.0, -7.5, 15.0];
     let points: Vec<_> =
@@ -246,6 +246,7 @@ fn order_its_intervals_and_the_constant_are_those_of_the_normal_equations() {
     assert_close(&line.interval95, &[1.769_819_522_684_142_8, 2.366_570_054_478_859_7]);
     assert_close(&line.verdict_band, &[1.520_571_136_461_884_1, 2.615_818_440_701_118_4]);
     assert_close(&[line.error_constant], &[0.113_273_365_139_022_55]);
+    assert_close(&fit.constant_interval.unwrap(), &[0.068_982_412_445_190_83, 0.186_001_834_309_766_05]);
 }
 
 #[test]
@@ -253,7 +254,7 @@ fn an_order_passes_only_where_its_band_holds_neither_neighbour() {
     let verdict = |class: Class, verdict_band: [f64; 2]| {
         let points: Vec<_> = (1..9).map(|i| StepError::new(f64::from(i), f64::from(i))).collect();
         let line = fit(&points).unwrap().line.map(|line| PowerLaw { verdict_band, ..line });
-        OrderFit { line, class, reason: String::new(), points: Vec::new() }.verdict(2.0)
+        OrderFit { line, constant_interval: None, class, reason: String::new(), points: Vec::new() }.verdict(2.0)
     };
     for (band, expected) in [
         ([1.5, 2.5], Verdict::Passed),
