@@ -94,6 +94,8 @@ struct Exact {
 }
 
 impl StageSolver<f64> for Exact {
+    // A call here has the state stored in halves and loaded whole: a stall of 30 ns, a third of a flight.
+    #[inline(always)]
     fn solve_stage(&mut self, course: &mut Course<'_>) -> Solved<StageEnd> {
         let (problem, stage, entry) = (course.problem, course.stage, course.state);
         let limit = problem.limit_of(stage);
