@@ -448,8 +448,7 @@ fn push_text(line: &mut String, text: &str) {
         return push_text(line, &format!("'{text}"));
     }
     if text.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_') {
-        line.push_str(text);
-        return;
+        return line.push_str(text);
     }
     line.push('"');
     for c in text.chars() {

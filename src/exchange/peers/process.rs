@@ -16,7 +16,7 @@ use thiserror::Error;
 
 use super::wire::{PeerAnswer, PeerRequest};
 use crate::exchange::diagnostic::printable;
-use crate::physics::{Advice, Outcome};
+use crate::physics::{Advice, Event, EventKind, Outcome};
 use crate::text::clipped;
 
 /// Exit code by which a peer says, before its greeting, that a program it needs is missing.
@@ -365,18 +365,21 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Pee
     }
     let mut answer: PeerAnswer = serde_json::from_slice(line).map_err(nonsense)?;
     if head.outcome.is_none() {
-        answer.outcome = outcome_of_depth(answer.depth_m, request);
+        // A peer that names none perforates where it reaches the exit depth within the tolerance asked for.
+        let is_reached = |exit: f64| exit - answer.depth_m <= (request.rtol * exit).max(request.atol[0]);
+        let perforates = request.exit_depth_m.is_some_and(is_reached);
+        answer.outcome = if perforates { Outcome::Perforated } else { Outcome::Stopped };
+    }
+    // Two events of one place may differ in time by what the tolerance allows.
+    for (index, Event { kind, state }) in answer.events.iter().enumerate() {
+        let is_known = !matches!(kind, EventKind::StageEnd(stage) if *stage >= request.stages.len());
+        let latest = state.time + request.rtol * answer.time_s.abs();
+        let follows = |before: &Event| before.kind != *kind && before.state.time <= latest;
+        if !is_known || !answer.events[..index].iter().all(follows) {
+            return Err(PeerFault::nonsense("its events are not of the stages, each once, in the order of time", line));
+        }
     }
     Ok(answer)
-}
-
-/// The outcome that a depth means when the peer names none: perforated where the exit depth is reached within the
-/// tolerance asked for.
-fn outcome_of_depth(depth: f64, request: &PeerRequest) -> Outcome {
-    match request.exit_depth_m {
-        Some(exit) if exit - depth <= (request.rtol * exit).max(request.atol[0]) => Outcome::Perforated,
-        _ => Outcome::Stopped,
-    }
 }
 
 /// The beginning of what was printed, on one line and harmless on a terminal.

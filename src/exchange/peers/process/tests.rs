@@ -124,6 +124,25 @@ fn nonsense_is_quoted() {
     assert_eq!(nonsense_of_answer(&long).chars().count(), QUOTED_CHARS + 1);
 }
 
+#[test]
+fn events_are_of_the_stages_each_once_in_the_order_of_time() {
+    let event =
+        |name: &str, time: f64| format!(r#"{{"event": {name}, "time_s": {time}, "depth_m": 0.1, "velocity_m_s": 0}}"#);
+    let with =
+        |events: &[String]| ANSWER.replace(r#""id": 1"#, &format!(r#""id": 1, "events": [{}]"#, events.join(", ")));
+    let (stage, rest) = (r#""stage-end", "stage": 0"#, r#""rest""#);
+    for events in [
+        [event(rest, 2e-3), event(stage, 1e-3)],
+        [event(stage, 1e-3), event(stage, 1e-3)],
+        [event(r#""stage-end", "stage": 1"#, 1e-3), event(rest, 2e-3)],
+    ] {
+        assert!(nonsense_of_answer(&with(&events)).contains("in the order of time"), "{events:?}");
+    }
+    // Found apart, two events of one place differ in time by less than the tolerance.
+    let answer = with(&[event(stage, 2e-3), event(rest, 2e-3 * (1.0 - 1e-12))]);
+    assert_eq!(peer(&format!("read q; echo '{answer}'; read q")).ask(&request()).unwrap().events.len(), 2);
+}
+
 /// No answer, an answer to another question, and one that is no number or no outcome, each with words of the refusal.
 #[test]
 fn what_is_no_answer_says_why() {
