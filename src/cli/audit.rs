@@ -21,7 +21,7 @@ use crate::text::or_dash;
 #[command(after_help = "Example: penetrode audit results.csv --scene slab.toml --order 2")]
 pub struct AuditArgs {
     /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
-    /// critical_velocity_m_s; - for standard input.
+    /// critical_velocity_m_s, or with other units (dt_us, depth_mm), and other columns of numbers; - for standard input.
     pub results: PathBuf,
     /// Scene whose exact answer the results must approach.
     #[arg(long)]
@@ -68,7 +68,7 @@ fn text(file: &str, judged: &Audit) -> String {
     let header = ["quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"];
     let row = |q: &QuantityAudit| {
         [
-            q.quantity.name().to_owned(),
+            escape_terminal(q.quantity.name()),
             or_dash(q.observed_order, |order| format!("{order:.2}")),
             interval_text(q.interval),
             or_dash(q.limit, significant),
@@ -80,7 +80,7 @@ fn text(file: &str, judged: &Audit) -> String {
     text.table(&header, judged.quantities.iter().map(row));
     text.gap();
     for q in &judged.quantities {
-        text.wrapped("  ", &format!("{}: {}", q.quantity.name(), q.reason));
+        text.wrapped("  ", &escape_terminal(&format!("{}: {}", q.quantity.name(), q.reason)));
         for band in &q.error_bands {
             text.wrapped("    ", &format!("+- {:.2e} by {}", band.half_width, band.rule));
         }

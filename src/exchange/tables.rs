@@ -93,13 +93,24 @@ impl Column {
     }
 }
 
+/// What becomes of columns that a [`Format`] does not name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Others {
+    /// The table is refused.
+    Refused,
+    /// They are not read.
+    Ignored,
+    /// The caller reads them by [`Row::names`] and [`Row::cell`], and sees to it that none is missing or there twice.
+    Read,
+}
+
 /// What a table that comes in may look like.
 #[derive(Debug)]
 pub struct Format {
     /// Its columns.
     pub columns: &'static [Column],
-    /// Whether columns of other names are ignored; else they are refused.
-    pub ignores_others: bool,
+    /// What becomes of columns of other names.
+    pub others: Others,
     /// Whether a line that begins with `#` is a comment.
     pub has_comments: bool,
 }
@@ -121,6 +132,9 @@ impl Format {
         if !optional.is_empty() {
             text.push_str(&format!("; these may be left out: {optional}"));
         }
+        if self.others == Others::Read {
+            text.push_str("; units as in dt_us and depth_mm, and further columns of numbers, are read too");
+        }
         text
     }
 
@@ -139,8 +153,8 @@ pub struct Layout {
     columns: &'static [Column],
     /// Index of each column, from 0.
     places: Vec<Option<usize>>,
-    /// Number of columns, unknown ones among them.
-    width: usize,
+    /// Names as they stand, without blanks at their ends, unknown ones among them.
+    names: Vec<String>,
     /// Line of the names.
     header: At,
 }
@@ -161,17 +175,21 @@ impl Layout {
                 Some(known) if places[known].replace(index).is_some() => {
                     return refuse(index + 1, Fault::ColumnTwice(name.to_owned()));
                 }
-                None if !format.ignores_others => {
+                // A line with another separator is one name.
+                None if format.others == Others::Refused
+                    || format.others == Others::Read && name.contains([';', '\t']) =>
+                {
                     let near = format.resembling(name);
                     return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
                 }
                 _ => {}
             }
         }
+        let names = names.iter().map(|name| name.trim().to_owned()).collect();
         let mut missing = format.columns.iter().zip(&places).filter(|(_, place)| place.is_none());
         match missing.find(|(column, _)| column.need == Need::Required) {
-            Some((column, _)) => refuse(0, Fault::MissingColumn(column.name)),
-            None => Ok(Self { columns: format.columns, places, width: names.len(), header: at }),
+            Some((column, _)) if format.others != Others::Read => refuse(0, Fault::MissingColumn(column.name)),
+            _ => Ok(Self { columns: format.columns, places, names, header: at }),
         }
     }
 }
@@ -222,8 +240,8 @@ impl Rows {
     pub fn row(&self, index: usize) -> Result<Row<'_>, Box<TableError>> {
         let row = Row { rows: self, index };
         match &self.data {
-            Data::Csv(records, _) if records[index].len() != self.layout.width => {
-                let fault = Fault::Ragged { found: records[index].len(), expected: self.layout.width };
+            Data::Csv(records, _) if records[index].len() != self.layout.names.len() => {
+                let fault = Fault::Ragged { found: records[index].len(), expected: self.layout.names.len() };
                 Err(TableError::of_row(row.at(), 0, fault))
             }
             Data::Csv(..) => Ok(row),
@@ -251,6 +269,26 @@ impl<'a> Row<'a> {
         self.rows.layout.header
     }
 
+    /// Names of all columns in the order of the table.
+    pub fn names(&self) -> &'a [String] {
+        &self.rows.layout.names
+    }
+
+    /// The text at `place`, from 0, in the order of a CSV table, without blanks at its ends.
+    ///
+    /// # Errors
+    /// [`Fault::NotText`].
+    #[inline]
+    pub fn cell(&self, place: usize) -> Result<&'a str, Box<TableError>> {
+        match &self.rows.data {
+            Data::Csv(records, _) => std::str::from_utf8(records[self.index].get(place).unwrap_or_default())
+                .map(str::trim)
+                .map_err(|_| TableError::of_row(self.at(), place + 1, Fault::NotText)),
+            #[cfg(feature = "parquet")]
+            Data::Parquet(..) => Ok(""),
+        }
+    }
+
     /// Position of `column` in the table, from 1; 0 where the table does not have it.
     pub fn position(&self, column: usize) -> usize {
         self.rows.layout.places[column].map_or(0, |place| place + 1)
@@ -274,7 +312,7 @@ impl<'a> Row<'a> {
     /// The cell of `text` in `column` is `reason`.
     pub fn refuse_cell(&self, column: usize, text: &str, reason: impl Into<Cow<'static, str>>) -> Box<TableError> {
         let (name, text) = (self.rows.layout.columns[column].name, shortened(text));
-        self.refuse(column, Fault::Cell { name, text, reason: reason.into() })
+        self.refuse(column, Fault::Cell { name: name.into(), text, reason: reason.into() })
     }
 
     /// The text in `column` without blanks at its ends; empty where it is absent.
@@ -285,9 +323,7 @@ impl<'a> Row<'a> {
     pub fn text(&self, column: usize) -> Result<&'a str, Box<TableError>> {
         let Some(place) = self.rows.layout.places[column] else { return Ok("") };
         match &self.rows.data {
-            Data::Csv(records, _) => std::str::from_utf8(records[self.index].get(place).unwrap_or_default())
-                .map(str::trim)
-                .map_err(|_| self.refuse(column, Fault::NotText)),
+            Data::Csv(..) => self.cell(place),
             #[cfg(feature = "parquet")]
             Data::Parquet(columns, _) => Ok(match &columns[column] {
                 Cells::Texts(cells) => cells[self.index].as_deref().map_or("", str::trim),
@@ -346,7 +382,7 @@ impl<'a> Row<'a> {
 
     /// The cell in `column` is empty and must not be.
     pub fn refuse_empty(&self, column: usize) -> Box<TableError> {
-        self.refuse(column, Fault::EmptyCell(self.rows.layout.columns[column].name))
+        self.refuse(column, Fault::EmptyCell(self.rows.layout.columns[column].name.into()))
     }
 }
 

@@ -7,6 +7,7 @@
 //! oscillation, a missed order and a wrong limit fail (3); constants, zero errors and noise leave it undecided (4). Rows
 //! out of order and repeated rows are put right and mentioned.
 
+mod column;
 mod table;
 
 use serde::Serialize;
@@ -21,7 +22,8 @@ use super::quantity::Quantity;
 use super::verdict::Verdict;
 use crate::exchange::tables::TableError;
 use crate::physics::{Advice, Shown};
-pub use table::{RESULTS, ROWS_MAX, Table};
+pub use column::{Column, RESULTS};
+pub use table::{ROWS_MAX, Table};
 use table::{ResultColumn, StepRow};
 
 /// Two-sided level of the intervals behind a verdict on one table.
@@ -98,7 +100,7 @@ pub struct Finding {
     /// What it is about.
     pub kind: FindingKind,
     /// Column it concerns; `null` for the whole table.
-    pub quantity: Option<Quantity>,
+    pub quantity: Option<Column>,
     /// The remark, one sentence with its numbers.
     pub message: String,
 }
@@ -145,8 +147,8 @@ pub struct AuditPoint {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct QuantityAudit {
-    /// Which quantity.
-    pub quantity: Quantity,
+    /// Which quantity, or the name of another column.
+    pub quantity: Column,
     /// Order expected, if one was given.
     pub formal_order: Option<f64>,
     /// Order found.
@@ -210,7 +212,7 @@ pub fn audit(table: &Table, order: Option<f64>, exact: Option<ExactValues>) -> R
     }
     let mut findings = table.findings.clone();
     let judged = table.columns.iter().map(|column| {
-        let exact = exact.and_then(|exact| exact.of(column.quantity));
+        let exact = exact.and_then(|exact| exact.of(column.column.quantity()?));
         judge(table, column, order, exact, &mut findings)
     });
     let quantities: Vec<QuantityAudit> = judged.collect();
@@ -233,31 +235,32 @@ impl QuantityAudit {
 /// `findings`.
 fn judge(
     table: &Table,
-    &ResultColumn { quantity, rounding, .. }: &ResultColumn,
+    column: &ResultColumn,
     formal_order: Option<f64>,
     exact: Option<(f64, f64)>,
     findings: &mut Vec<Finding>,
 ) -> QuantityAudit {
     let mut remark = |kind, message: &str| {
-        findings.push(Finding { kind, quantity: Some(quantity), message: message.to_owned() });
+        findings.push(Finding { kind, quantity: Some(column.column.clone()), message: message.to_owned() });
     };
     let points = table.rows.iter().map(|row| {
-        let (dt_s, value) = (row.step, row.value(quantity));
+        let (dt_s, value) = (row.step, row.value(column));
         AuditPoint { dt_s, value, error: None, used: false, excluded: None }
     });
     // Failed until shown otherwise.
+    let quantity = column.column.clone();
     let mut judged =
         QuantityAudit { quantity, formal_order, rule: "none", points: points.collect(), ..QuantityAudit::default() };
-    if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.value(quantity).is_finite()) {
+    if let Some(row) = table.rows.iter().find(|row| !row.step.is_finite() || !row.value(column).is_finite()) {
         judged.reason =
-            format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.value(quantity), row.step);
+            format!("{}:{}: {} at the step {} s is not finite", table.file, row.line, row.value(column), row.step);
         remark(FindingKind::NotFinite, &judged.reason);
         return judged;
     }
     // The values round by the digits printed, and by the arithmetic at least.
     let grid = |row: &StepRow| {
-        let value = row.value(quantity);
-        GridValue { step: row.step, value, round_off: rounding.max(0.5 * f64::EPSILON * value.abs()) }
+        let value = row.value(column);
+        GridValue { step: row.step, value, round_off: column.rounding.max(0.5 * f64::EPSILON * value.abs()) }
     };
     let grids: Vec<GridValue> = table.rows.iter().map(grid).collect();
     let (Ok(own), Ok(least_squares)) = (self_convergence(&grids, AUDIT_LEVEL), eca_hoekstra(&grids)) else {

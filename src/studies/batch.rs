@@ -9,14 +9,14 @@ use thiserror::Error;
 
 use super::critical_velocity::{self, CriticalError};
 use super::random_scenes::Generator;
-use crate::exchange::tables::{Block, Column, Format, Kind, Need, Place, Row, Rows, TableError, Value};
+use crate::exchange::tables::{Block, Column, Format, Kind, Need, Others, Place, Row, Rows, TableError, Value};
 use crate::integrators::lanes::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, MethodName};
 use crate::physics::parameter::{Absence, Parameter};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, ResolveError, Scene};
 
 /// A table of scenes; whether its numbers are admissible is for [`Scene::resolve`] to say.
-pub static SCENES: Format = Format { columns: &COLUMNS, ignores_others: false, has_comments: false };
+pub static SCENES: Format = Format { columns: &COLUMNS, others: Others::Refused, has_comments: false };
 
 /// The columns of the first numbers in [`Parameter::PLAIN`], by the names that [`Parameter::column`] gives them.
 const NUMBERS: [&str; 11] = [

@@ -17,7 +17,7 @@ use thiserror::Error;
 use super::applicability::model_error;
 use super::error::{Studied, StudyError};
 use super::sensitivity::{Spread, by_closed_form};
-use crate::exchange::tables::{self, Column, Format, Need, Row, TableError};
+use crate::exchange::tables::{self, Column, Format, Need, Others, Row, TableError};
 use crate::integrators::{ClosedForm, Detail, Integrator};
 use crate::physics::Parameter;
 use crate::physics::groups::Groups;
@@ -68,7 +68,7 @@ pub struct Experiment {
 }
 
 /// A table of experiments; columns of other names are ignored.
-pub static EXPERIMENTS: Format = Format { columns: &COLUMNS, ignores_others: true, has_comments: false };
+pub static EXPERIMENTS: Format = Format { columns: &COLUMNS, others: Others::Ignored, has_comments: false };
 
 const COLUMNS: [Column; 10] = [
     Column::number("M_kg").within(Range::Positive),

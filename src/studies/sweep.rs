@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::critical_velocity;
 use super::error::{Studied, StudyError};
-use crate::exchange::tables::{self, Column, Format, Kind, TableError, Value};
+use crate::exchange::tables::{self, Column, Format, Kind, Others, TableError, Value};
 use crate::integrators::{Detail, Integrator};
 use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::parameter::{Parameter, ParameterError};
@@ -373,7 +373,7 @@ impl Plan {
 /// A table of measured points; columns of other names are ignored.
 pub static POINTS: Format = Format {
     columns: &[Column::number("H/d").within(Range::Positive), Column::number("E_c/(d3 fc)").within(Range::Positive)],
-    ignores_others: true,
+    others: Others::Ignored,
     has_comments: false,
 };
 

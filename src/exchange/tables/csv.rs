@@ -7,7 +7,7 @@ use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::error::{At, Fault, Place, TableError};
 use super::lines::{LineEnds, line_of};
-use super::{Data, Format, Layout, Rows};
+use super::{Data, Format, Layout, Others, Rows};
 
 /// Longest line (bytes): without a limit one open quote, or a file that is no table, would fill the memory.
 const LINE_MAX: u64 = 1 << 20;
@@ -72,7 +72,7 @@ impl<R: Read> CsvTable<R> {
             let has_break = record.as_slice().contains(&b'\n');
             let line = line_of(&self.reader, if has_break { record.as_slice() } else { b"" });
             // A text that is ignored may have several lines.
-            if has_break && !(self.format.ignores_others && record.len() == self.layout.width) {
+            if has_break && !(self.format.others == Others::Ignored && record.len() == self.layout.names.len()) {
                 let place = Place { file: self.file.clone(), at: At::Line(line), column: 0 };
                 return Err(TableError::new(place, Fault::OpenQuote, self.format));
             }
@@ -107,7 +107,7 @@ mod tests {
 
     static FORMAT: Format = Format {
         columns: &[Column::number("a"), Column::number("b").needed(Need::Default(7.0)), Column::text("c")],
-        ignores_others: false,
+        others: Others::Refused,
         has_comments: false,
     };
 

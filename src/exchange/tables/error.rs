@@ -91,14 +91,16 @@ pub enum Fault {
     TooManyRows(usize),
     #[error("there is no column of results")]
     NoResults,
+    #[error("more than {0} columns of results")]
+    TooManyColumns(usize),
     #[error("the step {} s has two values of `{name}`, {} here and {} in line {other}", Shown(*.step), Shown(*.second), Shown(*.first))]
-    TwoValues { step: f64, name: &'static str, first: f64, second: f64, other: u64 },
+    TwoValues { step: f64, name: Cow<'static, str>, first: f64, second: f64, other: u64 },
     #[error("{found} different steps, and an order needs {needed}")]
     TooFewSteps { found: usize, needed: usize },
     #[error("the cell in `{0}` is empty")]
-    EmptyCell(&'static str),
+    EmptyCell(Cow<'static, str>),
     #[error("`{}` in `{name}` is {reason}", shortened(.text))]
-    Cell { name: &'static str, text: String, reason: Cow<'static, str> },
+    Cell { name: Cow<'static, str>, text: String, reason: Cow<'static, str> },
 }
 
 /// Why a table, or a row of it, cannot be used: a mistake of the caller, exit code 2.
@@ -152,6 +154,7 @@ impl Advice for TableError {
             Fault::WrongType { .. } => "store numbers as DOUBLE, FLOAT or integers, and texts as UTF8",
             Fault::Ragged { .. } => "complete the row, or remove it",
             Fault::TooManyRows(_) => "keep every tenth row",
+            Fault::TooManyColumns(_) => "keep the columns whose convergence is asked for",
             Fault::EmptyCell(_) => "fill the cell, or remove the row or the column",
             Fault::Cell { reason, .. } if reason.contains("a number") => {
                 "write numbers with a decimal point and without units: 1.25e-6"

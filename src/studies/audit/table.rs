@@ -1,32 +1,17 @@
 //! A table of results over the step size, as another code gives it: reading, and what the digits printed mean.
 
+use super::column::{Column, Heading, RESULTS};
 use super::{AuditError, Finding, FindingKind};
-use crate::exchange::tables::{self, At, Column, Fault, Format, Need, Place, Row, TableError};
+use crate::exchange::tables::{self, At, Fault, Place, Row, TableError};
+use crate::physics::units::{Dimension, quantity};
 use crate::studies::order::STEPS_MIN;
-use crate::studies::quantity::Quantity;
+use crate::text::shortened;
 
 /// Rows of a table at most: each costs some tens of microseconds, and an order is as sure with a hundred.
 pub const ROWS_MAX: usize = 10_000;
 
-/// A table of results over the step size, the quantities in the order of [`Quantity::ALL`] behind the step.
-pub static RESULTS: Format = Format {
-    columns: &[
-        Column::number("dt_s"),
-        Column::number("depth_m").needed(Need::Optional),
-        Column::number("time_s").needed(Need::Optional),
-        Column::number("velocity_m_s").needed(Need::Optional),
-        Column::number("crater_end_time_s").needed(Need::Optional),
-        Column::number("crater_end_velocity_m_s").needed(Need::Optional),
-        Column::number("critical_velocity_m_s").needed(Need::Optional),
-    ],
-    ignores_others: false,
-    has_comments: true,
-};
-
-/// Column of `quantity` in [`RESULTS`].
-fn column_of(quantity: Quantity) -> usize {
-    quantity as usize + 1
-}
+/// Columns of results at most: 10,000 rows of them are judged in a second.
+const COLUMNS_MAX: usize = 64;
 
 /// A table as read: steps ascending and different, one value each.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,50 +24,102 @@ pub struct Table {
     pub(super) findings: Vec<Finding>,
 }
 
+/// A number as it stands in a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cell {
+    /// Its value, in SI units where the column is a quantity.
+    pub(super) value: f64,
+    /// Half a unit of the last digit printed, in the same unit.
+    half_unit: f64,
+    /// Digits printed, without zeros in front.
+    digits: i32,
+}
+
+impl Cell {
+    fn read(text: &str, unit: Option<&(Dimension, String)>) -> Option<Self> {
+        let (value, half_unit, digits) = (parse(text)?, half_last_digit(text), significant_digits(text));
+        let Some((dimension, unit)) = unit else { return Some(Self { value, half_unit, digits }) };
+        // The decimal as a whole is converted and rounded once; what no unit takes is no finite number.
+        let coefficient = dimension.coefficient(unit)?;
+        let value = quantity(&format!("{text} {unit}"), *dimension).unwrap_or(value * coefficient);
+        Some(Self { value, half_unit: half_unit * coefficient, digits })
+    }
+}
+
 /// A row as it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StepRow {
     pub(super) line: u64,
     /// Step (s).
     pub(super) step: f64,
-    /// For each quantity the value and half a unit of its last digit, if there is one.
-    cells: [Option<(f64, f64)>; Quantity::ALL.len()],
+    /// The step as printed.
+    printed: Cell,
+    /// The number of each column, if there is one.
+    cells: Vec<Option<Cell>>,
 }
 
 impl StepRow {
-    /// Value of `quantity`, of which the table has a column.
-    pub(super) fn value(&self, quantity: Quantity) -> f64 {
-        self.cells[quantity as usize].map_or(f64::NAN, |(value, _)| value)
+    /// Value in `column`.
+    pub(super) fn value(&self, column: &ResultColumn) -> f64 {
+        self.cells[column.place].map_or(f64::NAN, |cell| cell.value)
     }
 }
 
 /// A column that is filled.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ResultColumn {
-    pub(super) quantity: Quantity,
-    /// Number of the column in the file, from 1.
-    number: usize,
+    pub(super) column: Column,
+    /// Place in the file, from 0.
+    place: usize,
     /// Half a unit of the last digit printed, the finest in the column: short numbers may be exact.
     pub(super) rounding: f64,
 }
 
-fn step_row(row: &Row<'_>) -> Result<StepRow, Box<TableError>> {
-    let number = |column| match row.text(column)? {
-        "" => Ok(None),
-        text => match parse(text) {
-            Some(value) => Ok(Some((value, half_last_digit(text)))),
-            None => Err(row.refuse_cell(column, text, "not a number")),
-        },
+/// The names of the columns, one of them the step.
+fn headings(row: &Row<'_>) -> Result<Vec<Heading>, Box<TableError>> {
+    let refuse = |column, fault| {
+        let place = Place { at: row.header(), column, ..Place::default() };
+        TableError::new(place, fault, &RESULTS)
     };
-    let Some((step, _)) = number(0)? else { return Err(row.refuse_empty(0)) };
-    if step <= 0.0 {
-        return Err(row.refuse_cell(0, row.text(0)?, "not a time above zero, in seconds"));
+    let mut headings: Vec<Heading> = Vec::new();
+    for (index, name) in row.names().iter().enumerate() {
+        let unknown = |near| refuse(index + 1, Fault::UnknownColumn { name: name.clone(), near });
+        let heading = Heading::read(name).map_err(unknown)?;
+        if headings.iter().any(|other| other.column == heading.column) {
+            return Err(refuse(index + 1, Fault::ColumnTwice(name.clone())));
+        }
+        if index > COLUMNS_MAX {
+            return Err(refuse(index + 1, Fault::TooManyColumns(COLUMNS_MAX)));
+        }
+        headings.push(heading);
     }
-    let mut cells = [None; Quantity::ALL.len()];
-    for (cell, quantity) in cells.iter_mut().zip(Quantity::ALL) {
-        *cell = number(column_of(quantity))?;
+    let has_step = headings.iter().any(|heading| heading.column.is_none());
+    if has_step { Ok(headings) } else { Err(refuse(0, Fault::MissingColumn(RESULTS.columns[0].name))) }
+}
+
+fn step_row(row: &Row<'_>, headings: &[Heading]) -> Result<StepRow, Box<TableError>> {
+    let (mut step, mut cells) = (None, vec![None; headings.len()]);
+    for (place, heading) in headings.iter().enumerate() {
+        let text = row.cell(place)?;
+        let refuse = |fault| TableError::of_row(row.at(), place + 1, fault);
+        let bad = |reason: &'static str| {
+            refuse(Fault::Cell { name: heading.name.clone().into(), text: shortened(text), reason: reason.into() })
+        };
+        let cell = match text {
+            "" => None,
+            text => Some(Cell::read(text, heading.unit.as_ref()).ok_or_else(|| bad("not a number"))?),
+        };
+        if heading.column.is_none() {
+            if cell.is_some_and(|cell| cell.value <= 0.0) {
+                return Err(bad("not a time above zero"));
+            }
+            step = cell;
+        }
+        cells[place] = cell;
     }
-    Ok(StepRow { line: row.at().number(), step, cells })
+    let empty = || Fault::EmptyCell(RESULTS.columns[0].name.into());
+    let printed = step.ok_or_else(|| TableError::of_row(row.at(), 0, empty()))?;
+    Ok(StepRow { line: row.at().number(), step: printed.value, printed, cells })
 }
 
 impl Table {
@@ -92,35 +129,34 @@ impl Table {
     ///
     /// # Errors
     /// [`AuditError`] with the place: every cell must be a number (`nan` and `inf` are read, and fail later), every row
-    /// complete, every name known and there once, every step positive, with one value, and four of them different; of
-    /// [`ROWS_MAX`] rows at most.
+    /// complete, every name there once and none a known one written wrongly, every step positive, with one value, and
+    /// four of them different; of [`ROWS_MAX`] rows at most.
     pub fn read(file: &str, bytes: &[u8]) -> Result<Self, AuditError> {
-        let (mut count, mut header, mut positions) = (0, At::Table, Vec::new());
+        let (mut count, mut header, mut names) = (0, At::Table, Vec::new());
         let rows = tables::read(file, bytes, &RESULTS, |row| {
             count += 1;
             if count > ROWS_MAX {
                 return Err(TableError::of_row(row.at(), 0, Fault::TooManyRows(ROWS_MAX)));
             }
             if count == 1 {
-                header = row.header();
-                positions = Quantity::ALL.map(|quantity| (row.position(column_of(quantity)), quantity)).to_vec();
+                (header, names) = (row.header(), headings(row)?);
             }
-            step_row(row)
+            step_row(row, &names)
         })?;
-        positions.sort_by_key(|(number, _)| *number);
         let mut table = Self { file: file.to_owned(), rows, columns: Vec::new(), findings: Vec::new() };
-        for (number, quantity) in positions.into_iter().filter(|(number, _)| *number > 0) {
-            let filled = table.rows.iter().filter_map(|row| row.cells[quantity as usize]);
-            let Some(rounding) = filled.map(|(_, rounding)| rounding).reduce(f64::min) else {
+        for (place, Heading { name, column, .. }) in names.into_iter().enumerate() {
+            let Some(column) = column else { continue };
+            let filled = table.rows.iter().filter_map(|row| row.cells[place]);
+            let Some(rounding) = filled.map(|cell| cell.half_unit).reduce(f64::min) else {
                 // A column of a template that was never filled says nothing; a gap in a column that is used hides something.
-                table.remark(FindingKind::EmptyColumn, Some(quantity), "the column is empty and left out".to_owned());
+                table.remark(FindingKind::EmptyColumn, Some(column), "the column is empty and left out".to_owned());
                 continue;
             };
-            if let Some(row) = table.rows.iter().find(|row| row.cells[quantity as usize].is_none()) {
-                let fault = Fault::EmptyCell(RESULTS.columns[column_of(quantity)].name);
-                return Err(TableError::of_row(At::Line(row.line), number, fault).in_file(file).into());
+            if let Some(row) = table.rows.iter().find(|row| row.cells[place].is_none()) {
+                let fault = Fault::EmptyCell(name.into());
+                return Err(TableError::of_row(At::Line(row.line), place + 1, fault).in_file(file).into());
             }
-            table.columns.push(ResultColumn { quantity, number, rounding });
+            table.columns.push(ResultColumn { column, place, rounding });
         }
         if table.columns.is_empty() {
             let place = Place { file: file.to_owned(), at: header, column: 0 };
@@ -130,8 +166,8 @@ impl Table {
         Ok(table)
     }
 
-    fn remark(&mut self, kind: FindingKind, quantity: Option<Quantity>, message: String) {
-        self.findings.push(Finding { kind, quantity, message });
+    fn remark(&mut self, kind: FindingKind, column: Option<Column>, message: String) {
+        self.findings.push(Finding { kind, quantity: column, message });
     }
 
     /// Sorts by step, merges equal rows, refuses two values at one step.
@@ -152,11 +188,11 @@ impl Table {
                 continue;
             };
             for column in &self.columns {
-                let [first, second] = [before, &row].map(|row| row.value(column.quantity));
+                let [first, second] = [before, &row].map(|row| row.value(column));
                 // NaN twice is the same cell twice; -0 and 0 are one value.
                 if first != second && !(first.is_nan() && second.is_nan()) {
-                    let place = Place { file: self.file.clone(), at: At::Line(row.line), column: column.number };
-                    let name = RESULTS.columns[column_of(column.quantity)].name;
+                    let place = Place { file: self.file.clone(), at: At::Line(row.line), column: column.place + 1 };
+                    let name = column.column.with_unit().into();
                     let (step, other) = (row.step, before.line);
                     let fault = Fault::TwoValues { step, name, first, second, other };
                     return Err(TableError::new(place, fault, &RESULTS).into());
@@ -200,6 +236,13 @@ fn parse(text: &str) -> Option<f64> {
     text.parse().ok()
 }
 
+/// Digits of a decimal number without zeros in front.
+fn significant_digits(text: &str) -> i32 {
+    let mantissa = text.split(['e', 'E']).next().unwrap_or_default();
+    let digits = mantissa.chars().filter(char::is_ascii_digit).skip_while(|&digit| digit == '0').count();
+    i32::try_from(digits).unwrap_or(i32::MAX)
+}
+
 /// Half a unit of the last digit of a decimal number; zero for what has no digits.
 fn half_last_digit(text: &str) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
@@ -236,6 +279,37 @@ mod tests {
         assert_eq!(message(1), "line 6 repeated another row and was merged with it");
         assert!(message(10).starts_with("each of lines 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 repeated"));
         assert!(message(11).starts_with("each of lines 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 and 1 more repeated"));
+    }
+
+    #[test]
+    fn units_in_the_names_change_no_value_and_the_rounding_with_it() {
+        let table = |text: &str| Table::read("run.csv", text.as_bytes()).unwrap();
+        let si = table("dt_s,depth_m,velocity_m_s\n1e-6,0.1448,300\n2e-6,0.1451,310\n4e-6,0.15,320\n8e-6,nan,340\n");
+        let others = table("dt_us,depth (mm),velocity_km_s\n1,144.8,0.300\n2,145.1,.310\n4,150.,0.32\n8,nan,0.340\n");
+        assert_eq!(si.columns, others.columns);
+        for (row, other) in si.rows.iter().zip(&others.rows) {
+            assert_eq!((row.line, row.step), (other.line, other.step));
+            for column in &si.columns {
+                let [a, b] = [row.value(column), other.value(column)];
+                assert!(a == b || a.is_nan() && b.is_nan(), "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_and_every_quantity_are_there_once_whatever_the_unit() {
+        for (names, message) in [
+            ("depth_m,time_s", "run.csv:1: the column `dt_s` is missing"),
+            ("dt_s,dt_us", "run.csv:1, column 2: the column `dt_us` is there twice"),
+            ("dt_s,depth_m,depth_mm", "run.csv:1, column 3: the column `depth_mm` is there twice"),
+            ("dt_s,force_n,force_n", "run.csv:1, column 3: the column `force_n` is there twice"),
+            ("dt_s,dephts_m", "run.csv:1, column 2: there is no column `dephts_m`; is `depth_m` meant?"),
+        ] {
+            assert_eq!(refused(&format!("{names}\n1,2,3\n")).to_string(), message);
+        }
+        let wide = |count: usize| (0..count).fold("dt_s".to_owned(), |names, index| format!("{names},force_{index}"));
+        let message = refused(&format!("{}\n1\n", wide(COLUMNS_MAX + 1))).to_string();
+        assert_eq!(message, "run.csv:1, column 66: more than 64 columns of results");
     }
 
     #[test]
