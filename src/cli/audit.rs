@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::output::{Text, escape_terminal, interval_text, significant};
-use super::{Answer, Ask, CliError, problem_of, read_scene};
+use super::{Answer, Ask, CliError, Settings};
 use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::tables::read_bytes;
-use crate::physics::Problem;
+use crate::physics::{Problem, Scene};
 use crate::studies::audit::{Audit, ExactValues, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::critical_velocity;
 use crate::studies::error::Truth;
@@ -19,6 +19,7 @@ use crate::text::or_dash;
 /// Arguments of `audit`.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: penetrode audit results.csv --scene slab.toml --order 2")]
+#[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct AuditArgs {
     /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
     /// critical_velocity_m_s, or with other units (dt_us, depth_mm), and other columns of numbers; - for standard input.
@@ -26,6 +27,9 @@ pub struct AuditArgs {
     /// Scene whose exact answer the results must approach.
     #[arg(long)]
     pub scene: Option<String>,
+    /// What is set in it.
+    #[command(flatten)]
+    pub settings: Settings,
     /// Formal order of the code; without it any order above zero converges.
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub order: Option<f64>,
@@ -43,16 +47,14 @@ impl Ask for AuditArgs {
         }
         let file = name_of(&self.results);
         let results = Table::read(&file, &read_bytes(&self.results, &RESULTS)?)?;
-        let exact = self.scene.as_deref().map(exact_values).transpose()?;
+        let exact = self.scene.as_deref().map(|path| exact_values(self.settings.read_problem(path)?)).transpose()?;
         let judged = audit(&results, self.order, exact)?;
         Ok(Answer { text: text(&file, &judged), exit: judged.verdict.into(), data: Some(judged) })
     }
 }
 
-/// What the scene at `path` gives exactly.
-fn exact_values(path: &str) -> Result<ExactValues, CliError> {
-    let scene = read_scene(path)?;
-    let problem: Problem = problem_of(&scene, path)?;
+/// What a scene gives exactly.
+fn exact_values((scene, problem): (Scene, Problem)) -> Result<ExactValues, CliError> {
     let exact = Truth::of(&problem)?.flight;
     let values = Quantity::ALL.map(|quantity| match quantity {
         Quantity::CriticalVelocity => critical_velocity::exact_or_refined(&scene).ok(),

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, error_text, escape_terminal, say_line, show_progress, wrapped};
 use super::verify::report_line;
-use super::{Answer, Ask, CliError, Exit, command_typed, read_scene};
+use super::{Answer, Ask, CliError, Exit, Settings, command_typed};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
 use crate::exchange::scene_file::SHIPPED;
 use crate::physics::Scene;
@@ -31,9 +31,13 @@ const VARIED: usize = 1000;
 /// Arguments of `bench`.
 #[derive(Args, Debug)]
 #[command(after_help = include_str!("help/bench.txt"))]
+#[command(mut_arg("set", |set| set.requires("scenes")))]
 pub struct BenchArgs {
     /// Scene files [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
     pub scenes: Vec<String>,
+    /// What is set in each of them.
+    #[command(flatten)]
+    pub settings: Settings,
     /// What is measured.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,..",
           default_values_t = [Part::WorkPrecision, Part::StepSize])]
@@ -98,8 +102,7 @@ impl BenchArgs {
         }
         let mut scenes: Vec<(String, Scene)> = Vec::new();
         for path in &self.scenes {
-            let scene = read_scene(path)?;
-            scene.problem()?;
+            let (scene, _) = self.settings.read_problem(path)?;
             let stem = Path::new(path).file_stem().map_or_else(|| path.clone(), |stem| stem.to_string_lossy().into());
             let stem = if path == "-" { "standard-input".to_owned() } else { stem };
             // Two files of one name in two folders are two scenes.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, time_option};
 use super::output::{Text, interval_text};
-use super::{Answer, Ask, CliError, problem_of, read_scene};
+use super::{Answer, Ask, CliError, SceneArgs};
 use crate::integrators::{MethodName, MethodOptions};
 use crate::physics::Shown;
 use crate::studies::convergence::{
@@ -21,8 +21,9 @@ use crate::text::or_dash;
 #[derive(Args, Debug)]
 #[command(after_help = "Example: penetrode converge slab.toml --velocity centred --events interpolated --dt 10ns:10us")]
 pub struct ConvergeArgs {
-    /// Scene file (TOML), or - for standard input.
-    pub scene: String,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
     /// Method of integration [default: central-difference].
     #[arg(long, value_enum, default_value_t = MethodName::CentralDifference)]
     pub method: MethodName,
@@ -97,8 +98,7 @@ impl Ask for ConvergeArgs {
     type Answer = ConvergeJson;
 
     fn ask(&self) -> Result<Answer<ConvergeJson>, CliError> {
-        let scene = read_scene(&self.scene)?;
-        let problem = problem_of(&scene, &self.scene)?;
+        let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
         let method =
             MethodArgs { method: self.method, rtol: None, dt: None, velocity: self.velocity, events: self.events };
         if self.method == MethodName::ClosedForm {
@@ -115,7 +115,7 @@ impl Ask for ConvergeArgs {
                 "the flight takes no time, and has no order of convergence",
                 "give it a velocity and a target",
             )
-            .in_file(&self.scene));
+            .in_file(&self.scene.path));
         }
         let [from, to] = if fixed { self.steps(truth.flight.end.time)? } else { TOLERANCES };
         let ladder = Ladder { from, to, points: usize::from(self.points), seed: self.seed };

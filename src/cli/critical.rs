@@ -7,18 +7,19 @@ use serde::Serialize;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{Text, engineering, error_text, say, significant};
 use super::scene_json::SceneJson;
-use super::{Answer, Ask, CliError, Exit, read_scene};
+use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
 use crate::physics::{Criterion, Scene, Shown, groups};
-use crate::studies::sensitivity::{self, Spread};
+use crate::studies::sensitivity::{self, Share, Spread, Uncertainty};
 use crate::studies::{applicability, critical_velocity};
 
 /// Arguments of `critical`.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: penetrode critical slab.toml --spread target.strength=5% --spread projectile.mass=1%")]
 pub struct CriticalArgs {
-    /// Scene file (TOML), or - for standard input.
-    pub scene: String,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
@@ -49,36 +50,9 @@ pub struct CriticalJson {
     relative_error: Option<f64>,
     eq15: Option<Eq15Json>,
     /// Uncertainty of V_c from the spreads asked for; `null` without any.
-    uncertainty: Option<UncertaintyJson>,
+    uncertainty: Option<Uncertainty>,
     /// What was asked for and not computed, and why.
     skipped: Vec<String>,
-}
-
-/// Uncertainty of V_c from stated input spreads.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct UncertaintyJson {
-    spreads: Vec<SpreadJson>,
-    /// To first order, by the derivatives of V_c.
-    first_order_m_s: f64,
-    samples: usize,
-    /// Random scenes that were not admissible, left out.
-    inadmissible: usize,
-    seed: u64,
-    mean_m_s: f64,
-    deviation_m_s: f64,
-    /// Quantiles 2.5, 50 and 97.5 %.
-    quantiles_m_s: [f64; 3],
-}
-
-/// One input's part in it.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct SpreadJson {
-    /// Path of the number.
-    pub path: String,
-    /// Its relative standard deviation.
-    pub relative: f64,
-    /// Its share in the variance of V_c, to first order.
-    pub share: f64,
 }
 
 /// The exact critical velocity.
@@ -123,13 +97,13 @@ impl Ask for CriticalArgs {
     type Answer = CriticalJson;
 
     fn ask(&self) -> Result<Answer<CriticalJson>, CliError> {
-        let scene = read_scene(&self.scene)?;
+        let scene = self.scene.settings.read(&self.scene.path)?;
         if scene.thickness.is_none() {
             return Err(CliError::usage(
                 "a semi-infinite target has no critical velocity",
                 "give the target a thickness: [target] thickness = \"180 mm\"",
             )
-            .in_file(&self.scene));
+            .in_file(&self.scene.path));
         }
         let method = self.method.build()?;
         let spreads = sensitivity::spreads(&self.spread)?;
@@ -141,7 +115,7 @@ impl Ask for CriticalArgs {
         }
         let is_zero = exact == Some(0.0) || found.velocity == 0.0;
         let uncertainty = match spreads.as_slice() {
-            [_, ..] if !is_zero => Some(self.uncertainty(&scene, &spreads)?),
+            [_, ..] if !is_zero => Some(sensitivity::uncertainty(&scene, &spreads, self.samples as usize, self.seed)?),
             _ => None,
         };
         let no_spread = (is_zero && !spreads.is_empty())
@@ -176,27 +150,6 @@ impl Ask for CriticalArgs {
     }
 }
 
-impl CriticalArgs {
-    fn uncertainty(&self, scene: &Scene, spreads: &[Spread]) -> Result<UncertaintyJson, CliError> {
-        let found = sensitivity::uncertainty(scene, spreads, self.samples as usize, self.seed)?;
-        let spread = |(spread, &share): (&Spread, &f64)| SpreadJson {
-            path: spread.parameter.to_string(),
-            relative: spread.relative,
-            share,
-        };
-        Ok(UncertaintyJson {
-            spreads: spreads.iter().zip(&found.shares).map(spread).collect(),
-            first_order_m_s: found.first_order,
-            samples: found.samples,
-            inadmissible: found.inadmissible,
-            seed: self.seed,
-            mean_m_s: found.mean,
-            deviation_m_s: found.deviation,
-            quantiles_m_s: found.quantiles,
-        })
-    }
-}
-
 impl CriticalJson {
     fn text(&self, criterion: Criterion) -> String {
         let criterion = match criterion {
@@ -218,7 +171,7 @@ impl CriticalJson {
         }
         self.skipped.iter().for_each(|note| text.wrapped("  note       ", note));
         if let Some(uncertainty) = &self.uncertainty {
-            uncertainty.add_to(&mut text);
+            add_uncertainty(&mut text, uncertainty);
         }
         if let Some((ours, eq15)) = self.dimensionless_energy.zip(self.eq15.as_ref()) {
             eq15.add_to(&mut text, ours);
@@ -227,21 +180,20 @@ impl CriticalJson {
     }
 }
 
-impl UncertaintyJson {
-    fn add_to(&self, text: &mut Text) {
-        text.line(format!("  spread     +- {:.4} m/s to first order", self.first_order_m_s));
-        for SpreadJson { path, relative, share } in &self.spreads {
-            text.line(format!("             {path} {} %: {:.1} % of the variance", 100.0 * relative, 100.0 * share));
-        }
-        let [low, median, high] = self.quantiles_m_s;
-        text.line(format!("  sampled    mean {:.4}, deviation {:.4} m/s", self.mean_m_s, self.deviation_m_s));
-        text.line(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
-        let left_out = match self.inadmissible {
-            0 => String::new(),
-            count => format!(", {count} inadmissible left out"),
-        };
-        text.line(format!("             {} random scenes, seed {}{left_out}", self.samples, self.seed));
+/// Adds the uncertainty of V_c to `text`.
+fn add_uncertainty(text: &mut Text, found: &Uncertainty) {
+    text.line(format!("  spread     +- {:.4} m/s to first order", found.first_order));
+    for Share { spread: Spread { parameter, relative }, share } in &found.spreads {
+        text.line(format!("             {parameter} {} %: {:.1} % of the variance", 100.0 * relative, 100.0 * share));
     }
+    let [low, median, high] = found.quantiles;
+    text.line(format!("  sampled    mean {:.4}, deviation {:.4} m/s", found.mean, found.deviation));
+    text.line(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
+    let left_out = match found.inadmissible {
+        0 => String::new(),
+        count => format!(", {count} inadmissible left out"),
+    };
+    text.line(format!("             {} random scenes, seed {}{left_out}", found.samples, found.seed));
 }
 
 impl Eq15Json {

@@ -350,14 +350,37 @@ impl Cli {
     }
 }
 
-/// The scene in the file at `path`; `-` is standard input.
-fn read_scene(path: &str) -> Result<Scene, Box<SceneError>> {
-    Scene::read(Path::new(path))
+/// The scene of a command.
+#[derive(Args, Debug)]
+pub struct SceneArgs {
+    /// Scene file (TOML), or - for standard input.
+    #[arg(value_name = "SCENE")]
+    pub path: String,
+    /// What is set in the scene.
+    #[command(flatten)]
+    pub settings: Settings,
 }
 
-/// The problem of `scene`, read from `path`; what is wrong with it names the file.
-fn problem_of(scene: &Scene, path: &str) -> Result<Problem, CliError> {
-    scene.problem().map_err(|error| CliError::from(error).in_file(path))
+/// What is set in each scene of a command, as if its file gave it.
+#[derive(Args, Debug)]
+pub struct Settings {
+    /// Set a number or word of the scene, such as impact.velocity=400m/s, as if the file gave it; repeatable.
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl Settings {
+    /// The scene in the file at `path`; `-` is standard input.
+    fn read(&self, path: &str) -> Result<Scene, Box<SceneError>> {
+        Scene::read_with(Path::new(path), &self.set)
+    }
+
+    /// The scene in the file at `path` and its problem; what is wrong with it names the file.
+    fn read_problem(&self, path: &str) -> Result<(Scene, Problem), CliError> {
+        let scene = self.read(path)?;
+        let problem = scene.problem().map_err(|error| CliError::from(error).in_file(path))?;
+        Ok((scene, problem))
+    }
 }
 
 /// The command of this run as it was typed, its words quoted as for a shell.

@@ -11,7 +11,7 @@ use super::method_args::{MethodArgs, MethodJson};
 use super::output::{Text, check_outputs, engineering, error_text, say, significant, write_table};
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
-use super::{Answer, Ask, CliError, Exit, problem_of, read_scene};
+use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::tables::{Kind, Value, table_of};
 use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Sample};
 use crate::physics::groups::Groups;
@@ -24,8 +24,9 @@ use crate::studies::quantity::Quantity;
 #[derive(Args, Debug)]
 #[command(after_help = "Example: penetrode solve scene.toml --method tsit45 --rtol 1e-12 --trajectory path.csv")]
 pub struct SolveArgs {
-    /// Scene file (TOML), or - for standard input.
-    pub scene: String,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
@@ -108,13 +109,9 @@ impl RelativeErrorJson {
     /// Errors of `flight` against `exact`, at impact speed `impact_speed` (m/s); `None` where the outcomes differ.
     fn new(flight: &Flight, exact: &Flight, impact_speed: f64) -> Option<Self> {
         let error = |quantity| flight_error(quantity, flight, exact, impact_speed).map(f64::abs);
-        flight.outcome.agrees_with(exact.outcome).then(|| Self {
-            depth: error(Quantity::Depth),
-            time: error(Quantity::Time),
-            velocity: error(Quantity::Velocity),
-            crater_end_time: error(Quantity::CraterEndTime),
-            crater_end_velocity: error(Quantity::CraterEndVelocity),
-        })
+        let [depth, time, velocity, crater_end_time, crater_end_velocity] = Quantity::OF_A_FLIGHT.map(error);
+        let errors = Self { depth, time, velocity, crater_end_time, crater_end_velocity };
+        flight.outcome.agrees_with(exact.outcome).then_some(errors)
     }
 }
 
@@ -138,11 +135,10 @@ impl Ask for SolveArgs {
     }
 
     fn ask(&self) -> Result<Answer<SolveJson>, CliError> {
-        let scene = read_scene(&self.scene)?;
+        let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
         if let Some(path) = &self.trajectory {
-            check_outputs(&[("the scene", Path::new(&self.scene))], &[("the trajectory", path)])?;
+            check_outputs(&[("the scene", Path::new(&self.scene.path))], &[("the trajectory", path)])?;
         }
-        let problem = problem_of(&scene, &self.scene)?;
         let method = self.method.build()?;
         let detail = if self.trajectory.is_some() { Detail::Trajectory } else { Detail::Events };
         let started = Instant::now();

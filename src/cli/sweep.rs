@@ -11,7 +11,7 @@ use super::method_args::{MethodArgs, MethodJson};
 use super::output::{
     Text, WIDTH, check_format, check_table, figure_paths, is_parquet, say, significant, table, table_lines, write_table,
 };
-use super::{Answer, Ask, CliError, Exit, read_scene};
+use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::input::name_of;
 use crate::exchange::tables::{self, Kind, read_bytes};
 use crate::integrators::Method;
@@ -28,8 +28,9 @@ const ROWS_SHOWN: usize = 24;
 #[derive(Args, Debug)]
 #[command(after_help = include_str!("help/sweep.txt"))]
 pub struct SweepArgs {
-    /// Scene file (TOML), or - for standard input.
-    pub scene: String,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArgs,
     /// What to vary: N values from A to B, both included. Once or twice; the last runs fastest.
     #[arg(long, value_name = "PATH=A:B:N[:log]", required = true)]
     pub vary: Vec<String>,
@@ -89,14 +90,14 @@ impl Ask for SweepArgs {
 
     fn ask(&self) -> Result<Answer<SweepJson>, CliError> {
         self.table().map(check_format).transpose()?;
-        let scene = read_scene(&self.scene)?;
+        let scene = self.scene.settings.read(&self.scene.path)?;
         let axes: Vec<Axis> = self.vary.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         if axes.len() > 2 {
             return Err(CliError::usage("--vary may be given once or twice", "sweep the third number in another run"));
         }
         let plan = Plan::new(scene, &axes)?;
         // Table and figures replace neither the scene nor the measured points, nor one another.
-        let mut inputs = vec![("the scene", Path::new(&self.scene))];
+        let mut inputs = vec![("the scene", Path::new(&self.scene.path))];
         inputs.extend(self.data.as_deref().map(|path| ("the measured points", path)));
         check_table(&inputs, self.table(), endings(&plan))?;
         let method = self.method.build()?;
@@ -235,16 +236,13 @@ fn points_table(paths: &[String], rows: &[&Row]) -> (Vec<String>, Vec<&'static s
 /// The curves at the measured points, computed there and not interpolated.
 fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<MeasuredPoint>, CliError> {
     let mut data = Vec::with_capacity(points.len());
-    for &(ratio, measured) in points {
+    for &(thickness_ratio, measured) in points {
         let parameter = Parameter::ThicknessRatio;
-        let axis = Axis { parameter, from: ratio, to: ratio, count: 1, logarithmic: false };
+        let axis = Axis { parameter, from: thickness_ratio, to: thickness_ratio, count: 1, logarithmic: false };
         let there = Plan::new(plan.scene().clone(), &[axis])?.run(method.integrator());
-        data.extend(there.into_iter().map(|row| MeasuredPoint {
-            thickness_ratio: ratio,
-            measured,
-            energy_full_depth: row.energy_full_depth,
-            energy_ndrc: row.energy_ndrc,
-            eq15_printed: row.eq15_printed,
+        data.extend(there.into_iter().map(|row| {
+            let Row { energy_full_depth, energy_ndrc, eq15_printed, .. } = row;
+            MeasuredPoint { thickness_ratio, measured, energy_full_depth, energy_ndrc, eq15_printed }
         }));
     }
     Ok(data)

@@ -124,7 +124,7 @@ pub(crate) fn quoted(text: &str) -> String {
 /// What is wrong with a text, before it is known which file it is from.
 #[derive(Debug)]
 pub(crate) struct Fault {
-    span: Span,
+    pub(super) span: Span,
     message: String,
     allowed: String,
     help: String,

@@ -73,7 +73,7 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn from_toml(text: &str, file: &str) -> Result<Self, Box<SceneError>> {
-        SceneFile::from_toml(text, file).map(|read| read.scene)
+        SceneFile::from_toml(text, file, &[]).map(|read| read.scene)
     }
 
     /// The scene in the file at `path`; `-` is standard input.
@@ -82,8 +82,16 @@ impl Scene {
     /// [`SceneError`]: the file cannot be read, is larger than 1 MiB (it is then not read), is not UTF-8, or is
     /// not a scene.
     pub fn read(path: &Path) -> Result<Self, Box<SceneError>> {
+        Self::read_with(path, &[])
+    }
+
+    /// As [`Scene::read`], with `settings` as in [`SceneFile::from_toml`].
+    ///
+    /// # Errors
+    /// As [`Scene::read`]; also a setting that is none, or that the scene cannot have.
+    pub fn read_with(path: &Path, settings: &[String]) -> Result<Self, Box<SceneError>> {
         let (file, text) = read_text(path)?;
-        Self::from_toml(&text, &file)
+        SceneFile::from_toml(&text, &file, settings).map(|read| read.scene)
     }
 }
 
@@ -98,17 +106,37 @@ pub struct SceneFile {
 }
 
 impl SceneFile {
-    /// As [`Scene::from_toml`], with the decimals.
+    /// The scene file `text`, where each of the `settings`, such as `target.thickness=0.3 m`, stands as if the file gave
+    /// it, in place of what the file gives there. All numbers and words of a scene file can be set, with values as there
+    /// but without quotes; a nose factor or shape replaces the whole nose of the file.
     ///
     /// # Errors
-    /// As [`Scene::from_toml`].
-    pub fn from_toml(text: &str, file: &str) -> Result<Self, Box<SceneError>> {
-        let read = parse(text).and_then(|root| {
+    /// As [`Scene::from_toml`]; also a setting that is none, or that the scene cannot have.
+    pub fn from_toml(text: &str, file: &str, settings: &[String]) -> Result<Self, Box<SceneError>> {
+        // One text, one line for each setting behind the file: a span tells which of them is at fault.
+        let lines = || settings.iter().map(String::as_str);
+        let whole = [text].into_iter().chain(lines()).collect::<Vec<_>>().join("\n");
+        let read = parse(&whole[..text.len()]).and_then(|mut root| {
             check(root.get_ref(), "")?;
-            let mut reader = Reader { text, root, given: Vec::new() };
+            let mut start = text.len() + 1;
+            for line in lines() {
+                set(root.get_mut(), &whole, start..start + line.len(), text.len())?;
+                start += line.len() + 1;
+            }
+            let mut reader = Reader { text: &whole, root, given: Vec::new() };
             Ok(Self { scene: reader.scene()?, given: reader.given })
         });
-        read.map_err(|fault| fault.in_file(file, text))
+        read.map_err(|mut fault| {
+            let mut source = (file, text);
+            for line in lines() {
+                let next = source.1.len() + 1;
+                if fault.span.start >= next {
+                    fault.span = fault.span.start - next..fault.span.end - next;
+                    source = ("--set", line);
+                }
+            }
+            fault.in_file(source.0, source.1)
+        })
     }
 }
 
@@ -199,6 +227,68 @@ fn check(table: &DeTable<'_>, home: &str) -> Result<(), Fault> {
         }
     }
     Ok(())
+}
+
+/// Sets in `root` what the setting at `span` of `text` says; the file is the first `file_length` bytes.
+fn set<'t>(root: &mut DeTable<'t>, text: &'t str, span: Span, file_length: usize) -> Result<(), Fault> {
+    let setting = &text[span.clone()];
+    let Some((path, value)) = setting.split_once('=') else {
+        return Err(Fault::new(span, "this sets nothing", "PATH=VALUE", "write for instance impact.velocity=300m/s"));
+    };
+    let (place, path, text) = (span.start..span.start + path.len(), path.trim(), value.trim());
+    let value_place = span.end - value.len()..span.end;
+    let is_index = |word: &str| word.parse::<usize>().is_ok();
+    let general = path.split('.').map(|word| if is_index(word) { "*" } else { word }).collect::<Vec<_>>().join(".");
+    if !paths().any(|known| known == general) {
+        let index = path.split('.').find(|word| is_index(word)).unwrap_or("0");
+        let of_that_key = || paths().find(|known| key_of(known) == key_of(path));
+        let near = nearest(&general, &paths().collect::<Vec<_>>()).or_else(of_that_key);
+        let help = match (path.parse::<Parameter>(), near) {
+            (Ok(group), _) => format!("set `{}`", group.moves()),
+            (Err(_), Some(known)) => did_you_mean(&known.replace('*', index)),
+            (Err(_), None) => "docs/reference.md lists all keys of a scene file".to_owned(),
+        };
+        let allowed = "what a scene file gives, such as target.strength or stage.0.drag";
+        return Err(Fault::new(place, format!("no scene file has {}", quoted(path)), allowed, help));
+    }
+    let value = match DeValue::parse(text).map(Spanned::into_inner) {
+        Ok(value) if value.is_str() || (bare(&value).is_some() && !WORDS.contains(&path)) => value,
+        _ => DeValue::String(text.into()),
+    };
+    let (homes, key) = path.rsplit_once('.').unwrap_or(("", path));
+    let mut homes = homes.split('.').filter(|home| !home.is_empty());
+    let Some(home) = home_of(root, &mut homes, &place) else {
+        let message = format!("the scene has no `{}`", path.trim_end_matches(key).trim_end_matches('.'));
+        return Err(Fault::new(place, message, "one that the file gives, counted from 0", "add it to the file"));
+    };
+    if ["factor", "shape"].contains(&key) {
+        *home = std::mem::take(home).into_iter().filter(|(_, value)| value.span().start > file_length).collect();
+    }
+    if home.remove(key).is_some_and(|old| old.span().start > file_length) {
+        return Err(Fault::new(place, format!("`{path}` is set twice"), "each once", "remove one of the two"));
+    }
+    home.insert(Spanned::new(place, key.into()), Spanned::new(value_place, value));
+    Ok(())
+}
+
+/// The table at `homes`, made where it is none of a list; its keys stand at `place`.
+fn home_of<'a, 't>(
+    table: &'a mut DeTable<'t>,
+    homes: &mut (impl Iterator<Item = &'t str> + Clone),
+    place: &Span,
+) -> Option<&'a mut DeTable<'t>> {
+    let Some(home) = homes.next() else { return Some(table) };
+    let index = homes.clone().next().and_then(|word| word.parse::<usize>().ok());
+    let inner = if let Some(index) = index {
+        homes.next();
+        let DeValue::Array(entries) = table.get_mut(home)?.get_mut() else { return None };
+        entries.get_mut(index)?
+    } else {
+        let made = || Spanned::new(place.start..place.start, DeValue::Table(DeTable::new()));
+        table.entry(Spanned::new(place.clone(), home.into())).or_insert_with(made)
+    };
+    let DeValue::Table(inner) = inner.get_mut() else { return None };
+    home_of(inner, homes, place)
 }
 
 /// A file as it stands, and the numbers read from it.

@@ -467,6 +467,18 @@ pub enum ParameterError {
         /// What is wrong with it.
         cause: QuantityError,
     },
+    /// A text that is no spread.
+    #[error("`{0}` is not of the form PATH=REL, REL from 0 to 1 or in percent")]
+    Spread(String),
+    /// A spread of a group, which is no input.
+    #[error("`{0}` is a group of inputs: give the spreads of the numbers themselves")]
+    Group(Parameter),
+    /// A spread of a number on which V_c does not depend.
+    #[error("V_c does not depend on `{0}`")]
+    NoInput(Parameter),
+    /// Two spreads of a number.
+    #[error("`{0}` has two spreads")]
+    Twice(Parameter),
 }
 
 impl Advice for ParameterError {
@@ -481,6 +493,9 @@ impl Advice for ParameterError {
                 Some(dimension) => format!("write {} with its unit, or a bare SI number", dimension.noun()),
                 None => "write a plain number".to_owned(),
             },
+            Self::Spread(_) | Self::Group(_) => "write for example --spread target.strength=5%".to_owned(),
+            Self::NoInput(_) => "leave its spread out: V_c is sought whatever the impact velocity".to_owned(),
+            Self::Twice(_) => "leave one of the two out".to_owned(),
         }
     }
 }

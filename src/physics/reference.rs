@@ -135,22 +135,9 @@ pub struct ExactCritical {
 }
 
 /// Condition numbers: the sum over all inputs p of `|p df/dp|/|f|`, so that inputs off by one ulp each move f by no
-/// more than so many ulps. Velocities and the margin are taken absolutely (over V0, over 1).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conditions {
-    /// Of the depth at the end.
-    pub depth: f64,
-    /// Of the time of the end.
-    pub time: f64,
-    /// Of the velocity at the end, over V0.
-    pub velocity: f64,
-    /// Of the time at x = k d.
-    pub crater_end_time: Option<f64>,
-    /// Of the velocity at x = k d, over V0.
-    pub crater_end_velocity: Option<f64>,
-    /// Of the exit margin, absolute.
-    pub exit_margin: Option<f64>,
-}
+/// more than so many ulps. Of depth, time and velocity at the end, and of time and velocity at x = k d (zero where it is
+/// not reached); velocities are taken over V0.
+pub type Conditions = [f64; 5];
 
 /// Why there is no reference answer.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -216,31 +203,22 @@ pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
 /// [`ReferenceError`].
 pub fn conditions(source: Source<'_>) -> Result<Conditions, ReferenceError> {
     let (base, bits) = settled(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees)?;
-    let mut sums = [0.0; 6];
+    let mut sums = [0.0; 5];
     for input in source.moving_inputs()? {
         let moved = solve(&source.model(bits, Some(input))?)?;
         if !moved.same_course(&base) {
-            sums = [f64::INFINITY; 6];
-            break;
+            let at_crater_end = if base.crater_end().is_some() { f64::INFINITY } else { 0.0 };
+            return Ok([f64::INFINITY, f64::INFINITY, f64::INFINITY, at_crater_end, at_crater_end]);
         }
-        for (sum, term) in sums.iter_mut().zip(quotients(&moved, &base, bits)) {
+        for (sum, term) in sums.iter_mut().zip(quotients(&moved, &base)) {
             *sum += term;
         }
     }
-    let [depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin] = sums;
-    let at_crater_end = |sum| base.crater_end().map(|_| sum);
-    Ok(Conditions {
-        depth,
-        time,
-        velocity,
-        crater_end_time: at_crater_end(crater_end_time),
-        crater_end_velocity: at_crater_end(crater_end_velocity),
-        exit_margin: base.exit_margin.as_ref().map(|_| exit_margin),
-    })
+    Ok(sums)
 }
 
-/// The terms of [`Conditions`] for one input, in its order; zero for what the flights do not have.
-fn quotients(moved: &ExactFlight, base: &ExactFlight, bits: usize) -> [f64; 6] {
+/// The terms of [`Conditions`] for one input; zero for what the flights do not have.
+fn quotients(moved: &ExactFlight, base: &ExactFlight) -> [f64; 5] {
     let of = |moved: &Exact, base: &Exact, scale: &Exact| quotient(&moved.0 - &base.0, &scale.0, STEP_BITS);
     let at = |moved: &ExactState, state: &ExactState| {
         let velocity = of(&moved.velocity, &state.velocity, &base.impact_speed);
@@ -249,9 +227,7 @@ fn quotients(moved: &ExactFlight, base: &ExactFlight, bits: usize) -> [f64; 6] {
     let [depth, time, velocity] = at(&moved.end, &base.end);
     let crater_ends = moved.crater_end().zip(base.crater_end());
     let [_, crater_end_time, crater_end_velocity] = crater_ends.map_or([0.0; 3], |(moved, base)| at(moved, base));
-    let margins = moved.exit_margin.as_ref().zip(base.exit_margin.as_ref());
-    let exit_margin = margins.map_or(0.0, |(moved, base)| quotient(&moved.0 - &base.0, &int(1, bits), STEP_BITS));
-    [depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin]
+    [depth, time, velocity, crater_end_time, crater_end_velocity]
 }
 
 /// Condition number of the critical velocity of `source` with respect to all its inputs.

@@ -1,17 +1,16 @@
 //! Which SI value a text such as `26.9 mm` stands for.
 //!
-//! Units are those of the `uom` crate, by abbreviation, singular and plural. Two things are added:
+//! Units are those of the `uom` crate, by abbreviation, singular and plural, and a test compares each with it. The crate
+//! itself stays out of the program: its conversions are a function for each unit. Three things differ:
 //!
 //! - the product of number and conversion factor is taken of the decimals as written and rounded once, so that
 //!   `26.9 mm` is the f64 nearest 0.0269, which `26.9 · 0.001` need not be;
 //! - pound, ounce, slug, pound-force and what is made of them convert by their exact definitions (1 lb = 0.45359237 kg,
-//!   1 in = 25.4 mm, g = 9.80665 m/s²); `uom` rounds them to seven digits.
-
-use std::str::FromStr;
+//!   1 in = 25.4 mm, g = 9.80665 m/s²); `uom` rounds them to seven digits;
+//! - a power of ten is one: some prefixes of `uom` are quotients of rounded powers, and 1 µg gives 9.999999999999999e-10 kg.
 
 use strum::VariantArray;
 use thiserror::Error;
-use uom::si::f64 as si;
 
 /// What a quantity of a scene is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::IntoStaticStr, strum::VariantArray)]
@@ -41,8 +40,8 @@ pub enum Dimension {
     Energy,
 }
 
-/// Units that `uom` rounds or lacks, by exact definition, one a line: dimension, spellings, SI value.
-const EXACT: &str = include_str!("units.txt");
+/// The units, one a line: dimension, spellings, SI value.
+const UNITS: &str = include_str!("units.txt");
 
 impl Dimension {
     /// Name for messages, and common units, the SI unit first.
@@ -80,42 +79,16 @@ impl Dimension {
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
     pub fn coefficient(self, unit: &str) -> Option<f64> {
         let unit = canonical(unit);
-        let exact = EXACT.lines().find_map(|line| {
-            let (dimension, rest) = line.split_once(" | ")?;
-            let (names, value) = rest.split_once(" | ")?;
-            let is_it = dimension == <&str>::from(self) && names.split(", ").any(|name| name == unit);
-            if is_it { value.parse().ok() } else { None }
-        });
-        if exact.is_some() {
-            return exact;
-        }
-        let coefficient = match self {
-            Self::Mass => one::<si::Mass>(&unit).map(|q| q.value),
-            Self::Length => one::<si::Length>(&unit).map(|q| q.value),
-            Self::Pressure => one::<si::Pressure>(&unit).map(|q| q.value),
-            Self::Density => one::<si::MassDensity>(&unit).map(|q| q.value),
-            Self::Velocity => one::<si::Velocity>(&unit).map(|q| q.value),
-            Self::Force => one::<si::Force>(&unit).map(|q| q.value),
-            Self::Stiffness => one::<si::SurfaceTension>(&unit).map(|q| q.value),
-            Self::Viscosity => one::<si::MassRate>(&unit).map(|q| q.value),
-            Self::Drag => one::<si::LinearMassDensity>(&unit).map(|q| q.value),
-            Self::Time => one::<si::Time>(&unit).map(|q| q.value),
-            Self::Energy => one::<si::Energy>(&unit).map(|q| q.value),
-        }?;
-        // Some prefixes are quotients of rounded powers of ten there: 1 µg gives 9.999999999999999e-10 kg.
-        let power = format!("1e{}", coefficient.log10().round()).parse().unwrap_or(coefficient);
-        Some(if (coefficient / power - 1.0).abs() < 1e-15 { power } else { coefficient })
+        UNITS.lines().find_map(|line| {
+            let (names, value) = line.strip_prefix(<&str>::from(self))?.strip_prefix(" | ")?.split_once(" | ")?;
+            if names.split(", ").any(|name| name == unit) { value.parse().ok() } else { None }
+        })
     }
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
         Self::VARIANTS.iter().copied().find(|dimension| dimension.coefficient(unit).is_some())
     }
-}
-
-/// One of a unit, read by `uom`.
-fn one<Q: FromStr>(unit: &str) -> Option<Q> {
-    format!("1 {unit}").parse().ok()
 }
 
 /// Spelling that the tables know: single spaces, `²` and `³` for `^2`, `^3` or a digit after a letter, one micro sign.
@@ -317,11 +290,11 @@ mod tests {
                 assert_eq!(Dimension::of(unit), Some(dimension), "{unit}");
             }
         }
-        for line in EXACT.lines() {
+        for line in UNITS.lines() {
             let [dimension, names, value] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
             let dimension = Dimension::VARIANTS.iter().find(|known| <&str>::from(*known) == dimension).unwrap();
             for name in names.split(", ") {
-                assert_eq!(quantity(&format!("1{name}"), *dimension), Ok(value.parse().unwrap()), "{name}");
+                assert_eq!(quantity(&format!("1 {name}"), *dimension), Ok(value.parse().unwrap()), "{name}");
             }
         }
     }
@@ -375,25 +348,36 @@ mod tests {
     }
 
     #[test]
-    fn metric_prefixes_of_the_library_are_exact_powers_of_ten() {
-        // Each prefix is a quotient of two f64 powers in the table of the library.
-        for (prefix, power) in [("k", "3"), ("M", "6"), ("G", "9"), ("m", "-3"), ("µ", "-6"), ("n", "-9")] {
-            for (unit, dimension, base) in [
-                ("m", Dimension::Length, 0),
-                ("g", Dimension::Mass, -3),
-                ("Pa", Dimension::Pressure, 0),
-                ("N", Dimension::Force, 0),
-                ("N/m", Dimension::Stiffness, 0),
-                ("m/s", Dimension::Velocity, 0),
-                ("g/s", Dimension::Viscosity, -3),
-                ("g/m³", Dimension::Density, -3),
-                ("s", Dimension::Time, 0),
-            ] {
-                let exponent = power.parse::<i32>().unwrap_or_default() + base;
-                let exact = format!("1e{exponent}").parse().ok();
-                let Some(coefficient) = dimension.coefficient(&format!("{prefix}{unit}")) else { continue };
-                assert_eq!(Some(coefficient), exact, "{prefix}{unit}");
+    fn units_are_those_of_uom_and_so_are_their_values() {
+        use uom::si::{self, f64 as of};
+        let is_exact_here =
+            |name: &str| ["lb", "kip", "slug", "pound", "oz", "ounce", "psi"].iter().any(|part| name.contains(part));
+        let compare = |dimension: Dimension, name: &'static str, theirs: Option<f64>| {
+            // The Greek mu of `μin` is read as the micro sign.
+            let Some(theirs) = theirs.filter(|_| canonical(name) == name) else { return };
+            let ours = dimension.coefficient(name).unwrap_or(f64::NAN);
+            let power: f64 = format!("1e{}", theirs.log10().round()).parse().unwrap();
+            if (theirs / power - 1.0).abs() < 1e-15 {
+                assert_eq!(ours, power, "{name}");
+            } else if ours != theirs {
+                assert!(is_exact_here(name) && (ours / theirs - 1.0).abs() < 1e-6, "{name}: {ours:e} {theirs:e}");
             }
+        };
+        macro_rules! compare {
+            ($($dimension:ident $quantity:ident $module:ident,)*) => {$(
+                for unit in si::$module::units() {
+                    for name in [unit.abbreviation(), unit.singular(), unit.plural()] {
+                        let one = format!("1 {name}").parse::<of::$quantity>();
+                        compare(Dimension::$dimension, name, one.ok().map(|one| one.value));
+                    }
+                }
+            )*};
+        }
+        compare! {
+            Mass Mass mass, Length Length length, Pressure Pressure pressure, Density MassDensity mass_density,
+            Velocity Velocity velocity, Force Force force, Stiffness SurfaceTension surface_tension,
+            Viscosity MassRate mass_rate, Drag LinearMassDensity linear_mass_density, Time Time time,
+            Energy Energy energy,
         }
     }
 

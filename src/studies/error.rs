@@ -11,7 +11,7 @@ use twofloat::TwoFloat;
 use super::critical_velocity::CriticalError;
 use super::quantity::Quantity;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
-use crate::physics::parameter::{Parameter, ParameterError};
+use crate::physics::parameter::ParameterError;
 use crate::physics::reference::{Conditions, ExactFlight, ReferenceError};
 use crate::physics::{Advice, Outcome, Problem, ResolveError, Scalar, State, closed_form};
 
@@ -39,9 +39,6 @@ pub enum StudyError {
     /// One of its numbers.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// A spread of the impact velocity, on which V_c does not depend.
-    #[error("V_c does not depend on `{}`", Parameter::Velocity)]
-    NoInput,
     /// It has no reference in 50 digits.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
@@ -67,14 +64,7 @@ impl Advice for StudyError {
     }
 
     fn is_usage(&self) -> bool {
-        self.inner().map_or(*self == Self::NoInput, Advice::is_usage)
-    }
-
-    fn help(&self) -> String {
-        match self {
-            Self::NoInput => "leave its spread out: V_c is sought whatever the impact velocity".to_owned(),
-            _ => self.inner().map_or_else(String::new, Advice::help),
-        }
+        self.inner().is_some_and(Advice::is_usage)
     }
 }
 
@@ -194,7 +184,7 @@ impl Errors {
         let mut errors = Vec::with_capacity(5);
         for quantity in Quantity::OF_A_FLIGHT {
             let end = if quantity.is_at_crater_end() { exact.crater_end() } else { Some(&exact.end) };
-            let condition = condition_of(conditions, quantity).unwrap_or(1.0).max(1.0);
+            let condition = condition_of(conditions, quantity);
             let error = match (value_of(quantity, flight), end, quantity) {
                 (Some(value), Some(end), Quantity::Depth) => end.depth.relative_error(value),
                 (Some(value), Some(end), Quantity::Time | Quantity::CraterEndTime) => end.time.relative_error(value),
@@ -216,7 +206,7 @@ impl Errors {
     #[must_use]
     pub fn over(mut self, conditions: &Conditions) -> Self {
         for (error, quantity) in &mut self.0 {
-            *error /= condition_of(conditions, *quantity).unwrap_or(1.0).max(1.0);
+            *error /= condition_of(conditions, *quantity);
         }
         self
     }
@@ -232,25 +222,18 @@ impl Errors {
     }
 }
 
-/// Condition number of `quantity`; `None` where the flight does not have it.
-pub fn condition_of(conditions: &Conditions, quantity: Quantity) -> Option<f64> {
-    match quantity {
-        Quantity::Depth => Some(conditions.depth),
-        Quantity::Time => Some(conditions.time),
-        Quantity::Velocity => Some(conditions.velocity),
-        Quantity::CraterEndTime => conditions.crater_end_time,
-        Quantity::CraterEndVelocity => conditions.crater_end_velocity,
-        Quantity::CriticalVelocity => None,
-    }
+/// Condition number of `quantity`, at least one; one for what no flight has.
+pub fn condition_of(conditions: &Conditions, quantity: Quantity) -> f64 {
+    conditions.get(quantity as usize).map_or(1.0, |condition| condition.max(1.0))
 }
 
 /// Condition numbers of `problem` by dual numbers: one flight for each input that is not zero. As
-/// [`crate::physics::reference::conditions`], without that of the margin and far cheaper.
+/// [`crate::physics::reference::conditions`], and far cheaper.
 ///
 /// # Errors
 /// As [`Taylor::solve_in`].
 pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, IntegrationError> {
-    let mut sums = [0.0; 5];
+    let mut sums = Conditions::default();
     let mut add = |input: &dyn Fn(&mut Problem<Dual64>) -> &mut Dual64| -> Result<(), IntegrationError> {
         let mut dual = problem.cast::<Dual64>();
         let number = input(&mut dual);
@@ -276,9 +259,7 @@ pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, Integ
         add(&|p| &mut p.stages[index].drag)?;
         add(&|p| &mut p.stages[index].end)?;
     }
-    let [depth, time, velocity, at_crater_end @ ..] = sums;
-    let [crater_end_time, crater_end_velocity] = at_crater_end.map(Some);
-    Ok(Conditions { depth, time, velocity, crater_end_time, crater_end_velocity, exit_margin: None })
+    Ok(sums)
 }
 
 #[cfg(test)]

@@ -19,18 +19,19 @@
 
 use num_dual::Dual64;
 use rayon::prelude::*;
-use thiserror::Error;
+use serde::Serialize;
 
 use super::critical_velocity;
 use super::error::{Studied, StudyError, Truth};
 use super::random::Random;
+use super::sweep::as_text;
 #[cfg(feature = "diffsol")]
 use crate::integrators::diffsol_sensitivity;
 use crate::integrators::{Detail, Energy, Solved, Taylor};
 #[cfg(feature = "diffsol")]
 use crate::physics::EventKind;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError};
-use crate::physics::{Advice, Outcome, Problem, Resolved, Scene, Stage, State, closed_form};
+use crate::physics::{Outcome, Problem, Resolved, Scene, Stage, State, closed_form};
 
 /// Derivatives with respect to one number of the scene; `None` where there is no such quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -318,52 +319,27 @@ impl Sensitivities {
 }
 
 /// A number of the scene with its relative standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Spread {
-    /// The number.
+    /// Path of the number.
+    #[serde(rename = "path", serialize_with = "as_text")]
+    #[cfg_attr(feature = "report", schemars(with = "String"))]
     pub parameter: Parameter,
     /// Standard deviation of its logarithm, which for small spreads is its relative standard deviation.
     pub relative: f64,
 }
 
-/// Why a text is no spread: a mistake of the caller, exit code 2.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum SpreadError {
-    /// Not `PATH=REL`.
-    #[error("`{0}` is not of the form PATH=REL, REL from 0 to 1 or in percent")]
-    Form(String),
-    /// The number.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-    /// A group, which is no input.
-    #[error("`{0}` is a group of inputs: give the spreads of the numbers themselves")]
-    Group(Parameter),
-    /// A number twice.
-    #[error("`{0}` has two spreads")]
-    Twice(Parameter),
-}
-
-impl Advice for SpreadError {
-    fn help(&self) -> String {
-        match self {
-            Self::Parameter(error) => error.help(),
-            Self::Twice(_) => "leave one of the two out".to_owned(),
-            _ => "write for example --spread target.strength=5%".to_owned(),
-        }
-    }
-}
-
 /// Reads `texts` as spreads of different numbers.
 ///
 /// # Errors
-/// [`SpreadError`].
-pub fn spreads(texts: &[String]) -> Result<Vec<Spread>, SpreadError> {
+/// [`ParameterError`].
+pub fn spreads(texts: &[String]) -> Result<Vec<Spread>, ParameterError> {
     let mut all: Vec<Spread> = Vec::with_capacity(texts.len());
     for text in texts {
         let spread: Spread = text.parse()?;
         if all.iter().any(|earlier| earlier.parameter == spread.parameter) {
-            return Err(SpreadError::Twice(spread.parameter));
+            return Err(ParameterError::Twice(spread.parameter));
         }
         all.push(spread);
     }
@@ -371,14 +347,14 @@ pub fn spreads(texts: &[String]) -> Result<Vec<Spread>, SpreadError> {
 }
 
 impl std::str::FromStr for Spread {
-    type Err = SpreadError;
+    type Err = ParameterError;
 
-    fn from_str(text: &str) -> Result<Self, SpreadError> {
-        let form = || SpreadError::Form(text.to_owned());
+    fn from_str(text: &str) -> Result<Self, ParameterError> {
+        let form = || ParameterError::Spread(text.to_owned());
         let (path, relative) = text.split_once('=').ok_or_else(form)?;
         let parameter: Parameter = path.trim().parse()?;
         if parameter.moves() != parameter {
-            return Err(SpreadError::Group(parameter));
+            return Err(ParameterError::Group(parameter));
         }
         let (digits, unit) = relative.trim().strip_suffix('%').map_or((relative, 1.0), |digits| (digits, 0.01));
         let relative = digits.trim().parse::<f64>().map_err(|_| form())? * unit;
@@ -390,24 +366,40 @@ impl std::str::FromStr for Spread {
 }
 
 /// Uncertainty of V_c from the spreads of its inputs.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Uncertainty {
-    /// V_c at the scene's own numbers (m/s).
-    pub critical_velocity: f64,
+    /// The spreads, in the order given.
+    pub spreads: Vec<Share>,
     /// Standard deviation to first order [m/s]: root of the sum of squares of elasticity times spread, times V_c.
+    #[serde(rename = "first_order_m_s")]
     pub first_order: f64,
-    /// Share of each spread in the variance, in the order given; they sum up to one.
-    pub shares: Vec<f64>,
     /// Samples that had a critical velocity.
     pub samples: usize,
     /// Samples left out because the scene is not admissible (a nose factor above one, say).
     pub inadmissible: usize,
+    /// Seed of the samples.
+    pub seed: u64,
     /// Mean of the samples (m/s).
+    #[serde(rename = "mean_m_s")]
     pub mean: f64,
     /// Standard deviation of the samples (m/s).
+    #[serde(rename = "deviation_m_s")]
     pub deviation: f64,
     /// Quantiles 2.5, 50 and 97.5 % of the samples (m/s).
+    #[serde(rename = "quantiles_m_s")]
     pub quantiles: [f64; 3],
+}
+
+/// A spread and its part in the uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct Share {
+    /// The spread.
+    #[serde(flatten)]
+    pub spread: Spread,
+    /// Its share in the variance of V_c, to first order; they sum up to one.
+    pub share: f64,
 }
 
 /// Samples per seed: a fixed unit of parallel work, so that results do not depend on the number of threads.
@@ -424,30 +416,28 @@ const CHUNK: usize = 4096;
 /// admissible sample at all.
 pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64) -> Studied<Uncertainty> {
     if spreads.iter().any(|spread| spread.parameter == Parameter::Velocity) {
-        return Err(StudyError::NoInput);
+        return Err(ParameterError::NoInput(Parameter::Velocity).into());
     }
     // V_c depends on neither; a clone without a title allocates nothing.
     let base = Scene { title: None, velocity: None, ..scene.clone() };
-    let mut spreads: Vec<(usize, Spread)> = spreads.iter().copied().enumerate().collect();
-    spreads.sort_by_key(|(_, spread)| spread.parameter);
+    let mut ordered = spreads.to_vec();
+    ordered.sort_by_key(|spread| spread.parameter);
     let derivatives = match by_closed_form(&base)? {
         full if full.entries.iter().any(|e| e.critical_velocity.is_some()) => full,
         _ => by_taylor(&base)?,
     };
     let critical =
         derivatives.quantities.critical_velocity.ok_or_else(|| StudyError::NoCritical(derivatives.notes.join("; ")))?;
-    let mut shares = vec![0.0; spreads.len()];
-    for (place, spread) in &spreads {
+    let mut shares = Vec::with_capacity(spreads.len());
+    for spread in spreads {
         spread.parameter.get(&base)?;
         let entry = derivatives.entries.iter().find(|entry| entry.parameter == spread.parameter);
         let elasticity = entry.and_then(|e| elasticity(e.critical_velocity, Some(critical), e.value)).unwrap_or(0.0);
-        shares[*place] = (elasticity * spread.relative).powi(2);
+        shares.push(Share { spread: *spread, share: (elasticity * spread.relative).powi(2) });
     }
-    let variance: f64 = shares.iter().sum();
-    if variance > 0.0 {
-        for share in &mut shares {
-            *share /= variance;
-        }
+    let variance: f64 = shares.iter().map(|share| share.share).sum();
+    for share in shares.iter_mut().filter(|_| variance > 0.0) {
+        share.share /= variance;
     }
 
     let chunks = samples.div_ceil(CHUNK);
@@ -456,7 +446,7 @@ pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64)
         .flat_map_iter(|chunk| {
             let mut random = Random::for_part(seed, &format!("spread {chunk}"));
             let count = CHUNK.min(samples - chunk * CHUNK);
-            (0..count).map(|_| sample(&base, &spreads, &mut random)).collect::<Vec<_>>()
+            (0..count).map(|_| sample(&base, &ordered, &mut random)).collect::<Vec<_>>()
         })
         .collect();
     let mut velocities: Vec<f64> = drawn.iter().copied().flatten().collect();
@@ -469,11 +459,11 @@ pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64)
     let squares: f64 = velocities.iter().map(|v| (v - mean) * (v - mean)).sum();
     let quantile = |share: f64| velocities[(share * (count - 1.0)).round() as usize];
     Ok(Uncertainty {
-        critical_velocity: critical,
+        spreads: shares,
         first_order: variance.sqrt() * critical,
-        shares,
         samples: velocities.len(),
         inadmissible: samples - velocities.len(),
+        seed,
         mean,
         deviation: (squares / (count - 1.0).max(1.0)).sqrt(),
         quantiles: [quantile(0.025), quantile(0.5), quantile(0.975)],
@@ -481,9 +471,9 @@ pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64)
 }
 
 /// V_c of one random scene; `None` where it is not admissible.
-fn sample(base: &Scene, spreads: &[(usize, Spread)], random: &mut Random) -> Option<f64> {
+fn sample(base: &Scene, spreads: &[Spread], random: &mut Random) -> Option<f64> {
     let mut scene = base.clone();
-    for (_, Spread { parameter, relative }) in spreads {
+    for Spread { parameter, relative } in spreads {
         let value = parameter.get(&scene).ok()? * (relative * normal(random)).exp();
         parameter.set(&mut scene, value).ok()?;
     }
@@ -654,9 +644,12 @@ mod tests {
     fn a_spread_is_of_an_input_of_v_c_and_there_once() {
         let texts = |all: &[&str]| spreads(&all.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>());
         let twice = texts(&["target.strength=2%", "projectile.mass=1%", "target.strength=0.02"]);
-        assert_eq!(twice, Err(SpreadError::Twice(Parameter::Strength)));
+        assert_eq!(twice, Err(ParameterError::Twice(Parameter::Strength)));
         let two = texts(&["target.strength=2%", "impact.velocity=1%"]).unwrap();
-        assert_eq!(uncertainty(&shipped("paper-slab"), &two, 10, 1), Err(StudyError::NoInput));
+        assert_eq!(
+            uncertainty(&shipped("paper-slab"), &two, 10, 1),
+            Err(ParameterError::NoInput(Parameter::Velocity).into())
+        );
         assert!(uncertainty(&shipped("paper-slab"), &two[..1], 10, 1).is_ok());
     }
 
@@ -668,8 +661,8 @@ mod tests {
         assert_eq!((found.samples, found.inadmissible), (20_000, 0));
         // The deviation of 20,000 samples has a standard error of 0.5 %.
         assert!((found.deviation / found.first_order - 1.0).abs() < 0.02, "{found:?}");
-        assert!((found.mean / found.critical_velocity - 1.0).abs() < 1e-3);
-        assert!((found.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((found.mean / critical_velocity::exact(&scene).unwrap() - 1.0).abs() < 1e-3);
+        assert!((found.spreads.iter().map(|share| share.share).sum::<f64>() - 1.0).abs() < 1e-12);
         assert_eq!(found, uncertainty(&scene, &spreads, 20_000, 7).unwrap());
         assert_ne!(found.mean, uncertainty(&scene, &spreads, 20_000, 8).unwrap().mean);
     }
@@ -692,9 +685,9 @@ mod tests {
             "projectile.mass=nan",
             "projectile.mass=200%",
         ] {
-            assert!(matches!(text.parse::<Spread>(), Err(SpreadError::Form(_))), "{text}");
+            assert!(matches!(text.parse::<Spread>(), Err(ParameterError::Spread(_))), "{text}");
         }
-        assert!(matches!("H/d=0.1".parse::<Spread>(), Err(SpreadError::Group(_))));
+        assert!(matches!("H/d=0.1".parse::<Spread>(), Err(ParameterError::Group(_))));
         assert_eq!("projectile.mass=5 %".parse::<Spread>().unwrap().relative, 0.05);
     }
 }

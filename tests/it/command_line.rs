@@ -69,6 +69,26 @@ fn what_a_command_prints_is_what_its_schema_says() {
     }
 }
 
+#[test]
+fn every_command_that_reads_scenes_takes_settings() {
+    for line in ["solve @S", "critical @S", "converge @S --points 8", "sweep @S --vary H/d=1:2:2", "bench @S"] {
+        let line = format!("{} --set projectile.mass=5Pa", line.replace('S', "paper-slab"));
+        let words = run(&line).refused();
+        assert!(words.contains("`Pa` is a unit of pressure"), "{line}: {words}");
+    }
+    let mass = |line: &str| json(line)["scene"]["mass_kg"].as_f64();
+    assert_eq!(mass("solve @tunnel --set projectile.mass=500g"), Some(0.5));
+    // Half the mass, root of two times the speed.
+    let critical = |set: &str| json(&format!("critical @paper-slab {set}"))["critical_velocity_m_s"].as_f64().unwrap();
+    let ratio = critical("--set resistance.B=0 --set projectile.mass=1")
+        / critical("--set resistance.B=0 --set projectile.mass=2");
+    assert!((ratio - std::f64::consts::SQRT_2).abs() < 1e-12, "{ratio}");
+    let rows = "dt_s,depth_m\n8,1.64\n4,1.16\n2,1.04\n1,1.01\n";
+    let audit = |line: &str| run_with(rows, &format!("audit - {line}"));
+    assert!(audit("--set projectile.mass=5kg").refused().contains("--scene"));
+    assert!(run("bench --set projectile.mass=5kg").refused().contains("SCENES"));
+}
+
 /// Each request, and words of the refusal.
 #[test]
 fn a_request_that_cannot_be_served_is_refused_with_its_cause_and_writes_nothing() {

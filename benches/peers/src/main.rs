@@ -149,14 +149,7 @@ impl Known {
         // The closed form, or for a stage without one the Taylor series to round-off.
         let exact = Truth::of(&problem).unwrap_or_else(|error| panic!("{error}")).flight;
         let exact = Solved::of(Ok(exact)).unwrap_or_else(|error| panic!("{error}"));
-        let conditions = reference::conditions(Source::Problem(&problem)).unwrap_or(Conditions {
-            depth: 1.0,
-            time: 1.0,
-            velocity: 1.0,
-            crater_end_time: None,
-            crater_end_velocity: None,
-            exit_margin: None,
-        });
+        let conditions = reference::conditions(Source::Problem(&problem)).unwrap_or([1.0; 5]);
         Self { problem, exact, conditions }
     }
 
@@ -170,14 +163,14 @@ impl Known {
         let speed = self.problem.impact_speed;
         let over = |difference: f64, scale: f64, condition: f64| (difference / scale).abs() / condition.max(1.0);
         let mut errors = vec![
-            over(found.end.time - exact.end.time, exact.end.time, conditions.time),
-            over(found.end.depth - exact.end.depth, exact.end.depth, conditions.depth),
-            over(found.end.velocity - exact.end.velocity, speed, conditions.velocity),
+            over(found.end.time - exact.end.time, exact.end.time, conditions[1]),
+            over(found.end.depth - exact.end.depth, exact.end.depth, conditions[0]),
+            over(found.end.velocity - exact.end.velocity, speed, conditions[2]),
         ];
         if let (Some(found), Some(exact)) = (found.first_boundary, exact.first_boundary) {
             let State { time, velocity, .. } = exact;
-            errors.push(over(found.time - time, time, conditions.crater_end_time.unwrap_or(1.0)));
-            errors.push(over(found.velocity - velocity, speed, conditions.crater_end_velocity.unwrap_or(1.0)));
+            errors.push(over(found.time - time, time, conditions[3]));
+            errors.push(over(found.velocity - velocity, speed, conditions[4]));
         }
         errors.into_iter().fold(0.0, |worst, error| if error <= worst { worst } else { error })
     }

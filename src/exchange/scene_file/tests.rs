@@ -90,7 +90,7 @@ fn every_key_is_read() {
 #[test]
 fn every_number_of_a_file_stays_as_the_decimal_that_was_written() {
     let text = with("\"50 mm\"", "\"26.90 mm\"").replace("S = 12.0", "S = 1_2.0");
-    let given = SceneFile::from_toml(&text, "scene.toml").unwrap().given;
+    let given = SceneFile::from_toml(&text, "scene.toml", &[]).unwrap().given;
     let decimal = |parameter: Parameter| given.iter().find(|(p, _)| *p == parameter).map(|(_, q)| q.decimal.as_str());
     assert_eq!(decimal(Parameter::Diameter), Some("2690e-5"));
     assert_eq!(decimal(Parameter::StaticFactor), Some("12.0"));
@@ -260,7 +260,7 @@ fn admissible_ranges_are_those_of_the_table() {
     let layers = text_of_shipped("layered").replace("density", "viscosity = 5\nS = 9\ndensity");
     let numbers = [f64::MIN_POSITIVE, 1e-9, 0.5, 1.0, 1.1, 1e9, 1e300, 0.0, -0.0, -1e-300, -0.1, -1.0];
     for text in [FULL, STAGES, &layers] {
-        for (parameter, _) in SceneFile::from_toml(text, "scene.toml").unwrap().given {
+        for (parameter, _) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().given {
             // An air gap has no S; a file gives none that is zero.
             let is_factor = parameter.key() == Parameter::StaticFactor.key();
             let range = if is_factor { Parameter::StaticFactor } else { parameter }.entry().range;
@@ -287,6 +287,89 @@ fn admissible_ranges_are_those_of_the_table() {
             refuse(&text(value));
         }
     }
+}
+
+fn set(text: &str, settings: &[&str]) -> Result<Scene, Box<SceneError>> {
+    let settings: Vec<_> = settings.iter().map(|setting| (*setting).to_owned()).collect();
+    SceneFile::from_toml(text, "scene.toml", &settings).map(|read| read.scene)
+}
+
+/// `text` without what it gives at `path`.
+fn without(text: &str, path: &str) -> String {
+    let mut file: toml::Table = text.parse().unwrap();
+    let (home, key) = path.rsplit_once('.').unwrap();
+    let mut table = &mut file;
+    for word in home.split('.') {
+        table = table[word].as_table_mut().unwrap();
+    }
+    table.remove(key).unwrap();
+    toml::to_string(&file).unwrap()
+}
+
+#[test]
+fn what_is_set_is_as_if_the_file_gave_it() {
+    for (_, text) in SHIPPED {
+        for (parameter, quantity) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().given {
+            // Within the range of each number, and within the next boundary of a stage.
+            let value = 1.0625 * quantity.value;
+            let stated = read(&with_value(text, parameter, &value.into()));
+            let unit = parameter.entry().dimension.map_or("", |dimension| dimension.units()[0]);
+            for setting in [format!("{parameter}={value:e}"), format!(" {parameter} = {value:e}{unit} ")] {
+                assert_eq!(set(text, &[&setting]).as_ref(), Ok(&stated), "{setting}");
+            }
+        }
+    }
+    // What the file leaves out.
+    for (path, value) in [
+        ("impact.velocity", "0.3km/s"),
+        ("target.thickness", "'180 mm'"),
+        ("resistance.S", "12.0"),
+        ("perforation.criterion", "ndrc"),
+        ("projectile.nose.factor", "0.72"),
+        ("resistance.crater_stiffness", "8.48e6 N/m"),
+    ] {
+        assert_eq!(set(&without(FULL, path), &[&format!("{path}={value}")]).unwrap(), read(FULL), "{path}");
+    }
+    let bare = FULL.replace("[impact]\nvelocity = \"300 m/s\"\n", "");
+    assert_eq!(set(&bare, &["impact.velocity=300"]).unwrap(), read(FULL));
+    assert_eq!(set(FULL, &["title=7 = seven"]).unwrap().title.unwrap(), "7 = seven");
+    // S that the file leaves to Eq. 14 follows the strength, and a nose is another one as a whole.
+    let scene = set(&without(FULL, "resistance.S"), &["target.strength=144MPa"]).unwrap();
+    assert_eq!(scene.concrete().unwrap().static_factor, 6.0);
+    let ogive = ["projectile.nose.caliber_radius_head=3", "projectile.nose.shape=ogive"];
+    let stated = read(&with("{ factor = 0.72 }", "{ shape = \"ogive\", caliber_radius_head = 3 }"));
+    assert_eq!(set(FULL, &ogive[1..]).unwrap_err().message, "the nose has no `caliber_radius_head`");
+    for text in [FULL.to_owned(), with("{ factor = 0.72 }", "{ shape = \"cone\", length_ratio = 2 }")] {
+        assert_eq!(set(&text, &ogive).unwrap(), stated);
+    }
+}
+
+#[test]
+fn a_setting_that_is_none_says_where_and_why() {
+    let mut shown = String::new();
+    for (text, settings) in [
+        (FULL, &["impact.velocity"][..]),
+        (FULL, &["impact.velocity=400 m", "target.density=-1"]),
+        (FULL, &["impact.velocity=400m/s", "target.density=-1"]),
+        (FULL, &["impact.velocity="]),
+        (FULL, &["target.strenght=5MPa"]),
+        (FULL, &["strength=5MPa"]),
+        (FULL, &["H/d=5"]),
+        (FULL, &["nothing=5"]),
+        (FULL, &["stage.0.drag=5"]),
+        (STAGES, &["stage.2.drag=5"]),
+        (STAGES, &["stage.1.darg=5"]),
+        (STAGES, &["target.strength=5MPa"]),
+        (STAGES, &["stage.0.end=5", "stage.1.end=4"]),
+        (FULL, &["resistance.k=2", "resistance.B=2", "resistance.k=3"]),
+        (FULL, &["resistance.k=2 m"]),
+        (FULL, &["projectile.nose.factor=1", "projectile.nose.shape=flat"]),
+        (FULL, &["perforation.criterion=ndrk"]),
+        ("projectile = 2", &["projectile.mass=2"]),
+    ] {
+        shown += &set(text, settings).unwrap_err().render(false);
+    }
+    snapbox::assert_data_eq!(shown, snapbox::file!["snapshots/settings.txt"].raw());
 }
 
 #[test]

@@ -16,14 +16,7 @@ const LIMIT: f64 = 8.0;
 /// Allowed error in units of rounding, each 1/2 to 1 ulp, over max(1, condition).
 const ROUNDINGS_MAX: f64 = 4.0;
 
-const UNCONDITIONED: Conditions = Conditions {
-    depth: 1.0,
-    time: 1.0,
-    velocity: 1.0,
-    crater_end_time: None,
-    crater_end_velocity: None,
-    exit_margin: None,
-};
+const UNCONDITIONED: Conditions = [1.0; 5];
 
 /// Random cases of a test: all of them where the big floats are compiled with optimization.
 const CASES: u32 = if cfg!(debug_assertions) { 1_000 } else { 20_000 };

@@ -87,7 +87,7 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
     let error = flight_error(quantity, &flight, exact, problem.impact_speed)
         .ok_or_else(|| NotMeasured::broken(format!("{} where {} is right", flight.outcome, exact.outcome)))?;
     let conditions = reference::conditions(Source::Problem(problem)).ok();
-    let condition = conditions.and_then(|c| condition_of(&c, quantity)).map_or(1.0, |c| c.max(1.0));
+    let condition = conditions.map_or(1.0, |conditions| condition_of(&conditions, quantity));
     let value = value_of(quantity, &flight).unwrap_or(f64::NAN);
     let mut remark = format!("{value} with {} evaluations, error {:.1e}", flight.cost.force_evaluations, error.abs());
     if condition > 1.0 {
