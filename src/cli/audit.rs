@@ -14,6 +14,7 @@ use crate::studies::critical_velocity;
 use crate::studies::error::Truth;
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::quantity::Quantity;
+use crate::studies::scheme_of_table::identify;
 use crate::text::or_dash;
 
 /// Arguments of `audit`.
@@ -47,17 +48,19 @@ impl Ask for AuditArgs {
         }
         let file = name_of(&self.results);
         let results = Table::read(&file, &read_bytes(&self.results, &RESULTS)?)?;
-        let exact = self.scene.as_deref().map(|path| exact_values(self.settings.read_problem(path)?)).transpose()?;
-        let judged = audit(&results, self.order, exact)?;
+        let scene = self.scene.as_deref().map(|path| self.settings.read_problem(path)).transpose()?;
+        let exact = scene.as_ref().map(|(scene, problem)| exact_values(scene, problem)).transpose()?;
+        let mut judged = audit(&results, self.order, exact)?;
+        judged.scheme = scene.and_then(|(_, problem)| identify(&problem, &results));
         Ok(Answer { text: text(&file, &judged), exit: judged.verdict.into(), data: Some(judged) })
     }
 }
 
-/// What a scene gives exactly.
-fn exact_values((scene, problem): (Scene, Problem)) -> Result<ExactValues, CliError> {
-    let exact = Truth::of(&problem)?.flight;
+/// What the scene gives exactly.
+fn exact_values(scene: &Scene, problem: &Problem) -> Result<ExactValues, CliError> {
+    let exact = Truth::of(problem)?.flight;
     let values = Quantity::ALL.map(|quantity| match quantity {
-        Quantity::CriticalVelocity => critical_velocity::exact_or_refined(&scene).ok(),
+        Quantity::CriticalVelocity => critical_velocity::exact_or_refined(scene).ok(),
         fixed if is_fixed(fixed, &exact) => None,
         free => value_of(free, &exact),
     });
@@ -93,6 +96,9 @@ fn text(file: &str, judged: &Audit) -> String {
     }
     for finding in &judged.findings {
         text.wrapped("  note: ", &escape_terminal(&finding.message));
+    }
+    if let Some(scheme) = &judged.scheme {
+        text.wrapped("  scheme     ", &scheme.sentence());
     }
     text.line(format!("  verdict    {}", judged.verdict.name()));
     text.finish()

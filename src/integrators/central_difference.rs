@@ -33,6 +33,7 @@ use super::flight::at_once;
 use super::outcome::{Detail, Flight, IntegrationError, Integrator, Solved};
 use crate::physics::{Problem, Scalar, State};
 use boundaries::Run;
+pub(crate) use boundaries::Step;
 use scheme::Stepper;
 pub use stability::{default_time_step, stability_limit};
 

@@ -19,10 +19,12 @@ use super::grid_convergence::{
 };
 use super::order::{Class, Exclusion, PowerLaw, ROUND_OFF_ALLOWANCE, StepError, fit_at_level};
 use super::quantity::Quantity;
+use super::scheme_of_table::Identification;
 use super::verdict::Verdict;
 use crate::exchange::tables::TableError;
 use crate::physics::{Advice, Shown};
 pub use column::{Column, RESULTS};
+pub(crate) use table::FlightRow;
 pub use table::{ROWS_MAX, Table};
 use table::{ResultColumn, StepRow};
 
@@ -197,6 +199,8 @@ pub struct Audit {
     pub findings: Vec<Finding>,
     /// One per column, in the order of the table.
     pub quantities: Vec<QuantityAudit>,
+    /// The schemes that reproduce the table; `null` without a scene, or where no row can be compared.
+    pub scheme: Option<Identification>,
 }
 
 /// Judges a table, by the formal `order` of the other scheme and the `exact` values where they are known.
@@ -218,7 +222,7 @@ pub fn audit(table: &Table, order: Option<f64>, exact: Option<ExactValues>) -> R
     let quantities: Vec<QuantityAudit> = judged.collect();
     // A table always has a column.
     let verdict = quantities.iter().map(|column| column.verdict).max().unwrap_or(Verdict::Undecided);
-    Ok(Audit { schema: "penetrode/audit/1", verdict, findings, quantities })
+    Ok(Audit { schema: "penetrode/audit/1", verdict, findings, quantities, scheme: None })
 }
 
 impl QuantityAudit {

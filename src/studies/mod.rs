@@ -18,6 +18,7 @@ pub mod random;
 pub mod random_scenes;
 pub mod relations;
 pub mod rounding;
+pub mod scheme_of_table;
 pub mod sensitivity;
 pub mod stability;
 pub mod sweep;

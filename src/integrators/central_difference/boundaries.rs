@@ -11,12 +11,12 @@ use crate::physics::{Problem, Scalar, State};
 const STUCK_STEPS: u64 = 1 << 20;
 
 /// A step in which something happens, from one state to the next; the velocity at its end may be negative.
-struct Step<S> {
-    from: State<S>,
-    to: State<S>,
-    /// -a(i).
-    deceleration: S,
-    size: S,
+pub(crate) struct Step<S> {
+    pub(crate) from: State<S>,
+    pub(crate) to: State<S>,
+    /// That of the parabola of the depth, which meets the depth at the end: -a(i) in this scheme.
+    pub(crate) deceleration: S,
+    pub(crate) size: S,
 }
 
 impl<S: Scalar> Step<S> {
@@ -64,6 +64,32 @@ impl<S: Scalar> Step<S> {
     fn at(&self, place: S) -> Option<State<S>> {
         let state = |tau| State { time: self.from.time + tau, depth: place, velocity: self.velocity(tau) };
         self.reach(place).map(state)
+    }
+
+    /// State at the end, not moving back.
+    fn arrival(&self) -> State<S> {
+        if self.to.velocity.value() <= 0.0 { State { velocity: S::zero(), ..self.to } } else { self.to }
+    }
+
+    /// State in which depth `place` counts as passed, inside the step or at its end; `None` if it is not.
+    pub(crate) fn passed(&self, place: S, is_located: bool) -> Option<State<S>> {
+        if is_located {
+            return self.at(place);
+        }
+        let arrival = self.arrival();
+        (place.value() <= arrival.depth.value()).then_some(arrival)
+    }
+
+    /// State of rest, if V(i+1) <= 0; not before depth `passed`.
+    pub(crate) fn at_rest(&self, passed: S, is_located: bool) -> Option<State<S>> {
+        let tau = self.rest()?;
+        if !is_located {
+            let turned_back = self.from.depth.value() > self.to.depth.value();
+            return Some(State { depth: if turned_back { self.from.depth } else { self.to.depth }, ..self.arrival() });
+        }
+        let depth = self.depth(tau);
+        let depth = if depth.value() > passed.value() { depth } else { passed };
+        Some(State { time: self.from.time + tau, depth, velocity: S::zero() })
     }
 }
 
@@ -209,36 +235,20 @@ impl<'a, S: Scalar> Run<'a, S> {
     fn push_events(&mut self, step: &Step<S>, first: usize) -> bool {
         let problem = self.stepper.problem;
         let is_located = self.stepper.options.boundaries != Boundaries::StepEnd;
-        let at_rest = step.to.velocity.value() <= 0.0;
-        let arrival = if at_rest { State { velocity: S::zero(), ..step.to } } else { step.to };
-        let passed = |place: S| {
-            if is_located { step.at(place) } else { (place.value() <= arrival.depth.value()).then_some(arrival) }
-        };
         let mut deepest = step.from.depth;
         for index in first..problem.stages.len() {
             let end = problem.stages[index].end;
             if end.value() > problem.exit_depth.value() {
                 break;
             }
-            let Some(state) = passed(end) else { break };
+            let Some(state) = step.passed(end, is_located) else { break };
             deepest = end;
             self.pass_ends(index..index + 1, state);
         }
-        let exit = if problem.has_exit() { passed(problem.exit_depth) } else { None };
+        let exit = if problem.has_exit() { step.passed(problem.exit_depth, is_located) } else { None };
         self.course.is_through = exit.is_some();
-        self.course.state = match (exit, step.rest()) {
-            (Some(state), _) => state,
-            (None, None) => return false,
-            (None, Some(tau)) if is_located => {
-                let depth = step.depth(tau);
-                let depth = if depth.value() > deepest.value() { depth } else { deepest };
-                State { time: step.from.time + tau, depth, velocity: S::zero() }
-            }
-            (None, Some(_)) => {
-                let turned_back = step.from.depth.value() > arrival.depth.value();
-                State { depth: if turned_back { step.from.depth } else { step.to.depth }, ..arrival }
-            }
-        };
+        let Some(end) = exit.or_else(|| step.at_rest(deepest, is_located)) else { return false };
+        self.course.state = end;
         self.course.stage = self.stepper.stage;
         self.course.end();
         true

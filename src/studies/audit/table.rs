@@ -5,6 +5,7 @@ use super::{AuditError, Finding, FindingKind};
 use crate::exchange::tables::{self, At, Fault, Place, Row, TableError};
 use crate::physics::units::{Dimension, quantity};
 use crate::studies::order::STEPS_MIN;
+use crate::studies::quantity::Quantity;
 use crate::text::shortened;
 
 /// Rows of a table at most: each costs some tens of microseconds, and an order is as sure with a hundred.
@@ -214,6 +215,50 @@ impl Table {
     }
 }
 
+/// What a row says of one flight.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FlightRow {
+    /// Step (s).
+    pub(crate) step: f64,
+    /// Relative rounding of the step, zero for a short number, which is meant exactly.
+    pub(crate) step_rounding: f64,
+    /// Each finite value, in SI units, with half a unit of the last digit that its column is printed with.
+    pub(crate) values: Vec<(Quantity, f64, f64)>,
+}
+
+/// Digits from which on a step counts as rounded: shorter ones, such as 2.5e-7, are meant exactly.
+const ROUNDED_DIGITS: i32 = 6;
+
+impl Table {
+    /// The rows with values of one flight, steps ascending.
+    ///
+    /// Numbers lose zeros at their end. A column has a number of decimals or a number of digits; a cell is rounded to
+    /// the finer of what it shows itself and the coarser of these two.
+    pub(crate) fn flights(&self) -> Vec<FlightRow> {
+        let columns: Vec<_> =
+            self.columns.iter().filter_map(|column| Some((column, column.column.quantity()?))).collect();
+        let columns = columns.into_iter().filter(|(_, quantity)| Quantity::OF_A_FLIGHT.contains(quantity));
+        let digits = |column: &ResultColumn| {
+            self.rows.iter().filter_map(|row| row.cells[column.place]).map(|cell| cell.digits).max()
+        };
+        let columns: Vec<_> =
+            columns.map(|(column, quantity)| (column, quantity, digits(column).unwrap_or(0))).collect();
+        let step_digits = self.rows.iter().map(|row| row.printed.digits).max().unwrap_or(0);
+        let flight = |row: &StepRow| {
+            let value = |&(column, quantity, digits): &(&ResultColumn, Quantity, i32)| {
+                let cell = row.cells[column.place].filter(|cell| cell.value.is_finite())?;
+                let as_digits = cell.half_unit * 10_f64.powi(cell.digits - digits);
+                Some((quantity, cell.value, cell.half_unit.min(as_digits.max(column.rounding))))
+            };
+            let rounding = row.printed.half_unit * 10_f64.powi(row.printed.digits - step_digits) / row.step;
+            let step_rounding = if step_digits < ROUNDED_DIGITS { 0.0 } else { rounding };
+            FlightRow { step: row.step, step_rounding, values: columns.iter().filter_map(value).collect() }
+        };
+        let rows = self.rows.iter().filter(|row| row.step.is_finite()).map(flight);
+        rows.filter(|row| !row.values.is_empty()).collect()
+    }
+}
+
 /// Lines by their numbers, ten of them at most.
 fn lines(lines: &[String]) -> String {
     let named = lines[..lines.len().min(10)].join(", ");
@@ -305,10 +350,12 @@ mod tests {
             ("dt_s,force_n,force_n", "run.csv:1, column 3: the column `force_n` is there twice"),
             ("dt_s,dephts_m", "run.csv:1, column 2: there is no column `dephts_m`; is `depth_m` meant?"),
         ] {
-            assert_eq!(refused(&format!("{names}\n1,2,3\n")).to_string(), message);
+            let row = ["1"; 3][..names.split(',').count()].join(",");
+            assert_eq!(refused(&format!("{names}\n{row}\n")).to_string(), message);
         }
         let wide = |count: usize| (0..count).fold("dt_s".to_owned(), |names, index| format!("{names},force_{index}"));
-        let message = refused(&format!("{}\n1\n", wide(COLUMNS_MAX + 1))).to_string();
+        let row = "1,".repeat(COLUMNS_MAX + 1);
+        let message = refused(&format!("{}\n{row}1\n", wide(COLUMNS_MAX + 1))).to_string();
         assert_eq!(message, "run.csv:1, column 66: more than 64 columns of results");
     }
 
