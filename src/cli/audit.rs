@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::output::{Text, escape_terminal, interval_text, significant};
+use super::runs::RunArgs;
 use super::{Answer, Ask, CliError, Settings};
 use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::tables::read_bytes;
@@ -24,7 +25,11 @@ use crate::text::or_dash;
 pub struct AuditArgs {
     /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
     /// critical_velocity_m_s, or with other units (dt_us, depth_mm), and other columns of numbers; - for standard input.
-    pub results: PathBuf,
+    #[arg(required_unless_present = "runs", conflicts_with = "runs")]
+    pub results: Option<PathBuf>,
+    /// Runs in place of a table.
+    #[command(flatten)]
+    pub runs: RunArgs,
     /// Scene whose exact answer the results must approach.
     #[arg(long)]
     pub scene: Option<String>,
@@ -40,15 +45,20 @@ impl Ask for AuditArgs {
     type Answer = Audit;
 
     fn ask(&self) -> Result<Answer<Audit>, CliError> {
-        if is_standard(&self.results) && self.scene.as_deref() == Some("-") {
+        if self.results.as_deref().is_some_and(is_standard) && self.scene.as_deref() == Some("-") {
             return Err(CliError::usage(
                 "the results and the scene cannot both come from standard input",
                 "name a file for one",
             ));
         }
-        let file = name_of(&self.results);
-        let results = Table::read(&file, &read_bytes(&self.results, &RESULTS)?)?;
         let scene = self.scene.as_deref().map(|path| self.settings.read_problem(path)).transpose()?;
+        let (file, results) = match &self.results {
+            Some(path) => (name_of(path), Table::read(&name_of(path), &read_bytes(path, &RESULTS)?)?),
+            None => {
+                let exit_depth = scene.as_ref().map(|(_, problem)| problem.exit_depth);
+                (format!("{} runs", self.runs.runs.len()), self.runs.table(exit_depth)?)
+            }
+        };
         let exact = scene.as_ref().map(|(scene, problem)| exact_values(scene, problem)).transpose()?;
         let mut judged = audit(&results, self.order, exact)?;
         judged.scheme = scene.and_then(|(_, problem)| identify(&problem, &results));

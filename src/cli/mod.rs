@@ -10,6 +10,7 @@ pub mod experiments;
 pub mod map;
 pub mod method_args;
 pub mod output;
+pub mod runs;
 pub mod scene_json;
 pub mod schema;
 pub mod sensitivities;

@@ -8,6 +8,7 @@
 //! out of order and repeated rows are put right and mentioned.
 
 mod column;
+mod run;
 mod table;
 
 use serde::Serialize;
@@ -24,6 +25,7 @@ use super::verdict::Verdict;
 use crate::exchange::tables::TableError;
 use crate::physics::{Advice, Shown};
 pub use column::{Column, RESULTS};
+pub use run::{Axis, Reading, Run, RunError};
 pub(crate) use table::FlightRow;
 pub use table::{ROWS_MAX, Table};
 use table::{ResultColumn, StepRow};
@@ -50,6 +52,9 @@ pub enum AuditError {
     /// A fault of the table itself.
     #[error(transparent)]
     Table(#[from] Box<TableError>),
+    /// A run of another code that gives no row: its file, and why.
+    #[error("{0}: {1}")]
+    Run(String, RunError),
     /// An order to compare with that no study of step sizes can show.
     #[error("the order {} is not allowed: a number from {ORDER_MIN} to {ORDER_MAX}", Shown(*.0))]
     BadOrder(f64),
@@ -59,6 +64,7 @@ impl Advice for AuditError {
     fn help(&self) -> String {
         match self {
             Self::Table(error) => error.help(),
+            Self::Run(_, error) => error.help(),
             Self::BadOrder(_) => "give the formal order of the other code's scheme, such as 1 or 2".to_owned(),
         }
     }

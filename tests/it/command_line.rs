@@ -30,6 +30,50 @@ fn a_table_to_audit_may_come_from_standard_input_and_the_scene_not_as_well() {
     assert!(both.contains("cannot both come from standard input"), "{both}");
 }
 
+/// The files hold the last lines of runs of the lagged scheme through the scene `perforate`, in the layouts of the codes.
+#[test]
+fn histories_of_other_codes_are_a_table_of_their_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/runs");
+    for entry in fs::read_dir(runs).unwrap().map(Result::unwrap) {
+        fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
+    }
+    let audit = |file: &dyn Fn(u32) -> String, rest: &str| {
+        let all: Vec<_> = [8, 4, 2, 1].iter().map(|&us| format!("--run {}={us}us", file(us))).collect();
+        run_in(folder.path(), &format!("audit {} {rest}", all.join(" ")))
+    };
+    // By hand, from the lines with all their digits.
+    let velocities = [134.907_052, 134.806_259, 134.606_417, 134.222_257];
+    for (file, rest, digits) in [
+        (&|us| format!("abaqus-{us}us.rpt"), "", 1e-3),
+        (&|us| format!("rbdout-{us}us"), "--units mm,ms", 0.02),
+        (&|us| format!("nodout-{us}us"), "--id 11", 0.02),
+    ] as [(&dyn Fn(u32) -> String, &str, f64); 3]
+    {
+        let answer = audit(file, &format!("--thickness 180mm --json {rest}")).json();
+        let quantities = answer["quantities"].as_array().unwrap();
+        let names: Vec<_> = quantities.iter().map(|quantity| quantity["quantity"].as_str().unwrap()).collect();
+        assert_eq!(names, ["time", "velocity"]);
+        for (point, velocity) in quantities[1]["points"].as_array().unwrap().iter().zip(velocities) {
+            assert!((point["value"].as_f64().unwrap() - velocity).abs() < digits, "{rest}: {point}, {velocity}");
+        }
+        for (point, us) in quantities[0]["points"].as_array().unwrap().iter().zip([1.0, 2.0, 4.0, 8.0]) {
+            assert_eq!(point["dt_s"].as_f64(), Some(us * 1e-6));
+        }
+    }
+    for (file, rest, cause) in [
+        ("abaqus-8us.rpt", "", "does not come to its end: 129.1475 m/s at 0.1814744 m"),
+        ("nodout-8us", "--thickness 0.18", "there are several bodies, 11 and 12"),
+        ("nodout-8us", "--thickness 0.18 --id 13", "there is no body 13"),
+        ("abaqus-8us.rpt", "--thickness 0.18 --units ms,mm", "`ms` is no unit of length"),
+        ("missing", "--thickness 0.18", "missing"),
+    ] {
+        let refused = run_in(folder.path(), &format!("audit --run {file}=8us --run {file}=4us {rest}"));
+        let words = refused.refused();
+        assert!(words.contains(cause), "{words}");
+    }
+}
+
 #[test]
 fn every_method_finds_the_critical_velocity_of_the_slab() {
     for method in MethodName::built() {

@@ -1,6 +1,7 @@
 //! A table of results over the step size, as another code gives it: reading, and what the digits printed mean.
 
 use super::column::{Column, Heading, RESULTS};
+use super::run::{End, Reading, Run, RunError, end_of};
 use super::{AuditError, Finding, FindingKind};
 use crate::exchange::tables::{self, At, Fault, Place, Row, TableError};
 use crate::physics::units::{Dimension, quantity};
@@ -167,6 +168,40 @@ impl Table {
         Ok(table)
     }
 
+    /// A table of the ends of runs, one a row, in the sequence of the files.
+    ///
+    /// # Errors
+    /// [`AuditError::Run`] for a file that gives no row, or where one run leaves the target and another comes to rest;
+    /// [`AuditError::Table`] as [`Self::read`], for the steps.
+    pub fn of_runs(runs: &[Run], reading: &Reading) -> Result<Self, AuditError> {
+        let refuse = |run: &Run, error| AuditError::Run(run.file.clone(), error);
+        let mut table =
+            Self { file: "the runs".to_owned(), rows: Vec::new(), columns: Vec::new(), findings: Vec::new() };
+        let mut first: Option<bool> = None;
+        for (run, line) in runs.iter().zip(1..) {
+            let End { is_exit, state, rounding } = end_of(&run.text, reading).map_err(|error| refuse(run, error))?;
+            if *first.get_or_insert(is_exit) != is_exit {
+                return Err(refuse(run, RunError::Outcome { is_exit, other: runs[0].file.clone() }));
+            }
+            let values = if is_exit { [state.time, state.velocity] } else { [state.depth, state.time] };
+            let half_units = if is_exit { [rounding[1], rounding[2]] } else { [rounding[0], rounding[1]] };
+            let cell = |place: usize| Cell { value: values[place], half_unit: half_units[place], digits: 0 };
+            let printed = Cell { value: run.step, half_unit: 0.0, digits: 0 };
+            table.rows.push(StepRow { line, step: run.step, printed, cells: vec![Some(cell(0)), Some(cell(1))] });
+        }
+        let quantities = match first {
+            Some(true) => [Quantity::Time, Quantity::Velocity],
+            _ => [Quantity::Depth, Quantity::Time],
+        };
+        for (place, quantity) in quantities.into_iter().enumerate() {
+            let half_units = table.rows.iter().filter_map(|row| row.cells[place]).map(|cell| cell.half_unit);
+            let rounding = half_units.fold(f64::INFINITY, f64::min);
+            table.columns.push(ResultColumn { column: Column::Quantity(quantity), place, rounding });
+        }
+        table.put_in_order()?;
+        Ok(table)
+    }
+
     fn remark(&mut self, kind: FindingKind, column: Option<Column>, message: String) {
         self.findings.push(Finding { kind, quantity: column, message });
     }
@@ -270,7 +305,7 @@ fn lines(lines: &[String]) -> String {
 }
 
 /// A number as codes print them, NaN and infinity included also as the Microsoft runtime writes them (`1.#IND`).
-fn parse(text: &str) -> Option<f64> {
+pub(super) fn parse(text: &str) -> Option<f64> {
     let lower = text.to_ascii_lowercase();
     if lower.contains("#inf") {
         return Some(f64::INFINITY);
@@ -289,7 +324,7 @@ fn significant_digits(text: &str) -> i32 {
 }
 
 /// Half a unit of the last digit of a decimal number; zero for what has no digits.
-fn half_last_digit(text: &str) -> f64 {
+pub(super) fn half_last_digit(text: &str) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     if !mantissa.contains(|c: char| c.is_ascii_digit()) {
         return 0.0;
