@@ -29,6 +29,7 @@ use serde_json::json;
 
 use crate::exchange::SceneError;
 use crate::exchange::input::{is_standard, name_of};
+use crate::exchange::peers::end_with_program;
 use crate::physics::{Advice, Problem, Scene, State};
 use crate::report::folder::{FolderError, without_temporary_name};
 use crate::suite::Verdict;
@@ -382,6 +383,12 @@ impl Settings {
         let problem = scene.problem().map_err(|error| CliError::from(error).in_file(path))?;
         Ok((scene, problem))
     }
+}
+
+/// Lets the peers of this run end with it, however it ends.
+fn end_peers_with_program() -> Result<(), CliError> {
+    let failed = |cause| CliError::failed(format!("signals cannot be received: {cause}"), "run without a peer");
+    end_with_program().map_err(failed)
 }
 
 /// The command of this run as it was typed, its words quoted as for a shell.

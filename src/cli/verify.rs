@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, escape_terminal, say, say_line, show_progress};
 use super::sweep::read_data;
-use super::{Answer, Ask, CliError, command_typed};
+use super::{Answer, Ask, CliError, command_typed, end_peers_with_program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
@@ -105,6 +105,9 @@ impl VerifyArgs {
             }
             started => started,
         };
+        if self.live_peers || self.peer.is_some() {
+            end_peers_with_program()?;
+        }
         if self.live_peers {
             for (name, peer) in [
                 ("sundae-adams", BundledPeer::SundaeAdams),

@@ -19,6 +19,6 @@ pub mod references;
 pub mod wire;
 
 pub use environment::{BundledPeer, Environment, PeerSetupError};
-pub use process::{Peer, PeerFailure, PeerFault, PeerIdentity, PeerStartError};
+pub use process::{Peer, PeerFailure, PeerFault, PeerIdentity, PeerStartError, end_with_program};
 pub use references::{RecordedFlight, Recording, recordings};
 pub use wire::{Difference, PeerAnswer, PeerRequest};

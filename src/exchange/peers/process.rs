@@ -14,10 +14,15 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use thiserror::Error;
 
+use self::group::Group;
 use super::wire::{PeerAnswer, PeerRequest};
 use crate::exchange::diagnostic::printable;
 use crate::physics::{Advice, Event, EventKind, Outcome};
 use crate::text::clipped;
+
+mod group;
+
+pub use group::end_with_program;
 
 /// Exit code by which a peer says, before its greeting, that a program it needs is missing.
 pub const EXIT_CODE_MISSING: i32 = 5;
@@ -147,7 +152,7 @@ impl Advice for PeerStartError {
     }
 }
 
-/// A running peer that has greeted. Dropped, it is killed.
+/// A running peer that has greeted. Dropped, it is killed, and what it started with it.
 #[derive(Debug)]
 pub struct Peer {
     identity: PeerIdentity,
@@ -161,6 +166,7 @@ pub struct Peer {
 #[derive(Debug)]
 struct Line {
     child: Child,
+    group: Group,
     /// Lines for its standard input.
     to_peer: Sender<Vec<u8>>,
     /// Lines of its standard output, the last of them cut off if it is too long; disconnects when that has ended.
@@ -242,18 +248,19 @@ impl Peer {
 
 impl Line {
     fn open(command: &mut Command, silence: Duration) -> io::Result<Self> {
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
+        let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let (mut child, group) = Group::spawn(command)?;
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
         let (to_peer, questions) = channel::<Vec<u8>>();
         // One line of look-ahead: a peer that floods its output waits in its own pipe.
         let (heard, from_peer) = sync_channel(1);
         let (alive, stderr_ended) = channel();
         let stderr = Arc::new(Mutex::new(Vec::new()));
-        let line = Self { child, to_peer, from_peer, stderr: Arc::clone(&stderr), stderr_ended, silence };
+        let line = Self { child, group, to_peer, from_peer, stderr: Arc::clone(&stderr), stderr_ended, silence };
         let (Some(mut input), Some(output), Some(complaints)) = pipes else {
             return Err(io::Error::other("a pipe to the peer is missing"));
         };
-        // The threads are not joined: a grandchild may keep a pipe open for as long as it likes.
+        // The threads are not joined: a grandchild that has left the group may keep a pipe open for as long as it likes.
         thread::Builder::new().spawn(move || questions.iter().try_for_each(|question| input.write_all(&question)))?;
         thread::Builder::new().spawn(move || read_lines(output, &heard))?;
         thread::Builder::new().spawn(move || store_tail(complaints, &stderr, &alive))?;
@@ -279,7 +286,10 @@ impl Line {
         let deadline = Instant::now() + GRACE;
         while Instant::now() < deadline {
             match self.child.try_wait() {
-                Ok(Some(status)) => return status.to_string(),
+                Ok(Some(status)) => {
+                    self.group.end();
+                    return status.to_string();
+                }
                 Ok(None) => thread::sleep(Duration::from_millis(5)),
                 Err(error) => return error.to_string(),
             }
@@ -287,13 +297,18 @@ impl Line {
         "it closed its output and runs on".to_owned()
     }
 
-    /// Ends the process, if it still runs, and lets its last words arrive.
+    /// Ends the process and what it started, if they still run, and lets their last words arrive.
     fn end(&mut self) -> Option<ExitStatus> {
-        // Errors here mean that it is gone already.
-        let _ = self.child.kill();
-        let status = self.child.wait().ok();
+        let status = self.kill();
         let _ = self.stderr_ended.recv_timeout(GRACE);
         status
+    }
+
+    fn kill(&mut self) -> Option<ExitStatus> {
+        self.group.end();
+        // Errors here mean that it is gone already.
+        let _ = self.child.kill();
+        self.child.wait().ok()
     }
 
     fn stderr_text(&self) -> String {
@@ -304,8 +319,7 @@ impl Line {
 
 impl Drop for Line {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        let _ = self.kill();
     }
 }
 

@@ -208,6 +208,23 @@ fn a_grandchild_that_keeps_the_pipes_open_blocks_nothing() {
     assert!(started.elapsed() < Duration::from_secs(7), "{:?}", started.elapsed());
 }
 
+/// Standard error ends when the last process that holds it has ended.
+#[test]
+fn what_a_peer_started_ends_with_it_whether_it_hangs_dies_or_is_dropped() {
+    for script in ["sleep 60 & read q; exec sleep 60", "sleep 60 & read q; exit 3", "sleep 60 & exec cat"] {
+        let mut peer = peer_within(script, IMPATIENT);
+        if script.ends_with("cat") {
+            let ended = std::mem::replace(&mut peer.line.stderr_ended, channel().1);
+            drop(peer);
+            assert_eq!(ended.recv_timeout(Duration::from_secs(20)), Err(RecvTimeoutError::Disconnected), "{script}");
+        } else {
+            assert!(peer.ask(&request()).is_err());
+            let ended = peer.line.stderr_ended.recv_timeout(Duration::from_secs(20));
+            assert_eq!(ended, Err(RecvTimeoutError::Disconnected), "{script}");
+        }
+    }
+}
+
 #[test]
 fn a_reported_error_is_no_fault_and_the_next_question_is_asked() {
     let second = ANSWER.replace(r#""id": 1"#, r#""id": 2"#);
