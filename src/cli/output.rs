@@ -78,7 +78,7 @@ pub type Named<'a> = (&'static str, &'a Path);
 ///
 /// # Errors
 /// A file that would be replaced, or that is none, such as a device; a folder that is missing, or in the place of a file
-/// (exit 2).
+/// (exit 2). A folder in which the system allows no new file (exit 1).
 pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), CliError> {
     for (index, (what, path)) in outputs.iter().enumerate() {
         let others = inputs.iter().chain(&outputs[..index]);
@@ -95,6 +95,8 @@ pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), 
         if let Some((why, help)) = obstacle(path) {
             return Err(CliError::usage(format!("{what} cannot go to {}: {why}", path.display()), help));
         }
+        // What the system refuses is known by trying alone; the file of the trial vanishes.
+        Destination::open(path).map_err(|cause| CliError::write(path, cause))?;
     }
     Ok(())
 }

@@ -40,16 +40,16 @@ impl FolderError {
 /// Name of the folder where none is given.
 pub const DEFAULT: &str = "penetrode-report";
 
-/// Refuses a folder that exists and is not a report of ours, before any work is done.
+/// Refuses a folder that exists and is not a report of ours or cannot be written, before any work is done.
 ///
 /// # Errors
-/// [`FolderError::NotOurs`].
+/// [`FolderError`].
 pub fn check(folder: &Path) -> Result<(), FolderError> {
     let refuse = |why: String| Err(FolderError::NotOurs { path: folder.display().to_string(), why });
     let failed = |cause| FolderError::write(folder, cause);
     // Reading would follow a link, and writing would replace it: it is refused like any other foreign entry.
     match fs::symlink_metadata(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return try_to_write(folder),
         Err(cause) => return Err(failed(cause)),
         Ok(metadata) if metadata.is_symlink() => return refuse("is a link, which a report would replace".to_owned()),
         Ok(metadata) if !metadata.is_dir() => return refuse("is a file, and a report is a folder".to_owned()),
@@ -57,15 +57,23 @@ pub fn check(folder: &Path) -> Result<(), FolderError> {
     }
     let contents = contents(folder).map_err(failed)?;
     if contents.is_empty() {
-        return Ok(());
+        return try_to_write(folder);
     }
     let Some(written) = manifest(folder) else {
         return refuse("exists and is not a report of penetrode".to_owned());
     };
     match contents.iter().find(|name| !written.contains(name)) {
         Some(foreign) => refuse(format!("holds `{foreign}`, which is no part of the report there and would be lost")),
-        None => Ok(()),
+        None => try_to_write(folder),
     }
+}
+
+/// Makes and removes a folder where the report at `folder` will be made: the system says by that alone whether it can be.
+fn try_to_write(folder: &Path) -> Result<(), FolderError> {
+    let is_there = |place: &&Path| !place.as_os_str().is_empty() && place.exists();
+    let place = folder.ancestors().skip(1).find(is_there).unwrap_or(Path::new("."));
+    let made = tempfile::Builder::new().prefix(TEMPORARY).tempdir_in(place);
+    made.map(drop).map_err(|cause| FolderError::write(folder, cause))
 }
 
 /// Every file under `folder` by its path in it, parts joined by `/`; a folder without files by its own name.

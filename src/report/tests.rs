@@ -222,3 +222,14 @@ fn an_empty_run_has_a_report() {
     // A slot without contents of that name would be shown as it is written.
     assert_eq!(html.lines().filter(|line| line.starts_with('@') && !line.starts_with("@media")).count(), 0);
 }
+
+#[test]
+fn a_report_that_cannot_be_made_is_refused_before_the_work() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    let error = folder::check(&file.join("report")).unwrap_err();
+    assert!(matches!(error, folder::FolderError::Write { .. }), "{error}");
+    folder::check(&place.path().join("a/b/report")).unwrap();
+    assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
+}

@@ -67,3 +67,25 @@ fn scenes_that_once_showed_a_defect_show_none() {
         assert!(fs::read_to_string(&file).unwrap().starts_with("# "), "{}", file.display());
     }
 }
+
+/// In `/proc` no file can be made, not even by root.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_place_that_cannot_be_written_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in [
+        "stress --cases 100000000 --out /proc/report",
+        "verify --out /proc/report",
+        "bench --out /proc/report",
+        "batch random:1000000000:1 --out /proc/results.csv",
+        "sweep @paper-slab --vary H/d=1:18:9000000 --out /proc/table.csv",
+        "solve @paper-slab --trajectory /proc/path.csv",
+        "map --out /proc/map.csv",
+        "experiments --out /proc/table.csv",
+    ] {
+        let started = std::time::Instant::now();
+        let said = run_in(folder.path(), command).expect(1).words();
+        assert!(said.contains("cannot write /proc"), "{command}: {said}");
+        assert!(started.elapsed().as_secs() < 5, "{command}");
+    }
+}
