@@ -539,7 +539,12 @@ where
 
         let end = loop {
             if course.cost.steps + cost.steps >= max_steps {
-                return Err(IntegrationError::StepBudgetSpent { max_steps, last: state_at(epoch, before) });
+                let remedy = if method.scheme == Some(Scheme::Tsit45) {
+                    "take --method adaptive, or a looser --rtol"
+                } else {
+                    "take a looser --rtol, or --method taylor"
+                };
+                return Err(IntegrationError::StepBudgetSpent { max_steps, remedy, last: state_at(epoch, before) });
             }
             // The stop reason says nothing here: there is neither a root function nor a stop time.
             let _ = solver.step().map_err(|e| failure(e, epoch, before))?;

@@ -47,6 +47,9 @@ const TIME_ORDER: usize = 24;
 /// Bound on the steps of one flight, in depth and in time each; ends flights of millions of drag lengths.
 const STEPS_MAX: u64 = 1_000_000;
 
+/// What to do where they do not suffice.
+const REMEDY: &str = "take --method taylor";
+
 /// Roundings that enter w in a step, in units of its terms: three in each coefficient and one for each sum.
 const ROUNDINGS_PER_STEP: f64 = 4.0;
 
@@ -297,7 +300,11 @@ impl<S: Scalar> Walk<S> {
         let mut rest = None;
         while self.depth.value() < limit.value() {
             if self.cost.steps >= STEPS_MAX {
-                return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: last_state() });
+                return Err(IntegrationError::StepBudgetSpent {
+                    max_steps: STEPS_MAX,
+                    remedy: REMEDY,
+                    last: last_state(),
+                });
             }
             let (x, w) = (self.depth, self.w);
             if limit.value().is_finite() && loss.is_at_limit(x, w) {
@@ -494,7 +501,7 @@ impl<S: Scalar> Clock<S> {
             course.sample(si(course.problem, now));
             if cost.steps >= STEPS_MAX {
                 let last = si(course.problem, now).values();
-                return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last });
+                return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy: REMEDY, last });
             }
         }
         Ok(State { time: now.time, depth, velocity })

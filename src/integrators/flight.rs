@@ -15,6 +15,10 @@ use crate::physics::exit_energy::{energy_beyond_stop, speed_missing};
 pub(crate) use crate::physics::problem::StageEnd;
 use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State};
 
+/// What is said of a place that is reached without speed, if it is reached.
+const LEAST_TIME: &str = "the speed vanishes towards the end: the time is the least possible, until 2e-16 of the speed is \
+                          left, and may be infinite";
+
 /// A method, as the loop sees it.
 pub(crate) trait StageSolver<S: Scalar> {
     /// Solves stage `course.stage` from `course.state` (V > 0, before the limit) to [`Course::limit`].
@@ -234,7 +238,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// [`IntegrationError::NeverEnds`] where more is missing than the error bound: `W(limit)` would be
     /// `-missing (2 V + missing)` below that of the present state, and the place itself is rounded.
     #[cold]
-    fn arrive_in_doubt(&self, at: State<S>, why: &'static str) -> Solved<State<S>> {
+    fn arrive_in_doubt(&mut self, at: State<S>, why: &'static str) -> Solved<State<S>> {
         let (last, limit) = (at.values(), self.problem.limit_of(self.stage));
         let (law, mass) = (self.problem.stages[self.stage].values(), self.problem.mass.value());
         let v = last.velocity.max(0.0);
@@ -244,6 +248,7 @@ impl<'a, S: Scalar> Course<'a, S> {
         if missing.is_none_or(|missing| missing * (2.0 * v + missing) > bound) {
             return Err(IntegrationError::NeverEnds { why, last });
         }
+        self.notes.push(LEAST_TIME.to_owned());
         // Until the speed is an epsilon of what it was.
         let time = if v > 0.0 { -f64::EPSILON.ln() * mass / law.viscosity } else { 0.0 };
         Ok(State { time: at.time + S::from_f64(time), depth: limit, velocity: S::zero() })
@@ -403,8 +408,10 @@ mod tests {
         let v0 = 300.0;
         let arrival = |exit: f64, velocity: f64, error_bound: f64| {
             let problem = alone(stage(0.0, 1.5, 0.0), exit);
-            let course = Course { error_bound, ..Course::new(&problem, Detail::End) };
-            course.arrive_in_doubt(State { time: 1.0, depth: 0.5, velocity }, "")
+            let mut course = Course { error_bound, ..Course::new(&problem, Detail::End) };
+            let arrived = course.arrive_in_doubt(State { time: 1.0, depth: 0.5, velocity }, "");
+            assert_eq!(arrived.is_ok(), course.notes == [LEAST_TIME]);
+            arrived
         };
         let state = arrival(4.5, 3.0, 0.0).unwrap();
         assert_eq!((state.depth, state.velocity), (4.5, 0.0));

@@ -135,6 +135,8 @@ pub enum IntegrationError {
     StepBudgetSpent {
         /// Steps allowed.
         max_steps: u64,
+        /// What to do, by the method that ran.
+        remedy: &'static str,
         /// State at the last step.
         last: State,
     },
@@ -198,12 +200,12 @@ impl Advice for IntegrationError {
 
     fn help(&self) -> String {
         match self {
-            Self::StepBudgetSpent { .. } => "take a longer step or a looser tolerance, or another method",
+            Self::StepBudgetSpent { remedy, .. } => remedy,
             Self::NotFinite { .. } => "check the scene for forces beyond the range of 64-bit numbers",
             Self::NeverEnds { .. } => {
                 "give each stage a force that resists at rest (static_force > 0), and the last one that or a thickness"
             }
-            Self::SolverFailed { .. } => "loosen --rtol, or take another method",
+            Self::SolverFailed { .. } => "loosen --rtol, or take --method taylor",
             _ => "",
         }
         .to_owned()
@@ -323,7 +325,7 @@ mod tests {
     fn an_error_knows_whose_fault_it_is_and_what_to_change() {
         let last = State { time: 1.0, depth: 2.0, velocity: 3.0 };
         for (error, usage, help) in [
-            (IntegrationError::StepBudgetSpent { max_steps: 1, last }, false, "longer step"),
+            (IntegrationError::StepBudgetSpent { max_steps: 1, remedy: "longer step", last }, false, "longer step"),
             (IntegrationError::NotFinite { what: "x", last }, false, "range of 64-bit"),
             (IntegrationError::NeverEnds { why: "x", last }, false, "thickness"),
             (IntegrationError::SolverFailed { method: "m", cause: String::new(), last }, false, "--rtol"),

@@ -44,6 +44,9 @@ const PHASE_MAX: f64 = 1.8;
 /// Longest step in its own unit of time. No flight needs more, and beyond it coefficients that underflow would count.
 const SPAN_MAX: f64 = 64.0;
 
+/// How much nearer to the start of a step than to its end a boundary lies that is searched from the start.
+const NEAR_START: f64 = 16.0;
+
 /// Most coefficients that are computed without a loop.
 const UNROLLED_MAX: usize = 24;
 
@@ -357,11 +360,6 @@ impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> 
     fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError> {
         let law = &course.problem.stages[course.stage];
         let limit = course.limit()?;
-        // A spring stops everything but a creep, which is judged while it goes on.
-        if law.static_force.value() <= 0.0 && law.stiffness.value() <= 0.0 && course.is_only_approached(limit.value()) {
-            let why = "a resistance that vanishes with the velocity brings it to nothing before the boundary";
-            return Ok(StageEnd::Approach(course.state, why));
-        }
         match Shape::of(law) {
             Shape::Constant => self.0.step_through::<S, 4, false, false, false>(course, limit),
             Shape::Spring => self.0.step_through::<S, L, true, false, false>(course, limit),
@@ -389,6 +387,8 @@ impl Steps {
         let frequency = if SPRING { stiffness.value().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
+        // Judged again at each step: what is a rounding at the start of a stage is all of the speed that is left.
+        let may_vanish = static_force.value() == 0.0 && stiffness.value() == 0.0 && viscosity.value() > 0.0;
 
         while course.cost.steps < STEPS_MAX {
             // Units: velocity and time, powers of two. The time is the shortest of V/|a|, M/r, M/(q V), 1/w, or,
@@ -397,12 +397,24 @@ impl Steps {
             let at_start = static_force + stiffness * depth;
             let speed = velocity.value();
             let rate = at_start.value().abs() + speed * (viscosity.value() + drag.value() * speed + frequency);
-            let scale = if rate > 0.0 { speed / rate } else { (limit.value() - depth.value()) / speed };
-            let unit_velocity = power_of_two_below(speed);
+            let distance = limit.value() - depth.value();
+            let (fastest, scale) = if !SPRING && !DRAG && at_start.value() < 0.0 {
+                // The one step of a constant drive reaches the limit, however slow its start.
+                let fastest = speed.hypot((-2.0 * at_start.value()).sqrt() * distance.sqrt());
+                (fastest, 2.0 * distance / (speed + fastest))
+            } else {
+                (speed, if rate > 0.0 { speed / rate } else { distance / speed })
+            };
+            let mut unit_velocity = power_of_two_below(fastest);
             let unit_time = power_of_two_below(scale);
-            let unit_depth = unit_velocity * unit_time;
+            let mut unit_depth = unit_velocity * unit_time;
+            if unit_depth < f64::MIN_POSITIVE {
+                // Next to no speed and a force: rest is nearer than numbers can say.
+                (unit_velocity, unit_depth) = (f64::MIN_POSITIVE / unit_time, f64::MIN_POSITIVE);
+            }
             let law = Stage {
-                static_force: at_start * S::from_f64(unit_time / unit_velocity),
+                // The quotient of the units alone may leave the range of numbers.
+                static_force: at_start * S::from_f64(unit_time) * S::from_f64(1.0 / unit_velocity),
                 stiffness: if SPRING { stiffness * S::from_f64(unit_time * unit_time) } else { S::zero() },
                 viscosity: viscosity * S::from_f64(unit_time),
                 drag: if DRAG { drag * S::from_f64(unit_depth) } else { S::zero() },
@@ -410,6 +422,10 @@ impl Steps {
             };
             if may_creep {
                 course.refuse_creep(limit.value())?;
+            }
+            if may_vanish && course.is_only_approached(limit.value()) {
+                let why = "a resistance that vanishes with the velocity brings it to nothing before the boundary";
+                return Ok(StageEnd::Approach(course.state, why));
             }
             let start =
                 State { time: S::zero(), depth: S::zero(), velocity: velocity * S::from_f64(1.0 / unit_velocity) };
@@ -447,7 +463,12 @@ impl Steps {
                 Step::Limit(_) | Step::Rest(_) => return Ok(StageEnd::Limit(next)),
             }
         }
-        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, last: course.state.values() })
+        let remedy = if cfg!(feature = "diffsol") {
+            "the stage is stiff: take --method adaptive"
+        } else {
+            "the stage is stiff: a build with the feature diffsol has --method adaptive for it"
+        };
+        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: course.state.values() })
     }
 
     /// Adds the error of one step to the error bound of `W/V0²`, in energy over depth, where it never grows:
@@ -531,22 +552,21 @@ fn search_certified<S: Scalar, const N: usize>(
 ) -> Step<S> {
     let at = |time| series.at(time);
     let distance = law.end.value();
+    // The time of a boundary has the round-off of the time from which it is searched.
+    let pass = |end: State<S>| {
+        let start = if NEAR_START * distance < end.depth.value() { at(0.0) } else { end };
+        through(locate::passage(law, at, start, end.time.value(), true, closing))
+    };
     if let Some(root) = locate::first_root(&series.velocity.map(Scalar::value), span) {
         // The root is isolated; correct it in the number type, from the nearest trial.
         let rest = match locate::rest(law, at, at(root), span, closing) {
             Found::Inside(rest) => rest,
             _ => State { velocity: S::zero(), ..at(root) },
         };
-        if rest.depth.value() >= distance {
-            return through(locate::passage(law, at, rest, rest.time.value(), true, closing));
-        }
-        return Step::Rest(rest);
+        return if rest.depth.value() >= distance { pass(rest) } else { Step::Rest(rest) };
     }
     let end = at(span);
-    if end.depth.value() >= distance {
-        return through(locate::passage(law, at, end, span, true, closing));
-    }
-    Step::Whole(end)
+    if end.depth.value() >= distance { pass(end) } else { Step::Whole(end) }
 }
 
 /// A passage that is known to lie inside the step.

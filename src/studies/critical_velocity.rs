@@ -18,7 +18,7 @@ use smallvec::SmallVec;
 use thiserror::Error;
 
 use super::error::Studied;
-use crate::integrators::{Cost, IntegrationError, Integrator, Margin, Taylor};
+use crate::integrators::{Accuracy, Cost, IntegrationError, Integrator, Margin, MethodName, Taylor};
 use crate::physics::{
     Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, closed_form, exit_energy,
 };
@@ -139,8 +139,8 @@ pub enum CriticalError {
     },
     /// W changes sign without a root: it jumps, or is flat on one side.
     #[error(
-        "the exit energy changes sign without a root, {at} between {low} and {high}: a step too long for the scene, \
-         or an integrator whose margin is not the signed energy"
+        "the exit energy changes sign without a root, {at} between {low} and {high}: a method too coarse for the scene, \
+         or one whose margin is not the signed energy"
     )]
     Jump {
         /// Where the search ended.
@@ -160,6 +160,8 @@ pub enum CriticalError {
         velocity: f64,
         /// Half-width of the error bound there (m/s).
         error_bar: f64,
+        /// What resolves more, by the method that was asked.
+        remedy: &'static str,
     },
     /// The tolerance was not reached.
     #[error("tolerance not reached after {flights} flights ({reason}), between {low} and {high}")]
@@ -191,12 +193,10 @@ impl Advice for CriticalError {
 
     fn help(&self) -> String {
         match self {
-            Self::Undecided { .. } => {
-                "--method taylor or energy, or a tighter --rtol, resolves more of what is left of V0²".to_owned()
-            }
+            Self::Undecided { remedy, .. } => (*remedy).to_owned(),
             Self::NoBracket { .. } => {
-                "drag takes all speed over the thickness: check the thickness, the density and the mass; with a fixed \
-                 step, shorten --dt"
+                "drag takes all speed over the thickness: check the thickness, the density and the mass; with \
+                 central-difference, shorten --dt"
                     .to_owned()
             }
             _ => self.inner().map_or_else(String::new, Advice::help),
@@ -260,8 +260,16 @@ fn within(flights_max: u32, resolve: impl Fn(f64) -> Resolved, integrator: &dyn 
     let velocity = root.velocity();
     // dV = du / 2V.
     let error_bar = root.bar.map(|bar| ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity));
+    let error_bar = match error_bar {
+        // The slope may be that of the other side of a kink, such as drag behind a barrier leaves: ask flights.
+        Some(bar) if !(bar < UNDECIDED * velocity) => {
+            let half_width = search.half_width(root, resolution).unwrap_or(f64::INFINITY);
+            Some(bar.min(half_width / (2.0 * velocity)))
+        }
+        ordinary => ordinary,
+    };
     if let Some(error_bar) = error_bar.filter(|bar| !(*bar < UNDECIDED * velocity)) {
-        return Err(CriticalError::Undecided { velocity, error_bar });
+        return Err(CriticalError::Undecided { velocity, error_bar, remedy: remedy(integrator.name()) });
     }
     let tally = search.tally.take();
     Ok(CriticalVelocity {
@@ -273,6 +281,16 @@ fn within(flights_max: u32, resolve: impl Fn(f64) -> Resolved, integrator: &dyn 
         bracket: (bracket.low.velocity(), bracket.high.velocity()),
         note: "",
     })
+}
+
+/// What resolves more of what is left of V0² than `method` does.
+fn remedy(method: &str) -> &'static str {
+    match method.parse().map(|name: MethodName| (name, name.accuracy())) {
+        Ok((MethodName::Taylor, _)) => "--method energy has another error bound: compare with it",
+        Ok((_, Accuracy::Tolerance)) => "--method taylor or energy, or a tighter --rtol, resolves more",
+        Ok((_, Accuracy::Step)) => "--method taylor or energy, or a shorter --dt, resolves more",
+        _ => "--method taylor resolves more",
+    }
 }
 
 /// `V_c = 0`, up to `error_bar` (m/s).
@@ -495,6 +513,25 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
             return Ok(narrower);
         }
         Ok(narrower.with(self.at(root * (1.0 - width))?))
+    }
+
+    /// The distance in u from `root` to which flights decide on both sides of it that W is negative or positive; infinite
+    /// where they do not.
+    fn half_width(&self, root: Point, resolution: f64) -> Sought<f64> {
+        let mut half_width = resolution;
+        for side in [-1.0, 1.0] {
+            loop {
+                if half_width > UNDECIDED * root.u {
+                    return Ok(f64::INFINITY);
+                }
+                let point = self.at(root.u + side * half_width)?;
+                if side * point.w > point.bar.unwrap_or(f64::INFINITY) {
+                    break;
+                }
+                half_width *= 16.0;
+            }
+        }
+        Ok(half_width)
     }
 
     fn not_converged(&self, reason: String, bracket: Bracket) -> CriticalError {

@@ -1,6 +1,6 @@
 //! Stage ends, exit and rest: where they lie inside a step, and what [`Boundaries`] makes of them.
 
-use super::scheme::{Node, Pause, Stepper, Sum};
+use super::scheme::{Node, Pause, REMEDY, Stepper, Sum};
 use super::stability::cannot_end;
 use super::{Boundaries, CentralDifference, Steps};
 use crate::integrators::flight::Course;
@@ -118,7 +118,7 @@ impl<'a, S: Scalar> Run<'a, S> {
             let (before, steps) = (run.course.state, run.stepper.cost.steps);
             let left = max_steps - steps;
             if left == 0 || is_hopeless && steps >= STUCK_STEPS {
-                return Err(IntegrationError::StepBudgetSpent { max_steps, last: before.values() });
+                return Err(IntegrationError::StepBudgetSpent { max_steps, remedy: REMEDY, last: before.values() });
             }
             let allowance = if run.course.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
             let has_ended = match run.stepper.cruise(limit, allowance) {

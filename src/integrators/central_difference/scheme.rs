@@ -5,6 +5,9 @@ use super::{CentralDifference, Steps, Summation, VelocityAt};
 use crate::integrators::outcome::{Cost, IntegrationError, Solved, StepLimit};
 use crate::physics::{Problem, Scalar, Stage, State};
 
+/// What to do where the steps allowed do not suffice.
+pub(super) const REMEDY: &str = "take a longer --dt, or --method taylor";
+
 impl VelocityAt {
     /// Evaluations of the force in one step.
     pub(super) fn evaluations(self) -> u64 {
@@ -327,7 +330,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             while !lands {
                 if states.len() as u64 > self.options.max_steps {
                     let (max_steps, last) = (self.options.max_steps, self.state().values());
-                    return Err(IntegrationError::StepBudgetSpent { max_steps, last });
+                    return Err(IntegrationError::StepBudgetSpent { max_steps, remedy: REMEDY, last });
                 }
                 let (now, h) = (self.clock.now(), self.clock.step());
                 let left = S::from_f64(end) - now;

@@ -502,7 +502,7 @@ fn a_spent_budget_and_an_overflow_are_errors_with_the_state_reached() {
     for detail in [Detail::End, Detail::Trajectory] {
         let scheme = CentralDifference { max_steps: 1000, ..scheme(1e-7, VelocityAt::Centred, Boundaries::Landed) };
         let error = scheme.solve(&problem, detail).unwrap_err();
-        let IntegrationError::StepBudgetSpent { max_steps: 1000, last } = error else { unreachable!("{error}") };
+        let IntegrationError::StepBudgetSpent { max_steps: 1000, last, .. } = error else { unreachable!("{error}") };
         approx::assert_relative_eq!(last.time, 1e-4, max_relative = 1e-14);
     }
     // Exactly enough is enough.

@@ -167,7 +167,7 @@ fn overdamped_spring_that_only_resists_comes_to_rest_at_any_tolerance() {
 fn step_budget_is_kept_and_reported() {
     let method = Diffsol { max_steps: 5, ..Diffsol::new(Scheme::Bdf, 1e-10) };
     let error = method.solve(&tunnel(f64::INFINITY), Detail::Events).unwrap_err();
-    let IntegrationError::StepBudgetSpent { max_steps, last } = error else { panic!("{error}") };
+    let IntegrationError::StepBudgetSpent { max_steps, last, .. } = error else { panic!("{error}") };
     assert_eq!(max_steps, 5);
     assert!(last.depth > 0.0 && last.velocity > 0.0, "{last}");
 }

@@ -3,7 +3,7 @@ use twofloat::TwoFloat;
 use super::super::energy::Energy;
 use super::*;
 use crate::integrators::Cost;
-use crate::physics::{EventKind, Outcome};
+use crate::physics::{Advice, EventKind, Outcome};
 use crate::testing::{continuous, kinds, of_stages};
 
 fn solve(problem: &Problem) -> Flight {
@@ -228,10 +228,57 @@ fn the_last_step_of_the_budget_may_end_a_flight_and_no_other_follows() {
     assert!(orders().solve_stage(&mut course).is_ok());
     let mut course = course_at(&problem, 0.0, 3.0);
     course.cost.steps = STEPS_MAX;
-    assert!(matches!(
-        orders().solve_stage(&mut course),
-        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, .. })
-    ));
+    let error = orders().solve_stage(&mut course).unwrap_err();
+    assert!(matches!(error, IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, .. }));
+    // It has no step to lengthen.
+    assert!(error.help().contains("--method adaptive") && !error.help().contains("--dt"), "{}", error.help());
+}
+
+/// By the inverse series `t = e (1 - b + 2 b² - c)`, `e = D/V`, whose next term is below 1e-20 here.
+#[test]
+fn the_time_of_a_place_near_the_start_of_a_stage_has_the_round_off_of_that_time() {
+    for (mass, stiffness, drag, v) in [
+        (20.8, 0.0045, 1.7225, 0.1134),
+        (4.7315, 45.61, 0.05038, 42.74995),
+        (1.0, 1e5, 1e-2, 1e3),
+        (3e-3, 7.0, 0.4, 2.0),
+    ] {
+        for (exponent, static_force) in
+            (-20..=-8).flat_map(|exponent| [(exponent, 0.0), (exponent, 0.01), (exponent, -0.01)])
+        {
+            let law = Stage { static_force, stiffness, ..Stage::tunnel(0.0, drag) };
+            let depth = v * 10f64.powi(exponent);
+            let first = -(static_force + drag * v * v) / mass;
+            let second = -(stiffness * v + 2.0 * drag * v * first) / mass;
+            let e = depth / v;
+            let (b, c) = (0.5 * first * e / v, second * e * e / v / 6.0);
+            let exact = e * (1.0 - b + 2.0 * b * b - c);
+            let alone = solve(&of_stages(mass, v, depth, &[law])).end.time;
+            let two = [law.until(depth), Stage { static_force: 1.0, ..law }];
+            let passed = solve(&of_stages(mass, v, 1.0, &two)).events[0].state.time;
+            for time in [alone, passed] {
+                assert!(relative(time, exact) < 4.0 * f64::EPSILON, "{law:?} {depth:e}: {time:e}, {exact:e}");
+            }
+        }
+    }
+}
+
+/// `t = 2 H/(V0 + V)`, `V² = V0² + 2 |p| H/M`, and V0 next to nothing.
+#[test]
+fn a_constant_drive_takes_a_projectile_from_almost_no_speed_through_the_slab() {
+    let law = Stage::tunnel(-3.608_37e-5, 0.0);
+    for exponent in [0, -3, -12, -15, -17, -30, -100, -300] {
+        let v0 = 10f64.powi(exponent);
+        let flight = solve(&of_stages(0.002_144_98, v0, 0.036_811_3, &[law]));
+        let v = v0.hypot((2.0 * 3.608_37e-5 * 0.036_811_3 / 0.002_144_98_f64).sqrt());
+        assert_eq!(flight.outcome, Outcome::Perforated);
+        assert!(relative(flight.end.velocity, v) < 4.0 * f64::EPSILON, "{v0:e}: {:?}", flight.end);
+        assert!(
+            relative(flight.end.time, 2.0 * 0.036_811_3 / (v0 + v)) < 4.0 * f64::EPSILON,
+            "{v0:e}: {:?}",
+            flight.end
+        );
+    }
 }
 
 /// Depth over speed, near both ends of the range of numbers, and a depth that is a multiple of a small speed.
@@ -241,6 +288,29 @@ fn a_gap_of_any_size_is_crossed_at_any_speed() {
         let flight = solve(&one_stage(Stage::tunnel(0.0, 0.0), speed, depth));
         assert_eq!((flight.end.depth, flight.end.velocity), (depth, speed));
         assert!(relative(flight.end.time, depth / speed) < 1e-15, "{:e}", flight.end.time);
+    }
+}
+
+#[test]
+fn a_force_stops_what_drag_has_left_next_to_no_speed() {
+    for decades in [100.0, 170.0, 200.0, 300.0] {
+        let drag = Stage::tunnel(0.0, 1.0).until(decades * std::f64::consts::LN_10);
+        for behind in [Stage::tunnel(1e3, 0.0), Stage { stiffness: 1e3, ..Stage::tunnel(1.0, 2.0) }] {
+            let flight = solve(&of_stages(1.0, 1.0, drag.end + 1.0, &[drag, behind]));
+            assert_eq!((flight.outcome, flight.end.depth), (Outcome::Stopped, drag.end));
+            let (margin, bound) = (flight.exit_margin.unwrap(), flight.exit_margin_error.unwrap());
+            assert!(margin < -bound && bound < 1e-12 * margin.abs(), "{margin} {bound:e}");
+        }
+    }
+}
+
+/// `V = V0 e^(-q H/M)`, down to 1e-260 of V0, `t = M (e^(q H/M) - 1)/(q V0)`.
+#[test]
+fn drag_may_take_nearly_all_speed_that_numbers_have() {
+    for decades in [100.0, 155.0, 260.0] {
+        let length = decades * std::f64::consts::LN_10;
+        let end = solve(&one_stage(Stage::tunnel(0.0, 1.0), 1.0, length)).end;
+        assert!(relative(end.velocity, (-length).exp()) < 1e-12 && relative(end.time, length.exp()) < 1e-12, "{end}");
     }
 }
 

@@ -133,7 +133,7 @@ fn an_error_bar_that_leaves_no_digit_is_undecided_and_not_a_number() {
     let slab = Slab { h: 12.0, ..SLAB };
     let coarse = Oracle(|problem: &Problem| (true_margin(problem), Some(1e-15)));
     let refusal = search(slab, &coarse).unwrap_err();
-    let CriticalError::Undecided { velocity, error_bar } = refusal else { panic!("{refusal}") };
+    let CriticalError::Undecided { velocity, error_bar, .. } = refusal else { panic!("{refusal}") };
     assert!(2.0 * error_bar >= velocity, "{velocity} {error_bar}");
 }
 
@@ -295,4 +295,48 @@ fn barrier_decides_the_critical_velocity_of_a_driven_target() {
     let strong = constant(-20.0, 0.0, 1.0);
     let found = search(&[strong, barrier, constant(0.0, 0.0, f64::INFINITY)]).unwrap();
     assert_eq!(found.velocity, 0.0);
+}
+
+/// V_c of a barrier, and of a viscous stage, in front of what only drags or drives: `sqrt(2 P L/M)` and `r L/M`.
+#[test]
+fn a_stage_that_decides_has_its_critical_velocity_whatever_creeps_or_drives_behind_it() {
+    let force = |static_force: f64, end: f64| constant(static_force, 0.0, end);
+    let slowing = |viscosity: f64, end: f64| Stage { viscosity, ..force(0.0, end) };
+    let barrier = force(2_729_150.0, 13.801_015_898_614_65);
+    let dragging = constant(0.0, 0.133_084, f64::INFINITY);
+    let damped = Stage { viscosity: 0.01, ..force(3.0, f64::INFINITY) };
+    for (mass, exit, stages, exact) in [
+        (
+            0.001_865_34,
+            0.015_983_208,
+            vec![slowing(4.554, 0.004_114_068_643_424_028), force(-0.110_194, f64::INFINITY)],
+            10.043_996_591_588_142,
+        ),
+        (
+            0.601_95,
+            586.485_26,
+            vec![barrier, dragging.until(1000.0), damped],
+            (2.0 * barrier.static_force * barrier.end / 0.601_95).sqrt(),
+        ),
+        (0.002_144_98, 0.036_811_3, vec![force(-3.608_37e-5, f64::INFINITY)], 0.0),
+    ] {
+        let at = |v0| Ok(Problem::of_stages(mass, v0, stages.iter().copied()).with_exit(exit));
+        let found = critical_velocity(at, &Taylor::default()).unwrap();
+        let off = (found.velocity - exact).abs();
+        assert!(off <= 1e-12 * exact, "{found:?}, {exact}");
+        assert!(
+            found.error_bar.unwrap() <= (1e-9 * exact).max(1e-15) && off <= found.error_bar.unwrap() + 1e-15 * exact,
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn what_is_advised_is_an_option_of_the_method_that_was_asked() {
+    for name in MethodName::ALL {
+        let advised = remedy(name.name());
+        assert_eq!(advised.contains("--rtol"), name.accuracy() == Accuracy::Tolerance, "{name}: {advised}");
+        assert_eq!(advised.contains("--dt"), name.accuracy() == Accuracy::Step, "{name}: {advised}");
+        assert!(!advised.contains(&format!("--method {name}")), "{name}: {advised}");
+    }
 }
