@@ -31,6 +31,7 @@ pub(crate) fn concrete() -> Concrete {
         strength: 35.2e6,
         density: 2370.0,
         static_factor: 12.0,
+        follows_eq14: false,
         inertia_factor: 1.0,
         crater_ratio: 2.0,
         crater_stiffness: CraterStiffness::Continuous,

@@ -110,7 +110,9 @@ impl Ask for CriticalArgs {
         let found = critical_velocity::of_scene(&scene, method.integrator())?;
         let exact = critical_velocity::exact(&scene).ok();
         let problem = scene.resolve(found.velocity)?;
-        for warning in scene.exit_depth_warning().into_iter().chain(applicability::warnings(&scene, found.velocity)) {
+        let warnings = applicability::warnings(&scene, found.velocity).into_iter();
+        let warnings = warnings.chain(applicability::drag_in_crater(&scene, &problem));
+        for warning in scene.exit_depth_warning().into_iter().chain(warnings) {
             say("warning: ", &warning);
         }
         let is_zero = exact == Some(0.0) || found.velocity == 0.0;
@@ -172,6 +174,7 @@ impl CriticalJson {
         self.skipped.iter().for_each(|note| text.wrapped("  note       ", note));
         if let Some(uncertainty) = &self.uncertainty {
             add_uncertainty(&mut text, uncertainty);
+            self.scene.follows.iter().for_each(|sentence| text.wrapped("             ", sentence));
         }
         if let Some((ours, eq15)) = self.dimensionless_energy.zip(self.eq15.as_ref()) {
             eq15.add_to(&mut text, ours);

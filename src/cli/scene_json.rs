@@ -27,6 +27,7 @@ pub struct SceneJson {
     pub static_force_n: Option<f64>,
     pub drag_kg_m: Option<f64>,
     pub exit_depth_m: Option<f64>,
+    pub follows: Vec<String>,
     pub stages: Vec<Stage>,
 }
 
@@ -58,6 +59,7 @@ impl SceneJson {
             static_force_n: homogeneous.and(scene.tunnel()).map(|law| law.static_force),
             drag_kg_m: homogeneous.and(scene.tunnel()).map(|law| law.drag),
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
+            follows: scene.follows(),
             stages: problem.stages.to_vec(),
         }
     }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::CliError;
 use super::output::Text;
 use crate::physics::{Scene, Shown};
+use crate::studies::applicability::drag_in_crater;
 use crate::studies::sensitivity::{Sensitivity, by_closed_form, by_taylor, elasticity};
 use crate::text::or_dash;
 
@@ -50,6 +51,9 @@ impl SensitivitiesJson {
         let integrated = by_taylor(scene)?;
         let exact = by_closed_form(scene)?;
         let q = integrated.quantities;
+        let speeds = [scene.velocity, q.critical_velocity].into_iter().flatten();
+        let mut problems = speeds.filter_map(|speed| scene.resolve(speed).ok());
+        let drag = problems.find_map(|problem| drag_in_crater(scene, &problem));
         let entry = |s: &Sensitivity| {
             let of = |derivative: Option<f64>, quantity: Option<f64>| {
                 derivative.map(|d| DerivativeJson { derivative: d, elasticity: elasticity(Some(d), quantity, s.value) })
@@ -66,12 +70,12 @@ impl SensitivitiesJson {
             method: "taylor",
             disagreement: exact.disagreement(&integrated),
             parameters: integrated.entries.iter().map(entry).collect(),
-            notes: integrated.notes,
+            notes: integrated.notes.into_iter().chain(drag).collect(),
         })
     }
 
-    /// Adds the table of elasticities to `text`.
-    pub fn add_to(&self, text: &mut Text) {
+    /// Adds the table of elasticities to `text`, and which numbers follow others.
+    pub fn add_to(&self, text: &mut Text, follows: &[String]) {
         let row = |p: &ParameterJson| {
             let derivatives = [&p.depth, &p.velocity, &p.critical_velocity];
             let cells = derivatives.map(|d| or_dash(d.as_ref().and_then(|d| d.elasticity), |e| format!("{e:+.6}")));
@@ -83,6 +87,7 @@ impl SensitivitiesJson {
             format!("{difference:.1e} from those through the closed form")
         });
         text.line(format!("  dual numbers through taylor; {beside}"));
+        follows.iter().for_each(|sentence| text.wrapped("  ", sentence));
         self.notes.iter().for_each(|note| text.wrapped("  note: ", note));
     }
 }

@@ -110,6 +110,8 @@ impl RelativeErrorJson {
     fn new(flight: &Flight, exact: &Flight, impact_speed: f64) -> Option<Self> {
         let error = |quantity| flight_error(quantity, flight, exact, impact_speed).map(f64::abs);
         let [depth, time, velocity, crater_end_time, crater_end_velocity] = Quantity::OF_A_FLIGHT.map(error);
+        // The time of an arrival that is in doubt is no number to compare: it may be infinite.
+        let time = time.filter(|_| flight.outcome != Outcome::Undecided);
         let errors = Self { depth, time, velocity, crater_end_time, crater_end_velocity };
         flight.outcome.agrees_with(exact.outcome).then_some(errors)
     }
@@ -213,6 +215,10 @@ impl SolveArgs {
         text.table(&["event", "time", "depth", "velocity"], flight.events.iter().map(row));
         text.gap();
         data.add_exact(&mut text);
+        if data.outcome == Outcome::Undecided {
+            let notes = flight.notes.iter().map(String::as_str).chain([UNDECIDED]);
+            notes.for_each(|note| text.wrapped("  note     ", note));
+        }
         if let Some(limit) = flight.step_limit.filter(|limit| !limit.stable) {
             text.line(format!("  the step lies beyond the stability limit {}", engineering(limit.limit, "s")));
         }
@@ -226,7 +232,7 @@ impl SolveArgs {
             data.skipped.iter().for_each(|note| text.wrapped("  - ", note));
         }
         if let Some(sensitivities) = &data.sensitivities {
-            sensitivities.add_to(&mut text);
+            sensitivities.add_to(&mut text, &data.scene.follows);
         }
         text.finish()
     }
@@ -267,6 +273,10 @@ impl SolveJson {
         text.lines(errors.is_none().then(|| format!("  the closed form says {}", exact.outcome)));
     }
 }
+
+/// What would decide an outcome that is undecided.
+const UNDECIDED: &str = "the exit margin lies within its error bound: this speed is V_c to the accuracy of the method. A \
+                         smaller error may decide it, another speed or thickness will";
 
 /// The columns of a trajectory: a row for each step and each event.
 const TRAJECTORY: [(&str, Kind); 5] = [

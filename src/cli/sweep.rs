@@ -1,4 +1,4 @@
-//! `penetrode sweep`: the paper's Figures 4 and 5, and the same along any number of a scene.
+//! `penetrode sweep`: the paper's Figure 4, the difference from Eq. 15, and the same along any number of a scene.
 
 use std::path::{Path, PathBuf};
 
@@ -60,6 +60,8 @@ pub struct SweepJson {
     pub axes: Vec<Axis>,
     /// Whether S was computed anew from each strength (Eq. 14).
     pub static_factor_follows_strength: bool,
+    /// Which numbers the scene does not state: they follow others at every point.
+    pub follows: Vec<String>,
     /// The points; the last axis runs fastest.
     pub rows: Vec<Row>,
     /// Measured points beside the curves at the same H/d.
@@ -110,6 +112,7 @@ impl Ask for SweepArgs {
             criterion: plan.scene().criterion.into(),
             axes,
             static_factor_follows_strength: plan.moves_static_factor(),
+            follows: plan.follows(),
             data: beside(&plan, &points, &method)?,
             explanation: explanation(&plan, &rows),
             bad_rows: rows.iter().filter(|row| !row.error.is_empty()).count(),
@@ -143,9 +146,7 @@ impl SweepArgs {
             "  ",
             &format!("{} points over {}, criterion {}", rows.len(), paths.join(" and "), data.criterion),
         );
-        if data.static_factor_follows_strength {
-            text.line("  S follows the strength by Eq. 14");
-        }
+        data.follows.iter().for_each(|sentence| text.wrapped("  ", sentence));
         text.line("  V_c and V in m/s, X in m, E_c over d³ fc; `over it` is E_c over Eq. 15");
         text.gap();
         // Evenly, first and last among them.
@@ -216,8 +217,8 @@ fn points_table(paths: &[String], rows: &[&Row]) -> (Vec<String>, Vec<&'static s
         shown.set_content_arrangement(arrangement);
         for row in rows {
             let cells = columns[..count].iter().map(|(_, cell)| cell(row).unwrap_or_else(|| "-".to_owned()));
-            let error = (!row.error.is_empty()).then(|| "no answer".to_owned());
-            let cells = cells.filter(|_| row.error.is_empty()).chain(error);
+            let has_any = columns.iter().any(|(_, cell)| cell(row).is_some());
+            let cells = cells.filter(|_| has_any).chain((!has_any).then(|| "no answer".to_owned()));
             shown.add_row(row.values.iter().copied().map(significant).chain(cells));
         }
         table_lines(&shown)

@@ -580,6 +580,7 @@ impl<'t> Reader<'t> {
             strength: medium.strength,
             density: medium.density,
             static_factor: medium.static_factor,
+            follows_eq14: medium.follows_eq14,
             inertia_factor,
             crater_ratio,
             crater_stiffness,
@@ -715,10 +716,9 @@ fn bare(value: &DeValue<'_>) -> Option<Result<Quantity, QuantityError>> {
 
 /// A medium without an end, S from Eq. 14 unless given.
 fn medium(strength: f64, density: f64, static_factor: Option<f64>) -> Layer {
-    // An air gap has no strength for Eq. 14 to go by, and needs none.
-    let eq14 = if strength == 0.0 { 0.0 } else { semi_empirical::static_factor(strength) };
-    let static_factor = static_factor.unwrap_or(eq14);
-    Layer { thickness: f64::INFINITY, strength, density, static_factor, viscosity: 0.0 }
+    let follows_eq14 = static_factor.is_none();
+    let static_factor = static_factor.unwrap_or_else(|| semi_empirical::static_factor_or_none(strength));
+    Layer { thickness: f64::INFINITY, strength, density, static_factor, follows_eq14, viscosity: 0.0 }
 }
 
 #[cfg(test)]

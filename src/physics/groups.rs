@@ -120,7 +120,14 @@ mod tests {
         assert_eq!(Groups::of(&Scene { resistance: bare, ..scene() }, 1.0).unwrap().geometry, None);
         let stages = Scene { resistance: Resistance::Stages(Vec::new()), ..scene() };
         assert_eq!(Groups::of(&stages, 1.0), None);
-        let layer = Layer { thickness: 1.0, strength: 30e6, density: 2300.0, static_factor: 12.0, viscosity: 0.0 };
+        let layer = Layer {
+            thickness: 1.0,
+            strength: 30e6,
+            density: 2300.0,
+            static_factor: 12.0,
+            follows_eq14: false,
+            viscosity: 0.0,
+        };
         let layered = Resistance::Concrete(Concrete { layers: vec![layer], ..concrete() });
         assert_eq!(Groups::of(&Scene { resistance: layered, ..scene() }, 1.0), None);
     }

@@ -5,7 +5,8 @@
 //! Three groups (docs/theory.md, section 1) are paths too, each with the one number that it sets: `H/d` the thickness,
 //! `I` the impact velocity, `N` the density.
 //!
-//! Where a scene leaves S to Eq. 14, S follows the strength: `target.strength` then stands for both.
+//! Where a scene states no S, S follows the strength by Eq. 14: `target.strength` then stands for both. A stated S stays,
+//! also where it equals that of Eq. 14.
 
 use std::fmt;
 use std::str::FromStr;
@@ -344,7 +345,9 @@ impl Parameter {
                 }
             }
             (Self::Density, Concrete(concrete)) => concrete.density = value,
-            (Self::StaticFactor, Concrete(concrete)) => concrete.static_factor = value,
+            (Self::StaticFactor, Concrete(concrete)) => {
+                (concrete.static_factor, concrete.follows_eq14) = (value, false);
+            }
             (Self::InertiaFactor, Concrete(concrete)) => concrete.inertia_factor = value,
             (Self::CraterRatio, Concrete(concrete)) => concrete.crater_ratio = value,
             (Self::CraterStiffness, Concrete(concrete)) => concrete.crater_stiffness = CraterStiffness::Given(value),
@@ -352,8 +355,9 @@ impl Parameter {
                 let layer = &mut concrete.layers[index];
                 *which.field(layer) = value;
                 if follows_eq14 {
-                    layer.static_factor = semi_empirical::static_factor(value);
+                    layer.static_factor = semi_empirical::static_factor_or_none(value);
                 }
+                layer.follows_eq14 &= which != LayerNumber::StaticFactor;
                 let sum = concrete.layers.iter().fold(0.0, |sum, layer| sum + layer.thickness);
                 scene.thickness = sum.is_finite().then_some(sum);
             }
@@ -366,16 +370,41 @@ impl Parameter {
         Ok(())
     }
 
-    /// True if setting it in `scene` changes an S that follows Eq. 14.
+    /// True if setting it in `scene` changes an S that follows Eq. 14, because none is stated.
     pub fn moves_static_factor(self, scene: &Scene) -> bool {
         let Some(concrete) = scene.concrete() else { return false };
         match self {
-            Self::Strength => concrete.layers.is_empty() && concrete.follows_eq14(),
-            Self::Layer(index, LayerNumber::Strength) => {
-                concrete.layers.get(index).is_some_and(|l| l.static_factor == semi_empirical::static_factor(l.strength))
-            }
+            Self::Strength => concrete.layers.is_empty() && concrete.follows_eq14,
+            Self::Layer(index, LayerNumber::Strength) => concrete.layers.get(index).is_some_and(|l| l.follows_eq14),
             _ => false,
         }
+    }
+}
+
+impl Scene {
+    /// Which numbers are not stated in the scene and follow others, one sentence each.
+    pub fn follows(&self) -> Vec<String> {
+        let Some(concrete) = self.concrete() else { return Vec::new() };
+        let mut sentences = Vec::new();
+        let eq14 = |of: &str| format!("{of} by Eq. 14");
+        let layers = concrete.layers.iter().enumerate().filter(|(_, layer)| layer.follows_eq14);
+        let layers: Vec<_> = layers.map(|(index, _)| index.to_string()).collect();
+        if concrete.layers.is_empty() && concrete.follows_eq14 {
+            sentences.push(eq14("resistance.S follows target.strength"));
+        } else if !layers.is_empty() && layers.len() == concrete.layers.len() {
+            sentences.push(eq14("target.layer.*.S follows target.layer.*.strength"));
+        } else if !layers.is_empty() {
+            sentences.push(eq14(&format!("S follows the strength in layer {}", layers.join(", "))));
+        }
+        if concrete.crater_stiffness == CraterStiffness::Continuous && concrete.crater_ratio > 0.0 {
+            let words =
+                "resistance.crater_stiffness follows from a force continuous at x = k d, impact.velocity included";
+            sentences.push(words.to_owned());
+        }
+        if !concrete.layers.is_empty() && self.thickness.is_some() {
+            sentences.push("target.thickness is the sum of the layers".to_owned());
+        }
+        sentences
     }
 }
 
@@ -584,6 +613,26 @@ mod tests {
         let mut layers = shipped("layered");
         Parameter::Layer(1, LayerNumber::Strength).set(&mut layers, 36e6).unwrap();
         assert_eq!(Parameter::Layer(1, LayerNumber::StaticFactor).get(&layers), Ok(12.0));
+        // Stated, and as Eq. 14 would have it.
+        let mut tunnel = shipped("tunnel");
+        Parameter::Strength.set(&mut tunnel, 64e6).unwrap();
+        assert_eq!(Parameter::StaticFactor.get(&tunnel), Ok(12.0));
+        Parameter::Layer(1, LayerNumber::StaticFactor).set(&mut layers, 12.0).unwrap();
+        Parameter::Layer(1, LayerNumber::Strength).set(&mut layers, 64e6).unwrap();
+        assert_eq!(Parameter::Layer(1, LayerNumber::StaticFactor).get(&layers), Ok(12.0));
+    }
+
+    #[test]
+    fn a_scene_says_which_of_its_numbers_follow_others() {
+        let said = |name: &str| shipped(name).follows().join("; ");
+        assert!(
+            said("paper-slab")
+                .starts_with("resistance.S follows target.strength by Eq. 14; resistance.crater_stiffness")
+        );
+        assert!(said("tunnel").starts_with("resistance.crater_stiffness follows"), "{}", said("tunnel"));
+        assert_eq!(said("jump"), "");
+        assert!(said("layered").starts_with("target.layer.*.S follows") && said("layered").ends_with("the layers"));
+        assert_eq!(said("viscous"), "");
     }
 
     #[test]

@@ -57,6 +57,11 @@ pub fn static_factor(strength: f64) -> f64 {
     72.0 / (strength / 1e6).sqrt()
 }
 
+/// As [`static_factor`], and 0 for an air gap, which has no strength for Eq. 14 to go by.
+pub(crate) fn static_factor_or_none(strength: f64) -> f64 {
+    if strength == 0.0 { 0.0 } else { static_factor(strength) }
+}
+
 /// Range of the experiments to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
 pub fn static_factor_validity(strength: f64) -> Validity {
     let note = format!("Eq. 14 was fitted to strengths from 13.5 to 96.7 MPa; this one is {} MPa", strength / 1e6);

@@ -67,7 +67,8 @@ pub fn critical_energy(rows: &[Row], points: &[Point], judged: &[&Judged]) -> Op
     Figure::new("critical-energy", "", judged, &[&full, &ndrc], vec![panel])
 }
 
-/// The paper's Figure 5: simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria.
+/// Simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria; the paper's Figure 5 is in percent of
+/// measured energies.
 ///
 /// `None` where no row has H/d of at least one.
 pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Figure> {

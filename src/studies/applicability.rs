@@ -17,7 +17,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use super::order::bisect;
 use crate::physics::groups::Groups;
 use crate::physics::semi_empirical::{self, static_factor_validity};
-use crate::physics::{CraterStiffness, Scene};
+use crate::physics::{CraterStiffness, Problem, Scene, Stage};
+use crate::text::significant;
 
 /// Error beyond which a scene counts as outside Eq. 11-12.
 pub const ERROR_ALLOWED: f64 = 0.05;
@@ -115,13 +116,31 @@ pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {
             ));
         }
     }
-    if concrete.follows_eq14() {
+    if concrete.follows_eq14 {
         let range = static_factor_validity(concrete.strength);
         if !range.valid {
             warnings.push(range.note);
         }
     }
     warnings
+}
+
+/// What a user should know of drag where a projectile stops or leaves within the crater, at the impact speed of `problem`.
+///
+/// There `c/c(Q = 0) = (1 + Q V0²/P)/(1 + k d Q/M)` is less than one: drag that is stronger makes a crater that is softer.
+pub fn drag_in_crater(scene: &Scene, problem: &Problem) -> Option<String> {
+    let crater = problem
+        .crater
+        .filter(|_| scene.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous))?;
+    let (kd, Stage { static_force, .. }) = (problem.stages[crater].end, problem.stages[crater + 1]);
+    let lowered = 1.0 - problem.stages[crater].stiffness * kd / static_force;
+    (lowered > 1e-12).then(|| {
+        format!(
+            "this projectile stops or leaves within x = k d, where drag acts through the crater constant c alone, which \
+             it lowers, here by {} %: in this model more density, nose factor or B then means less resistance",
+            significant(100.0 * lowered)
+        )
+    })
 }
 
 /// A group for people: four decimals, scientific where those would be hundreds of digits or none.
@@ -207,6 +226,20 @@ mod tests {
         let impacts: Vec<f64> = (0..200).map(|i| 10f64.powf(-2.0 + f64::from(i) / 40.0)).collect();
         // The line is broken at I = k pi/4, where Eq. 11-12 is exact.
         assert_eq!(contour(0.01, &impacts, 2.0).len(), 2);
+    }
+
+    /// At H/d = 1 the drag of the slab takes 3.0 % of E_c, and so of c.
+    #[test]
+    fn drag_that_softens_the_crater_is_said_with_its_share() {
+        let mut scene = slab();
+        let said = |scene: &Scene, speed: f64| drag_in_crater(scene, &scene.resolve(speed).unwrap());
+        Parameter::ThicknessRatio.set(&mut scene, 1.0).unwrap();
+        let critical = crate::studies::critical_velocity::exact(&scene).unwrap();
+        let text = said(&scene, critical).unwrap();
+        assert!(text.contains("here by 2.96") && text.contains("less resistance"), "{text}");
+        assert_eq!(said(&scene, 500.0), None);
+        Parameter::Density.set(&mut scene, 0.0).unwrap();
+        assert_eq!(said(&scene, critical), None);
     }
 
     #[test]

@@ -84,7 +84,7 @@ pub enum RowError {
 /// # Errors
 /// [`RowError`]: a cell that cannot be read or is missing, or a strength that gives no S.
 pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
-    let strength = row.number(3)?;
+    let (strength, static_factor) = (row.number(3)?, row.optional(6)?);
     Ok(Scene {
         title: None,
         mass: row.number(0)?,
@@ -93,10 +93,8 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
             nose_factor: row.number(2)?,
             strength,
             density: row.number(4)?,
-            static_factor: match row.optional(6)? {
-                Some(given) => given,
-                None => Concrete::usual_static_factor(strength)?,
-            },
+            static_factor: static_factor.map_or_else(|| Concrete::usual_static_factor(strength), Ok)?,
+            follows_eq14: static_factor.is_none(),
             inertia_factor: row.number(7)?,
             crater_ratio: row.number(8)?,
             crater_stiffness: row.optional(9)?.map_or(CraterStiffness::Continuous, CraterStiffness::Given),
@@ -114,7 +112,11 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
 /// The cells of `scene`, a crater and a tunnel, in the order of [`SCENES`]: [`scene_of`] gives it back.
 pub fn cells_of(scene: &Scene) -> Vec<Value<'static>> {
     let criterion = Value::Text(if scene.criterion == Criterion::Ndrc { "ndrc" } else { "" });
-    let numbers = Parameter::PLAIN.iter().take(NUMBERS.len()).map(|parameter| Value::Number(parameter.get(scene).ok()));
+    // An S that is not stated stays so.
+    let follows = scene.concrete().is_some_and(|concrete| concrete.follows_eq14);
+    let is_stated = |parameter: &Parameter| !(follows && *parameter == Parameter::StaticFactor);
+    let value = |parameter: &Parameter| parameter.get(scene).ok().filter(|_| is_stated(parameter));
+    let numbers = Parameter::PLAIN.iter().take(NUMBERS.len()).map(|parameter| Value::Number(value(parameter)));
     numbers.chain([criterion]).collect()
 }
 
@@ -323,6 +325,14 @@ mod tests {
         let text = format!("{}\n{lines}", SCENES.header());
         let mut table = CsvTable::new("t.csv", text.as_bytes(), &SCENES).unwrap();
         Scenes::Table(table.next_rows(100, None).unwrap())
+    }
+
+    #[test]
+    fn a_factor_that_a_row_states_is_stated() {
+        let scenes = table("2,0.05,0.72,36e6,2300,,12,,,,300,\n2,0.05,0.72,36e6,2300,,,,,,300,\n").scenes(0..2);
+        let follows: Vec<_> =
+            scenes.iter().map(|scene| scene.as_ref().unwrap().concrete().unwrap().follows_eq14).collect();
+        assert_eq!(follows, [false, true]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::quantity::Quantity;
 use crate::integrators::{ClosedForm, Detail, Flight, IntegrationError, Integrator, Taylor};
 use crate::physics::parameter::ParameterError;
 use crate::physics::reference::{Conditions, ExactFlight, ReferenceError};
-use crate::physics::{Advice, Outcome, Problem, ResolveError, Scalar, State, closed_form};
+use crate::physics::{Advice, Outcome, Problem, ResolveError, Scalar, Shown, State, closed_form};
 
 /// What the study of a scene gives.
 pub type Studied<T> = Result<T, StudyError>;
@@ -36,6 +36,9 @@ pub enum StudyError {
     /// It has no critical velocity.
     #[error("there is no critical velocity: {0}")]
     NoCritical(String),
+    /// Neither the simulation nor Eq. 15 asks for energy, and the difference of the two in percent is 0/0.
+    #[error("there is no difference from Eq. 15 at H/d = {}: both energies are 0", Shown(*.0))]
+    NoDifference(f64),
     /// One of its numbers.
     #[error(transparent)]
     Parameter(#[from] ParameterError),

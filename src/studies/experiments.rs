@@ -113,6 +113,7 @@ fn experiment_of(row: &Row<'_>, name: &str) -> Result<Experiment, Box<TableError
             strength,
             density: row.number(5)?,
             static_factor: semi_empirical::static_factor(strength),
+            follows_eq14: true,
             inertia_factor: 1.0,
             crater_ratio: nose.crater_ratio(),
             crater_stiffness: CraterStiffness::Continuous,

@@ -75,6 +75,7 @@ fn draw(random: &mut Random) -> Scene {
         strength: random.log_uniform(1e6, 1e9),
         density: 0.0,
         static_factor: random.log_uniform(1.0, 100.0),
+        follows_eq14: false,
         inertia_factor: 1.0,
         crater_ratio: if random.chance(0.05) { 0.0 } else { random.log_uniform(1e-8, 10.0) },
         crater_stiffness: CraterStiffness::Continuous,

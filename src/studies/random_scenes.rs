@@ -31,6 +31,7 @@ impl Generator {
             strength: random.log_uniform(10e6, 150e6),
             density: 0.0,
             static_factor: random.log_uniform(4.0, 25.0),
+            follows_eq14: false,
             inertia_factor: 1.0,
             crater_ratio: random.log_uniform(0.1, 10.0),
             crater_stiffness: CraterStiffness::Continuous,

@@ -14,7 +14,7 @@
 //!
 //! - **Taylor**: the integrator itself solves in dual numbers, over time, its events moving with the parameter.
 //!
-//! If S follows the strength by Eq. 14, the derivative with respect to the strength includes that of S, as in a sweep.
+//! If no S is stated, it follows the strength by Eq. 14, and the derivative with respect to the strength includes that of S, as in a sweep.
 //! S itself is also listed, for the uncertainty of Eq. 14.
 
 use num_dual::Dual64;
@@ -31,7 +31,7 @@ use crate::integrators::{Detail, Energy, Solved, Taylor};
 #[cfg(feature = "diffsol")]
 use crate::physics::EventKind;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError};
-use crate::physics::{Outcome, Problem, Resolved, Scene, Stage, State, closed_form};
+use crate::physics::{Outcome, Problem, Resistance, Resolved, Scene, Stage, State, closed_form};
 
 /// Derivatives with respect to one number of the scene; `None` where there is no such quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,9 +92,31 @@ fn slope(scene: &Scene, number: Parameter, value: f64, parameter: Parameter) -> 
     };
     match parameter.get(scene) {
         // S by Eq. 14 goes as fc^(-1/2).
-        Ok(strength) if follows && parameter.moves_static_factor(scene) => -0.5 * value / strength,
+        // That of an air gap is zero, and stays so.
+        Ok(strength) if follows && strength > 0.0 && parameter.moves_static_factor(scene) => -0.5 * value / strength,
         _ => f64::from(u8::from(number == parameter)),
     }
+}
+
+/// Most stages to be solved for the derivatives of one quantity: seconds.
+const STAGES_MAX: usize = 1_000_000;
+
+/// The numbers of `scene` that are affordable: of very many stages or layers those that they share.
+fn affordable(scene: &Scene, notes: &mut Vec<String>) -> Vec<Parameter> {
+    let mut parameters = Parameter::all_of(scene);
+    let stages = match &scene.resistance {
+        Resistance::Concrete(concrete) => concrete.layers.len() + 2,
+        Resistance::Stages(stages) => stages.len(),
+    };
+    let solved = parameters.len().saturating_mul(stages);
+    if solved > STAGES_MAX {
+        parameters.retain(|parameter| !matches!(parameter, Parameter::Layer(..) | Parameter::Stage(..)));
+        notes.push(format!(
+            "the numbers of the single stages are left out: all derivatives would take {solved} stages to solve, and \
+             {STAGES_MAX} are allowed; `critical --spread stage.0.drag=1%` takes chosen ones"
+        ));
+    }
+    parameters
 }
 
 /// The quantities of `scene` that have derivatives; `notes` says why one has none.
@@ -127,16 +149,19 @@ fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Studied<Quantities> {
     Ok(quantities)
 }
 
-/// Derivatives of the quantities of `scene` with respect to each of its numbers, from its problems in dual numbers.
+/// Derivatives of the quantities of `scene` with respect to `wanted`, or to each of its numbers, from its problems in dual
+/// numbers.
 ///
 /// - `end`: dX/dp and dV_r/dp.
 /// - `excess`: dg/dp of any function g that is zero at V_c, so that `dV_c/dp = -(dg/dp)/(dg/dV0)`.
 fn differentiate(
     scene: &Scene,
+    wanted: Option<&[Parameter]>,
     end: impl Fn(&Problem<Dual64>, Quantities) -> Solved<[Option<f64>; 2]>,
     excess: impl Fn(Problem<Dual64>) -> Solved<Option<f64>>,
 ) -> Studied<Sensitivities> {
     let mut notes = Vec::new();
+    let parameters = wanted.map_or_else(|| affordable(scene, &mut notes), <[_]>::to_vec);
     let quantities = quantities(scene, &mut notes)?;
     let at_critical = |parameter| -> Studied<Option<f64>> {
         let Some(critical) = quantities.critical_velocity else { return Ok(None) };
@@ -145,7 +170,7 @@ fn differentiate(
     let faster = at_critical(Parameter::Velocity)?;
     let speed = scene.velocity.filter(|_| quantities.depth.or(quantities.velocity).is_some());
     let mut entries = Vec::new();
-    for parameter in Parameter::all_of(scene) {
+    for parameter in parameters {
         let [depth, velocity] = match speed {
             Some(speed) => end(&dual_problem(scene, speed, parameter)?, quantities)?,
             None => [None; 2],
@@ -170,6 +195,10 @@ fn squared_speed(problem: &Problem<Dual64>, depth: Dual64) -> Option<Dual64> {
 /// # Errors
 /// [`StudyError`]: the scene does not resolve, or the projectile neither rests nor leaves.
 pub fn by_closed_form(scene: &Scene) -> Studied<Sensitivities> {
+    closed_form_of(scene, None)
+}
+
+fn closed_form_of(scene: &Scene, wanted: Option<&[Parameter]>) -> Studied<Sensitivities> {
     let end = |problem: &Problem<Dual64>, quantities: Quantities| {
         let half_slope = |depth: Dual64| squared_speed(problem, depth).map(|w| 0.5 * w.eps);
         let depth = quantities.depth.and_then(|depth| {
@@ -179,7 +208,7 @@ pub fn by_closed_form(scene: &Scene) -> Studied<Sensitivities> {
         let velocity = quantities.velocity.filter(|velocity| *velocity > 0.0);
         Ok([depth, velocity.and_then(|velocity| Some(half_slope(problem.exit_depth)? / velocity))])
     };
-    differentiate(scene, end, |problem| Ok(squared_speed(&problem, problem.exit_depth).map(|w| w.eps)))
+    differentiate(scene, wanted, end, |problem| Ok(squared_speed(&problem, problem.exit_depth).map(|w| w.eps)))
 }
 
 /// Sensitivities by the Taylor series in dual numbers.
@@ -187,7 +216,11 @@ pub fn by_closed_form(scene: &Scene) -> Studied<Sensitivities> {
 /// # Errors
 /// [`StudyError`].
 pub fn by_taylor(scene: &Scene) -> Studied<Sensitivities> {
-    by_integration(scene, |problem| Ok(Taylor::default().solve_in(&with_every_term(problem), Detail::End)?.end))
+    taylor_of(scene, None)
+}
+
+fn taylor_of(scene: &Scene, wanted: Option<&[Parameter]>) -> Studied<Sensitivities> {
+    by_integration(scene, wanted, |problem| Ok(Taylor::default().solve_in(&with_every_term(problem), Detail::End)?.end))
 }
 
 /// `problem` with a negligible value, 1e-30 of a noticeable one, for each coefficient that is zero and has a derivative.
@@ -218,13 +251,17 @@ fn with_every_term(problem: &Problem<Dual64>) -> Problem<Dual64> {
 /// Sensitivities by `solve`, which gives the state at the end of a problem in dual numbers.
 ///
 /// V_c is the speed at which the rest depth of the target, continued beyond H, is H.
-fn by_integration(scene: &Scene, solve: impl Fn(&Problem<Dual64>) -> Solved<State<Dual64>>) -> Studied<Sensitivities> {
+fn by_integration(
+    scene: &Scene,
+    wanted: Option<&[Parameter]>,
+    solve: impl Fn(&Problem<Dual64>) -> Solved<State<Dual64>>,
+) -> Studied<Sensitivities> {
     let end = |problem: &Problem<Dual64>, quantities: Quantities| {
         let State { depth, velocity, .. } = solve(problem)?;
         let residual = quantities.velocity.filter(|v| *v > 0.0);
         Ok([quantities.depth.map(|_| depth.eps), residual.map(|_| velocity.eps)])
     };
-    differentiate(scene, end, |problem| {
+    differentiate(scene, wanted, end, |problem| {
         let exit = problem.exit_depth.eps;
         Ok(Some(solve(&problem.with_exit(Dual64::from_re(f64::INFINITY)))?.depth.eps - exit))
     })
@@ -285,7 +322,7 @@ fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Solved<State<Dual64
 /// [`StudyError`].
 #[cfg(feature = "diffsol")]
 pub fn by_diffsol(scene: &Scene, rtol: f64) -> Studied<Sensitivities> {
-    by_integration(scene, |problem| solve_by_diffsol(problem, rtol))
+    by_integration(scene, None, |problem| solve_by_diffsol(problem, rtol))
 }
 
 impl Sensitivities {
@@ -422,15 +459,18 @@ pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64)
     let base = Scene { title: None, velocity: None, ..scene.clone() };
     let mut ordered = spreads.to_vec();
     ordered.sort_by_key(|spread| spread.parameter);
-    let derivatives = match by_closed_form(&base)? {
+    let wanted: Vec<_> = ordered.iter().map(|spread| spread.parameter).collect();
+    for parameter in &wanted {
+        parameter.get(&base)?;
+    }
+    let derivatives = match closed_form_of(&base, Some(&wanted))? {
         full if full.entries.iter().any(|e| e.critical_velocity.is_some()) => full,
-        _ => by_taylor(&base)?,
+        _ => taylor_of(&base, Some(&wanted))?,
     };
     let critical =
         derivatives.quantities.critical_velocity.ok_or_else(|| StudyError::NoCritical(derivatives.notes.join("; ")))?;
     let mut shares = Vec::with_capacity(spreads.len());
     for spread in spreads {
-        spread.parameter.get(&base)?;
         let entry = derivatives.entries.iter().find(|entry| entry.parameter == spread.parameter);
         let elasticity = entry.and_then(|e| elasticity(e.critical_velocity, Some(critical), e.value)).unwrap_or(0.0);
         shares.push(Share { spread: *spread, share: (elasticity * spread.relative).powi(2) });
@@ -638,6 +678,43 @@ mod tests {
         let integrated = by_taylor(&scene).unwrap();
         assert!(integrated.entries.iter().any(|e| e.depth.is_some_and(|d| d < 0.0)));
         assert_eq!(exact.disagreement(&integrated), None);
+    }
+
+    /// The strength of `tunnel` is stated with the S of Eq. 14: P as fc, and not as its root.
+    #[test]
+    fn a_stated_factor_does_not_follow_the_strength_though_it_is_that_of_eq_14() {
+        let of = |scene: &Scene, derivatives: &Sensitivities| {
+            let e = entry(derivatives, Parameter::Strength);
+            elasticity(e.depth, derivatives.quantities.depth, Parameter::Strength.get(scene).unwrap()).unwrap()
+        };
+        let stated = shipped("tunnel");
+        let mut left_out = stated.clone();
+        let Resistance::Concrete(concrete) = &mut left_out.resistance else { unreachable!() };
+        concrete.follows_eq14 = true;
+        for (scene, expected) in [(&stated, -0.544_703), (&left_out, -0.272_351)] {
+            for derivatives in [by_closed_form(scene).unwrap(), by_taylor(scene).unwrap()] {
+                assert!((of(scene, &derivatives) - expected).abs() < 1e-6, "{}", of(scene, &derivatives));
+            }
+        }
+    }
+
+    #[test]
+    fn of_very_many_stages_the_shared_numbers_have_derivatives_and_a_chosen_one_its_spread() {
+        let stage = |index: u32| Stage { end: 1e-3 * f64::from(index + 1), ..Stage::tunnel(1e4, 0.1) };
+        let stages: Vec<_> = (0..500).map(stage).collect();
+        let scene = Scene {
+            resistance: Resistance::Stages(stages),
+            thickness: Some(0.5),
+            velocity: Some(300.0),
+            ..crate::testing::scene()
+        };
+        for derivatives in [by_closed_form(&scene).unwrap(), by_taylor(&scene).unwrap()] {
+            let named: Vec<_> = derivatives.entries.iter().map(|e| e.parameter).collect();
+            assert_eq!(named, [Parameter::Mass, Parameter::Thickness, Parameter::Velocity]);
+            assert!(derivatives.notes[0].contains("left out"), "{:?}", derivatives.notes);
+        }
+        let spread = "stage.3.static_force=1%".parse().unwrap();
+        assert!(uncertainty(&scene, &[spread], 2, 1).unwrap().first_order > 0.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! How do the critical velocity, depth and residual velocity move along one number of a scene, or over two?
 //!
-//! Along H/d this is the paper's result: `E_c/(d³ fc)` of the simulation beside Eq. 15 (its Figure 4) and their
-//! difference (its Figure 5). A sweep computes both criteria there, and so shows what the gap consists of: the
+//! Along H/d this is the paper's result: `E_c/(d³ fc)` of the simulation beside Eq. 15 (its Figure 4), and their
+//! difference in percent of Eq. 15 (its Figure 5 is in percent of measured energies). A sweep computes both criteria there, and so shows what the gap consists of: the
 //! simulation asks for a path through the whole thickness, Eq. 15 for the depth from which the rest of the slab fails
 //! (docs/theory.md, section 4). With Q = 0 and the criterion `ndrc` the equation of motion *is* unrounded Eq. 15.
 
@@ -18,7 +18,7 @@ use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::parameter::{Parameter, ParameterError};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::number;
-use crate::physics::{Advice, Criterion, Outcome, Range, Scene, Shown};
+use crate::physics::{Advice, CraterStiffness, Criterion, Outcome, Range, Resistance, Scene, Shown};
 
 /// Most points of one sweep: a table of a gigabyte.
 pub const POINTS_MAX: usize = 10_000_000;
@@ -289,6 +289,11 @@ impl Plan {
             && self.axes.iter().all(|axis| axis.parameter != Parameter::StaticFactor)
     }
 
+    /// Which numbers of its scenes are not stated and follow others, one sentence each.
+    pub fn follows(&self) -> Vec<String> {
+        self.point(0).1.map_or_else(|_| Vec::new(), |scene| scene.follows())
+    }
+
     /// The values and the scene of point `index`.
     ///
     /// # Errors
@@ -339,7 +344,8 @@ impl Plan {
         }
         self.compare(scene, integrator, row);
         critical?;
-        Ok(())
+        let is_nothing = row.dimensionless_energy == Some(0.0) && row.eq15_unrounded == Some(0.0);
+        row.thickness_ratio.filter(|_| is_nothing).map_or(Ok(()), |ratio| Err(StudyError::NoDifference(ratio)))
     }
 
     /// What a slab of one concrete has beyond its critical velocity: dimensionless energies and Eq. 15.
@@ -353,7 +359,7 @@ impl Plan {
         let finite = |value: f64| value.is_finite().then_some(value);
         row.eq15_printed = finite(concrete.static_factor * eq15_printed(ratio));
         row.eq15_unrounded = finite(concrete.static_factor * eq15_unrounded(ratio));
-        let over = |formula: Option<f64>| Some(row.dimensionless_energy? / formula? - 1.0);
+        let over = |formula: Option<f64>| finite(row.dimensionless_energy? / formula? - 1.0);
         (row.difference_printed, row.difference_unrounded) = (over(row.eq15_printed), over(row.eq15_unrounded));
         if self.is_along_thickness() {
             let by = |criterion: Criterion| {
@@ -407,23 +413,61 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
         .filter(|row| row.thickness_ratio.is_some_and(|ratio| ratio > 0.0))
         .filter_map(|row| Some(over(row, row.energy_ndrc)?.abs()))
         .fold(0.0, f64::max);
-    let (remainder, finite_n) = match first.1.geometry {
-        Some(n) => (
-            format!("here N = {n:.4}, and it is what finite N (and another k or a given c) adds"),
-            " At finite N it grows again where drag gains on strength.",
-        ),
-        None => ("here there is no drag, and another k or a given c is all that adds to it".to_owned(), ""),
+    let parts = |(_, row): &(f64, &Row)| {
+        let index = rows.iter().position(|other| std::ptr::eq(other, *row))?;
+        parts_of_gap(&plan.point(index).1.ok()?, row)
+    };
+    let parts: Vec<_> = [first, last].into_iter().filter_map(parts).collect();
+    let lowers = parts.iter().any(|(_, drag)| *drag < 0.0);
+    let parts = parts.iter().map(|(text, _)| format!(" {text}.")).collect::<String>();
+    let below = if lowers {
+        " Where drag lowers it the crater is what the slab consists of: there drag acts through c alone, and lowers c."
+    } else {
+        ""
     };
     let values = [
         ("{first}", at(first)),
         ("{last}", at(last)),
         ("{least}", at(least)),
         ("{ndrc}", format!("{ndrc:.1}")),
-        ("{remainder}", remainder),
-        ("{finite N}", finite_n.to_owned()),
+        ("{parts}", parts),
+        ("{below}", below.to_owned()),
     ];
     let text = include_str!("sweep/why.txt").trim_ascii_end();
     values.iter().fold(format!("{WHY}. {text}"), |text, (slot, value)| text.replace(slot, value))
+}
+
+/// What the gap between simulation and unrounded Eq. 15 consists of at one point, and the part of drag (%).
+///
+/// The energy is that of the criterion alone (no drag, k = 2, c continuous), times what k and c make of it, times what
+/// drag does.
+fn parts_of_gap(scene: &Scene, row: &Row) -> Option<(String, f64)> {
+    let energy = |scene: &Scene| {
+        let velocity = critical_velocity::exact(&Scene { criterion: Criterion::FullDepth, ..scene.clone() }).ok()?;
+        Some(dimensionless_energy(0.5 * scene.mass * velocity * velocity, scene.concrete()?))
+    };
+    let mut bare = scene.clone();
+    let Resistance::Concrete(concrete) = &mut bare.resistance else { return None };
+    concrete.density = 0.0;
+    let without_drag = energy(&bare)?;
+    let Resistance::Concrete(concrete) = &mut bare.resistance else { return None };
+    let is_usual = concrete.crater_ratio == 2.0 && concrete.crater_stiffness == CraterStiffness::Continuous;
+    (concrete.crater_ratio, concrete.crater_stiffness) = (2.0, CraterStiffness::Continuous);
+    let alone = energy(&bare)?;
+    let percent = |over: f64, under: f64| 100.0 * (over / under - 1.0);
+    let drag = percent(row.energy_full_depth?, without_drag);
+    let mut text = format!(
+        "At H/d = {:.4} the criterion alone makes {:+.1} %",
+        row.thickness_ratio?,
+        percent(alone, row.eq15_unrounded?)
+    );
+    if !is_usual {
+        text += &format!(", k and c {:+.1} %", percent(without_drag, alone));
+    }
+    if let Some(n) = row.geometry {
+        text += &format!(", drag (N = {n:.4}) {drag:+.1} %");
+    }
+    Some((text, if row.geometry.is_some() { drag } else { 0.0 }))
 }
 
 #[cfg(test)]
@@ -431,7 +475,6 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
 mod tests {
     use super::*;
     use crate::integrators::{Energy, Taylor};
-    use crate::physics::Resistance;
     use crate::testing::shipped;
 
     fn slab() -> Scene {
@@ -549,6 +592,15 @@ mod tests {
     }
 
     #[test]
+    fn a_slab_without_thickness_has_its_answer_and_no_difference_in_percent() {
+        let rows = plan(&["H/d=0:2:3"]).run(&Taylor::default());
+        assert_eq!((rows[0].critical_velocity_m_s, rows[0].dimensionless_energy), (Some(0.0), Some(0.0)));
+        assert_eq!((rows[0].eq15_unrounded, rows[0].difference_unrounded), (Some(0.0), None));
+        assert!(rows[0].error.contains("no difference from Eq. 15 at H/d = 0"), "{}", rows[0].error);
+        assert!(rows[1].error.is_empty() && rows[1].difference_unrounded.is_some());
+    }
+
+    #[test]
     fn an_impact_function_moves_the_flight_and_not_the_critical_velocity() {
         let rows = plan(&["I=1:100:5:log"]).run(&Taylor::default());
         assert!(rows.windows(2).all(|pair| pair[0].critical_velocity_m_s == pair[1].critical_velocity_m_s));
@@ -560,6 +612,29 @@ mod tests {
     fn measured_points_are_read_by_the_names_of_their_columns() {
         let text = "series,E_c/(d3 fc), H/d\na,10.5,3\n\"b\nc\", 20,5.5\n";
         assert_eq!(read_points("p.csv", text.as_bytes()).unwrap(), [(3.0, 10.5), (5.5, 20.0)]);
+    }
+
+    /// Parts of the gap found apart, by mpmath.
+    #[test]
+    fn the_text_has_the_parts_of_the_gap_of_its_own_scene() {
+        let said = |scene: Scene| {
+            let plan = Plan::new(scene, &["H/d=0.5:18:2".parse().unwrap()]).unwrap();
+            explanation(&plan, &plan.run(&Taylor::default()))
+        };
+        let text = said(slab());
+        for words in [
+            "At H/d = 0.5000 the criterion alone makes +844.4 %, drag (N = 38.5802) -3.7 %.",
+            "At H/d = 18.0000 the criterion alone makes +36.5 %, drag (N = 38.5802) +44.0 %.",
+            "Where drag lowers it",
+        ] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        let mut bare = slab();
+        Parameter::Density.set(&mut bare, 0.0).unwrap();
+        Parameter::CraterRatio.set(&mut bare, 0.707).unwrap();
+        let text = said(bare);
+        assert!(text.contains("alone makes +36.5 %, k and c +3.8 %.") && !text.contains("drag ("), "{text}");
+        assert!(!text.contains("Where drag lowers it"), "{text}");
     }
 
     #[test]

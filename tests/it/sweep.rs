@@ -75,7 +75,7 @@ fn two_axes_with_units_give_every_pair_and_say_that_s_follows() {
     assert_eq!(value["rows"].as_array().unwrap().len(), 12);
     assert_eq!(value["static_factor_follows_strength"], true);
     let said = run_in(folder.path(), &format!("{sweep} --out two.csv")).expect(0);
-    assert!(said.out.contains("S follows the strength by Eq. 14"), "{said:?}");
+    assert!(said.out.contains("resistance.S follows target.strength by Eq. 14"), "{said:?}");
     let svg = text_of(&folder, "two.svg");
     assert!(svg.contains("H/d = 8") && svg.contains("target.strength [Pa]"));
 }

@@ -94,6 +94,7 @@ pub(super) fn concrete(diameter: f64, nose_factor: f64, density: f64) -> Concret
         strength: 36e6,
         density,
         static_factor: 12.0,
+        follows_eq14: false,
         inertia_factor: 1.0,
         crater_ratio: 2.0,
         crater_stiffness: CraterStiffness::Continuous,
