@@ -44,6 +44,9 @@ const PHASE_MAX: f64 = 1.8;
 /// Longest step in its own unit of time. No flight needs more, and beyond it coefficients that underflow would count.
 const SPAN_MAX: f64 = 64.0;
 
+/// Least unit of depth (m), `2^-900`: depths in this unit are numbers.
+const LEAST_UNIT_DEPTH: f64 = f64::from_bits((1023 - 900) << 52);
+
 /// How much nearer to the start of a step than to its end a boundary lies that is searched from the start.
 const NEAR_START: f64 = 16.0;
 
@@ -408,9 +411,9 @@ impl Steps {
             let mut unit_velocity = power_of_two_below(fastest);
             let unit_time = power_of_two_below(scale);
             let mut unit_depth = unit_velocity * unit_time;
-            if unit_depth < f64::MIN_POSITIVE {
-                // Next to no speed and a force: rest is nearer than numbers can say.
-                (unit_velocity, unit_depth) = (f64::MIN_POSITIVE / unit_time, f64::MIN_POSITIVE);
+            if unit_depth < LEAST_UNIT_DEPTH {
+                // Next to no speed and a force: rest is nearer than depths can say.
+                (unit_velocity, unit_depth) = (LEAST_UNIT_DEPTH / unit_time, LEAST_UNIT_DEPTH);
             }
             let law = Stage {
                 // The quotient of the units alone may leave the range of numbers.
