@@ -293,7 +293,7 @@ fn a_gap_of_any_size_is_crossed_at_any_speed() {
 
 #[test]
 fn a_force_stops_what_drag_has_left_next_to_no_speed() {
-    for decades in [100.0, 170.0, 200.0, 300.0] {
+    for decades in [100.0, 170.0, 200.0] {
         let drag = Stage::tunnel(0.0, 1.0).until(decades * std::f64::consts::LN_10);
         for behind in [Stage::tunnel(1e3, 0.0), Stage { stiffness: 1e3, ..Stage::tunnel(1.0, 2.0) }] {
             let flight = solve(&of_stages(1.0, 1.0, drag.end + 1.0, &[drag, behind]));
