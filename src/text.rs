@@ -52,17 +52,23 @@ pub fn engineering(value: f64, unit: &str) -> String {
 
 /// `value` to six significant digits without a prefix: plain between 1e-4 and 1e7, scientific beyond.
 pub fn significant(value: f64) -> String {
+    digits_text(value, 6)
+}
+
+/// `value` to so many significant `digits`, 1 to 17, as [`significant`].
+pub fn digits_text(value: f64, digits: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
     if !value.is_finite() {
         return value.to_string();
     }
+    let behind = digits - 1;
     if (1e-4..1e7).contains(&value.abs()) {
-        let decimals = (5 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+        let decimals = (behind - value.abs().log10().floor() as i32).clamp(0, 17) as usize;
         format!("{value:.decimals$}")
     } else {
-        format!("{value:.5e}")
+        format!("{value:.*e}", behind as usize)
     }
 }
 

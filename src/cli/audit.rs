@@ -10,13 +10,14 @@ use super::{Answer, Ask, CliError, Settings};
 use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::tables::read_bytes;
 use crate::physics::{Problem, Scene};
-use crate::studies::audit::{Audit, ExactValues, QuantityAudit, RESULTS, Table, audit};
+use crate::studies::audit::{Audit, ErrorBand, Exact, ExactValues, FormalOrders, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::critical_velocity;
 use crate::studies::error::Truth;
 use crate::studies::error::{is_fixed, value_of};
+use crate::studies::grid_convergence::ThreeGrids;
 use crate::studies::quantity::Quantity;
 use crate::studies::scheme_of_table::identify;
-use crate::text::or_dash;
+use crate::text::{digits_text, or_dash};
 
 /// Arguments of `audit`.
 #[derive(Args, Debug)]
@@ -36,9 +37,10 @@ pub struct AuditArgs {
     /// What is set in it.
     #[command(flatten)]
     pub settings: Settings,
-    /// Formal order of the code; without it any order above zero converges.
+    /// Formal order of the code, of all quantities or of each: 2, or depth=2,time=1; without it any order above zero
+    /// converges.
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
-    pub order: Option<f64>,
+    pub order: Option<FormalOrders>,
 }
 
 impl Ask for AuditArgs {
@@ -60,8 +62,8 @@ impl Ask for AuditArgs {
             }
         };
         let exact = scene.as_ref().map(|(scene, problem)| exact_values(scene, problem)).transpose()?;
-        let mut judged = audit(&results, self.order, exact)?;
-        judged.scheme = scene.and_then(|(_, problem)| identify(&problem, &results));
+        let scheme = scene.and_then(|(_, problem)| identify(&problem, &results));
+        let judged = audit(&results, &self.order.clone().unwrap_or_default(), exact.as_ref(), scheme)?;
         Ok(Answer { text: text(&file, &judged), exit: judged.verdict.into(), data: Some(judged) })
     }
 }
@@ -69,42 +71,36 @@ impl Ask for AuditArgs {
 /// What the scene gives exactly.
 fn exact_values(scene: &Scene, problem: &Problem) -> Result<ExactValues, CliError> {
     let exact = Truth::of(problem)?.flight;
-    let values = Quantity::ALL.map(|quantity| match quantity {
-        Quantity::CriticalVelocity => critical_velocity::exact_or_refined(scene).ok(),
-        fixed if is_fixed(fixed, &exact) => None,
-        free => value_of(free, &exact),
+    let values = Quantity::ALL.map(|quantity| match value_of(quantity, &exact) {
+        Some(value) if is_fixed(quantity, &exact) => Exact::Fixed(value),
+        Some(value) => Exact::Free(value),
+        None if quantity != Quantity::CriticalVelocity => Exact::Absent("the projectile does not reach x = k d"),
+        None if !problem.has_exit() => Exact::Absent("the target has no far side"),
+        None => critical_velocity::exact_or_refined(scene).map_or(Exact::Unknown, Exact::Free),
     });
-    Ok(ExactValues { impact_velocity: problem.impact_speed, values })
+    Ok(ExactValues { impact_velocity: problem.impact_speed, stops: exact.outcome.is_stop(), values })
 }
 
 fn text(file: &str, judged: &Audit) -> String {
     let mut text = Text::titled(Some(file));
     text.gap();
-    let header = ["quantity", "order", "95 % interval", "limit", "error band", "class", "verdict"];
+    let header = ["quantity", "finest value", "+-", "order", "95 % interval", "verdict"];
     let row = |q: &QuantityAudit| {
         [
             escape_terminal(q.quantity.name()),
+            value_text(q.finest.value, q.error_band),
+            or_dash(q.error_band.map(|band| band.half_width), |half| format!("{half:.1e}")),
             or_dash(q.observed_order, |order| format!("{order:.2}")),
             interval_text(q.interval),
-            or_dash(q.limit, significant),
-            or_dash(q.error_bands.first().map(|band| band.half_width), |half| format!("{half:.1e}")),
-            q.class.name().to_owned(),
             q.verdict.name().to_owned(),
         ]
     };
     text.table(&header, judged.quantities.iter().map(row));
-    text.gap();
     for q in &judged.quantities {
-        text.wrapped("  ", &escape_terminal(&format!("{}: {}", q.quantity.name(), q.reason)));
-        for band in &q.error_bands {
-            text.wrapped("    ", &format!("+- {:.2e} by {}", band.half_width, band.rule));
-        }
-        if let (Some(exact), Some(agrees)) = (q.exact, q.agrees_with_exact) {
-            let word = if agrees { "agrees with" } else { "misses" };
-            text.line(format!("    the limit {word} the exact {}", significant(exact)));
-        }
+        quantity_text(&mut text, q);
     }
-    for finding in &judged.findings {
+    text.gap();
+    for finding in judged.findings.iter().filter(|finding| finding.quantity.is_none()) {
         text.wrapped("  note: ", &escape_terminal(&finding.message));
     }
     if let Some(scheme) = &judged.scheme {
@@ -112,4 +108,78 @@ fn text(file: &str, judged: &Audit) -> String {
     }
     text.line(format!("  verdict    {}", judged.verdict.name()));
     text.finish()
+}
+
+/// `value` with the digits that its error bar leaves.
+fn value_text(value: f64, band: Option<ErrorBand>) -> String {
+    let digits = band.map_or(6.0, |band| (value.abs() / band.half_width).log10().ceil() + 2.0);
+    digits_text(value, digits.clamp(4.0, 15.0) as i32)
+}
+
+/// What is known of one column, its reason first.
+fn quantity_text(text: &mut Text, q: &QuantityAudit) {
+    let unit = q.quantity.quantity().map_or("", Quantity::unit);
+    text.part(format!("{}: {}, {}", escape_terminal(q.quantity.name()), q.class.name(), q.verdict.name()));
+    text.wrapped("  ", &escape_terminal(&q.reason));
+    if let Some(advice) = &q.advice {
+        text.wrapped("  to decide it: ", advice);
+    }
+    if let Some(band) = q.error_band {
+        let value = value_text(q.finest.value, q.error_band);
+        let percent = 100.0 * band.half_width / q.finest.value.abs();
+        let percent = if percent.is_finite() { format!(" ({} %)", digits_text(percent, 2)) } else { String::new() };
+        let half = band.half_width;
+        let step = significant(q.finest.dt_s);
+        text.wrapped("  ", &format!("{value} {unit} +- {half:.2e} {unit}{percent} at dt = {step} s: {}", band.rule));
+    }
+    if let (Some(limit), Some(exact)) = (q.limit, q.exact) {
+        let word = match q.agrees_with_exact {
+            Some(true) => "agrees with",
+            Some(false) => "misses",
+            None => "is too unsure to compare with",
+        };
+        text.wrapped(
+            "  ",
+            &format!("limit {} {unit}: {word} the exact {} {unit}", significant(limit), significant(exact)),
+        );
+    } else if let Some(limit) = q.limit {
+        text.line(format!("  limit {} {unit}", significant(limit)));
+    }
+    if q.local_orders.len() > 1 {
+        let shown = q.local_orders.iter().take(8).map(|order| or_dash(*order, |order| format!("{order:.2}")));
+        text.wrapped(
+            "  ",
+            &format!("order of each three rows, finest first: {}", shown.collect::<Vec<_>>().join("  ")),
+        );
+    }
+    if let Some(three) = &q.three_grids {
+        three_grids_text(text, three, unit);
+    }
+    for band in &q.error_bands {
+        let digits = format!("{:.2e} {unit}", band.half_width);
+        text.wrapped("  ", &format!("+- {digits} by {}, order {:.2}", band.rule, band.order));
+    }
+}
+
+/// The table of a grid convergence study, in its usual names.
+fn three_grids_text(text: &mut Text, three: &ThreeGrids, unit: &str) {
+    let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.3} %", 100.0 * share));
+    text.table(
+        &["", "1", "2", "3"],
+        [("h (s)".to_owned(), three.steps), (format!("f ({unit})"), three.values)]
+            .map(|(name, row)| [name, significant(row[0]), significant(row[1]), significant(row[2])]),
+    );
+    let order = or_dash(three.order, |order| format!("{order:.3}"));
+    let [r21, r32] = three.ratios;
+    let extrapolated = or_dash(three.extrapolated, significant);
+    let ratio = or_dash(three.asymptotic_ratio, |ratio| format!("{ratio:.4}"));
+    let (error, index) = (percent(three.approximate_error), percent(three.grid_convergence_index));
+    text.wrapped(
+        "  ",
+        &format!(
+            "r21 {r21:.3}, r32 {r32:.3}, p {order}, extrapolated {extrapolated}, e_a {error}, GCI {index}, asymptotic \
+             ratio {ratio}: {}",
+            three.rule
+        ),
+    );
 }

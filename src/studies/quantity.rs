@@ -45,6 +45,15 @@ impl Quantity {
         matches!(self, Self::Velocity | Self::CraterEndVelocity)
     }
 
+    /// Unit of its value.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Depth => "m",
+            Self::Time | Self::CraterEndTime => "s",
+            Self::Velocity | Self::CraterEndVelocity | Self::CriticalVelocity => "m/s",
+        }
+    }
+
     /// Name in JSON and in suites.
     pub fn name(self) -> &'static str {
         self.into()

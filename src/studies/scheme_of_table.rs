@@ -223,12 +223,12 @@ impl Scheme {
     }
 
     /// Formal order of `quantity`; `None` where the flight fixes it, or where it is not known.
-    fn formal_order(self, path: &Path, quantity: Quantity) -> Option<f64> {
+    fn formal_order(self, path: Path, quantity: Quantity) -> Option<f64> {
         // That flight is another one than the critical flight.
         if quantity == Quantity::CriticalVelocity {
             return None;
         }
-        let of_second = formal_order(self.velocity().unwrap_or(VelocityAt::Centred), self.events, path, quantity)?;
+        let of_second = formal_order(self.velocity().unwrap_or(VelocityAt::Centred), self.events, &path, quantity)?;
         match self.advance {
             Advance::Euler | Advance::SemiImplicitEuler => Some(1.0),
             // Of the interpolation, or of the scheme at steps far below those in use.
@@ -334,9 +334,14 @@ impl Identification {
     /// Formal order of `quantity`; `None` where the schemes found differ in it, where the flight fixes the quantity, or
     /// where none was found.
     pub fn formal_order(&self, quantity: Quantity) -> Option<f64> {
-        let mut orders = self.candidates.iter().map(|found| found.scheme.formal_order(&self.path, quantity));
+        let mut orders = self.candidates.iter().map(|found| found.scheme.formal_order(self.path, quantity));
         let first = orders.next()??;
         orders.all(|order| order == Some(first)).then_some(first)
+    }
+
+    /// Whether a scheme reproduces all of `rows` rows, three at least.
+    pub fn reproduces_all(&self, rows: usize) -> bool {
+        rows >= 3 && self.rows == rows && !self.candidates.is_empty()
     }
 
     /// What was found, in one sentence.
@@ -403,7 +408,9 @@ pub fn identify(problem: &Problem, table: &Table) -> Option<Identification> {
     let mut all = table.flights();
     if exact.outcome.is_stop() {
         // What a code prints for the velocity at rest is a matter of taste: zero, or that of the last step.
-        all.iter_mut().for_each(|row| row.values.retain(|(quantity, ..)| *quantity != Quantity::Velocity));
+        for row in &mut all {
+            row.values.retain(|(quantity, ..)| *quantity != Quantity::Velocity);
+        }
         all.retain(|row| !row.values.is_empty());
     }
     let rows: Vec<&FlightRow> = all.iter().rev().filter(|row| duration / row.step <= STEPS_MAX).collect();
@@ -552,7 +559,7 @@ mod tests {
                     continue;
                 }
                 for quantity in [Quantity::Depth, Quantity::Time, Quantity::Velocity] {
-                    let Some(formal) = scheme.formal_order(&path, quantity) else { continue };
+                    let Some(formal) = scheme.formal_order(path, quantity) else { continue };
                     let value = super::super::error::value_of(quantity, &exact).unwrap();
                     // The place of a stage end in its step makes a noise: the mean of many steps.
                     let error = |step: f64| {

@@ -5,7 +5,6 @@ use super::run::{End, Reading, Run, RunError, end_of};
 use super::{AuditError, Finding, FindingKind};
 use crate::exchange::tables::{self, At, Fault, Place, Row, TableError};
 use crate::physics::units::{Dimension, quantity};
-use crate::studies::order::STEPS_MIN;
 use crate::studies::quantity::Quantity;
 use crate::text::shortened;
 
@@ -131,8 +130,7 @@ impl Table {
     ///
     /// # Errors
     /// [`AuditError`] with the place: every cell must be a number (`nan` and `inf` are read, and fail later), every row
-    /// complete, every name there once and none a known one written wrongly, every step positive, with one value, and
-    /// four of them different; of [`ROWS_MAX`] rows at most.
+    /// complete, every name there once and none a known one written wrongly, every step positive, with one value; of [`ROWS_MAX`] rows at most.
     pub fn read(file: &str, bytes: &[u8]) -> Result<Self, AuditError> {
         let (mut count, mut header, mut names) = (0, At::Table, Vec::new());
         let rows = tables::read(file, bytes, &RESULTS, |row| {
@@ -240,12 +238,17 @@ impl Table {
             let message = format!("{} repeated another row and was merged with it", lines(&merged));
             self.remark(FindingKind::DuplicateRows, None, message);
         }
-        let found = different.iter().filter(|row| row.step.is_finite()).count();
-        if found < STEPS_MIN {
-            let place = Place { file: self.file.clone(), ..Place::default() };
-            return Err(TableError::new(place, Fault::TooFewSteps { found, needed: STEPS_MIN }, &RESULTS).into());
-        }
         self.rows = different;
+        Ok(())
+    }
+
+    /// Refuses a table of fewer than `needed` different steps.
+    pub(super) fn holds_steps(&self, needed: usize) -> Result<(), AuditError> {
+        let found = self.rows.iter().filter(|row| row.step.is_finite()).count();
+        if found < needed {
+            let place = Place { file: self.file.clone(), ..Place::default() };
+            return Err(TableError::new(place, Fault::TooFewSteps { found, needed }, &RESULTS).into());
+        }
         Ok(())
     }
 }

@@ -9,7 +9,8 @@ use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrat
 use crate::studies::convergence::{self, Convergence, Ladder, QuantityStudy, STEPS_OVER_TIME};
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::formal_order::{Path, formal_order};
-use crate::studies::grid_convergence::{GridValue, richardson, roache, self_convergence as fit_values, three_grids};
+use crate::studies::grid_convergence::{GridValue, richardson, roache, three_grids};
+use crate::studies::limit::law_of_values;
 use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit, PowerLaw};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
@@ -116,7 +117,7 @@ fn self_convergence(subject: &Subject<'_>) -> Found {
     let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
     let ladder = Ladder { from: from * 10.0, to, points: 40, seed: subject.context.seed };
     let grids = values_at(subject, quantity, &ladder.sizes())?;
-    let found = fit_values(&grids, FALSE_ALARM_LEVEL)?;
+    let found = law_of_values(&grids, None, FALSE_ALARM_LEVEL)?;
     let [low, high] = found.limit_band;
     let is_open = found.behaviour.class() != Class::Converging;
     Ok(Measurement {

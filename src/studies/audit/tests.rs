@@ -1,0 +1,361 @@
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+use std::fmt::Write;
+
+use super::*;
+use crate::studies::order::noise::Noise;
+
+/// A depth table; `f` of the step in units of the coarsest.
+fn table(rows: i32, mut f: impl FnMut(f64, i32) -> f64) -> String {
+    let mut text = "dt_s,depth_m\n".to_owned();
+    for i in 0..rows {
+        let h = 0.5_f64.powi(i);
+        writeln!(text, "{},{}", 1e-5 * h, f(h, i)).unwrap();
+    }
+    text
+}
+
+fn judge_text(text: &str, order: Option<f64>, exact: Option<f64>) -> Audit {
+    let exact = exact.map(|depth| {
+        let mut values = [Exact::Unknown; Quantity::ALL.len()];
+        values[Quantity::Depth as usize] = Exact::Free(depth);
+        ExactValues { impact_velocity: 300.0, stops: true, values }
+    });
+    let table = Table::read("run.csv", text.as_bytes()).unwrap();
+    audit(&table, &FormalOrders::of_all(order), exact.as_ref(), None).unwrap()
+}
+
+fn kinds(audit: &Audit) -> Vec<FindingKind> {
+    audit.findings.iter().map(|finding| finding.kind).collect()
+}
+
+const BASE: &str = "1e-6,1.01\n2e-6,1.04\n4e-6,1.16\n8e-6,1.64\n";
+
+#[test]
+fn clean_tables_of_either_order_pass_from_four_rows_on_with_and_without_an_exact_value() {
+    for rows in 4..=8 {
+        for order in [1.0, 2.0] {
+            // A next term of 10 %, and seven digits as Abaqus prints them.
+            let text = table(rows, |h, _| {
+                let term = h.powf(order);
+                ((5.0 + 0.1 * term * (1.0 + 0.1 * term)) * 1e6).round() / 1e6
+            });
+            for exact in [None, Some(5.0)] {
+                let audit = judge_text(&text, Some(order), exact);
+                assert_eq!(
+                    audit.verdict,
+                    Verdict::Passed,
+                    "{rows} rows, order {order}, {exact:?}: {:?}",
+                    audit.findings
+                );
+                assert_ne!(
+                    judge_text(&text, Some(3.0 - order), exact).verdict,
+                    Verdict::Passed,
+                    "{rows} rows, order {order}"
+                );
+                assert_eq!(judge_text(&text, None, exact).verdict, Verdict::Passed);
+            }
+        }
+    }
+}
+
+#[test]
+fn noisy_tables_of_twelve_rows_pass_and_miss_the_other_order() {
+    let mut noise = Noise(11);
+    for _ in 0..20 {
+        for order in [1.0, 2.0] {
+            let deviations: Vec<f64> = (0..12).map(|_| 1.0 + 0.05 * noise.normal()).collect();
+            let text = table(12, |h, i| 0.17 + 0.01 * h.powf(order) * deviations[i as usize]);
+            for exact in [None, Some(0.17)] {
+                let audit = judge_text(&text, Some(order), exact);
+                assert_eq!(audit.verdict, Verdict::Passed, "order {order}, {exact:?}: {:?}", audit.findings);
+                let missed = judge_text(&text, Some(3.0 - order), exact);
+                assert_eq!(missed.verdict, Verdict::Failed);
+                assert_eq!(kinds(&missed), [FindingKind::OrderMissed]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_diverging_table_fails_where_its_reverse_passes() {
+    assert_eq!(judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None).verdict, Verdict::Passed);
+    let text = "dt_s,depth_m\n8e-6,1.01\n4e-6,1.04\n2e-6,1.16\n1e-6,1.64\n";
+    for (order, exact) in [(None, None), (Some(2.0), None), (None, Some(1.0)), (Some(2.0), Some(1.0))] {
+        let audit = judge_text(text, order, exact);
+        assert_eq!((audit.verdict, audit.quantities[0].class), (Verdict::Failed, Class::Diverging));
+        assert_eq!(kinds(&audit), [FindingKind::Diverging]);
+        assert!(audit.quantities[0].error_bands.is_empty(), "no error bar for what diverges");
+    }
+}
+
+#[test]
+fn an_oscillating_table_fails_even_where_its_amplitude_falls() {
+    for decay in [0.0, 0.81, 2.0, -0.5] {
+        let text = table(6, |h, i| 1.0 + 0.1 * h.powf(decay) * f64::from(1 - 2 * (i % 2)));
+        for exact in [None, Some(1.0)] {
+            let audit = judge_text(&text, None, exact);
+            assert_eq!(audit.verdict, Verdict::Failed, "decay {decay}, {exact:?}: {:?}", audit.findings);
+            assert!(matches!(kinds(&audit)[0], FindingKind::Oscillating | FindingKind::Diverging));
+        }
+    }
+}
+
+#[test]
+fn constants_and_zero_errors_are_undecided() {
+    let text = table(6, |_, _| 0.173);
+    let audit = judge_text(&text, Some(2.0), None);
+    assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Undecided, vec![FindingKind::Constant]));
+    let audit = judge_text(&text, Some(2.0), Some(0.173));
+    assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Undecided, vec![FindingKind::ZeroError]));
+    let audit = judge_text(&text, Some(2.0), Some(0.2));
+    assert_eq!(audit.verdict, Verdict::Failed, "a constant that is not the exact value");
+}
+
+#[test]
+fn noise_passes_in_fewer_than_one_table_of_a_thousand() {
+    // Of 10^4 tables a size, as PENETRODE_NOISE_TABLES=10000 judges them: at most 9 pass at four rows, 5 at five, 1 at
+    // twenty, none at eight. The few judged by default only see a rule that has come loose.
+    let count: usize = std::env::var("PENETRODE_NOISE_TABLES").ok().and_then(|n| n.parse().ok()).unwrap_or(25);
+    let mut noise = Noise(5);
+    let mut passed = [[0; 4]; 4];
+    for (size, rows) in [4, 5, 8, 20].into_iter().enumerate() {
+        for _ in 0..count {
+            let values: Vec<f64> = (0..rows).map(|_| 5.0 + 0.1 * noise.normal()).collect();
+            let text = table(rows, |_, i| values[i as usize]);
+            let cases = [(Some(1.0), None), (Some(2.0), None), (Some(2.0), Some(5.0)), (None, None)];
+            for (case, (order, exact)) in cases.into_iter().enumerate() {
+                passed[size][case] += usize::from(judge_text(&text, order, exact).verdict == Verdict::Passed);
+            }
+        }
+    }
+    println!("{count} tables of 4, 5, 8, 20 rows; order 1, order 2, order 2 against exact, no order: {passed:?}");
+    for case in 0..3 {
+        let all: usize = passed.iter().map(|size| size[case]).sum();
+        assert!(1000 * all <= 4 * count + 2000, "{all} of {} tables of noise pass, case {case}", 4 * count);
+    }
+}
+
+#[test]
+fn convergence_to_something_else_than_the_exact_value_fails() {
+    let text = table(7, |h, _| 1.01 + 0.1 * h * h);
+    assert_eq!(judge_text(&text, Some(2.0), None).verdict, Verdict::Passed);
+    let audit = judge_text(&text, None, Some(1.0));
+    assert_eq!(audit.verdict, Verdict::Failed);
+    assert!(kinds(&audit).contains(&FindingKind::WrongLimit), "{:?}", audit.findings);
+}
+
+#[test]
+fn rows_that_differ_from_the_exact_value_by_their_printed_digits_only_are_left_out() {
+    let text = table(9, |h, _| ((0.173_214_1 + 0.02 * h * h) * 1e6).round() / 1e6);
+    let audit = judge_text(&text, Some(2.0), Some(0.173_214_1));
+    assert_eq!(audit.verdict, Verdict::Passed, "{:?}", audit.findings);
+    let finest = audit.quantities[0].points[0];
+    assert_eq!((finest.used, finest.excluded), (false, Some(Exclusion::RoundOffFloor)));
+}
+
+fn exact(quantity: Quantity, value: Exact, stops: bool) -> ExactValues {
+    let mut values = [Exact::Unknown; Quantity::ALL.len()];
+    values[quantity as usize] = value;
+    ExactValues { impact_velocity: 300.0, stops, values }
+}
+
+fn judge_against(text: &str, order: Option<f64>, exact: &ExactValues) -> Audit {
+    let table = Table::read("run.csv", text.as_bytes()).unwrap();
+    audit(&table, &FormalOrders::of_all(order), Some(exact), None).unwrap()
+}
+
+#[test]
+fn a_code_of_another_outcome_fails_and_the_outcome_is_named() {
+    let leaves = "dt_s,velocity_m_s\n4e-6,136\n2e-6,135.5\n1e-6,135.25\n5e-7,135.125\n";
+    let at_rest = exact(Quantity::Velocity, Exact::Fixed(0.0), true);
+    let stays = "dt_s,depth_m\n4e-6,0.14500\n2e-6,0.14490\n1e-6,0.14485\n5e-7,0.144825\n";
+    let perforated = exact(Quantity::Depth, Exact::Fixed(0.18), false);
+    for (text, exact, named) in [
+        (leaves, at_rest, "it leaves where the projectile of the scene comes to rest"),
+        (stays, perforated, "(-19.56 %): it comes to rest where the scene is perforated"),
+    ] {
+        for order in [None, Some(1.0)] {
+            let audit = judge_against(text, order, &exact);
+            assert_eq!(audit.verdict, Verdict::Failed);
+            assert!(audit.quantities[0].reason.ends_with(named), "{}", audit.quantities[0].reason);
+            assert!(kinds(&audit).contains(&FindingKind::WrongLimit) && audit.quantities[0].error_band.is_some());
+        }
+    }
+}
+
+#[test]
+fn a_quantity_that_the_scene_does_not_have_fails() {
+    let exact = exact(Quantity::CraterEndTime, Exact::Absent("the projectile does not reach x = k d"), true);
+    let text = "dt_s,crater_end_time_s\n4e-6,0.0014\n2e-6,0.00139\n1e-6,0.001385\n5e-7,0.0013825\n";
+    let audit = judge_against(text, None, &exact);
+    assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Failed, vec![FindingKind::Absent]));
+}
+
+#[test]
+fn what_the_scene_fixes_passes_when_every_row_has_it_and_is_judged_as_others_when_not() {
+    let perforated = exact(Quantity::Depth, Exact::Fixed(0.18), false);
+    let audit = judge_against(&table(5, |_, _| 0.18), Some(1.0), &perforated);
+    assert_eq!((audit.verdict, audit.quantities[0].fixed), (Verdict::Passed, true));
+    // A code that ends the step beyond the far side approaches it.
+    assert_eq!(judge_against(&table(8, |h, _| 0.18 + 0.01 * h), Some(1.0), &perforated).verdict, Verdict::Passed);
+    assert_eq!(judge_against(&table(5, |_, _| 0.1801), None, &perforated).verdict, Verdict::Failed);
+}
+
+#[test]
+fn the_order_of_a_mixture_is_that_of_the_finest_steps() {
+    const LIMIT: f64 = 5.0 / 3.0;
+    // f0 + 20 h + D h²: the first order is seen whichever term is larger at the coarse steps.
+    for (rows, ratio, crossover) in [(5, 2.0, 4.0), (6, 2.0, 2.5), (12, 1.5, 64.0), (8, 2.0, -3.0)] {
+        let mut text = "dt_s,depth_m\n".to_owned();
+        for i in 0..rows {
+            let h = 1e-6 * f64::powi(ratio, i);
+            writeln!(text, "{h},{}", LIMIT + 20.0 * h * (1.0 + h / (1e-6 * crossover))).unwrap();
+        }
+        for exact in [None, Some(LIMIT)] {
+            let first = judge_text(&text, Some(1.0), exact);
+            assert_eq!(first.verdict, Verdict::Passed, "{rows} rows, {exact:?}: {:?}", first.findings);
+            let term = first.quantities[0].second_term.unwrap();
+            assert!((term.crossover / (1e-6 * crossover) - 1.0_f64.copysign(crossover)).abs() < 0.05, "{term:?}");
+            assert_ne!(judge_text(&text, Some(2.0), exact).verdict, Verdict::Passed, "{rows} rows, {exact:?}");
+        }
+    }
+}
+
+#[test]
+fn four_rows_whose_order_drifts_pass_no_order() {
+    let text = table(4, |h, _| 5.0 + 0.1 * h * (1.0 + 4.0 * h));
+    for order in [1.0, 2.0] {
+        let audit = judge_text(&text, Some(order), None);
+        assert_eq!(audit.verdict, Verdict::Undecided, "order {order}: {:?}", audit.quantities[0].reason);
+        assert!(audit.quantities[0].advice.is_some());
+    }
+}
+
+#[test]
+fn three_rows_pass_within_a_tenth_of_the_formal_order_and_two_have_an_error_bar() {
+    let text = table(3, |h, _| 5.0 + 0.1 * h * (1.0 + 0.1 * h));
+    let verdict = |order| judge_text(&text, order, None).verdict;
+    assert_eq!(verdict(Some(1.0)), Verdict::Passed);
+    assert_eq!((verdict(Some(2.0)), verdict(None)), (Verdict::Undecided, Verdict::Undecided));
+    assert_eq!(judge_text(&text, None, Some(5.0)).verdict, Verdict::Passed, "each pair has an order of its own");
+    let audit = judge_text(&table(2, |h, _| 5.0 + 0.1 * h), Some(1.0), None);
+    let half_width = audit.quantities[0].error_band.unwrap().half_width;
+    assert!((half_width - 3.0 * 0.05).abs() < 1e-12 && audit.verdict == Verdict::Undecided, "{half_width}");
+    let two = Table::read("run.csv", table(2, |h, _| h).as_bytes()).unwrap();
+    let refused = audit_error(&two, None);
+    assert_eq!(refused, "run.csv: 2 different steps, and an order needs 3");
+}
+
+fn audit_error(table: &Table, order: Option<f64>) -> String {
+    audit(table, &FormalOrders::of_all(order), None, None).unwrap_err().to_string()
+}
+
+#[test]
+fn the_unit_of_the_values_changes_no_judgement() {
+    let scaled = |scale: f64| judge_text(&table(6, |h, _| scale * (5.0 + 0.1 * h * h)), Some(2.0), None);
+    for scale in [1.0, 1e200, 1e-160, -1e160] {
+        let audit = scaled(scale);
+        assert_eq!(audit.verdict, Verdict::Passed, "{scale}: {:?}", audit.findings);
+        let band = audit.quantities[0].error_band.unwrap().half_width / scale.abs();
+        assert!((band - scaled(1.0).quantities[0].error_band.unwrap().half_width).abs() < 1e-6, "{scale}: {band}");
+    }
+}
+
+#[test]
+fn each_column_may_have_an_order_of_its_own() {
+    let mut text = "dt_s,depth_m,time_s\n".to_owned();
+    for i in 0..6 {
+        let h = 0.5_f64.powi(i);
+        writeln!(text, "{},{},{}", 1e-5 * h, 5.0 + 0.1 * h * h, 2.0 + 0.1 * h).unwrap();
+    }
+    let table = Table::read("run.csv", text.as_bytes()).unwrap();
+    let verdict = |orders: &str| audit(&table, &orders.parse().unwrap(), None, None).unwrap().verdict;
+    assert_eq!(verdict("depth=2,time=1"), Verdict::Passed);
+    assert_eq!(verdict("1,depth=2"), Verdict::Passed);
+    assert_eq!(verdict("2"), Verdict::Failed);
+    assert_eq!("depth=x".parse::<FormalOrders>(), Err("`x` is not a number".to_owned()));
+    let error = audit(&table, &"velocity=1".parse().unwrap(), None, None).unwrap_err();
+    assert_eq!(error.to_string(), "an order is given for `velocity`, and the columns are depth, time");
+}
+
+#[test]
+fn the_error_bar_of_the_headline_covers_nineteen_tables_of_twenty() {
+    // Share of tables whose limit lies within the bar of the finest value, and the median of bar over error.
+    let mut noise = Noise(3);
+    for (kind, rows) in [("order", 6), ("noise", 6), ("rounded", 6), ("mixture", 6), ("saw-tooth", 8)] {
+        let (count, mut covered, mut widths) = (40, 0, Vec::new());
+        for _ in 0..count {
+            let (next, share) = (0.2 * noise.normal(), 0.5 + noise.uniform());
+            let text = table(rows, |h, _| {
+                let value = match kind {
+                    "mixture" => h * (1.0 + h / share),
+                    "saw-tooth" => h * (2.0 * noise.uniform() - 1.0),
+                    "noise" => h * (1.0 + next * h) + 0.02 * noise.normal(),
+                    _ => h * (1.0 + next * h),
+                };
+                let value = 5.0 + 0.1 * value;
+                if kind == "rounded" { (value * 1e4).round() / 1e4 } else { value }
+            });
+            let audit = judge_text(&text, None, None);
+            let (finest, band) = (audit.quantities[0].finest.value, audit.quantities[0].error_band);
+            let band = band.unwrap();
+            covered += usize::from((finest - 5.0).abs() <= band.half_width);
+            widths.push(band.half_width / (finest - 5.0).abs());
+        }
+        widths.sort_by(f64::total_cmp);
+        assert!(10 * covered >= 9 * count, "{kind}: {covered} of {count}");
+        assert!(widths[count / 2] <= 5.0, "{kind}: {}", widths[count / 2]);
+    }
+}
+
+#[test]
+fn not_finite_values_fail_in_every_spelling() {
+    for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
+        let audit = judge_text(&format!("dt_s,depth_m\n{BASE}16e-6,{cell}\n"), Some(2.0), Some(1.0));
+        assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Failed, vec![FindingKind::NotFinite]), "{cell}");
+    }
+    let audit = judge_text(&format!("dt_s,depth_m\n{BASE}nan,2\n"), None, None);
+    assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Failed, vec![FindingKind::NotFinite]));
+    let text = audit.quantities[0].reason.clone();
+    assert!(text.starts_with("run.csv:6: "), "{text}");
+}
+
+#[test]
+fn a_bad_column_fails_the_table_and_leaves_the_good_one_judged() {
+    let text = "dt_s,depth_m,time_s\n1e-6,1.01,1\n2e-6,1.04,nan\n4e-6,1.16,1\n8e-6,1.64,1\n";
+    let audit = judge_text(text, Some(2.0), None);
+    assert_eq!(audit.verdict, Verdict::Failed);
+    assert_eq!(audit.quantities[0].verdict, Verdict::Passed);
+}
+
+#[test]
+fn the_form_of_a_table_changes_no_judgement_and_what_is_put_right_is_mentioned() {
+    let straight = judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None);
+    assert_eq!((straight.verdict, kinds(&straight)), (Verdict::Passed, Vec::new()));
+    let out_of_order = "dt_s,depth_m\n4e-6,1.16\n1e-6,1.01\n8e-6,1.64\n2e-6,1.04\n1e-6,1.01\n";
+    let with_marks = "\u{feff}# from the solver\r\n\"dt_s\", depth_m\r\n1e-6 ,\"1.01\"\r\n2e-6,1.04\r\n\r\n\
+                      4e-6,1.16\r\n8e-6,1.64";
+    let with_empty_column = "dt_s,depth_m,velocity_m_s\n1e-6,1.01,\n2e-6,1.04,\n4e-6,1.16,\n8e-6,1.64,\n";
+    for (text, mentioned) in [
+        (out_of_order, &[FindingKind::Unsorted, FindingKind::DuplicateRows][..]),
+        (with_marks, &[]),
+        (with_empty_column, &[FindingKind::EmptyColumn]),
+    ] {
+        let audit = judge_text(text, Some(2.0), None);
+        assert_eq!((audit.verdict, &kinds(&audit)[..]), (Verdict::Passed, mentioned), "{text}");
+        assert_eq!(audit.quantities, straight.quantities, "{text}");
+    }
+}
+
+#[test]
+fn the_judgement_serialises_under_the_names_of_the_contract() {
+    let json = serde_json::to_value(judge_text(&format!("dt_s,depth_m\n{BASE}"), Some(2.0), None)).unwrap();
+    assert_eq!(json["schema"], "penetrode/audit/1");
+    assert_eq!(json["verdict"], "passed");
+    let column = &json["quantities"][0];
+    assert_eq!((&column["quantity"], &column["class"]), (&"depth".into(), &"converging".into()));
+    for name in ["formal_order", "observed_order", "interval", "error_constant", "points", "error_bands"] {
+        assert!(!column[name].is_null(), "{name}");
+    }
+    assert!(column["points"][0]["dt_s"].is_number() && column["points"][0]["error"].is_number());
+}
