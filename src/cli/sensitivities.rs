@@ -87,7 +87,9 @@ impl SensitivitiesJson {
             format!("{difference:.1e} from those through the closed form")
         });
         text.line(format!("  dual numbers through taylor; {beside}"));
-        follows.iter().for_each(|sentence| text.wrapped("  ", sentence));
+        for sentence in follows {
+            text.wrapped("  ", sentence);
+        }
         self.notes.iter().for_each(|note| text.wrapped("  note: ", note));
     }
 }

@@ -419,7 +419,7 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
     };
     let parts: Vec<_> = [first, last].into_iter().filter_map(parts).collect();
     let lowers = parts.iter().any(|(_, drag)| *drag < 0.0);
-    let parts = parts.iter().map(|(text, _)| format!(" {text}.")).collect::<String>();
+    let parts = parts.iter().map(|(text, _)| format!(" {text}.")).collect::<Vec<_>>().concat();
     let below = if lowers {
         " Where drag lowers it the crater is what the slab consists of: there drag acts through c alone, and lowers c."
     } else {
