@@ -54,12 +54,11 @@ impl Ask for AuditArgs {
             ));
         }
         let scene = self.scene.as_deref().map(|path| self.settings.read_problem(path)).transpose()?;
-        let (file, results) = match &self.results {
-            Some(path) => (name_of(path), Table::read(&name_of(path), &read_bytes(path, &RESULTS)?)?),
-            None => {
-                let exit_depth = scene.as_ref().map(|(_, problem)| problem.exit_depth);
-                (format!("{} runs", self.runs.runs.len()), self.runs.table(exit_depth)?)
-            }
+        let file = self.results.as_deref().map_or_else(|| format!("{} runs", self.runs.runs.len()), name_of);
+        let results = if let Some(path) = &self.results {
+            Table::read(&file, &read_bytes(path, &RESULTS)?)?
+        } else {
+            self.runs.table(scene.as_ref().map(|(_, problem)| problem.exit_depth))?
         };
         let exact = scene.as_ref().map(|(scene, problem)| exact_values(scene, problem)).transpose()?;
         let scheme = scene.and_then(|(_, problem)| identify(&problem, &results));

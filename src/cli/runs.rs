@@ -36,6 +36,9 @@ pub struct RunArgs {
 
 impl RunArgs {
     /// The table of the ends of all runs; `exit_depth` (m) is that of the scene, if there is one.
+    ///
+    /// # Errors
+    /// For a file that cannot be read, and as [`Table::of_runs`].
     pub fn table(&self, exit_depth: Option<f64>) -> Result<Table, CliError> {
         let (length, time) = self.units;
         let thickness = exit_depth.or(self.thickness).unwrap_or(f64::INFINITY);

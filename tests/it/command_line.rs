@@ -61,6 +61,10 @@ fn histories_of_other_codes_are_a_table_of_their_ends() {
             assert_eq!(point["dt_s"].as_f64(), Some(us * 1e-6));
         }
     }
+    let answer = audit(&|us| format!("rbdout-{us}us"), "--units mm,ms --scene @perforate --json").json();
+    conforms("audit", &answer);
+    let scheme = &answer["scheme"]["candidates"][0];
+    assert_eq!((&scheme["velocity"], &scheme["events"]), (&"lagged".into(), &"interpolated".into()));
     for (file, rest, cause) in [
         ("abaqus-8us.rpt", "", "does not come to its end: 129.1475 m/s at 0.1814744 m"),
         ("nodout-8us", "--thickness 0.18", "there are several bodies, 11 and 12"),
@@ -109,7 +113,9 @@ fn what_a_command_prints_is_what_its_schema_says() {
         conforms(command, &json(&format!("{command} {rest}")));
     }
     for rows in ["8,1.64\n4,1.16\n2,1.04\n1,1.01\n", "8,nan\n4,1.16\n2,inf\n1,1.01\n", "8,1\n4,1\n2,1\n1,1\n1,1\n"] {
-        conforms("audit", &run_with(&format!("dt_s,depth_m\n{rows}"), "audit - --json").json());
+        for scene in ["", "--scene @tunnel"] {
+            conforms("audit", &run_with(&format!("dt_s,depth_m\n{rows}"), &format!("audit - --json {scene}")).json());
+        }
     }
 }
 

@@ -380,6 +380,22 @@ mod tests {
     }
 
     #[test]
+    fn zeros_that_a_number_lost_at_its_end_still_count_as_printed() {
+        // Seven digits, and four decimals; a number of six digits in the first column is one of seven.
+        let text = "dt_s,time_s,depth_m\n1e-6,9.999999e-4,0.1448\n2e-6,1.000123e-3,10.1451\n4e-6,1.5e-3,0.2\n\
+                    8e-6,1.00025e-3,3\n";
+        let rows = Table::read("run.csv", text.as_bytes()).unwrap().flights();
+        let halves = |place: usize| rows.iter().map(move |row| row.values[place].2);
+        for (half, expected) in halves(0).zip([0.5e-10, 0.5e-9, 0.5e-9, 0.5e-9]).chain(halves(1).map(|h| (h, 0.5e-4))) {
+            assert!((half / expected - 1.0).abs() < 1e-12, "{half:e} {expected:e}");
+        }
+        assert!(rows.iter().all(|row| row.step_rounding == 0.0), "short steps are exact");
+        let thirds = Table::read("run.csv", b"dt_s,depth_m\n3.33333e-7,1\n6.66667e-7,1\n1e-6,1\n2e-6,1\n").unwrap();
+        let rounding = thirds.flights()[0].step_rounding;
+        assert!((rounding / (0.5e-12 / 3.33333e-7) - 1.0).abs() < 1e-12, "{rounding:e}");
+    }
+
+    #[test]
     fn a_step_and_every_quantity_are_there_once_whatever_the_unit() {
         for (names, message) in [
             ("depth_m,time_s", "run.csv:1: the column `dt_s` is missing"),
