@@ -405,7 +405,7 @@ mod tests {
 
     #[test]
     fn a_run_ends_at_the_thickness_before_rest_and_at_rest_else() {
-        let text = report(&[0.0, 0.7, 1.4, 2.1], -1.0);
+        let text = report(&[0.0, 0.7, 1.2, 2.1], -1.0);
         let rest = end_of(&text, &READING).unwrap();
         assert!(!rest.is_exit);
         let exit = end_of(&text, &Reading { thickness: 2.0, ..READING }).unwrap();
