@@ -277,7 +277,7 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) ->
 fn say_notes(plan: &Plan, data: &SweepJson) {
     let (rows, count) = (&data.rows, data.rows.len());
     if data.bad_rows > 0 {
-        let why = "have no answer; `error` in --json, and in the table of --out, says why";
+        let why = "have no answer, or not all of it; `error` in --json, and in the table of --out, says why";
         say("warning: ", &format!("{} of {count} points {why}", data.bad_rows));
     }
     let undecided = rows.iter().filter(|row| row.outcome == Some(Outcome::Undecided)).count();
