@@ -117,7 +117,7 @@ fn value_text(value: f64, band: Option<ErrorBand>) -> String {
 
 /// What is known of one column, its reason first.
 fn quantity_text(text: &mut Text, q: &QuantityAudit) {
-    let unit = q.quantity.quantity().map_or("", Quantity::unit);
+    let unit = q.quantity.quantity().map_or(String::new(), |quantity| format!(" {}", quantity.unit()));
     text.part(format!("{}: {}, {}", escape_terminal(q.quantity.name()), q.class.name(), q.verdict.name()));
     text.wrapped("  ", &escape_terminal(&q.reason));
     if let Some(advice) = &q.advice {
@@ -129,7 +129,7 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
         let percent = if percent.is_finite() { format!(" ({} %)", digits_text(percent, 2)) } else { String::new() };
         let half = band.half_width;
         let step = significant(q.finest.dt_s);
-        text.wrapped("  ", &format!("{value} {unit} +- {half:.2e} {unit}{percent} at dt = {step} s: {}", band.rule));
+        text.wrapped("  ", &format!("{value}{unit} +- {half:.2e}{unit}{percent} at dt = {step} s: {}", band.rule));
     }
     if let (Some(limit), Some(exact)) = (q.limit, q.exact) {
         let word = match q.agrees_with_exact {
@@ -139,10 +139,10 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
         };
         text.wrapped(
             "  ",
-            &format!("limit {} {unit}: {word} the exact {} {unit}", significant(limit), significant(exact)),
+            &format!("limit {}{unit}: {word} the exact {}{unit}", significant(limit), significant(exact)),
         );
     } else if let Some(limit) = q.limit {
-        text.line(format!("  limit {} {unit}", significant(limit)));
+        text.line(format!("  limit {}{unit}", significant(limit)));
     }
     if q.local_orders.len() > 1 {
         let shown = q.local_orders.iter().take(8).map(|order| or_dash(*order, |order| format!("{order:.2}")));
@@ -152,10 +152,10 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
         );
     }
     if let Some(three) = &q.three_grids {
-        three_grids_text(text, three, unit);
+        three_grids_text(text, three, unit.trim());
     }
     for band in &q.error_bands {
-        let digits = format!("{:.2e} {unit}", band.half_width);
+        let digits = format!("{:.2e}{unit}", band.half_width);
         text.wrapped("  ", &format!("+- {digits} by {}, order {:.2}", band.rule, band.order));
     }
 }
@@ -165,8 +165,11 @@ fn three_grids_text(text: &mut Text, three: &ThreeGrids, unit: &str) {
     let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.3} %", 100.0 * share));
     text.table(
         &["", "1", "2", "3"],
-        [("h (s)".to_owned(), three.steps), (format!("f ({unit})"), three.values)]
-            .map(|(name, row)| [name, significant(row[0]), significant(row[1]), significant(row[2])]),
+        [
+            ("h (s)".to_owned(), three.steps),
+            (if unit.is_empty() { "f".to_owned() } else { format!("f ({unit})") }, three.values),
+        ]
+        .map(|(name, row)| [name, significant(row[0]), significant(row[1]), significant(row[2])]),
     );
     let order = or_dash(three.order, |order| format!("{order:.3}"));
     let [r21, r32] = three.ratios;
