@@ -315,7 +315,7 @@ fn commands_for_people() -> Vec<String> {
         "experiments",
         "experiments --spread target.strength=10%",
         "verify --only eq15",
-        "bench @perforate @stiff --repeats 1 --varied 20",
+        "bench @constant-force --repeats 1 --parts step-size",
     ]
     .map(str::to_owned)
     .to_vec();

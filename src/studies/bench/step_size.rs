@@ -347,27 +347,28 @@ mod tests {
         assert_eq!(walk().largest(&LEVELS, &mut |_| Some(f64::NAN)).1, [None; 4]);
     }
 
-    fn study(scene: &str, quantity: Quantity) -> (Problem, Flight, StepStudy) {
-        use crate::exchange::scene_file::SHIPPED;
-        let text = SHIPPED.iter().find(|(name, _)| *name == scene).unwrap().1;
-        let scene_read = Scene::from_toml(text, scene).unwrap();
-        let problem = scene_read.problem().unwrap();
+    /// The depth of the shipped `scene` by lagged drag with `boundaries`: its problem, its exact flight, and the curve.
+    fn lagged(scene: &str, boundaries: Boundaries) -> (Problem, Flight, Curve) {
+        let scene = crate::testing::shipped(scene);
+        let problem = scene.problem().unwrap();
         let exact = Truth::of(&problem).unwrap().flight;
-        let studies = of_scene(scene, &scene_read, Effort { samples: 1 }, 3).unwrap();
-        (problem, exact, studies.into_iter().find(|study| study.quantity == quantity).unwrap())
-    }
-
-    fn held_by<'a>(study: &'a StepStudy, method: &str) -> &'a [Held] {
-        &study.curves.iter().find(|curve| curve.method == method).unwrap().held
+        let quantity = Quantity::Depth;
+        let question = Question { scene: &scene, problem: &problem, exact: &exact, critical: None, quantity };
+        let time = exact.end.time;
+        let steps = Walk { from: time, to: time / STEPS_MAX, per_decade: 12, probes: 128, seed: 3 };
+        let with_size = |dt| MethodOptions { dt: Some(dt), events: Some(boundaries), ..MethodOptions::default() };
+        let effort = Effort { samples: 1 };
+        let curve = question.curve(String::new(), MethodName::CentralDifference, steps, effort, &with_size);
+        (problem, exact, curve)
     }
 
     #[test]
     fn at_rest_in_the_crater_the_largest_step_is_that_of_the_error_constant() {
         // X(dt)/X - 1 = (w dt)²/8 with rest located, and the envelope of what step ends leave (docs/theory.md, section 5).
-        let (problem, _, study) = study("crater", Quantity::Depth);
-        let w = (problem.stages[0].stiffness / problem.mass).sqrt();
-        for (boundaries, most) in [("step-end", 1.05), ("interpolated", 1.02), ("landed", 1.02)] {
-            for held in &held_by(&study, &format!("lagged/{boundaries}"))[1..] {
+        for (boundaries, most) in [(Boundaries::StepEnd, 1.05), (Boundaries::Interpolated, 1.02)] {
+            let (problem, _, curve) = lagged("crater", boundaries);
+            let w = (problem.stages[0].stiffness / problem.mass).sqrt();
+            for held in &curve.held[1..] {
                 let ratio = held.size.unwrap() * w / (8.0 * held.level).sqrt();
                 assert!((0.98..most).contains(&ratio), "{boundaries} at {:e}: {ratio}", held.level);
             }
@@ -377,18 +378,16 @@ mod tests {
     #[test]
     fn with_lagged_drag_the_largest_step_is_that_of_the_error_constant() {
         // X(dt) - X = -D dt, D = V1 - P (T - t1)/M: the velocity lost to drag (docs/theory.md, section 5).
-        let (problem, exact, study) = study("tunnel", Quantity::Depth);
+        let (problem, exact, curve) = lagged("tunnel", Boundaries::Landed);
         let start = exact.crater_end().unwrap();
         let lost = start.velocity - problem.stages[1].static_force * (exact.end.time - start.time) / problem.mass;
-        for boundaries in ["interpolated", "landed"] {
-            for held in &held_by(&study, &format!("lagged/{boundaries}"))[2..] {
-                let ratio = held.size.unwrap() * lost / (held.level * exact.end.depth);
-                assert!((ratio - 1.0).abs() < 0.02, "{boundaries} at {:e}: {ratio}", held.level);
-                // Steps of the flight, and what they cost, are those of that step.
-                let steps = exact.end.time / held.size.unwrap();
-                assert!((held.steps.unwrap() as f64 / steps - 1.0).abs() < 0.02, "{held:?}");
-                assert!(held.force_evaluations.unwrap() >= held.steps.unwrap() && held.time.is_some());
-            }
+        for held in &curve.held[2..] {
+            let ratio = held.size.unwrap() * lost / (held.level * exact.end.depth);
+            assert!((ratio - 1.0).abs() < 0.02, "at {:e}: {ratio}", held.level);
+            // Steps of the flight, and what they cost, are those of that step.
+            let steps = exact.end.time / held.size.unwrap();
+            assert!((held.steps.unwrap() as f64 / steps - 1.0).abs() < 0.02, "{held:?}");
+            assert!(held.force_evaluations.unwrap() >= held.steps.unwrap() && held.time.is_some());
         }
     }
 }
