@@ -6,11 +6,13 @@ use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, time_option};
 use super::output::{Text, interval_text};
+use super::verify::progress_bar;
 use super::{Answer, Ask, CliError, SceneArgs};
 use crate::integrators::{MethodName, MethodOptions};
 use crate::physics::Shown;
+use crate::studies::asymptotic::TwoPowers;
 use crate::studies::convergence::{
-    Ladder, POINTS_DEFAULT, QuantityStudy, STEPS_OVER_TIME, TOLERANCES, of_fixed_steps, of_tolerances,
+    FixedSteps, Ladder, POINTS_DEFAULT, QuantityStudy, TOLERANCES, of_fixed_steps, of_tolerances,
 };
 use crate::studies::error::Truth;
 use crate::studies::order::{Class, Exclusion, FittedPoint};
@@ -34,6 +36,8 @@ pub struct ConvergeArgs {
     #[arg(long, value_enum)]
     pub events: Option<crate::integrators::Boundaries>,
     /// Smallest and largest step, such as 10ns:10us [default: 1e-5 to 1e-2 of the time to the end].
+    ///
+    /// Without it, quantities that these do not decide have other steps, once.
     #[arg(long, value_name = "A:B")]
     pub dt: Option<String>,
     /// How many step sizes or tolerances.
@@ -70,11 +74,14 @@ pub struct QuantityJson {
     #[serde(skip_serializing_if = "Option::is_none")]
     /// Order against the force evaluations; absent for fixed steps, `null` where none was found.
     pub work_order: Option<Option<f64>>,
+    /// Leading and next power, fitted together where one alone does not hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    powers: Option<TwoPowers>,
     class: Class,
     verdict: Verdict,
-    /// Why this class, or why there is no fit.
+    /// Why this verdict; for a plain pass, why this class.
     reason: String,
-    /// Runs with another outcome than the exact one.
+    /// Runs that failed, had another outcome than the exact one, or were not begun because the work allowed was spent.
     lost_runs: usize,
     points: Vec<PointJson>,
 }
@@ -117,19 +124,35 @@ impl Ask for ConvergeArgs {
             )
             .in_file(&self.scene.path));
         }
-        let [from, to] = if fixed { self.steps(truth.flight.end.time)? } else { TOLERANCES };
-        let ladder = Ladder { from, to, points: usize::from(self.points), seed: self.seed };
+        let range = self.steps()?;
+        let points = usize::from(self.points);
         let options = method.options()?;
         let study = if fixed {
             let with_step = |size| MethodOptions { dt: Some(size), ..options.clone() }.central_difference();
-            of_fixed_steps(&scene, &problem, &truth.flight, &with_step, ladder, true)?
+            let bar = progress_bar(0, "runs");
+            let progress = |done, planned| {
+                bar.set_length(planned);
+                bar.set_position(done);
+            };
+            let study = FixedSteps {
+                scheme: &with_step,
+                range,
+                points,
+                seed: self.seed,
+                with_critical: true,
+                progress: &progress,
+            };
+            let study = of_fixed_steps(&scene, &problem, &truth.flight, &study);
+            bar.finish_and_clear();
+            study?
         } else {
-            of_tolerances(&problem, &truth.flight, self.method, ladder)?
+            let [from, to] = TOLERANCES;
+            of_tolerances(&problem, &truth.flight, self.method, Ladder { from, to, points, seed: self.seed })?
         };
         // Failed if a quantity diverges or misses its formal order, else undecided if one is.
-        let verdicts = study.quantities.iter().map(QuantityStudy::verdict);
+        let verdicts = study.quantities.iter().map(|study| study.verdict);
         let verdict = verdicts.max().unwrap_or(Verdict::Undecided);
-        let without = |why| format!("{} does not apply: {why}", Quantity::CriticalVelocity);
+        let without = |why: String| format!("{} is not studied: {why}", Quantity::CriticalVelocity);
         let data = ConvergeJson {
             schema: "penetrode/converge/1",
             title: scene.title,
@@ -145,17 +168,15 @@ impl Ask for ConvergeArgs {
 }
 
 impl ConvergeArgs {
-    /// Smallest and largest step (s).
-    fn steps(&self, time: f64) -> Result<[f64; 2], CliError> {
-        let Some(text) = &self.dt else {
-            return Ok(STEPS_OVER_TIME.map(|share| share * time));
-        };
+    /// Smallest and largest step (s), if given.
+    fn steps(&self) -> Result<Option<[f64; 2]>, CliError> {
+        let Some(text) = &self.dt else { return Ok(None) };
         let help = "write the smallest and the largest step, such as 10ns:10us";
         let refuse = |what| CliError::usage(format!("--dt {text}{what}"), help);
         let (a, b) = text.split_once(':').ok_or_else(|| refuse(" is not a range"))?;
         let (a, b) = (time_option(a, help)?, time_option(b, help)?);
         if a > 0.0 && a < b && b.is_finite() {
-            Ok([a, b])
+            Ok(Some([a, b]))
         } else {
             Err(refuse(": the first must be above zero and below the second"))
         }
@@ -164,12 +185,13 @@ impl ConvergeArgs {
 
 impl QuantityJson {
     fn new(study: QuantityStudy, fixed: bool) -> Self {
-        let verdict = study.verdict();
         let work = study.work.and_then(Result::ok).and_then(|fit| fit.line);
-        let (line, class, reason, points) = match study.fit {
+        let (line, class, fitted, points) = match study.fit {
             Ok(fit) => (fit.line, fit.class, fit.reason, fit.points),
             Err(error) => (None, Class::Undecided, error.to_string(), Vec::new()),
         };
+        // A plain pass has no other reason than its fit.
+        let reason = if study.reason.is_empty() { fitted } else { study.reason };
         let point = |(index, point): (usize, FittedPoint)| PointJson {
             dt_s: fixed.then_some(point.step),
             rtol: (!fixed).then_some(point.step),
@@ -185,8 +207,9 @@ impl QuantityJson {
             interval: line.map(|line| line.interval95),
             error_constant: line.map(|line| line.error_constant),
             work_order: (!fixed).then(|| work.map(|line| line.order)),
+            powers: study.powers,
             class,
-            verdict,
+            verdict: study.verdict,
             reason,
             lost_runs: study.lost,
             points: points.into_iter().enumerate().map(point).collect(),
@@ -215,7 +238,8 @@ impl ConvergeJson {
         };
         let header = ["quantity", "formal", "found", "95 % interval", "constant", "used", "class"];
         text.table(&header, self.quantities.iter().map(row));
-        for q in self.quantities.iter().filter(|q| q.verdict != Verdict::Passed) {
+        // A pass by two powers says so; one by a single power is in the table.
+        for q in self.quantities.iter().filter(|q| q.verdict != Verdict::Passed || q.powers.is_some()) {
             text.wrapped("  ", &format!("{}: {} ({})", q.quantity, q.verdict.name(), q.reason));
         }
         self.skipped.iter().for_each(|note| text.wrapped("  ", note));

@@ -102,7 +102,7 @@ mod tests {
     use crate::integrators::central_difference::tests::{DRAG as Q, SPEED, combinations, concrete};
     use crate::integrators::{CentralDifference, Cost};
     use crate::physics::{Event, Stage, State};
-    use crate::studies::convergence::{Ladder, STEPS_OVER_TIME, of_fixed_steps};
+    use crate::studies::convergence::{FixedSteps, STEPS_OVER_TIME, of_fixed_steps};
     use crate::studies::error::Truth;
     use crate::testing::scene;
 
@@ -216,10 +216,17 @@ mod tests {
         let problem = concrete(Q, 1.0, SPEED, 0.06);
         let exact = Truth::of(&problem).unwrap().flight;
         let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
-        let ladder = Ladder { from, to, points: 60, seed: 1 };
         for (velocity, boundaries) in combinations() {
             let scheme = |size| CentralDifference::uniform(size, velocity, boundaries);
-            let studies = of_fixed_steps(&scene(), &problem, &exact, &scheme, ladder, false).unwrap().quantities;
+            let study = FixedSteps {
+                scheme: &scheme,
+                range: Some([from, to]),
+                points: 60,
+                seed: 1,
+                with_critical: false,
+                progress: &|_, _| {},
+            };
+            let studies = of_fixed_steps(&scene(), &problem, &exact, &study).unwrap().quantities;
             assert_eq!(studies.len(), 2, "time and velocity");
             for study in studies {
                 let (order, formal) = (study.fit.unwrap().line.unwrap().order, study.formal.unwrap());

@@ -1,6 +1,7 @@
 //! What many flights show: orders of convergence, critical velocity, other people's programs and tables.
 
 pub mod applicability;
+pub mod asymptotic;
 pub mod audit;
 pub mod batch;
 #[cfg(feature = "report")]

@@ -71,6 +71,10 @@ const FLOOR_HEIGHT: f64 = 3.0;
 /// If at least half of the points lie above this multiple of the round-off estimate, all finest points below it are
 /// dropped: accumulated round-off exceeds the estimate tenfold, and one polluted point can bend the fit.
 const NOISY_HEIGHT: f64 = 100.0;
+/// An error up to this many times its round-off is an accident if both neighbours are [`ACCIDENT_RATIO`] times as large.
+const ACCIDENT_HEIGHT: f64 = 30.0;
+/// See [`ACCIDENT_HEIGHT`].
+const ACCIDENT_RATIO: f64 = 1e6;
 /// Share of the trend that the floor may still be at the finest step used.
 const FLOOR_SHARE: f64 = 0.25;
 /// Share of the trend that the law of the coarse end may still be at the coarsest step used.
@@ -319,6 +323,11 @@ fn exclusions(sorted: &[StepError], round_off: &[f64]) -> Vec<Option<Exclusion>>
     for reason in &mut excluded[..floor] {
         reason.get_or_insert(Exclusion::RoundOffFloor);
     }
+    for (i, reason) in excluded.iter_mut().enumerate().skip(floor) {
+        if is_accidental(sorted, round_off, i) {
+            reason.get_or_insert(Exclusion::RoundOffFloor);
+        }
+    }
     for _ in 0..BENDS_MAX {
         let used: Vec<usize> = (0..sorted.len()).filter(|&i| excluded[i].is_none()).collect();
         let x: Vec<f64> = used.iter().map(|&i| sorted[i].step.ln()).collect();
@@ -352,6 +361,16 @@ fn exclusions(sorted: &[StepError], round_off: &[f64]) -> Vec<Option<Exclusion>>
         }
     }
     excluded
+}
+
+/// Whether the error at `i` is round-off between two that are far above it: an event fell on the end of a step by chance.
+///
+/// An error that changes its sign at random comes so close to zero once in a million points.
+fn is_accidental(sorted: &[StepError], round_off: &[f64], i: usize) -> bool {
+    let size = |i: usize| sorted[i].error.abs();
+    let others = [i.checked_sub(1), (i + 1 < sorted.len()).then_some(i + 1)];
+    size(i) <= ACCIDENT_HEIGHT * round_off[i]
+        && others.into_iter().flatten().all(|other| size(other) > ACCIDENT_RATIO * size(i))
 }
 
 /// The class of the used points `x, y`, their signs, and the height above round-off of all.
@@ -436,6 +455,12 @@ impl Line {
             error_constant: (y - self.slope * x).exp(),
         }
     }
+}
+
+/// The law of the steps and errors `points`, none of them zero, without any exclusion.
+pub(super) fn line_of(points: &[(f64, f64)], level: f64) -> Option<PowerLaw> {
+    let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|(step, error)| (step.ln(), error.abs().ln())).unzip();
+    Some(line(&x, &y)?.power_law(level))
 }
 
 /// `None` for fewer than [`STEPS_MIN`] points or fewer than two different x.

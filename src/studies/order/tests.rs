@@ -311,6 +311,21 @@ fn one_error_near_round_off_among_many_above_is_no_floor() {
 }
 
 #[test]
+fn an_event_at_the_end_of_a_step_by_chance_is_round_off_wherever_it_stands() {
+    let used = |place: usize, error: f64| {
+        let points: Vec<_> = (1..=20)
+            .map(|i| StepError::new(f64::from(i), if i as usize == place { error } else { 1e-3 * f64::from(i) }))
+            .collect();
+        fit(&points).unwrap().used()
+    };
+    for place in [1, 10, 20] {
+        assert_eq!(used(place, -3e-16), 19, "{place}");
+    }
+    // A change of sign comes near zero, not to within round-off of it.
+    assert_eq!(used(10, 3e-8), 20);
+}
+
+#[test]
 fn noisy_points_go_up_to_half_of_all_and_beyond_that_pure_round_off_alone() {
     let run = |heights: [f64; 8]| {
         let point = |(i, height): (usize, f64)| StepError {

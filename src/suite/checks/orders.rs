@@ -6,7 +6,7 @@ use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
 use super::super::verdict::Verdict;
 use super::{FIXED, NO_FAR_SIDE, Subject, off, worst_of};
 use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, Steps};
-use crate::studies::convergence::{self, Convergence, Ladder, QuantityStudy, STEPS_OVER_TIME};
+use crate::studies::convergence::{self, Convergence, FixedSteps, Ladder, QuantityStudy, STEPS_OVER_TIME};
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::formal_order::{Path, formal_order};
 use crate::studies::grid_convergence::{GridValue, richardson, roache, three_grids};
@@ -74,8 +74,9 @@ fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subjec
             steps: steps(pattern, size, seed),
             ..CentralDifference::uniform(size, claim.velocity, claim.boundaries)
         };
-        let ladder = Ladder { from, to, points, seed };
-        Ok(convergence::of_fixed_steps(subject.scene()?, subject.problem()?, exact, &scheme, ladder, critical)?)
+        let range = Some([from, to]);
+        let study = FixedSteps { scheme: &scheme, range, points, seed, with_critical: critical, progress: &|_, _| {} };
+        Ok(convergence::of_fixed_steps(subject.scene()?, subject.problem()?, exact, &study)?)
     })?;
     let formal = study.formal;
     let agree = formal == Some(expected);
