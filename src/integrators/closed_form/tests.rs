@@ -239,13 +239,18 @@ fn compare_random_stages(cases: u32) {
 }
 
 #[test]
-#[ignore = "a minute, and a quarter of an hour without optimization: .ci/run has it"]
+#[ignore = "two minutes of a processor, many more without optimization: .ci/run has it"]
 fn twenty_thousand_cases_of_each_kind_are_within_their_limits() {
     const MANY: u32 = 20_000;
-    compare_random_scenes(MANY);
-    compare_oscillators(MANY / 50);
-    compare_random_stages(MANY);
-    compare_critical_velocities(MANY);
+    // The oscillators take as long as all others.
+    rayon::join(
+        || compare_oscillators(MANY / 50),
+        || {
+            compare_random_scenes(MANY);
+            compare_random_stages(MANY);
+            compare_critical_velocities(MANY);
+        },
+    );
 }
 
 #[test]
