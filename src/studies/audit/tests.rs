@@ -309,6 +309,59 @@ fn the_error_bar_of_the_headline_covers_nineteen_tables_of_twenty() {
 }
 
 #[test]
+fn a_limit_that_is_missed_by_little_does_not_pass_as_a_lower_order() {
+    // Central difference on a slab of 0.1 % less density: towards 134.921 and not 135.009 m/s.
+    let velocities = "dt_s,velocity_m_s\n1.6e-05,133.340364\n8e-06,134.133081\n4e-06,134.517912\n2e-06,134.718008\n\
+                      1e-06,134.818929\n";
+    let velocity = exact(Quantity::Velocity, Exact::Free(135.008_9), false);
+    // First order towards 0.181803 and not 0.18.
+    let mut depths = "dt_s,depth_m\n".to_owned();
+    for i in 0..6 {
+        let h = 1.5_f64.powi(-i);
+        writeln!(depths, "{},{}", 1e-7 * h, 0.181_803 - 0.0223 * h).unwrap();
+    }
+    let depth = exact(Quantity::Depth, Exact::Free(0.18), true);
+    for (text, exact) in [(velocities, velocity), (depths.as_str(), depth)] {
+        for order in [None, Some(1.0)] {
+            assert_ne!(judge_against(text, order, &exact).verdict, Verdict::Passed, "{order:?}");
+        }
+    }
+}
+
+#[test]
+fn rows_at_round_off_bend_no_law() {
+    let text = table(20, |h, _| 5.0 / 3.0 + 0.1 * h.powi(4) * (1.0 + 0.3 * h));
+    let verdict = |order| judge_text(&text, Some(order), None).verdict;
+    assert_eq!(verdict(4.0), Verdict::Passed);
+    assert!(verdict(3.0) != Verdict::Passed && verdict(2.0) != Verdict::Passed);
+}
+
+#[test]
+fn a_law_of_two_terms_passes_only_an_order_within_its_interval() {
+    // Order 4 and a little noise, which h^3.1 beside h^4.1 follows.
+    let text = "dt_s,depth_m\n0.000463644,0.322785471698701\n0.000927288,0.3227854689907127\n\
+                0.00185458,0.32278541075363143\n0.00370915,0.3227845062195921\n0.00741831,0.3227698169504584\n\
+                0.0148366,0.3225248513788802\n";
+    assert_ne!(judge_text(text, Some(3.0), None).verdict, Verdict::Passed);
+}
+
+#[test]
+fn values_that_scatter_seldom_fail() {
+    let mut noise = Noise(8);
+    let mut failed = [0; 4];
+    for (count, rows) in failed.iter_mut().zip([3, 4, 6, 8]) {
+        for _ in 0..40 {
+            let text = table(rows, |h, _| 5.0 + 0.1 * h * (2.0 * noise.uniform() - 1.0));
+            let audit = judge_text(&text, Some(1.0), None);
+            *count += usize::from(audit.verdict == Verdict::Failed);
+            let said = format!("{:?}", (&audit.quantities[0].reason, &audit.quantities[0].advice));
+            assert!(!said.contains("NaN") && !said.contains("inf"), "{said}");
+        }
+    }
+    assert!(failed.iter().sum::<usize>() <= 16, "{failed:?} of 40 each");
+}
+
+#[test]
 fn not_finite_values_fail_in_every_spelling() {
     for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
         let audit = judge_text(&format!("dt_s,depth_m\n{BASE}16e-6,{cell}\n"), Some(2.0), Some(1.0));
