@@ -65,10 +65,12 @@ const EXACT_REACH: f64 = 1.25;
 /// Scatter over range of few rows that follow a law.
 const FEW_SCATTER: f64 = 1e-2;
 
-/// A column that a known scheme reproduces passes when its finest value is this near to the exact one, and its digits
-/// reach down to this share.
+/// A column that a known scheme reproduces passes when its finest value is this near to the exact one, when a column of
+/// the table tells schemes and scenes apart by digits down to the second share, and its own reach down to the third: the
+/// time of a step's end may be a short number.
 const NEAR_EXACT: f64 = 0.05;
 const DIGITS_SURE: f64 = 1e-4;
+const DIGITS_LEAST: f64 = 2e-3;
 
 /// How far from the orders of the three finest rows an order may lie.
 const ORDER_SPARE: f64 = 0.25;
@@ -525,9 +527,11 @@ impl<'a> Judge<'a> {
         let is_near = || {
             let (exact, quantity) = self.judged.exact.zip(quantity)?;
             let scale = self.exact?.scale(quantity, exact)?;
-            Some((self.finest().value - exact).abs() <= NEAR_EXACT * scale && self.rounding() <= DIGITS_SURE * scale)
+            Some((self.finest().value - exact).abs() <= NEAR_EXACT * scale && self.rounding() <= DIGITS_LEAST * scale)
         };
-        scheme.reproduces_all(self.grids.len()) && is_near() == Some(true)
+        let row = &self.table.rows[0];
+        let is_sure = |column: &ResultColumn| column.rounding <= DIGITS_SURE * row.value(column).abs();
+        scheme.reproduces_all(self.grids.len()) && self.table.columns.iter().any(is_sure) && is_near() == Some(true)
     }
 
     /// Class, order and verdict, the exact value as far as the errors go.

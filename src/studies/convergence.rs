@@ -171,7 +171,7 @@ pub struct FixedSteps<'a> {
 /// A run that fails costs its point alone.
 ///
 /// # Errors
-/// [`StudyError`](super::error::StudyError), where the request is at fault.
+/// [`StudyError`], where the request is at fault.
 pub fn of_fixed_steps(
     scene: &Scene,
     problem: &Problem,
@@ -452,7 +452,7 @@ fn resolves(size: f64, flight: &Flight, exact: &Flight, quantity: Quantity) -> b
 /// Convergence of an adaptive method with its tolerance and with its work, against `exact`.
 ///
 /// # Errors
-/// [`StudyError`](super::error::StudyError).
+/// [`StudyError`].
 pub fn of_tolerances(problem: &Problem, exact: &Flight, method: MethodName, ladder: Ladder) -> Studied<Convergence> {
     let mut flights = Vec::new();
     let mut order = None;
