@@ -511,6 +511,10 @@ impl<'a> Judge<'a> {
             let order = of_scheme.map_or_else(String::new, |order| format!(", of order {order} here"));
             self.judged.verdict = Verdict::Passed;
             self.judged.advice = None;
+            if self.judged.agrees_with_exact == Some(false) {
+                // A limit that scatter has moved is none.
+                (self.judged.agrees_with_exact, self.judged.limit, self.judged.limit_band) = (None, None, None);
+            }
             self.judged.reason = format!("{}{order}", scheme.sentence());
             self.findings.clear();
         }
@@ -523,15 +527,15 @@ impl<'a> Judge<'a> {
     /// value: steps beyond the limit of stability are reproduced too. Values at the ends of steps may alternate, or seem
     /// to approach another value, by chance.
     fn is_reproduced(&self, scheme: &Identification) -> bool {
-        let quantity = self.column.column.quantity().filter(|quantity| Quantity::OF_A_FLIGHT.contains(quantity));
         let is_near = || {
-            let (exact, quantity) = self.judged.exact.zip(quantity)?;
+            let (exact, quantity) = self.judged.exact.zip(self.column.column.quantity())?;
             let scale = self.exact?.scale(quantity, exact)?;
-            Some((self.finest().value - exact).abs() <= NEAR_EXACT * scale && self.rounding() <= DIGITS_LEAST * scale)
+            let is_near = (self.finest().value - exact).abs() <= NEAR_EXACT * scale;
+            Some(is_near && self.rounding() <= DIGITS_LEAST * scale && scheme.reproduces(quantity, self.grids.len()))
         };
         let row = &self.table.rows[0];
         let is_sure = |column: &ResultColumn| column.rounding <= DIGITS_SURE * row.value(column).abs();
-        scheme.reproduces_all(self.grids.len()) && self.table.columns.iter().any(is_sure) && is_near() == Some(true)
+        self.table.columns.iter().any(is_sure) && is_near() == Some(true)
     }
 
     /// Class, order and verdict, the exact value as far as the errors go.

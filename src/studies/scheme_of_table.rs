@@ -299,6 +299,9 @@ pub struct Identification {
     /// What decides the formal orders.
     #[serde(skip)]
     path: Path,
+    /// Quantities compared.
+    #[serde(skip)]
+    quantities: Vec<Quantity>,
 }
 
 /// The scheme that comes nearest to a table.
@@ -339,9 +342,11 @@ impl Identification {
         orders.all(|order| order == Some(first)).then_some(first)
     }
 
-    /// Whether a scheme reproduces all of `rows` rows, three at least.
-    pub fn reproduces_all(&self, rows: usize) -> bool {
-        rows >= 3 && self.rows == rows && !self.candidates.is_empty()
+    /// Whether a scheme reproduces `quantity` in all of `rows` rows, three at least. A quantity that was not compared is
+    /// not reproduced.
+    pub fn reproduces(&self, quantity: Quantity, rows: usize) -> bool {
+        let is_compared = self.quantities.contains(&quantity);
+        is_compared && rows >= 3 && self.rows == rows && !self.candidates.is_empty()
     }
 
     /// What was found, in one sentence.
@@ -446,7 +451,9 @@ pub fn identify(problem: &Problem, table: &Table) -> Option<Identification> {
         found.iter().filter(|(_, fits, _)| *fits).map(|(scheme, _, worst)| Candidate::new(*scheme, *worst)).collect();
     let nearest = if candidates.is_empty() { Some(nearest(problem, &rows[..compared], duration)?) } else { None };
     let rows_skipped = all.len() - if candidates.is_empty() { rows.len() } else { compared };
-    Some(Identification { candidates, nearest, rows: compared, rows_skipped, path: Path::of(problem, &exact) })
+    let quantities = rows.first()?.values.iter().map(|(quantity, ..)| *quantity).collect();
+    let path = Path::of(problem, &exact);
+    Some(Identification { candidates, nearest, rows: compared, rows_skipped, path, quantities })
 }
 
 /// The scheme whose largest difference from `rows` is the least.

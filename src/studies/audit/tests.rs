@@ -362,6 +362,33 @@ fn values_that_scatter_seldom_fail() {
 }
 
 #[test]
+fn a_scheme_that_reproduces_depths_and_times_vouches_for_no_velocity_at_rest() {
+    use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, VelocityAt};
+    use crate::studies::scheme_of_table::identify;
+    let problem = crate::testing::scene().problem().unwrap();
+    let scheme = |step| {
+        let scheme = CentralDifference::uniform(step, VelocityAt::default(), Boundaries::Interpolated);
+        scheme.solve(&problem, Detail::Events).unwrap()
+    };
+    let rest = scheme(1e-6).end;
+    assert_eq!(rest.velocity, 0.0);
+    let mut text = "dt_s,depth_m,time_s,velocity_m_s\n".to_owned();
+    for step in [4e-6, 2e-6, 1e-6, 5e-7] {
+        let end = scheme(step).end;
+        writeln!(text, "{step},{},{},10.0000", end.depth, end.time).unwrap();
+    }
+    let mut exact = exact(Quantity::Depth, Exact::Free(rest.depth), true);
+    exact.values[Quantity::Time as usize] = Exact::Free(rest.time);
+    exact.values[Quantity::Velocity as usize] = Exact::Fixed(0.0);
+    let table = Table::read("run.csv", text.as_bytes()).unwrap();
+    let found = identify(&problem, &table);
+    assert!(found.as_ref().is_some_and(|found| !found.candidates.is_empty()));
+    let audit = audit(&table, &FormalOrders::default(), Some(&exact), found).unwrap();
+    let verdicts: Vec<Verdict> = audit.quantities.iter().map(|column| column.verdict).collect();
+    assert_eq!(verdicts, [Verdict::Passed, Verdict::Passed, Verdict::Failed]);
+}
+
+#[test]
 fn not_finite_values_fail_in_every_spelling() {
     for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
         let audit = judge_text(&format!("dt_s,depth_m\n{BASE}16e-6,{cell}\n"), Some(2.0), Some(1.0));
