@@ -18,8 +18,8 @@ use libtest_mimic::Arguments;
 use penetrode::report::stress::files;
 use penetrode::report::{Environment, Run, folder};
 use penetrode::studies::extreme_scenes;
-use penetrode::suite::Suite;
 use penetrode::suite::checks::PeerAnswers;
+use penetrode::suite::{Inputs, Suite};
 use serde_json::Value;
 
 use self::trials::{Check, Failure, ensure};
@@ -96,13 +96,13 @@ impl Stage {
         let starts = "order/drag order/jump small-impact invariant peer closed-form self events stab rounding sweep map measured \
                       layers sensitivities";
         suite.claims.retain(|claim| starts.split(' ').any(|start| claim.id.starts_with(start)));
-        let judged = suite.run(1, &PeerAnswers::recorded()?, &|_| ());
+        let judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::recorded()?, program: None }, &|_| ());
         let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
         let folder = tempfile::tempdir()?;
         let run = Run { suite: &suite, judged: &judged, environment, points: &[(5.0, 30.0)], random: None };
         folder::write(folder::files(&run), &folder.path().join(PAGES[0]))?;
         let suite = Suite::edges()?;
-        let judged = suite.run(1, &PeerAnswers::default(), &|_| ());
+        let judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::default(), program: None }, &|_| ());
         let summary = extreme_scenes::run(200, 1, &|| ());
         let environment = Environment::here(1, "penetrode stress --seed 1".to_owned(), &suite, Vec::new());
         let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: Some((&summary, 1.0)) };

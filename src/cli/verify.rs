@@ -12,7 +12,7 @@ use super::{Answer, Ask, CliError, command_typed, end_peers_with_program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
-use crate::suite::{Check, Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness};
+use crate::suite::{Check, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, looseness};
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
@@ -153,7 +153,9 @@ pub(super) fn counts_text(judged: &[Judged]) -> String {
 pub(super) fn judge_all(suite: &Suite, seed: u64, peers: &PeerAnswers, what: &str) -> Vec<Judged> {
     let bar = progress_bar(suite.claims.len() as u64, what);
     let failed = AtomicUsize::new(0);
-    let judged = suite.run(seed, peers, &|judged| {
+    // Of a user's suite too: its claims may ask for commands.
+    let program = std::env::current_exe().ok().and_then(|path| Program::new(&path).ok());
+    let judged = suite.run(Inputs { seed, peers, program: program.as_ref() }, &|judged| {
         bar.inc(1);
         if judged.verdict == Verdict::Failed {
             bar.set_message(format!("({} failed)", failed.fetch_add(1, Ordering::Relaxed) + 1));

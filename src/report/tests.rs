@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use super::{Environment, Run, folder};
 use crate::suite::checks::{Peer, PeerAnswers};
-use crate::suite::{Check, Evidence, Judged, Suite, Verdict};
+use crate::suite::{Check, Evidence, Inputs, Judged, Suite, Verdict};
 
 const HOSTILE: &str = "=1+1,a\"b'<script>alert(1)</script>&|`*_\n\u{1b}[2J\u{7}\u{202e},=1+1]]> ";
 
@@ -17,7 +17,7 @@ static JUDGED: LazyLock<(Suite, Vec<Judged>)> = LazyLock::new(|| {
         claim.id.starts_with("order/jump") && claim.id.ends_with("/depth")
             || starts.split(' ').any(|start| claim.id.starts_with(start))
     });
-    let mut judged = suite.run(1, &PeerAnswers::recorded().unwrap(), &|_| ());
+    let mut judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::recorded().unwrap(), program: None }, &|_| ());
     for verdict in [Verdict::Failed, Verdict::Undecided, Verdict::Skipped] {
         let mut hostile = judged[0].clone();
         hostile.claim.id = format!("{HOSTILE}/{}", verdict.name());

@@ -94,6 +94,12 @@ pub enum Section {
     Critical,
     /// Random scenes by the million.
     Random,
+    /// From the text of a scene to its stages.
+    Input,
+    /// What commands print.
+    Commands,
+    /// The judge itself.
+    Judge,
 }
 
 /// One claim: a table's claim for one scene, method, quantity and rule.

@@ -9,6 +9,7 @@ use serde::Deserialize;
 
 use super::checks::{Context, Memo, PeerAnswers, Subject};
 use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
+use super::program::Program;
 use crate::exchange::SceneError;
 use crate::exchange::decode::decode;
 use crate::exchange::diagnostic::{Dialect, Fault, did_you_mean, nearest, read_text};
@@ -43,6 +44,17 @@ impl Scenes {
         let problem = scene.problem().map_err(|error| error.to_string());
         self.0.insert(name.to_owned(), (scene, problem));
     }
+}
+
+/// What a run of a suite is given besides its claims and scenes.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Answers of other programs.
+    pub peers: &'a PeerAnswers,
+    /// The program; without it, claims about its commands are skipped.
+    pub program: Option<&'a Program>,
 }
 
 #[derive(Deserialize)]
@@ -174,9 +186,10 @@ impl Suite {
     }
 
     /// Judges every claim, in parallel, in the suite's order; `done` is called with each once it is judged.
-    pub fn run(&self, seed: u64, peers: &PeerAnswers, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
+    pub fn run(&self, inputs: Inputs<'_>, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
         let memo = Memo::default();
-        let context = Context { scenes: &self.scenes, peers, memo: &memo, seed };
+        let Inputs { seed, peers, program } = inputs;
+        let context = Context { scenes: &self.scenes, peers, memo: &memo, program, seed };
         self.claims
             .par_iter()
             .map(|claim| {

@@ -3,7 +3,9 @@
 #![expect(clippy::panic, reason = "a test that cannot be set up has failed")]
 
 use penetrode::suite::checks::PeerAnswers;
-use penetrode::suite::{Counts, Judged, LOOSENESS_MAX, Suite, Verdict, looseness};
+use std::path::Path;
+
+use penetrode::suite::{Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, looseness};
 
 /// Seeds of the run for false alarms.
 const SEEDS: u64 = 200;
@@ -11,7 +13,8 @@ const SEEDS: u64 = 200;
 fn run(seed: u64) -> Vec<Judged> {
     let suite = Suite::embedded().unwrap_or_else(|error| panic!("{error}"));
     let peers = PeerAnswers::recorded().unwrap_or_else(|error| panic!("{error}"));
-    suite.run(seed, &peers, &|_| ())
+    let program = Program::new(Path::new(env!("CARGO_BIN_EXE_penetrode"))).unwrap_or_else(|error| panic!("{error}"));
+    suite.run(Inputs { seed, peers: &peers, program: Some(&program) }, &|_| ())
 }
 
 /// One line for each claim that did not hold.

@@ -60,6 +60,7 @@ macro_rules! holds {
 
 mod agreement;
 mod applications;
+mod commands;
 mod edges;
 mod formulas;
 mod invariants;
@@ -74,6 +75,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use serde::Deserialize;
 
 use super::claim::{Claim, Found, Measurement, NotMeasured, Section};
+use super::program::Program;
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
@@ -84,8 +86,8 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, edges::*, formulas::*, invariants::*, manufactured::*, orders::*, peers::*,
-    scheme::*,
+    agreement::*, applications::*, commands::*, edges::*, formulas::*, invariants::*, manufactured::*, orders::*,
+    peers::*, scheme::*,
 };
 
 macro_rules! every_check {
@@ -120,6 +122,7 @@ macro_rules! every_check {
 }
 
 every_check! {
+    Exits
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
@@ -156,6 +159,8 @@ pub struct Context<'a> {
     pub peers: &'a PeerAnswers,
     /// Studies that claims share.
     pub memo: &'a Memo,
+    /// The program, for claims about its commands.
+    pub program: Option<&'a Program>,
     /// Seed of every random number.
     pub seed: u64,
 }
@@ -203,6 +208,11 @@ impl<'a> Subject<'a> {
     /// Solution of the claim's problem by its method at the default tolerance.
     fn solution(&self, detail: Detail) -> Found<Flight> {
         solve(&self.method(None)?, self.problem()?, detail)
+    }
+
+    /// The program; without one, a claim about its commands does not apply.
+    fn program(&self) -> Found<&'a Program> {
+        self.context.program.ok_or_else(|| NotMeasured::skip("no program whose commands could be run"))
     }
 
     /// Random numbers of `part`, from the seed of the run.

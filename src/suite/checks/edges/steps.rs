@@ -333,7 +333,7 @@ mod tests {
         let (scenes, peers, memo) = (Scenes::default(), PeerAnswers::default(), Memo::default());
         // The last two once fell on steps outside the asymptotic range.
         for seed in [1, u64::MAX - 1, u64::MAX] {
-            let context = Context { scenes: &scenes, peers: &peers, memo: &memo, seed };
+            let context = Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, seed };
             let measured = claim.check.measure(&Subject { claim, context }).unwrap();
             assert!(measured.value <= claim.limit, "seed {seed}: {}", measured.remark);
         }

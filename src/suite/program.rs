@@ -1,0 +1,97 @@
+//! The program itself, run as a person runs it: for claims about what its commands print.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+use super::claim::{Found, NotMeasured};
+use crate::exchange::scene_file::SHIPPED;
+
+/// Longest run of a command that a claim asks for.
+const TIME_MAX: Duration = Duration::from_secs(60);
+
+/// How often a run is asked whether it has ended.
+const POLL: Duration = Duration::from_millis(2);
+
+/// The program with a folder of its own, which holds the shipped scenes as `NAME.toml` and what runs leave there.
+#[derive(Debug)]
+pub struct Program {
+    path: PathBuf,
+    folder: TempDir,
+    runs: AtomicUsize,
+}
+
+/// What a run said.
+#[derive(Clone, Debug)]
+pub struct Said {
+    /// Exit code; -1 after a signal.
+    pub code: i32,
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+impl Program {
+    /// The program at `path`.
+    ///
+    /// # Errors
+    /// The system refuses a temporary folder, or to write the scenes there.
+    pub fn new(path: &Path) -> io::Result<Self> {
+        let folder = tempfile::tempdir()?;
+        for (name, text) in SHIPPED {
+            fs::write(folder.path().join(format!("{name}.toml")), text)?;
+        }
+        Ok(Self { path: path.to_owned(), folder, runs: AtomicUsize::new(0) })
+    }
+
+    /// The folder in which it runs.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Runs the program with the words of `line`, quoted as for a shell.
+    ///
+    /// # Errors
+    /// [`NotMeasured`]: it cannot be started, does not end within a minute, or prints what is not UTF-8.
+    pub fn run(&self, line: &str) -> Found<Said> {
+        let words = shlex::split(line).ok_or_else(|| NotMeasured::broken(format!("no command line: {line}")))?;
+        self.run_words(&words).map_err(|cause| NotMeasured::broken(format!("`penetrode {line}`: {cause}")))
+    }
+
+    fn run_words(&self, words: &[String]) -> io::Result<Said> {
+        let number = self.runs.fetch_add(1, Ordering::Relaxed);
+        let [out, err] = ["out", "err"].map(|name| self.folder.path().join(format!(".{number}.{name}")));
+        let mut child = Command::new(&self.path)
+            .args(words)
+            .current_dir(self.folder.path())
+            .env("NO_COLOR", "1")
+            .stdin(Stdio::null())
+            .stdout(File::create(&out)?)
+            .stderr(File::create(&err)?)
+            .spawn()?;
+        let started = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait()? {
+                break status;
+            }
+            if started.elapsed() > TIME_MAX {
+                child.kill()?;
+                child.wait()?;
+                return Err(io::Error::other(format!("does not end within {} s", TIME_MAX.as_secs())));
+            }
+            thread::sleep(POLL);
+        };
+        let said =
+            Said { code: status.code().unwrap_or(-1), out: fs::read_to_string(&out)?, err: fs::read_to_string(&err)? };
+        fs::remove_file(out)?;
+        fs::remove_file(err)?;
+        Ok(said)
+    }
+}
