@@ -206,6 +206,12 @@ impl Method {
         notes
     }
 
+    /// The same method with another integrator, which `wrap` makes of its own.
+    #[must_use]
+    pub fn within(self, wrap: impl FnOnce(Box<dyn Integrator + Sync>) -> Box<dyn Integrator + Sync>) -> Self {
+        Self { integrator: wrap(self.integrator), ..self }
+    }
+
     /// The integrator inside.
     pub fn integrator(&self) -> &(dyn Integrator + Sync) {
         &*self.integrator

@@ -3,6 +3,7 @@
 pub mod checks;
 pub mod claim;
 pub mod program;
+pub mod recorded;
 #[expect(clippy::module_inception, reason = "the suite of the module suite is its main concept")]
 pub mod suite;
 pub mod verdict;

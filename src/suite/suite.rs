@@ -193,7 +193,7 @@ impl Suite {
         self.claims
             .par_iter()
             .map(|claim| {
-                let judged = judge(claim, context);
+                let judged = judge(Subject { claim, context, flaw: None });
                 done(&judged);
                 judged
             })
@@ -202,12 +202,12 @@ impl Suite {
 }
 
 /// Measures one claim and compares it with its limit.
-pub fn judge(claim: &Claim, context: Context<'_>) -> Judged {
-    let started = Instant::now();
+pub(super) fn judge(subject: Subject<'_>) -> Judged {
+    let (started, claim) = (Instant::now(), subject.claim);
     let lacks = claim.method.filter(|method| !method.is_built());
     let found = match lacks {
         Some(method) => Err(NotMeasured::skip(format!("this build leaves out {method}"))),
-        None => claim.check.measure(&Subject { claim, context }),
+        None => claim.check.measure(&subject),
     };
     Judged::new(claim.clone(), found, started.elapsed().as_secs_f64() * 1e3)
 }

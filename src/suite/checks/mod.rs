@@ -64,6 +64,7 @@ mod commands;
 mod edges;
 mod formulas;
 mod invariants;
+mod known_bad;
 mod manufactured;
 mod orders;
 mod peers;
@@ -86,8 +87,8 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, commands::*, edges::*, formulas::*, invariants::*, manufactured::*, orders::*,
-    peers::*, scheme::*,
+    agreement::*, applications::*, commands::*, edges::*, formulas::*, invariants::*, known_bad::*, manufactured::*,
+    orders::*, peers::*, scheme::*,
 };
 
 macro_rules! every_check {
@@ -123,6 +124,7 @@ macro_rules! every_check {
 
 every_check! {
     Exits
+    KnownBad
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
@@ -172,6 +174,8 @@ pub struct Subject<'a> {
     pub claim: &'a Claim,
     /// Scenes, other programs, seed.
     pub context: Context<'a>,
+    /// What is wrong on purpose with the solutions of its method.
+    pub flaw: Option<Flaw>,
 }
 
 impl<'a> Subject<'a> {
@@ -202,7 +206,11 @@ impl<'a> Subject<'a> {
 
     /// The claim's method at a tolerance, or at its default.
     fn method(&self, rtol: Option<f64>) -> Found<Method> {
-        build(self.method_name(), &MethodOptions { rtol, ..MethodOptions::default() })
+        let method = build(self.method_name(), &MethodOptions { rtol, ..MethodOptions::default() })?;
+        Ok(match self.flaw {
+            Some(flaw) => method.within(|inner| Box::new(Flawed { inner, flaw })),
+            None => method,
+        })
     }
 
     /// Solution of the claim's problem by its method at the default tolerance.

@@ -334,7 +334,7 @@ mod tests {
         // The last two once fell on steps outside the asymptotic range.
         for seed in [1, u64::MAX - 1, u64::MAX] {
             let context = Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, seed };
-            let measured = claim.check.measure(&Subject { claim, context }).unwrap();
+            let measured = claim.check.measure(&Subject { claim, context, flaw: None }).unwrap();
             assert!(measured.value <= claim.limit, "seed {seed}: {}", measured.remark);
         }
     }
