@@ -6,6 +6,7 @@ pub mod program;
 pub mod recorded;
 #[expect(clippy::module_inception, reason = "the suite of the module suite is its main concept")]
 pub mod suite;
+pub mod transcript;
 pub mod verdict;
 
 pub use crate::studies::experiments::grouped;

@@ -62,15 +62,40 @@ impl Program {
     /// [`NotMeasured`]: it cannot be started, does not end within a minute, or prints what is not UTF-8.
     pub fn run(&self, line: &str) -> Found<Said> {
         let words = shlex::split(line).ok_or_else(|| NotMeasured::broken(format!("no command line: {line}")))?;
-        self.run_words(&words).map_err(|cause| NotMeasured::broken(format!("`penetrode {line}`: {cause}")))
+        self.run_words(&words, self.folder())
+            .map_err(|cause| NotMeasured::broken(format!("`penetrode {line}`: {cause}")))
     }
 
-    fn run_words(&self, words: &[String]) -> io::Result<Said> {
+    /// Runs it as [`Self::run`] in an empty folder, to which the shipped scenes that `line` names and the `given` files go:
+    /// also each file that it wrote there, by name.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn run_apart(&self, line: &str, given: &[(String, String)]) -> Found<(Said, Vec<(String, String)>)> {
+        let words = shlex::split(line).ok_or_else(|| NotMeasured::broken(format!("no command line: {line}")))?;
+        let apart = || {
+            let folder = TempDir::new_in(self.folder())?;
+            let shipped = SHIPPED.iter().map(|(name, text)| (format!("{name}.toml"), *text));
+            let given = given.iter().map(|(name, text)| (name.clone(), text.as_str()));
+            let there: Vec<_> = shipped.filter(|(name, _)| words.contains(name)).chain(given).collect();
+            for (name, text) in &there {
+                fs::write(folder.path().join(name), text)?;
+            }
+            let said = self.run_words(&words, folder.path())?;
+            let mut written = Vec::new();
+            add_files(folder.path(), "", &mut written)?;
+            written.retain(|(name, _)| !there.iter().any(|(given, _)| given == name));
+            Ok((said, written))
+        };
+        apart().map_err(|cause: io::Error| NotMeasured::broken(format!("`penetrode {line}`: {cause}")))
+    }
+
+    fn run_words(&self, words: &[String], folder: &Path) -> io::Result<Said> {
         let number = self.runs.fetch_add(1, Ordering::Relaxed);
         let [out, err] = ["out", "err"].map(|name| self.folder.path().join(format!(".{number}.{name}")));
         let mut child = Command::new(&self.path)
             .args(words)
-            .current_dir(self.folder.path())
+            .current_dir(folder)
             .env("NO_COLOR", "1")
             .stdin(Stdio::null())
             .stdout(File::create(&out)?)
@@ -94,4 +119,19 @@ impl Program {
         fs::remove_file(err)?;
         Ok(said)
     }
+}
+
+/// Adds the text of every file in `folder`, in the order of their names behind `prefix`.
+fn add_files(folder: &Path, prefix: &str, files: &mut Vec<(String, String)>) -> io::Result<()> {
+    let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+        if entry.file_type()?.is_dir() {
+            add_files(&entry.path(), &format!("{name}/"), files)?;
+        } else {
+            files.push((name, fs::read_to_string(entry.path())?));
+        }
+    }
+    Ok(())
 }

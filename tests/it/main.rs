@@ -20,3 +20,4 @@ mod properties;
 mod stress;
 mod suite;
 mod sweep;
+mod transcript;

@@ -1,7 +1,8 @@
 //! What the commands of the program print, and how they exit (`docs/reference.md`, "Exit codes").
 
 use super::Subject;
-use crate::suite::claim::{Found, Measurement};
+use crate::suite::claim::{Found, Measurement, NotMeasured};
+use crate::suite::transcript::{TRANSCRIPTS, Transcript};
 
 check! {
     /// A run of the program: exit codes other than the stated one.
@@ -11,6 +12,14 @@ check! {
         /// The exit code that is right.
         code: i32,
     } in Commands, "wrong exit codes", by exits;
+
+    /// Runs of the program beside what they said when a person last read it.
+    Recorded {
+        /// File of `verification/transcript`, without its ending.
+        runs: String,
+        /// Relative tolerance of the numbers.
+        tolerance: f64,
+    } in Commands, "lines that differ", by recorded;
 }
 
 fn exits(Exits { run, code }: &Exits, subject: &Subject<'_>) -> Found {
@@ -19,4 +28,14 @@ fn exits(Exits { run, code }: &Exits, subject: &Subject<'_>) -> Found {
     let cause = if is_right { "" } else { said.err.trim() };
     let remark = format!("`penetrode {run}` exits {} {cause}", said.code);
     Ok(Measurement::count(usize::from(!is_right)).remark(remark.trim()))
+}
+
+fn recorded(Recorded { runs, tolerance }: &Recorded, subject: &Subject<'_>) -> Found {
+    let program = subject.program()?;
+    let text = TRANSCRIPTS.iter().find(|(name, _)| name == runs).map(|(_, text)| *text);
+    let recorded =
+        Transcript::read(text.ok_or_else(|| NotMeasured::broken(format!("no transcript {runs}")))?)?.possible();
+    let found = recorded.differences(&recorded.again(program)?, *tolerance);
+    let remark = if found.lines == 0 { format!("{} runs", recorded.len()) } else { found.first };
+    Ok(Measurement::count(found.lines).remark(remark))
 }

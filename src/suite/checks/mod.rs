@@ -123,7 +123,7 @@ macro_rules! every_check {
 }
 
 every_check! {
-    Exits
+    Exits Recorded
     KnownBad
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
