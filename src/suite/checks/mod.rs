@@ -65,6 +65,7 @@ mod edges;
 mod formulas;
 mod invariants;
 mod known_bad;
+mod lanes;
 mod manufactured;
 mod orders;
 mod peers;
@@ -87,8 +88,8 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, commands::*, edges::*, formulas::*, invariants::*, known_bad::*, manufactured::*,
-    orders::*, peers::*, scheme::*,
+    agreement::*, applications::*, commands::*, edges::*, formulas::*, invariants::*, known_bad::*, lanes::*,
+    manufactured::*, orders::*, peers::*, scheme::*,
 };
 
 macro_rules! every_check {
@@ -136,6 +137,7 @@ every_check! {
     Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
+    TableOfScenes BoundsOfLanes
 }
 
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.

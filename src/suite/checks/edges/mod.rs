@@ -30,7 +30,7 @@ impl Subject<'_> {
     }
 
     /// The relative error that the method promises.
-    fn promise(&self) -> f64 {
+    pub(super) fn promise(&self) -> f64 {
         self.method_name().promise()
     }
 }
@@ -71,12 +71,12 @@ fn counted(check: impl FnOnce(&mut Violations) -> Found<()>) -> Found {
 }
 
 /// The solution in double-double.
-fn exact(problem: &Problem) -> Found<Flight<TwoFloat>> {
+pub(super) fn exact(problem: &Problem) -> Found<Flight<TwoFloat>> {
     Ok(Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events)?)
 }
 
 /// The exit margin in double-double, rounded: its sign is the outcome.
-fn exact_margin(problem: &Problem) -> Found<f64> {
+pub(super) fn exact_margin(problem: &Problem) -> Found<f64> {
     let margin = Energy::new().exit_margin_in(&problem.cast::<TwoFloat>())?;
     margin.map(|(value, ..)| value.hi()).ok_or_else(|| NotMeasured::broken("the problem has no exit"))
 }
@@ -91,7 +91,7 @@ fn end_error(flight: &Flight, exact: &Flight, impact_speed: f64) -> f64 {
 }
 
 /// Whether `outcome` is right for a margin of that sign; `Undecided` is not wrong.
-fn is_right(outcome: Outcome, margin: f64) -> bool {
+pub(super) fn is_right(outcome: Outcome, margin: f64) -> bool {
     match outcome {
         Outcome::Undecided => true,
         Outcome::Perforated => margin >= 0.0,
