@@ -158,7 +158,7 @@ impl Ask for ConvergeArgs {
             title: scene.title,
             method: MethodJson::new(self.method, &options, None, None),
             seed: self.seed,
-            reference: if truth.is_closed_form { "closed-form" } else { "taylor" },
+            reference: if truth.is_exact { "closed-form" } else { "taylor" },
             verdict,
             quantities: study.quantities.into_iter().map(|study| QuantityJson::new(study, fixed)).collect(),
             skipped: study.no_critical_velocity.map(without).into_iter().collect(),

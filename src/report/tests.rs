@@ -131,6 +131,8 @@ fn stress_reports_of_one_run_differ_in_times_alone() {
         resolution: 0.0,
         remark: HOSTILE.to_owned(),
         evidence,
+        cases: 1,
+        lacks: false,
         wall_ms,
     };
     let figures = judged.iter().filter_map(|j| match &j.evidence {

@@ -76,8 +76,8 @@ impl Advice for StudyError {
 pub struct Truth {
     /// The solution.
     pub flight: Flight,
-    /// Whether it is the closed form.
-    pub is_closed_form: bool,
+    /// Whether it is exact, and not the refined solution of a method.
+    pub is_exact: bool,
 }
 
 impl Truth {
@@ -87,8 +87,8 @@ impl Truth {
     /// When neither has an answer.
     pub fn of(problem: &Problem) -> Result<Self, IntegrationError> {
         match ClosedForm.solve(problem, Detail::Events) {
-            Ok(flight) => Ok(Self { flight, is_closed_form: true }),
-            Err(_) => Ok(Self { flight: Taylor::default().solve(problem, Detail::Events)?, is_closed_form: false }),
+            Ok(flight) => Ok(Self { flight, is_exact: true }),
+            Err(_) => Ok(Self { flight: Taylor::default().solve(problem, Detail::Events)?, is_exact: false }),
         }
     }
 }

@@ -211,12 +211,19 @@ pub struct Measurement {
     pub remark: String,
     /// Data behind it, for the figures.
     pub evidence: Option<Evidence>,
+    /// How many cases it was measured on: scenes, steps, expectations.
+    pub cases: usize,
 }
 
 impl Measurement {
-    /// A plain measurement.
+    /// A plain measurement of one case.
     pub fn new(value: f64) -> Self {
-        Self { value, resolution: f64::EPSILON, verdict: None, remark: String::new(), evidence: None }
+        Self { value, resolution: f64::EPSILON, verdict: None, remark: String::new(), evidence: None, cases: 1 }
+    }
+
+    /// Measured on so many cases.
+    pub fn cases(self, cases: usize) -> Self {
+        Self { cases, ..self }
     }
 
     /// A number of things, to which no limit is loose.
@@ -248,22 +255,29 @@ pub type Found<T = Measurement> = Result<T, NotMeasured>;
 pub struct NotMeasured {
     verdict: Verdict,
     reason: String,
+    /// Whether it would be measured by a complete build on a complete machine.
+    lacks: bool,
 }
 
 impl NotMeasured {
     /// The claim does not apply: it is skipped.
     pub fn skip(reason: impl Into<String>) -> Self {
-        Self { verdict: Verdict::Skipped, reason: reason.into() }
+        Self { verdict: Verdict::Skipped, reason: reason.into(), lacks: false }
+    }
+
+    /// This build or this run lacks what the claim needs: it is skipped.
+    pub fn lacks(reason: impl Into<String>) -> Self {
+        Self { lacks: true, ..Self::skip(reason) }
     }
 
     /// The measurement cannot decide.
     pub fn undecided(reason: impl Into<String>) -> Self {
-        Self { verdict: Verdict::Undecided, reason: reason.into() }
+        Self { verdict: Verdict::Undecided, reason: reason.into(), lacks: false }
     }
 
     /// The measurement itself failed: the claim fails.
     pub fn broken(reason: impl fmt::Display) -> Self {
-        Self { verdict: Verdict::Failed, reason: reason.to_string() }
+        Self { verdict: Verdict::Failed, reason: reason.to_string(), lacks: false }
     }
 }
 
@@ -329,6 +343,12 @@ pub struct Judged {
     /// Data for the figures.
     #[serde(skip)]
     pub evidence: Option<Evidence>,
+    /// How many cases it was measured on.
+    #[serde(skip)]
+    pub cases: usize,
+    /// Whether it was skipped since this build or this run lacks something.
+    #[serde(skip)]
+    pub lacks: bool,
     /// Time spent (ms).
     pub wall_ms: f64,
 }
@@ -336,13 +356,13 @@ pub struct Judged {
 impl Judged {
     /// `claim` with what its check found in `wall_ms` (ms).
     pub fn new(claim: Claim, found: Found, wall_ms: f64) -> Self {
-        let Measurement { value, resolution, verdict, remark, evidence } = found.unwrap_or_else(|lack| Measurement {
-            verdict: Some(lack.verdict),
-            ..Measurement::new(f64::NAN).remark(lack.reason)
+        let lacks = found.as_ref().is_err_and(|lack| lack.lacks);
+        let Measurement { value, resolution, verdict, remark, evidence, cases } = found.unwrap_or_else(|lack| {
+            Measurement { verdict: Some(lack.verdict), ..Measurement::new(f64::NAN).remark(lack.reason).cases(0) }
         });
         let verdict = verdict.unwrap_or_else(|| Verdict::of(value, claim.limit));
         let measured = Some(value).filter(|value| value.is_finite());
-        Self { claim, verdict, measured, resolution, remark, evidence, wall_ms }
+        Self { claim, verdict, measured, resolution, remark, evidence, cases, lacks, wall_ms }
     }
 
     /// Whether the claim failed or is undecided.

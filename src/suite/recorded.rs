@@ -6,8 +6,10 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use serde::Deserialize;
+use serde::de::IntoDeserializer;
 
-use crate::studies::quantity::Quantity;
+use crate::integrators::{Cost, Events, Flight};
+use crate::physics::{Event, EventKind, Outcome, State};
 
 /// A scene and what the recipe says of it.
 #[derive(Debug, Deserialize)]
@@ -52,32 +54,50 @@ pub fn shipped(name: &str) -> Option<&'static RecordedScene> {
 }
 
 impl RecordedScene {
-    /// Name of its outcome; empty where none is recorded.
-    pub fn outcome(&self) -> &str {
-        self.words.get("outcome").map_or("", String::as_str)
-    }
-
     /// The number at `path`, rounded to `f64`.
     pub fn number(&self, path: &str) -> Option<f64> {
         self.numbers.get(path)?.parse().ok()
     }
 
-    /// The exact value of `quantity`; `None` for what the scene does not have.
-    pub fn value(&self, quantity: Quantity) -> Option<f64> {
-        let of_crater_end = |field: &str| {
-            let (path, _) = self.words.iter().find(|(path, word)| {
-                path.starts_with("events.") && path.ends_with(".event") && *word == "crater-end"
-            })?;
-            self.number(&path.replace(".event", field))
+    /// Its flight as recorded: outcome, end, events and exit margin, rounded to `f64`.
+    ///
+    /// # Errors
+    /// Only if the record lacks one of them, which a test excludes; in words.
+    pub fn flight(&self) -> Result<Flight, String> {
+        let lacks = |path: &str| format!("exact.json has no {path} of {}", self.name);
+        let number = |path: String| self.number(&path).ok_or_else(|| lacks(&path));
+        let state = |prefix: &str| {
+            Ok::<_, String>(State {
+                time: number(format!("{prefix}time_s"))?,
+                depth: number(format!("{prefix}depth_m"))?,
+                velocity: number(format!("{prefix}velocity_m_s"))?,
+            })
         };
-        match quantity {
-            Quantity::Depth => self.number("depth_m"),
-            Quantity::Time => self.number("time_s"),
-            Quantity::Velocity => self.number("velocity_m_s"),
-            Quantity::CraterEndTime => of_crater_end(".time_s"),
-            Quantity::CraterEndVelocity => of_crater_end(".velocity_m_s"),
-            Quantity::CriticalVelocity => self.number("critical_velocity_m_s"),
+        let outcome = self.words.get("outcome").ok_or_else(|| lacks("outcome"))?.as_str();
+        let outcome: Result<Outcome, serde::de::value::Error> = Outcome::deserialize(outcome.into_deserializer());
+        let mut events = Events::new();
+        while let Some(name) = self.words.get(&format!("events.{}.event", events.len())) {
+            let prefix = format!("events.{}.", events.len());
+            let kind = match name.as_str() {
+                "crater-end" => EventKind::CraterEnd,
+                "rest" => EventKind::Rest,
+                "exit" => EventKind::Exit,
+                _ => EventKind::StageEnd(number(format!("{prefix}stage"))? as usize),
+            };
+            events.push(Event { kind, state: state(&prefix)? });
         }
+        Ok(Flight {
+            outcome: outcome.map_err(|error| format!("{}: {error}", self.name))?,
+            stage: number("stage".to_owned())? as usize,
+            end: state("")?,
+            events,
+            exit_margin: self.number("exit_margin"),
+            exit_margin_error: None,
+            cost: Cost::default(),
+            trajectory: Vec::new(),
+            step_limit: None,
+            notes: Vec::new(),
+        })
     }
 }
 
@@ -91,10 +111,11 @@ mod tests {
     fn every_shipped_scene_is_recorded_with_its_quantities() {
         for (name, _) in SHIPPED {
             let scene = shipped(name).unwrap();
-            assert!(scene.value(Quantity::Depth).is_some() && scene.words.contains_key("outcome"), "{name}");
+            assert!(scene.flight().unwrap().end.depth > 0.0, "{name}");
         }
         let tunnel = shipped("tunnel").unwrap();
-        assert!(tunnel.value(Quantity::CraterEndVelocity).unwrap() > tunnel.value(Quantity::Velocity).unwrap());
-        assert_eq!(tunnel.value(Quantity::CriticalVelocity), None);
+        let flight = tunnel.flight().unwrap();
+        assert!(flight.crater_end().unwrap().velocity > flight.end.velocity && flight.events.len() == 2);
+        assert_eq!(tunnel.number("critical_velocity_m_s"), None);
     }
 }

@@ -87,6 +87,8 @@ pub struct Suite {
     pub scenes: Scenes,
     /// The claims.
     pub claims: Vec<Claim>,
+    /// Whether claims of it were left out.
+    is_part: bool,
 }
 
 impl Suite {
@@ -177,11 +179,19 @@ impl Suite {
             }
             claims.extend(spec.expand());
         }
-        Ok(Self { title: read.title, is_embedded: folder.is_none(), text: text.to_owned(), scenes, claims })
+        Ok(Self {
+            title: read.title,
+            is_embedded: folder.is_none(),
+            text: text.to_owned(),
+            scenes,
+            claims,
+            is_part: false,
+        })
     }
 
     /// Keeps the claims whose id contains `pattern`.
     pub fn only(&mut self, pattern: &str) {
+        self.is_part = true;
         self.claims.retain(|claim| claim.id.contains(pattern));
     }
 
@@ -189,15 +199,23 @@ impl Suite {
     pub fn run(&self, inputs: Inputs<'_>, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
         let memo = Memo::default();
         let Inputs { seed, peers, program } = inputs;
-        let context = Context { scenes: &self.scenes, peers, memo: &memo, program, seed };
-        self.claims
-            .par_iter()
-            .map(|claim| {
+        let context = Context { scenes: &self.scenes, peers, memo: &memo, program, judged: None, seed };
+        let judge_those = |is_last, context| {
+            let claims = self.claims.par_iter().enumerate().filter(|(_, c)| c.check.is_last() == is_last);
+            let judged = claims.map(|(place, claim)| {
                 let judged = judge(Subject { claim, context, flaw: None });
                 done(&judged);
-                judged
-            })
-            .collect()
+                (place, judged)
+            });
+            judged.collect::<Vec<_>>()
+        };
+        let (places, mut judged): (Vec<_>, Vec<_>) = judge_those(false, context).into_iter().unzip();
+        let others = (!self.is_part).then_some(judged.as_slice());
+        let last = judge_those(true, Context { judged: others, ..context });
+        for (place, claim) in last {
+            judged.insert(places.partition_point(|p| *p < place), claim);
+        }
+        judged
     }
 }
 
@@ -206,7 +224,7 @@ pub(super) fn judge(subject: Subject<'_>) -> Judged {
     let (started, claim) = (Instant::now(), subject.claim);
     let lacks = claim.method.filter(|method| !method.is_built());
     let found = match lacks {
-        Some(method) => Err(NotMeasured::skip(format!("this build leaves out {method}"))),
+        Some(method) => Err(NotMeasured::lacks(format!("this build leaves out {method}"))),
         None => claim.check.measure(&subject),
     };
     Judged::new(claim.clone(), found, started.elapsed().as_secs_f64() * 1e3)

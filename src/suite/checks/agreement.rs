@@ -76,25 +76,19 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
     if quantity == Quantity::CriticalVelocity {
         return critical(subject, &method);
     }
-    let Truth { flight: exact, is_closed_form } = &subject.truth()?;
+    let Truth { flight: exact, is_exact } = &subject.truth()?;
     applies!(!is_fixed(quantity, exact), "{FIXED}");
-    let recorded = shipped(subject.scene_name()?);
-    // A number computed elsewhere shares nothing with any method.
-    let is_independent = recorded.is_some() || *is_closed_form || subject.method_name() != MethodName::Taylor;
-    applies!(is_independent, "no closed form, and the refined answer is the method's own");
+    let is_independent = *is_exact || subject.method_name() != MethodName::Taylor;
+    applies!(is_independent, "no exact answer, and the refined one is the method's own");
     let flight = solve(&method, problem, Detail::Events)?;
     if flight.outcome == physics::Outcome::Undecided {
         let remark = format!("undecided: margin {:?} within {:?}", flight.exit_margin, flight.exit_margin_error);
         return Err(NotMeasured::undecided(remark));
     }
-    let (outcome, value) = match recorded {
-        Some(scene) => (scene.outcome(), scene.value(quantity)),
-        None => (exact.outcome.name(), value_of(quantity, exact)),
-    };
-    holds!(flight.outcome.name() == outcome, "{} where {outcome} is right", flight.outcome);
-    let (found, exact) = value_of(quantity, &flight)
-        .zip(value)
-        .ok_or_else(|| NotMeasured::broken(format!("no {quantity}, where {value:?} is right")))?;
+    holds!(flight.outcome.agrees_with(exact.outcome), "{} where {} is right", flight.outcome, exact.outcome);
+    let (found, value) = (value_of(quantity, &flight), value_of(quantity, exact));
+    let (found, exact) =
+        found.zip(value).ok_or_else(|| NotMeasured::broken(format!("no {quantity}, where {value:?} is right")))?;
     let error = signed_error(quantity, found, exact, problem.impact_speed);
     let conditions = reference::conditions(Source::Problem(problem)).ok();
     let condition = conditions.map_or(1.0, |conditions| condition_of(&conditions, quantity));
@@ -107,7 +101,7 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
 
 fn critical(subject: &Subject<'_>, method: &Method) -> Found {
     applies!(subject.problem()?.has_exit(), "{NO_FAR_SIDE}");
-    let exact = match shipped(subject.scene_name()?).and_then(|scene| scene.value(Quantity::CriticalVelocity)) {
+    let exact = match shipped(subject.scene_name()?).and_then(|scene| scene.number("critical_velocity_m_s")) {
         Some(exact) => exact,
         None => critical_velocity::exact(subject.scene()?)
             .map_err(|error| NotMeasured::skip(format!("no closed form of the critical velocity: {error}")))?,

@@ -6,7 +6,7 @@ use super::{Check, Subject};
 use crate::integrators::{Detail, Flight, Integrator, Solved};
 use crate::physics::{EventKind, Outcome, Problem};
 use crate::studies::quantity::Quantity;
-use crate::suite::claim::{Claim, Found, Measurement};
+use crate::suite::claim::{Claim, Found, Measurement, NotMeasured};
 use crate::suite::suite::judge;
 use crate::suite::verdict::Verdict;
 
@@ -141,6 +141,9 @@ impl Integrator for Flawed {
 fn known_bad(KnownBad { is, flaw, limit, check }: &KnownBad, subject: &Subject<'_>) -> Found {
     let claim = Claim { check: (**check).clone(), limit: *limit, unit: check.unit(), ..subject.claim.clone() };
     let judged = judge(Subject { claim: &claim, flaw: *flaw, ..*subject });
+    if judged.lacks {
+        return Err(NotMeasured::lacks(judged.remark));
+    }
     let must = match is {
         Bad::Failed => Verdict::Failed,
         Bad::Undecided => Verdict::Undecided,

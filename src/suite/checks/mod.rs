@@ -61,6 +61,7 @@ macro_rules! holds {
 mod agreement;
 mod applications;
 mod commands;
+mod counts;
 mod edges;
 mod formulas;
 mod invariants;
@@ -76,8 +77,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde::Deserialize;
 
-use super::claim::{Claim, Found, Measurement, NotMeasured, Section};
+use super::claim::{Claim, Found, Judged, Measurement, NotMeasured, Section};
 use super::program::Program;
+use super::recorded::shipped;
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
@@ -88,8 +90,8 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, commands::*, edges::*, formulas::*, invariants::*, known_bad::*, lanes::*,
-    manufactured::*, orders::*, peers::*, scheme::*,
+    agreement::*, applications::*, commands::*, counts::*, edges::*, formulas::*, invariants::*, known_bad::*,
+    lanes::*, manufactured::*, orders::*, peers::*, scheme::*,
 };
 
 macro_rules! every_check {
@@ -112,6 +114,11 @@ macro_rules! every_check {
                 match self { $(Self::$name(_) => $name::SECTION,)* }
             }
 
+            /// Whether it is about the other claims, and measured after them.
+            pub fn is_last(&self) -> bool {
+                matches!(self, Self::Counted(_))
+            }
+
             /// Measures a claim.
             ///
             /// # Errors
@@ -125,7 +132,7 @@ macro_rules! every_check {
 
 every_check! {
     Exits Recorded
-    KnownBad
+    KnownBad Counted
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
@@ -165,6 +172,8 @@ pub struct Context<'a> {
     pub memo: &'a Memo,
     /// The program, for claims about its commands.
     pub program: Option<&'a Program>,
+    /// The other claims, judged, for claims about them; `None` while they are, and where a part of the suite is run.
+    pub judged: Option<&'a [Judged]>,
     /// Seed of every random number.
     pub seed: u64,
 }
@@ -222,7 +231,7 @@ impl<'a> Subject<'a> {
 
     /// The program; without one, a claim about its commands does not apply.
     fn program(&self) -> Found<&'a Program> {
-        self.context.program.ok_or_else(|| NotMeasured::skip("no program whose commands could be run"))
+        self.context.program.ok_or_else(|| NotMeasured::lacks("no program whose commands could be run"))
     }
 
     /// Random numbers of `part`, from the seed of the run.
@@ -230,15 +239,20 @@ impl<'a> Subject<'a> {
         Random::for_part(self.context.seed, part)
     }
 
-    /// The exact solution, or a refined one.
+    /// The exact solution: as computed elsewhere for a scene that ships, else the closed form; or a refined one.
     fn truth(&self) -> Found<Truth> {
-        Ok(Truth::of(self.problem()?)?)
+        match shipped(self.scene_name()?) {
+            Some(scene) => Ok(Truth { flight: scene.flight().map_err(NotMeasured::broken)?, is_exact: true }),
+            None => Ok(Truth::of(self.problem()?)?),
+        }
     }
 }
 
 /// The method `name`; one that this build lacks makes the claim inapplicable.
 fn build(name: MethodName, options: &MethodOptions) -> Found<Method> {
-    applies!(name.is_built(), "this build leaves out {name}");
+    if !name.is_built() {
+        return Err(NotMeasured::lacks(format!("this build leaves out {name}")));
+    }
     Ok(Method::new(name, options)?)
 }
 
@@ -275,10 +289,12 @@ fn worst_of(errors: impl IntoIterator<Item = f64>) -> f64 {
 struct Worst {
     value: f64,
     place: String,
+    cases: usize,
 }
 
 impl Worst {
     fn take(&mut self, value: f64, place: impl FnOnce() -> String) {
+        self.cases += 1;
         if value.is_nan() || value > self.value {
             (self.value, self.place) = (value, place());
         }
@@ -286,6 +302,6 @@ impl Worst {
 
     fn measurement(self) -> Measurement {
         let remark = if self.place.is_empty() { String::new() } else { format!("worst {}", self.place) };
-        Measurement::new(self.value).remark(remark)
+        Measurement::new(self.value).remark(remark).cases(self.cases)
     }
 }

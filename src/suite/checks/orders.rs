@@ -231,7 +231,7 @@ pub(super) fn judge(fit: Result<OrderFit, FitError>, lost: usize, expected: f64)
         (None, seen)
     };
     let evidence = Some(Evidence::Fit { formal: expected, fit: Box::new(fit) });
-    let measured = Measurement::new((line.order - expected).abs()).resolving(half_width(&line));
+    let measured = Measurement::new((line.order - expected).abs()).resolving(half_width(&line)).cases(total);
     Ok(Measurement { verdict, remark, evidence, ..measured })
 }
 

@@ -244,6 +244,7 @@ fn defects_of(summary: &Summary) -> Measurement {
     Measurement {
         verdict: (scenes == unresolved).then_some(Verdict::Undecided),
         ..Measurement::new(summary.defect_count as f64)
+            .cases(usize::try_from(*scenes).unwrap_or(usize::MAX))
             .remark(format!("{scenes} scenes, {unresolved} unresolved, {undecided} outcomes undecided{first}"))
     }
 }
@@ -333,7 +334,7 @@ mod tests {
         let (scenes, peers, memo) = (Scenes::default(), PeerAnswers::default(), Memo::default());
         // The last two once fell on steps outside the asymptotic range.
         for seed in [1, u64::MAX - 1, u64::MAX] {
-            let context = Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, seed };
+            let context = Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, judged: None, seed };
             let measured = claim.check.measure(&Subject { claim, context, flaw: None }).unwrap();
             assert!(measured.value <= claim.limit, "seed {seed}: {}", measured.remark);
         }
