@@ -5,9 +5,10 @@
 //! `verify` and `stress` with one fault after the other. A text that does not stand exactly once in its file fails before
 //! the build. A fault is seen where a claim fails or is undecided that held without it, or where a command gives no report.
 //!
-//! - `FAULTS=list.toml` takes the faults of another list.
-//! - `SURVEY=table.tsv` judges every claim under every fault, and writes which tables of claims see it. A fault that has
-//!   its line there already is not run again, and one that nobody sees has its line too.
+//! `verification/seeded_faults.toml` records which tables of claims notice each fault, and those are tried.
+//! `SNAPSHOTS=overwrite` renews the records of the faults that are asked for. `FAULTS=list.toml SURVEY=table.tsv` takes the
+//! faults of another list, and adds a line for each that has none in the table: what notices, or nobody. Both judge the
+//! tables that take little time, and where fewer than [`ENOUGH`] of them notice, all claims.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
@@ -20,6 +21,7 @@ use std::time::{Duration, Instant};
 use std::{env, fs, io, thread};
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use penetrode::suite::{SeededFault, Suite, seeded_faults};
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -27,8 +29,17 @@ use serde::Deserialize;
 const COPIED: [&str; 8] =
     ["Cargo.toml", "Cargo.lock", "build.rs", "src", "tests", "benches", "examples", "verification"];
 
-/// A program with a fault that runs longer than this has none to give.
-const PATIENCE: Duration = Duration::from_secs(600);
+/// A program with a fault that runs longer than this has no report to give.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Tables of claims that are recorded for a fault; where as many notice, no others are asked.
+const ENOUGH: usize = 5;
+
+/// A table that takes less than this part of the time of all is a quick one. Eight in ten are, in an eighth of the time.
+const QUICK: f64 = 0.01;
+
+/// The record, in the source tree.
+const RECORD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/verification/seeded_faults.toml");
 
 /// Number of the active fault, from the environment; a copy without it is a healthy program.
 const SWITCH: &str = "
@@ -59,9 +70,6 @@ struct Fault {
     wrong: String,
     #[serde(default)]
     form: Form,
-    /// Claims to try first: parts of their ids, separated by `|`, of `stress` where `stress:` stands before one. Then
-    /// all are tried.
-    claims: Option<String>,
 }
 
 /// What the two texts of a fault are.
@@ -78,7 +86,7 @@ enum Form {
 }
 
 #[derive(Deserialize)]
-struct Run {
+struct Report {
     claims: Vec<Claim>,
 }
 
@@ -92,37 +100,85 @@ struct Claim {
     wall_ms: f64,
 }
 
-/// The two commands that judge.
-#[derive(Clone, Copy, PartialEq)]
-enum Judge {
+/// The commands that judge, and a suite of some of their tables.
+#[derive(Clone, Copy)]
+enum Judge<'a> {
     Verify,
     Stress,
+    Tables(&'a [&'a str]),
 }
 
-impl Judge {
-    const ALL: [Self; 2] = [Self::Verify, Self::Stress];
+impl Judge<'_> {
+    const ALL: [Judge<'static>; 2] = [Judge::Verify, Judge::Stress];
 
     fn name(self) -> &'static str {
         match self {
-            Self::Verify => "verify",
+            Self::Verify | Self::Tables(_) => "verify",
             Self::Stress => "stress",
         }
     }
+}
 
-    /// What the command shows, `fault` active: of all its claims, or of those whose id contains `only`.
-    fn run(self, program: &Path, fault: Option<usize>, only: Option<&str>) -> Result<Shown, Box<dyn Error>> {
-        let folder = tempfile::tempdir()?;
-        let mut command = Command::new(program);
-        match (self, only) {
-            (Self::Verify, _) => command.arg("verify").args(only.map(|only| format!("--only={only}"))),
-            (Self::Stress, None) => command.arg("stress"),
-            // `stress` judges all of its claims or none.
-            (Self::Stress, Some(only)) => {
-                let suite = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/edges.toml");
-                command.arg("verify").arg(suite).args(["--only", only])
+/// What a command showed.
+enum Shown {
+    Claims(Vec<Claim>),
+    /// No report, and why.
+    Nothing(String),
+}
+
+/// What notices a fault, and by what.
+struct Notice {
+    /// The table of claims, or the command that gave no report.
+    table: String,
+    by: String,
+}
+
+/// The program with every fault, and how it is without any.
+struct Subject {
+    program: PathBuf,
+    /// The tables of both suites, by their ids.
+    tables: BTreeMap<String, toml::Value>,
+    /// The table of each claim, by the id of the claim.
+    table_of: BTreeMap<String, String>,
+    /// Claims that do not hold.
+    open: BTreeSet<String>,
+    /// Time of each table of claims (ms).
+    cost: BTreeMap<String, f64>,
+}
+
+impl Subject {
+    fn new(program: PathBuf) -> Result<Self, Box<dyn Error>> {
+        let (mut tables, mut table_of) = (BTreeMap::new(), BTreeMap::new());
+        for suite in [Suite::embedded()?, Suite::edges()?] {
+            let text: toml::Table = toml::from_str(&suite.text)?;
+            for table in text["claim"].as_array().into_iter().flatten() {
+                tables.insert(table["id"].as_str().unwrap_or_default().to_owned(), table.clone());
             }
-        };
-        command.args(["--json", "--out"]).arg(folder.path().join("report"));
+            table_of.extend(suite.claims.into_iter().map(|claim| (claim.id, claim.table)));
+        }
+        let mut subject = Self { program, tables, table_of, open: BTreeSet::new(), cost: BTreeMap::new() };
+        for judge in Judge::ALL {
+            subject.add_healthy(judge)?;
+        }
+        let quick: Vec<String> = subject.quick().into_iter().map(str::to_owned).collect();
+        subject.add_healthy(Judge::Tables(&quick.iter().map(String::as_str).collect::<Vec<_>>()))?;
+        Ok(subject)
+    }
+
+    fn run(&self, judge: Judge<'_>, fault: Option<usize>) -> Result<Shown, Box<dyn Error>> {
+        let folder = tempfile::tempdir()?;
+        let mut command = Command::new(&self.program);
+        command.arg(judge.name()).args(["--json", "--out"]).arg(folder.path().join("report"));
+        if let Judge::Tables(ids) = judge {
+            let claims = ids.iter().filter_map(|id| self.tables.get(*id).cloned()).collect::<Vec<_>>();
+            let suite = toml::Table::from_iter([
+                ("title".to_owned(), "some of its tables".into()),
+                ("claim".to_owned(), claims.into()),
+            ]);
+            let path = folder.path().join("suite.toml");
+            fs::write(&path, toml::to_string(&suite)?)?;
+            command.arg(path);
+        }
         if let Some(number) = fault {
             command.env("SEEDED_FAULT", number.to_string());
         }
@@ -144,66 +200,47 @@ impl Judge {
         let said = fs::read(said)?;
         let said = String::from_utf8_lossy(&said);
         Ok(match serde_json::from_slice(&fs::read(answer)?) {
-            Ok(Run { claims }) if status.code().is_some_and(|code| code != 1) => Shown::Claims(claims),
+            Ok(Report { claims }) if matches!(status.code(), Some(0 | 3 | 4)) => Shown::Claims(claims),
             _ => Shown::Nothing(format!("{status}: {}", said.lines().next().unwrap_or_default())),
         })
     }
-}
 
-/// What a command showed.
-enum Shown {
-    Claims(Vec<Claim>),
-    /// No report, and why.
-    Nothing(String),
-}
-
-/// What notices a fault, and by what.
-struct Notice {
-    /// The table of claims, or the command that gave no report.
-    table: String,
-    by: String,
-}
-
-/// The program with every fault, and how it is without any.
-struct Subject {
-    program: PathBuf,
-    /// Claims that do not hold.
-    open: BTreeSet<String>,
-    /// Time of each table of claims (ms).
-    cost: BTreeMap<String, f64>,
-}
-
-impl Subject {
-    fn new(program: PathBuf) -> Result<Self, Box<dyn Error>> {
-        let mut subject = Self { program, open: BTreeSet::new(), cost: tables()? };
-        for judge in Judge::ALL {
-            match judge.run(&subject.program, None, None)? {
-                Shown::Claims(claims) => {
-                    for claim in claims {
-                        let table = subject.table(&claim.id);
-                        *subject.cost.entry(table).or_default() += claim.wall_ms;
-                        if is_open(&claim) {
-                            subject.open.insert(claim.id);
-                        }
+    /// Notes what `judge` shows of the program without a fault.
+    fn add_healthy(&mut self, judge: Judge<'_>) -> Result<(), Box<dyn Error>> {
+        match self.run(judge, None)? {
+            Shown::Claims(claims) => {
+                for claim in claims {
+                    if !matches!(judge, Judge::Tables(_)) {
+                        *self.cost.entry(self.table(&claim.id)).or_default() += claim.wall_ms;
+                    }
+                    if is_open(&claim) {
+                        self.open.insert(claim.id);
                     }
                 }
-                Shown::Nothing(why) => return Err(format!("{} without a fault: {why}", judge.name()).into()),
+                Ok(())
             }
+            Shown::Nothing(why) => Err(format!("{} without a fault: {why}", judge.name()).into()),
         }
-        Ok(subject)
     }
 
-    /// The table whose claim `id` is: ids of tables are the beginnings of ids.
+    /// The tables that take little time.
+    fn quick(&self) -> Vec<&str> {
+        let most = QUICK * self.cost.values().sum::<f64>();
+        self.tables.keys().map(String::as_str).filter(|table| self.cost(table) < most).collect()
+    }
+
+    fn cost(&self, table: &str) -> f64 {
+        self.cost.get(table).copied().unwrap_or_default()
+    }
+
+    /// The table of the claim `id`.
     fn table(&self, id: &str) -> String {
-        let mut ends = id.match_indices('/').map(|(at, _)| at).chain([id.len()]).collect::<Vec<_>>();
-        ends.reverse();
-        let table = ends.into_iter().map(|end| &id[..end]).find(|table| self.cost.contains_key(*table));
-        table.unwrap_or(id).to_owned()
+        self.table_of.get(id).map_or(id, String::as_str).to_owned()
     }
 
-    /// Every claim that notices the fault, among those whose id contains `only`.
-    fn notices(&self, judge: Judge, fault: usize, only: Option<&str>) -> Result<Vec<Notice>, Box<dyn Error>> {
-        Ok(match judge.run(&self.program, Some(fault), only)? {
+    /// What notices the fault.
+    fn notices(&self, judge: Judge<'_>, fault: usize) -> Result<Vec<Notice>, Box<dyn Error>> {
+        Ok(match self.run(judge, Some(fault))? {
             Shown::Nothing(why) => vec![Notice { table: judge.name().to_owned(), by: why }],
             Shown::Claims(claims) => {
                 let open = claims.into_iter().filter(|claim| is_open(claim) && !self.open.contains(&claim.id));
@@ -212,34 +249,42 @@ impl Subject {
         })
     }
 
-    /// Who notices the fault: the first that does of the claims named and of all.
-    fn first(&self, number: usize, fault: &Fault) -> Result<Notice, Box<dyn Error>> {
-        let named = fault.claims.iter().flat_map(|claims| claims.split('|')).filter(|only| !only.is_empty());
-        let named = named.map(|only| match only.strip_prefix("stress:") {
-            Some(only) => (Judge::Stress, Some(only)),
-            None => (Judge::Verify, Some(only)),
-        });
-        for (judge, only) in named.chain(Judge::ALL.map(|judge| (judge, None))) {
-            if let Some(notice) = self.notices(judge, number, only)?.into_iter().next() {
-                return Ok(notice);
+    /// The first that notices the fault: of the tables recorded, and without a record of all.
+    fn first(&self, number: usize, fault: &Fault, record: Option<&SeededFault>) -> Result<Notice, Box<dyn Error>> {
+        let recorded: Vec<&str> = record.iter().flat_map(|record| &record.noticed_by).map(String::as_str).collect();
+        let some = recorded.iter().any(|table| self.tables.contains_key(*table));
+        let tables = some.then_some(Judge::Tables(&recorded));
+        for judge in tables.into_iter().chain(Judge::ALL) {
+            if let Some(notice) = self.notices(judge, number)?.into_iter().next() {
+                if record.is_none() || recorded.contains(&notice.table.as_str()) {
+                    return Ok(notice);
+                }
+                let help = format!("SNAPSHOTS=overwrite cargo test --test seeded_faults -- {}", fault.id);
+                return Err(format!("not {recorded:?} notices, but {}; renew the record: {help}", notice.by).into());
             }
         }
         Err(format!("no claim notices: {} ({})", fault.what, fault.file).into())
     }
 
-    /// All that notices the fault, as one line: id, file, what, number of claims, their tables (cheapest first), the first.
-    fn survey(&self, number: usize, fault: &Fault) -> Result<String, Box<dyn Error>> {
+    /// What notices the fault: how many claims, their tables, the quickest first, and what the first of them saw.
+    fn survey(&self, number: usize) -> Result<(usize, Vec<String>, String), Box<dyn Error>> {
         let mut notices = Vec::new();
-        for judge in Judge::ALL {
-            notices.extend(self.notices(judge, number, None)?);
+        let mut tables: Vec<String> = Vec::new();
+        for judges in [&[Judge::Tables(&self.quick())][..], &Judge::ALL] {
+            if tables.len() >= ENOUGH {
+                break;
+            }
+            notices.clear();
+            for judge in judges {
+                notices.extend(self.notices(*judge, number)?);
+            }
+            let cost = |notice: &Notice| self.cost(&notice.table);
+            notices.sort_by(|a, b| cost(a).total_cmp(&cost(b)).then_with(|| a.table.cmp(&b.table)));
+            tables = notices.iter().map(|notice| notice.table.clone()).collect();
+            tables.dedup();
         }
-        let cost = |table: &str| self.cost.get(table).copied().unwrap_or_default();
-        notices.sort_by(|a, b| cost(&a.table).total_cmp(&cost(&b.table)));
-        let mut tables: Vec<&str> = notices.iter().map(|notice| notice.table.as_str()).collect();
-        tables.dedup();
-        let first = notices.first().map_or_else(|| "nobody", |notice| notice.by.as_str());
-        let cells = [&fault.id, &fault.file, &fault.what, &notices.len().to_string(), &tables.join(" "), first];
-        Ok(cells.map(|cell| cell.replace(['\t', '\n'], " ")).join("\t"))
+        let first = notices.first().map_or_else(|| "nobody".to_owned(), |notice| notice.by.clone());
+        Ok((notices.len(), tables, first))
     }
 }
 
@@ -254,28 +299,18 @@ fn shown(Claim { id, verdict, measured, limit, remark, .. }: &Claim) -> String {
     }
 }
 
-/// The tables of claims of the two suites, each without a cost yet.
-fn tables() -> Result<BTreeMap<String, f64>, Box<dyn Error>> {
-    #[derive(Deserialize)]
-    struct Suite {
-        claim: Vec<Table>,
+fn main() {
+    if let Err(error) = run() {
+        eprintln!("{error}");
+        std::process::exit(1);
     }
-    #[derive(Deserialize)]
-    struct Table {
-        id: String,
-    }
-    let mut tables = BTreeMap::new();
-    for text in [include_str!("../verification/suite.toml"), include_str!("../verification/edges.toml")] {
-        tables.extend(toml::from_str::<Suite>(text)?.claim.into_iter().map(|table| (table.id, 0.0)));
-    }
-    Ok(tables)
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn run() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::from_args();
-    let list = env::var_os("FAULTS")
-        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/faults.toml")), PathBuf::from);
-    let text = fs::read_to_string(&list).map_err(|error| format!("{}: {error}", list.display()))?;
+    let list =
+        env::var("FAULTS").unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/tests/faults.toml").to_owned());
+    let text = fs::read_to_string(&list).map_err(|error| format!("{list}: {error}"))?;
     let Faults { mut fault } = toml::from_str(&text)?;
     // A fault of a file that this build leaves out cannot show.
     fault.retain(|fault| cfg!(feature = "diffsol") || !fault.file.ends_with("diffsol.rs"));
@@ -284,11 +319,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         libtest_mimic::run(&arguments, trials).exit();
     }
     let subject = Subject::new(build(&fault)?)?;
-    if let Some(path) = env::var_os("SURVEY") {
+    if let Ok(path) = env::var("SURVEY") {
         return survey(&subject, &fault, Path::new(&path));
     }
+    if env::var("SNAPSHOTS").is_ok_and(|value| value == "overwrite") {
+        return renew(&subject, &fault, arguments.filter.as_deref().unwrap_or_default());
+    }
 
-    let shared = Arc::new((subject, Mutex::new(Vec::new())));
+    let records: BTreeMap<String, SeededFault> = records()?;
+    let shared = Arc::new((subject, records, Mutex::new(Vec::new())));
     let context = Arc::clone(&shared);
     let mut trials = vec![Trial::test("without_a_fault_every_claim_holds", move || {
         let open = &context.0.open;
@@ -297,34 +336,69 @@ fn main() -> Result<(), Box<dyn Error>> {
     trials.extend(fault.into_iter().enumerate().map(|(number, fault)| {
         let context = Arc::clone(&shared);
         Trial::test(fault.id.clone(), move || {
-            let (subject, seen) = &*context;
-            let by = subject.first(number, &fault).map_err(|error| Failed::from(error.to_string()))?.by;
+            let (subject, records, seen) = &*context;
+            let first = subject.first(number, &fault, records.get(&fault.id));
+            let by = first.map_err(|error| Failed::from(error.to_string()))?.by;
             let line = format!("{:26} {:38} {:62} {by}", fault.id, fault.file, fault.what);
             seen.lock().unwrap_or_else(PoisonError::into_inner).push(line);
             Ok(())
         })
     }));
     let conclusion = libtest_mimic::run(&arguments, trials);
-    for line in shared.1.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+    for line in shared.2.lock().unwrap_or_else(PoisonError::into_inner).iter() {
         println!("{line}");
     }
     conclusion.exit()
 }
 
-/// Adds a line to the table at `path` for each fault that has none there.
+/// The records by the id of the fault.
+fn records() -> Result<BTreeMap<String, SeededFault>, Box<dyn Error>> {
+    Ok(seeded_faults()?.into_iter().map(|fault| (fault.id.clone(), fault)).collect())
+}
+
+/// Adds a line to the table at `path` for each fault that has none there: id, file, what, number of claims, their tables,
+/// what the quickest of them saw.
 fn survey(subject: &Subject, faults: &[Fault], path: &Path) -> Result<(), Box<dyn Error>> {
     let there = fs::read_to_string(path).unwrap_or_default();
     let there: BTreeSet<&str> = there.lines().filter_map(|line| line.split('\t').next()).collect();
     let file = Mutex::new(fs::File::options().create(true).append(true).open(path)?);
     let left: Vec<_> = faults.iter().enumerate().filter(|(_, fault)| !there.contains(fault.id.as_str())).collect();
     println!("{} faults, {} of which are in {} already", faults.len(), faults.len() - left.len(), path.display());
-    left.into_par_iter().try_for_each(|(number, fault)| {
-        let mut line = subject.survey(number, fault).map_err(|error| format!("{}: {error}", fault.id))?;
+    left.into_par_iter().try_for_each(|(number, Fault { id, file: of, what, .. })| {
+        let (count, tables, first) = subject.survey(number).map_err(|error| format!("{id}: {error}"))?;
+        let cells = [id, of, what, &count.to_string(), &tables.join(" "), &first];
+        let line = cells.map(|cell| cell.replace(['\t', '\n'], " ")).join("\t");
         println!("{line}");
-        line.push('\n');
         let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.write_all(line.as_bytes()).map_err(|error| error.to_string())
+        writeln!(file, "{line}").map_err(|error| error.to_string())
     })?;
+    Ok(())
+}
+
+/// Renews the records of the faults whose id contains `only`, and leaves out those of faults that are no more.
+fn renew(subject: &Subject, faults: &[Fault], only: &str) -> Result<(), Box<dyn Error>> {
+    let known = records()?;
+    let renewed = faults.par_iter().enumerate().map(|(number, Fault { id, what, file, .. })| {
+        if let Some(record) = known.get(id).filter(|_| !id.contains(only)) {
+            return Ok(record.clone());
+        }
+        let (_, mut noticed_by, first) = subject.survey(number).map_err(|error| format!("{id}: {error}"))?;
+        println!("{id}: {first}");
+        noticed_by.truncate(ENOUGH);
+        Ok(SeededFault { id: id.clone(), what: what.clone(), file: file.clone(), noticed_by })
+    });
+    let renewed: Vec<SeededFault> = renewed.collect::<Result<_, String>>()?;
+    let mut text =
+        "# What notices the faults of tests/faults.toml, as tests/seeded_faults.rs measured it (CONTRIBUTING.md).\n\n"
+            .to_owned();
+    text += "fault = [\n";
+    for SeededFault { id, what, file, noticed_by } in renewed {
+        // Strings of JSON are strings of TOML.
+        let [id, what, file] = [id, what, file].map(serde_json::Value::from);
+        let noticed_by = serde_json::to_string(&noticed_by)?;
+        writeln!(text, "{{ id = {id}, what = {what}, file = {file}, noticed_by = {noticed_by} }},")?;
+    }
+    fs::write(RECORD, text + "]\n")?;
     Ok(())
 }
 
@@ -419,6 +493,10 @@ fn with_faults(name: &str, text: &str, faults: &[Fault]) -> Result<String, Strin
         let (wrong, length) = (&fault.wrong, fault.right.len());
         let active = format!("crate::seeded_fault::active({number})");
         let [opening, closing] = match fault.form {
+            Form::Text if !wrong.contains("ACTIVE") => {
+                misfits += &format!("fault {}: its text does not ask whether it is ACTIVE\n", fault.id);
+                continue;
+            }
             Form::Text => {
                 edits.push((from, usize::MAX, length, wrong.replace("ACTIVE", &active)));
                 continue;

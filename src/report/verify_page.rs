@@ -14,7 +14,9 @@ use crate::studies::experiments;
 use crate::studies::sweep::{WHY, explanation};
 use crate::studies::{Path, Quantity, Stretch, formal_order};
 use crate::suite::checks::{Order, StepPattern};
-use crate::suite::{Check, Counts, Evidence, Judged, LOOSENESS_MAX, grouped, looseness, skipped};
+use crate::suite::{
+    Check, Counts, Evidence, Judged, LOOSENESS_MAX, SeededFault, grouped, looseness, seeded_faults, skipped,
+};
 
 /// The page of `run` with its figures.
 pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
@@ -28,6 +30,8 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
         "sets" => sets(run),
         "meaning-of-data" => html! { p { (experiments::MEANING) } },
         "layered-claims" => layered_claims(run),
+        "faults" if run.suite.is_embedded => faults(),
+        "faults" => html! {},
         "deviations" => deviations(run.judged),
         _ => slot(run, figures, name, words),
     };
@@ -188,6 +192,29 @@ fn sets(run: &Run<'_>) -> Markup {
         (Table::cards(caption, cells::SETS).numbers(1..8).rows(cells::sets(&sets), |row| row.map(cell)))
         (facts(cells::uncertainties(comparisons).map(|(name, known)| (name, cell(known)))))
     }
+}
+
+/// The faults that were built into copies of the program, and which claims noticed.
+fn faults() -> Markup {
+    let seeded = seeded_faults().unwrap_or_default();
+    let (thin, others): (Vec<_>, Vec<_>) = seeded.iter().partition(|fault| fault.is_thin());
+    let summary = html! { (count(others.len(), "fault")) " that two tables of claims or more notice" };
+    html! { @if !seeded.is_empty() {
+        p { "All " (count(seeded.len(), "fault")) " were noticed, " (others.len()) " by more than one table of claims." }
+        @if !thin.is_empty() { (faults_table("Noticed by one table of claims alone: without it they pass", &thin)) }
+        (folded(summary, true, faults_table("", &others)))
+    } }
+}
+
+fn faults_table(caption: &str, faults: &[&SeededFault]) -> Table {
+    let header = ["fault", "what is wrong", "source file", "noticed by, at most five"];
+    Table::cards(caption, header).rows(faults, |fault| {
+        let quickest = html! { @for (index, table) in fault.noticed_by.iter().enumerate() {
+            @if index > 0 { ", " }
+            code { (one_line(table)) }
+        } };
+        [html! { code { (one_line(&fault.id)) } }, cell(&fault.what), cell(&fault.file), quickest]
+    })
 }
 
 fn deviations(judged: &[Judged]) -> Markup {

@@ -2,10 +2,11 @@
 
 #![expect(clippy::panic, reason = "a test that cannot be set up has failed")]
 
-use penetrode::suite::checks::PeerAnswers;
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use penetrode::suite::{Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, looseness};
+use penetrode::suite::checks::PeerAnswers;
+use penetrode::suite::{Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, looseness, seeded_faults};
 
 /// Seeds of the run for false alarms.
 const SEEDS: u64 = 200;
@@ -38,6 +39,24 @@ fn every_claim_of_the_shipped_suite_holds_and_no_limit_is_loose() {
     // One limit a table: the worst of its claims decides. A loosened limit does not outlive its cause.
     let loose: Vec<_> = looseness(&judged).into_iter().filter(|(_, times)| *times > LOOSENESS_MAX).collect();
     assert_eq!(loose, []);
+}
+
+/// That the tables do notice is the test `seeded_faults`.
+#[test]
+fn the_record_of_seeded_faults_names_each_of_them_and_claims_that_exist() {
+    let listed: toml::Table = toml::from_str(include_str!("../faults.toml")).unwrap_or_else(|error| panic!("{error}"));
+    let listed = listed["fault"].as_array().into_iter().flatten();
+    let listed: Vec<_> = listed.map(|fault| ["id", "what", "file"].map(|key| fault[key].as_str())).collect();
+    let recorded = seeded_faults().unwrap_or_else(|error| panic!("{error}"));
+    let named: Vec<_> = recorded.iter().map(|f| [&f.id, &f.what, &f.file].map(|text| Some(text.as_str()))).collect();
+    assert_eq!(named, listed);
+    let suites = [Suite::embedded(), Suite::edges()].map(|suite| suite.unwrap_or_else(|error| panic!("{error}")));
+    let tables = suites.into_iter().flat_map(|suite| suite.claims).map(|claim| claim.table);
+    let tables: BTreeSet<_> = tables.chain(["verify", "stress"].map(str::to_owned)).collect();
+    for fault in &recorded {
+        let lost: Vec<_> = fault.noticed_by.iter().filter(|table| !tables.contains(*table)).collect();
+        assert!(!fault.noticed_by.is_empty() && lost.is_empty(), "{}: no table {lost:?}", fault.id);
+    }
 }
 
 /// Ten minutes of one processor: `cargo test --release --test it suite -- --ignored --nocapture`.
