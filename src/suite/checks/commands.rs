@@ -1,5 +1,11 @@
 //! What the commands of the program print, and how they exit (`docs/reference.md`, "Exit codes").
 
+mod answer;
+mod printed;
+mod report;
+mod ties;
+
+pub use self::{printed::*, report::*, ties::*};
 use super::Subject;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 use crate::suite::transcript::{TRANSCRIPTS, Transcript};

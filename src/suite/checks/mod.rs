@@ -131,7 +131,8 @@ macro_rules! every_check {
 }
 
 every_check! {
-    Exits Recorded
+    Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
+    BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
     KnownBad Counted
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
