@@ -85,6 +85,15 @@ impl Dimension {
         })
     }
 
+    /// Every spelling of every unit, with its dimension.
+    pub fn spellings() -> impl Iterator<Item = (Self, &'static str)> {
+        UNITS.lines().filter_map(|line| line.split_once(" | ")).flat_map(|(name, rest)| {
+            let dimension = Self::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name);
+            let names = rest.split(" | ").next().unwrap_or_default();
+            dimension.into_iter().flat_map(move |dimension| names.split(", ").map(move |unit| (dimension, unit)))
+        })
+    }
+
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
         Self::VARIANTS.iter().copied().find(|dimension| dimension.coefficient(unit).is_some())

@@ -14,9 +14,10 @@ numbers that magnify a relative error of the scene's own numbers more than ten t
 """
 
 import json
+import math
 import pathlib
+import random
 import re
-import sys
 import tomllib
 from decimal import Decimal
 from fractions import Fraction as Fr
@@ -78,6 +79,8 @@ ATOMS = {
     "psf": (LBF / FOOT**2, (1, -1, -2)),
     "pcf": (POUND / FOOT**3, (1, -3, 0)),
     "kn": (Fr(1852, 3600), (0, 1, -1)),
+    "Ns": (Fr(1), (1, 1, -1)),
+    "kNs": (Fr(1000), (1, 1, -1)),
 }
 DIMENSIONS = {
     "mass": (1, 0, 0),
@@ -132,6 +135,160 @@ def quantity(given, dimension=None):
     return Fr(Decimal(number)) * value
 
 
+# What follows is for units.json alone: every spelling that a scene file may have, with its value by definition. Those of
+# PUBLISHED are in use with the seven digits of NIST Special Publication 811, appendix B; ancient ones with fifteen.
+
+LONG_PREFIXES = dict(
+    zip(
+        "yotta zetta exa peta tera giga mega kilo hecto deca deci centi milli micro nano pico femto atto zepto yocto".split(),
+        PREFIXES.values(),
+        strict=True,
+    )
+)
+LONG = {"gram": "g", "meter": "m", "second": "s", "newton": "N", "pascal": "Pa", "joule": "J", "electronvolt": "eV"}
+YARD, SURVEY_FOOT, GALLON, GALLON_UK = 3 * FOOT, Fr(1200, 3937), 231 * INCH**3, Fr(454609, 10**8)
+GRAIN, LIBRA, PES, MERCURY, WATER = POUND / 7000, Fr(3289, 10**4), Fr(296, 1000), Fr(133322387415, 10**9), GRAVITY
+BOHR, LIGHT, BTU, AU = Fr(529177210903, 10**22), Fr(299792458), Fr(105505585262, 10**8), Fr(149597870700)
+DAY, PI = Fr(86400), Fr(Decimal("3.14159265358979323846264338327950288"))
+# Spelling, SI value; a plural in s goes without saying.
+NAMED = {
+    "lb": POUND, "lbs": POUND, "lbm": POUND, "pound": POUND, "oz": POUND / 16, "ounce": POUND / 16, "slug": LBF / FOOT,
+    "ct": Fr(2, 10**4), "carat": Fr(2, 10**4), "Da": Fr(16605390666, 10**37), "dalton": Fr(16605390666, 10**37), "grain": GRAIN,
+    "cwt long": 112 * POUND, "hundredweight (long)": 112 * POUND, "cwt short": 100 * POUND, "hundredweight (short)": 100 * POUND,
+    "oz t": 480 * GRAIN, "troy ounce": 480 * GRAIN, "dwt": 24 * GRAIN, "pennyweight": 24 * GRAIN, "lb t": 5760 * GRAIN,
+    "troy pound": 5760 * GRAIN, "AT": Fr(2916667, 10**8), "assay ton": Fr(2916667, 10**8), "2240 lb": 2240 * POUND,
+    "long ton": 2240 * POUND, "2000 lb": 2000 * POUND, "short ton": 2000 * POUND, "ton": Fr(1000), "Å": Fr(1, 10**10),
+    "ångström": Fr(1, 10**10), "a₀": BOHR, "bohr radius": BOHR, "bohr radiuses": BOHR, "a.u. of length": BOHR,
+    "atomic unit of length": BOHR, "atomic units of length": BOHR, "ua": AU, "astronomical unit": AU, "ch": 66 * SURVEY_FOOT,
+    "chain": 66 * SURVEY_FOOT, "DM": 6000 * FOOT, "data mile": 6000 * FOOT, "fathom": 6 * SURVEY_FOOT, "fermi": Fr(1, 10**15),
+    "foot": FOOT, "feet": FOOT, "ft (U.S. survey)": SURVEY_FOOT, "foot (U.S. survey)": SURVEY_FOOT, "feet (U.S. survey)": SURVEY_FOOT,
+    "inch": INCH, "inches": INCH, "l. y.": LIGHT * DAY * Fr(36525, 100), "light year": LIGHT * DAY * Fr(36525, 100),
+    "microinch": INCH / 10**6, "microinches": INCH / 10**6, "micron": Fr(1, 10**6), "0.001 in": INCH / 1000, "mile": 5280 * FOOT,
+    "mi (U.S. survey)": 5280 * SURVEY_FOOT, "mile (U.S. survey)": 5280 * SURVEY_FOOT, "miles (U.S. survey)": 5280 * SURVEY_FOOT,
+    "M": Fr(1852), "nautical mile": Fr(1852), "pc": AU * 648000 / PI, "parsec": AU * 648000 / PI, "1/6 in (computer)": INCH / 6,
+    "pica (computer)": INCH / 6, "picas (computer)": INCH / 6, "1/6 in": Fr(4217518, 10**9), "pica (printer's)": Fr(4217518, 10**9),
+    "picas (printer's)": Fr(4217518, 10**9), "1/72 in (computer)": INCH / 72, "point (computer)": INCH / 72,
+    "points (computer)": INCH / 72, "1/72 in": Fr(3514598, 10**10), "point (printer's)": Fr(3514598, 10**10),
+    "points (printer's)": Fr(3514598, 10**10), "rd": Fr(33, 2) * SURVEY_FOOT, "rod": Fr(33, 2) * SURVEY_FOOT, "yard": YARD,
+    "pound-force": LBF, "pounds-force": LBF, "kips": 1000 * LBF, "dyne": Fr(1, 10**5), "kilogram-force": GRAVITY,
+    "kilograms-force": GRAVITY, "gram-force": GRAVITY / 1000, "grams-force": GRAVITY / 1000, "ozf": LBF / 16, "ounce-force": LBF / 16,
+    "ounces-force": LBF / 16, "poundal": POUND * FOOT, "2000 lbf": 2000 * LBF, "ton-force": 2000 * LBF, "tons-force": 2000 * LBF,
+    "atmosphere": Fr(101325), "atmosphere (technical)": GRAVITY * 10**4, "atmospheres (technical)": GRAVITY * 10**4,
+    "mbar": Fr(100), "millibar": Fr(100), "cm Hg": MERCURY * 10, "mm Hg": MERCURY, "in Hg": MERCURY * Fr(254, 10),
+    "ft Hg": MERCURY * Fr(3048, 10), "cm H₂O": WATER * 10, "mm H₂O": WATER, "in H₂O": WATER * Fr(254, 10), "ft H₂O": WATER * Fr(3048, 10),
+    "cm Hg (0 °C)": Fr(133322, 100), "cm H₂O (4 °C)": Fr(980638, 10**4), "ft H₂O (39.2 °F)": Fr(298898, 100),
+    "in Hg (32 °F)": Fr(338638, 100), "in Hg (60 °F)": Fr(337685, 100), "in H₂O (39.2 °F)": Fr(249082, 1000),
+    "in H₂O (60 °F)": Fr(24884, 100), "Torr": Fr(101325, 760), "torr": Fr(101325, 760), "mTorr": Fr(101325, 760000),
+    "millitorr": Fr(101325, 760000), "knot": Fr(1852, 3600), "c": LIGHT, "natural unit of velocity": LIGHT,
+    "natural units of velocity": LIGHT, "speed of light in vacuum": LIGHT, "speeds of light in vacuum": LIGHT,
+    "a₀ · Eₕ/ħ": Fr(218769126364, 10**5), "atomic unit of velocity": Fr(218769126364, 10**5), "gallon": GALLON, "gal": GALLON,
+    "atomic units of velocity": Fr(218769126364, 10**5), "gal (UK)": GALLON_UK, "Imperial gallon": GALLON_UK, "hour": Fr(3600),
+    "day": DAY, "minute": Fr(60), "10.0 ns": Fr(1, 10**8), "shake": Fr(1, 10**8), "a": 365 * DAY, "year": 365 * DAY,
+    "Eₕ": Fr(43597447222071, 10**31), "hartree": Fr(43597447222071, 10**31), "Btu (IT)": BTU, "cal (IT)": Fr(41868, 10**4),
+    "Cal (IT)": Fr(41868, 10), "kcal (IT)": Fr(41868, 10), "Btu": Fr(105435, 100), "cal": Fr(4184, 1000), "Cal": Fr(4184),
+    "kcal": Fr(4184), "calorie": Fr(4184, 1000), "Calorie": Fr(4184), "kilocalorie": Fr(4184), "Btu₃₉": Fr(105967, 100),
+    "Btu₅₉": Fr(10548, 10), "Btu₆₀": Fr(105468, 100), "cal₁₅": Fr(41858, 10**4), "cal₂₀": Fr(41819, 10**4), "erg": Fr(1, 10**7),
+    "British thermal unit (IT)": BTU, "British thermal unit": Fr(105435, 100), "British thermal unit (39 °F)": Fr(105967, 100),
+    "British thermal unit (59 °F)": Fr(10548, 10), "British thermal unit (60 °F)": Fr(105468, 100), "calorie (IT)": Fr(41868, 10**4),
+    "calorie (15 °C)": Fr(41858, 10**4), "calorie (20 °C)": Fr(41819, 10**4), "Calorie (IT)": Fr(41868, 10),
+    "kilocalorie (IT)": Fr(41868, 10), "ft · pdl": FOOT * POUND * FOOT, "foot poundal": FOOT * POUND * FOOT, "ft · lbf": FOOT * LBF,
+    "foot pound-force": FOOT * LBF, "foot pounds-force": FOOT * LBF, "10¹⁵ Btu (IT)": 10**15 * BTU, "quad": 10**15 * BTU,
+    "thm (EC)": Fr(105506, 1) * 1000, "therm (EC)": Fr(105506, 1) * 1000, "thm": Fr(1054804, 1) * 100, "therm": Fr(1054804, 1) * 100,
+    "t of TNT": Fr(4184) * 10**6, "ton of TNT": Fr(4184) * 10**6, "tons of TNT": Fr(4184) * 10**6, "W · s": Fr(1), "watt second": Fr(1),
+    "s (sidereal)": Fr(9972696, 10**7), "second (sidereal)": Fr(9972696, 10**7), "d (sidereal)": Fr(8616409, 100),
+    "day (sidereal)": Fr(8616409, 100), "h (sidereal)": Fr(359017, 100), "hour (sidereal)": Fr(359017, 100),
+    "a (sidereal)": Fr(31558150), "year (sidereal)": Fr(31558150), "a (tropical)": Fr(31556930), "year (tropical)": Fr(31556930),
+    "t": Fr(1000), "kip": 1000 * LBF,
+}  # fmt: skip
+NAMED |= {f"{name} of mercury{at}": NAMED[f"{short} Hg{at}"] for name, short in
+          [("centimeter", "cm"), ("millimeter", "mm"), ("inch", "in"), ("foot", "ft")]
+          for at in ("", " (0 °C)", " (32 °F)", " (60 °F)") if f"{short} Hg{at}" in NAMED}  # fmt: skip
+NAMED |= {f"{name} of water{at}": NAMED[f"{short} H₂O{at}"] for name, short in
+          [("centimeter", "cm"), ("millimeter", "mm"), ("inch", "in"), ("foot", "ft")]
+          for at in ("", " (4 °C)", " (39.2 °F)", " (60 °F)") if f"{short} H₂O{at}" in NAMED}  # fmt: skip
+# Parts of the Roman pound of 328.9 g, and multiples of the Roman foot of 296 mm.
+ROMAN = {
+    "mass": {
+        "libra librae": 1, "deunx deunces": Fr(11, 12), "dextans dextantes": Fr(10, 12), "dodrans dodrantes": Fr(9, 12),
+        "bes bessis": Fr(8, 12), "septunx septunces": Fr(7, 12), "semis semisses": Fr(6, 12), "quincunx": Fr(5, 12),
+        "triens trientes": Fr(4, 12), "quadrans_teruncius quadrantes_teruncius": Fr(3, 12), "sextans sextantes": Fr(2, 12),
+        "sescuncia sescunciae": Fr(1, 8), "uncia unciae": Fr(1, 12), "semuncia semunciae": Fr(1, 24), "duella": Fr(1, 36),
+        "sicilicus scilici": Fr(1, 48), "sextula sextulae": Fr(1, 72), "semisextula semisextulae": Fr(1, 144),
+        "scrupulum scrupula": Fr(1, 288), "obolus oboli": Fr(1, 576), "siliqua siliquae": Fr(1, 1728),
+    },
+    "length": {
+        "leuga leugae": 7500, "mille_passus mille_passa": 5000, "stadium stadia": 625, "actus acta": 120, "decempeda decempedae": 10,
+        "passus passa": 5, "gradus": Fr(5, 2), "cubitum cubita": Fr(3, 2), "palmipes palmipedes": Fr(5, 4), "pes pedes": 1,
+        "palmus_maior palmas_maior": Fr(3, 4), "palmus palmas": Fr(1, 4), "uncia unciae": Fr(1, 12), "digitus digiti": Fr(1, 16),
+    },
+}  # fmt: skip
+# Composed of customary units, and exact all the same.
+EXACT = set(
+    "lb lbs lbm pound pounds oz ounce ounces slug slugs lbf pound-force pounds-force kip kips psi ksi psf pcf lbf/in² kip/in² lbf/ft² "
+    "lb/ft³ lb/in³ slug/ft³ lbf/in lbf/ft lb/s slug/s lbf_s/ft lbf·s/ft lbf*s/ft lb/ft lb/in slug/ft gr grain grains".split()
+)
+PUBLISHED = (
+    "lb oz ozf slug lbf pdl pound ounce poundal pound-force pounds-force ounce-force ounces-force ton-force tons-force kip kips cwt "
+    "hundredweight dwt pennyweight survey chain ch fathom rod rd year y parsec pc computer Hg mercury H₂O water Torr torr mTorr "
+    "millitorr Btu British thermal quad gal gallon short long".split()
+)
+
+
+def spelled(name, dimension):
+    """SI value of a spelling of any form."""
+    for names, share in ROMAN.get(dimension, {}).items():
+        if name.replace(" ", "_") in names.split():
+            return share * (LIBRA if dimension == "mass" else PES)
+    name = name.replace("short tons", "short ton").replace("long tons", "long ton")
+    plural = name[-1] == "s" and len(name) > 2
+    one = re.sub(r"^feet ", "foot ", re.sub(r"^inches ", "inch ", name))
+    for known in (name, name[:-1] if plural else name, re.sub(r"s( |$)", r"\1", name, count=1), one):
+        if known in NAMED and (known == name or len(known) > 1):
+            return NAMED[known]
+    if " per " in name or "/" in name:
+        above, below = name.split(" per " if " per " in name else "/")
+        power = 1
+        if below.startswith(("square ", "cubic ")):
+            power, below = (2, below[7:]) if below[0] == "s" else (3, below[6:])
+        elif below[-1] in "²³":
+            power, below = "0123".index({"²": "2", "³": "3"}[below[-1]]), below[:-1]
+        if re.match(r"(k?N|lbf)[ ·*]?s", above):
+            return unit(name)[0]
+        return spelled(above, None) / spelled(below, None) ** power
+    for long in (name, name.removesuffix("s")):
+        for prefix in ("", *LONG_PREFIXES):
+            scale = Fr(10) ** LONG_PREFIXES.get(prefix, 0)
+            if long.startswith(prefix) and long[len(prefix) :] in LONG:
+                return atom(LONG[long[len(prefix) :]])[0] * scale
+            if long == f"{prefix}watt hour":
+                return 3600 * scale
+    if name.endswith("W · h"):
+        return 3600 * Fr(10) ** PREFIXES.get(name[:-5], 0)
+    return unit(name.removesuffix("s") if name == "mils" else name)[0]
+
+
+def units():
+    """Every spelling of the program, in lines of one value: dimension, digits that are in use, value, spellings."""
+    lines = []
+    for line in (HERE.parents[1] / "src/physics/units.txt").read_text().splitlines():
+        # Only what is to be said is taken from there, and no value.
+        dimension, names = line.split(" | ")[:2]
+        groups = {}
+        for name in names.split(", "):
+            value = spelled(name, dimension)
+            mp.dps = 40
+            decimal = mp.nstr(mpf(value.numerator) / value.denominator, 19, min_fixed=-4, max_fixed=9)
+            digits = 17
+            if len(decimal.split("e")[0].replace(".", "").strip("0")) > 7 and name.replace(" ", "_") not in EXACT:
+                words = re.split(r"[\s/·()'.²³]+", name)
+                words += [word.rstrip("s") for word in words]
+                is_roman = any(name.replace(" ", "_") in names.split() for names in ROMAN.get(dimension, ()))
+                digits = 15 if is_roman else 7 if any(word in PUBLISHED for word in words) else 17
+            groups.setdefault((decimal.removesuffix(".0"), digits), []).append(name)
+        lines += [[dimension, digits, decimal, names] for (decimal, digits), names in groups.items()]
+    return lines
+
+
 # ------------------------------------------------------------------------------------------------ from the text to numbers
 
 
@@ -149,6 +306,7 @@ def read(text):
     put("thickness", target, "thickness", "length")
     if "impact" in root:
         put("velocity", root["impact"], "velocity", "velocity")
+    words["title"] = root.get("title")
     words["criterion"] = root.get("perforation", {}).get("criterion", "full-depth")
     stages = root.get("stage", [])
     words["stages"] = len(stages)
@@ -271,6 +429,8 @@ class Problem:
         if self.k > 0:
             self.crater = 0
             self.stages = [Stage(end=crater_depth), *tunnels]
+        if self.exit is not None and self.crater is not None and abs(self.exit - crater_depth) < mpf(10) ** -30:
+            self.exit = crater_depth  # equal as fractions
         if words["criterion"] == "ndrc" and self.exit is not None:
             self.exit = perforating_depth(self.exit / d) * d
 
@@ -474,6 +634,12 @@ def critical(problem, order):
         scale = mp.sqrt(2 * max(abs(law.force(barrier, mpf(0))) for law in stages) * barrier / mass) or mpf(1)
         while index >= 0 and not (index == 0 and problem.crater is not None):
             law, start = stages[index], stages[index - 1].end if index else mpf(0)
+            if law.p == 0 and law.s == 0 and law.r > 0:
+                # Viscosity and drag alone slow the projectile in x, and bring it to rest at no time.
+                growth = mp.exp(law.q * (x - start) / mass)
+                v = (v + law.r / law.q) * growth - law.r / law.q if law.q else v + law.r * (x - start) / mass
+                x, index = start, index - 1
+                continue
             if v == 0 and law.force(x, v) <= 0:
                 x = None
                 break
@@ -548,6 +714,8 @@ def answers(numbers, words, order):
             if problem.Q:
                 out["groups.N"] = problem.mass / (problem.nose * problem.B * n["density"] * problem.d**3)
     flight = None
+    if words["title"] is not None:
+        word["scene.title"] = words["title"]
     if speed is not None:
         scene("velocity_m_s", speed)
         flight = fly(problem, speed, order)
@@ -585,6 +753,8 @@ def answers(numbers, words, order):
         out["critical_energy_j"] = problem.mass * vc**2 / 2
         if not words["stages"] and problem.plain:
             out["dimensionless_energy"] = out["critical_energy_j"] / (problem.d**3 * n["strength"])
+            if problem.thickness == 0:
+                return out, word, problem, flight
             printed, unrounded = eq15(problem.thickness / problem.d)
             out["eq15.printed"], out["eq15.unrounded"] = problem.S * printed, problem.S * unrounded
     return out, word, problem, flight
@@ -595,7 +765,7 @@ def decimals(numbers):
 
 
 def record(name, text, digits=25):
-    """One line of the file."""
+    """One line of the file; of a text that does not ship, only what is not said already, in fewer digits."""
     exact, words = read(text if text is not None else (SCENES / f"{name}.toml").read_text())
     mp.dps = 65
     second, word2, _, _ = answers(decimals(exact), words, 90)
@@ -610,7 +780,8 @@ def record(name, text, digits=25):
         worst = proof_without_viscosity(problem, flight, problem.n["velocity"])
         assert worst < mpf(10) ** -30, (name, mp.nstr(worst, 3))
         mp.dps = 50
-    if first.get("critical_velocity_m_s"):
+    # Through viscosity and drag alone the flight below V_c has no end.
+    if first.get("critical_velocity_m_s") and not any(law.r and not law.p and not law.s for law in problem.stages):
         vc, tiny = first["critical_velocity_m_s"], mpf(10) ** -25
         for sign, outcome in ((1, True), (-1, False)):
             ends = fly(problem, vc * (1 + sign * tiny), 62)["outcome"] == "perforated"
@@ -630,22 +801,301 @@ def record(name, text, digits=25):
         for key, before in base.items():
             if before and key in there:
                 condition[key] += abs(there[key] / before - 1) * 10**14
-    large = {key: mp.nstr(mp.ceil(c), 3) for key, c in condition.items() if 10 < c < 10**10}
+    large = {key: str(int(mp.ceil(c))) for key, c in condition.items() if 10 < c < 10**10}
     show = lambda x: mp.nstr(x, digits, min_fixed=-4, max_fixed=9, strip_zeros=True).removesuffix(".0")
+    if text is not None:
+        digits, last = 19, f"events.{len(flight['events']) - 1 if flight else 0}."
+        for key, x in list(second.items()):
+            # The last event is the end; a coefficient that is absent is zero; others follow.
+            said = key in ("scene.static_force_n", "scene.drag_kg_m", "groups.X_over_d", "critical_energy_j")
+            said |= key == "scene.exit_depth_m" and x == second["scene.thickness_m"]
+            if said or key.startswith(last) or (key.startswith("scene.stages.") and not x):
+                del second[key]
     line = {"name": name, "text": text, "words": word, "numbers": {key: show(x) for key, x in second.items()}}
     if large:
-        line["condition"] = {key: str(int(mpf(c))) for key, c in large.items()}
+        line["condition"] = {key: c for key, c in large.items() if key in second}
     return line
 
 
 SHIPPED = sorted(path.stem for path in SCENES.glob("*.toml"))
 
+# ------------------------------------------------------------------------------------------------ other texts
+
+
+def digits(number, count=4):
+    """A decimal of a few digits near a number."""
+    return f"{float(f'{number:.{count - 1}e}'):.10g}"
+
+
+# Spellings that the texts take in turn.
+SPELLINGS = {
+    "mass": ["kg", "g", "lb", "oz", "slug", "t", "mg", "gr", "lbs", "hg", "Mg", "dag", "pounds", "µg", "ounces", "cg"],
+    "length": ["m", "mm", "in", "cm", "ft", "µm", "km", "mil", "yd", "dm", "um", "mi", "nm", "inches", "feet", "hm", "dam"],
+    "pressure": ["Pa", "MPa", "psi", "ksi", "GPa", "kPa", "bar", "N/mm^2", "kgf/cm^2", "lbf/in^2", "kip/in²", "psf", "atm",
+                 "N/mm²", "kgf/mm²", "at", "hPa", "TPa", "lbf/in2"],
+    "density": ["kg/m^3", "g/cm^3", "lb/ft^3", "lb/in³", "slug/ft^3", "t/m³", "kg/L", "kg/m3", "pcf", "kg/dm³", "g/cm3", "kg/l",
+                "lb/ft³", "kg / m ^3"],
+    "velocity": ["m/s", "km/s", "ft/s", "mm/µs", "km/h", "mi/h", "in/s", "mm/ms", "cm/µs", "kn", "mm/us", "cm/s", "mm/s",
+                 "ft/min", "mi/s", "dm/s"],
+    "force": ["N", "kN", "lbf", "kip", "MN", "kgf", "dyn", "daN", "GN", "gf", "kips", "mN", "hN"],
+    "stiffness": ["N/m", "kN/m", "N/mm", "lbf/in", "lbf/ft", "MN/m", "kN/mm", "kgf/m", "dyn/cm", "J/m²", "GN/m", "gf/cm"],
+    "viscosity": ["kg/s", "N s/m", "kN s/m", "lb/s", "slug/s", "g/s", "lbf s/ft", "N·s/m", "kg/min", "t/s", "Ns/m", "t/h",
+                  "N*s/m", "kg/h", "kNs/m", "lbf·s/ft", "Mg/s"],
+    "drag": ["kg/m", "g/cm", "lb/ft", "slug/ft", "N s²/m²", "g/mm", "lb/in", "t/m", "g/m", "N*s^2/m^2", "t/km", "N·s²/m²", "g/km"],
+}  # fmt: skip
+# Spelled out, where the abbreviations of above do not say it.
+ATOMS |= {name: ATOMS[short] for name, short in [("lbs", "lb"), ("pounds", "lb"), ("ounces", "oz"), ("inches", "in"),
+                                                 ("feet", "ft"), ("kips", "kip")]}  # fmt: skip
+
+
+class Writer:
+    """Writes texts of scenes; units, forms of the file and odd digits come in turn, by a fixed random sequence."""
+
+    def __init__(self, seed):
+        self.random, self.turn = random.Random(seed), dict.fromkeys(SPELLINGS, 0)
+
+    def between(self, low, high):
+        return low * (high / low) ** self.random.random()
+
+    def number(self, value, dimension, count=4):
+        """A quantity near a value in SI units."""
+        names = SPELLINGS[dimension]
+        name = names[self.turn[dimension] % len(names)]
+        self.turn[dimension] += 1
+        text = digits(value / float(unit(name)[0]), count)
+        if name == names[0] and self.turn[dimension] % 2 == 0 and "e" not in text:
+            return text
+        space = "" if self.turn[dimension] % 3 == 0 and name != "um" else " "
+        return f"'{text}{space}{name}'"
+
+    def table(self, name, keys, inline):
+        """`name = { key = value, ... }` or `[name]` and its keys."""
+        keys = [(key, value) for key, value in keys if value is not None]
+        if not keys:
+            return ""
+        if inline:
+            return f"{name} = {{ " + ", ".join(f"{key} = {value}" for key, value in keys) + " }\n"
+        return f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in keys)
+
+    def tables(self, name, entries, inline):
+        bodies = [[(key, value) for key, value in keys if value is not None] for keys in entries]
+        if inline:
+            rows = ["{ " + ", ".join(f"{key} = {value}" for key, value in keys) + " }" for keys in bodies]
+            return f"{name} = [{', '.join(rows)}]\n"
+        return "".join(f"[[{name}]]\n" + "".join(f"{key} = {value}\n" for key, value in keys) for keys in bodies)
+
+    def concrete(self, nose=None, H=None, reach=None, layers=None, **given):
+        """A scene of concrete. `H` in diameters; `reach`: the impact speed over the one that comes to rest at H or, without
+        H, at five diameters, roughly. Keys of `given` are taken as they are, else drawn; None leaves a key out."""
+        draw = lambda key, low, high: given[key] if key in given else self.between(low, high)
+        d, geometry, fc = draw("d", 0.004, 0.3), self.between(2, 150), draw("fc", 15e6, 90e6)
+        rho, k, S = draw("rho", 1500, 3100), given.get("k"), given.get("S")
+        B, c = given.get("B"), given.get("c")
+        nose = nose or f"{{ factor = {digits(self.between(0.1, 0.97), 3)} }}"
+        mass = 0.4 * geometry * max(rho, 1000) * d**3
+        depth = (H if H else 5) * d
+        factor = S or 72 / (fc / 1e6) ** 0.5
+        force = 0.785 * d * d * factor * fc
+        crater = (2 if k is None else k) * d
+        work = force * (depth - crater / 2 if depth > crater else depth**2 / (2 * crater))
+        drag = 0.785 * d * d * 0.4 * (1 if B is None else B) * rho
+        speed = (2 * work / mass * math.exp(drag * max(depth - crater, 0) / mass)) ** 0.5 * (reach or 0)
+        inline, pick = self.random.random() < 0.5, self.random.random
+        stiffness = None if c is None else self.number(c * force / max(crater, d), "stiffness")
+        projectile = [("mass", self.number(mass, "mass")), ("diameter", self.number(d, "length")), ("nose", nose)]
+        exactly = given.get("exactly")
+        if exactly:
+            projectile[1] = ("diameter", exactly[0])
+        target = [("strength", self.number(fc, "pressure")), ("density", self.number(rho, "density") if rho else "0")]
+        if H:
+            target.append(("thickness", exactly[1] if exactly else self.number(H * d, "length")))
+        if layers:
+            entries = [
+                [
+                    ("thickness", None if h is None else self.number(h * d, "length")),
+                    ("strength", self.number(strength, "pressure") if strength else "0"),
+                    ("density", self.number(density, "density") if density else "0"),
+                    ("S", own),
+                    ("viscosity", None if r is None else self.number(r * force / speed, "viscosity")),
+                ]
+                for h, strength, density, own, r in layers
+            ]
+            body = self.tables("target.layer", entries, False)
+        else:
+            body = self.table("target", target, inline)
+        law = [("S", S), ("B", B), ("k", k), ("crater_stiffness", stiffness)]
+        if c is None and pick() < 0.2:
+            law[3] = ("crater_stiffness", "'continuous'")
+        criterion = given.get("criterion")
+        texts = [
+            self.table("projectile", projectile, inline),
+            self.table("resistance", law, inline),
+            self.table("perforation", [("criterion", f"'{criterion}'" if criterion else None)], inline),
+            self.table("impact", [("velocity", self.number(speed, "velocity") if reach else None)], inline),
+        ]
+        self.random.shuffle(texts)
+        title = f"title = 'scene {self.random.randrange(1000)}, of text'\n" if pick() < 0.3 else ""
+        return title + "".join([body, *texts] if body.startswith("target =") else [*texts, body])
+
+    def stages(self, laws, H=None, M=None, V=None, L=None, end=None):
+        """A scene of stages. Each law: shares of M V^2/L, M V^2/L^2, M V/L and M/L, and its end over L; None leaves out."""
+        M, V, L = M or self.between(0.02, 60), V or self.between(20, 900), L or self.between(0.03, 2)
+        units = [("static_force", M * V * V / L, "force"), ("stiffness", M * V * V / L**2, "stiffness"),
+                 ("viscosity", M * V / L, "viscosity"), ("drag", M / L, "drag"), ("end", L, "length")]  # fmt: skip
+        far = self.number(H * L, "length") if H else None
+        entries = [
+            [
+                # An end at the far side is written alike, to be there exactly.
+                (key, None if share is None else far if key == "end" and share == H else self.number(share * scale, dimension))
+                for (key, scale, dimension), share in zip(units, law, strict=True)
+            ]
+            for law in laws
+        ]
+        self.random.shuffle(units)
+        inline = self.random.random() < 0.5
+        texts = [
+            self.table("projectile", [("mass", self.number(M, "mass"))], inline),
+            self.table("impact", [("velocity", self.number(V, "velocity"))], inline),
+            self.table("target", [("thickness", far)], inline),
+        ]
+        self.random.shuffle(texts)
+        body = self.tables("stage", entries, inline)
+        return "".join([body, *texts] if inline else [*texts, body])
+
+
+def texts():
+    """Names and texts, in an order from the plain to the odd."""
+    w, found = Writer(15), {}
+    add = found.__setitem__
+    for shape, key, values in (
+        ("ogive", "caliber_radius_head", ("0.55", "1.9", "4.25", "6")),
+        ("cone", "length_ratio", ("0.31", "0.9", "2.7")),
+        ("spherical", "radius_ratio", ("0.61", "0.83", "1.7", "7")),
+    ):
+        for i, psi in enumerate(values):
+            nose = f"{{ shape = '{shape}', {key} = {psi} }}"
+            H, reach = ((None, 0.8), (6.3, 1.3), (4.1, 0.9), (3.3, 1.6))[i]
+            add(f"{shape} {psi}", w.concrete(nose, H, reach))
+    add("flat stop", w.concrete("{ shape = 'flat' }", None, 1.2))
+    add("flat exit", w.concrete("{ shape = 'flat' }", 3.7, 1.4))
+    # Eq. 14 below, within and above its fit, each stopped and not.
+    for fc in (4.3e6, 9.7e6, 13.1e6, 27e6, 64.7e6, 101e6, 137e6, 211e6):
+        reach = w.between(1.1, 1.7) if len(found) % 2 else w.between(0.55, 0.9)
+        add(f"fc {fc / 1e6:g}", w.concrete(None, w.between(1.2, 9), reach, fc=fc, k=1.37 if len(found) % 3 else None))
+    # Each number of [resistance] alone, and together.
+    for name, given in {
+        "S": dict(S=17.3), "small S": dict(S=3.19), "B": dict(B=1.83), "small B": dict(B=0.27), "k": dict(k=3.1),
+        "small k": dict(k=0.707), "no k": dict(k=0), "no B": dict(B=0), "no rho": dict(rho=0), "c": dict(c=0.87),
+        "small c": dict(c=0.21), "large c": dict(c=2.9), "SB": dict(S=8.6, B=1.27), "Sk": dict(S=9.9, k=2.6),
+        "Bk": dict(B=0.71, k=1.43), "Sc": dict(S=11.3, c=1.9), "kc": dict(k=3.7, c=1.2), "SBkc": dict(S=14.7, B=1.61, k=2.3, c=0.64),
+        "SBk": dict(S=6.1, B=0.43, k=4.1), "no k c": dict(k=0, c=1.3),
+    }.items():  # fmt: skip
+        add(f"{name} exit", w.concrete(None, w.between(2.2, 9), w.between(1.15, 1.8), **given))
+        if len(given) == 1:
+            add(f"{name} stop", w.concrete(None, None if len(found) % 3 else w.between(2.2, 9), w.between(0.6, 0.93), **given))
+    # Far sides: within the crater, at its end, none, nothing, and without an impact.
+    for H in (0.23, 0.9, 1.3, 1.7):
+        add(f"thin {H}", w.concrete(None, H, w.between(1.2, 2.5) if H in (0.9, 1.7) else w.between(0.4, 0.85)))
+    add("H = k d exit", w.concrete(None, 2, 1.3, exactly=("'3 in'", "'6 in'"), d=0.0762))
+    add("H = k d stop", w.concrete(None, 2, 0.7, exactly=("'16 mm'", "'3.2cm'"), d=0.016))
+    add("H = k d, k = 3", w.concrete(None, 3, 1.6, exactly=("'0.2 ft'", "'7.2 in'"), d=0.06096, k=3, S=7.7))
+    add("no impact", w.concrete(None, 4.4, None))
+    add("no impact, c", w.concrete(None, 2.9, None, c=1.7, k=1.1, S=10.3, B=1.4))
+    add("no thickness", w.concrete(None, 1.9, 1.2, exactly=("'37 mm'", "'0 in'")))
+    add("no speed", w.concrete(None, 3.1, 1e-9).replace("velocity =", "velocity = 0 #"))
+    add("slow in the crater", w.concrete(None, None, 0.05))
+    for name, H, reach, given in (
+        ("ndrc thin", 1.1, 1.4, {}), ("ndrc first", 2.6, 0.8, dict(k=1.2)), ("ndrc between", 2.996, 1.3, {}),
+        ("ndrc second", 3.4, 0.9, dict(S=9.1)), ("ndrc third", 7.7, 0.5, dict(B=1.9)), ("ndrc thick", 16.3, 1.2, dict(c=1.3)),
+        ("ndrc beyond", 21.4, 0.9, {}), ("full depth", 5.2, 1.3, {}), ("eq15 beyond", 19.7, 1.1, {}),
+    ):  # fmt: skip
+        criterion = "ndrc" if name.startswith("ndrc") else "full-depth"
+        add(name, w.concrete(None, H, reach, criterion=criterion, **given))
+    # Layers: thickness in diameters, strength, density, S, viscosity as a share of the force.
+    for name, layers, given in (
+        ("two layers", [(3.1, 41e6, 2310, None, None), (2.3, 67e6, 2570, None, None)], dict(reach=1.3)),
+        ("two layers stop", [(3.1, 41e6, 2310, None, None), (4.3, 67e6, 2570, None, None)], dict(reach=0.9)),
+        ("S of each layer", [(2.7, 41e6, 2310, 9.3, None), (3.3, 28e6, 2110, 16.1, None)], dict(reach=1.1)),
+        ("S of one layer", [(2.9, 37e6, 2290, None, None), (3.7, 53e6, 2410, 7.3, None)], dict(reach=0.9, S=13.9)),
+        ("S of no layer", [(2.3, 47e6, 2270, None, None), (2.6, 33e6, 2050, None, None)], dict(reach=1.2, S=10.7)),
+        ("S by Eq. 14 beside", [(2.6, 7.7e6, 1870, None, None), (3.1, 149e6, 2680, 5.9, None)], dict(reach=1.1)),
+        ("viscous layer", [(2.4, 36e6, 2330, None, None), (1.9, 44e6, 2440, None, 0.31)], dict(reach=1.3)),
+        ("viscous layers", [(2.7, 31e6, 2130, 12.7, 0.17), (2.1, 57e6, 2490, None, 0.43)], dict(reach=1.6)),
+        ("viscous stop", [(3.3, 43e6, 2390, None, 0.23), (None, 29e6, 2080, None, 0.37)], dict(reach=0.8)),
+        ("viscous in a gap", [(2.8, 51e6, 2370, None, None), (1.4, 0, 0, None, 0.11), (1.7, 38e6, 2210, None, None)], dict(reach=1.3)),
+        ("gap", [(2.5, 34e6, 2260, None, None), (3.6, 0, 0, None, None), (1.3, 71e6, 2610, None, None)], dict(reach=1.1, S=9.7)),
+        ("gap stop", [(2.2, 34e6, 2260, None, None), (1.1, 0, 0, None, None), (None, 71e6, 2610, None, None)], dict(reach=0.9)),
+        ("water in a gap", [(2.9, 42e6, 2340, None, None), (2.7, 0, 998, None, None), (1.2, 26e6, 2160, None, None)], dict(reach=1.4)),
+        ("crater over layers", [(0.6, 83e6, 2710, None, None), (0.7, 19e6, 1930, None, None), (3.2, 46e6, 2420, None, None)], dict(reach=1.1)),
+        ("crater to a weak layer", [(1.4, 91e6, 2730, None, None), (2.2, 17e6, 1890, None, None), (1.9, 58e6, 2480, None, None)], dict(reach=1.2, k=1.9)),
+        ("thinner than the crater", [(0.4, 45e6, 2350, None, None), (0.9, 62e6, 2540, 8.9, None)], dict(reach=0.8, k=2.7)),
+        ("layers without crater", [(1.3, 23e6, 1990, None, None), (1.6, 48e6, 2450, None, 0.13), (1.1, 39e6, 2240, 18.3, None)], dict(reach=1.2, k=0, B=1.31)),
+        ("layers and c", [(2.6, 54e6, 2460, None, None), (1.7, 32e6, 2180, None, None)], dict(reach=1.3, c=1.23, B=0.83)),
+        ("layers and c stop", [(2.3, 49e6, 2430, None, None), (2.9, 35e6, 2220, None, None)], dict(reach=0.8, c=0.67, k=1.7)),
+        ("layers ndrc", [(2.4, 44e6, 2360, None, None), (2.7, 61e6, 2520, None, None)], dict(reach=1.1, criterion="ndrc")),
+        ("five layers", [(0.9, 30e6, 2120, None, None), (1.7, 55e6, 2470, 10.9, None), (0.8, 0, 0, None, None),
+                         (1.9, 76e6, 2630, None, 0.07), (1.2, 24e6, 2020, None, None)], dict(reach=1.5, k=1.6, B=1.17)),
+    ):  # fmt: skip
+        add(name, w.concrete(None, None, layers=layers, **given))
+    # Stages: p, s, r, q and the end, as shares of what stops the projectile about a length L.
+    none = None
+    for name, laws, H in (
+        ("p", [(0.43, none, none, none, none)], none),
+        ("s", [(none, 0.83, none, none, none)], 0.7),
+        ("ps", [(0.27, 0.61, none, none, none)], none),
+        ("pr", [(0.31, none, 0.47, none, none)], none),
+        ("sr under", [(none, 1.7, 0.61, none, none)], none),
+        ("sr over", [(none, 0.19, 1.9, none, none)], none),
+        ("psr under", [(0.23, 1.3, 0.41, none, none)], 0.9),
+        ("psr over", [(0.17, 0.29, 2.3, none, none)], none),
+        ("pq", [(0.37, none, none, 0.59, none)], none),
+        ("sq", [(none, 0.79, none, 0.33, none)], none),
+        ("psq", [(0.21, 0.53, none, 0.39, none)], 0.47),
+        ("prq", [(0.19, none, 0.23, 0.41, none)], none),
+        ("srq", [(none, 0.67, 0.29, 0.37, none)], none),
+        ("psrq", [(0.13, 0.47, 0.26, 0.34, none)], none),
+        ("psrq exit", [(0.11, 0.36, 0.24, 0.31, none)], 0.57),
+        ("r exit", [(none, none, 0.83, none, none)], 0.61),
+        ("q exit", [(none, none, none, 1.3, none)], 1.7),
+        ("rq exit", [(none, none, 0.37, 0.43, none)], 0.9),
+        ("nothing, then p", [(none, none, none, none, 0.41), (0.83, none, none, none, none)], none),
+        ("two", [(0.31, 0.23, 0.17, 0.13, 0.37), (0.19, 0.41, 0.29, 0.07, none)], none),
+        ("two exit", [(0.14, 0.33, 0.09, 0.21, 0.29), (0.26, 0.12, 0.18, 0.06, none)], 0.73),
+        ("three", [(0.11, none, 0.16, 0.22, 0.23), (none, 0.53, none, 0.31, 0.59), (0.43, 0.27, 0.13, none, none)], none),
+        ("three exit", [(none, 0.71, none, none, 0.19), (0.24, none, none, 0.37, 0.43), (0.09, 0.28, 0.21, none, none)], 0.67),
+        ("stiffness later", [(0.22, none, none, 0.18, 0.31), (none, 0.91, none, none, none)], 0.83),
+        ("stiffness later, viscous", [(0.12, 0.17, none, 0.15, 0.27), (0.07, 0.63, 0.33, none, none)], none),
+        ("four", [(0.16, 0.21, none, none, 0.17), (0.29, none, none, 0.23, 0.31), (none, none, 0.37, none, 0.47), (0.41, 0.13, none, 0.11, none)], none),
+        ("an end at H", [(0.19, 0.27, none, 0.14, 0.53)], 0.53),
+        ("an end beyond H", [(0.23, none, none, 0.32, 0.21), (0.15, 0.24, none, 0.09, 0.97)], 0.49),
+        ("H within the first", [(0.17, 0.38, none, 0.26, 0.71), (0.33, none, none, 0.12, none)], 0.43),
+        ("H within the first, stop", [(0.83, 0.94, none, 0.46, 0.77), (0.31, none, none, 0.19, none)], 0.69),
+        ("driven", [(-0.31, none, none, 0.23, none)], 1.3),
+        ("driven, then stopped", [(-0.23, 0.11, none, none, 0.61), (0.67, 0.37, none, 0.19, none)], none),
+        ("driven and viscous", [(-0.17, 0.09, 0.43, none, none)], 0.8),
+        ("a barrier, then driven", [(0.57, none, none, 0.13, 0.53), (-0.41, none, none, 0.21, none)], 1.4),
+        ("a barrier that stops", [(0.97, 0.83, none, 0.13, 0.79), (-0.29, none, none, 0.17, none)], 1.2),
+        ("driven, then a viscous barrier", [(-0.19, none, none, none, 0.33), (0.23, 0.14, 0.27, 0.16, none)], 0.71),
+    ):  # fmt: skip
+        add(f"stages {name}", w.stages(laws, H))
+    # Noses, groups and far sides at random.
+    noses = ["shape = 'flat'", "shape = 'ogive', caliber_radius_head = {:.3g}", "shape = 'cone', length_ratio = {:.3g}",
+             "shape = 'spherical', radius_ratio = {:.3g}"]  # fmt: skip
+    for i in range(5):
+        nose = "{ " + noses[i % 4].format(w.between(0.6, 5)) + " }"
+        law = {key: float(digits(w.between(low, high), 3)) for key, low, high in (("S", 4, 20), ("B", 0.4, 2.5), ("k", 0.5, 4))}
+        H = w.between(0.8, 12)
+        add(f"mixed {i}", w.concrete(nose, H, w.between(0.5, 2), fc=w.between(9e6, 180e6), c=w.between(0.3, 2), **law))
+    return found
+
 
 def main():
-    lines = [record(name, None) for name in SHIPPED]
-    text = {"recipe": "python3 verification/references/exact.py", "scenes": []}
+    lines = [record(name, None) for name in SHIPPED] + [record(name, text) for name, text in texts().items()]
+    head = json.dumps({"recipe": "python3 verification/references/exact.py", "scenes": []})
     body = ",\n".join(json.dumps(line, ensure_ascii=False, separators=(",", ":")) for line in lines)
-    (HERE / "exact.json").write_text(json.dumps(text)[:-2] + "\n" + body + "\n]}\n")
+    rows = ",\n".join(json.dumps(line, ensure_ascii=False, separators=(",", ":")) for line in units())
+    (HERE / "units.json").write_text(f"[\n{rows}\n]\n")
+    (HERE / "exact.json").write_text(head[:-2] + "\n" + body + "\n]}\n")
 
 
 if __name__ == "__main__":

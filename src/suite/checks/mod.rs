@@ -32,9 +32,9 @@ macro_rules! check {
     )*};
     (@by $self:ident, $subject:ident, $measure:ident,) => { $measure($subject) };
     (@by $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => { $measure($self, $subject) };
-    (@counting $self:ident, $subject:ident, $measure:ident,) => { super::counted(|seen| $measure($subject, seen)) };
+    (@counting $self:ident, $subject:ident, $measure:ident,) => { $crate::suite::checks::edges::counted(|seen| $measure($subject, seen)) };
     (@counting $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => {
-        super::counted(|seen| $measure($self, $subject, seen))
+        $crate::suite::checks::edges::counted(|seen| $measure($self, $subject, seen))
     };
 }
 
@@ -71,6 +71,7 @@ mod manufactured;
 mod orders;
 mod peers;
 mod scheme;
+mod texts;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -91,7 +92,7 @@ use crate::studies::random::Random;
 
 pub use self::{
     agreement::*, applications::*, commands::*, counts::*, edges::*, formulas::*, invariants::*, known_bad::*,
-    lanes::*, manufactured::*, orders::*, peers::*, scheme::*,
+    lanes::*, manufactured::*, orders::*, peers::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -131,6 +132,7 @@ macro_rules! every_check {
 }
 
 every_check! {
+    ExactText SetText Units Wire
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
     KnownBad Counted

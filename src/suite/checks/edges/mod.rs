@@ -38,7 +38,7 @@ impl Subject<'_> {
 
 /// Counts expectations, and states the first that fails.
 #[derive(Debug, Default)]
-struct Violations {
+pub(in crate::suite::checks) struct Violations {
     checks: usize,
     count: usize,
     first: Option<String>,
@@ -46,7 +46,7 @@ struct Violations {
 }
 
 impl Violations {
-    fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
+    pub(in crate::suite::checks) fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
         self.checks += 1;
         if !holds {
             self.count += 1;
@@ -65,7 +65,7 @@ impl Violations {
 }
 
 /// What `check` counts.
-fn counted(check: impl FnOnce(&mut Violations) -> Found<()>) -> Found {
+pub(in crate::suite::checks) fn counted(check: impl FnOnce(&mut Violations) -> Found<()>) -> Found {
     let mut seen = Violations::default();
     check(&mut seen)?;
     Ok(seen.measurement())
