@@ -97,9 +97,14 @@ impl MethodName {
     ///
     /// The multiples are those by which the adapter widens the library's local tolerance into an error bound.
     pub fn promise(self) -> f64 {
+        self.promise_at(RTOL_DEFAULT)
+    }
+
+    /// The same of a library method at the tolerance `rtol`.
+    pub fn promise_at(self, rtol: f64) -> f64 {
         match (self, self.accuracy()) {
-            (Self::TrBdf2, _) => 3.0 * RTOL_DEFAULT.powf(2.0 / 3.0),
-            (_, Accuracy::Tolerance) => 10.0 * RTOL_DEFAULT,
+            (Self::TrBdf2, _) => 3.0 * rtol.powf(2.0 / 3.0),
+            (_, Accuracy::Tolerance) => 10.0 * rtol,
             _ => f64::EPSILON,
         }
     }

@@ -70,6 +70,7 @@ mod lanes;
 mod manufactured;
 mod orders;
 mod peers;
+mod problems;
 mod scheme;
 mod texts;
 
@@ -92,7 +93,7 @@ use crate::studies::random::Random;
 
 pub use self::{
     agreement::*, applications::*, commands::*, counts::*, edges::*, formulas::*, invariants::*, known_bad::*,
-    lanes::*, manufactured::*, orders::*, peers::*, scheme::*, texts::*,
+    lanes::*, manufactured::*, orders::*, peers::*, problems::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -148,6 +149,7 @@ every_check! {
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
+    EveryNumber MarginBound CriticalBound Response
 }
 
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.

@@ -1,0 +1,497 @@
+//! Random problems of every kind of stage: every number of a solution, every error bound, every tolerance.
+//!
+//! Truth is the Taylor series in double-double, beside which the other methods share nothing but the law of a stage.
+
+use serde::Deserialize;
+use twofloat::TwoFloat;
+
+use super::super::claim::{Found, Measurement, NotMeasured};
+use super::edges::{exact, is_right};
+use super::{Subject, Worst, refusal_or_failure, worse};
+use crate::integrators::{Detail, Energy, Flight, Method, Taylor};
+use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, Stage, State};
+use crate::studies::critical_velocity::critical_velocity;
+use crate::studies::random::Random;
+use crate::studies::rounding;
+
+check! {
+    /// `count` random problems of each of `kinds`, solved by the method: outcome, every event, rows of the path (depth, time,
+    /// velocity, force and stage) and the end against double-double; worst error over its condition.
+    EveryNumber {
+        /// Kinds of the problems.
+        kinds: Vec<Kind>,
+        /// How many of each.
+        count: usize,
+        /// Relative tolerance of the method.
+        rtol: Option<f64>,
+    } in Random, "promises x condition", by every_number;
+    /// Error bounds of the exit margin of `count` random problems of each of `kinds`: how many times the bound holds the
+    /// error that a tenth of the problems of a kind exceed, of the kind where it is most. An error beyond its bound breaks
+    /// it, and so does a kind below `least`.
+    MarginBound {
+        /// Kinds of the problems.
+        kinds: Vec<Kind>,
+        /// How many of each.
+        count: usize,
+        /// The least quotient of bound and error.
+        least: f64,
+        /// Relative tolerance of the method.
+        rtol: Option<f64>,
+    } in Random, "bound/error", by margin_bound;
+    /// The same of the critical velocity, found by halving in double-double.
+    CriticalBound {
+        /// Kinds of the problems.
+        kinds: Vec<Kind>,
+        /// How many of each.
+        count: usize,
+        /// The least quotient of bound and error.
+        least: f64,
+        /// Relative tolerance of the method.
+        rtol: Option<f64>,
+    } in Random, "bound/error", by critical_bound;
+    /// Mean error over random problems against the tolerance, from `from` to `to`: distance of the slope from `slope`. A
+    /// cost that does not rise breaks it, and so does an error at `to` that is not within a factor 10 of `level` tolerances.
+    Response {
+        /// Largest tolerance.
+        from: f64,
+        /// Smallest tolerance.
+        to: f64,
+        /// Slope expected.
+        slope: f64,
+        /// Error at `to` over `to`.
+        level: f64,
+        /// How many problems.
+        count: usize,
+    } in Random, "order", by response;
+}
+
+/// What stages a random problem has, and where it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// A crater that stops the projectile, or is left through its far side.
+    Crater,
+    /// A crater and a tunnel, with drag or without.
+    Tunnel,
+    /// One stage with p, s and q.
+    SpringAndDrag,
+    /// One stage with p, r and at times q.
+    Viscous,
+    /// One stage with s, r and at times p.
+    ViscousSpring,
+    /// A stage that drives against drag or viscosity, and at times one that resists.
+    Driven,
+    /// Three to five stages without viscosity: forces, springs, drag, gaps.
+    Several,
+    /// Three to five stages, most with viscosity.
+    SeveralViscous,
+}
+
+/// Numbers from which forces are made: mass (kg), speed (m/s), length (m).
+struct Scale {
+    mass: f64,
+    speed: f64,
+    length: f64,
+}
+
+impl Scale {
+    /// A stage of shares of `M V²/L`: static force, force of the spring at L, of viscosity and of drag at V.
+    fn stage(&self, [p, s, r, q]: [f64; 4]) -> Stage {
+        let &Self { mass, speed, length } = self;
+        let force = mass * speed * speed / length;
+        Stage {
+            static_force: p * force,
+            stiffness: s * force / length,
+            viscosity: r * force / speed,
+            drag: q * force / speed / speed,
+            end: f64::INFINITY,
+        }
+    }
+}
+
+impl Kind {
+    /// A problem of this kind. Half of those that can stop do, the others perforate, some with an end of a stage as the
+    /// far side; the far side lies a thousandth to the whole of the depth of rest away from it. `None` where the speed only
+    /// dies out.
+    fn draw(self, random: &mut Random) -> Option<Problem> {
+        let scale = Scale {
+            mass: random.log_uniform(1e-2, 1e2),
+            speed: random.log_uniform(1.0, 1e3),
+            length: random.log_uniform(1e-2, 1e1),
+        };
+        let share = |random: &mut Random| random.log_uniform(0.1, 3.0);
+        let some = |random: &mut Random, chance: f64| if random.chance(chance) { share(random) } else { 0.0 };
+        let length = scale.length;
+        let mut stages = Vec::new();
+        match self {
+            Self::Crater => {
+                let spring = random.log_uniform(0.1, 10.0);
+                let rest = length / spring.sqrt();
+                stages.push(scale.stage([0.0, spring, 0.0, 0.0]).until(rest * random.log_uniform(1.05, 3.0)));
+                stages.push(scale.stage([share(random), 0.0, 0.0, some(random, 0.8)]));
+            }
+            Self::Tunnel => {
+                let depth = random.log_uniform(0.05, 1.0);
+                let spring = random.uniform(0.05, 0.8) / depth / depth;
+                stages.push(scale.stage([0.0, spring, 0.0, 0.0]).until(depth * length));
+                stages.push(scale.stage([share(random), 0.0, 0.0, some(random, 0.8)]));
+            }
+            Self::SpringAndDrag => {
+                stages.push(scale.stage([some(random, 0.7), share(random), 0.0, share(random)]));
+            }
+            Self::Viscous => {
+                stages.push(scale.stage([share(random), 0.0, share(random), some(random, 0.5)]));
+            }
+            Self::ViscousSpring => {
+                stages.push(scale.stage([some(random, 0.5), share(random), share(random), 0.0]));
+            }
+            Self::Driven => {
+                let [r, q] = if random.chance(0.5) { [share(random), 0.0] } else { [0.0, share(random)] };
+                let drive = scale.stage([-share(random), 0.0, r, q]);
+                stages.push(drive.until(length * share(random)));
+                stages.push(scale.stage([share(random), 0.0, 0.0, some(random, 0.5)]));
+            }
+            Self::Several | Self::SeveralViscous => {
+                let count = 3 + random.below(3);
+                let mut end = 0.0;
+                for index in 0..count {
+                    end += length * random.log_uniform(0.03, 0.5);
+                    let r = if self == Self::SeveralViscous { some(random, 0.7) } else { 0.0 };
+                    let [p, s, q] = match random.below(7) {
+                        0 => [share(random), 0.0, 0.0],
+                        1 => [0.0, share(random), 0.0],
+                        2 => [0.0, 0.0, share(random)],
+                        3 => [share(random), 0.0, share(random)],
+                        4 => [share(random), share(random), share(random)],
+                        5 => [-0.3 * share(random), 0.0, share(random)],
+                        _ => [0.0; 3],
+                    };
+                    stages.push(if index + 1 < count {
+                        scale.stage([p, s, r, q]).until(end)
+                    } else {
+                        scale.stage([share(random), s, r, q])
+                    });
+                }
+            }
+        }
+        let problem = match self {
+            Self::Crater | Self::Tunnel => {
+                Problem::crater_and_tunnel(scale.mass, scale.speed, Some(stages[0]), stages[1])
+            }
+            _ => Problem::of_stages(scale.mass, scale.speed, stages),
+        };
+        let rest = Taylor::default().solve_in(&problem, Detail::End).ok()?.end.depth;
+        let away = random.log_uniform(1e-3, 1.0);
+        let ends: Vec<f64> = problem.stages.iter().map(|stage| stage.end).filter(|end| *end < rest).collect();
+        let exit = if !ends.is_empty() && random.chance(0.15) {
+            ends[random.below(ends.len())]
+        } else if random.chance(0.5) {
+            rest * (1.0 + away)
+        } else {
+            rest * (1.0 - 0.95 * away)
+        };
+        Some(problem.with_exit(exit))
+    }
+}
+
+/// `count` problems of `kind` for the claim.
+fn problems(subject: &Subject<'_>, kind: Kind, count: usize) -> Found<Vec<Problem>> {
+    let mut random = subject.random(&format!("problems {kind:?}"));
+    let drawn: Vec<_> = (0..2 * count).filter_map(|_| kind.draw(&mut random)).take(count).collect();
+    holds!(drawn.len() == count, "only {} of {} problems come to rest", drawn.len(), 2 * count);
+    Ok(drawn)
+}
+
+/// The solution, unless the method has none for stages of this kind.
+fn attempt(method: &Method, problem: &Problem, detail: Detail) -> Found<Option<Flight>> {
+    match method.integrator().solve(problem, detail) {
+        Ok(flight) => Ok(Some(flight)),
+        Err(error) if error.is_usage() => Ok(None),
+        Err(error) => Err(refusal_or_failure(error)),
+    }
+}
+
+/// How errors of a path are judged: relative to the greatest speed on it, and to what a loss of speed makes of times.
+struct Judge<'a> {
+    problem: &'a Problem,
+    fastest: f64,
+    /// Least `V t/x` so far: an error of the speed counts so many times less in itself than in the time.
+    slowest: f64,
+}
+
+impl Judge<'_> {
+    /// Worst error of `found`, at a boundary or on the way, against `exact` at the same depth.
+    fn passing(&mut self, found: &State, exact: &State<TwoFloat>) -> f64 {
+        let (time, depth, velocity) = (exact.time.value(), exact.depth.value(), exact.velocity.value());
+        if time == 0.0 || depth == 0.0 {
+            return if found.time == 0.0 { 0.0 } else { f64::INFINITY };
+        }
+        self.slowest = self.slowest.min(velocity * time / depth);
+        let (v, t) = (TwoFloat::from(found.velocity), TwoFloat::from(found.time));
+        let energy = ((v - exact.velocity) * (v + exact.velocity)).value() / self.fastest / self.fastest;
+        let late = (t - exact.time).value() / time * self.slowest;
+        worse(energy.abs(), late.abs())
+    }
+
+    /// Worst error of `found` at rest, in `stage`.
+    fn at_rest(&self, found: &State, exact: &State<TwoFloat>, stage: usize) -> f64 {
+        let (time, depth) = (exact.time.value(), exact.depth.value());
+        let brake = self.problem.stages[stage].force(depth, 0.0) / self.problem.mass;
+        let far = (TwoFloat::from(found.depth) - exact.depth).value() / depth;
+        let late = (TwoFloat::from(found.time) - exact.time).value() / time;
+        let in_depth = (2.0 * brake * depth / self.fastest / self.fastest).min(1.0);
+        let in_time = (brake * time / self.fastest).min(self.slowest);
+        if found.velocity == 0.0 { worse((far * in_depth).abs(), (late * in_time).abs()) } else { f64::NAN }
+    }
+}
+
+/// The greatest speed of a flight, at impact or an event.
+fn fastest(problem: &Problem, exact: &Flight<TwoFloat>) -> f64 {
+    exact.events.iter().map(|event| event.state.velocity.value()).fold(problem.impact_speed, f64::max)
+}
+
+/// Worst error of the events and of the end of `flight`; what is missing, or in another order, breaks the claim.
+fn error_of_events(problem: &Problem, flight: &Flight, exact: &Flight<TwoFloat>) -> Found<f64> {
+    let kinds = |events: &[EventKind]| format!("{events:?}");
+    let found: Vec<_> = flight.events.iter().map(|event| event.kind).collect();
+    let right: Vec<_> = exact.events.iter().map(|event| event.kind).collect();
+    holds!(found == right, "{} in place of {}, of {problem:?}", kinds(&found), kinds(&right));
+    holds!(flight.stage == exact.stage, "ends in stage {}, not {}, of {problem:?}", flight.stage, exact.stage);
+    let last = flight.events.last().map(|event| event.state);
+    holds!(last == Some(flight.end), "the last event is not the end of {problem:?}");
+    let mut judge = Judge { problem, fastest: fastest(problem, exact), slowest: 1.0 };
+    let mut worst = 0.0;
+    for (event, Event { kind, state }) in flight.events.iter().zip(&exact.events) {
+        let error = if *kind == EventKind::Rest {
+            judge.at_rest(&event.state, state, exact.stage)
+        } else {
+            holds!(event.state.depth == state.depth.value(), "{kind:?} at {} m of {problem:?}", event.state.depth);
+            judge.passing(&event.state, state)
+        };
+        worst = worse(worst, error);
+    }
+    Ok(worst)
+}
+
+/// Worst error of four rows of the path of `flight` or more; its force is the law of its stage in every row.
+fn error_of_rows(problem: &Problem, flight: &Flight, exact_end: &Flight<TwoFloat>) -> Found<f64> {
+    let rows = &flight.trajectory;
+    let (first, last) = rows.first().zip(rows.last()).ok_or_else(|| NotMeasured::broken("no path"))?;
+    holds!(first.state == State::at_impact(problem), "the path begins at {}", first.state);
+    holds!(last.state == flight.end, "the path ends at {}, the flight at {}", last.state, flight.end);
+    holds!(rows.windows(2).all(|pair| pair[0].state.time <= pair[1].state.time), "times fall in {problem:?}");
+    let mut worst = 0.0;
+    let mut judge = Judge { problem, fastest: fastest(problem, exact_end), slowest: 1.0 };
+    let apart = (rows.len() / 4).max(2);
+    for (index, row) in rows.iter().enumerate() {
+        let State { depth: x, velocity: v, .. } = row.state;
+        let law = &problem.stages[row.stage];
+        let is_inside = problem.start_of(row.stage) <= x && x <= law.end;
+        holds!(is_inside, "a row at {x} m is of stage {} of {problem:?}", row.stage);
+        let terms = [law.static_force, law.stiffness * x, law.viscosity * v, law.drag * v * v];
+        let size: f64 = terms.iter().map(|term| term.abs()).sum();
+        let difference = (row.force - terms.iter().sum::<f64>()).abs();
+        holds!(difference <= 8.0 * f64::EPSILON * size, "force {} N at {} of {problem:?}", row.force, row.state);
+        let is_judged = index % apart == apart - 1 && x > 0.0 && v > 0.0 && x < exact_end.end.depth.value();
+        if is_judged {
+            let there = exact(&problem.clone().with_exit(x))?;
+            worst = worse(worst, judge.passing(&row.state, &there.end));
+        }
+    }
+    Ok(worst)
+}
+
+fn every_number(EveryNumber { kinds, count, rtol }: &EveryNumber, subject: &Subject<'_>) -> Found {
+    let method = subject.method(*rtol)?;
+    let promise = rtol.map_or(subject.promise(), |rtol| subject.method_name().promise_at(rtol));
+    let mut worst = Worst::default();
+    let mut solved = 0;
+    for &kind in kinds {
+        let (mut judged, mut stops) = (0, 0);
+        for (index, problem) in problems(subject, kind, *count)?.iter().enumerate() {
+            let Some(flight) = attempt(&method, problem, Detail::Trajectory)? else { continue };
+            let exact = exact(problem)?;
+            if let Some(margin) = exact_margin(problem, &exact)? {
+                holds!(is_right(flight.outcome, margin.value()), "{} of {problem:?}", flight.outcome);
+            }
+            judged += 1;
+            if [flight.outcome, exact.outcome].contains(&Outcome::Undecided) {
+                continue;
+            }
+            let is_same = flight.outcome == exact.outcome;
+            holds!(is_same, "{} where {} is right, of {problem:?}", flight.outcome, exact.outcome);
+            stops += usize::from(exact.outcome.is_stop());
+            let name = || format!("in problem {index} of {kind:?}, {problem:?}");
+            worst.take(error_of_events(problem, &flight, &exact)? / promise, name);
+            worst.take(error_of_rows(problem, &flight, &exact)? / promise, name);
+        }
+        holds!(3 * judged >= *count, "only {judged} of {count} problems of {kind:?} are solved");
+        let few = judged / 12;
+        holds!((few..=judged - few).contains(&stops), "{stops} of {judged} of {kind:?} stop");
+        solved += judged;
+    }
+    let found = worst.measurement();
+    let remark = format!("{solved} problems; {}", found.remark);
+    Ok(found.resolving(1.0).remark(remark))
+}
+
+/// The exit margin in double-double. `None` where stops in viscous stages leave it to a formula of the engine.
+fn exact_margin(problem: &Problem, exact: &Flight<TwoFloat>) -> Found<Option<TwoFloat>> {
+    let is_crossed = |index: usize| problem.start_of(index) < problem.exit_depth;
+    let is_viscous = (0..problem.stages.len()).any(|index| is_crossed(index) && problem.stages[index].viscosity > 0.0);
+    if !is_viscous {
+        return Ok(Energy::new().exit_margin_in(&problem.cast::<TwoFloat>())?.map(|(margin, ..)| margin));
+    }
+    let speed = TwoFloat::from(problem.impact_speed);
+    if exact.at(EventKind::Exit).is_some() {
+        let squares = exact.events.iter().filter(|event| event.kind != EventKind::Rest).map(|event| {
+            let share = event.state.velocity.over(speed);
+            share * share
+        });
+        return Ok(squares.reduce(|a, b| if b.value() < a.value() { b } else { a }));
+    }
+    let law = &problem.stages[exact.stage];
+    if law.end < problem.exit_depth || law.viscosity == 0.0 {
+        return Ok(None);
+    }
+    // Minus twice the static work from rest to the exit, over M V0².
+    let (rest, exit) = (exact.end.depth, TwoFloat::from(problem.exit_depth));
+    let mean = TwoFloat::from(law.static_force) + TwoFloat::from(0.5 * law.stiffness) * (rest + exit);
+    let lacking = TwoFloat::from(2.0) * mean * (exit - rest);
+    Ok(Some(-lacking.over(TwoFloat::from(problem.mass)).over(speed).over(speed)))
+}
+
+/// The largest of the quotients of bound and error that nine tenths of the problems of each of `kinds` keep to, whose
+/// shares, errors over their bounds, `shares` gives with the worst of them.
+fn quotient(kinds: &[Kind], count: usize, least: f64, shares: impl Fn(Kind) -> Found<(Vec<f64>, Worst)>) -> Found {
+    let (mut most, mut remark) = (0.0, Vec::new());
+    for &kind in kinds {
+        let (mut shares, worst) = shares(kind)?;
+        holds!(3 * shares.len() >= count, "only {} of {count} problems of {kind:?} have a bound", shares.len());
+        holds!(worst.value <= 1.0, "an error of {} bounds, {}", worst.value, worst.place);
+        shares.sort_by(f64::total_cmp);
+        let upper = shares[shares.len() - 1 - shares.len() / 10];
+        holds!(1.0 / upper >= least, "errors of {upper:.3} bounds are no rarity among {kind:?}");
+        most = worse(most, 1.0 / upper);
+        remark.push(format!("{kind:?} {:.1}", 1.0 / upper));
+    }
+    Ok(Measurement::new(most).remark(remark.join(", ")))
+}
+
+fn margin_bound(MarginBound { kinds, count, least, rtol }: &MarginBound, subject: &Subject<'_>) -> Found {
+    let method = subject.method(*rtol)?;
+    quotient(kinds, *count, *least, |kind| {
+        let mut worst = Worst::default();
+        let mut shares = Vec::new();
+        for (index, problem) in problems(subject, kind, *count)?.iter().enumerate() {
+            let Some(flight) = attempt(&method, problem, Detail::End)? else { continue };
+            let Some(exact) = exact_margin(problem, &exact(problem)?)? else { continue };
+            let (margin, bound) = flight
+                .exit_margin
+                .zip(flight.exit_margin_error)
+                .ok_or_else(|| NotMeasured::broken(format!("no margin of {problem:?}")))?;
+            let error = (TwoFloat::from(margin) - exact).value().abs();
+            // Far from zero the rounding of the margin itself may exceed a bound that is there to decide its sign.
+            let rounding = 4.0 * f64::EPSILON * exact.value().abs();
+            worst.take((error - rounding).max(0.0) / bound, || format!("of problem {index} of {kind:?}, {problem:?}"));
+            shares.push(error / bound);
+        }
+        Ok((shares, worst))
+    })
+}
+
+fn critical_bound(CriticalBound { kinds, count, least, rtol }: &CriticalBound, subject: &Subject<'_>) -> Found {
+    let method = subject.method(*rtol)?;
+    quotient(kinds, *count, *least, |kind| {
+        let mut worst = Worst::default();
+        let mut shares = Vec::new();
+        for (index, problem) in problems(subject, kind, *count)?.iter().enumerate() {
+            let Some((share, spacing)) = critical_share(&method, problem)? else { continue };
+            worst.take((share - spacing).max(0.0), || format!("of problem {index} of {kind:?}, {problem:?}"));
+            shares.push(share);
+        }
+        Ok((shares, worst))
+    })
+}
+
+/// Error of the critical velocity of `problem`, whose stages are the same at any speed, and the spacing of numbers there,
+/// over its error bar; `None` where the method has no solution or any speed perforates.
+fn critical_share(method: &Method, problem: &Problem) -> Found<Option<(f64, f64)>> {
+    let at = |impact_speed: f64| Problem { impact_speed, ..problem.clone() };
+    let found = match critical_velocity(|speed| Ok(at(speed)), method.integrator()) {
+        Ok(found) => found,
+        Err(error) if error.is_usage() => return Ok(None),
+        Err(error) => return Err(NotMeasured::broken(format!("{error}, of {problem:?}"))),
+    };
+    if found.velocity == 0.0 {
+        return Ok(None);
+    }
+    let bar = found.error_bar.ok_or_else(|| NotMeasured::broken("no error bar"))?;
+    let energy = 0.5 * problem.mass * found.velocity * found.velocity;
+    holds!((found.energy / energy - 1.0).abs() <= 4.0 * f64::EPSILON, "E_c {} J of V_c {found:?}", found.energy);
+    let perforates = |speed: f64| -> Found<bool> {
+        let flight = exact(&at(speed))?;
+        Ok(flight.at(EventKind::Exit).is_some_and(|state| state.velocity.value() > 0.0))
+    };
+    let spacing = 2.0 * f64::EPSILON * found.velocity;
+    let (mut low, mut high) = (found.velocity - bar - spacing, found.velocity + bar + spacing);
+    let is_inside = !perforates(low)? && perforates(high)?;
+    holds!(is_inside, "V_c is not in {} ± {bar:e} m/s, of {problem:?}", found.velocity);
+    // To a five-hundredth of the bar, or to neighbouring numbers.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if high - low <= 0.004 * bar || middle <= low || middle >= high {
+            break;
+        }
+        if perforates(middle)? {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    Ok(Some(((0.5 * (low + high) - found.velocity).abs() / bar, spacing / bar)))
+}
+
+/// Tolerances of [`response`].
+const RUNGS: i32 = 4;
+
+fn response(&Response { from, to, slope, level, count }: &Response, subject: &Subject<'_>) -> Found {
+    let ladder = (0..RUNGS).map(|rung| from * (to / from).powf(f64::from(rung) / f64::from(RUNGS - 1)));
+    let methods = ladder.map(|rtol| Ok((rtol, subject.method(Some(rtol))?))).collect::<Found<Vec<_>>>()?;
+    let mut sums = vec![(0.0, 0.0); methods.len()];
+    let mut judged = 0;
+    for kind in [Kind::Tunnel, Kind::SpringAndDrag, Kind::Viscous, Kind::Several] {
+        for problem in problems(subject, kind, count)? {
+            let exact = exact(&problem)?;
+            let mut errors = Vec::new();
+            for (_, method) in &methods {
+                let Some(flight) = attempt(method, &problem, Detail::Events)? else { break };
+                // Near the margin a loose tolerance may be undecided, or stop in front of a boundary.
+                if flight.outcome != exact.outcome || flight.stage != exact.stage {
+                    break;
+                }
+                let error = error_of_events(&problem, &flight, &exact)?;
+                errors.push((error.max(f64::EPSILON).ln(), flight.cost.force_evaluations as f64));
+            }
+            if errors.len() == methods.len() {
+                judged += 1;
+                for (sum, (error, cost)) in sums.iter_mut().zip(errors) {
+                    *sum = (sum.0 + error, sum.1 + cost);
+                }
+            }
+        }
+    }
+    holds!(judged >= count, "only {judged} problems are solved at every tolerance");
+    let mean = |(error, cost): &(f64, f64)| ((error / judged as f64).exp(), cost / judged as f64);
+    let means: Vec<(f64, f64)> = sums.iter().map(mean).collect();
+    let rises = means.windows(2).all(|pair| pair[1].1 > pair[0].1);
+    holds!(rises, "the cost does not rise as the tolerance falls: {means:?}");
+    let last = means.last().map_or(f64::NAN, |mean| mean.0 / to);
+    holds!((0.1 * level..=10.0 * level).contains(&last), "the error at rtol {to:e} is {last:.2e} of it");
+    let points = methods.iter().zip(&means);
+    let shown: Vec<_> =
+        points.clone().map(|((rtol, _), (error, cost))| format!("{rtol:.0e}: {error:.1e} at {cost:.0}")).collect();
+    let found = rounding::slope(points.map(|((rtol, _), (error, _))| (*rtol, *error)));
+    Ok(Measurement::new((found - slope).abs())
+        .remark(format!("slope {found:.3}, level {last:.1e}; {}", shown.join(", "))))
+}
