@@ -195,7 +195,7 @@ impl Kind {
 }
 
 /// `count` problems of `kind` for the claim.
-fn problems(subject: &Subject<'_>, kind: Kind, count: usize) -> Found<Vec<Problem>> {
+pub(super) fn problems(subject: &Subject<'_>, kind: Kind, count: usize) -> Found<Vec<Problem>> {
     let mut random = subject.random(&format!("problems {kind:?}"));
     let drawn: Vec<_> = (0..2 * count).filter_map(|_| kind.draw(&mut random)).take(count).collect();
     holds!(drawn.len() == count, "only {} of {} problems come to rest", drawn.len(), 2 * count);
@@ -325,7 +325,7 @@ fn every_number(EveryNumber { kinds, count, rtol }: &EveryNumber, subject: &Subj
             worst.take(error_of_events(problem, &flight, &exact)? / promise, name);
             worst.take(error_of_rows(problem, &flight, &exact)? / promise, name);
         }
-        holds!(3 * judged >= *count, "only {judged} of {count} problems of {kind:?} are solved");
+        holds!(6 * judged >= *count, "only {judged} of {count} problems of {kind:?} are solved");
         let few = judged / 12;
         holds!((few..=judged - few).contains(&stops), "{stops} of {judged} of {kind:?} stop");
         solved += judged;
@@ -367,7 +367,7 @@ fn quotient(kinds: &[Kind], count: usize, least: f64, shares: impl Fn(Kind) -> F
     let (mut most, mut remark) = (0.0, Vec::new());
     for &kind in kinds {
         let (mut shares, worst) = shares(kind)?;
-        holds!(3 * shares.len() >= count, "only {} of {count} problems of {kind:?} have a bound", shares.len());
+        holds!(6 * shares.len() >= count, "only {} of {count} problems of {kind:?} have a bound", shares.len());
         holds!(worst.value <= 1.0, "an error of {} bounds, {}", worst.value, worst.place);
         shares.sort_by(f64::total_cmp);
         let upper = shares[shares.len() - 1 - shares.len() / 10];
