@@ -7,14 +7,14 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use strum::VariantArray as _;
 
 use super::super::claim::{Found, Measurement, NotMeasured};
 use super::super::recorded::{self, RecordedScene};
 use super::edges::Violations;
 use super::{Subject, Worst, build};
-use crate::exchange::peers::PeerRequest;
+use crate::exchange::peers::{PeerAnswer, PeerRequest};
 use crate::exchange::scene_file::{SHIPPED, SceneFile};
 use crate::integrators::method::{Method, MethodOptions};
 use crate::integrators::{Detail, Flight};
@@ -22,7 +22,7 @@ use crate::physics::groups::{self, Groups};
 use crate::physics::parameter::{Parameter, StageNumber};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::{self, Dimension};
-use crate::physics::{Advice, EventKind, Problem, Resistance, Scene, Stage, State};
+use crate::physics::{Advice, EventKind, Outcome, Problem, Resistance, Scene, Stage, State};
 use crate::studies::critical_velocity;
 use crate::studies::random::Random;
 
@@ -44,6 +44,11 @@ check! {
         /// How many.
         problems: usize,
     } in CrossCode, "differences", counting wire;
+    /// Random answers of a peer: numbers that are read otherwise, and differences between two answers other than those put in.
+    WireAnswer {
+        /// How many.
+        problems: usize,
+    } in CrossCode, "differences", counting wire_answer;
 }
 
 /// A group of the numbers of a text.
@@ -342,6 +347,13 @@ fn grouped(text: &RecordedScene, scene: &Scene, seen: &mut Violations) -> Found<
     for (name, group) in [("I", Parameter::Impact), ("N", Parameter::Geometry), ("H_over_d", Parameter::ThicknessRatio)]
     {
         let recorded = text.numbers.get(&format!("groups.{name}")).and_then(|decimal| decimal.parse::<f64>().ok());
+        let of = |name: &str| text.numbers.get(name).and_then(|decimal| decimal.parse::<f64>().ok());
+        let (density, strength) = (of("scene.density_kg_m3"), of("scene.strength_pa"));
+        if let (Some(density), Some(strength), Some(speed)) = (density, strength, scene.velocity) {
+            let johnson = Groups::of(scene, speed).map_or(f64::NAN, |groups| groups.johnson);
+            let is_right = (johnson - density * speed * speed / strength).abs() <= 1e-15 * johnson;
+            seen.expect(is_right, || format!("Johnson's number of `{}` is {johnson:e}", text.name));
+        }
         let (Some(recorded), Ok(value)) = (recorded, group.moves().get(scene)) else { continue };
         let mut other = scene.clone();
         let set = group.moves().set(&mut other, 1.7 * value).and_then(|()| group.set(&mut other, recorded));
@@ -488,4 +500,102 @@ fn of_many_stages(random: &mut Random) -> Problem {
     }
     let problem = Problem::of_stages(random.log_uniform(0.01, 100.0), random.log_uniform(1.0, 1000.0), stages);
     if count == 1 || random.chance(0.75) { problem.with_exit(random.log_uniform(0.05, 2.0) * end) } else { problem }
+}
+
+/// The state `of` in an answer.
+fn fields(mut of: Value, state: State) -> Value {
+    of["time_s"] = json!(state.time);
+    of["depth_m"] = json!(state.depth);
+    of["velocity_m_s"] = json!(state.velocity);
+    of
+}
+
+fn wire_answer(&WireAnswer { problems }: &WireAnswer, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
+    let mut random = subject.random("wire-answer");
+    for index in 0..problems {
+        let mut problem = of_many_stages(&mut random);
+        problem.crater = Some(0).filter(|_| random.chance(0.5) && problem.stages.len() > 1);
+        let (rests, speed) = (random.chance(0.5), problem.impact_speed);
+        let mut state = |depth: f64| State {
+            time: random.log_uniform(1e-6, 1.0),
+            depth,
+            velocity: speed * random.log_uniform(1e-3, 2.0),
+        };
+        let mut places: Vec<_> = problem.stages.iter().map(|stage| stage.end).filter(|end| end.is_finite()).collect();
+        places.push(2.0 * places.last().copied().unwrap_or(0.3));
+        let mut states: Vec<_> = places.into_iter().map(&mut state).collect();
+        if rests && let Some(last) = states.last_mut() {
+            last.velocity = 0.0;
+        }
+        let end = states[states.len() - 1];
+        let answer = |states: &[State]| {
+            let event = |(stage, state): (usize, &State)| {
+                let is_last = stage + 1 == states.len();
+                let name = if !is_last {
+                    "stage-end"
+                } else if rests {
+                    "rest"
+                } else {
+                    "exit"
+                };
+                let event = if is_last { json!({"event": name}) } else { json!({"event": name, "stage": stage}) };
+                fields(event, *state)
+            };
+            let outcome = if rests { "stopped" } else { "perforated" };
+            let events: Vec<_> = states.iter().enumerate().map(event).collect();
+            let whole = json!({"outcome": outcome, "events": events, "force_evaluations": 17 + index, "wall_ns": 2.5,
+                "wall_ns_quartiles": [1.25, 3.75]});
+            let line = fields(whole, states[states.len() - 1]).to_string();
+            serde_json::from_str::<PeerAnswer>(&line).map_err(|error| NotMeasured::broken(error.to_string()))
+        };
+        let read = answer(&states)?;
+        let flight = read.flight(&problem);
+        let listed: Vec<_> = flight.events.iter().map(|event| event.state).collect();
+        let kinds = flight.events.iter().enumerate().all(|(at, event)| match event.kind {
+            EventKind::CraterEnd => problem.crater == Some(at) && at + 1 < states.len(),
+            EventKind::StageEnd(stage) => problem.crater != Some(at) && stage == at && at + 1 < states.len(),
+            EventKind::Rest => rests && at + 1 == states.len(),
+            EventKind::Exit => !rests && at + 1 == states.len(),
+        });
+        let is_outcome = flight.outcome.name() == if rests { "stopped" } else { "perforated" };
+        let is_read = flight.end == end && listed == states && kinds && is_outcome;
+        seen.expect(is_read, || format!("answer {index} is read as {flight:?}"));
+        let costs = (read.force_evaluations, read.wall_ns, read.wall_ns_quartiles);
+        let is_cost = costs == (Some(17 + index as u64), Some(2.5), Some([1.25, 3.75]));
+        seen.expect(is_cost && flight.cost.force_evaluations == 17 + index as u64, || format!("{costs:?}"));
+        // Each number moved by a share of its own.
+        let mut shares = Vec::new();
+        let mut moved = states.clone();
+        for state in &mut moved {
+            let share = [(); 3].map(|()| random.log_uniform(1e-3, 1e-2) * if random.chance(0.5) { 1.0 } else { -1.0 });
+            state.time *= 1.0 + share[0];
+            state.depth *= 1.0 + share[1];
+            state.velocity *= 1.0 + share[2];
+            shares.push(share);
+        }
+        let differences = answer(&moved)?.differences_from(&flight, &problem);
+        let differences = differences.ok_or_else(|| NotMeasured::broken("answers of one outcome are not compared"))?;
+        // The end, and then each event.
+        let rows = std::iter::once(states.len() - 1).chain(0..states.len());
+        let expected = rows.flat_map(|at| {
+            let (State { time, depth, velocity }, [of_time, of_depth, of_velocity]) = (states[at], shares[at]);
+            let stage = problem.stages.iter().find(|stage| depth <= stage.end).unwrap_or(&problem.stages[0]);
+            // V0/V at a place that is passed; at rest V0 over the speed lost in the whole time.
+            let slowing = (stage.static_force + stage.stiffness * depth).abs() / problem.mass * time;
+            let of_passing = if velocity > 0.0 { (speed / velocity).max(1.0) } else { 1.0 };
+            let of_timing = if velocity > 0.0 { of_passing } else { (speed / slowing).max(1.0) };
+            [(of_depth.abs(), 1.0), (of_time.abs(), of_timing), (of_velocity.abs() * velocity / speed, of_passing)]
+        });
+        let expected: Vec<_> = expected.collect();
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-10 * b.abs();
+        let is_all = differences.len() == expected.len()
+            && differences.iter().zip(&expected).all(|(found, (relative, conditioning))| {
+                near(found.relative, *relative) && near(found.conditioning, *conditioning)
+            });
+        seen.expect(is_all, || format!("answer {index} differs by {differences:?} for {expected:?}"));
+        let contrary = Flight { outcome: if rests { Outcome::Perforated } else { Outcome::Stopped }, ..flight };
+        let is_refused = read.differences_from(&contrary, &problem).is_none();
+        seen.expect(is_refused, || format!("answer {index} is compared with a contrary one"));
+    }
+    Ok(())
 }
