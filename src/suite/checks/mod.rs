@@ -133,7 +133,7 @@ macro_rules! every_check {
 }
 
 every_check! {
-    ExactText SetText Units Wire WireAnswer
+    ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
     KnownBad Counted

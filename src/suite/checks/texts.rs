@@ -19,7 +19,7 @@ use crate::exchange::scene_file::{SHIPPED, SceneFile};
 use crate::integrators::method::{Method, MethodOptions};
 use crate::integrators::{Detail, Flight};
 use crate::physics::groups::{self, Groups};
-use crate::physics::parameter::{Parameter, StageNumber};
+use crate::physics::parameter::{LayerNumber, Parameter, StageNumber};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::{self, Dimension};
 use crate::physics::{Advice, EventKind, Outcome, Problem, Resistance, Scene, Stage, State};
@@ -36,6 +36,9 @@ check! {
     /// Every number of every recorded text, set to what it is, in another unit: numbers that read back as another, and
     /// problems that are another.
     SetText {} in Input, "differences", counting set_text;
+    /// Every line of the recorded texts, made wrong in each way that docs/reference.md, "Scene files", excludes, and at the
+    /// edge of what it admits: texts that are refused or read otherwise, or blamed at another place.
+    RefuseText {} in Input, "differences", counting refuse_text;
     /// Every unit through the text of a scene, against its definition: error in ulp, and where the unit is in use with fewer
     /// digits, in half units of the last.
     Units {} in Input, "ulp", by every_unit;
@@ -322,6 +325,18 @@ fn moved(
     seen.expect(is_one, || format!("{place} gives one problem in the text and another in the scene"));
     let is_back = parameter.get(&in_scene) == Ok(other) && parameter.get(&in_text) == Ok(other);
     seen.expect(is_back, || format!("{place} reads back as another number"));
+    // A stated S stays, whatever the strength.
+    let strength = match parameter {
+        Parameter::StaticFactor => Some(Parameter::Strength),
+        Parameter::Layer(layer, LayerNumber::StaticFactor) => Some(Parameter::Layer(layer, LayerNumber::Strength)),
+        _ => None,
+    };
+    if let Some(strength) = strength {
+        for mut scene in [in_scene.clone(), in_text.clone()] {
+            let set = strength.get(&scene).and_then(|of| strength.set(&mut scene, 0.75 * of));
+            seen.expect(set.is_ok() && parameter.get(&scene) == Ok(other), || format!("{place} follows the strength"));
+        }
+    }
     let without = scene.concrete().is_some_and(|c| {
         let no_crater = c.crater_ratio == 0.0 && matches!(parameter, Parameter::CraterStiffness);
         let no_drag = c.density * c.nose_factor * c.inertia_factor == 0.0;
@@ -364,6 +379,107 @@ fn grouped(text: &RecordedScene, scene: &Scene, seen: &mut Violations) -> Found<
         seen.expect(is_back, || format!("{name} = {recorded} of `{}` sets {value_back:e} for {value:e}", text.name));
     }
     Ok(())
+}
+
+/// What docs/reference.md says of a key that holds a number.
+struct Key {
+    /// Whether a scene that leaves it out is none.
+    is_required: bool,
+    /// Whether it may be negative, and whether it may be zero.
+    negative: bool,
+    zero: bool,
+}
+
+/// The rule for `key` of the table `header`.
+fn rule_of(header: &str, key: &str) -> Option<Key> {
+    let is_layer = header == "[[target.layer]]";
+    let (is_required, negative, zero) = match key {
+        "mass" | "diameter" => (true, false, false),
+        "strength" => (true, false, is_layer),
+        "density" | "velocity" => (true, false, true),
+        "S" | "crater_stiffness" => (false, false, false),
+        "B" | "k" | "viscosity" | "stiffness" | "drag" => (false, false, true),
+        "thickness" if !is_layer => (false, false, true),
+        "static_force" => (false, true, true),
+        _ => return None,
+    };
+    Some(Key { is_required, negative, zero })
+}
+
+/// Texts in which a key is made wrong.
+const TEXTS_FOR_A_KEY: usize = 5;
+
+fn refuse_text(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
+    let mut tried = BTreeMap::<_, usize>::new();
+    for text in texts()? {
+        let (lines, name) = (text_of(text)?.lines().collect::<Vec<_>>(), &text.name);
+        let mut header = "";
+        for (at, line) in lines.iter().enumerate() {
+            if line.starts_with('[') {
+                header = line;
+            }
+            let Some((key, value)) = line.split_once(" = ").filter(|(key, _)| !key.starts_with('#')) else { continue };
+            // A nose by what stands in front of its number.
+            let kind = if key == "nose" { value.rsplit_once('=').map_or(value, |(shape, _)| shape) } else { key };
+            let count = tried.entry((header, kind)).or_default();
+            *count += 1;
+            if *count > TEXTS_FOR_A_KEY {
+                continue;
+            }
+            // The scene with `new` in place of the line is read where `is_read`, else refused at that line.
+            let mut expect = |new: &str, is_read: bool, has_place: bool| {
+                let mut changed = lines.clone();
+                changed[at] = new;
+                let read = Scene::from_toml(&changed.join("\n"), name);
+                let place = read.as_ref().err().and_then(|error| error.place.as_ref());
+                let is_there = place.is_some_and(|place| {
+                    let underlined = changed.join("\n").get(place.span.clone()).map(str::to_owned);
+                    place.line == at + 1 && underlined.is_some_and(|part| !part.is_empty() && new.contains(&part))
+                });
+                seen.expect(read.is_ok() == is_read, || format!("`{new}` in `{name}`: {:?}", read.as_ref().err()));
+                seen.expect(is_read || !has_place || is_there, || {
+                    format!("`{new}` in `{name}` is blamed at {place:?}")
+                });
+            };
+            if key == "nose" {
+                nose_ranges(value, |new, is_read| expect(&format!("nose = {new}"), is_read, true));
+            }
+            let Some(rule) = rule_of(header, key) else { continue };
+            expect(&format!("{key} = -3"), rule.negative, true);
+            expect(&format!("{key} = -0.0"), rule.zero, true);
+            expect(&format!("{key} = 0"), rule.zero, true);
+            for wrong in
+                ["nan", "inf", "1e999", "true", "'three'", "'3 J'", "'3 furlong'", "[3]", "{ a = 3 }", "'1,5 mm'"]
+            {
+                expect(&format!("{key} = {wrong}"), false, true);
+            }
+            expect(&format!("{key}s = {value}"), false, true);
+            expect(&format!("{key} = {value}\n{key} = {value}"), false, false);
+            // A last stage that ends at the far side needs one.
+            if key != "thickness" {
+                expect("", !rule.is_required, false);
+            }
+            expect(&format!("{key} = {value} # of the scene"), true, true);
+        }
+    }
+    Ok(())
+}
+
+/// The edges of the range of the number in a nose, each with whether it is admitted.
+fn nose_ranges(nose: &str, mut expect: impl FnMut(&str, bool)) {
+    let Some((shape, number)) = nose.trim_end_matches([' ', '}']).rsplit_once(" = ") else { return };
+    let edges: &[(&str, bool)] = if number.parse::<f64>().is_err() {
+        &[("'round'", false), ("3", false), ("'flat', factor = 0.7", false), ("'flat', radius_ratio = 0.7", false)]
+    } else if shape.ends_with("factor") {
+        &[("0", true), ("1", true), ("-0.001", false), ("1.001", false), ("nan", false)]
+    } else if shape.ends_with("length_ratio") {
+        &[("0.001", true), ("0", false), ("-1", false), ("inf", false)]
+    } else {
+        &[("0.5", true), ("0.499", false), ("'0.7 m'", false), ("nan", false)]
+    };
+    for (edge, is_read) in edges {
+        expect(&format!("{shape} = {edge} }}"), *is_read);
+    }
 }
 
 /// `verification/references/units.json`: dimension, digits that the unit is in use with, SI value, spellings.
