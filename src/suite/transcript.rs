@@ -30,7 +30,7 @@ macro_rules! recorded {
 
 /// The transcripts of `verification/transcript`, by file name without its ending.
 pub const TRANSCRIPTS: &[(&str, &str)] =
-    recorded!["solve", "critical", "sweep", "batch", "converge", "audit", "studies", "report"];
+    recorded!["solve", "critical", "sweep", "batch", "converge", "audit", "studies", "report", "refused"];
 
 /// Runs of the program, and what they said.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -228,11 +228,15 @@ const PASSING: [(&str, &str); 4] =
     [("\"wall_ns\": ", ","), ("\"wall_ms\": ", ","), (" time=\"", "\""), ("</code> with penetrode ", "")];
 
 /// Lines of a text that are kept at most, evenly.
-const LINES_MAX: usize = 200;
+const LINES_MAX: usize = 150;
 
 /// The lines of `text`, the contents of the file `name`, without what differs between two runs; of a page its tables alone.
 fn lasting(name: &str, text: &str) -> Vec<String> {
-    let text = if name.ends_with(".html") { &rows_of(text) } else { text };
+    let text = match name.rsplit('.').next() {
+        Some("html") => &rows_of(text),
+        Some("svg") => &drawn(text),
+        _ => text,
+    };
     // The environment of a run is the last object of its JSON.
     let text = text.split("\n  \"environment\": {").next().unwrap_or_default();
     let count = text.lines().count();
@@ -250,6 +254,21 @@ fn lasting_line(line: &str) -> String {
         line.replace_range(start..length.map_or(line.len(), |length| start + length), "*");
     }
     line
+}
+
+/// A figure without the colours that its classes say again.
+fn drawn(figure: &str) -> String {
+    const SAID_AGAIN: [&str; 5] =
+        [" fill=\"", " stroke=\"", " stroke-linejoin=\"", " stroke-dasharray=\"none\"", " font-family=\""];
+    let mut drawn = figure.to_owned();
+    for attribute in SAID_AGAIN {
+        let mut parts = drawn.split(attribute);
+        let first = parts.next().unwrap_or_default().to_owned();
+        let is_whole = attribute.ends_with("none\"");
+        let rest = parts.map(|part| if is_whole { part } else { part.split_once('"').map_or("", |(_, rest)| rest) });
+        drawn = rest.fold(first, |drawn, part| drawn + part);
+    }
+    drawn
 }
 
 /// The rows of the tables of a page, cells parted by `|`, up to what its run says of the machine.
@@ -479,6 +498,9 @@ mod tests {
         assert_eq!(lasting_line("<testcase name=\"a\" time=\"0.250\">"), "<testcase name=\"a\" time=\"*\">");
         let json = "{\n  \"verdict\": \"passed\",\n  \"environment\": {\n    \"date\": 1\n  }\n}";
         assert_eq!(lasting("report.json", json), ["{", "  \"verdict\": \"passed\","]);
+        let figure =
+            "<path d=\"M1 2\" fill=\"none\" stroke=\"#5a6470\" class=\"s-muted\" stroke-dasharray=\"none\"></path>";
+        assert_eq!(lasting("a.svg", figure), ["<path d=\"M1 2\" class=\"s-muted\"></path>"]);
         assert_eq!(lasting("a.html", "<p>x</p><tr><th>a<td><b>1</b> m</td></tr>y"), ["| a | 1 m"]);
     }
 }
