@@ -144,7 +144,7 @@ every_check! {
     EnergyBalance TimeReversal Similarity Split
     Sweep Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
-    ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver
+    ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop
     Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15

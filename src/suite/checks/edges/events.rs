@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::super::{Subject, off, worse, worst_of};
+use super::super::{Subject, Worst, off, worse, worst_of};
 use super::{Violations, concrete, end_error, exact, exact_margin, is_right, slab};
 use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::{
@@ -53,6 +53,8 @@ check! {
     AcrossTheCraterEnd {} in Events, "promises", by across_the_crater_end;
     /// E19 of `verification/edges.toml`.
     ApproachedForEver {} in Events, "violations", counting approached_for_ever;
+    /// E20 of `verification/edges.toml`.
+    MarginOfAStop {} in Events, "error bounds", by margin_of_a_stop;
 }
 
 /// Widest |margin| at which a method may still be undecided.
@@ -143,6 +145,7 @@ fn exactly_critical(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
         let flight = subject.flight(&problem)?;
         let outcome = flight.outcome;
         seen.expect(matches!(outcome, Outcome::Perforated | Outcome::Undecided), || format!("{outcome}"));
+        check_order(&flight, seen);
         let error = off(flight.end.depth, problem.exit_depth);
         seen.expect(error <= 10.0 * subject.promise(), || format!("ends off H by {error:e}"));
         // Near rest V is the root of an error of W.
@@ -156,8 +159,11 @@ fn kinds(flight: &Flight) -> Vec<EventKind> {
     flight.events.iter().map(|event| event.kind).collect()
 }
 
-/// Events rise in time and depth, and at one place in the order of their kinds.
+/// Events rise in time and depth, and at one place in the order of their kinds; the last of a flight without speed left is
+/// rest.
 fn check_order(flight: &Flight, seen: &mut Violations) {
+    let at_rest = kinds(flight).last() == Some(&EventKind::Rest);
+    seen.expect(at_rest == (flight.end.velocity <= 0.0), || format!("{:?}, and {}", kinds(flight), flight.end));
     for pair in flight.events.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);
         // An ulp of depth takes less than an ulp of time.
@@ -269,6 +275,24 @@ fn scaled_forces(subject: &Subject<'_>) -> Found {
         Scene { mass: 1e-310, resistance: Resistance::Stages(vec![Stage::tunnel(1e-310, 0.0)]), ..slab(false) };
     holds!(subnormal.problem().is_err(), "subnormal mass and force are taken");
     Ok(Measurement::new(worst / subject.promise()))
+}
+
+/// What a stop lacks is continued through the rest of its stage, with `y = 2 q xi/M` up to q/5.
+fn margin_of_a_stop(subject: &Subject<'_>) -> Found {
+    let mut worst = Worst::default();
+    for drag in [0.1, 1.0, 3.0, 7.0, 14.0, 40.0] {
+        for speed in [30.0, 120.0, 300.0] {
+            let law = Stage { static_force: 3e5, stiffness: 5e6, drag, ..Stage::free() };
+            let problem = Problem::of_stages(2.0, speed, [law]).with_exit(0.2);
+            let flight = subject.flight(&problem)?;
+            holds!(flight.outcome.is_stop(), "{} at {speed} m/s with {drag} kg/m", flight.outcome);
+            let (Some(margin), Some(bound)) = (flight.exit_margin, flight.exit_margin_error) else {
+                return Err(NotMeasured::broken("no exit margin with an error bound"));
+            };
+            worst.take((margin - exact_margin(&problem)?).abs() / bound, || format!("at {speed} m/s with {drag} kg/m"));
+        }
+    }
+    Ok(worst.measurement())
 }
 
 /// A spring of 1 kN/m over half a metre, then 1 kg/s over another, 1 kg: V_c² = s (1/2)² + (r/2)².

@@ -88,6 +88,12 @@ fn stated_step_limits(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
         let found = limit(&tunnel, part, VelocityAt::LaggedHalfStep)?;
         seen.expect(is_right(found, part), || format!("lagged drag at {part}: {found:?}"));
     }
+    // A picometre allows steps of 1 ns, 2/w, and a millionth of the kilosecond behind it is a millisecond.
+    let stiff = Problem::of_stages(1.0, 1.0, [Stage::crater(4e18, 1e-12), Stage::tunnel(1e-3, 0.0)]);
+    for velocity in VelocityAt::ALL {
+        let step = CentralDifference { velocity, ..CentralDifference::default() }.time_step(&stiff);
+        seen.expect(step < 1e-9, || format!("the default step for {velocity} is {step} s, where 1e-9 s is unstable"));
+    }
     // One step of twice the duration: V falls below zero in it, and P + Q V² would drive it on to minus infinity.
     for boundaries in Boundaries::ALL {
         for velocity in VelocityAt::ALL {
