@@ -152,7 +152,7 @@ impl Transcript {
                     let [was, is] = [text, other].map(|text| text.lines.get(i).map_or("", String::as_str));
                     let place = || format!("`{}`, {} line {}: {is:?} in place of {was:?}", run.line, text.name, i + 1);
                     let is_there = i < text.lines.len() && i < other.lines.len();
-                    found.take(is_there && numbers.agree(was, is, &place), &place);
+                    found.take(is_there && numbers.agree(was, is, &place), place);
                 }
             }
         }
@@ -317,7 +317,7 @@ impl Numbers {
             self.short += pieces(was).iter().filter(|piece| piece.is_short()).count();
             return true;
         }
-        let [was, is] = [was, is].map(|line| plain(line));
+        let [was, is] = [was, is].map(plain);
         let [was, is] = [pieces(&was), pieces(&is)];
         was.len() == is.len() && was.iter().zip(&is).all(|(was, is)| self.piece_agrees(was, is, place))
     }
@@ -484,7 +484,8 @@ mod tests {
     #[test]
     fn the_last_digit_of_a_number_for_people_may_differ_in_one_of_fifty() {
         let text = |last: u32, count: usize| {
-            let lines = (0..100).map(|i| format!("|1.23{}\n", if i < count { last } else { 4 })).collect::<String>();
+            let line = |i: usize| format!("|1.23{}\n", if i < count { last } else { 4 });
+            let lines = (0..100).map(line).collect::<Vec<_>>().concat();
             Transcript::read(&format!("$ map\n= 0\n> stdout\n{lines}")).unwrap()
         };
         assert_eq!(text(4, 0).differences(&text(5, 2), 1e-9).lines, 0);

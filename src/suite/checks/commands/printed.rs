@@ -12,13 +12,16 @@ use crate::suite::recorded::{self, RecordedScene};
 check! {
     /// Each number of `solve --json` and `critical --json` by the claim's method, on every scene of
     /// `verification/references/exact.json`, against the one there: numbers, words, and what is `null`.
-    Printed {} in Commands, "relative x condition", by printed;
+    Printed {
+        /// Only each so-manieth scene.
+        each: usize,
+    } in Commands, "relative x condition", by printed;
 
     /// Each number in the text of `solve` and `critical` on the shipped scenes, found by its label, against that of the JSON.
     PrintedText {} in Commands, "half units of the last digit", by printed_text;
 }
 
-fn printed(subject: &Subject<'_>) -> Found {
+fn printed(Printed { each }: &Printed, subject: &Subject<'_>) -> Found {
     let (program, method) = (subject.program()?, subject.method_name());
     let scenes = recorded::scenes().map_err(NotMeasured::broken)?;
     let of_scene = |scene: &RecordedScene| {
@@ -57,9 +60,11 @@ fn printed(subject: &Subject<'_>) -> Found {
         }
         Ok(worst)
     };
-    let found = scenes.par_iter().map(of_scene).collect::<Found<Vec<_>>>()?;
+    let found = scenes.par_iter().step_by(*each).map(of_scene).collect::<Found<Vec<_>>>()?;
     let mut worst = Worst::default();
-    found.into_iter().for_each(|of| worst.take(of.value, || of.place));
+    for of in found {
+        worst.take(of.value, || of.place);
+    }
     Ok(worst.measurement())
 }
 
@@ -231,9 +236,9 @@ fn printed_text(subject: &Subject<'_>) -> Found {
             let answer = Answer::of(program, &line, &[])?;
             let mut reading = Reading { answer: &answer, worst: Worst::default(), seen: 0 };
             if command == "solve" {
-                reading.solved(&said.out)
+                reading.solved(&said.out);
             } else {
-                reading.critical(&said.out)
+                reading.critical(&said.out);
             }
             let title = answer.at("scene.title").as_str();
             let is_titled = title.is_none_or(|title| said.out.lines().next() == Some(title));

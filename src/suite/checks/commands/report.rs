@@ -103,7 +103,7 @@ fn report(subject: &Subject<'_>) -> Found {
                 see(is_known && (*verdict != "skipped" || measured.is_none()), format!("{id} measures {measured:?}"));
             }
             // Three digits on the page and in Markdown, all of them in XML; what is skipped or undecided has none.
-            let shown = value.map_or("—".to_owned(), |value| format!("{:.5}", value));
+            let shown = value.map_or("—".to_owned(), |value| format!("{value:.5}"));
             let cells = format!("{verdict} | {shown} | {limit} ");
             let has_row = page.split("<tr").skip(1).map(words).any(|row| row.contains(id) && row.contains(&cells));
             see(has_row, format!("the page has no row of {id} with `{cells}`"));

@@ -280,7 +280,7 @@ fn slopes(Slopes { by }: &Slopes, subject: &Subject<'_>) -> Found {
 /// `critical --spread` of `spreads`, and the relative deviation of V_c that each makes, by the elasticities of `solve`.
 fn spread(spreads: &[String], seed: u64, subject: &Subject<'_>) -> Found<(Answer, Vec<f64>)> {
     let (program, scene) = (subject.program()?, subject.scene_name()?);
-    let asked: String = spreads.iter().map(|spread| format!(" --spread {spread}")).collect();
+    let asked = spreads.iter().fold(String::new(), |asked, spread| asked + " --spread " + spread);
     let answer = Answer::of(program, &format!("critical {scene}.toml{asked} --samples 4000 --seed {seed}"), &[])?;
     let slopes = Answer::of(program, &format!("solve {scene}.toml --sensitivities"), &[])?;
     let parts = spreads.iter().map(|spread| {
@@ -733,7 +733,8 @@ fn step_errors(StepErrors { options }: &StepErrors, subject: &Subject<'_>) -> Fo
 }
 
 fn three_grid_rule(ThreeGridRule { steps, values }: &ThreeGridRule, subject: &Subject<'_>) -> Found {
-    let rows: String = steps.iter().zip(values).map(|(step, value)| format!("{step:?},{value:?}\n")).collect();
+    let row = |(step, value): (&f64, &f64)| format!("{step:?},{value:?}\n");
+    let rows = steps.iter().zip(values).map(row).collect::<Vec<_>>().concat();
     let table = format!("dt_s,f\n{rows}");
     let answer = Answer::of(subject.program()?, "audit r.csv", &[("r.csv", &table)])?;
     let [h1, h2, h3] = *steps;
