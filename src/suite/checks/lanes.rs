@@ -348,14 +348,13 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
         let solution = of_cells(&row_cells[1], &values, &answer.solution)
             .ok_or_else(|| NotMeasured::broken(format!("row {index}: the cells {row_cells:?} of {answer:?}")))?;
         worst.take(error_of(subject, &problem, &solution)?, name);
-        let critical = answer.critical.as_ref().map(|found| found.as_ref().map_err(|error| error.to_string()));
+        let critical = answer.critical.as_ref().map(|found| found.as_ref().map_err(ToString::to_string));
         match (row.critical(), values[6], critical) {
-            (None, None, None) => {}
             (Some((exact, condition)), Some(value), Some(Ok(same))) if row.criterion != "ndrc" => {
                 holds!(value == *same, "row {index}: V_c {value} is printed, {same} found");
                 worst.take(off(value, exact) / condition / subject.promise(), name);
             }
-            (Some(_), Some(_), Some(Ok(_))) => {}
+            (None, None, None) | (Some(_), Some(_), Some(Ok(_))) => {}
             (_, printed, other) => {
                 return Err(NotMeasured::broken(format!("row {index}: V_c is {printed:?}, from {other:?}")));
             }

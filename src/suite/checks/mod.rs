@@ -60,6 +60,7 @@ macro_rules! holds {
 
 mod agreement;
 mod applications;
+mod by_hand;
 mod commands;
 mod counts;
 mod edges;
@@ -92,8 +93,8 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, commands::*, counts::*, edges::*, formulas::*, invariants::*, known_bad::*,
-    lanes::*, manufactured::*, orders::*, peers::*, problems::*, scheme::*, texts::*,
+    agreement::*, applications::*, by_hand::*, commands::*, counts::*, edges::*, formulas::*, invariants::*,
+    known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -149,7 +150,7 @@ every_check! {
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
-    EveryNumber MarginBound CriticalBound Response
+    EveryNumber MarginBound CriticalBound Response StepsByHand
 }
 
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.

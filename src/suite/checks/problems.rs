@@ -213,7 +213,7 @@ fn attempt(method: &Method, problem: &Problem, detail: Detail) -> Found<Option<F
 }
 
 /// The solution in double-double.
-fn exact(problem: &Problem) -> Found<Flight<TwoFloat>> {
+pub(super) fn in_double_double(problem: &Problem) -> Found<Flight<TwoFloat>> {
     Ok(Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events)?)
 }
 
@@ -320,7 +320,7 @@ fn error_of_rows(problem: &Problem, flight: &Flight, exact_end: &Flight<TwoFloat
         holds!(difference <= 8.0 * f64::EPSILON * size, "force {} N at {} of {problem:?}", row.force, row.state);
         let is_judged = index % apart == apart - 1 && x > 0.0 && v > 0.0 && x < exact_end.end.depth.value();
         if is_judged {
-            let there = exact(&problem.clone().with_exit(x))?;
+            let there = in_double_double(&problem.clone().with_exit(x))?;
             worst = worse(worst, judge.passing(&row.state, &there.end));
         }
     }
@@ -336,7 +336,7 @@ fn every_number(EveryNumber { kinds, count, rtol }: &EveryNumber, subject: &Subj
         let (mut judged, mut stops) = (0, 0);
         for (index, problem) in problems(subject, kind, *count)?.iter().enumerate() {
             let Some(flight) = attempt(&method, problem, Detail::Trajectory)? else { continue };
-            let exact = exact(problem)?;
+            let exact = in_double_double(problem)?;
             if let Some(margin) = exact_margin(problem, &exact)? {
                 holds!(is_right(flight.outcome, margin.value()), "{} of {problem:?}", flight.outcome);
             }
@@ -416,7 +416,7 @@ fn margin_bound(MarginBound { kinds, count, least, rtol }: &MarginBound, subject
         let mut shares = Vec::new();
         for (index, problem) in problems(subject, kind, *count)?.iter().enumerate() {
             let Some(flight) = attempt(&method, problem, Detail::End)? else { continue };
-            let Some(exact) = exact_margin(problem, &exact(problem)?)? else { continue };
+            let Some(exact) = exact_margin(problem, &in_double_double(problem)?)? else { continue };
             let (margin, bound) = flight
                 .exit_margin
                 .zip(flight.exit_margin_error)
@@ -461,7 +461,7 @@ fn critical_share(method: &Method, problem: &Problem) -> Found<Option<(f64, f64)
     let energy = 0.5 * problem.mass * found.velocity * found.velocity;
     holds!((found.energy / energy - 1.0).abs() <= 4.0 * f64::EPSILON, "E_c {} J of V_c {found:?}", found.energy);
     let perforates = |speed: f64| -> Found<bool> {
-        let flight = exact(&at(speed))?;
+        let flight = in_double_double(&at(speed))?;
         Ok(flight.at(EventKind::Exit).is_some_and(|state| state.velocity.value() > 0.0))
     };
     let spacing = 2.0 * f64::EPSILON * found.velocity;
@@ -493,7 +493,7 @@ fn response(&Response { from, to, slope, level, count }: &Response, subject: &Su
     let mut judged = 0;
     for kind in [Kind::Tunnel, Kind::SpringAndDrag, Kind::Viscous, Kind::Several] {
         for problem in problems(subject, kind, count)? {
-            let exact = exact(&problem)?;
+            let exact = in_double_double(&problem)?;
             let mut errors = Vec::new();
             for (_, method) in &methods {
                 let Some(flight) = attempt(method, &problem, Detail::Events)? else { break };
