@@ -65,6 +65,7 @@ mod commands;
 mod counts;
 mod edges;
 mod formulas;
+mod generators;
 mod invariants;
 mod known_bad;
 mod lanes;
@@ -93,8 +94,8 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, by_hand::*, commands::*, counts::*, edges::*, formulas::*, invariants::*,
-    known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, scheme::*, texts::*,
+    agreement::*, applications::*, by_hand::*, commands::*, counts::*, edges::*, formulas::*, generators::*,
+    invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -150,7 +151,7 @@ every_check! {
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
-    EveryNumber MarginBound CriticalBound Response StepsByHand
+    EveryNumber MarginBound CriticalBound Response StepsByHand Generators
 }
 
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.
