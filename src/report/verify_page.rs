@@ -198,10 +198,10 @@ fn sets(run: &Run<'_>) -> Markup {
 fn faults() -> Markup {
     let seeded = seeded_faults().unwrap_or_default();
     let (thin, others): (Vec<_>, Vec<_>) = seeded.iter().partition(|fault| fault.is_thin());
-    let summary = html! { (count(others.len(), "fault")) " that two tables of claims or more notice" };
+    let summary = html! { (count(others.len(), "fault")) " with two recorded tables of claims or more" };
     html! { @if !seeded.is_empty() {
-        p { "All " (count(seeded.len(), "fault")) " were noticed, " (others.len()) " by more than one table of claims." }
-        @if !thin.is_empty() { (faults_table("Noticed by one table of claims alone: without it they pass", &thin)) }
+        p { "All " (count(seeded.len(), "fault")) " were noticed; of " (others.len()) " more than one table of claims is recorded." }
+        @if !thin.is_empty() { (faults_table("One table of claims is recorded: without it they may pass", &thin)) }
         (folded(summary, true, faults_table("", &others)))
     } }
 }
