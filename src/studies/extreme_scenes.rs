@@ -27,8 +27,8 @@ use super::random::Random;
 use super::random_scenes::errors_of;
 use serde::Serialize;
 
-use crate::integrators::{Detail, Energy, Method, MethodName, MethodOptions, Taylor};
-use crate::physics::reference::{self, Source};
+use crate::integrators::{Detail, Energy, Flight, Method, MethodName, MethodOptions, Taylor};
+use crate::physics::reference::{self, Exact, Source};
 use crate::physics::{Advice, Concrete, CraterStiffness, Outcome, Problem, Resistance, Scalar, Scene, groups};
 
 /// Largest error in units of round-off times max(1, condition number).
@@ -49,6 +49,9 @@ const FAR_MARGIN_ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// stage the projectile stops, and the time is as uncertain as the root of an ulp (`docs/theory.md`, section 8). The
 /// depth is then as uncertain as the weaker stage makes it.
 const CRATER_MARGIN_MIN: f64 = 64.0 * f64::EPSILON;
+
+/// One scene of so many is solved in 50 digits too, whatever the methods say of it.
+const SCENES_PER_REFERENCE: u64 = 9;
 
 /// Defects that a summary keeps in full; all are counted.
 const DEFECTS_KEPT: usize = 100;
@@ -242,6 +245,9 @@ fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) -> Result<
     };
     let conditions = LazyCell::new(|| conditions_in_dual_numbers(problem).ok());
     let jump = near_jump(problem);
+    if index.is_multiple_of(SCENES_PER_REFERENCE) {
+        examine_yardstick(index, problem, &exact, margin.map(|(margin, _)| margin.value()), jump, seen);
+    }
     for method in METHODS {
         let solved = Method::new(method, &MethodOptions::default())
             .and_then(|method| method.integrator().solve(problem, Detail::Events));
@@ -296,6 +302,40 @@ fn examine_problem(index: u64, problem: &Problem, seen: &mut Summary) -> Result<
         }
     }
     Ok(())
+}
+
+/// Adds how the solution in double-double, which judges the others, compares with 50 digits, which share no code with it.
+fn examine_yardstick(
+    index: u64,
+    problem: &Problem,
+    fine: &Flight<TwoFloat>,
+    margin: Option<f64>,
+    jump: Option<f64>,
+    seen: &mut Summary,
+) {
+    let source = Source::Problem(problem);
+    let Ok(exact) = reference::flight(source) else { return };
+    seen.asked_reference = 1;
+    if let (Some(found), Some(right)) = (margin, &exact.exit_margin) {
+        let off = right.error_over(found, &Exact::one()).abs();
+        if exceeds(off, FAR_MARGIN_ROUNDING * (1.0 + found.abs())) {
+            seen.defect(index, format!("double-double: margin {found:e} is off by {off:.2e} from 50 digits"));
+        }
+    }
+    // Within a tie of double-double itself either outcome may stand there.
+    if !fine.outcome.agrees_with(exact.outcome) {
+        return;
+    }
+    match errors_of(source, &fine.values()) {
+        Ok(errors) => {
+            for (units, quantity) in excused(errors, jump).0 {
+                if exceeds(units, ULPS_MAX) {
+                    seen.defect(index, format!("double-double: {quantity} is off by {units:.1} ulp x condition"));
+                }
+            }
+        }
+        Err(why) => seen.defect(index, format!("double-double: {why}")),
+    }
 }
 
 /// Where an ulp decides on which side of a force jump at k d the projectile stops: the force before over that behind, or

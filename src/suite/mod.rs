@@ -5,6 +5,7 @@ pub mod claim;
 pub mod faults;
 pub mod program;
 pub mod recorded;
+pub mod roads;
 #[expect(clippy::module_inception, reason = "the suite of the module suite is its main concept")]
 pub mod suite;
 pub mod transcript;

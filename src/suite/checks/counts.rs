@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use super::Subject;
 use crate::suite::claim::{Found, Judged, Measurement, NotMeasured};
+use crate::suite::roads::{roads, shared};
 use crate::suite::verdict::Verdict;
 
 check! {
@@ -15,6 +16,8 @@ check! {
         /// What each family must have.
         families: BTreeMap<String, Family>,
     } in Judge, "families", by counted;
+    /// Claims whose two computations share more than the scene ([`crate::suite::roads`]).
+    Independent {} in Judge, "claims", by independent;
 }
 
 /// What a family of claims must have.
@@ -61,4 +64,15 @@ fn difference(family: Family, claims: &[&Judged]) -> Option<String> {
     } else {
         None
     }
+}
+
+fn independent(subject: &Subject<'_>) -> Found {
+    let judged = subject.context.judged.ok_or_else(|| NotMeasured::skip("a part of the suite was run"))?;
+    let compared: Vec<_> = judged.iter().filter_map(|judged| Some((&judged.claim, roads(&judged.claim)?))).collect();
+    let shared: Vec<_> = compared.iter().filter_map(|(claim, roads)| Some((*claim, shared(roads)?))).collect();
+    let remark = match shared.first() {
+        Some((claim, source)) => format!("both computations of {} come from: {source}", claim.id),
+        None => format!("{} claims compare two computations that share nothing but the scene", compared.len()),
+    };
+    Ok(Measurement::count(shared.len()).remark(remark).cases(compared.len()))
 }

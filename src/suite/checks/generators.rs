@@ -39,6 +39,7 @@ fn groups(scene: &Scene) -> Option<[Option<f64>; 6]> {
 
 const NAMES: [&str; 6] = ["I", "N", "H/d", "k", "d", "given c"];
 
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
 fn generators(&Generators { scenes: count }: &Generators, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let seed = subject.context.seed;
     let mut generator = random_scenes::Generator::new(seed, "coverage");

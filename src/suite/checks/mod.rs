@@ -120,7 +120,7 @@ macro_rules! every_check {
 
             /// Whether it is about the other claims, and measured after them.
             pub fn is_last(&self) -> bool {
-                matches!(self, Self::Counted(_))
+                matches!(self, Self::Counted(_) | Self::Independent(_))
             }
 
             /// Measures a claim.
@@ -138,7 +138,7 @@ every_check! {
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
-    KnownBad Counted
+    KnownBad Counted Independent
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured

@@ -235,8 +235,8 @@ fn step_option(StepOption { order, step }: &StepOption, subject: &Subject<'_>) -
 }
 
 fn slopes(Slopes { by }: &Slopes, subject: &Subject<'_>) -> Found {
-    let (program, scene) = (subject.program()?, subject.scene_name()?);
-    let answer = Answer::of(program, &format!("solve {scene}.toml --sensitivities"), &[])?;
+    let (program, scene, method) = (subject.program()?, subject.scene_name()?, subject.method_name());
+    let answer = Answer::of(program, &format!("solve {scene}.toml --sensitivities --method {method}"), &[])?;
     let mut centres = Vec::new();
     for of in ["solve", "critical"] {
         let (said, _) = run(program, &format!("{of} {scene}.toml --json"), &[])?;

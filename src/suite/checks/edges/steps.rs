@@ -4,9 +4,7 @@ use super::super::scheme::rounding_of;
 use super::super::{Subject, Worst, off, solve, worse, worst_of};
 use super::{Violations, concrete, end_error, exact, slab, stop};
 use crate::integrators::central_difference::stability_limit;
-use crate::integrators::{
-    Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, Taylor, VelocityAt,
-};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, VelocityAt};
 use crate::physics::{Outcome, Problem, Stage};
 use crate::studies::error::flight_error;
 use crate::studies::extreme_scenes::Summary;
@@ -145,7 +143,7 @@ fn slab_rounding(_: &Subject<'_>) -> Found {
 
 /// Fitted order of `quantity` over the steps `sizes`.
 fn fitted(problem: &Problem, scheme: (VelocityAt, Boundaries), quantity: Quantity, sizes: &[f64]) -> Found<OrderFit> {
-    let exact = Taylor::default().solve(problem, Detail::Events)?;
+    let exact = exact(problem)?.values();
     let mut points = Vec::with_capacity(sizes.len());
     for &dt in sizes {
         let flight = CentralDifference::uniform(dt, scheme.0, scheme.1).solve(problem, Detail::Events)?;
@@ -188,7 +186,7 @@ fn ladder_ratios(subject: &Subject<'_>) -> Found {
 fn orders_by_rule(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     for drag in [false, true] {
         let problem = stop(drag)?;
-        let exact = Taylor::default().solve(&problem, Detail::Events)?;
+        let exact = exact(&problem)?.values();
         let path = Path::of(&problem, &exact);
         for velocity in VelocityAt::ALL {
             for boundaries in Boundaries::ALL {
