@@ -2,7 +2,8 @@
 
 #![expect(clippy::panic, reason = "a test that cannot be set up has failed")]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::path::Path;
 
 use penetrode::suite::checks::PeerAnswers;
@@ -12,7 +13,10 @@ use penetrode::suite::{Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Ve
 const SEEDS: u64 = 200;
 
 fn run(seed: u64) -> Vec<Judged> {
-    let suite = Suite::embedded().unwrap_or_else(|error| panic!("{error}"));
+    judged(&Suite::embedded().unwrap_or_else(|error| panic!("{error}")), seed)
+}
+
+fn judged(suite: &Suite, seed: u64) -> Vec<Judged> {
     let peers = PeerAnswers::recorded().unwrap_or_else(|error| panic!("{error}"));
     let program = Program::new(Path::new(env!("CARGO_BIN_EXE_penetrode"))).unwrap_or_else(|error| panic!("{error}"));
     suite.run(Inputs { seed, peers: &peers, program: Some(&program) }, &|_| ())
@@ -56,6 +60,61 @@ fn the_record_of_seeded_faults_names_each_of_them_and_claims_that_exist() {
     for fault in &recorded {
         let lost: Vec<_> = fault.noticed_by.iter().filter(|table| !tables.contains(*table)).collect();
         assert!(!fault.noticed_by.is_empty() && lost.is_empty(), "{}: no table {lost:?}", fault.id);
+    }
+}
+
+/// `judged` without the claims that are skipped for want of a program or a feature, by family: claims, skipped, cases.
+fn families(judged: &[Judged]) -> String {
+    let mut families = BTreeMap::<&str, [usize; 3]>::new();
+    for judged in judged.iter().filter(|judged| !judged.claim.check.is_last()) {
+        let [claims, skipped, cases] = families.entry(judged.claim.group()).or_default();
+        *claims += 1;
+        *skipped += usize::from(judged.verdict == Verdict::Skipped && !judged.lacks);
+        *cases += judged.cases;
+    }
+    let line = |(name, [claims, skipped, cases]): (&&str, &[usize; 3])| {
+        let name = if name.contains(' ') { format!("{name:?}") } else { (*name).to_owned() };
+        format!("{name} = {{ claims = {claims}, skipped = {skipped}, cases = {} }}\n", cases * 9 / 10)
+    };
+    families.iter().map(line).collect()
+}
+
+#[test]
+fn a_family_of_claims_that_is_lost_or_measured_on_less_fails_the_counts() {
+    let suite = |id: &str, cases: usize| {
+        let text = format!(
+            "title = 'small'\n[[claim]]\nid = 'self/counts'\nstatement = ''\nlimit = 0\nreason = ''\n\
+             [claim.check.counted.families]\nnose = {{ claims = 1, skipped = 0, cases = {cases} }}\n\
+             [[claim]]\nid = '{id}'\nstatement = ''\nlimit = 1e-14\nreason = ''\ncheck = {{ nose = {{}} }}\n"
+        );
+        let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+        let path = folder.path().join("suite.toml");
+        fs::write(&path, text).unwrap_or_else(|error| panic!("{error}"));
+        let suite = Suite::read(&path.to_string_lossy()).unwrap_or_else(|error| panic!("{error}"));
+        not_held(&judged(&suite, 1)).join("")
+    };
+    assert_eq!(suite("nose/integral", 30), "");
+    let lost = suite("other/integral", 30);
+    assert!(lost.contains("nose: 0 claims, and the suite counts 1; other: 1 claims, and the suite counts 0"), "{lost}");
+    assert!(suite("nose/integral", 1000).contains("cases, and the suite counts 1000"));
+}
+
+/// The suites whose claims are counted.
+const SUITES: [&str; 2] = ["verification/suite.toml", "verification/edges.toml"];
+
+/// Writes what the suites count after claims came or went: `cargo test --release --test it write_the_counts -- --ignored`.
+#[test]
+#[ignore = "changes files of the repository"]
+fn write_the_counts() {
+    const MARK: &str = "[claim.check.counted.families]\n";
+    for (path, suite) in SUITES.iter().zip([Suite::embedded(), Suite::edges()]) {
+        let suite = suite.unwrap_or_else(|error| panic!("{error}"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+        let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{error}"));
+        let (before, rest) = text.split_once(MARK).unwrap_or_else(|| panic!("{} has no counts", path.display()));
+        let after: String = rest.split_inclusive('\n').skip_while(|line| !line.trim().is_empty()).collect();
+        let text = format!("{before}{MARK}{}{after}", families(&judged(&suite, 1)));
+        fs::write(&path, text).unwrap_or_else(|error| panic!("{error}"));
     }
 }
 
