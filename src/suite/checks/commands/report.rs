@@ -83,6 +83,16 @@ fn report(subject: &Subject<'_>) -> Found {
         let totals =
             format!("tests=\"{}\" skipped=\"{skipped}\" failures=\"{failed}\" errors=\"{undecided}\"", claims.len());
         see(xml.contains(&format!("<testsuites name=\"small\" {totals}")), format!("no {totals} in junit.xml"));
+        let hash = blake3::hash(text.as_bytes()).to_hex().to_string();
+        see(kept["environment"]["suite_hash"] == hash, format!("the hash is {}", kept["environment"]["suite_hash"]));
+        // In seconds, rounded to milliseconds.
+        let seconds =
+            claims.iter().enumerate().filter_map(|(i, _)| kept["claims"][i]["wall_ms"].as_f64()).sum::<f64>() / 1e3;
+        let said = xml.split(" time=\"").nth(1).and_then(|rest| rest.split('"').next()?.parse::<f64>().ok());
+        see(
+            said.is_some_and(|said| (said - seconds).abs() <= 2e-3),
+            format!("junit.xml says {said:?} for {seconds} s"),
+        );
         see(markdown.contains(&format!("small: {verdict}")), format!("summary.md does not say {verdict}"));
         for (i, (id, _, verdict, value)) in claims.iter().enumerate() {
             let (limit, claim) = (limit_of(id), &answer.json["claims"][i]);
