@@ -120,6 +120,14 @@ impl PeerAnswer {
         }
     }
 
+    /// The first event of `reference` before its end that a peer leaves out which lists others; the event of the end is in
+    /// the numbers of the end, and a peer may list none at all.
+    pub fn left_out<'a>(&self, reference: &'a Flight, problem: &Problem) -> Option<&'a Event> {
+        let listed = self.flight(problem);
+        let before = reference.events.iter().filter(|event| event.state.depth < reference.end.depth);
+        before.into_iter().find(|event| !self.events.is_empty() && listed.at(event.kind).is_none())
+    }
+
     /// Differences from `reference`, another solution of `problem`: of the end, and of each event listed here. An event
     /// that the reference lacks is compared with its end.
     ///
@@ -234,6 +242,20 @@ mod tests {
         // 150 m/s of 300 are left there: the time of the passage magnifies an error of the energy twice.
         assert_eq!(time.conditioning, 2.0);
         assert!(differences.iter().filter(|d| d.quantity != "crater-end time").all(|d| d.relative == 0.0));
+    }
+
+    #[test]
+    fn whoever_lists_events_lists_each_boundary_and_whoever_lists_none_leaves_out_none() {
+        let crater_end = r#"{"event": "crater-end", "time_s": 4e-4, "depth_m": 0.1, "velocity_m_s": 150}"#;
+        let rest = r#"{"event": "rest", "time_s": 1e-3, "depth_m": 0.2, "velocity_m_s": 0}"#;
+        let of = |events: &str| answer(Outcome::Stopped, 0.0, events);
+        let ours = of(&format!("[{crater_end}, {rest}]")).flight(&problem());
+        let left_out = |events: String| of(&events).left_out(&ours, &problem()).map(|event| event.kind);
+        assert_eq!(left_out(format!("[{rest}]")), Some(EventKind::CraterEnd));
+        assert_eq!(left_out(format!("[{crater_end}]")), None, "rest is the end");
+        assert_eq!(left_out("[]".to_owned()), None);
+        let as_stage_end = crater_end.replace("crater-end\"", "stage-end\", \"stage\": 0");
+        assert_eq!(left_out(format!("[{as_stage_end}, {rest}]")), None);
     }
 
     #[test]

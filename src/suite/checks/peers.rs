@@ -167,6 +167,10 @@ fn agreement(Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {
             theirs.outcome, theirs.depth_m, ours.outcome, ours.end.depth
         ))
     })?;
+    if let Some(event) = theirs.left_out(&ours, problem) {
+        let (kind, depth) = (event.kind.name(), event.state.depth);
+        return Err(NotMeasured::broken(format!("{name} lists events, and not the {kind} at x = {depth} m")));
+    }
     let mut worst = Worst { place: "nothing".to_owned(), ..Worst::default() };
     for difference in &differences {
         worst.take(difference.relative / difference.conditioning, || difference.quantity.clone());
