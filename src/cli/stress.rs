@@ -11,7 +11,7 @@ use super::{Answer, Ask, CliError, Exit, command_typed};
 use crate::report::{self, Environment, Run, StressJson, cells, folder};
 use crate::studies::extreme_scenes::{self, Summary, ULPS_MAX};
 use crate::suite::checks::{PeerAnswers, judged_random_scenes};
-use crate::suite::{Counts, Judged, Suite, skipped, tables, worst};
+use crate::suite::{Counts, Inputs, Judged, Suite, skipped, tables, worst};
 use crate::text::Shown;
 
 /// Arguments of `stress`.
@@ -43,7 +43,9 @@ impl Ask for StressArgs {
         }
         self.out.as_deref().map(folder::check).transpose()?;
         let suite = Suite::edges()?;
-        let mut judged = judge_all(&suite, self.seed, &PeerAnswers::default(), "cases");
+        // No case is about commands.
+        let inputs = Inputs { seed: self.seed, peers: &PeerAnswers::default(), program: None };
+        let mut judged = judge_all(&suite, inputs, "cases");
         let random = self.cases.map(|cases| self.run_random(cases));
         judged.extend(random.as_ref().and_then(|(summary, wall_ms)| judged_random_scenes(&suite, summary, *wall_ms)));
         let run = Run {

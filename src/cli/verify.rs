@@ -66,7 +66,12 @@ impl Ask for VerifyArgs {
             ));
         }
         let peers = self.peers()?;
-        let judged = judge_all(&suite, self.seed, &peers, "claims");
+        // Without it the claims about commands would be skipped, and the suite pass.
+        let program = std::env::current_exe().and_then(|path| Program::new(&path)).map_err(|cause| {
+            let help = "its claims run it in a temporary folder: let TMPDIR name one that can be written";
+            CliError::failed(format!("the program cannot be run again: {cause}"), help)
+        })?;
+        let judged = judge_all(&suite, Inputs { seed: self.seed, peers: &peers, program: Some(&program) }, "claims");
         let run = Run {
             suite: &suite,
             judged: &judged,
@@ -150,12 +155,10 @@ pub(super) fn counts_text(judged: &[Judged]) -> String {
 }
 
 /// Judges every claim of `suite` behind a progress bar that counts `what`.
-pub(super) fn judge_all(suite: &Suite, seed: u64, peers: &PeerAnswers, what: &str) -> Vec<Judged> {
+pub(super) fn judge_all(suite: &Suite, inputs: Inputs<'_>, what: &str) -> Vec<Judged> {
     let bar = progress_bar(suite.claims.len() as u64, what);
     let failed = AtomicUsize::new(0);
-    // Of a user's suite too: its claims may ask for commands.
-    let program = std::env::current_exe().ok().and_then(|path| Program::new(&path).ok());
-    let judged = suite.run(Inputs { seed, peers, program: program.as_ref() }, &|judged| {
+    let judged = suite.run(inputs, &|judged| {
         bar.inc(1);
         if judged.verdict == Verdict::Failed {
             bar.set_message(format!("({} failed)", failed.fetch_add(1, Ordering::Relaxed) + 1));

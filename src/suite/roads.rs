@@ -103,9 +103,12 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::RefuseText(_)
         | Check::PrintedText(_)
         | Check::Report(_)
+        // Earlier answers of the same program, or two of its commands: they show that nothing changed, and that all say the same.
+        | Check::Recorded(_)
+        | Check::BatchRows(_)
         | Check::SweepRows(_) => return None,
         Check::Units(_) => [Vec::new(), vec![Elsewhere]],
-        Check::Exits(_) | Check::Recorded(_) | Check::Printed(_) | Check::Tolerance(_) => {
+        Check::Exits(_) | Check::Printed(_) | Check::Tolerance(_) => {
             [vec![Commands], vec![Elsewhere]]
         }
         Check::PathRows(_)
@@ -118,7 +121,6 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::StepErrors(_)
         | Check::ThreeGridRule(_) => [vec![Commands], vec![Itself]],
         Check::Slopes(_) => [vec![Duals], vec![Itself]],
-        Check::BatchRows(_) => [vec![Lanes], method],
         Check::Reference(_) | Check::ClosedFormEverywhere(_) => [vec![ClosedForm, Loop], vec![FiftyDigits]],
         Check::Agreement(_) | Check::Proportionality(_) | Check::WorkOrder(_) => [method, truth],
         Check::ExactText(_) | Check::Stated(_) | Check::Outcome(_) | Check::Peer(_) | Check::MeasuredDepth(_) => {
@@ -140,7 +142,7 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::AcrossTheCraterEnd(_)
         | Check::ToleranceSweep(_)
         | Check::ViscousResisting(_)
-        // Their truth in double-double is confirmed in 50 digits.
+        // Their truth in double-double is confirmed in 50 digits, but for viscosity and drag together.
         | Check::EveryNumber(_)
         | Check::MarginBound(_)
         | Check::MarginOfAStop(_)
