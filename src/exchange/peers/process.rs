@@ -3,6 +3,7 @@
 //! Its three pipes are served by a thread each, so that no full pipe can block the asker; every wait has a time limit,
 //! every line and buffer a size. A peer that breaks the protocol is ended at once, named, and not asked again.
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
@@ -42,16 +43,44 @@ const LINE_BYTES: usize = 1 << 20;
 const STDERR_BYTES: usize = 64 << 10;
 
 /// Who a peer says it is; control characters are replaced and lengths bounded.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PeerIdentity {
     /// Name of the program.
     pub name: String,
     /// Its version; empty when it gives none.
-    #[serde(default)]
     pub version: String,
     /// Its method; empty when it gives none.
-    #[serde(default)]
     pub method: String,
+    /// Whether it takes fixed steps: it is told the step, and a tolerance means nothing to it.
+    pub fixed_step: bool,
+    /// Whether it answers from the physical scene in place of the stages.
+    pub reads_scene: bool,
+    /// Orders of convergence that it claims, by quantity ([`ORDER_QUANTITIES`]), or one for all of them ([`ORDER_OF_ALL`]).
+    pub claimed_orders: BTreeMap<String, f64>,
+}
+
+/// Key of an order that is claimed for every quantity.
+pub const ORDER_OF_ALL: &str = "all";
+
+/// Quantities whose order a peer may claim, by name.
+pub const ORDER_QUANTITIES: [&str; 5] = ["depth", "time", "velocity", "crater_end_time", "crater_end_velocity"];
+
+/// The answer to `hello`, as it stands on the line.
+#[derive(Deserialize)]
+struct Greeting {
+    name: String,
+    version: Option<String>,
+    method: Option<String>,
+    fixed_step: Option<bool>,
+    reads: Option<Reads>,
+    order: Option<Value>,
+}
+
+/// What a peer reads, where it says so.
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Reads {
+    Scene,
 }
 
 impl std::fmt::Display for PeerIdentity {
@@ -348,15 +377,40 @@ fn store_tail(mut complaints: ChildStderr, tail: &Mutex<Vec<u8>>, _alive: &Sende
 
 /// Reads the greeting.
 fn greeting(line: &[u8]) -> Result<PeerIdentity, PeerFault> {
-    let mut identity: PeerIdentity =
-        serde_json::from_slice(line).map_err(|error| PeerFault::nonsense(&format!("no greeting ({error})"), line))?;
-    if identity.name.trim().is_empty() {
-        return Err(PeerFault::nonsense("a greeting without a name", line));
+    let nonsense = |why: &str| PeerFault::nonsense(why, line);
+    let said: Greeting = serde_json::from_slice(line).map_err(|error| nonsense(&format!("no greeting ({error})")))?;
+    if said.name.trim().is_empty() {
+        return Err(nonsense("a greeting without a name"));
     }
-    for text in [&mut identity.name, &mut identity.version, &mut identity.method] {
-        *text = escaped(&clipped(text, NAME_CHARS));
-    }
-    Ok(identity)
+    let text = |text: Option<String>| escaped(&clipped(&text.unwrap_or_default(), NAME_CHARS));
+    Ok(PeerIdentity {
+        name: text(Some(said.name)),
+        version: text(said.version),
+        method: text(said.method),
+        fixed_step: said.fixed_step == Some(true),
+        reads_scene: said.reads.is_some(),
+        claimed_orders: claimed_orders(said.order).map_err(|why| nonsense(&why))?,
+    })
+}
+
+/// The orders of a greeting: a number, or an object of one for each quantity. The error says what is wrong.
+fn claimed_orders(order: Option<Value>) -> Result<BTreeMap<String, f64>, String> {
+    let orders = match order {
+        None => return Ok(BTreeMap::new()),
+        Some(Value::Object(orders)) => orders.into_iter().collect(),
+        Some(order) => vec![(ORDER_OF_ALL.to_owned(), order)],
+    };
+    let number = |(name, order): (String, Value)| {
+        if name != ORDER_OF_ALL && !ORDER_QUANTITIES.contains(&name.as_str()) {
+            return Err(format!(
+                "a greeting with an order of {name}, which is none of {}",
+                ORDER_QUANTITIES.join(", ")
+            ));
+        }
+        let positive = order.as_f64().filter(|order| *order > 0.0);
+        positive.map(|order| (name, order)).ok_or_else(|| format!("a greeting with the order {order}"))
+    };
+    orders.into_iter().map(number).collect()
 }
 
 /// Reads the answer to question number `id`.

@@ -276,6 +276,37 @@ fn a_greeting_without_a_name_is_nonsense() {
 }
 
 #[test]
+fn a_greeting_says_how_the_peer_is_asked_and_what_it_claims() {
+    let said = |fields: &str| greeting(format!(r#"{{"name": "own"{fields}}}"#).as_bytes());
+    let plain = PeerIdentity { name: "own".to_owned(), ..PeerIdentity::default() };
+    for fields in [
+        "",
+        r#", "note": 1"#,
+        r#", "fixed_step": false, "order": {}"#,
+        r#", "reads": null, "version": null, "order": null"#,
+    ] {
+        assert_eq!(said(fields), Ok(plain.clone()), "{fields}");
+    }
+    let identity = said(r#", "fixed_step": true, "reads": "scene", "order": 4"#).unwrap();
+    assert!(identity.fixed_step && identity.reads_scene);
+    assert_eq!(identity.claimed_orders, BTreeMap::from([(ORDER_OF_ALL.to_owned(), 4.0)]));
+    let each = said(r#", "order": {"depth": 2, "crater_end_time": 0.5}"#).unwrap().claimed_orders;
+    assert_eq!(each, BTreeMap::from([("depth".to_owned(), 2.0), ("crater_end_time".to_owned(), 0.5)]));
+    for (fields, why) in [
+        (r#", "fixed_step": "yes""#, "expected a boolean"),
+        (r#", "reads": "stages""#, "unknown variant `stages`, expected `scene`"),
+        (r#", "order": 0"#, "the order 0"),
+        (r#", "order": -1.5"#, "the order -1.5"),
+        (r#", "order": "2""#, "the order \"2\""),
+        (r#", "order": {"depth": null}"#, "the order null"),
+        (r#", "order": {"energy": 2}"#, "an order of energy, which is none of depth, time, velocity, "),
+    ] {
+        let Err(PeerFault::Nonsense { why: said, .. }) = said(fields) else { unreachable!("{fields}") };
+        assert!(said.contains(why), "{fields}: {said}");
+    }
+}
+
+#[test]
 fn a_dropped_peer_is_dead() {
     let peer = peer("exec sleep 60");
     let pid = peer.line.child.id().to_string();
