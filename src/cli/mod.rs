@@ -7,6 +7,7 @@ pub mod completions;
 pub mod converge;
 pub mod critical;
 pub mod experiments;
+pub mod init;
 pub mod map;
 pub mod method_args;
 pub mod output;
@@ -318,6 +319,8 @@ commands! {
     Verify = "verify": Printing<verify::VerifyArgs>,
     /// Numerical stability and event stress cases, and random scenes by the million.
     Stress = "stress": Printing<stress::StressArgs>,
+    /// A file to begin with: a solver of your own, a scene, a suite, or data.
+    Init = "init": init::InitArgs,
     /// JSON schema of what a command prints.
     Schema = "schema": schema::SchemaArgs,
     /// Shell completion.

@@ -279,7 +279,7 @@ fn bad_convergence_data_never_passes() {
 
 #[test]
 fn help_and_completion_are_there_for_every_command() {
-    for command in ["solve", "critical", "converge", "audit", "bench", "verify", "schema", "completions"] {
+    for command in ["solve", "critical", "converge", "audit", "bench", "verify", "init", "schema", "completions"] {
         let text = run(&format!("{command} --help")).expect(0).out;
         let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
         assert!(widest <= 80, "{command}: a line of {widest} characters");
@@ -399,4 +399,33 @@ fn a_critical_velocity_inside_its_error_bar_is_undecided_and_not_a_number() {
         let answer = of_changed_slab("\"180 mm\"", "\"25 m\"", &line).json();
         assert!(answer["relative_error"].as_f64().unwrap() < 1e-12, "{answer}");
     }
+}
+
+#[test]
+fn init_writes_one_file_and_replaces_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let init = |rest: &str| run_in(folder.path(), &format!("init {rest}"));
+    fs::write(folder.path().join("scene.toml"), "mine").unwrap();
+    fs::create_dir(folder.path().join("folder.py")).unwrap();
+    for (rest, words) in [
+        ("scene", "scene.toml is there already, and no file is replaced"),
+        ("peer own.rs", "the ending of own.rs is that of no language known here help: the endings are .py, .cpp, "),
+        ("peer own", "the ending of own is that"),
+        ("peer own.py --language cpp", "own.py is no name of such a file help: let it end with .cpp or .cc or .cxx"),
+        ("data results.txt", "let it end with .csv"),
+        ("suite --language julia", "a suite has no language"),
+        ("peer folder.py", "it is a folder"),
+        ("peer no/such.py", "there is no folder no"),
+        ("peer --language cobol", "possible values: python, cpp, fortran, julia, octave"),
+    ] {
+        let said = init(rest).refused();
+        assert!(said.contains(words), "{rest}: {said}");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("scene.toml")).unwrap(), "mine");
+    assert_eq!(names(folder.path()), ["folder.py", "scene.toml"]);
+    let printed = init("peer - --language fortran").expect(0).out;
+    init("peer peer.F90").expect(0);
+    assert_eq!(fs::read_to_string(folder.path().join("peer.F90")).unwrap(), printed.replace("peer.f90", "peer.F90"));
+    let said = init("peer 'my own.cpp'").expect(0).out;
+    assert!(said.starts_with("my own.cpp is written. Next, with that name for peer.cpp:\n  g++ "), "{said}");
 }

@@ -1,0 +1,124 @@
+//! What `init` writes runs as it stands: each command that it prints does what it is for.
+//!
+//! Where the compiler or interpreter of a language is missing, its test says so in one line and counts as ignored; with
+//! `CI=true` it fails. Julia is in no Debian release that is still maintained, and may be missing there too.
+
+use std::env;
+use std::path::Path;
+use std::process::Command;
+
+use libtest_mimic::{Arguments, Trial};
+use serde_json::Value;
+
+use self::trials::{Check, Failure, ensure, required, trial};
+
+#[path = "it/trials.rs"]
+mod trials;
+
+/// Language, name of its file, the program that it needs, and how it is started.
+const PEERS: [(&str, &str, &str, &str); 5] = [
+    ("python", "peer.py", "python3", "python3 peer.py"),
+    ("cpp", "peer.cpp", "g++", "./peer"),
+    ("fortran", "peer.f90", "gfortran", "./peer"),
+    ("julia", "peer.jl", "julia", "julia peer.jl"),
+    ("octave", "peer.m", "octave-cli", "octave-cli peer.m"),
+];
+
+fn main() {
+    let peers = PEERS.map(|(language, file, needs, command)| {
+        let name = format!("a_peer_in_{language}_runs_as_it_is_written_and_agrees_with_the_suite");
+        let is_there = Command::new(needs).arg("--version").output().is_ok();
+        if !is_there {
+            eprintln!("the peer in {language} is not tested: {needs} is missing");
+        }
+        let may_be_ignored = !is_there && (!required() || language == "julia");
+        trial(&name, move || runs_and_agrees(language, file, command)).with_ignored_flag(may_be_ignored)
+    });
+    let files = [("scene", "scene.toml"), ("suite", "suite.toml"), ("data", "data.csv")].map(|(kind, file)| {
+        trial(&format!("the_{kind}_of_a_beginner_runs_as_it_is_written"), move || runs(kind, file))
+    });
+    libtest_mimic::run(&Arguments::from_args(), peers.into_iter().chain(files).collect::<Vec<Trial>>()).exit();
+}
+
+/// What `command` prints in `folder`, where it must end well; `penetrode` is the program under test.
+fn output(folder: &Path, command: &str) -> Result<String, Failure> {
+    let program = Path::new(env!("CARGO_BIN_EXE_penetrode"));
+    let own = program.parent().map(Path::to_owned).into_iter();
+    let path = env::join_paths(own.chain(env::split_paths(&env::var_os("PATH").unwrap_or_default())))?;
+    let said = Command::new("sh").args(["-c", command]).current_dir(folder).env("PATH", path).output()?;
+    let text = String::from_utf8(said.stdout)?;
+    ensure!(said.status.success(), "{command}: {text}{}", String::from_utf8_lossy(&said.stderr));
+    Ok(text)
+}
+
+/// Writes `file` and gives the commands that are printed, without their remarks.
+fn written(folder: &Path, arguments: &str, file: &str) -> Result<Vec<String>, Failure> {
+    let said = output(folder, &format!("penetrode init {arguments}"))?;
+    let (head, commands) = said.split_once('\n').unwrap_or_default();
+    ensure!(head == format!("{file} is written. Next:"), "{said}");
+    ensure!(said.lines().all(|line| line.chars().count() <= 80), "a long line: {said}");
+    let without_remark = |line: &str| line.trim().split("   ").next().unwrap_or_default().to_owned();
+    Ok(commands.lines().map(without_remark).collect())
+}
+
+fn runs(kind: &str, file: &str) -> Check {
+    let folder = tempfile::tempdir()?;
+    let commands = written(folder.path(), kind, file)?;
+    ensure!(!commands.is_empty(), "no command");
+    commands.iter().try_for_each(|command| output(folder.path(), command).map(drop))
+}
+
+fn runs_and_agrees(language: &str, file: &str, command: &str) -> Check {
+    let folder = tempfile::tempdir()?;
+    let commands = written(folder.path(), &format!("peer --language {language}"), file)?;
+    let verify = format!("penetrode verify --only peer/user --peer \"{command}\"").replace("\"./peer\"", "./peer");
+    ensure!(commands.contains(&verify), "{commands:?}");
+    for command in commands.iter().filter(|command| !command.starts_with("penetrode diagnose ")) {
+        let said = output(folder.path(), command)?;
+        ensure!(*command != verify || said.starts_with("passed: 10 passed, 0 failed, "), "{said}");
+    }
+    lists_events_times_itself_and_outlives_what_it_cannot_solve(folder.path(), command)
+}
+
+fn lists_events_times_itself_and_outlives_what_it_cannot_solve(folder: &Path, command: &str) -> Check {
+    let question = |id: u32, drag: &str, end: &str| {
+        let stage = |drag: &str, end: &str| {
+            format!(
+                r#"{{"static_force_n":1e6,"stiffness_n_m":0.0,"viscosity_kg_s":0.0,"drag_kg_m":{drag},"end_m":{end}}}"#
+            )
+        };
+        format!(
+            r#"{{"atol":[1e-12,1e-10],"exit_depth_m":0.2,"id":{id},"mass_kg":20.0,"repeats":3,"rtol":1e-12,"stages":[{},{},{}],"velocity_m_s":200.0}}"#,
+            stage(drag, end),
+            stage("0.0", "0.1"),
+            stage("0.0", "null"),
+        )
+    };
+    // The middle one is a stage without a number, as of a law that is no sum of these terms.
+    let questions = [question(1, "0.0", "0.1"), question(2, "null", "0.1"), question(3, "0.0", "0.05")];
+    std::fs::write(folder.join("questions"), questions.join("\n") + "\n")?;
+    let said = output(folder, &format!("{command} < questions"))?;
+    let answers = said.lines().map(serde_json::from_str).collect::<Result<Vec<Value>, _>>()?;
+    ensure!(answers.len() == 3, "{said}");
+    ensure!(answers[1]["error"].is_string() && answers[1]["id"] == 2, "{}", answers[1]);
+    for (answer, id, first_end) in [(&answers[0], 1, 0.1), (&answers[2], 3, 0.05)] {
+        // V² = V0² - 2 F x/M: 30,000 is left at 0.1 m, 20,000 at 0.2 m.
+        let exit_speed = 20_000_f64.sqrt();
+        let is_near = |value: &Value, wanted: f64| value.as_f64().is_some_and(|v| (v - wanted).abs() <= 1e-9 * wanted);
+        ensure!(answer["id"] == id && answer["outcome"] == "perforated", "{answer}");
+        ensure!(is_near(&answer["velocity_m_s"], exit_speed) && answer["depth_m"] == 0.2, "{answer}");
+        ensure!(is_near(&answer["time_s"], (200.0 - exit_speed) / 5e4), "{answer}");
+        ensure!(answer["wall_ns"].as_f64().is_some_and(|ns| ns > 0.0), "{answer}");
+        let events = answer["events"].as_array().map(Vec::as_slice).unwrap_or_default();
+        let listed: Vec<_> = events.iter().map(|event| (event["event"].as_str(), event["stage"].as_u64())).collect();
+        ensure!(
+            listed == [(Some("stage-end"), Some(0)), (Some("stage-end"), Some(1)), (Some("exit"), None)],
+            "{answer}"
+        );
+        ensure!(
+            events[0]["depth_m"] == first_end && is_near(&events[1]["velocity_m_s"], 30_000_f64.sqrt()),
+            "{answer}"
+        );
+    }
+    Ok(())
+}
