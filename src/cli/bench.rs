@@ -132,7 +132,7 @@ impl BenchArgs {
             }
         }
         for command in &self.peer {
-            let peer = Peer::start(command)?;
+            let peer = Peer::start_adaptive(command)?;
             let name = escape_terminal(&peer.identity().name);
             let taken = peers.iter().filter(|(known, _): &&(String, Peer)| known.starts_with(&name)).count();
             peers.push((if taken == 0 { name } else { format!("{name} {}", taken + 1) }, peer));
@@ -155,6 +155,12 @@ impl BenchArgs {
             }
             if self.varied() > 0 {
                 cases.push(Case::varied(self.varied(), self.seed)?);
+            }
+        }
+        for (_, peer) in &mut *peers {
+            if cases.first().is_some_and(|case| !peers::is_timed(case, peer)) {
+                let message = format!("`{}` answers without wall_ns, and its time is not known", peer.command());
+                return Err(CliError::usage(message, "let its answers have the time of one solution (ns)"));
             }
         }
         progress.inc_length((cases.len() * (Contender::all().len() + peers.len())) as u64);

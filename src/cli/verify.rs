@@ -12,7 +12,7 @@ use super::{Answer, Ask, CliError, command_typed, end_peers_with_program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
-use crate::suite::{Check, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, looseness};
+use crate::suite::{Check, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, grouped, looseness};
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
@@ -135,12 +135,23 @@ pub(super) fn report_line(folder: &Path) -> String {
     format!("report: {}", folder.join("report.html").display())
 }
 
-/// Adds every failed or undecided claim, with its statement and what was seen.
+/// Adds every failed or undecided claim, with its statement and what was seen; claims of one table of which nothing was
+/// measured, for one reason, are told once.
 pub(super) fn add_not_passed(text: &mut Text, judged: &[Judged]) {
-    for Judged { claim, verdict, measured, remark, .. } in judged.iter().filter(|judged| judged.is_open()) {
+    let open = judged.iter().filter(|judged| judged.is_open());
+    let told = grouped(open, |judged| {
+        let Judged { claim, verdict, measured, remark, .. } = judged;
+        (&claim.table, verdict, remark, measured.map(|_| &claim.id))
+    });
+    for (_, claims) in told {
+        let Judged { claim, verdict, measured, remark, .. } = claims[0];
         let measured = measured
             .map_or("nothing measured".to_owned(), |m| format!("{m:.3e}, limit {:.1e} {}", claim.limit, claim.unit));
         text.line(format!("{:<9} {}", verdict.name(), escape_terminal(&claim.id)));
+        if claims.len() > 1 {
+            let others = format!("and {} more of {}", claims.len() - 1, escape_terminal(&claim.table));
+            text.wrapped("          ", &others);
+        }
         text.wrapped("          ", &escape_terminal(&claim.statement));
         text.wrapped("          ", &format!("{measured}; {}", escape_terminal(remark)));
     }

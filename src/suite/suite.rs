@@ -7,7 +7,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::checks::{Context, Memo, PeerAnswers, Subject};
+use super::checks::{Check, Context, Memo, PeerAnswers, Subject};
 use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
 use super::program::Program;
 use crate::exchange::SceneError;
@@ -201,13 +201,21 @@ impl Suite {
         let Inputs { seed, peers, program } = inputs;
         let context = Context { scenes: &self.scenes, peers, memo: &memo, program, judged: None, seed };
         let judge_those = |is_last, context| {
-            let claims = self.claims.par_iter().enumerate().filter(|(_, c)| c.check.is_last() == is_last);
-            let judged = claims.map(|(place, claim)| {
+            let those = self.claims.iter().enumerate().filter(|(_, claim)| claim.check.is_last() == is_last);
+            let (of_peers, others): (Vec<_>, Vec<_>) = those.partition(|(_, c)| matches!(c.check, Check::Peer(_)));
+            let judge_one = |(place, claim)| {
                 let judged = judge(Subject { claim, context, flaw: None });
                 done(&judged);
                 (place, judged)
-            });
-            judged.collect::<Vec<_>>()
+            };
+            // A peer is asked in the order of the suite: the claim that meets its failure is the same in every run.
+            let (mut judged, others) = rayon::join(
+                || of_peers.into_iter().map(judge_one).collect::<Vec<_>>(),
+                || others.into_par_iter().map(judge_one).collect::<Vec<_>>(),
+            );
+            judged.extend(others);
+            judged.sort_unstable_by_key(|(place, _)| *place);
+            judged
         };
         let (places, mut judged): (Vec<_>, Vec<_>) = judge_those(false, context).into_iter().unzip();
         let others = (!self.is_part).then_some(judged.as_slice());

@@ -205,6 +205,9 @@ fn a_peer_is_timed_by_its_own_clock_and_judged_like_any_method() {
     let clock = "\"wall_ns\": 5000, \"wall_ns_quartiles\": [4000, 7000]";
     let right = answering("right", &format!("{{\"id\": $n, {numbers}, {clock}}}"));
     let wrong = answering("wrong", &format!("{{\"id\": $n, \"outcome\": \"perforated\", {numbers}, {clock}}}"));
+    let timeless = answering("timeless", &format!("{{\"id\": $n, {numbers}}}"));
+    let refused = run(&format!("bench @tunnel --parts work-precision {right} {timeless}")).refused();
+    assert!(refused.contains("answers without wall_ns"), "{refused}");
     let dies = peer("dies", "read q; echo '{\"name\": \"mortal\"}'; read q");
     let report = bench(&format!("@tunnel --parts work-precision {right} {wrong} {dies}"));
     let right = runs(&report, "tunnel", "fake");

@@ -31,18 +31,21 @@ fn judge(script: &str) -> (Said, Duration) {
     (said.expect(3), taken)
 }
 
-/// The claim fails, and each remark holds `reason`.
-fn fails_with(script: &str, reason: &str) {
+/// Every claim fails; the remark of the first holds `reason`, and each of the others says `then`.
+fn fails_with(script: &str, reason: &str, then: &str) {
     let report = judge(script).0.json();
     let claims = report["claims"].as_array().unwrap();
-    assert!(!claims.is_empty());
-    for claim in claims {
+    assert!(claims.len() > 1);
+    for (index, claim) in claims.iter().enumerate() {
         assert_eq!(claim["verdict"], "failed", "{script}: {claim}");
         let remark = claim["remark"].as_str().unwrap();
-        assert!(remark.contains(reason), "{script}: {remark}");
+        assert!(if index == 0 { remark.contains(reason) } else { remark.ends_with(then) }, "{script}: {remark}");
         assert!(remark.len() < 2000 && !remark.chars().any(char::is_control), "{remark:?}");
     }
 }
+
+const AT_A_QUESTION: &str = "not asked: it failed at crater";
+const AT_THE_GREETING: &str = "not asked: it failed at its greeting";
 
 /// Greets, then does `deed` at each question.
 fn at_a_question(deed: &str) -> String {
@@ -52,19 +55,34 @@ fn at_a_question(deed: &str) -> String {
 /// What else a peer may say or do is tested where it is read, src/exchange/peers/process/tests.rs.
 #[test]
 fn a_peer_that_dies_or_answers_nonsense_fails_its_claim() {
-    for (script, reason) in [
-        (at_a_question("echo 'out of luck' >&2; exit 7"), "out of luck"),
-        (at_a_question("kill -SEGV $$"), "ended without an answer"),
-        ("exit 1".to_owned(), "ended without an answer"),
-        ("read hello; exit 0".to_owned(), "ended without an answer"),
-        (at_a_question("echo hello world"), "nonsense"),
-        (at_a_question("echo '{\"id\": 1, \"error\": \"cannot do this\"}'"), "cannot do this"),
-        (at_a_question("printf '\\033[2J\\007\\n'"), "nonsense"),
-        (at_a_question("printf '\\377\\376\\n'"), "nonsense"),
-        // Before the greeting as well.
-        ("echo 'Welcome to Solver 7'; sleep 60".to_owned(), "nonsense"),
+    for (deed, reason) in [
+        ("echo 'out of luck' >&2; exit 7", "out of luck"),
+        ("kill -SEGV $$", "ended without an answer"),
+        ("echo hello world", "nonsense"),
+        ("printf '\\033[2J\\007\\n'", "nonsense"),
+        ("printf '\\377\\376\\n'", "nonsense"),
     ] {
-        fails_with(&script, reason);
+        fails_with(&at_a_question(deed), reason, AT_A_QUESTION);
+    }
+    fails_with("echo 'Welcome to Solver 7'; sleep 60", "nonsense", AT_THE_GREETING);
+    // Who says that it cannot do this is asked the next.
+    let sorry = "read hello\n".to_owned()
+        + GREETING
+        + "\nn=0\nwhile read question; do n=$((n + 1)); echo '{\"id\": '$n', \"error\": \"cannot do this\"}'; done";
+    fails_with(&sorry, "cannot do this", "cannot do this");
+}
+
+/// A person reads what happened once, and the same in every run.
+#[test]
+fn a_failure_of_a_peer_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    for (deed, reason, lines) in [("echo oops >&2; exit 7", "`oops`", 10), ("echo hello", "it printed `hello`", 10)] {
+        fs::write(folder.path().join("peer.sh"), at_a_question(deed)).unwrap();
+        let said = || run_in(folder.path(), "verify --only peer/user --out report --peer 'sh peer.sh'").expect(3);
+        let Said { out, err, .. } = said();
+        assert_eq!((out.matches(reason).count(), out.lines().count()), (1, lines), "{out}");
+        assert!(out.starts_with("failed    peer/user/crater") && out.contains("and 8 more of peer/user"), "{out}");
+        assert_eq!((said().out, err.as_str()), (out, ""));
     }
 }
 
@@ -88,10 +106,11 @@ fn a_peer_that_hangs_is_given_thirty_seconds() {
 #[test]
 fn megabytes_are_cut_off() {
     // 256 MB on one line: more than the program may keep.
-    fails_with(&at_a_question("head -c 268435456 /dev/zero | tr '\\0' x; echo"), "nonsense");
-    fails_with(&at_a_question("yes '{\"id\": 1}'"), "nonsense");
-    fails_with(&at_a_question("head -c 33554432 /dev/zero >&2; exit 1"), "ended without an answer");
-    fails_with("head -c 268435456 /dev/zero", "nonsense");
+    fails_with(&at_a_question("head -c 268435456 /dev/zero | tr '\\0' x; echo"), "nonsense", AT_A_QUESTION);
+    fails_with(&at_a_question("yes '{\"id\": 1}'"), "nonsense", AT_A_QUESTION);
+    let dies = at_a_question("head -c 33554432 /dev/zero >&2; exit 1");
+    fails_with(&dies, "ended without an answer", AT_A_QUESTION);
+    fails_with("head -c 268435456 /dev/zero", "nonsense", AT_THE_GREETING);
 }
 
 #[test]
@@ -104,11 +123,30 @@ fn a_wrong_answer_in_right_form_fails_its_claim() {
 }
 
 #[test]
-fn a_peer_that_cannot_be_started_is_missing_and_no_command_is_usage() {
+fn a_peer_that_cannot_be_started_is_missing_and_one_that_cannot_be_asked_is_usage() {
     let folder = tempfile::tempdir().unwrap();
-    for (command, code) in [("no-such-program-anywhere", 5), ("/", 5), ("", 2), ("sh \"open quote", 2)] {
-        let said = run_in(folder.path(), &format!("verify --only peer/user --out report --peer '{command}'"));
-        assert!(said.expect(code).out.is_empty(), "{command}");
-        assert_eq!(names(folder.path()), [""; 0], "{command}: something was written");
+    let scripts = tempfile::tempdir().unwrap();
+    let greets = |name: &str, fields: &str| {
+        let path = scripts.path().join(name);
+        fs::write(&path, format!("read hello; echo '{{\"name\": \"own\", {fields}}}'; read question")).unwrap();
+        format!("sh {}", path.display())
+    };
+    let fixed = greets("fixed", "\"fixed_step\": true");
+    let of_scenes = greets("of-scenes", "\"reads\": \"scene\"");
+    for (command, code) in [
+        ("no-such-program-anywhere", 5),
+        ("/", 5),
+        ("sh no-such-script", 5),
+        ("sh -c \"read q; exit 0\"", 5),
+        ("", 2),
+        ("sh \"open quote", 2),
+        (&fixed, 2),
+        (&of_scenes, 2),
+    ] {
+        for asks in ["verify --only peer/user --out report", "bench @tunnel --parts work-precision"] {
+            let said = run_in(folder.path(), &format!("{asks} --peer '{command}'")).expect(code);
+            assert!(said.out.is_empty() && said.err.lines().count() <= 4, "{command}: {said:?}");
+            assert_eq!(names(folder.path()), [""; 0], "{command}: something was written");
+        }
     }
 }

@@ -150,13 +150,21 @@ pub enum PeerStartError {
         /// What is wrong.
         why: &'static str,
     },
-    /// The program, or something it needs, is missing: exit code 5.
+    /// The program, or something it needs, is missing, or it ended before it greeted: exit code 5.
     #[error("`{command}` {why}")]
     Missing {
         /// As given.
         command: String,
         /// The system's reason, or the last line of its standard error.
         why: String,
+    },
+    /// It takes fixed steps, or reads the physical scene, where stages are to be solved to a tolerance: exit code 2.
+    #[error("`{command}` {why}, and here it would be asked for stages and a tolerance")]
+    Unfit {
+        /// As given.
+        command: String,
+        /// What its greeting says.
+        why: &'static str,
     },
     /// It started and did not greet: a failed peer like any other.
     #[error(transparent)]
@@ -169,13 +177,14 @@ impl Advice for PeerStartError {
     }
 
     fn is_usage(&self) -> bool {
-        matches!(self, Self::Command { .. })
+        matches!(self, Self::Command { .. } | Self::Unfit { .. })
     }
 
     fn help(&self) -> String {
         match self {
             Self::Command { .. } => "give a program and its arguments, quoted as for a shell".to_owned(),
             Self::Missing { .. } => String::new(),
+            Self::Unfit { .. } => "`penetrode diagnose` asks it what it can answer".to_owned(),
             Self::Greeting(_) => "see the peer protocol: verification/peers/README.md".to_owned(),
         }
     }
@@ -216,6 +225,20 @@ impl Peer {
         Self::start_within(command, SILENCE)
     }
 
+    /// [`Peer::start`] of a peer that solves stages to a tolerance.
+    ///
+    /// # Errors
+    /// As [`Peer::start`], and [`PeerStartError::Unfit`] for a peer of another kind.
+    pub fn start_adaptive(command: &str) -> Result<Self, PeerStartError> {
+        let peer = Self::start(command)?;
+        let why = match peer.identity {
+            PeerIdentity { fixed_step: true, .. } => "takes fixed steps",
+            PeerIdentity { reads_scene: true, .. } => "reads the physical scene",
+            _ => return Ok(peer),
+        };
+        Err(PeerStartError::Unfit { command: command.to_owned(), why })
+    }
+
     /// [`Peer::start`] with `silence` as the longest wait for one answer.
     ///
     /// # Errors
@@ -232,10 +255,17 @@ impl Peer {
             Err(fault) => {
                 let code = line.end().and_then(|status| status.code());
                 let failure = PeerFailure { peer: format!("`{command}`"), fault, stderr: line.stderr_text() };
-                if code == Some(EXIT_CODE_MISSING) && matches!(failure.fault, PeerFault::Died(_)) {
-                    return Err(missing(format!("lacks what it needs: {}", last_line(&failure.stderr))));
-                }
-                Err(failure.into())
+                let last_words = last_line(&failure.stderr);
+                Err(match failure.fault {
+                    PeerFault::Died(_) if code == Some(EXIT_CODE_MISSING) => {
+                        missing(format!("lacks what it needs: {last_words}"))
+                    }
+                    PeerFault::Died(status) => {
+                        let said = quote("; on standard error ", &last_words);
+                        missing(format!("ended before it greeted ({status}){said}"))
+                    }
+                    _ => failure.into(),
+                })
             }
         }
     }

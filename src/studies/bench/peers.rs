@@ -37,6 +37,12 @@ pub const BUNDLED: [(&str, BundledPeer, &str); 6] = [
     ("sundae BDF", BundledPeer::SundaeBdf, ""),
 ];
 
+/// Whether `peer` tells its time. Nobody knows of one that gives no answer: each of its runs will say why.
+pub fn is_timed(case: &Case, peer: &mut Peer) -> bool {
+    let first = case.problems.first().map(|known| PeerRequest::from_problem(&known.problem, 1e-6));
+    first.and_then(|request| peer.ask(&request).ok()).is_none_or(|answer| answer.wall_ns.is_some())
+}
+
 /// Every tolerance of `peer`, called `name`, on `case`. What goes wrong is a run that failed.
 pub fn runs(case: &Case, name: &str, peer: &mut Peer, effort: Effort) -> Vec<Run> {
     let settings = DIGITS.map(|digits| Setting::Tolerance(10f64.powi(-digits))).collect();

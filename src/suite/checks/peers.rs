@@ -38,17 +38,30 @@ pub struct PeerAnswers {
 enum Source {
     /// Answers recorded earlier.
     Recorded(Box<Recording>),
-    /// A program that failed before it could be asked: why.
-    Failed(String),
+    /// A program that failed before it could be asked: why, for the claim that meets it first.
+    Failed(Mutex<GivenUp>, String),
     /// A program that is asked now.
     Running { peer: Box<Mutex<Asked>>, rtol: f64 },
 }
 
-/// A running peer and, once it has failed, why it is not asked again.
+/// A running peer and, once it has failed, where.
 #[derive(Debug)]
 struct Asked {
     peer: peers::Peer,
-    given_up: Option<String>,
+    given_up: GivenUp,
+}
+
+/// Where a peer failed, once a claim has said why: the others say no more than that.
+#[derive(Debug, Default)]
+struct GivenUp(Option<String>);
+
+impl GivenUp {
+    fn check(&self) -> Found<()> {
+        match &self.0 {
+            Some(place) => Err(NotMeasured::broken(format!("not asked: it failed {place}"))),
+            None => Ok(()),
+        }
+    }
 }
 
 impl PeerAnswers {
@@ -68,21 +81,21 @@ impl PeerAnswers {
     /// Starts `command` and asks it in place of what was recorded under `name`.
     ///
     /// # Errors
-    /// [`PeerStartError`]: it cannot be started, or does not greet.
+    /// [`PeerStartError`]: it cannot be started, does not greet, or solves no stages to a tolerance.
     pub fn start(&mut self, name: &str, command: &str) -> Result<(), PeerStartError> {
-        let peer = peers::Peer::start(command)?;
+        let peer = peers::Peer::start_adaptive(command)?;
         let rtol = match self.sources.get(name) {
             Some(Source::Recorded(recording)) => recording.rtol,
             _ => RTOL_USER,
         };
-        let asked = Mutex::new(Asked { peer, given_up: None });
+        let asked = Mutex::new(Asked { peer, given_up: GivenUp::default() });
         self.sources.insert(name.to_owned(), Source::Running { peer: Box::new(asked), rtol });
         Ok(())
     }
 
     /// Notes that the program `name` failed before it could be asked: its claims fail.
     pub fn fail(&mut self, name: &str, why: String) {
-        self.sources.insert(name.to_owned(), Source::Failed(why));
+        self.sources.insert(name.to_owned(), Source::Failed(Mutex::default(), why));
     }
 
     /// Names and versions of the programs, for the report.
@@ -97,7 +110,7 @@ impl PeerAnswers {
                             r.program, r.version, r.method, r.rtol, r.recorded
                         )
                     }
-                    Source::Failed(why) => why.clone(),
+                    Source::Failed(_, why) => why.clone(),
                     Source::Running { peer, rtol } => {
                         let asked = peer.lock().unwrap_or_else(PoisonError::into_inner);
                         let identity = asked.peer.identity();
@@ -129,15 +142,18 @@ impl PeerAnswers {
                 holds!(is_same, "{scene} was recorded with other numbers: remake with `{recipe}`");
                 Ok(flight.answer.clone())
             }
-            Source::Failed(why) => Err(NotMeasured::broken(why)),
+            Source::Failed(given_up, why) => {
+                let mut given_up = given_up.lock().unwrap_or_else(PoisonError::into_inner);
+                given_up.check()?;
+                given_up.0 = Some("at its greeting".to_owned());
+                Err(NotMeasured::broken(why))
+            }
             Source::Running { peer, rtol } => {
                 let mut asked = peer.lock().unwrap_or_else(PoisonError::into_inner);
-                if let Some(why) = &asked.given_up {
-                    return Err(NotMeasured::broken(format!("not asked again: {why}")));
-                }
+                asked.given_up.check()?;
                 asked.peer.ask(&PeerRequest::from_problem(problem, *rtol)).map_err(|failure| {
                     if !failure.is_reported() {
-                        asked.given_up = Some(failure.to_string());
+                        asked.given_up.0 = Some(format!("at {scene}"));
                     }
                     NotMeasured::broken(failure)
                 })

@@ -257,13 +257,33 @@ fn a_program_that_is_not_there_is_missing_and_a_bad_command_is_usage() {
 }
 
 #[test]
-fn exit_code_5_before_the_greeting_says_that_something_is_missing() {
+fn a_peer_that_ends_before_it_greets_is_missing_something() {
     let error = Peer::start(&sh("echo 'scikit-sundae is not installed' >&2; exit 5")).unwrap_err();
     assert!(error.is_missing());
     assert!(error.to_string().ends_with("lacks what it needs: scikit-sundae is not installed"), "{error}");
-    let error = Peer::start(&sh("exit 4")).unwrap_err();
-    assert!(!error.is_missing() && !error.is_usage());
-    assert_eq!(error.to_string(), "`sh -c 'exit 4'` ended without an answer (exit status: 4)");
+    for (script, words) in [
+        ("exit 4", "`sh -c 'exit 4'` ended before it greeted (exit status: 4)"),
+        ("read q; echo 'no such file' >&2; exit 2", "greeted (exit status: 2); on standard error `no such file`"),
+    ] {
+        let error = Peer::start(&sh(script)).unwrap_err();
+        assert!(error.is_missing() && !error.is_usage());
+        assert!(error.to_string().ends_with(words), "{error}");
+    }
+}
+
+#[test]
+fn a_peer_of_fixed_steps_or_scenes_is_not_asked_for_a_tolerance() {
+    let greeting = |fields: &str| sh(&format!(r#"read q; echo '{{"name": "own"{fields}}}'; read q"#));
+    for (fields, why) in [
+        (r#", "fixed_step": true"#, "takes fixed steps, and"),
+        (r#", "reads": "scene""#, "reads the physical scene, and"),
+    ] {
+        let command = greeting(fields);
+        assert!(Peer::start(&command).is_ok());
+        let error = Peer::start_adaptive(&command).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains(why) && error.help().contains("diagnose"), "{error}");
+    }
+    assert!(Peer::start_adaptive(&greeting(r#", "fixed_step": false, "order": 5"#)).is_ok());
 }
 
 #[test]
