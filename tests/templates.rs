@@ -37,7 +37,12 @@ fn main() {
     let files = [("scene", "scene.toml"), ("suite", "suite.toml"), ("data", "data.csv")].map(|(kind, file)| {
         trial(&format!("the_{kind}_of_a_beginner_runs_as_it_is_written"), move || runs(kind, file))
     });
-    libtest_mimic::run(&Arguments::from_args(), peers.into_iter().chain(files).collect::<Vec<Trial>>()).exit();
+    let together = trial("the_suite_of_a_beginner_judges_the_peer_and_warns_of_nothing", judges_without_a_warning);
+    libtest_mimic::run(
+        &Arguments::from_args(),
+        peers.into_iter().chain(files).chain([together]).collect::<Vec<Trial>>(),
+    )
+    .exit();
 }
 
 /// What `command` prints in `folder`, where it must end well; `penetrode` is the program under test.
@@ -66,6 +71,15 @@ fn runs(kind: &str, file: &str) -> Check {
     let commands = written(folder.path(), kind, file)?;
     ensure!(!commands.is_empty(), "no command");
     commands.iter().try_for_each(|command| output(folder.path(), command).map(drop))
+}
+
+fn judges_without_a_warning() -> Check {
+    let folder = tempfile::tempdir()?;
+    written(folder.path(), "suite", "suite.toml")?;
+    written(folder.path(), "peer", "peer.py")?;
+    let said = output(folder.path(), "penetrode verify suite.toml --peer 'python3 peer.py' 2>&1")?;
+    ensure!(said.starts_with("passed: ") && said.contains(" 0 undecided, 0 skipped"), "{said}");
+    Ok(())
 }
 
 fn runs_and_agrees(language: &str, file: &str, command: &str) -> Check {

@@ -9,7 +9,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::checks::Check;
+use super::checks::{Check, USER};
 use super::verdict::Verdict;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::MethodName;
@@ -373,9 +373,11 @@ impl Judged {
     /// How many times looser the limit is than what was measured, taken as at least one ulp and as at least what the
     /// measurement resolves.
     ///
-    /// `None` where nothing was measured, and for counts and limits of zero.
+    /// `None` where nothing was measured, for counts and limits of zero, and for a program given with `--peer`: no limit
+    /// of a suite knows how good it is.
     pub fn looseness(&self) -> Option<f64> {
-        let is_decisive = self.claim.limit > 0.0 && self.resolution.is_finite();
+        let is_given = matches!(&self.claim.check, Check::Peer(peer) if peer.name == USER);
+        let is_decisive = self.claim.limit > 0.0 && self.resolution.is_finite() && !is_given;
         self.measured.filter(|_| is_decisive).map(|measured| self.claim.limit / measured.max(self.resolution))
     }
 }
