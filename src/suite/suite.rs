@@ -220,8 +220,8 @@ impl Suite {
         let (places, mut judged): (Vec<_>, Vec<_>) = judge_those(false, context).into_iter().unzip();
         let others = (!self.is_part).then_some(judged.as_slice());
         let last = judge_those(true, Context { judged: others, ..context });
-        for (place, claim) in last {
-            judged.insert(places.partition_point(|p| *p < place), claim);
+        for (inserted, (place, claim)) in last.into_iter().enumerate() {
+            judged.insert(inserted + places.partition_point(|p| *p < place), claim);
         }
         judged
     }

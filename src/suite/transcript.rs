@@ -29,8 +29,10 @@ macro_rules! recorded {
 }
 
 /// The transcripts of `verification/transcript`, by file name without its ending.
-pub const TRANSCRIPTS: &[(&str, &str)] =
-    recorded!["solve", "critical", "sweep", "batch", "converge", "audit", "studies", "report", "refused"];
+pub const TRANSCRIPTS: &[(&str, &str)] = recorded![
+    "solve", "methods", "paths", "critical", "sweep", "numbers", "batch", "converge", "audit", "studies", "bench",
+    "report", "suites", "peers", "spelled", "refused", "places",
+];
 
 /// Runs of the program, and what they said.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -119,10 +121,21 @@ impl Transcript {
         self.0.par_iter().enumerate().map(again).collect::<Found<_>>().map(Self)
     }
 
-    /// The runs that this build can make: those whose words name no method that it leaves out.
+    /// The runs that this build can make: those that use no method that it leaves out, and `bench` uses each. Solvers given
+    /// with `--peer` are shell scripts.
     #[must_use]
     pub fn possible(self) -> Self {
-        let is_possible = |run: &Run| !run.line.split_whitespace().any(names_method_left_out);
+        let is_whole = MethodName::ALL.iter().all(|name| name.is_built());
+        let is_left_out = |word: &str| match word {
+            "--peer" => !cfg!(unix),
+            "bench" => !is_whole,
+            _ => word.parse::<MethodName>().is_ok_and(|name| !name.is_built()),
+        };
+        let is_possible = |run: &Run| {
+            let given = run.given.iter().flat_map(|text| &text.lines);
+            let mut words = given.chain([&run.line]).flat_map(|line| line.split([' ', '"', ',']));
+            !words.any(is_left_out)
+        };
         Self(self.0.into_iter().filter(is_possible).collect())
     }
 
@@ -196,10 +209,6 @@ impl Run {
     }
 }
 
-fn names_method_left_out(word: &str) -> bool {
-    word.parse::<MethodName>().is_ok_and(|name| !name.is_built())
-}
-
 impl fmt::Display for Transcript {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for run in &self.0 {
@@ -222,10 +231,21 @@ impl Text {
     }
 }
 
-/// Where a line names what differs between two runs: the time, the machine, the build. What stands from the first mark up
+/// Where a line names what differs between two runs: the time, the machine, the build, the name of the program's file. What stands from the first mark up
 /// to the second is left out; without a second one, the rest of the line.
-const PASSING: [(&str, &str); 4] =
-    [("\"wall_ns\": ", ","), ("\"wall_ms\": ", ","), (" time=\"", "\""), ("</code> with penetrode ", "")];
+const PASSING: [(&str, &str); 8] = [
+    ("\"wall_ns\": ", ","),
+    ("\"wall_ms\": ", ","),
+    ("\"median_ns\": ", ","),
+    ("\"low_ns\": ", ","),
+    ("\"high_ns\": ", ","),
+    (" time=\"", "\""),
+    ("</code> with penetrode ", ""),
+    ("Usage: ", " "),
+];
+
+/// Where what lasts of a JSON ends: behind it, what is fastest, or the environment of the run.
+const END_OF_LASTING: [&str; 2] = ["\n  \"fastest\": [", "\n  \"environment\": {"];
 
 /// Lines of a text that are kept at most, evenly.
 const LINES_MAX: usize = 150;
@@ -237,8 +257,7 @@ fn lasting(name: &str, text: &str) -> Vec<String> {
         Some("svg") => &drawn(text),
         _ => text,
     };
-    // The environment of a run is the last object of its JSON.
-    let text = text.split("\n  \"environment\": {").next().unwrap_or_default();
+    let text = END_OF_LASTING.iter().fold(text, |text, end| text.split(end).next().unwrap_or_default());
     let count = text.lines().count();
     // An odd number, so that each key of the objects of a list comes up.
     let each = if count > LINES_MAX { count.div_ceil(LINES_MAX) | 1 } else { 1 };

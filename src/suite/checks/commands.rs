@@ -43,5 +43,5 @@ fn recorded(Recorded { runs, tolerance }: &Recorded, subject: &Subject<'_>) -> F
         Transcript::read(text.ok_or_else(|| NotMeasured::broken(format!("no transcript {runs}")))?)?.possible();
     let found = recorded.differences(&recorded.again(program)?, *tolerance);
     let remark = if found.lines == 0 { format!("{} runs", recorded.len()) } else { found.first };
-    Ok(Measurement::count(found.lines).remark(remark))
+    Ok(Measurement::count(found.lines).remark(remark).cases(recorded.len()))
 }
