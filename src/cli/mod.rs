@@ -6,6 +6,7 @@ pub mod bench;
 pub mod completions;
 pub mod converge;
 pub mod critical;
+pub mod diagnose;
 pub mod experiments;
 pub mod init;
 pub mod map;
@@ -315,6 +316,8 @@ commands! {
     Experiments = "experiments": Printing<experiments::ExperimentsArgs>,
     /// Order, error band and verdict for step-size results of another code.
     Audit = "audit": Printing<audit::AuditArgs>,
+    /// Is a solver right, and if not, what is wrong with it?
+    Diagnose = "diagnose": Printing<diagnose::DiagnoseArgs>,
     /// The verification suite and its report.
     Verify = "verify": Printing<verify::VerifyArgs>,
     /// Numerical stability and event stress cases, and random scenes by the million.

@@ -31,6 +31,9 @@ const STEPS_MAX: f64 = 2e6;
 /// Steps of all flights at most: some tenths of a second.
 const STEPS_TOTAL: f64 = 5e7;
 
+/// Steps of a simulated flight at most.
+const SIMULATED_MAX: u64 = 200_000;
+
 /// Units of round-off that a value may be off by, besides one a step: the sums of another code run in another sequence.
 const ULPS: f64 = 32.0;
 
@@ -93,7 +96,7 @@ impl Advance {
 
 /// A scheme of equal steps: how it advances, and what it does about stage ends, exit and rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Scheme {
+pub(crate) struct Scheme {
     advance: Advance,
     events: Boundaries,
 }
@@ -119,11 +122,12 @@ impl Answer {
 
 impl Scheme {
     /// Every candidate.
-    fn all() -> impl Iterator<Item = Self> {
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
         Advance::ALL.into_iter().flat_map(|advance| Boundaries::ALL.map(|events| Self { advance, events }))
     }
 
-    fn name(self) -> &'static str {
+    /// Name: `central-difference`, `euler`, `heun` ...
+    pub(crate) fn name(self) -> &'static str {
         match self.advance {
             Advance::CentralDifference(_) => "central-difference",
             Advance::Euler => "euler",
@@ -134,11 +138,22 @@ impl Scheme {
         }
     }
 
-    fn velocity(self) -> Option<VelocityAt> {
+    /// Velocity rule of central difference.
+    pub(crate) fn velocity(self) -> Option<VelocityAt> {
         match self.advance {
             Advance::CentralDifference(velocity) => Some(velocity),
             _ => None,
         }
+    }
+
+    /// Treatment of events.
+    pub(crate) fn events(self) -> Boundaries {
+        self.events
+    }
+
+    /// The end of `problem` with steps of `step` (s); `None` if it takes too many.
+    pub(crate) fn end(self, problem: &Problem, step: f64) -> Option<State> {
+        self.solve(problem, step, SIMULATED_MAX).map(|answer| answer.end)
     }
 
     /// The end of `problem` with steps of `step` (s); `None` if it does not come within `max_steps`.

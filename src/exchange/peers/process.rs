@@ -18,7 +18,7 @@ use thiserror::Error;
 use self::group::Group;
 use super::wire::{PeerAnswer, PeerRequest};
 use crate::exchange::diagnostic::printable;
-use crate::physics::{Advice, Event, EventKind, Outcome};
+use crate::physics::{Advice, Outcome};
 use crate::text::clipped;
 
 mod group;
@@ -286,13 +286,26 @@ impl Peer {
     /// [`PeerFailure`]. Unless the peer itself reports an error, it is ended, and each later question gets the same
     /// failure without being asked.
     pub fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        self.ask_judging(request, true)
+    }
+
+    /// As [`Peer::ask`], whatever events are listed: for who says what is wrong with them.
+    ///
+    /// # Errors
+    /// As [`Peer::ask`].
+    pub fn ask_any_events(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        self.ask_judging(request, false)
+    }
+
+    fn ask_judging(&mut self, request: &PeerRequest, events: bool) -> Result<PeerAnswer, PeerFailure> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
         }
         self.questions_asked += 1;
         let mut question = json!(request);
         question["id"] = json!(self.questions_asked);
-        let answer = self.line.exchange(&question).and_then(|line| answer(&line, self.questions_asked, request));
+        let answer =
+            self.line.exchange(&question).and_then(|line| answer(&line, self.questions_asked, request, events));
         answer.map_err(|fault| {
             let mut failure = PeerFailure { peer: self.identity.to_string(), fault, stderr: self.line.stderr_text() };
             if !failure.is_reported() {
@@ -443,8 +456,8 @@ fn claimed_orders(order: Option<Value>) -> Result<BTreeMap<String, f64>, String>
     orders.into_iter().map(number).collect()
 }
 
-/// Reads the answer to question number `id`.
-fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, PeerFault> {
+/// Reads the answer to question number `id`; its `events` are judged or not.
+fn answer(line: &[u8], id: u64, request: &PeerRequest, events: bool) -> Result<PeerAnswer, PeerFault> {
     #[derive(Deserialize)]
     struct Head {
         id: Value,
@@ -468,14 +481,8 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest) -> Result<PeerAnswer, Pee
         let perforates = request.exit_depth_m.is_some_and(is_reached);
         answer.outcome = if perforates { Outcome::Perforated } else { Outcome::Stopped };
     }
-    // Two events of one place may differ in time by what the tolerance allows.
-    for (index, Event { kind, state }) in answer.events.iter().enumerate() {
-        let is_known = !matches!(kind, EventKind::StageEnd(stage) if *stage >= request.stages.len());
-        let latest = state.time + request.rtol * answer.time_s.abs();
-        let follows = |before: &Event| before.kind != *kind && before.state.time <= latest;
-        if !is_known || !answer.events[..index].iter().all(follows) {
-            return Err(PeerFault::nonsense("its events are not of the stages, each once, in the order of time", line));
-        }
+    if events && !answer.has_events_in_order(request) {
+        return Err(PeerFault::nonsense("its events are not of the stages, each once, in the order of time", line));
     }
     Ok(answer)
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::integrators::{Cost, Flight};
-use crate::physics::{Event, EventKind, Outcome, Problem, Stage, State, Target};
+use crate::physics::{CraterStiffness, Event, EventKind, Outcome, Problem, Scene, Stage, State, Target};
 
 /// A flight that a peer is asked for. The client numbers the questions, so there is no `id` here.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +22,68 @@ pub struct PeerRequest {
     pub repeats: u32,
     /// The stages, in order.
     pub stages: Vec<Stage>,
+    /// Step (s) that a peer of fixed steps must use; not sent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dt_s: Option<f64>,
+    /// The physical scene that the problem stems from; `null` for any other.
+    #[serde(default)]
+    pub scene: Option<PeerScene>,
+}
+
+/// The numbers of a physical scene: one crater, one medium behind it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeerScene {
+    /// Mass M (kg).
+    pub mass_kg: f64,
+    /// Diameter d (m).
+    pub diameter_m: f64,
+    /// Nose factor N*.
+    pub nose_factor: f64,
+    /// Compressive strength fc (Pa).
+    pub strength_pa: f64,
+    /// Density rho (kg/m³).
+    pub density_kg_m3: f64,
+    /// Thickness H (m); `null` for a semi-infinite target.
+    pub thickness_m: Option<f64>,
+    /// Static strength over fc; `null` means Eq. 14.
+    #[serde(rename = "S")]
+    pub static_factor: Option<f64>,
+    /// Inertia factor.
+    #[serde(rename = "B")]
+    pub inertia_factor: f64,
+    /// Crater depth in diameters.
+    #[serde(rename = "k")]
+    pub crater_ratio: f64,
+    /// Crater constant c (N/m); `null` for the one that makes the force continuous.
+    pub crater_stiffness_n_m: Option<f64>,
+    /// Impact velocity V0 (m/s).
+    pub velocity_m_s: f64,
+    /// When the target counts as perforated: `full-depth` or `ndrc`.
+    pub criterion: String,
+}
+
+impl PeerScene {
+    /// The numbers of `scene`; `None` for stages, layers and a scene without an impact velocity.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let concrete = scene.concrete().filter(|concrete| concrete.layers.is_empty())?;
+        Some(Self {
+            mass_kg: scene.mass,
+            diameter_m: concrete.diameter,
+            nose_factor: concrete.nose_factor,
+            strength_pa: concrete.strength,
+            density_kg_m3: concrete.density,
+            thickness_m: scene.thickness,
+            static_factor: (!concrete.follows_eq14).then_some(concrete.static_factor),
+            inertia_factor: concrete.inertia_factor,
+            crater_ratio: concrete.crater_ratio,
+            crater_stiffness_n_m: match concrete.crater_stiffness {
+                CraterStiffness::Given(stiffness) => Some(stiffness),
+                CraterStiffness::Continuous => None,
+            },
+            velocity_m_s: scene.velocity?,
+            criterion: <&str>::from(scene.criterion).to_owned(),
+        })
+    }
 }
 
 impl PeerRequest {
@@ -36,6 +98,8 @@ impl PeerRequest {
             atol: [rtol * depth_scale(problem), rtol * problem.impact_speed],
             repeats: 1,
             stages: problem.stages.to_vec(),
+            dt_s: None,
+            scene: None,
         }
     }
 
@@ -90,7 +154,9 @@ pub struct PeerAnswer {
 pub struct Difference {
     /// `depth`, `time`, `velocity`, or an event and what of it: `crater-end time`, `stage-end 2 velocity`.
     pub quantity: String,
-    /// Absolute value; depth and times relative to the reference, velocities to V0.
+    /// With its sign; depth and times relative to the reference, velocities to V0.
+    pub signed: f64,
+    /// Its absolute value.
     pub relative: f64,
     /// How much the problem itself magnifies a relative error of the velocity or the energy in this quantity, at least
     /// 1: V0/V at a place passed with velocity V; V0/(a T) in the time T of a rest that is reached with deceleration a.
@@ -118,6 +184,17 @@ impl PeerAnswer {
             step_limit: None,
             notes: Vec::new(),
         }
+    }
+
+    /// Whether the events are those of the stages, each once, in the order of time.
+    pub fn has_events_in_order(&self, request: &PeerRequest) -> bool {
+        // Two events of one place may differ in time by what the tolerance allows.
+        self.events.iter().enumerate().all(|(index, Event { kind, state })| {
+            let is_known = !matches!(kind, EventKind::StageEnd(stage) if *stage >= request.stages.len());
+            let latest = state.time + request.rtol * self.time_s.abs();
+            let follows = |before: &Event| before.kind != *kind && before.state.time <= latest;
+            is_known && self.events[..index].iter().all(follows)
+        })
     }
 
     /// The first event of `reference` before its end that a peer leaves out which lists others; the event of the end is in
@@ -153,23 +230,38 @@ impl PeerAnswer {
 
 /// Depth, time and velocity of two states, each with its conditioning.
 fn compare(prefix: &str, ours: State, theirs: State, problem: &Problem) -> Vec<Difference> {
-    let relative = |ours: f64, theirs: f64, scale: f64| {
-        // Equal zeros differ by nothing, whatever the scale.
-        if ours == theirs { 0.0 } else { ((ours - theirs) / scale).abs() }
-    };
-    let impact_speed = problem.impact_speed;
-    // W = V² has the relative error of the energy: dV = dW/2V, and the time at a place follows dx/V.
-    let passing = if theirs.velocity > 0.0 { (impact_speed / theirs.velocity).max(1.0) } else { 1.0 };
-    let timing =
-        if theirs.velocity > 0.0 { passing } else { (impact_speed / change_to_rest(theirs, problem)).max(1.0) };
+    let names = ["depth", "time", "velocity"];
+    names
+        .into_iter()
+        .zip(errors(ours, theirs, problem.impact_speed))
+        .zip(conditioning(theirs, problem))
+        .map(|((name, signed), conditioning)| Difference {
+            quantity: format!("{prefix}{name}"),
+            signed,
+            relative: signed.abs(),
+            conditioning,
+        })
+        .collect()
+}
+
+/// Errors with their signs of depth, time and velocity: relative, of the velocity over `impact_speed` (m/s).
+pub fn errors(ours: State, theirs: State, impact_speed: f64) -> [f64; 3] {
+    // Equal zeros differ by nothing, whatever the scale.
+    let over = |ours: f64, theirs: f64, scale: f64| if ours == theirs { 0.0 } else { (ours - theirs) / scale };
     [
-        ("depth", relative(ours.depth, theirs.depth, theirs.depth), 1.0),
-        ("time", relative(ours.time, theirs.time, theirs.time), timing),
-        ("velocity", relative(ours.velocity, theirs.velocity, impact_speed), passing),
+        over(ours.depth, theirs.depth, theirs.depth.abs()),
+        over(ours.time, theirs.time, theirs.time.abs()),
+        over(ours.velocity, theirs.velocity, impact_speed),
     ]
-    .into_iter()
-    .map(|(name, relative, conditioning)| Difference { quantity: format!("{prefix}{name}"), relative, conditioning })
-    .collect()
+}
+
+/// [`Difference::conditioning`] of depth, time and velocity in the state `at`.
+pub fn conditioning(at: State, problem: &Problem) -> [f64; 3] {
+    // W = V² has the relative error of the energy: dV = dW/2V, and the time at a place follows dx/V.
+    let passing = if at.velocity > 0.0 { (problem.impact_speed / at.velocity).max(1.0) } else { 1.0 };
+    let is_passing = at.velocity > 0.0;
+    let timing = if is_passing { passing } else { (problem.impact_speed / change_to_rest(at, problem)).max(1.0) };
+    [1.0, timing, passing]
 }
 
 /// Velocity (m/s) that the deceleration at rest would take away in the whole time of the flight; infinite without one.

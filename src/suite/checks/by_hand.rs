@@ -1,10 +1,11 @@
 //! The central difference beside a plain loop over the same steps, with each velocity and boundary rule.
 
 use super::super::claim::{Found, Measurement, NotMeasured};
-use super::problems::{Kind, in_double_double, problems};
+use super::problems::{in_double_double, problems};
 use super::{Subject, Worst, off};
 use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, Steps, VelocityAt};
 use crate::physics::{EventKind, Outcome, Problem, Stage, State};
+use crate::studies::random_problems::Kind;
 
 check! {
     /// The claim's rules of the central difference on random problems of every kind against Eq. 6-8 in a plain loop, at a

@@ -548,7 +548,7 @@ fn through_text(dimension: Dimension, unit: &str) -> Option<f64> {
 }
 
 /// Fields of a question, the id apart, which is that of the line.
-const FIELDS: usize = 7;
+const FIELDS: usize = 8;
 
 fn wire(&Wire { problems }: &Wire, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let mut random = subject.random("wire");
@@ -591,6 +591,7 @@ fn wire(&Wire { problems }: &Wire, subject: &Subject<'_>, seen: &mut Violations)
             seen.expect(is_right, || format!("{path} is {said:?} for {value:e} in problem {index}"));
         }
         let is_all = question.as_object().is_some_and(|fields| fields.len() == FIELDS)
+            && question["scene"].is_null()
             && question["stages"].as_array().is_some_and(|all| all.len() == problem.stages.len());
         seen.expect(is_all, || format!("problem {index} has other fields: {line}"));
         let back: Option<PeerRequest> = serde_json::from_str(&line).ok();

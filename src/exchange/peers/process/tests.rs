@@ -21,6 +21,8 @@ fn request() -> PeerRequest {
         atol: [1e-9, 1e-9],
         repeats: 1,
         stages: vec![Stage::tunnel(1.0, 0.0)],
+        dt_s: None,
+        scene: None,
     }
 }
 
@@ -66,7 +68,7 @@ fn a_question_carries_its_number_and_every_field_of_the_contract() {
     let stage =
         json!({"static_force_n": 1.0, "stiffness_n_m": 0.0, "viscosity_kg_s": 0.0, "drag_kg_m": 0.0, "end_m": null});
     let wanted = json!({"id": 1, "mass_kg": 1.0, "velocity_m_s": 1.0, "exit_depth_m": null, "rtol": 1e-9,
-        "atol": [1e-9, 1e-9], "repeats": 1, "stages": [stage]});
+        "atol": [1e-9, 1e-9], "scene": null, "repeats": 1, "stages": [stage]});
     assert_eq!(question, wanted);
 }
 

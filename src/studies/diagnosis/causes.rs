@@ -1,0 +1,490 @@
+//! Which fault explains the answers? Each hypothesis computes what it would answer; its number is fitted.
+//!
+//! A cause is *certain* where it explains every failing answer to within the accuracy of the solver, contradicts no
+//! passing one, and no other hypothesis of as little freedom does the same. Where no single one does, two at once are
+//! tried. What only a number of its own in every answer explains is never certain by a single quantity.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
+use super::questions::Question;
+use super::simulation::Simulated;
+use crate::exchange::peers::wire::{conditioning, errors};
+use crate::physics::{Problem, State};
+
+/// Failing answers from which the number of a hypothesis is fitted.
+const FITTED: usize = 6;
+/// The same of a second fault.
+const FITTED_OF_SECOND: usize = 2;
+/// Failing answers that a number must explain before all of them are compared.
+const TRIED: usize = 8;
+/// What is so near to zero, in units of the accuracy, is a root.
+const NEAR_ROOT: f64 = 1e-4;
+/// Rounds of a search between two numbers.
+const ROUNDS_MAX: usize = 80;
+/// Failing answers that must be explained for certainty.
+const CERTAIN_FROM: usize = 3;
+/// First causes with which a second one is tried.
+const FIRST_OF_TWO: usize = 5;
+/// Causes listed at most.
+const LISTED: usize = 5;
+/// Part of the effect of a fault that an explanation may leave, up to so many times the accuracy: a solver with a fault
+/// may err more than a sound one does on the same question.
+const LEFT: f64 = 1e-4;
+const LEFT_MAX: f64 = 100.0;
+/// An error that is so many times the allowed one tells a fault from the accuracy of a solver.
+const TELLING: f64 = 10.0;
+
+/// How sure a cause is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, strum::Display)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Certainty {
+    /// It explains every answer, and nothing else does.
+    Certain,
+    /// It explains every answer, and so does something else; or nearly every one.
+    Likely,
+    /// It explains some.
+    Possible,
+}
+
+/// What is wrong with a solver.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct Cause {
+    /// Id (`docs/reference.md`, "Diagnosis").
+    pub id: String,
+    /// Number over the right one; a speed for `rest-threshold`.
+    pub factor: Option<f64>,
+    /// How sure it is.
+    pub certainty: Certainty,
+    /// What is wrong, in a sentence.
+    pub statement: String,
+    /// Failing answers that it explains.
+    pub explains: usize,
+    /// Failing answers.
+    pub of: usize,
+    /// Largest relative difference between those answers and what the cause gives.
+    pub largest_difference: Option<f64>,
+}
+
+/// An answer to a question, and how near a sound one would be.
+#[derive(Clone, Debug)]
+pub(super) struct Seen<'a> {
+    /// The question.
+    pub question: &'a Question,
+    /// Numbers of the answer.
+    pub answer: State,
+    /// How the solver works.
+    pub how: How,
+    /// Relative error of a sound answer, before its condition.
+    pub accuracy: f64,
+    /// Whether the answer fails.
+    pub fails: bool,
+    /// Whether only its outcome is wrong.
+    pub is_misnamed: bool,
+}
+
+/// Quantities that are compared: depth, time, velocity.
+type Mask = [bool; 3];
+const ALL_THREE: Mask = [true; 3];
+
+impl Seen<'_> {
+    /// Errors of the answer against `end`, the end of a flight through `problem`, each over what is allowed.
+    fn excess(&self, problem: &Problem, end: State) -> [f64; 3] {
+        let errors = errors(self.answer, end, self.question.problem.impact_speed);
+        let conditions = conditioning(end, problem);
+        std::array::from_fn(|i| {
+            let condition = conditions[i].max(self.question.conditions[i]);
+            errors[i] / (self.accuracy * condition)
+        })
+    }
+
+    /// Whether `excess` leaves next to nothing of what is wrong with the answer.
+    fn is_near(&self, excess: [f64; 3], mask: Mask) -> bool {
+        let wrong = self.excess(&self.question.problem, self.question.exact.end);
+        let wrong = wrong.iter().fold(0.0, |a, b| f64::max(a, b.abs()));
+        let allowed = if self.fails { (LEFT * wrong).clamp(1.0, LEFT_MAX) } else { 1.0 };
+        (0..3).all(|i| !mask[i] || excess[i].abs() <= allowed)
+    }
+
+    /// Largest relative error against what `faults` give, if they explain the answer.
+    fn explained_by(&self, faults: &[Fault<'_>], mask: Mask) -> Option<f64> {
+        let (problem, Simulated { end, .. }) = predict(self.question, faults, self.how)?;
+        let excess = self.excess(&problem, end);
+        let is_near = self.is_near(excess, mask);
+        let errors = errors(self.answer, end, self.question.problem.impact_speed);
+        is_near.then(|| (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max))
+    }
+
+    /// Whether `faults` give another answer. Where none can be computed, nothing is contradicted.
+    fn contradicts(&self, faults: &[Fault<'_>], mask: Mask) -> bool {
+        predict(self.question, faults, self.how).is_some() && self.explained_by(faults, mask).is_none()
+    }
+
+    /// Whether what `faults` give is another answer than the right one.
+    fn is_told_apart(&self, faults: &[Fault<'_>]) -> bool {
+        let Some((_, found)) = predict(self.question, faults, self.how) else { return false };
+        let Some((problem, right)) = predict(self.question, &[], self.how) else { return false };
+        let faulty = Seen { answer: found.end, ..self.clone() };
+        let told = faulty.excess(&problem, right.end).iter().filter(|excess| excess.abs() > TELLING).count();
+        // A number of its own in every answer explains one quantity by itself.
+        let is_fitted = |(fault, _): &Fault<'_>| {
+            matches!(fault.parameter, Parameter::Delay | Parameter::Lateness | Parameter::Nearness)
+        };
+        let is_time = |(fault, _): &Fault<'_>| fault.id.starts_with("event-time");
+        told > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_time))
+    }
+
+    /// Numbers of `hypothesis` that explain the answer, together with `others`.
+    fn fit(&self, hypothesis: &Hypothesis, others: &[Fault<'_>], mask: Mask) -> Vec<f64> {
+        let with =
+            |number: f64| -> Vec<(&Hypothesis, f64)> { others.iter().copied().chain([(hypothesis, number)]).collect() };
+        let excess = |number: f64| {
+            let (problem, found) = predict(self.question, &with(number), self.how)?;
+            Some(self.excess(&problem, found.end))
+        };
+        let mut fitting: Vec<f64> = Vec::new();
+        if hypothesis.changes.is_empty() {
+            return if self.explained_by(&with(1.0), mask).is_some() { vec![1.0] } else { fitting };
+        }
+        let mut add = |number: f64| {
+            let is_new = fitting.iter().all(|known| (known - number).abs() > 1e-9 * number.abs());
+            if is_new && self.explained_by(&with(number), mask).is_some() {
+                fitting.push(number);
+            }
+        };
+        let grid = hypothesis.parameter.grid(self.question);
+        // What does not concern this flight leaves it as it is, whatever the number.
+        if grid.len() > 4
+            && matches!(
+                [grid[0], grid[grid.len() / 3], grid[grid.len() - 1]].map(&excess),
+                [Some(a), Some(b), Some(c)] if a == b && b == c
+            )
+        {
+            return fitting;
+        }
+        let values: Vec<_> = grid.iter().map(|number| excess(*number)).collect();
+        for (index, number) in grid.iter().enumerate() {
+            if values[index].is_some_and(|excess| self.is_near(excess, mask)) {
+                add(*number);
+            }
+        }
+        if matches!(hypothesis.parameter, Parameter::Choice(_) | Parameter::OneOf(_)) {
+            return fitting;
+        }
+        for index in 1..grid.len() {
+            let (Some(low), Some(high)) = (values[index - 1], values[index]) else { continue };
+            // The number is a root in every quantity that it moves: the one that it moves most tells.
+            let moves = |i: &usize| (high[*i] - low[*i]).abs();
+            let crossing = (0..3).filter(|i| mask[*i] && low[*i] * high[*i] < 0.0);
+            if let Some(quantity) = crossing.max_by(|a, b| moves(a).total_cmp(&moves(b))) {
+                let ends = (grid[index - 1], low[quantity], grid[index], high[quantity]);
+                if let Some(root) = root(ends, |number| Some(excess(number)?[quantity])) {
+                    add(root);
+                }
+            }
+        }
+        fitting
+    }
+}
+
+/// A root of `g` between two numbers at which its signs differ.
+fn root(
+    (mut low, mut g_low, mut high, mut g_high): (f64, f64, f64, f64),
+    g: impl Fn(f64) -> Option<f64>,
+) -> Option<f64> {
+    for round in 0..ROUNDS_MAX {
+        let width = high - low;
+        if width <= f64::EPSILON * high.abs().max(low.abs()) {
+            break;
+        }
+        let falsi = low - g_low * width / (g_high - g_low);
+        let next = if round % 3 == 2 || !(low < falsi && falsi < high) { 0.5 * (low + high) } else { falsi };
+        let value = g(next)?;
+        if value.abs() < NEAR_ROOT {
+            return Some(next);
+        }
+        if (value < 0.0) == (g_low < 0.0) {
+            (low, g_low) = (next, value);
+            g_high *= 0.5;
+        } else {
+            (high, g_high) = (next, value);
+            g_low *= 0.5;
+        }
+    }
+    Some(if g_low.abs() < g_high.abs() { low } else { high })
+}
+
+/// `number`, or the round one that it is within its accuracy.
+fn rounded(number: f64) -> impl Iterator<Item = f64> {
+    let zero = (number != 0.0 && number.abs() < 1e-6).then_some(0.0);
+    let ratios = [1.0, 2.0, 3.0, 4.0, 8.0, std::f64::consts::PI];
+    let near = ratios.into_iter().flat_map(move |by| {
+        [(number * by).round() / by, (number / by).round() * by]
+            .into_iter()
+            .filter(move |round| *round != number && (round - number).abs() <= 1e-4 * number.abs())
+    });
+    std::iter::once(number).chain(near).chain(zero)
+}
+
+/// How well faults explain what was seen.
+#[derive(Clone, Debug)]
+struct Explanation {
+    faults: Vec<(&'static Hypothesis, f64)>,
+    /// Failing answers explained.
+    explained: Vec<bool>,
+    /// Failing answers explained that differ from the right ones.
+    told_apart: usize,
+    /// Passing answers that it would have failed.
+    contradicted: usize,
+    largest: f64,
+}
+
+impl Explanation {
+    fn count(&self) -> usize {
+        self.explained.iter().filter(|is| **is).count()
+    }
+
+    fn is_full(&self) -> bool {
+        self.contradicted == 0 && self.explained.iter().all(|is| *is) && self.told_apart > 0
+    }
+
+    fn freedom(&self) -> u32 {
+        self.faults.iter().map(|(fault, _)| 1 + u32::from(fault.parameter.freedom())).sum()
+    }
+}
+
+/// What was seen, parted into failing and passing answers.
+struct Evidence<'a> {
+    failing: Vec<&'a Seen<'a>>,
+    passing: Vec<&'a Seen<'a>>,
+}
+
+impl Evidence<'_> {
+    /// How well `hypothesis` with `number`, or a number of its own in every answer, explains all, beside `others`.
+    fn explain(
+        &self,
+        hypothesis: &'static Hypothesis,
+        number: f64,
+        others: &[Fault<'static>],
+        mask: Mask,
+    ) -> Explanation {
+        let is_per_answer = hypothesis.parameter.is_per_answer();
+        let mut largest = 0.0_f64;
+        let mut told_apart = 0;
+        let mut explained = Vec::with_capacity(self.failing.len());
+        for seen in &self.failing {
+            let number = if is_per_answer { seen.fit(hypothesis, others, mask).first().copied() } else { Some(number) };
+            let faults: Option<Vec<_>> =
+                number.map(|number| others.iter().copied().chain([(hypothesis, number)]).collect());
+            let found = faults.as_ref().and_then(|faults| Some((seen.explained_by(faults, mask)?, faults)));
+            explained.push(found.is_some());
+            if let Some((difference, faults)) = found {
+                largest = largest.max(difference);
+                told_apart += usize::from(seen.is_misnamed || seen.is_told_apart(faults));
+            }
+        }
+        let faults: Vec<_> = others.iter().copied().chain([(hypothesis, number)]).collect();
+        // Where each answer has a number of its own, a passing one has that of no fault.
+        let contradicted = if is_per_answer {
+            let others_alone = |seen: &&&Seen<'_>| !others.is_empty() && seen.contradicts(others, mask);
+            self.passing.iter().filter(others_alone).count()
+        } else {
+            self.passing.iter().filter(|seen| seen.contradicts(&faults, mask)).count()
+        };
+        Explanation { faults, explained, told_apart, contradicted, largest }
+    }
+
+    /// The best explanation by `hypothesis`, if it explains anything.
+    fn best(
+        &self,
+        hypothesis: &'static Hypothesis,
+        others: &[Fault<'static>],
+        unexplained: &[usize],
+        mask: Mask,
+    ) -> Option<Explanation> {
+        let fitted = if others.is_empty() { FITTED } else { FITTED_OF_SECOND };
+        if hypothesis.parameter.is_per_answer() {
+            let is_tried = |index: &&usize| !self.failing[**index].fit(hypothesis, others, mask).is_empty();
+            let any = unexplained.iter().take(fitted).any(|index| is_tried(&index));
+            return any.then(|| self.explain(hypothesis, 1.0, others, mask)).filter(|found| found.count() > 0);
+        }
+        let mut numbers: Vec<f64> = Vec::new();
+        for index in unexplained.iter().take(fitted) {
+            for number in self.failing[*index].fit(hypothesis, others, mask) {
+                if numbers.iter().all(|known| (known - number).abs() > 1e-12 * number.abs()) {
+                    numbers.push(number);
+                }
+            }
+        }
+        let tried = |number: f64| {
+            let faults: Vec<_> = others.iter().copied().chain([(hypothesis, number)]).collect();
+            let explained = |index: &&usize| self.failing[**index].explained_by(&faults, mask).is_some();
+            unexplained.iter().take(TRIED).filter(explained).count()
+        };
+        let all = numbers.into_iter().flat_map(rounded);
+        let number = all.map(|number| (tried(number), number)).max_by_key(|(count, _)| *count)?.1;
+        Some(self.explain(hypothesis, number, others, mask)).filter(|found| found.count() > 0)
+    }
+}
+
+/// How far causes are looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// One at a time.
+    Singles,
+    /// Two at once too.
+    Pairs,
+}
+
+/// What explains the failing answers of `seen`, best first; `others` are all questions, asked or not, on which two
+/// causes may differ.
+pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question], effort: Effort) -> Vec<Cause> {
+    let mut evidence = Evidence {
+        failing: seen.iter().filter(|seen| seen.fails).collect(),
+        passing: seen.iter().filter(|seen| !seen.fails).collect(),
+    };
+    // What meets least says most.
+    evidence.failing.sort_by_key(|seen| seen.question.contains.len());
+    let of = evidence.failing.len();
+    if of == 0 {
+        return Vec::new();
+    }
+    let usable: Vec<&'static Hypothesis> = hypotheses()
+        .filter(|hypothesis| reads_scene || !hypothesis.needs_scene())
+        .filter(|hypothesis| hypothesis.id != "outcome-name" || evidence.failing.iter().all(|seen| seen.is_misnamed))
+        .collect();
+    let everything: Vec<usize> = (0..of).collect();
+    let mut found: Vec<Explanation> =
+        usable.par_iter().filter_map(|hypothesis| evidence.best(hypothesis, &[], &everything, ALL_THREE)).collect();
+    found.sort_by_key(|explanation| (explanation.contradicted > 0, of - explanation.count(), explanation.freedom()));
+    let is_nearly_full = |found: &Explanation| found.contradicted == 0 && found.told_apart * 10 >= of * 9;
+    if effort == Effort::Pairs && !found.iter().any(|found| found.is_full() || is_nearly_full(found)) {
+        let pairs = pairs(&evidence, &usable, &found);
+        found.extend(pairs);
+    }
+    let mut full: Vec<&Explanation> = found.iter().filter(|explanation| explanation.is_full()).collect();
+    full.sort_by_key(|explanation| explanation.freedom());
+    if let Some(simplest) = full.first() {
+        let rivals: Vec<&&Explanation> =
+            full.iter().filter(|explanation| explanation.freedom() == simplest.freedom()).collect();
+        return named(&rivals, &evidence, seen, others);
+    }
+    // What explains a few answers by its freedom explains nothing.
+    found.retain(|explanation| explanation.contradicted == 0 && 4 * explanation.told_apart >= of);
+    found.sort_by_key(|explanation| (of - explanation.count(), explanation.freedom()));
+    let mut causes: Vec<Cause> = Vec::new();
+    for explanation in found.iter().take(LISTED) {
+        let nearly_all = explanation.count() * 10 >= of * 9 && explanation.count() >= CERTAIN_FROM;
+        let certainty = if nearly_all { Certainty::Likely } else { Certainty::Possible };
+        causes.extend(explanation.faults.iter().map(|fault| cause(*fault, explanation, certainty)));
+    }
+    causes.dedup_by(|a, b| a.id == b.id && a.statement == b.statement);
+    causes.truncate(LISTED);
+    causes
+}
+
+fn cause((hypothesis, number): Fault<'static>, explanation: &Explanation, certainty: Certainty) -> Cause {
+    let parameter = hypothesis.parameter;
+    Cause {
+        id: hypothesis.id.to_owned(),
+        factor: parameter.is_factor().then_some(number),
+        certainty,
+        statement: hypothesis.says(number),
+        explains: explanation.count(),
+        of: explanation.explained.len(),
+        largest_difference: Some(explanation.largest),
+    }
+}
+
+/// Whether two explanations answer every question alike.
+fn are_twins(a: &Explanation, b: &Explanation, seen: &Seen<'_>, others: &[&Question]) -> bool {
+    others.iter().all(|question| {
+        let of = |explanation: &Explanation| predict(question, &explanation.faults, seen.how);
+        match (of(a), of(b)) {
+            (Some((problem, a)), Some((_, b))) => {
+                let seen = Seen { question, answer: b.end, ..seen.clone() };
+                seen.excess(&problem, a.end).iter().all(|excess| excess.abs() <= 1.0)
+            }
+            (None, None) => true,
+            _ => false,
+        }
+    })
+}
+
+/// The causes of explanations that hold equally well.
+fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], others: &[&Question]) -> Vec<Cause> {
+    let first = rivals[0];
+    let is_per_answer = first.faults.iter().any(|(fault, _)| fault.parameter.is_per_answer());
+    let is_same = |rival: &&&&Explanation| {
+        let ids = |explanation: &Explanation| explanation.faults.iter().map(|(fault, _)| fault.id).collect::<Vec<_>>();
+        ids(rival) == ids(first) || (!is_per_answer && are_twins(first, rival, &seen[0], others))
+    };
+    let is_alone = rivals.iter().all(|rival| is_same(&rival));
+    // One number fitted to one number proves nothing.
+    let by_time_alone = first.faults.iter().any(|(fault, _)| fault.id.starts_with("event-time"));
+    let is_enough = first.told_apart >= if evidence.passing.is_empty() { 2 * CERTAIN_FROM } else { CERTAIN_FROM };
+    let is_rounding = first.faults.iter().any(|(fault, _)| matches!(fault.parameter, Parameter::Nearness));
+    let is_certain = is_alone && !by_time_alone && !is_rounding && is_enough;
+    let certainty = if is_certain { Certainty::Certain } else { Certainty::Likely };
+    let mut causes: Vec<Cause> = Vec::new();
+    // Those that cannot be told apart are one cause.
+    for rival in rivals.iter().take(if is_alone { 1 } else { LISTED }) {
+        for fault in &rival.faults {
+            let next = cause(*fault, rival, certainty);
+            if causes.iter().all(|known| known.id != next.id) {
+                causes.push(next);
+            }
+        }
+    }
+    causes
+}
+
+/// Two faults at once, where no one explains all.
+fn pairs(evidence: &Evidence<'_>, usable: &[&'static Hypothesis], singles: &[Explanation]) -> Vec<Explanation> {
+    let of = evidence.failing.len();
+    let mut firsts: Vec<(Explanation, Mask)> = singles
+        .iter()
+        .filter(|single| single.told_apart > 0 && single.contradicted == 0 && 20 * single.count() >= of)
+        .map(|single| (single.clone(), ALL_THREE))
+        .collect();
+    // A fault of the report hides the others in one quantity.
+    for hidden in 0..3 {
+        let mask: Mask = std::array::from_fn(|i| i != hidden);
+        let everything: Vec<usize> = (0..of).collect();
+        let masked: Vec<Explanation> =
+            usable.par_iter().filter_map(|hypothesis| evidence.best(hypothesis, &[], &everything, mask)).collect();
+        firsts.extend(
+            masked
+                .into_iter()
+                .filter(|found| found.count() == of && found.told_apart > 0 && found.contradicted == 0)
+                .map(|found| (found, mask)),
+        );
+    }
+    firsts.sort_by_key(|(single, _)| (of - single.count(), single.freedom()));
+    let mut found = Vec::new();
+    for (first, mask) in
+        firsts.iter().filter(|(single, _)| !single.faults[0].0.parameter.is_per_answer()).take(FIRST_OF_TWO)
+    {
+        let missing: Vec<usize> = if *mask == ALL_THREE {
+            first.explained.iter().enumerate().filter_map(|(index, is)| (!is).then_some(index)).collect()
+        } else {
+            (0..of).collect()
+        };
+        // Two numbers of its own in every answer would explain anything.
+        let is_free = |second: &Hypothesis| matches!(second.parameter, Parameter::Nearness);
+        let others = usable
+            .par_iter()
+            .filter(|second| !is_free(second))
+            .filter(|second| !std::ptr::eq(**second, first.faults[0].0));
+        let both = others.filter_map(|second| evidence.best(second, &first.faults, &missing, ALL_THREE));
+        found.extend(both.filter(Explanation::is_full).collect::<Vec<_>>());
+        if !found.is_empty() {
+            break;
+        }
+    }
+    found
+}

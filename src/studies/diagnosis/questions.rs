@@ -1,0 +1,425 @@
+//! What a solver is asked: random problems that together hold every term in every stage and every kind of event.
+
+use serde::Serialize;
+
+use crate::exchange::peers::wire::PeerScene;
+use crate::integrators::Flight;
+use crate::physics::{CraterStiffness, Outcome, Problem, Resistance, Scene, Stage};
+use crate::studies::error::{Truth, conditions_in_dual_numbers};
+use crate::studies::random::Random;
+use crate::studies::random_problems::{Kind, Scale};
+use crate::studies::random_scenes::Generator;
+
+/// Largest condition number of a question: beyond it a sound solver may err by more than its tolerance can tell.
+const CONDITION_MAX: f64 = 1e3;
+/// Largest condition number where the exit is grazed.
+const CONDITION_AT_GRAZING: f64 = 1e6;
+/// Draws for one question at most.
+const DRAWS_MAX: usize = 200;
+/// Relative distance from rest within which an exit is grazed.
+const GRAZING: f64 = 0.02;
+/// Part of the depth of the flight below which a stage is short.
+const SHORT: f64 = 1e-2;
+/// Fast rate of a stage, times the duration of the flight, from which it is stiff.
+const STIFF: f64 = 200.0;
+/// Relative jump of the force at the end of a stage that counts as one.
+const JUMP: f64 = 1e-6;
+
+/// What the flight of a question meets.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, strum::Display, strum::EnumIter, strum::IntoStaticStr,
+)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Content {
+    /// A static force that resists.
+    StaticForce,
+    /// A static force that drives.
+    Drive,
+    /// A spring in the first stage.
+    Stiffness,
+    /// A spring in a later stage.
+    LaterStiffness,
+    /// A force proportional to V.
+    Viscosity,
+    /// A force proportional to V².
+    Drag,
+    /// A stage without force.
+    AirGap,
+    /// The end of a stage.
+    StageEnd,
+    /// Ends of two stages or more.
+    SeveralStageEnds,
+    /// A jump of the force at the end of a stage.
+    ForceJump,
+    /// A stage much shorter than the flight.
+    ShortStage,
+    /// A drive against viscosity with rates far apart.
+    Stiff,
+    /// The exit.
+    Exit,
+    /// The exit, before the last stage.
+    ExitBeforeLastStage,
+    /// The exit, at the very end of a stage.
+    ExitAtStageEnd,
+    /// Rest.
+    Rest,
+    /// Rest just before the exit, or hardly any speed left there.
+    Grazing,
+    /// No impact speed.
+    NoSpeed,
+    /// A physical scene.
+    Scene,
+    /// A scene that states its crater stiffness.
+    CraterStiffness,
+    /// A scene that leaves S to Eq. 14.
+    Eq14,
+}
+
+/// A problem that a solver is asked.
+#[derive(Clone, Debug)]
+pub(super) struct Question {
+    /// Name: what kind, and which.
+    pub id: String,
+    /// The problem.
+    pub problem: Problem,
+    /// The physical scene it stems from.
+    pub scene: Option<Scene>,
+    /// The right answer.
+    pub exact: Flight,
+    /// What its flight meets, in the order of the list.
+    pub contains: Vec<Content>,
+    /// Condition numbers of depth, time and velocity at the end, at least one.
+    pub conditions: [f64; 3],
+}
+
+impl Question {
+    /// The question about `problem`, unless it has no answer or too large a condition.
+    fn new(id: String, problem: Problem, scene: Option<Scene>) -> Option<Self> {
+        let exact = Truth::of(&problem).ok()?.flight;
+        let contains = contents(&problem, scene.as_ref(), &exact);
+        let allowed = if contains.contains(&Content::Grazing) { CONDITION_AT_GRAZING } else { CONDITION_MAX };
+        let conditions = if problem.impact_speed > 0.0 {
+            let all = conditions_in_dual_numbers(&problem).ok()?;
+            [all[0], all[1], all[2]].map(|condition| condition.max(1.0))
+        } else {
+            [1.0; 3]
+        };
+        let is_usable = exact.outcome != Outcome::Undecided && conditions.iter().all(|condition| *condition <= allowed);
+        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions })
+    }
+
+    /// The scene as a peer is told of it.
+    pub(super) fn peer_scene(&self) -> Option<PeerScene> {
+        self.scene.as_ref().and_then(PeerScene::of)
+    }
+}
+
+/// What the flight `exact` through `problem` meets.
+fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec<Content> {
+    let met = &problem.stages[..=exact.stage];
+    let ends: Vec<f64> = met[..exact.stage].iter().map(|law| law.end).collect();
+    let in_any = |of: fn(&Stage) -> bool| met.iter().any(of);
+    let is_through = exact.outcome == Outcome::Perforated;
+    let jumps = ends.iter().enumerate().any(|(index, &end)| {
+        let passed =
+            exact.events.iter().find(|event| event.state.depth == end).map_or(0.0, |event| event.state.velocity);
+        let [before, behind] = [index, index + 1].map(|stage| problem.stages[stage].force(end, passed));
+        (before - behind).abs() > JUMP * before.abs().max(behind.abs())
+    });
+    let is_short = |index: usize| problem.limit_of(index) - problem.start_of(index) < SHORT * exact.end.depth;
+    let concrete = scene.and_then(Scene::concrete);
+    let spring = |law: &Stage| law.stiffness > 0.0;
+    let free = |law: &Stage| Stage { end: 0.0, ..*law } == Stage { end: 0.0, ..Stage::free() };
+    [
+        (in_any(|law| law.static_force > 0.0), Content::StaticForce),
+        (in_any(|law| law.static_force < 0.0), Content::Drive),
+        (spring(&met[0]), Content::Stiffness),
+        (met[1..].iter().any(spring), Content::LaterStiffness),
+        (in_any(|law| law.viscosity > 0.0), Content::Viscosity),
+        (in_any(|law| law.drag > 0.0), Content::Drag),
+        (met.iter().any(free), Content::AirGap),
+        (!ends.is_empty(), Content::StageEnd),
+        (ends.len() > 1, Content::SeveralStageEnds),
+        (jumps, Content::ForceJump),
+        ((0..met.len()).any(is_short), Content::ShortStage),
+        (met.iter().any(|law| law.viscosity * exact.end.time > STIFF * problem.mass), Content::Stiff),
+        (is_through, Content::Exit),
+        (is_through && exact.stage + 1 < problem.stages.len(), Content::ExitBeforeLastStage),
+        (is_through && problem.stages.iter().any(|law| law.end == problem.exit_depth), Content::ExitAtStageEnd),
+        (exact.end.velocity <= 0.0, Content::Rest),
+        (exact.exit_margin.is_some_and(|margin| margin.abs() < GRAZING), Content::Grazing),
+        (problem.impact_speed == 0.0, Content::NoSpeed),
+        (concrete.is_some(), Content::Scene),
+        (
+            concrete.is_some_and(|concrete| matches!(concrete.crater_stiffness, CraterStiffness::Given(_))),
+            Content::CraterStiffness,
+        ),
+        (concrete.is_some_and(|concrete| concrete.follows_eq14), Content::Eq14),
+    ]
+    .into_iter()
+    .filter_map(|(is_met, content)| is_met.then_some(content))
+    .collect()
+}
+
+/// A way to draw a problem.
+struct Family {
+    name: &'static str,
+    draw: fn(&mut Random) -> Option<Problem>,
+}
+
+/// One stage of shares of p, s, r and q, drawn where the share is 1; with an exit before rest, or not.
+fn single(random: &mut Random, terms: [f64; 4]) -> Option<Problem> {
+    let scale = Scale::draw(random);
+    let law = scale.stage(terms.map(|term| term * random.log_uniform(0.2, 3.0)));
+    let endless = Problem::of_stages(scale.mass, scale.speed, [law]);
+    let rests = terms[0] > 0.0 || terms[1] > 0.0;
+    if rests && random.chance(0.5) {
+        return Some(endless);
+    }
+    let far = if rests { Truth::of(&endless).ok()?.flight.end.depth } else { scale.length };
+    Some(endless.with_exit(far * random.uniform(0.2, 0.95)))
+}
+
+/// A problem of several stages whose laws hold every pair of terms in turn, ending where `exit` says.
+fn layered(random: &mut Random, ends: usize, law: impl Fn(&mut Random, &Scale, usize) -> Stage) -> Problem {
+    let scale = Scale::draw(random);
+    let mut end = 0.0;
+    let mut stages = Vec::new();
+    for index in 0..=ends {
+        end += scale.length * random.uniform(0.05, 0.2);
+        let law = law(random, &scale, index);
+        stages.push(if index < ends { law.until(end) } else { law });
+    }
+    Problem::of_stages(scale.mass, scale.speed, stages)
+}
+
+/// Shares of a law with two or three terms, one of them static.
+fn mixed(random: &mut Random, scale: &Scale) -> Stage {
+    let mut shares = [random.log_uniform(0.3, 2.0), 0.0, 0.0, 0.0];
+    for share in &mut shares[1..] {
+        *share = if random.chance(0.5) { random.log_uniform(0.3, 2.0) } else { 0.0 };
+    }
+    scale.stage(shares)
+}
+
+/// `problem` with an exit at the depth of its rest times `1 + off`.
+fn near_rest(problem: Problem, off: f64) -> Option<Problem> {
+    let rest = Truth::of(&problem).ok()?.flight.end.depth;
+    Some(problem.with_exit(rest * (1.0 + off)))
+}
+
+/// A driven and overdamped stage behind one that resists: the fast rate is thousands of times the slow one.
+fn stiff(random: &mut Random) -> Problem {
+    let scale = Scale::draw(random);
+    let (rate, end) = (random.log_uniform(1e3, 5e3), 0.1 * scale.length);
+    // r/M is so many times V/L; the drive balances it at a speed of about V, and the spring at 3 L.
+    let driven = scale.stage([-rate, rate / 3.0, rate, 0.0]);
+    let first = scale.stage([random.uniform(0.1, 1.0), 0.0, 0.0, random.uniform(0.0, 1.0)]);
+    let stages = if random.chance(0.5) { vec![driven] } else { vec![first.until(end), driven] };
+    Problem::of_stages(scale.mass, scale.speed, stages).with_exit(scale.length * random.uniform(0.8, 2.0))
+}
+
+/// The families in the order in which they are asked: what tells causes apart first.
+const FAMILIES: [Family; 25] = [
+    Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
+    Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
+    Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
+    Family { name: "viscosity", draw: |random| single(random, [0.0, 0.0, 1.0, 0.0]) },
+    Family { name: "tunnel", draw: |random| Kind::Tunnel.draw(random) },
+    Family {
+        name: "layers",
+        draw: |random| near_rest(layered(random, 2, |random, scale, _| mixed(random, scale)), 0.3),
+    },
+    Family {
+        name: "later-spring",
+        draw: |random| {
+            let problem = layered(random, 1, |random, scale, index| {
+                let p = random.log_uniform(0.2, 1.0);
+                scale.stage([p, if index > 0 { random.log_uniform(0.5, 5.0) } else { 0.0 }, 0.0, 0.0])
+            });
+            let off = if random.chance(0.5) { 0.5 } else { -0.1 };
+            near_rest(problem, off)
+        },
+    },
+    Family {
+        name: "exit-in-a-stage",
+        draw: |random| {
+            let problem = layered(random, 3, |random, scale, _| mixed(random, scale));
+            let stage = random.below(3);
+            let (from, to) = (problem.start_of(stage), problem.stages[stage].end);
+            let exit = random.uniform(from + 0.1 * (to - from), to);
+            Some(problem.with_exit(exit))
+        },
+    },
+    Family { name: "four-terms", draw: |random| single(random, [1.0, 1.0, 1.0, 1.0]) },
+    Family {
+        name: "grazing",
+        draw: |random| {
+            let terms = [1.0, f64::from(u8::from(random.chance(0.3))), 0.0, f64::from(u8::from(random.chance(0.6)))];
+            let problem = Problem { exit_depth: f64::INFINITY, ..single(random, terms)? };
+            let off = 10f64.powf(-random.uniform(2.0, 4.5));
+            near_rest(problem, if random.chance(0.7) { -off } else { off })
+        },
+    },
+    Family { name: "crater", draw: |random| Kind::Crater.draw(random) },
+    Family {
+        name: "air-gap",
+        draw: |random| {
+            let problem = layered(
+                random,
+                2,
+                |random, scale, index| {
+                    if index == 1 { Stage::free() } else { mixed(random, scale) }
+                },
+            );
+            let off = if random.chance(0.5) { 0.2 } else { -0.02 };
+            near_rest(problem, off)
+        },
+    },
+    Family { name: "driven", draw: |random| Kind::Driven.draw(random) },
+    Family { name: "several", draw: |random| Kind::Several.draw(random) },
+    Family { name: "spring-and-drag", draw: |random| Kind::SpringAndDrag.draw(random) },
+    Family { name: "viscous", draw: |random| Kind::Viscous.draw(random) },
+    Family { name: "viscous-spring", draw: |random| Kind::ViscousSpring.draw(random) },
+    Family {
+        name: "short-stages",
+        draw: |random| {
+            let mut problem = layered(random, 5, |random, scale, _| mixed(random, scale));
+            // A few stages share what is next to nothing of the way.
+            let (from, thin) = (problem.stages[1].end, problem.stages[0].end * random.log_uniform(1e-5, 1e-3));
+            for (index, count) in [(2, 1.0), (3, 2.0), (4, 3.0)] {
+                problem.stages[index].end = from + count * thin;
+            }
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
+        },
+    },
+    Family {
+        name: "exit-at-stage-end",
+        draw: |random| {
+            let problem = layered(random, 2, |random, scale, _| mixed(random, scale));
+            let exit = problem.stages[random.below(2)].end;
+            Some(problem.with_exit(exit))
+        },
+    },
+    Family { name: "several-viscous", draw: |random| Kind::SeveralViscous.draw(random) },
+    Family {
+        name: "driven-later",
+        draw: |random| {
+            let problem = layered(random, 2, |random, scale, index| {
+                let mut law = mixed(random, scale);
+                if index == 1 {
+                    law.static_force *= -random.uniform(0.2, 1.0);
+                }
+                law
+            });
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.2 })
+        },
+    },
+    Family {
+        name: "through",
+        // Hardly slowed: many boundaries lie in one step.
+        draw: |random| {
+            let mut problem = layered(random, 4, |random, scale, _| mixed(random, scale));
+            let exit = problem.stages[3].end * random.uniform(1.01, 1.3);
+            problem.impact_speed *= random.log_uniform(3.0, 30.0);
+            Some(problem.with_exit(exit))
+        },
+    },
+    Family {
+        name: "stop-in-spring",
+        draw: |random| {
+            let problem = layered(random, 1, |random, scale, index| {
+                scale.stage([0.0, random.log_uniform(0.5, 5.0) * f64::from(1 + index as u8), 0.0, 0.0])
+            });
+            near_rest(problem, random.uniform(0.1, 1.0))
+        },
+    },
+    Family { name: "stiff", draw: |random| Some(stiff(random)) },
+    Family {
+        name: "no-speed",
+        draw: |random| {
+            let scale = Scale::draw(random);
+            let law = mixed(random, &scale);
+            Some(Problem::of_stages(scale.mass, 0.0, [law]).with_exit(scale.length))
+        },
+    },
+];
+
+/// Of so many questions of all families, one is of a physical scene.
+const SCENES_EACH: usize = 4;
+/// One question of so many asks for a projectile without speed.
+const NO_SPEED_EACH: usize = 4;
+
+/// `count` questions from `seed`; about physical scenes alone if `of_scenes`.
+pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Question> {
+    let mut asked = Vec::with_capacity(count);
+    let mut scenes = Generator::new(seed, "diagnosis scenes");
+    let mut choices = Random::for_part(seed, "diagnosis choices");
+    let mut family = 0;
+    let mut drawn = 0;
+    // Every family has questions, so the draws are bounded only against a fault of the families themselves.
+    while asked.len() < count && drawn < DRAWS_MAX * count {
+        drawn += 1;
+        let number = asked.len();
+        if of_scenes || number % SCENES_EACH == SCENES_EACH - 1 {
+            let scene = varied(scenes.next_scene(), &mut choices);
+            let Ok(problem) = scene.problem() else { continue };
+            asked.extend(Question::new(format!("scene-{}", number + 1), problem, Some(scene)));
+            continue;
+        }
+        let Family { name, draw } = &FAMILIES[family % FAMILIES.len()];
+        let round = family / FAMILIES.len();
+        family += 1;
+        if *name == "no-speed" && !round.is_multiple_of(NO_SPEED_EACH) {
+            continue;
+        }
+        let mut random = Random::for_part(seed, &format!("diagnosis {name} {round}"));
+        let found = (0..DRAWS_MAX).find_map(|_| {
+            draw(&mut random).and_then(|problem| Question::new(format!("{name}-{}", round + 1), problem, None))
+        });
+        asked.extend(found);
+    }
+    asked
+}
+
+/// `scene` with groups of a usual range, and in half of the cases with S left to Eq. 14.
+fn varied(mut scene: Scene, random: &mut Random) -> Scene {
+    let leaves_static_factor = random.chance(0.5);
+    if let Resistance::Concrete(concrete) = &mut scene.resistance {
+        // N* B below one, so that neither is mistaken for the other's absence.
+        concrete.inertia_factor = random.uniform(0.5, 1.5);
+        concrete.crater_ratio = random.uniform(0.5, 4.0);
+        if leaves_static_factor {
+            concrete.follows_eq14 = true;
+            concrete.static_factor = crate::physics::semi_empirical::static_factor(concrete.strength);
+        }
+    }
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use strum::IntoEnumIterator;
+
+    use super::*;
+
+    #[test]
+    fn two_hundred_questions_hold_everything_that_a_flight_can_meet() {
+        for seed in 1..=3 {
+            let asked = questions(seed, 200, false);
+            assert_eq!(asked.len(), 200);
+            let mut counts = BTreeMap::new();
+            for content in asked.iter().flat_map(|question| &question.contains) {
+                *counts.entry(*content).or_insert(0) += 1;
+            }
+            for content in Content::iter() {
+                let least = if content == Content::NoSpeed { 1 } else { 4 };
+                assert!(counts.get(&content).is_some_and(|count| *count >= least), "{seed}: {content}: {counts:?}");
+            }
+        }
+    }
+}

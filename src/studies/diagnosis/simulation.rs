@@ -1,0 +1,242 @@
+//! What would a solver with a given fault answer? The flight under any force, and on beyond its end.
+//!
+//! The law of a stage may be any smooth function of x and V here, such as a spring that pushes, or a drag with another
+//! power: the proofs behind [`Taylor`] do not hold for those, and a number that is only compared needs none. The
+//! integrator is Gragg's midpoint rule, extrapolated; an event is found by shortening the step that passes it.
+//!
+//! Source: Hairer, Nørsett, Wanner (1993), Solving Ordinary Differential Equations I, section II.9.
+
+use crate::integrators::{Detail, Integrator, Taylor};
+use crate::physics::{Problem, Stage, State};
+
+/// Columns of the extrapolation: order 16.
+const COLUMNS: usize = 8;
+/// Error allowed in a step, relative to the greatest speed and the way of the step: of the last column but one, and the
+/// last is far better.
+const TOLERANCE: f64 = 1e-12;
+/// Steps of a flight at most, those taken again included.
+const STEPS_MAX: usize = 4_000;
+/// Longest step, times the rate of the fastest motion.
+const PHASE_MAX: f64 = 2.0;
+/// Times that the bracket of an event is narrowed at most.
+const NARROWED_MAX: usize = 100;
+
+/// Where a force is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place<'a> {
+    /// Law of the stage.
+    pub law: &'a Stage,
+    /// Depth (m).
+    pub depth: f64,
+    /// Velocity (m/s).
+    pub velocity: f64,
+    /// Impact speed (m/s).
+    pub impact_speed: f64,
+}
+
+/// A force (N) at a place, by a law with one number in it.
+pub(super) type Force = fn(&Place<'_>, f64) -> f64;
+
+/// The force of the equation of motion.
+pub(super) fn right_force(place: &Place<'_>, _: f64) -> f64 {
+    place.law.force(place.depth, place.velocity)
+}
+
+/// Where a simulated flight ends, and what it passed on the way.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Simulated {
+    /// The end.
+    pub end: State,
+    /// Stage in which it ends.
+    pub stage: usize,
+    /// States at the ends of the stages passed, by stage.
+    pub passed: Vec<(usize, State)>,
+}
+
+/// x and V after a time `h`, and the estimated errors of both, under the deceleration `a`.
+fn extrapolated(a: &impl Fn(f64, f64) -> f64, x: f64, v: f64, h: f64) -> ([f64; 2], [f64; 2]) {
+    let mut row = [[0.0; 2]; COLUMNS];
+    for column in 0..COLUMNS {
+        let steps = 2 * (column + 1);
+        let part = h / steps as f64;
+        let (mut before, mut now) = ([x, v], [x + part * v, v - part * a(x, v)]);
+        for _ in 1..steps {
+            let next = [before[0] + 2.0 * part * now[1], before[1] - 2.0 * part * a(now[0], now[1])];
+            (before, now) = (now, next);
+        }
+        // Neville's scheme in h²: row k of the last column gives way to that of this one.
+        let mut finer =
+            [0.5 * (before[0] + now[0] + part * now[1]), 0.5 * (before[1] + now[1] - part * a(now[0], now[1]))];
+        for (k, entry) in row.iter_mut().enumerate().take(column + 1) {
+            let coarser = std::mem::replace(entry, finer);
+            if k < column {
+                let ratio = (column + 1) as f64 / (column - k) as f64;
+                finer = std::array::from_fn(|i| finer[i] + (finer[i] - coarser[i]) / (ratio * ratio - 1.0));
+            }
+        }
+    }
+    let [.., good, best] = row;
+    (best, std::array::from_fn(|i| (best[i] - good[i]).abs()))
+}
+
+/// The time in `0..=h` at which `g` becomes positive, if it does not do so at 0 and does at `h`.
+fn first_positive(h: f64, at_end: f64, at_start: f64, g: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high, mut g_low, mut g_high) = (0.0, h, at_start, at_end);
+    for round in 0..NARROWED_MAX {
+        let width = high - low;
+        if width <= f64::EPSILON * high {
+            break;
+        }
+        // Regula falsi as Illinois has it, and every fourth time the middle: no bracket shrinks too slowly.
+        let falsi = low - g_low * width / (g_high - g_low);
+        let next = if round % 4 == 3 || !(low < falsi && falsi < high) { 0.5 * (low + high) } else { falsi };
+        let value = g(next);
+        if value > 0.0 {
+            (high, g_high) = (next, value);
+            g_low *= 0.5;
+        } else {
+            (low, g_low) = (next, value);
+            g_high *= 0.5;
+        }
+        if value == 0.0 {
+            return next;
+        }
+    }
+    high
+}
+
+/// The flight through `problem` under `force` with the number `parameter`; it rests once V is at most `rest_speed` (m/s).
+///
+/// `None` where it does not end within some thousand steps, or leaves the range of numbers.
+pub(super) fn simulate(problem: &Problem, force: Force, parameter: f64, rest_speed: f64) -> Option<Simulated> {
+    let mut state = State::at_impact(problem);
+    let mut passed = Vec::new();
+    let mut taken = 0;
+    let mut h = f64::INFINITY;
+    let mut fastest = problem.impact_speed;
+    for (index, law) in problem.stages.iter().enumerate() {
+        let limit = problem.limit_of(index);
+        let impact_speed = problem.impact_speed;
+        while state.depth < limit {
+            let State { time, depth: x, velocity: v } = state;
+            if v <= rest_speed {
+                return Some(Simulated { end: state, stage: index, passed });
+            }
+            // By the way since x, not by the depth: a stage may be far shorter than it is deep.
+            let a = |way: f64, velocity| {
+                force(&Place { law, depth: x + way, velocity, impact_speed }, parameter) / problem.mass
+            };
+            let left = limit - x;
+            // No step much longer than the way to the limit, or than the loss of the speed.
+            let crossing = 1.2 * left / v;
+            let stopping = 1.2 * v / a(0.0, v).abs();
+            // Nor than what the fastest motion of the stage takes, of which the error estimate would see nothing.
+            let rate =
+                (law.stiffness.abs() / problem.mass).sqrt() + (law.viscosity + 2.0 * law.drag * v).abs() / problem.mass;
+            h = h.min(crossing).min(stopping).min(PHASE_MAX / rate);
+            if !h.is_finite() {
+                h = 1.0 / v;
+            }
+            let ([way, speed], error) = extrapolated(&a, 0.0, v, h);
+            taken += 1;
+            if taken > STEPS_MAX {
+                return None;
+            }
+            fastest = fastest.max(speed);
+            let off = (error[1] / fastest).max(error[0] / (h * fastest)) / TOLERANCE;
+            if !(off <= 1.0) {
+                h *= if off.is_finite() { (0.8 * off.powf(-1.0 / 15.0)).clamp(0.1, 0.7) } else { 0.1 };
+                continue;
+            }
+            let within = |part: f64| extrapolated(&a, 0.0, v, part).0;
+            let rest = (speed <= rest_speed)
+                .then(|| first_positive(h, rest_speed - speed, rest_speed - v, |part| rest_speed - within(part)[1]));
+            let last = rest.unwrap_or(h);
+            let farthest = rest.map_or(way, |part| within(part)[0]);
+            if farthest >= left {
+                let part = first_positive(last, farthest - left, -left, |part| within(part)[0] - left);
+                state = State { time: time + part, depth: limit, velocity: within(part)[1].max(rest_speed) };
+                break;
+            }
+            if let Some(part) = rest {
+                let end = State { time: time + part, depth: x + farthest, velocity: rest_speed };
+                return Some(Simulated { end, stage: index, passed });
+            }
+            state = State { time: time + h, depth: x + way, velocity: speed };
+            h *= (0.8 * off.max(1e-9).powf(-1.0 / 15.0)).clamp(1.0, 3.0);
+        }
+        if state.depth >= law.end {
+            passed.push((index, state));
+        }
+        if state.depth >= problem.exit_depth {
+            return Some(Simulated { end: state, stage: index, passed });
+        }
+        h = f64::INFINITY;
+    }
+    None
+}
+
+/// The state a time `late` (s) after `state`, as the law of stage `index` goes on, also backwards.
+pub(super) fn continued(problem: &Problem, index: usize, state: State, late: f64) -> Option<State> {
+    let law = problem.stages.get(index)?;
+    let a = |x, v| law.force(x, v) / problem.mass;
+    let (mut now, parts) = ([state.depth, state.velocity], 4);
+    for _ in 0..parts {
+        (now, _) = extrapolated(&a, now[0], now[1], late / f64::from(parts));
+    }
+    let [depth, velocity] = now;
+    let state = State { time: state.time + late, depth, velocity };
+    state.is_finite().then_some(state)
+}
+
+/// The right flight through `problem`, which may have numbers that no scene has.
+pub(super) fn solve(problem: &Problem) -> Option<Simulated> {
+    let is_usual = |law: &Stage| law.stiffness >= 0.0 && law.viscosity >= 0.0 && law.drag >= 0.0;
+    if !problem.stages.iter().all(is_usual) {
+        return simulate(problem, right_force, 1.0, 0.0);
+    }
+    let flight = Taylor::default().solve(problem, Detail::Events).ok()?;
+    let passed = flight.events.iter().filter_map(|event| match event.kind {
+        crate::physics::EventKind::StageEnd(index) => Some((index, event.state)),
+        crate::physics::EventKind::CraterEnd => Some((problem.crater?, event.state)),
+        _ => None,
+    });
+    Some(Simulated { end: flight.end, stage: flight.stage, passed: passed.collect() })
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a flight that does not end is a failed test")]
+mod tests {
+    use super::*;
+    use crate::exchange::peers::wire::{conditioning, errors};
+    use crate::studies::diagnosis::questions::{Content, questions};
+
+    #[test]
+    fn the_simulation_of_the_right_law_is_the_flight() {
+        let mut wrong = Vec::new();
+        for question in questions(3, 250, false).iter().filter(|question| question.problem.impact_speed > 0.0) {
+            let (problem, right) = (&question.problem, solve(&question.problem).unwrap());
+            // A stiff stage takes more steps than a simulation has.
+            let Some(found) = simulate(problem, right_force, 1.0, 0.0) else {
+                assert!(question.contains.contains(&Content::Stiff), "{}", question.id);
+                continue;
+            };
+            let errors = errors(found.end, right.end, problem.impact_speed);
+            let conditions = conditioning(right.end, problem);
+            let over = |i: usize| errors[i].abs() / conditions[i].max(question.conditions[i]);
+            if !((0..3).all(|i| over(i) < 1e-11)) || found.passed.len() != right.passed.len() {
+                wrong.push(format!("{}: {errors:?} {found:?} {right:?}", question.id));
+            }
+        }
+        assert!(wrong.is_empty(), "{}:\n{}", wrong.len(), wrong.join("\n"));
+    }
+
+    #[test]
+    fn a_flight_goes_on_after_its_rest_as_its_law_has_it() {
+        let problem = Problem::of_stages(2.0, 30.0, [Stage::tunnel(1000.0, 0.0)]);
+        let rest = solve(&problem).unwrap();
+        // 500 m/s² for 10 ms more.
+        let after = continued(&problem, rest.stage, rest.end, 0.01).unwrap();
+        assert!((after.velocity + 5.0).abs() < 1e-12 && (after.depth - (0.9 - 0.025)).abs() < 1e-14, "{after}");
+    }
+}
