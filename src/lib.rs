@@ -85,6 +85,7 @@
 //! | Along a parameter, over many scenes? | [`studies::sweep`], [`studies::batch`] |
 //! | By how much does an input matter? | [`studies::sensitivity`] |
 //! | Does another program agree? | [`exchange::peers`] |
+//! | What is wrong with a solver? | [`studies::diagnosis`](mod@studies::diagnosis) |
 //!
 //! # Errors
 //!

@@ -1070,11 +1070,13 @@ impl Hypothesis {
 
     /// The sentence with the number in it.
     pub(super) fn says(&self, number: f64) -> String {
+        // As many digits as tell the number from one, and those of a fit.
+        let digits = 5 - (number - 1.0).abs().clamp(1e-11, 1.0).log10().floor() as i32;
         let nearest = number.round();
-        let shown = if (number - nearest).abs() < 1e-6 && nearest.abs() < 1e6 {
+        let shown = if (number - nearest).abs() < 1e-12 && nearest.abs() < 1e6 {
             format!("{nearest}")
         } else {
-            crate::text::digits_text(number, 5)
+            crate::text::digits_text(number, digits)
         };
         if number == 0.0 && matches!(self.parameter, Parameter::Factor) {
             return self.statement.replacen("is {} times the right one", "is left out", 1).replacen("{}", "0", 1);

@@ -4,9 +4,8 @@ use rayon::prelude::*;
 
 use super::hypotheses::{Fault, Hypothesis, Parameter, hypotheses, predict};
 use super::*;
-use crate::integrators::CentralDifference;
-use crate::integrators::Detail;
-use crate::integrators::Integrator;
+use crate::integrators::{CentralDifference, Detail, Integrator, Taylor};
+use crate::physics::Problem;
 
 /// A solver with faults, exact but for them.
 struct Faulty {
@@ -154,6 +153,55 @@ fn numbers_of_single_precision_and_of_few_digits_are_seen() {
     let printed = |digits: usize| exact.iter().map(|x| format!("{x:.digits$e}").parse().unwrap()).collect();
     assert_eq!(id(printed(6)).as_deref(), Some("few-digits"));
     assert_eq!(id(printed(14)), None);
+}
+
+/// Exact for another problem than the one asked, in a way that no hypothesis knows.
+struct Strange(fn(&mut Problem));
+
+impl Solver for Strange {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity { name: "strange".to_owned(), ..PeerIdentity::default() }
+    }
+
+    fn command(&self) -> String {
+        "strange".to_owned()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let mut problem = request.problem(None);
+        self.0(&mut problem);
+        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
+        Ok(answer(flight.outcome, flight.end))
+    }
+
+    fn restart(&mut self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn a_fault_that_no_hypothesis_knows_is_found_and_not_named_with_certainty() {
+    let faults: [fn(&mut Problem); 3] = [
+        |problem| problem.stages.iter_mut().filter(|law| law.static_force < 0.0).for_each(|law| law.drag = 0.0),
+        |problem| problem.stages.iter_mut().filter(|law| law.viscosity < 1.0).for_each(|law| law.viscosity = 0.0),
+        |problem| problem.exit_depth -= 1e-6,
+    ];
+    for fault in faults {
+        let found = diagnose(&mut Strange(fault), Plan::default(), &|_, _| {});
+        assert_eq!(found.verdict, Verdict::Failed);
+        let is_certain = |cause: &Cause| cause.certainty == Certainty::Certain;
+        assert!(!found.causes.iter().any(is_certain), "{:?}", found.causes);
+        assert_eq!(found.causes[0].id, "unknown");
+        assert!(found.separation.is_some());
+    }
+}
+
+#[test]
+fn a_factor_near_one_is_shown_with_the_digits_that_tell_it_from_one() {
+    let drag = hypotheses().find(|hypothesis| hypothesis.id == "term:drag").unwrap();
+    assert_eq!(drag.says(1.0 + 1e-7), "the drag q is 1.00000010000 times the right one");
+    assert_eq!(drag.says(2.0), "the drag q is 2 times the right one");
+    assert_eq!(drag.says(0.0), "the drag q is left out");
 }
 
 /// Central difference, told its step.
