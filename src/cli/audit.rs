@@ -31,7 +31,7 @@ pub struct AuditArgs {
     /// Runs in place of a table.
     #[command(flatten)]
     pub runs: RunArgs,
-    /// Scene whose exact answer the results must approach.
+    /// Scene, file or name of a shipped one, whose exact answer the results must approach.
     #[arg(long)]
     pub scene: Option<String>,
     /// What is set in it.

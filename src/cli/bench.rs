@@ -9,7 +9,7 @@ use super::output::{Text, error_text, escape_terminal, say_line, show_progress, 
 use super::verify::report_line;
 use super::{Answer, Ask, CliError, Exit, Settings, command_typed, end_peers_with_program};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
-use crate::exchange::scene_file::SHIPPED;
+use crate::exchange::scene_file::shipped;
 use crate::physics::Scene;
 use crate::report::bench::{BenchJson, CaseJson, files};
 use crate::report::{Environment, cells, folder};
@@ -33,7 +33,7 @@ const VARIED: usize = 1000;
 #[command(after_help = include_str!("help/bench.txt"))]
 #[command(mut_arg("set", |set| set.requires("scenes")))]
 pub struct BenchArgs {
-    /// Scene files [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
+    /// Scene files or names of shipped scenes [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
     pub scenes: Vec<String>,
     /// What is set in each of them.
     #[command(flatten)]
@@ -97,8 +97,8 @@ impl BenchArgs {
     /// The scenes under names of their own.
     fn scenes(&self) -> Result<Vec<(String, Scene)>, CliError> {
         if self.scenes.is_empty() {
-            let shipped = DEFAULT_SCENES.iter().filter_map(|wanted| SHIPPED.iter().find(|(name, _)| name == wanted));
-            return shipped.map(|(name, text)| Ok(((*name).to_owned(), Scene::from_toml(text, name)?))).collect();
+            let scenes = DEFAULT_SCENES.iter().filter_map(|name| Some((*name, shipped(name)?)));
+            return scenes.map(|(name, text)| Ok((name.to_owned(), Scene::from_toml(text, name)?))).collect();
         }
         let mut scenes: Vec<(String, Scene)> = Vec::new();
         for path in &self.scenes {

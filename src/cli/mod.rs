@@ -14,6 +14,7 @@ pub mod method_args;
 pub mod output;
 pub mod runs;
 pub mod scene_json;
+pub mod scenes;
 pub mod schema;
 pub mod sensitivities;
 pub mod solve;
@@ -322,6 +323,8 @@ commands! {
     Verify = "verify": Printing<verify::VerifyArgs>,
     /// Numerical stability and event stress cases, and random scenes by the million.
     Stress = "stress": Printing<stress::StressArgs>,
+    /// The scenes that ship: one line each, or the file of one.
+    Scenes = "scenes": Printing<scenes::ScenesArgs>,
     /// A file to begin with: a solver of your own, a scene, a suite, or data.
     Init = "init": init::InitArgs,
     /// JSON schema of what a command prints.
@@ -361,7 +364,7 @@ impl Cli {
 /// The scene of a command.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// Scene file (TOML), or - for standard input.
+    /// Scene file (TOML), name of a shipped scene, or - for standard input.
     #[arg(value_name = "SCENE")]
     pub path: String,
     /// What is set in the scene.
@@ -378,7 +381,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The scene in the file at `path`; `-` is standard input.
+    /// The scene in the file at `path`, or of that name; `-` is standard input.
     fn read(&self, path: &str) -> Result<Scene, Box<SceneError>> {
         Scene::read_with(Path::new(path), &self.set)
     }

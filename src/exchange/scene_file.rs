@@ -51,6 +51,33 @@ pub const SHIPPED: &[(&str, &str)] = shipped![
     "constant-force",
 ];
 
+/// The text of the shipped scene `name`.
+pub fn shipped(name: &str) -> Option<&'static str> {
+    SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
+}
+
+/// What to do about `name`, which no shipped scene has: the one that it resembles, or else `otherwise`.
+pub(crate) fn shipped_like(name: &str, otherwise: &str) -> String {
+    let names: Vec<_> = SHIPPED.iter().map(|(name, _)| *name).collect();
+    nearest(name, &names).map_or_else(|| otherwise.to_owned(), did_you_mean)
+}
+
+/// Name and text of the scene file at `path`; where there is no file, of the shipped scene of that name.
+fn text_at(path: &Path) -> Result<(String, String), Box<SceneError>> {
+    let is_file = path.exists() && !path.is_dir();
+    if let Some((name, text)) = path.to_str().filter(|_| !is_file).and_then(|name| Some((name, shipped(name)?))) {
+        return Ok((name.to_owned(), text.to_owned()));
+    }
+    read_text(path).map_err(|mut error| {
+        if !path.exists() {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            "a scene file, the name of a scene that ships, or `-` for standard input".clone_into(&mut error.allowed);
+            error.help = shipped_like(&name, "check the path; `penetrode scenes` lists the scenes that ship");
+        }
+        error
+    })
+}
+
 impl Scene {
     /// The scene that the TOML `text` describes; `file` is its name in messages.
     ///
@@ -76,7 +103,8 @@ impl Scene {
         SceneFile::from_toml(text, file, &[]).map(|read| read.scene)
     }
 
-    /// The scene in the file at `path`; `-` is standard input.
+    /// The scene in the file at `path`; `-` is standard input. Where there is no such file, the scene of that name that
+    /// ships ([`SHIPPED`]).
     ///
     /// # Errors
     /// [`SceneError`]: the file cannot be read, is larger than 1 MiB (it is then not read), is not UTF-8, or is
@@ -90,7 +118,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`]; also a setting that is none, or that the scene cannot have.
     pub fn read_with(path: &Path, settings: &[String]) -> Result<Self, Box<SceneError>> {
-        let (file, text) = read_text(path)?;
+        let (file, text) = text_at(path)?;
         SceneFile::from_toml(&text, &file, settings).map(|read| read.scene)
     }
 }

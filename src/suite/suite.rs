@@ -12,8 +12,8 @@ use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
 use super::program::Program;
 use crate::exchange::SceneError;
 use crate::exchange::decode::decode;
-use crate::exchange::diagnostic::{Dialect, Fault, did_you_mean, nearest, read_text};
-use crate::exchange::scene_file::SHIPPED;
+use crate::exchange::diagnostic::{Dialect, Fault, read_text};
+use crate::exchange::scene_file::{shipped, shipped_like};
 use crate::physics::{Problem, Scene, Shown};
 
 /// Scenes by the name that claims use, each resolved once.
@@ -158,20 +158,17 @@ impl Suite {
                 if scenes.0.contains_key(name) {
                     continue;
                 }
-                let shipped = SHIPPED.iter().find(|(shipped, _)| shipped == name);
-                let found = match (shipped, folder) {
-                    (Some((name, text)), _) => Scene::from_toml(text, &format!("verification/scenes/{name}.toml"))?,
+                let found = match (shipped(name), folder) {
+                    (Some(text), _) => Scene::from_toml(text, &format!("verification/scenes/{name}.toml"))?,
                     (None, Some(folder)) if Path::new(name).extension().is_some_and(|e| e == "toml") => {
                         Scene::read(&folder.join(name))?
                     }
                     _ => {
-                        let names: Vec<_> = SHIPPED.iter().map(|(name, _)| *name).collect();
                         return Err(refuse(
                             scene.span(),
                             format!("no scene `{name}` ships"),
                             "a file that ends in .toml, or a scene that ships",
-                            &nearest(name, &names)
-                                .map_or_else(|| format!("choose from {}", names.join(", ")), did_you_mean),
+                            &shipped_like(name, "`penetrode scenes` lists those that ship"),
                         ));
                     }
                 };

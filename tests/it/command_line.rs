@@ -139,6 +139,62 @@ fn every_command_that_reads_scenes_takes_settings() {
     assert!(run("bench --set projectile.mass=5kg").refused().contains("SCENES"));
 }
 
+/// Away from the repository: the answer to a name is that to its file, but for the time that it took.
+#[test]
+fn a_scene_that_ships_goes_by_its_name_wherever_a_scene_is_read_and_a_file_of_that_name_wins() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("r.csv"), "dt_s,depth_m\n8e-6,0.15\n4e-6,0.147\n2e-6,0.146\n").unwrap();
+    let answer = |line: &str| {
+        let mut answer = run_in(folder.path(), &format!("{line} --json")).json();
+        answer["cost"]["wall_ns"].take();
+        answer
+    };
+    for line in [
+        "solve perforate",
+        "critical perforate --set target.thickness=150mm",
+        "converge perforate --points 5",
+        "sweep perforate --vary H/d=1:2:2",
+        "audit r.csv --scene perforate",
+    ] {
+        let of_file = answer(&line.replace("perforate", "@perforate"));
+        assert!(of_file.is_object() && answer(line) == of_file, "{line}");
+    }
+    let bench = answer("bench graze --parts step-size --repeats 1");
+    assert_eq!(bench["step_size"][0]["scene"], "graze", "{bench}");
+
+    // A folder is no scene; a file is what is named.
+    fs::create_dir(folder.path().join("tunnel")).unwrap();
+    assert_eq!(answer("solve tunnel")["scene"]["title"], "rest in the tunnel");
+    fs::copy(scene("crater"), folder.path().join("graze")).unwrap();
+    assert_eq!(answer("solve graze")["scene"]["title"], "rest in the crater");
+    for (name, help) in [
+        ("tunel", "did you mean `tunnel`?"),
+        ("stiff.toml", "did you mean `stiff`?"),
+        ("my/slab.toml", "check the path; `penetrode scenes` lists the scenes that ship"),
+    ] {
+        let words = run_in(folder.path(), &format!("solve {name}")).refused();
+        assert!(words.ends_with(&format!("Help: {help}")), "{words}");
+    }
+}
+
+#[test]
+fn the_scenes_that_ship_are_listed_and_one_is_printed_as_it_stands() {
+    let shipped = names(Path::new(scene("tunnel").trim_end_matches("tunnel.toml")));
+    let answer = json("scenes");
+    conforms("scenes", &answer);
+    let listed = answer["scenes"].as_array().unwrap();
+    assert_eq!(listed.len(), shipped.len());
+    let lines = run("scenes").out;
+    for (one, line) in listed.iter().zip(lines.lines().skip(1)) {
+        let [name, title] = ["name", "title"].map(|key| one[key].as_str().unwrap());
+        assert!(line.split_whitespace().next() == Some(name) && line.ends_with(title), "{line}");
+        let file = fs::read_to_string(scene(name)).unwrap();
+        assert_eq!(run(&format!("scenes {name}")).out, file);
+        assert_eq!(one["toml"], file);
+    }
+    assert!(run("scenes tunel").refused().ends_with("help: did you mean `tunnel`?"));
+}
+
 /// Each request, and words of the refusal.
 #[test]
 fn a_request_that_cannot_be_served_is_refused_with_its_cause_and_writes_nothing() {
