@@ -327,7 +327,7 @@ commands! {
     Scenes = "scenes": Printing<scenes::ScenesArgs>,
     /// A file to begin with: a solver of your own, a scene, a suite, or data.
     Init = "init": init::InitArgs,
-    /// JSON schema of what a command prints.
+    /// JSON schema of what a command prints, or of a scene or suite file.
     Schema = "schema": schema::SchemaArgs,
     /// Shell completion.
     Completions = "completions": completions::CompletionsArgs,

@@ -21,6 +21,10 @@ use crate::physics::units::{self, Dimension, Quantity, QuantityError};
 use crate::physics::{Stage, semi_empirical};
 use crate::text::Shown;
 
+mod schema;
+
+pub use schema::schema;
+
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
         &[$(($name, include_str!(concat!("../../verification/scenes/", $name, ".toml")))),*]
@@ -175,12 +179,35 @@ const WORDS: [&str; 3] = ["projectile.nose.shape", "perforation.criterion", "tit
 const RATIOS: [&str; 3] =
     ["projectile.nose.caliber_radius_head", "projectile.nose.length_ratio", "projectile.nose.radius_ratio"];
 
-/// Paths of all that a scene file may hold; `*` stands for an index.
-fn paths() -> impl Iterator<Item = &'static str> {
+/// What [projectile] has besides its mass, unless the force is given by stages.
+const MATERIAL_OF_PROJECTILE: [&str; 2] = ["projectile.diameter", "projectile.nose"];
+
+/// What [target] has besides its thickness, unless the force is given by stages; layers stand for the first two.
+const MATERIAL_OF_TARGET: [&str; 3] = ["target.strength", "target.density", "target.layer"];
+
+/// What [target] leaves to its layers, where it has any.
+const LAYERED_TARGET: [&str; 3] = ["target.strength", "target.density", "target.thickness"];
+
+type Shape = (&'static str, &'static str, Range, fn(f64) -> NoseShape);
+
+/// The shapes of a nose that take a ratio: name, path and range of the ratio.
+const NOSES: [Shape; 3] = [
+    ("ogive", RATIOS[0], Range::AtLeastHalf, |psi| NoseShape::Ogive { caliber_radius_head: psi }),
+    ("cone", RATIOS[1], Range::Positive, |psi| NoseShape::Cone { length_ratio: psi }),
+    ("spherical", RATIOS[2], Range::AtLeastHalf, |psi| NoseShape::Spherical { radius_ratio: psi }),
+];
+
+/// The numbers that a scene file may give, of one layer and one stage.
+fn numbers() -> impl Iterator<Item = Parameter> {
     let plain = Parameter::PLAIN.into_iter().filter(|number| number.moves() == *number);
     let layer = LayerNumber::ALL.map(|which| Parameter::Layer(0, which));
     let stage = StageNumber::ALL.map(|which| Parameter::Stage(0, which));
-    plain.chain(layer).chain(stage).map(|number| number.entry().path).chain(WORDS).chain(RATIOS)
+    plain.chain(layer).chain(stage)
+}
+
+/// Paths of all that a scene file may hold; `*` stands for an index.
+fn paths() -> impl Iterator<Item = &'static str> {
+    numbers().map(|number| number.entry().path).chain(WORDS).chain(RATIOS)
 }
 
 /// What stands behind `home` and a dot in the paths.
@@ -501,8 +528,7 @@ impl<'t> Reader<'t> {
         }
         let mass = self.value(Parameter::Mass)?;
         let (resistance, thickness) = if self.at("stage").is_some() {
-            let paths = ["projectile.diameter", "projectile.nose"];
-            self.without("[projectile]", &paths, "with [[stage]], [projectile] has only `mass`")?;
+            self.without("[projectile]", &MATERIAL_OF_PROJECTILE, "with [[stage]], [projectile] has only `mass`")?;
             self.without("the scene", &["resistance"], "with [[stage]] there is no [resistance]")?;
             self.stages()?
         } else if self.at("target").is_some() {
@@ -532,8 +558,7 @@ impl<'t> Reader<'t> {
     /// The resistance of stages given outright, and the thickness of the target.
     fn stages(&mut self) -> Result<(Resistance, Option<f64>), Fault> {
         let count = self.at_least_one("stage")?;
-        let keys = ["target.strength", "target.density", "target.layer"];
-        self.without("[target]", &keys, "with [[stage]], [target] has only `thickness`")?;
+        self.without("[target]", &MATERIAL_OF_TARGET, "with [[stage]], [target] has only `thickness`")?;
         let thickness = self.number(Parameter::Thickness)?;
         let mut stages: Vec<Stage> = Vec::with_capacity(count);
         for index in 0..count {
@@ -620,8 +645,7 @@ impl<'t> Reader<'t> {
     /// The layers from the impact face on.
     fn layers(&mut self, static_factor: Option<f64>) -> Result<Vec<Layer>, Fault> {
         let count = self.at_least_one("target.layer")?;
-        let keys = ["target.strength", "target.density", "target.thickness"];
-        self.without("[target]", &keys, "with [[target.layer]], each layer has its own")?;
+        self.without("[target]", &LAYERED_TARGET, "with [[target.layer]], each layer has its own")?;
         let mut layers = Vec::with_capacity(count);
         for index in 0..count {
             let layer = |which| Parameter::Layer(index, which);
@@ -677,13 +701,6 @@ impl<'t> Reader<'t> {
 
     /// N* of the nose, given as such or by a shape.
     fn nose_factor(&mut self) -> Result<f64, Fault> {
-        type Shape = (&'static str, Range, fn(f64) -> NoseShape);
-        // In the order of the ratios that they take.
-        const SHAPES: [Shape; 3] = [
-            ("ogive", Range::AtLeastHalf, |psi| NoseShape::Ogive { caliber_radius_head: psi }),
-            ("cone", Range::Positive, |psi| NoseShape::Cone { length_ratio: psi }),
-            ("spherical", Range::AtLeastHalf, |psi| NoseShape::Spherical { radius_ratio: psi }),
-        ];
         const NOSE: &str = "projectile.nose";
         if self.at(NOSE).is_none() {
             return Err(self.missing(NOSE, "{ shape = \"flat\" }"));
@@ -715,14 +732,14 @@ impl<'t> Reader<'t> {
             without(None, "the shape `flat` takes no parameter")?;
             return Ok(NoseShape::Flat.factor());
         }
-        let Some(index) = SHAPES.iter().position(|(shape, ..)| *shape == name) else {
+        let Some(index) = NOSES.iter().position(|(shape, ..)| *shape == name) else {
             let known = ["flat", "ogive", "cone", "spherical"];
             let help = nearest(&name, &known)
                 .map_or_else(|| "give the nose factor: { factor = 0.72 }".to_owned(), did_you_mean);
             let message = format!("unknown nose shape {}", quoted(&name));
             return Err(Fault::new(span, message, format!("one of {}", known.join(", ")), help));
         };
-        let ((_, range, of), path) = (SHAPES[index], RATIOS[index]);
+        let (_, path, range, of) = NOSES[index];
         let key = key_of(path);
         without(Some(index), &format!("the shape `{name}` takes `{key}`"))?;
         let (_, number) = self.at(path).ok_or_else(|| self.missing(path, "3.0"))?;

@@ -62,6 +62,7 @@ pub enum Steps {
 /// At impact, and where [`Boundaries::Landed`] restarts at a stage end, V(i) itself is known and every rule uses it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum VelocityAt {
@@ -86,6 +87,7 @@ pub enum VelocityAt {
 /// What is done about stage ends, exit depth and rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum Boundaries {

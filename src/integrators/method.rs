@@ -32,6 +32,7 @@ use crate::physics::{Problem, Shown};
     strum::VariantArray,
 )]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum MethodName {

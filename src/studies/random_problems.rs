@@ -8,6 +8,7 @@ use crate::physics::{Problem, Stage};
 
 /// What stages a random problem has, and where it ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// A crater that stops the projectile, or is left through its far side.

@@ -6,11 +6,12 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::checks::{Check, USER};
 use super::verdict::Verdict;
+use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
 use crate::integrators::method::MethodName;
 use crate::studies::applicability::Line;
@@ -22,19 +23,22 @@ use crate::studies::stability::BoundaryPoint;
 use crate::studies::sweep::{Plan, Row};
 
 /// One `[[claim]]` table.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClaimSpec {
     /// Name, unique in the suite; `/`-separated from coarse to fine.
+    #[schemars(with = "String")]
     pub id: toml::Spanned<String>,
     /// What is claimed, one sentence.
     pub statement: String,
     /// How it is checked.
+    #[schemars(with = "Check")]
     pub check: toml::Spanned<Check>,
     /// Section of the report; by default that of the check.
     pub section: Option<Section>,
     /// Scenes: names of shipped scenes, or files beside the suite.
     #[serde(default)]
+    #[schemars(schema_with = "scenes")]
     pub scenes: Vec<toml::Spanned<String>>,
     /// Methods.
     #[serde(default)]
@@ -49,13 +53,23 @@ pub struct ClaimSpec {
     #[serde(default)]
     pub boundaries: Vec<Boundaries>,
     /// Largest admissible measured value, in the unit of the check.
+    #[schemars(with = "f64", range(min = 0.0))]
     pub limit: toml::Spanned<f64>,
     /// Why this limit and no other.
     pub reason: String,
 }
 
+/// Schema of the scenes of a claim.
+fn scenes(_: &mut SchemaGenerator) -> Schema {
+    let shipped: Vec<_> = SHIPPED.iter().map(|(name, _)| *name).collect();
+    json_schema!({
+        "type": "array",
+        "items": { "anyOf": [{ "enum": shipped }, { "type": "string", "pattern": "\\.toml$" }] },
+    })
+}
+
 /// The section of a report that shows a claim or a figure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Section {
     /// What is solved.

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use rayon::prelude::*;
+use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 
 use super::checks::{Check, Context, Memo, PeerAnswers, Subject};
@@ -57,10 +59,15 @@ pub struct Inputs<'a> {
     pub program: Option<&'a Program>,
 }
 
-#[derive(Deserialize)]
+/// A suite of claims for `penetrode verify`.
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "A suite of penetrode")]
 struct SuiteFile {
+    /// Title for people.
     title: String,
+    /// The claims.
+    #[schemars(length(min = 1))]
     claim: Vec<ClaimSpec>,
 }
 
@@ -184,6 +191,11 @@ impl Suite {
             claims,
             is_part: false,
         })
+    }
+
+    /// The JSON schema (draft 7, which editors know best) of a suite file.
+    pub fn schema() -> Schema {
+        SchemaSettings::draft07().into_generator().into_root_schema_for::<SuiteFile>()
     }
 
     /// Keeps the claims whose id contains `pattern`.

@@ -17,6 +17,7 @@ mod layers;
 mod parquet;
 mod program;
 mod properties;
+mod schemas;
 mod stress;
 mod suite;
 mod sweep;

@@ -1,5 +1,6 @@
 //! Eq. 11-12 and 15 beside the equation of motion (docs/theory.md, sections 3 and 4).
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
@@ -65,7 +66,7 @@ check! {
 }
 
 /// Which coefficients of Eq. 15.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Eq15Form {
     /// As printed in the paper.

@@ -1,5 +1,6 @@
 //! The judge judged: claims that are wrong on purpose must come out as such.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Check, Subject};
@@ -25,7 +26,7 @@ check! {
 }
 
 /// How a known-bad claim must come out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bad {
     /// Failed.
@@ -35,7 +36,7 @@ pub enum Bad {
 }
 
 /// What is wrong on purpose with the solutions of a method.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Flaw {
     /// This quantity of the end is not a number.
@@ -59,7 +60,7 @@ pub enum Flaw {
 }
 
 /// An event that a flaw names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FlawedEvent {
     /// x = k d.

@@ -12,6 +12,7 @@
 
 use num_dual::{Dual2_64, DualNum, second_derivative};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::super::claim::Found;
@@ -33,7 +34,7 @@ check! {
 }
 
 /// Which manufactured path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ManufacturedPath {
     /// One stage.

@@ -12,7 +12,7 @@ macro_rules! check {
         in $section:ident, $unit:literal, $how:ident $measure:ident;)*) => {$(
         $(#[$about])*
         #[doc = concat!("\n\nUnit: ", $unit, ".")]
-        #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+        #[derive(Clone, Debug, PartialEq, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$of])* pub $field: $type,)*
@@ -79,6 +79,7 @@ mod texts;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::claim::{Claim, Found, Judged, Measurement, NotMeasured, Section};
@@ -101,7 +102,7 @@ pub use self::{
 macro_rules! every_check {
     ($($name:ident)*) => {
         /// How a claim is checked: a struct of this module under its name in kebab case.
-        #[derive(Clone, Debug, PartialEq, Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
         #[serde(rename_all = "kebab-case")]
         pub enum Check {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*

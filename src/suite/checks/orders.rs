@@ -1,5 +1,6 @@
 //! Orders of convergence, with and without an exact answer.
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
@@ -50,7 +51,7 @@ check! {
 }
 
 /// How the steps of one run are laid out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepPattern {
     /// All equal.
