@@ -70,7 +70,7 @@ fn right(name: MethodName, problem: &Problem, limit: f64) -> Method {
 }
 
 /// Flights of `problems`, one after the other.
-fn flights(name: MethodName, problems: Vec<Problem>, detail: Detail, limit: f64) -> Case {
+fn flights(name: MethodName, problems: Vec<Problem>, detail: Detail<'static>, limit: f64) -> Case {
     Box::new(move || {
         let methods: Vec<Method> = problems.iter().map(|problem| right(name, problem, limit)).collect();
         let method = methods.last().unwrap_or_else(|| panic!("no problem"));

@@ -12,17 +12,19 @@ use super::output::{Text, check_outputs, engineering, error_text, say, significa
 use super::scene_json::SceneJson;
 use super::sensitivities::SensitivitiesJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
-use crate::exchange::tables::{Kind, Value, table_of};
-use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Sample};
+use crate::exchange::input::name_of;
+use crate::exchange::tables::{self, Column, Format, Kind, Others, Value, table_of};
+use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Method, Sample};
 use crate::physics::groups::Groups;
-use crate::physics::{Event, EventKind, Outcome, Scene, State};
+use crate::physics::{Event, EventKind, Outcome, Problem, Range, Scene, State};
 use crate::studies::applicability;
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
+use crate::text::count;
 
 /// Arguments of `solve`.
 #[derive(Args, Debug)]
-#[command(after_help = "Example: penetrode solve scene.toml --method tsit45 --rtol 1e-12 --trajectory path.csv")]
+#[command(after_help = "Example: penetrode solve scene.toml --points 200 --trajectory path.csv")]
 pub struct SolveArgs {
     /// The scene.
     #[command(flatten)]
@@ -33,6 +35,16 @@ pub struct SolveArgs {
     /// Write every step and event to this CSV file; - for standard output, in place of the answer.
     #[arg(long, value_name = "F.csv")]
     pub trajectory: Option<PathBuf>,
+    /// In place of steps and events N states, evenly in time from impact to the end.
+    ///
+    /// They are the method's own solution inside its steps, as accurate as the steps themselves; central-difference has
+    /// none, and runs V linearly and x along the parabola that meets both nodes. Without --trajectory they are in the
+    /// answer.
+    #[arg(long, value_name = "N", conflicts_with = "times", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    pub points: Option<u32>,
+    /// The same at the times of this CSV file, in its column time_s.
+    #[arg(long, value_name = "FILE")]
+    pub times: Option<PathBuf>,
     /// Say what the scene let the method skip, and why.
     #[arg(long)]
     pub explain: bool,
@@ -60,6 +72,9 @@ pub struct SolveJson {
     cost: CostJson,
     closed_form: Option<ClosedFormJson>,
     relative_error: Option<RelativeErrorJson>,
+    /// Asked for with `--points` or `--times`; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trajectory: Option<Vec<Sample>>,
     skipped: Vec<String>,
     /// Asked for with `--sensitivities`; `null` otherwise.
     sensitivities: Option<SensitivitiesJson>,
@@ -139,10 +154,17 @@ impl Ask for SolveArgs {
     fn ask(&self) -> Result<Answer<SolveJson>, CliError> {
         let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
         if let Some(path) = &self.trajectory {
-            check_outputs(&[("the scene", Path::new(&self.scene.path))], &[("the trajectory", path)])?;
+            let times = self.times.as_deref().map(|path| ("the times", path));
+            let inputs: Vec<_> = [("the scene", Path::new(&self.scene.path))].into_iter().chain(times).collect();
+            check_outputs(&inputs, &[("the trajectory", path)])?;
         }
         let method = self.method.build()?;
-        let detail = if self.trajectory.is_some() { Detail::Trajectory } else { Detail::Events };
+        let times = self.wanted_times(&problem, &method)?;
+        let detail = match &times {
+            Some(times) => Detail::Times(times),
+            None if self.trajectory.is_some() => Detail::Trajectory,
+            None => Detail::Events,
+        };
         let started = Instant::now();
         let flight = method.integrator().solve(&problem, detail)?;
         let wall_ns = u64::try_from(started.elapsed().as_nanos()).unwrap_or(u64::MAX);
@@ -153,6 +175,11 @@ impl Ask for SolveArgs {
         let outside = applicability::warnings(&scene, problem.impact_speed);
         for warning in scene.exit_depth_warning().into_iter().chain(outside) {
             say("warning: ", &warning);
+        }
+        let late = times.as_ref().map_or(0, |times| times.len() - flight.trajectory.len());
+        if late > 0 {
+            let end = engineering(flight.end.time, "s");
+            say("warning: ", &format!("{} left out, behind the end of the flight at {end}", count(late, "time")));
         }
         let sensitivities = self.sensitivities.then(|| SensitivitiesJson::new(&scene)).transpose()?;
         let mut skipped = method.explain(&problem, &flight, detail);
@@ -177,6 +204,7 @@ impl Ask for SolveArgs {
                 crater_end_velocity_m_s: exact.crater_end().map(|s| s.velocity),
             }),
             relative_error: exact.and_then(|exact| RelativeErrorJson::new(&flight, &exact, problem.impact_speed)),
+            trajectory: times.is_some().then(|| flight.trajectory.clone()),
             skipped,
             sensitivities,
         };
@@ -191,6 +219,17 @@ impl Ask for SolveArgs {
 }
 
 impl SolveArgs {
+    /// The times (s) at which states are asked for, if any are.
+    fn wanted_times(&self, problem: &Problem, method: &Method) -> Result<Option<Vec<f64>>, CliError> {
+        if let Some(path) = &self.times {
+            return Ok(Some(read_times(path)?));
+        }
+        let Some(points) = self.points else { return Ok(None) };
+        let end = method.integrator().solve(problem, Detail::Events)?.end.time;
+        let time = |i: u32| end * (f64::from(i) / f64::from(points - 1));
+        Ok(Some((0..points).map(time).collect()))
+    }
+
     fn text(&self, data: &SolveJson, flight: &Flight) -> String {
         let mut text = Text::titled(data.scene.title.as_deref());
         text.line(format!("  method   {}", data.method.text()));
@@ -213,6 +252,14 @@ impl SolveArgs {
             [name, engineering(time, "s"), engineering(depth, "m"), engineering(velocity, "m/s")]
         };
         text.table(&["event", "time", "depth", "velocity"], flight.events.iter().map(row));
+        if let Some(rows) = data.trajectory.as_ref().filter(|_| self.trajectory.is_none()) {
+            text.gap();
+            let row = |Sample { state: State { time, depth, velocity }, force, .. }: &Sample| {
+                [(*time, "s"), (*depth, "m"), (*velocity, "m/s"), (*force, "N")]
+                    .map(|(value, unit)| engineering(value, unit))
+            };
+            text.table(&["time", "depth", "velocity", "force"], rows.iter().map(row));
+        }
         text.gap();
         data.add_exact(&mut text);
         if data.outcome == Outcome::Undecided {
@@ -278,7 +325,28 @@ impl SolveJson {
 const UNDECIDED: &str = "the exit margin lies within its error bound: this speed is V_c to the accuracy of the method. A \
                          smaller error may decide it, another speed or thickness will";
 
-/// The columns of a trajectory: a row for each step and each event.
+/// Times of one's own.
+static TIMES: Format = Format {
+    columns: &[Column::number("time_s").within(Range::NotNegative)],
+    others: Others::Ignored,
+    has_comments: true,
+};
+
+/// The times (s) in the table at `path`, ascending.
+fn read_times(path: &Path) -> Result<Vec<f64>, CliError> {
+    let mut last = 0.0;
+    let times = tables::read(&name_of(path), &tables::read_bytes(path, &TIMES)?, &TIMES, |row| {
+        let time = row.number(0)?;
+        if time < last {
+            return Err(row.refuse_cell(0, row.text(0)?, "less than the time above it"));
+        }
+        last = time;
+        Ok(time)
+    });
+    Ok(times?)
+}
+
+/// The columns of a trajectory: a row for each step and each event, or for each time that was asked for.
 const TRAJECTORY: [(&str, Kind); 5] = [
     ("time_s", Kind::Number),
     ("depth_m", Kind::Number),

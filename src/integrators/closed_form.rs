@@ -5,7 +5,10 @@
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample, Solved};
 use crate::physics::closed_form::{cross, cross_continuous_crater, margin_error};
-use crate::physics::{CraterStiffness, Problem, State};
+use crate::physics::{CraterStiffness, Problem, Stage, State};
+
+/// Bound on the places tried for a time; halving alone takes 53, and the parabola three or four.
+const PLACE_STEPS_MAX: u32 = 80;
 
 /// Parts of the distance between two events in a trajectory.
 const INTERVALS: u32 = 64;
@@ -34,8 +37,10 @@ impl Integrator for ClosedForm {
     }
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
-        let mut flight = flight::solve(problem, detail.min(Detail::Events), &mut Exact { continuous: false })?;
-        if detail == Detail::Trajectory && flight.end.time > 0.0 {
+        let is_path = matches!(detail, Detail::Trajectory);
+        let listed = if is_path { Detail::Events } else { detail };
+        let mut flight = flight::solve(problem, listed, &mut Exact { continuous: false })?;
+        if is_path && flight.end.time > 0.0 {
             flight.trajectory = path(problem, &flight, INTERVALS, |share| share)?;
             // One sample a place, with the force of the stage ahead.
             flight.trajectory.dedup_by(|next, last| {
@@ -112,6 +117,9 @@ impl StageSolver<f64> for Exact {
         }
         let (StageEnd::Limit(state) | StageEnd::Rest(state) | StageEnd::Approach(state, _)) = end;
         if state.is_finite() {
+            if !self.continuous {
+                course.sample_until(state, |time| state_in(&problem.stages[stage], problem.mass, entry, state, time));
+            }
             Ok(end)
         } else {
             Err(IntegrationError::NotFinite { what: "the closed form", last: entry })
@@ -122,6 +130,33 @@ impl StageSolver<f64> for Exact {
         let value = course.margin().value;
         Ok(Bounded { value, bound: margin_error(course.problem, course.stage, course.state.depth, value) })
     }
+}
+
+/// The state at `time` (s) on the way from `entry` to `end` through `law`: the place is sought whose formulas give that time.
+fn state_in(law: &Stage, mass: f64, entry: State, end: State, time: f64) -> State {
+    let (mut low, mut high) = (entry, end);
+    let mut here = entry;
+    // From a state that is near, the parabola of a constant force goes the rest of the way.
+    let along = |from: State| {
+        let (left, acceleration) = (time - from.time, -law.force(from.depth, from.velocity) / mass);
+        let depth = from.depth + left * (from.velocity + 0.5 * left * acceleration);
+        State { time, depth, velocity: from.velocity + left * acceleration }
+    };
+    for _ in 0..PLACE_STEPS_MAX {
+        let guess = along(here).depth;
+        let depth = if guess > low.depth && guess < high.depth { guess } else { 0.5 * (low.depth + high.depth) };
+        // Between neighbouring floats there may be no depth in between.
+        if depth <= low.depth || depth >= high.depth {
+            break;
+        }
+        let Ok(StageEnd::Limit(state) | StageEnd::Rest(state)) = cross(law, mass, entry, depth) else { break };
+        here = state;
+        *if here.time > time { &mut high } else { &mut low } = here;
+        if (here.time - time).abs() <= f64::EPSILON * time {
+            break;
+        }
+    }
+    along(here)
 }
 
 /// The path of `flight` through `problem`: impact, `intervals` parts of the distance between events, and the events.

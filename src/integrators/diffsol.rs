@@ -574,17 +574,30 @@ where
                 continue;
             }
             cost.steps += 1;
-            if after.velocity <= 0.0 || after.depth >= law.end {
-                let scratch = &mut self.scratch;
-                let end = locate(&law, before, after, |t| {
-                    solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]))
-                })
-                .map_err(|e| failure(e, epoch, before))?;
-                let (StageEnd::Limit(place) | StageEnd::Rest(place) | StageEnd::Approach(place, _)) = end;
-                energy_max = energy_max.max(place.velocity * place.velocity);
+            let scratch = &mut self.scratch;
+            let mut interpolant = |t| solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]));
+            let is_last = after.velocity <= 0.0 || after.depth >= law.end;
+            let end = is_last.then(|| locate(&law, before, after, &mut interpolant)).transpose();
+            let end = end.map_err(|e| failure(e, epoch, before))?;
+            let place = match end {
+                Some(StageEnd::Limit(place) | StageEnd::Rest(place) | StageEnd::Approach(place, _)) => place,
+                None => after,
+            };
+            let mut lost = Ok(());
+            course.sample_until(state_at(epoch, place), |time| {
+                let local = (time - stage.start.time) / (stage.length / stage.unit_speed) - epoch;
+                let local = local.max(before.time).min(place.time);
+                let (depth, velocity) = interpolant(local).unwrap_or_else(|cause| {
+                    lost = Err(failure(cause, epoch, before));
+                    (place.depth, place.velocity)
+                });
+                state_at(epoch, Node { time: local, depth, velocity })
+            });
+            lost?;
+            energy_max = energy_max.max(place.velocity * place.velocity);
+            if let Some(end) = end {
                 break end;
             }
-            energy_max = energy_max.max(after.velocity * after.velocity);
             before = after;
             course.sample(state_at(epoch, after));
             h = next_step;

@@ -47,6 +47,9 @@ const TIME_ORDER: usize = 24;
 /// Bound on the steps of one flight, in depth and in time each; ends flights of millions of drag lengths.
 const STEPS_MAX: u64 = 1_000_000;
 
+/// Bound on the steps of Newton's method for the place of a time; halving a bracket takes 53.
+const INVERSE_STEPS_MAX: u32 = 64;
+
 /// What to do where they do not suffice.
 const REMEDY: &str = "take --method taylor";
 
@@ -450,6 +453,7 @@ impl<S: Scalar> Clock<S> {
         course: &mut Course<'_, S>,
     ) -> Solved<Reduced<S>> {
         let mut now = from;
+        let end = State { depth, velocity, ..from };
         let end_rate = self.loss.rate(depth, velocity * velocity).value();
         for _ in 0..STEPS_MAX {
             let distance = (depth - now.depth).value();
@@ -479,9 +483,9 @@ impl<S: Scalar> Clock<S> {
             let by_speed =
                 monotone && (distance <= 0.0 || (falls_much && speed_radius / fall.abs() > depth_radius / distance));
             let done = if by_speed {
-                self.step_in_speed(&mut now, velocity, speed_radius)
+                self.step_in_speed(&mut now, end, speed_radius, course)
             } else if distance > 0.0 {
-                self.step_in_depth(&mut now, depth, depth_radius)
+                self.step_in_depth(&mut now, end, depth_radius, course)
             } else {
                 break;
             };
@@ -507,9 +511,9 @@ impl<S: Scalar> Clock<S> {
         Ok(State { time: now.time, depth, velocity })
     }
 
-    /// One step of `dt̂/dx = w^(-1/2)`; says whether it reached `end`.
-    fn step_in_depth(&self, now: &mut Reduced<S>, end: S, radius: f64) -> bool {
-        let left = end - now.depth;
+    /// One step of `dt̂/dx = w^(-1/2)`; says whether it reached the place of `end`.
+    fn step_in_depth(&self, now: &mut Reduced<S>, end: Reduced<S>, radius: f64, course: &mut Course<'_, S>) -> bool {
+        let left = end.depth - now.depth;
         // Coefficients are those of the depth in units of this length: of order one whatever the scene's scale.
         let unit = S::from_f64(radius.min(left.value()));
         let w0 = now.velocity * now.velocity;
@@ -532,15 +536,17 @@ impl<S: Scalar> Clock<S> {
             slowness[n] = -sum.over(S::from_f64(n as f64) * w0);
         }
         let (length, done) = self.step_length(&slowness, left.over(unit));
-        now.time += unit * integral(&slowness, length);
-        now.velocity = root_of(value(&w, length));
-        now.depth = if done { end } else { now.depth + unit * length };
+        let from = *now;
+        let time = now.time + unit * integral(&slowness, length);
+        let inside = State { time, depth: now.depth + unit * length, velocity: root_of(value(&w, length)) };
+        *now = if done { State { time, ..end } } else { inside };
+        sample_inside(course, from, *now, unit, &slowness, length, |z| (from.depth + unit * z, root_of(value(&w, z))));
         done
     }
 
-    /// One step of `dt̂/dv = -2/f, dx/dv = -2v/f`; says whether it reached the speed `end`.
-    fn step_in_speed(&self, now: &mut Reduced<S>, end: S, radius: f64) -> bool {
-        let fall = now.velocity - end;
+    /// One step of `dt̂/dv = -2/f, dx/dv = -2v/f`; says whether it reached the speed of `end`.
+    fn step_in_speed(&self, now: &mut Reduced<S>, end: Reduced<S>, radius: f64, course: &mut Course<'_, S>) -> bool {
+        let fall = now.velocity - end.velocity;
         // Signed: the speed falls by `unit` for each unit of the series' variable.
         let unit = S::from_f64(radius.min(fall.value().abs()).copysign(fall.value()));
         let two = S::from_f64(2.0);
@@ -568,9 +574,11 @@ impl<S: Scalar> Clock<S> {
             gain[n + 1] = (unit * (v * inverse[n] - before)).over(S::from_f64((n + 1) as f64));
         }
         let (length, done) = self.step_length(&inverse, fall.over(unit));
-        now.time += unit * integral(&inverse, length);
-        now.depth += value(&gain, length);
-        now.velocity = if done { end } else { v - unit * length };
+        let from = *now;
+        let time = now.time + unit * integral(&inverse, length);
+        let inside = State { time, depth: now.depth + value(&gain, length), velocity: v - unit * length };
+        *now = if done { State { time, ..end } } else { inside };
+        sample_inside(course, from, *now, unit, &inverse, length, |z| (from.depth + value(&gain, z), v - unit * z));
         done
     }
 
@@ -586,6 +594,42 @@ impl<S: Scalar> Clock<S> {
         // A NaN coefficient leaves the length infinite and shows in the sum, which is checked.
         if length >= left.value() { (left, true) } else { (S::from_f64(length), false) }
     }
+}
+
+/// Adds the states at the times asked for within a step `from` `to`, whose variable z, in units of `unit`, goes up to
+/// `length`: `slowness` is the series of dt̂/dz, and `at` gives depth and speed.
+fn sample_inside<S: Scalar>(
+    course: &mut Course<'_, S>,
+    from: Reduced<S>,
+    to: Reduced<S>,
+    unit: S,
+    slowness: &[S; TIME_ORDER],
+    length: S,
+    at: impl Fn(S) -> (S, S),
+) {
+    let problem = course.problem;
+    course.sample_until(si(problem, to), |time| {
+        let goal = (S::from_f64(time) * problem.impact_speed - from.time).over(unit);
+        // Time rises with z: Newton's method inside a bracket.
+        let (mut low, mut high) = (0.0, length.value());
+        let mut z = goal.over(slowness[0]);
+        for _ in 0..INVERSE_STEPS_MAX {
+            if !(low..=high).contains(&z.value()) {
+                z = S::from_f64(0.5 * (low + high));
+            }
+            let late = integral(slowness, z) - goal;
+            // Both fall where a drive makes the unit of speed negative.
+            let is_late = late.value() * slowness[0].value() > 0.0;
+            *if is_late { &mut high } else { &mut low } = z.value();
+            let step = late.over(value(slowness, z));
+            z -= step;
+            if step.value().abs() <= S::EPSILON * z.value().abs() {
+                break;
+            }
+        }
+        let (depth, velocity) = at(z);
+        si(problem, State { time: from.time, depth, velocity })
+    });
 }
 
 /// `Σ c_n z^n`.

@@ -66,7 +66,7 @@ impl Bounded {
 /// A flight in progress.
 pub(crate) struct Course<'a, S = f64> {
     pub(crate) problem: &'a Problem<S>,
-    pub(crate) detail: Detail,
+    pub(crate) detail: Detail<'a>,
     /// State at the start of the present stage; at the end of the flight, its end.
     pub(crate) state: State<S>,
     /// Index of the present stage.
@@ -80,6 +80,8 @@ pub(crate) struct Course<'a, S = f64> {
     pub(crate) notes: Vec<String>,
     events: Events<S>,
     trajectory: Vec<Sample>,
+    /// How many of the times asked for are passed.
+    passed: usize,
     /// Least `W/V0²` at the stage ends passed so far.
     least_at_ends: Bounded,
 }
@@ -87,7 +89,7 @@ pub(crate) struct Course<'a, S = f64> {
 impl<'a, S: Scalar> Course<'a, S> {
     /// A flight at impact.
     #[inline(always)]
-    pub(crate) fn new(problem: &'a Problem<S>, detail: Detail) -> Self {
+    pub(crate) fn new(problem: &'a Problem<S>, detail: Detail<'a>) -> Self {
         Self {
             problem,
             detail,
@@ -99,6 +101,7 @@ impl<'a, S: Scalar> Course<'a, S> {
             notes: Vec::new(),
             events: Events::new(),
             trajectory: Vec::new(),
+            passed: 0,
             least_at_ends: Bounded::NONE,
         }
     }
@@ -132,7 +135,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// Adds a row to the trajectory, if one is wanted: `state`, in the present stage.
     #[inline(always)]
     pub(crate) fn sample(&mut self, state: State<S>) {
-        if self.detail >= Detail::Trajectory {
+        if matches!(self.detail, Detail::Trajectory) {
             self.push_sample(state, self.problem.stages[self.stage].force(state.depth, state.velocity));
         }
     }
@@ -141,6 +144,30 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[cold]
     pub(crate) fn push_sample(&mut self, state: State<S>, force: S) {
         self.trajectory.push(Sample { state: state.values(), force: force.value(), stage: self.stage });
+    }
+
+    /// Adds the states at the times asked for up to that of `end`, in the present stage: those before it are `at`, the
+    /// method's own solution.
+    #[inline(always)]
+    pub(crate) fn sample_until(&mut self, end: State<S>, at: impl FnMut(f64) -> State<S>) {
+        if let Detail::Times(times) = self.detail {
+            self.push_until(times, end, at);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn push_until(&mut self, times: &[f64], end: State<S>, mut at: impl FnMut(f64) -> State<S>) {
+        let law = self.problem.stages[self.stage];
+        while let Some(&time) = times.get(self.passed).filter(|time| **time <= end.time.value()) {
+            let inside = if time == end.time.value() { end } else { at(time) };
+            // An event is placed to the last digit, the path in front of it is not.
+            let depth = if inside.depth.value() > end.depth.value() { end.depth } else { inside.depth };
+            let velocity = if inside.velocity.value() > 0.0 { inside.velocity } else { S::zero() };
+            let state = State { time: S::from_f64(time), depth, velocity };
+            self.push_sample(state, law.force(depth, velocity));
+            self.passed += 1;
+        }
     }
 
     /// Lists the event `kind` at the present state, if events are wanted.
@@ -251,7 +278,16 @@ impl<'a, S: Scalar> Course<'a, S> {
         self.notes.push(LEAST_TIME.to_owned());
         // Until the speed is an epsilon of what it was.
         let time = if v > 0.0 { -f64::EPSILON.ln() * mass / law.viscosity } else { 0.0 };
-        Ok(State { time: at.time + S::from_f64(time), depth: limit, velocity: S::zero() })
+        let arrival = State { time: at.time + S::from_f64(time), depth: limit, velocity: S::zero() };
+        self.sample_until(arrival, |time| {
+            // Viscosity and drag alone: V falls exponentially in the end.
+            let gone = -(-law.viscosity / mass * (time - last.time)).exp_m1();
+            let ratio = law.drag * v * gone / law.viscosity;
+            let distance = mass * v / law.viscosity * gone * if ratio == 0.0 { 1.0 } else { ratio.ln_1p() / ratio };
+            let velocity = v * (1.0 - gone) / (1.0 + ratio);
+            State { depth: at.depth + S::from_f64(distance), velocity: S::from_f64(velocity), ..at }
+        });
+        Ok(arrival)
     }
 
     /// The flight that ends at the present state, with its exit margin.
@@ -291,7 +327,8 @@ pub(crate) fn at_once<S: Scalar>(problem: &Problem<S>, detail: Detail) -> Option
 
 #[cold]
 fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is_through: bool) -> Flight<S> {
-    let mut course = Course::new(problem, detail.min(Detail::Events));
+    let mut course = Course::new(problem, if matches!(detail, Detail::Trajectory) { Detail::Events } else { detail });
+    course.sample_until(course.state, |_| State::at_impact(problem));
     // Ends at the face itself (k d = 0 leaves no crater, but a user's stage may end at 0) are reached at once.
     course.pass_ends();
     course.stage = course.stage.min(problem.stages.len() - 1);
@@ -319,6 +356,7 @@ pub(crate) fn solve<S: Scalar>(
     }
     let mut course = Course::new(problem, detail);
     course.sample(course.state);
+    course.sample_until(course.state, |_| State::at_impact(problem));
     course.pass_ends();
     // Each round passes a stage, or ends the flight.
     for _ in 0..problem.stages.len() {
@@ -342,6 +380,9 @@ pub(crate) fn solve<S: Scalar>(
                 false
             }
         };
+        // What the steps of the method leave of the stage, by a rounding.
+        let end = course.state;
+        course.sample_until(end, |_| end);
         if !rests {
             course.pass_ends();
             course.is_through = course.state.depth.value() >= problem.exit_depth.value();

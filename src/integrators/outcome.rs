@@ -7,8 +7,8 @@ use thiserror::Error;
 use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, State};
 
 /// How much of a flight to compute. What is not asked for is not computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Detail {
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+pub enum Detail<'t> {
     /// Outcome and end state only; events inside the flight are not listed.
     End,
     /// And every event.
@@ -16,6 +16,9 @@ pub enum Detail {
     Events,
     /// And every step.
     Trajectory,
+    /// And in place of the steps the states at these times (s, ascending), by the method's own solution inside its steps:
+    /// as accurate as its steps are. Times behind the end of the flight have no state.
+    Times(&'t [f64]),
 }
 
 /// Work done for a flight.
@@ -42,12 +45,15 @@ impl std::ops::Add for Cost {
     }
 }
 
-/// One row of a trajectory: a step's end or an event.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// One row of a trajectory: a step's end, an event, or a time that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Sample {
     /// Time, depth, velocity.
+    #[serde(flatten)]
     pub state: State,
     /// Force (N) in the stage below.
+    #[serde(rename = "force_n")]
     pub force: f64,
     /// Index of the stage that gives the force.
     pub stage: usize,
@@ -87,7 +93,7 @@ pub struct Flight<S = f64> {
     pub exit_margin_error: Option<f64>,
     /// Work done.
     pub cost: Cost,
-    /// Every step and event, when asked for.
+    /// Every step and event, or the states at given times, when asked for.
     pub trajectory: Vec<Sample>,
     /// Step limit, for schemes that have one.
     pub step_limit: Option<StepLimit>,

@@ -456,6 +456,18 @@ impl Steps {
             if !next.is_finite() {
                 return Err(IntegrationError::NotFinite { what: "the state", last: course.state.values() });
             }
+            if matches!(course.detail, Detail::Times(_)) {
+                // A copy: nothing may refer to the polynomials themselves, which are kept in registers.
+                let inside = series;
+                course.sample_until(next, |at| {
+                    let local = inside.at((at - time.value()) / unit_time);
+                    State {
+                        time: S::from_f64(at),
+                        depth: depth + local.depth * S::from_f64(unit_depth),
+                        velocity: local.velocity * S::from_f64(unit_velocity),
+                    }
+                });
+            }
             self.widen_bound(course, &law, &start, &local, unit_velocity, next.depth.value() / unit_depth);
             match step {
                 Step::Whole(_) => {

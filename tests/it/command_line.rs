@@ -290,6 +290,55 @@ fn a_crater_flight_builds_no_tunnel() {
 }
 
 #[test]
+fn a_trajectory_has_as_many_points_as_asked_for_or_times_of_ones_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let solve = |options: &str| run_in(folder.path(), &format!("solve tunnel {options}"));
+    let rows = |text: &str| -> Vec<Vec<f64>> {
+        text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect()
+    };
+    for method in MethodName::built() {
+        let table = rows(&solve(&format!("--method {method} --points 5 --trajectory -")).expect(0).out);
+        let answer = solve(&format!("--method {method} --points 5 --json")).expect(0).json();
+        conforms("solve", &answer);
+        let end = answer["time_s"].as_f64().unwrap();
+        let path = answer["trajectory"].as_array().unwrap();
+        assert_eq!((table.len(), path.len()), (5, 5), "{method}");
+        for (i, (row, point)) in table.iter().zip(path).enumerate() {
+            assert_eq!(row[0], end * (i as f64 / 4.0));
+            for (column, name) in ["time_s", "depth_m", "velocity_m_s", "force_n", "stage"].iter().enumerate() {
+                assert_eq!(row[column], point[name].as_f64().unwrap(), "{method}: {name}");
+            }
+        }
+        assert_eq!((table[4][1], table[4][2]), (answer["depth_m"].as_f64().unwrap(), 0.0), "{method}");
+    }
+    assert!(solve("--json").json().get("trajectory").is_none());
+    // 8.3e-4 s is behind the end; the other columns are somebody's own.
+    let times = |text: &str| fs::write(folder.path().join("t.csv"), text).unwrap();
+    times("# measured\nv,time_s\n300,0\n202,1e-4\n202,1e-4\n0,8.3e-4\n");
+    let said = solve("--times t.csv");
+    assert!(said.words().contains("warning: 1 time left out, behind the end of the flight at 829.197 µs"), "{said:?}");
+    let lines: Vec<_> = said.out.lines().skip_while(|line| !line.starts_with("  time")).skip(1).take(3).collect();
+    assert!(lines[0].starts_with("  0 s") && lines[1].starts_with("  100.000 µs") && lines[1] == lines[2], "{said:?}");
+    for (text, words) in [
+        ("time_s\n2e-4\n1e-4\n", "t.csv:3, column 1: `1e-4` in `time_s` is less than the time above it"),
+        ("time_s\n-1e-4\n", "not a number >= 0"),
+        ("1e-4\n2e-4\n", "time_s"),
+    ] {
+        times(text);
+        let refused = solve("--times t.csv").refused();
+        assert!(refused.contains(words), "{refused}");
+    }
+    for (options, words) in [
+        ("--points 1", "2.."),
+        ("--points 5 --times t.csv", "cannot be used with"),
+        ("--times t.csv --trajectory t.csv", "the trajectory would replace the times"),
+    ] {
+        let refused = solve(options).refused();
+        assert!(refused.contains(words), "{refused}");
+    }
+}
+
+#[test]
 fn a_suite_of_ones_own_runs_on_ones_own_scene() {
     let folder = tempfile::tempdir().unwrap();
     fs::copy(scene("tunnel"), folder.path().join("mine.toml")).unwrap();

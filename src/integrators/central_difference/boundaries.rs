@@ -60,6 +60,13 @@ impl<S: Scalar> Step<S> {
         rest.and(passage)
     }
 
+    /// State at `time`, V on the chord and x on the parabola.
+    fn inside(&self, time: f64) -> State<S> {
+        let time = S::from_f64(time);
+        let tau = time - self.from.time;
+        State { time, depth: self.depth(tau), velocity: self.velocity(tau) }
+    }
+
     /// State in which depth `place` is reached; `None` if it is not.
     fn at(&self, place: S) -> Option<State<S>> {
         let state = |tau| State { time: self.from.time + tau, depth: place, velocity: self.velocity(tau) };
@@ -101,10 +108,16 @@ pub(super) struct Run<'a, S> {
 
 impl<'a, S: Scalar> Run<'a, S> {
     /// [`CentralDifference::solve_in`].
-    pub(super) fn solve(options: &'a CentralDifference, problem: &'a Problem<S>, detail: Detail) -> Solved<Flight<S>> {
+    pub(super) fn solve(
+        options: &'a CentralDifference,
+        problem: &'a Problem<S>,
+        detail: Detail<'a>,
+    ) -> Solved<Flight<S>> {
         let mut run = Self { stepper: Stepper::new(options, problem), course: Course::new(problem, detail) };
         // Ends at the face are reached at once; `Stepper::new` has passed them.
-        run.pass_ends(0..run.stepper.stage, State::at_impact(problem));
+        let impact = State::at_impact(problem);
+        run.course.sample_until(impact, |_| impact);
+        run.pass_ends(0..run.stepper.stage, impact);
         let max_steps = options.max_steps;
         let is_hopeless = matches!(options.steps, Steps::Uniform(h) if cannot_end(problem, h * max_steps as f64));
         // Steps up to the last change of x or V.
@@ -112,7 +125,7 @@ impl<'a, S: Scalar> Run<'a, S> {
         loop {
             (run.course.stage, run.course.state) = (run.stepper.stage, run.stepper.state());
             let limit = run.course.limit()?.value();
-            if run.course.detail == Detail::Trajectory {
+            if matches!(run.course.detail, Detail::Trajectory) {
                 run.course.push_sample(run.course.state, run.stepper.node.d * problem.mass);
             }
             let (before, steps) = (run.course.state, run.stepper.cost.steps);
@@ -120,9 +133,16 @@ impl<'a, S: Scalar> Run<'a, S> {
             if left == 0 || is_hopeless && steps >= STUCK_STEPS {
                 return Err(IntegrationError::StepBudgetSpent { max_steps, remedy: REMEDY, last: before.values() });
             }
-            let allowance = if run.course.detail == Detail::Trajectory { 1 } else { left.min(STUCK_STEPS) };
+            let one_by_one = run.course.detail >= Detail::Trajectory;
+            let allowance = if one_by_one { 1 } else { left.min(STUCK_STEPS) };
+            let deceleration = run.stepper.node.d;
             let has_ended = match run.stepper.cruise(limit, allowance) {
-                Pause::Allowance => false,
+                Pause::Allowance => {
+                    let (to, size) = (run.stepper.state(), run.stepper.node.h);
+                    let step = Step { from: before, to, deceleration, size };
+                    run.course.sample_until(to, |time| step.inside(time));
+                    false
+                }
                 Pause::Crossing { x, u } => run.cross(x, u)?,
                 Pause::Rest(next) => run.come_to_rest(next)?,
             };
@@ -212,8 +232,10 @@ impl<'a, S: Scalar> Run<'a, S> {
             return Ok(self.complete(next, first));
         }
         self.stepper.cost.steps += 1;
+        let step = self.step_to(end, next.v, part);
         self.stepper.clock.tick_part(part);
         let landing = State { time: self.stepper.clock.now(), depth: end, velocity: next.v };
+        self.course.sample_until(landing, |time| step.inside(time));
         self.stepper.enter_stage_at(end);
         self.pass_ends(first..self.stepper.stage, landing);
         self.stepper.start(landing);
@@ -227,6 +249,9 @@ impl<'a, S: Scalar> Run<'a, S> {
         self.stepper.clock.tick();
         step.to.time = self.stepper.clock.now();
         let has_ended = self.push_events(&step, first);
+        let until = if has_ended { self.course.state } else { step.to };
+        self.course.stage = first;
+        self.course.sample_until(until, |time| step.inside(time));
         self.stepper.node = next;
         has_ended
     }
@@ -272,6 +297,11 @@ impl<'a, S: Scalar> Run<'a, S> {
         let exit_margin = problem.has_exit().then(|| self.course.margin().value);
         if self.course.detail >= Detail::Events {
             let note = "error bar of the exit margin not given: a fixed step has no error estimate";
+            self.course.notes.push(note.to_owned());
+        }
+        if matches!(self.course.detail, Detail::Times(_)) {
+            let note = "states at given times interpolated, V linearly and x along its parabola: the scheme has no \
+                        solution inside a step";
             self.course.notes.push(note.to_owned());
         }
         let (cost, step_limit) = (self.stepper.cost, Some(self.stepper.step_limit));

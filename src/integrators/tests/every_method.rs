@@ -638,6 +638,117 @@ fn detail_changes_what_is_listed_and_no_number_and_a_trajectory_keeps_the_energy
     }
 }
 
+/// Largest distance of the states of `flight` from `exact`: depth over that of the end, speed over V0.
+fn off_path(problem: &Problem, flight: &Flight, exact: &[State]) -> f64 {
+    assert_eq!(flight.trajectory.len(), exact.len());
+    let off = |(row, exact): (&Sample, &State)| {
+        let (found, speed) = (row.state, (row.state.velocity - exact.velocity) / problem.impact_speed);
+        assert_eq!(found.time, exact.time);
+        ((found.depth - exact.depth) / flight.end.depth).abs().max(speed.abs())
+    };
+    flight.trajectory.iter().zip(exact).map(off).fold(0.0, f64::max)
+}
+
+/// Places on the exact path, the events among them, each with its time: the formulas know the time of a depth, and the
+/// method is asked for the state at that time.
+fn exact_path(problem: &Problem, places: u32) -> Vec<State> {
+    let end = ClosedForm.solve(problem, Detail::Events).unwrap().end;
+    let depth = |i: u32| end.depth * f64::from(i) / f64::from(places);
+    let inside = (1..places).map(|i| crate::integrators::closed_form::state_at(problem, depth(i)).unwrap().unwrap());
+    [State::at_impact(problem)].into_iter().chain(inside).collect()
+}
+
+#[test]
+fn the_states_at_given_times_are_as_accurate_as_the_end_and_change_no_number() {
+    let mut random = Random::new(12);
+    let mut problems = vec![tunnel(0.12), tunnel(INF)];
+    problems.extend((0..40).map(|_| random_concrete(&mut random)));
+    // Of each family of stages: viscous, spring and drive, drag alone, free flight.
+    problems.push(of_stages(2.0, 30.0, INF, &[stage(50.0, 0.0, 20.0, 0.0, 1.0), stage(400.0, 30.0, 9.0, 0.0, INF)]));
+    problems.push(of_stages(1.0, 5.0, 3.0, &[stage(-20.0, 40.0, 0.0, 0.0, 1.0), stage(-1.0, 0.0, 0.0, 0.5, INF)]));
+    problems.push(of_stages(1.0, 5.0, 3.0, &[stage(0.0, 0.0, 0.0, 2.0, 1.0), stage(0.0, 0.0, 0.0, 0.0, INF)]));
+    problems.push(of_stages(1.0, 0.5, 3.0, &[stage(-200.0, 0.0, 0.0, 1.0, INF)]));
+    for (name, method) in methods(1e-9) {
+        let limit = match name {
+            MethodName::Tsit45 | MethodName::Adaptive => 1e-7,
+            name if is_tolerant(name) => 5e-6,
+            _ => 1e-13,
+        };
+        let mut worst = 0.0_f64;
+        for problem in &problems {
+            let exact = exact_path(problem, 29);
+            let mut times: Vec<_> = exact.iter().map(|state| state.time).collect();
+            let Some(events) = answer(&method, problem, Detail::Events).map(Result::unwrap) else { continue };
+            // An end that is off by more than the last of these times leaves that out.
+            if events.end.time < *times.last().unwrap() {
+                continue;
+            }
+            times.extend([events.end.time, events.end.time * 1.01, INF]);
+            let mut flight = method.integrator().solve(problem, Detail::Times(&times)).unwrap();
+            assert_eq!(flight.trajectory.pop().unwrap().state, events.end, "{name}");
+            assert_eq!((flight.trajectory[0].state, flight.trajectory[0].stage), (exact[0], 0), "{name}");
+            worst = worst.max(off_path(problem, &flight, &exact));
+            assert_eq!(Flight { trajectory: Vec::new(), ..flight }, events, "{name}");
+        }
+        assert!(worst < limit, "{name}: {worst:e}");
+    }
+}
+
+/// Viscosity and drag alone: V = v e/(1 + y), x = (M/q) ln(1 + y) with e = e^(-r t/M), y = (q v/r) (1 - e); the far side is
+/// where all speed is gone.
+#[test]
+fn the_way_to_a_place_that_is_only_approached_is_known_at_each_time() {
+    let (mass, v, r, q) = (2.0, 3.0, 1.5, 0.5_f64);
+    let depth = |gone: f64| mass / q * (q * v / r * gone).ln_1p();
+    let problem = of_stages(mass, v, depth(1.0), &[stage(0.0, 0.0, r, q, INF)]);
+    let times = [0.5, 2.0, 10.0];
+    let mut seen = 0;
+    for (name, method) in methods(1e-12) {
+        let Some(Ok(flight)) = answer(&method, &problem, Detail::Times(&times)) else { continue };
+        seen += 1;
+        let exact = times.map(|time| {
+            let gone = -(-r / mass * time).exp_m1();
+            State { time, depth: depth(gone), velocity: v * (1.0 - gone) / (1.0 + q * v / r * gone) }
+        });
+        let off = off_path(&problem, &flight, &exact);
+        assert!(off < if is_tolerant(name) { 1e-6 } else { 1e-14 }, "{name}: {off:e}");
+    }
+    assert!(seen > 0);
+}
+
+/// The scheme has no dense output: inside a step V runs linearly and x along its parabola, which costs no order.
+#[test]
+fn the_states_of_the_scheme_at_given_times_are_of_its_order_and_its_nodes_are_among_them() {
+    for problem in [tunnel(0.12), tunnel(INF)] {
+        let exact = exact_path(&problem, 97);
+        let times: Vec<_> = exact.iter().map(|state| state.time).collect();
+        let scheme = |steps: f64| CentralDifference::uniform(8e-4 / steps, VelocityAt::Centred, Boundaries::Landed);
+        let error = |steps: f64| {
+            let flight = scheme(steps).solve(&problem, Detail::Times(&times)).unwrap();
+            off_path(&problem, &flight, &exact)
+        };
+        let noted = scheme(100.3).solve(&problem, Detail::Times(&times)).unwrap().notes;
+        assert!(noted.iter().any(|note| note.contains("no solution inside a step")), "{noted:?}");
+        let (coarse, fine) = (error(100.3), error(401.2));
+        assert!(fine < 1e-4 && (coarse / fine).log2() > 3.5, "{coarse:e} {fine:e}");
+        for boundaries in Boundaries::ALL {
+            let scheme = CentralDifference::uniform(1.7e-6, VelocityAt::LaggedHalfStep, boundaries);
+            let nodes = scheme.solve(&problem, Detail::Trajectory).unwrap().trajectory;
+            let mut states: Vec<_> = nodes.iter().map(|row| row.state).collect();
+            states.dedup();
+            let times: Vec<_> = states.iter().map(|state| state.time).collect();
+            let rows = scheme.solve(&problem, Detail::Times(&times)).unwrap().trajectory;
+            let steps = rows.iter().zip(&states).filter(|(row, state)| row.state == **state).count();
+            // Under `step-end` an event and the step in which it is seen end at one time.
+            assert!(
+                rows.len() == states.len() && steps + 2 >= states.len(),
+                "{boundaries}: {steps} of {}",
+                states.len()
+            );
+        }
+    }
+}
+
 #[test]
 fn a_method_that_reuses_its_solver_has_the_same_name_order_and_answers() {
     let mut random = Random::new(11);
