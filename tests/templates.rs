@@ -38,9 +38,10 @@ fn main() {
         trial(&format!("the_{kind}_of_a_beginner_runs_as_it_is_written"), move || runs(kind, file))
     });
     let together = trial("the_suite_of_a_beginner_judges_the_peer_and_warns_of_nothing", judges_without_a_warning);
+    let fault = trial("a_fault_put_into_a_beginners_peer_is_pointed_to_and_named", the_fault_is_named);
     libtest_mimic::run(
         &Arguments::from_args(),
-        peers.into_iter().chain(files).chain([together]).collect::<Vec<Trial>>(),
+        peers.into_iter().chain(files).chain([together, fault]).collect::<Vec<Trial>>(),
     )
     .exit();
 }
@@ -92,7 +93,27 @@ fn runs_and_agrees(language: &str, file: &str, command: &str) -> Check {
         ensure!(!command.starts_with("penetrode diagnose ") || said.contains("verdict    sound"), "{said}");
         ensure!(*command != verify || said.starts_with("passed: 10 passed, 0 failed, "), "{said}");
     }
+    let edges = output(folder.path(), &format!("penetrode stress --peer '{command}' --cases 20"))?;
+    ensure!(edges.contains("passed: 13 passed, 0 failed"), "{edges}");
     lists_events_times_itself_and_outlives_what_it_cannot_solve(folder.path(), command)
+}
+
+/// From the template to the fault, as a person goes.
+fn the_fault_is_named() -> Check {
+    let folder = tempfile::tempdir()?;
+    written(folder.path(), "peer", "peer.py")?;
+    let (file, right, wrong) = (folder.path().join("peer.py"), "\"drag_kg_m\"))", "\"drag_kg_m\"))\n        q *= 0.5");
+    let text = std::fs::read_to_string(&file)?;
+    ensure!(text.contains(right), "the template has changed: {text}");
+    std::fs::write(&file, text.replace(right, wrong))?;
+    for command in ["verify --only peer/user --peer 'python3 peer.py'", "stress --peer 'python3 peer.py'"] {
+        let said = output(folder.path(), &format!("penetrode {command}; test $? = 3"))?;
+        ensure!(said.contains("what is wrong with it: penetrode diagnose 'python3 peer.py'"), "{said}");
+    }
+    let said = output(folder.path(), "penetrode diagnose 'python3 peer.py'; test $? = 3")?;
+    let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    ensure!(words.contains("term:drag (certain): the drag q is 0.500000 times the right one"), "{said}");
+    Ok(())
 }
 
 fn lists_events_times_itself_and_outlives_what_it_cannot_solve(folder: &Path, command: &str) -> Check {

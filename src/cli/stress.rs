@@ -6,11 +6,13 @@ use std::time::Instant;
 use clap::Args;
 
 use super::output::{Text, error_text, escape_terminal};
-use super::verify::{add_not_passed, counts_text, judge_all, progress_bar, report_line};
-use super::{Answer, Ask, CliError, Exit, command_typed};
+use super::verify::{add_not_passed, counts_text, diagnose_line, judge_all, progress_bar, report_line};
+use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program};
+use crate::exchange::peers::Peer;
 use crate::report::{self, Environment, Run, StressJson, cells, folder};
+use crate::studies::diagnosis::{self, Plan};
 use crate::studies::extreme_scenes::{self, Summary, ULPS_MAX};
-use crate::suite::checks::{PeerAnswers, judged_random_scenes};
+use crate::suite::checks::{PeerAnswers, USER, judged_answers, judged_random_scenes};
 use crate::suite::{Counts, Inputs, Judged, Suite, skipped, tables, worst};
 use crate::text::Shown;
 
@@ -24,8 +26,12 @@ pub struct StressArgs {
     /// Seed of every random number.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Put another solver through the events at their edges and N random problems: a program that speaks the peer
+    /// protocol and is told a tolerance.
+    #[arg(long, value_name = "CMD")]
+    pub peer: Option<String>,
     /// Print random scene N of the seed as a scene file, and run nothing.
-    #[arg(long, value_name = "N", conflicts_with_all = ["cases", "out", "json"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["cases", "out", "json", "peer"])]
     pub show: Option<u64>,
     /// Write the report to this folder: every case with its limit and reason, figures, JSON.
     #[arg(long, value_name = "DIR")]
@@ -45,13 +51,23 @@ impl Ask for StressArgs {
         let suite = Suite::edges()?;
         // No case is about commands.
         let inputs = Inputs { seed: self.seed, peers: &PeerAnswers::default(), program: None };
-        let mut judged = judge_all(&suite, inputs, "cases");
-        let random = self.cases.map(|cases| self.run_random(cases));
-        judged.extend(random.as_ref().and_then(|(summary, wall_ms)| judged_random_scenes(&suite, summary, *wall_ms)));
+        let mut peers = Vec::new();
+        let (judged, random) = if let Some(command) = &self.peer {
+            let (identity, judged) = self.run_peer(command, &suite)?;
+            peers.push((USER.to_owned(), identity));
+            (judged, None)
+        } else {
+            let mut judged = judge_all(&suite, inputs, "cases");
+            let random = self.cases.map(|cases| self.run_random(cases));
+            let as_claim =
+                random.as_ref().and_then(|(summary, wall_ms)| judged_random_scenes(&suite, summary, *wall_ms));
+            judged.extend(as_claim);
+            (judged, random)
+        };
         let run = Run {
             suite: &suite,
             judged: &judged,
-            environment: Environment::here(self.seed, command_typed(), &suite, Vec::new()),
+            environment: Environment::here(self.seed, command_typed(), &suite, peers),
             points: &[],
             random: random.as_ref().map(|(summary, wall_ms)| (summary, *wall_ms)),
         };
@@ -70,6 +86,22 @@ impl StressArgs {
         (summary, started.elapsed().as_secs_f64() * 1e3)
     }
 
+    /// Who the program of `command` says it is, and how it fares.
+    fn run_peer(&self, command: &str, suite: &Suite) -> Result<(String, Vec<Judged>), CliError> {
+        end_peers_with_program()?;
+        let mut peer = Peer::start_adaptive(command)?;
+        let identity = format!("{}, asked by `{command}`", peer.identity());
+        let bar = progress_bar(0, "problems");
+        let started = Instant::now();
+        let questions = self.cases.map_or(0, |cases| cases as usize);
+        let asked = diagnosis::at_edges(&mut peer, Plan { seed: self.seed, questions }, &|asked, all| {
+            bar.set_length(all as u64);
+            bar.set_position(asked as u64);
+        });
+        bar.finish_and_clear();
+        Ok((identity, judged_answers(suite, &asked, started.elapsed().as_secs_f64() * 1e3)))
+    }
+
     fn text(&self, run: &Run<'_>) -> String {
         let mut text = Text::default();
         text.table(&["case", "passed", "skipped", "worst", "limit", "unit"], tables(run.judged).map(case_row));
@@ -81,6 +113,7 @@ impl StressArgs {
             add_random(&mut text, summary);
         }
         text.line(counts_text(run.judged));
+        text.lines(self.peer.as_deref().and_then(|command| diagnose_line(command, run.judged)));
         text.lines(self.out.as_deref().map(report_line));
         text.finish()
     }

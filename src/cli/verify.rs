@@ -90,6 +90,7 @@ impl Ask for VerifyArgs {
         let mut text = Text::default();
         add_not_passed(&mut text, &judged);
         text.line(counts_text(&judged));
+        text.lines(self.peer.as_deref().and_then(|command| diagnose_line(command, &judged)));
         text.line(report_line(&self.out));
         let data = VerifyJson::new(&run);
         Ok(Answer { text: text.finish(), exit: data.verdict.into(), data: Some(data) })
@@ -163,6 +164,16 @@ pub(super) fn counts_text(judged: &[Judged]) -> String {
     let Counts { passed, failed, undecided, skipped } = counts;
     let verdict = counts.verdict().name();
     format!("{verdict}: {passed} passed, {failed} failed, {undecided} undecided, {skipped} skipped")
+}
+
+/// Who says what is wrong with the program of `command`, if a claim about its numbers failed.
+pub(super) fn diagnose_line(command: &str, judged: &[Judged]) -> Option<String> {
+    let is_wrong = |judged: &Judged| {
+        let claim = &judged.claim;
+        judged.verdict == Verdict::Failed && claim.id.split('/').any(|part| part == USER)
+    };
+    let command = shlex::try_quote(command).unwrap_or(command.into());
+    judged.iter().any(is_wrong).then(|| format!("what is wrong with it: penetrode diagnose {command}"))
 }
 
 /// Judges every claim of `suite` behind a progress bar that counts `what`.

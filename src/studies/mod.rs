@@ -9,6 +9,7 @@ pub mod bench;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod diagnosis;
+pub mod edge_problems;
 pub mod error;
 pub mod experiments;
 pub mod extreme_scenes;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::exchange::peers::wire::PeerScene;
 use crate::integrators::Flight;
 use crate::physics::{CraterStiffness, Outcome, Problem, Resistance, Scene, Stage};
+use crate::studies::edge_problems::{Case, cases};
 use crate::studies::error::{Truth, conditions_in_dual_numbers};
 use crate::studies::random::Random;
 use crate::studies::random_problems::{Kind, Scale};
@@ -382,6 +383,15 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
         asked.extend(found);
     }
     asked
+}
+
+/// Questions at the edges of what a solver may be asked, named by their cases in `verification/edges.toml`: `E3-1`.
+pub(super) fn edge_questions() -> Vec<Question> {
+    let of = |Case { id, problems, .. }: Case| {
+        let numbered = problems.into_iter().enumerate();
+        numbered.filter_map(move |(index, problem)| Question::new(format!("{id}-{}", index + 1), problem, None))
+    };
+    cases().into_iter().flat_map(of).collect()
 }
 
 /// `scene` with groups of a usual range, and in half of the cases with S left to Eq. 14.

@@ -17,7 +17,9 @@ struct Faulty {
 impl Faulty {
     fn new(faults: Vec<Fault<'static>>, plan: Plan) -> Self {
         let reads_scene = faults.iter().any(|(fault, _)| fault.needs_scene());
-        Self { faults, questions: questions(plan.seed, plan.questions, reads_scene), reads_scene }
+        let mut questions = questions(plan.seed, plan.questions, reads_scene);
+        questions.extend(edge_questions());
+        Self { faults, questions, reads_scene }
     }
 }
 

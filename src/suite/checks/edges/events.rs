@@ -9,8 +9,8 @@ use crate::integrators::{
     Boundaries, CentralDifference, Detail, Flight, IntegrationError, Integrator, MethodName, VelocityAt,
 };
 use crate::physics::{EventKind, Outcome, Problem, Resistance, Scene, Stage};
-use crate::studies::critical_velocity;
 use crate::studies::relations::reversed;
+use crate::studies::{critical_velocity, edge_problems};
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 check! {
@@ -127,13 +127,8 @@ fn scan(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
 }
 
 fn both_crossings(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
-    for j in 1..=14 {
-        for side in [-1.0, 1.0] {
-            // X = M V0²/(2 P) = 0.5 m.
-            let exit = 0.5 * (1.0 + side * 10f64.powi(-j));
-            let problem = Problem::of_stages(1.0, 10.0, [Stage::tunnel(100.0, 0.0)]).with_exit(exit);
-            check_outcome(subject, &problem, seen)?;
-        }
+    for problem in edge_problems::both_crossings() {
+        check_outcome(subject, &problem, seen)?;
     }
     Ok(())
 }
@@ -201,18 +196,7 @@ fn thin_targets(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     let scene = slab(true);
     let problem = scene.resolve(400.0)?;
     let depth = problem.stages[0].end;
-    for exit in [
-        0.0,
-        1e-300,
-        1e-30,
-        1e-9,
-        0.5 * depth,
-        depth * (1.0 - 1e-12),
-        depth.next_down(),
-        depth,
-        depth.next_up(),
-        depth * (1.0 + 1e-12),
-    ] {
+    for exit in [0.0, 1e-300, 1e-30].into_iter().chain(edge_problems::thin_exits(depth)) {
         // The library's steps end at times of about 1e-302 s: it reports so, and there is no solution to judge.
         if exit == 1e-300 && subject.method_name().needs_diffsol() {
             continue;
@@ -237,8 +221,7 @@ fn thin_targets(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
 
 fn stage_ends(StageEnds { ends, events }: &StageEnds, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
     holds!(ends.is_sorted(), "the stages do not end one behind the other");
-    let stages = ends.iter().chain([&f64::INFINITY]).map(|end| Stage::tunnel(20.0, 0.0).until(*end));
-    let problem = Problem::of_stages(1.0, 10.0, stages).with_exit(1.0);
+    let problem = edge_problems::stage_ends(ends);
     let flight = subject.flight(&problem)?;
     let exact = exact(&problem)?.values();
     let (found, expected) = (kinds(&flight), kinds(&exact));
@@ -370,23 +353,7 @@ fn at_a_step_end(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
 
 fn small_times_and_far_starts(subject: &Subject<'_>) -> Found {
     let mut worst = 0.0;
-    let base = slab(true).resolve(500.0)?;
-    // Lengths by 1e-9: the motion takes picoseconds, at the same speed.
-    let tiny = Problem {
-        exit_depth: base.exit_depth * 1e-9,
-        stages: base
-            .stages
-            .iter()
-            .map(|s| Stage {
-                static_force: s.static_force * 1e9,
-                stiffness: s.stiffness * 1e18,
-                drag: s.drag * 1e9,
-                end: s.end * 1e-9,
-                ..*s
-            })
-            .collect(),
-        ..base
-    };
+    let tiny = edge_problems::tiny().ok_or_else(|| NotMeasured::broken("the slab has no problem"))?;
     let far =
         Problem::of_stages(1.0, 300.0, [Stage::free().until(1e6), Stage::tunnel(1.2e5, 0.5)]).with_exit(1e6 + 0.25);
     // An ulp of the depth counts 4e6 times in the quarter of a metre behind 1e6 m.
@@ -431,18 +398,13 @@ fn laws_outside_their_range(_: &Subject<'_>) -> Found {
 }
 
 fn force_jump(subject: &Subject<'_>) -> Found {
-    let base = slab(true).resolve(500.0)?;
     let mut worst = 0.0;
-    for factor in [0.1, 0.5, 2.0, 10.0] {
-        for exit in [f64::INFINITY, 0.2] {
-            let mut problem = Problem { exit_depth: exit, ..base.clone() };
-            problem.stages[0].stiffness *= factor;
-            let (flight, exact) = subject.beside_exact(&problem)?;
-            worst = worse(worst, end_error(&flight, &exact, problem.impact_speed));
-            if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
-                let speed = (found.velocity - end.velocity).abs() / problem.impact_speed;
-                worst = worst_of([worst, off(found.time, end.time), speed]);
-            }
+    for problem in edge_problems::force_jumps() {
+        let (flight, exact) = subject.beside_exact(&problem)?;
+        worst = worse(worst, end_error(&flight, &exact, problem.impact_speed));
+        if let Some((found, end)) = flight.crater_end().zip(exact.crater_end()) {
+            let speed = (found.velocity - end.velocity).abs() / problem.impact_speed;
+            worst = worst_of([worst, off(found.time, end.time), speed]);
         }
     }
     Ok(Measurement::new(worst / subject.promise()))
@@ -464,16 +426,10 @@ fn back_again(subject: &Subject<'_>) -> Found {
 }
 
 fn across_the_crater_end(subject: &Subject<'_>) -> Found {
-    let scene = Scene { thickness: None, ..slab(true) };
-    let law = scene.resolve(1.0)?;
-    let zero = (law.stages[0].end * law.stages[1].static_force / law.mass).sqrt();
     let mut worst = 0.0;
-    for j in 1..=15 {
-        for sign in [-1.0, 0.0, 1.0] {
-            let problem = scene.resolve(zero * (1.0 + sign * 10f64.powi(-j)))?;
-            let (flight, exact) = subject.beside_exact(&problem)?;
-            worst = worst_of([worst, off(flight.end.depth, exact.end.depth), off(flight.end.time, exact.end.time)]);
-        }
+    for problem in edge_problems::across_the_crater_end() {
+        let (flight, exact) = subject.beside_exact(&problem)?;
+        worst = worst_of([worst, off(flight.end.depth, exact.end.depth), off(flight.end.time, exact.end.time)]);
     }
     Ok(Measurement::new(worst / subject.promise()))
 }

@@ -9,10 +9,11 @@ mod steps;
 
 use twofloat::TwoFloat;
 
-use super::{Subject, formulas, off, solve, worst_of};
+use super::{Subject, off, solve, worst_of};
 use crate::integrators::{Cost, Detail, Energy, Flight};
 use crate::physics::reference::{self, Exact, ExactFlight, ExactState, Source};
 use crate::physics::{Event, Outcome, Problem, Scene, Stage, State};
+use crate::studies::edge_problems::slab;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 pub use self::{critical::*, events::*, steps::*};
@@ -127,14 +128,7 @@ pub(super) fn is_right(outcome: Outcome, margin: f64) -> bool {
     }
 }
 
-/// A scene of the paper's size for which other programs found a wrong critical velocity: 0.9 kg, 26.9 mm,
-/// 36 MPa, S 12, k 2, H 0.30 m; an ogive of N* 0.106 in 2370 kg/m³, or no drag.
-fn slab(drag: bool) -> Scene {
-    let concrete = formulas::concrete(0.0269, 0.106, if drag { 2370.0 } else { 0.0 });
-    Scene { thickness: Some(0.30), velocity: Some(400.0), ..Scene::of_concrete(0.9, concrete) }
-}
-
-/// The same without a far side, at 400 m/s: it comes to rest in the tunnel.
+/// The slab without a far side, at 400 m/s: it comes to rest in the tunnel.
 fn stop(drag: bool) -> Found<Problem> {
     Ok(Scene { thickness: None, ..slab(drag) }.resolve(400.0)?)
 }

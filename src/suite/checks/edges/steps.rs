@@ -1,11 +1,13 @@
 //! Step sizes, number range, rounding and stiffness.
 
 use super::super::scheme::rounding_of;
-use super::super::{Subject, Worst, off, solve, worse, worst_of};
+use super::super::{Subject, USER, Worst, off, solve, worse, worst_of};
 use super::{Violations, concrete, end_error, exact, slab, stop};
 use crate::integrators::central_difference::stability_limit;
 use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, MethodName, StepLimit, VelocityAt};
 use crate::physics::{Outcome, Problem, Stage};
+use crate::studies::diagnosis::Asked;
+use crate::studies::edge_problems::{Case, cases};
 use crate::studies::error::flight_error;
 use crate::studies::extreme_scenes::Summary;
 use crate::studies::order::{OrderFit, StepError, fit};
@@ -267,6 +269,48 @@ pub fn judged_random_scenes(suite: &Suite, summary: &Summary, wall_ms: f64) -> O
         ..drawn.clone()
     };
     Some(Judged::new(claim, Ok(defects_of(summary)), wall_ms))
+}
+
+/// What another program answered at the edges as claims of `suite`, one each case; answers that are of no case are to
+/// random problems. `wall_ms` is the time spent on all (ms).
+pub fn judged_answers(suite: &Suite, asked: &[Asked], wall_ms: f64) -> Vec<Judged> {
+    let is_random = |claim: &&Claim| matches!(claim.check, Check::RandomScenes(_));
+    let random =
+        suite.claims.iter().find(is_random).map(|claim| (claim, "random", "every random problem has its answer"));
+    let of_case = |case: &Case| {
+        suite.claims.iter().find(|claim| claim.table == case.id).map(|claim| (claim, case.id, case.statement))
+    };
+    let cases = cases();
+    let parts = cases.iter().filter_map(of_case).chain(random);
+    let judged = parts.filter_map(|(model, name, statement)| {
+        let is_of = |asked: &&Asked| {
+            let case = asked.id.split('-').next().unwrap_or_default();
+            case == name || (name == "random" && !cases.iter().any(|known| known.id == case))
+        };
+        let answers: Vec<&Asked> = asked.iter().filter(is_of).collect();
+        let count = |is: fn(Verdict) -> bool| answers.iter().filter(|asked| is(asked.verdict)).count();
+        let (judged, wrong) =
+            (count(|verdict| verdict != Verdict::Skipped), count(|verdict| verdict == Verdict::Failed));
+        let claim = Claim {
+            id: format!("{name}/{USER}"),
+            table: name.to_owned(),
+            statement: statement.to_owned(),
+            method: None,
+            limit: 0.0,
+            unit: "wrong answers",
+            reason: "zero: outcome, depth, time and velocity, each within 1000 tolerances times its condition"
+                .to_owned(),
+            ..model.clone()
+        };
+        let first = answers.iter().find(|asked| asked.verdict == Verdict::Failed);
+        let first = first.map(|asked| format!("; first {}: {}", asked.id, asked.reason)).unwrap_or_default();
+        let found = Measurement::new(if judged == 0 { f64::NAN } else { wrong as f64 })
+            .cases(judged)
+            .remark(format!("{judged} answers judged{first}"));
+        let share = answers.len() as f64 / asked.len().max(1) as f64;
+        (!answers.is_empty()).then(|| Judged::new(claim, Ok(found), share * wall_ms))
+    });
+    judged.collect()
 }
 
 fn digits_lost(_: &Subject<'_>) -> Found {
