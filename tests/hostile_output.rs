@@ -140,6 +140,15 @@ fn a_report_goes_into_a_new_an_empty_or_its_own_folder_alone() {
         verify(out).expect(0);
         assert!(folder.path().join(out).join("report.html").exists());
     }
+    // One on a part of the claims has a folder of its own, and takes the place of no other.
+    run_in(folder.path(), "verify --only eq15").expect(0);
+    assert!(folder.path().join("penetrode-report-part/report.html").exists());
+    let suite = run_in(folder.path(), "init suite").expect(0).out;
+    assert!(suite.contains("penetrode verify suite.toml"), "{suite}");
+    run_in(folder.path(), "verify suite.toml --out whole").expect(0);
+    let refused = run_in(folder.path(), "verify --only eq15 --out whole").refused();
+    assert!(refused.contains("whole holds a report on all claims"), "{refused}");
+    run_in(folder.path(), "verify suite.toml --out penetrode-report-part").expect(0);
     fs::write(folder.path().join("new/notes.txt"), "years of work").unwrap();
     fs::create_dir(folder.path().join("thesis")).unwrap();
     fs::write(folder.path().join("thesis/thesis.txt"), "years of work").unwrap();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::output::{Text, error_text, escape_terminal};
-use super::verify::{add_not_passed, counts_text, diagnose_line, judge_all, progress_bar, report_line};
+use super::verify::{add_not_passed, counts_text, diagnose_line, judge_all, list, progress_bar, report_line};
 use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program};
 use crate::exchange::peers::Peer;
 use crate::report::{self, Environment, Run, StressJson, cells, folder};
@@ -30,8 +30,11 @@ pub struct StressArgs {
     /// protocol and is told a tolerance.
     #[arg(long, value_name = "CMD")]
     pub peer: Option<String>,
+    /// List the cases with what they say, and run none.
+    #[arg(long, conflicts_with_all = ["cases", "out", "json", "peer"])]
+    pub list: bool,
     /// Print random scene N of the seed as a scene file, and run nothing.
-    #[arg(long, value_name = "N", conflicts_with_all = ["cases", "out", "json", "peer"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["cases", "out", "json", "peer", "list"])]
     pub show: Option<u64>,
     /// Write the report to this folder: every case with its limit and reason, figures, JSON.
     #[arg(long, value_name = "DIR")]
@@ -47,8 +50,11 @@ impl Ask for StressArgs {
             let text = extreme_scenes::scene_text(&extreme_scenes::scene(self.seed, index), &title);
             return Ok(Answer { data: None, text: text.unwrap_or_default(), exit: Exit::Success });
         }
-        self.out.as_deref().map(folder::check).transpose()?;
         let suite = Suite::edges()?;
+        if self.list {
+            return Ok(Answer { data: None, text: list(&suite), exit: Exit::Success });
+        }
+        self.out.as_deref().map(folder::check).transpose()?;
         // No case is about commands.
         let inputs = Inputs { seed: self.seed, peers: &PeerAnswers::default(), program: None };
         let mut peers = Vec::new();

@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, escape_terminal, say, say_line, show_progress};
 use super::sweep::read_data;
-use super::{Answer, Ask, CliError, command_typed, end_peers_with_program};
+use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
@@ -20,12 +20,15 @@ use crate::suite::{Check, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite,
 pub struct VerifyArgs {
     /// Suite file (TOML) [default: the suite that ships].
     pub suite: Option<String>,
-    /// Folder of the report.
-    #[arg(long, value_name = "DIR", default_value = folder::DEFAULT)]
-    pub out: PathBuf,
-    /// Only claims whose id contains this.
+    /// Folder of the report [default: penetrode-report, or with --only penetrode-report-part].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Only claims whose id contains this, or with * and ? is this; repeatable.
     #[arg(long, value_name = "PATTERN")]
-    pub only: Option<String>,
+    pub only: Vec<String>,
+    /// List the ids of the claims with what they say, and judge none.
+    #[arg(long, conflicts_with_all = ["out", "live_peers", "peer", "data", "json"])]
+    pub list: bool,
     /// Seed of every random number.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -44,19 +47,26 @@ impl Ask for VerifyArgs {
     type Answer = VerifyJson;
 
     fn ask(&self) -> Result<Answer<VerifyJson>, CliError> {
-        folder::check(&self.out)?;
+        let out = self
+            .out
+            .as_deref()
+            .unwrap_or_else(|| Path::new(if self.only.is_empty() { folder::DEFAULT } else { folder::DEFAULT_OF_PART }));
+        if !self.list {
+            folder::check(out)?;
+            self.only.first().map(|_| folder::check_for_part(out)).transpose()?;
+        }
         let mut suite = match &self.suite {
             Some(path) => Suite::read(path)?,
             None => Suite::embedded()?,
         };
-        if let Some(pattern) = &self.only {
-            suite.only(pattern);
-            if suite.claims.is_empty() {
-                return Err(CliError::usage(
-                    format!("no claim has `{pattern}` in its id"),
-                    "see the ids in `report.json`, or leave out --only",
-                ));
-            }
+        if !self.only.is_empty() {
+            suite.keep_only(&self.only).map_err(|pattern| {
+                let what = if pattern.contains(['*', '?']) { "is" } else { "contains" };
+                CliError::usage(format!("no claim has an id that {what} `{pattern}`"), "see the ids with --list")
+            })?;
+        }
+        if self.list {
+            return Ok(Answer { data: None, text: list(&suite), exit: Exit::Success });
         }
         let points = self.data.as_deref().map(read_data).transpose()?.unwrap_or_default();
         if !points.is_empty() && !suite.claims.iter().any(|claim| matches!(claim.check, Check::Sweep(_))) {
@@ -79,7 +89,7 @@ impl Ask for VerifyArgs {
             points: &points,
             random: None,
         };
-        folder::write(folder::files(&run), &self.out)?;
+        folder::write(folder::files(&run), out)?;
         if !suite.is_embedded {
             for (table, looseness) in looseness(&judged).into_iter().filter(|(_, looseness)| *looseness > LOOSENESS_MAX)
             {
@@ -91,7 +101,7 @@ impl Ask for VerifyArgs {
         add_not_passed(&mut text, &judged);
         text.line(counts_text(&judged));
         text.lines(self.peer.as_deref().and_then(|command| diagnose_line(command, &judged)));
-        text.line(report_line(&self.out));
+        text.line(report_line(out));
         let data = VerifyJson::new(&run);
         Ok(Answer { text: text.finish(), exit: data.verdict.into(), data: Some(data) })
     }
@@ -129,6 +139,16 @@ impl VerifyArgs {
         }
         Ok(peers)
     }
+}
+
+/// The ids of the claims of `suite`, those of one table with what they say behind them.
+pub(super) fn list(suite: &Suite) -> String {
+    let mut text = Text::default();
+    for claims in suite.claims.chunk_by(|a, b| a.table == b.table) {
+        text.lines(claims.iter().map(|claim| escape_terminal(&claim.id)));
+        text.wrapped("    ", &escape_terminal(&claims[0].statement));
+    }
+    text.finish()
 }
 
 /// Where the report is.

@@ -40,6 +40,9 @@ impl FolderError {
 /// Name of the folder where none is given.
 pub const DEFAULT: &str = "penetrode-report";
 
+/// The same of a run of a part of the claims.
+pub const DEFAULT_OF_PART: &str = "penetrode-report-part";
+
 /// Refuses a folder that exists and is not a report of ours or cannot be written, before any work is done.
 ///
 /// # Errors
@@ -99,9 +102,27 @@ fn contents(folder: &Path) -> io::Result<Vec<String>> {
 /// The folders in a report.
 const FOLDERS: [&str; 2] = ["figures", "tables"];
 
+/// Refuses a folder that holds a report on all claims of a suite, which one on a part of them must not replace.
+///
+/// # Errors
+/// [`FolderError`].
+pub fn check_for_part(folder: &Path) -> Result<(), FolderError> {
+    let is_whole = |report: &serde_json::Value| report["schema"] == "penetrode/verify/1" && report["only"].is_null();
+    if report_in(folder).is_some_and(|report| is_whole(&report)) {
+        let why = "holds a report on all claims, which one on a part of them would replace".to_owned();
+        return Err(FolderError::NotOurs { path: folder.display().to_string(), why });
+    }
+    Ok(())
+}
+
+/// The numbers of the report in `folder`.
+fn report_in(folder: &Path) -> Option<serde_json::Value> {
+    serde_json::from_slice(&fs::read(folder.join("report.json")).ok()?).ok()
+}
+
 /// What the report in `folder` consists of, by the list in it; `None` where there is no report.
 fn manifest(folder: &Path) -> Option<Vec<String>> {
-    let report: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("report.json")).ok()?).ok()?;
+    let report = report_in(folder)?;
     let is_ours = report.get("schema")?.as_str()?.starts_with("penetrode/");
     let list = fs::read_to_string(folder.join(MANIFEST)).unwrap_or_default();
     is_ours.then(|| list.lines().map(str::to_owned).chain(["report.json".to_owned()]).collect())

@@ -14,6 +14,9 @@ pub struct VerifyJson {
     pub schema: &'static str,
     /// Title of the suite.
     pub title: String,
+    /// Patterns of the claims that were judged; absent where all were.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub only: Vec<String>,
     /// Verdict of the whole.
     pub verdict: Verdict,
     /// How many claims came to what.
@@ -87,6 +90,7 @@ impl VerifyJson {
         Self {
             schema: "penetrode/verify/1",
             title: run.suite.title.clone(),
+            only: run.suite.only.clone(),
             verdict: counts.verdict(),
             counts,
             claims: run.judged.to_vec(),

@@ -94,8 +94,8 @@ pub struct Suite {
     pub scenes: Scenes,
     /// The claims.
     pub claims: Vec<Claim>,
-    /// Whether claims of it were left out.
-    is_part: bool,
+    /// Patterns of the claims that were kept; empty where all were.
+    pub only: Vec<String>,
 }
 
 impl Suite {
@@ -189,7 +189,7 @@ impl Suite {
             text: text.to_owned(),
             scenes,
             claims,
-            is_part: false,
+            only: Vec::new(),
         })
     }
 
@@ -198,10 +198,19 @@ impl Suite {
         SchemaSettings::draft07().into_generator().into_root_schema_for::<SuiteFile>()
     }
 
-    /// Keeps the claims whose id contains `pattern`.
-    pub fn only(&mut self, pattern: &str) {
-        self.is_part = true;
-        self.claims.retain(|claim| claim.id.contains(pattern));
+    /// Keeps the claims whose id one of the `patterns` fits: as a part of the id, or, with `*` for any text and `?` for any
+    /// character, as the whole of it.
+    ///
+    /// # Errors
+    /// The first pattern that fits no claim.
+    pub fn keep_only<'p>(&mut self, patterns: &'p [String]) -> Result<(), &'p str> {
+        let fits_none = |pattern: &&String| !self.claims.iter().any(|claim| fits(pattern, &claim.id));
+        if let Some(pattern) = patterns.iter().find(fits_none) {
+            return Err(pattern);
+        }
+        self.claims.retain(|claim| patterns.iter().any(|pattern| fits(pattern, &claim.id)));
+        self.only = patterns.to_vec();
+        Ok(())
     }
 
     /// Judges every claim, in parallel, in the suite's order; `done` is called with each once it is judged.
@@ -227,13 +236,40 @@ impl Suite {
             judged
         };
         let (places, mut judged): (Vec<_>, Vec<_>) = judge_those(false, context).into_iter().unzip();
-        let others = (!self.is_part).then_some(judged.as_slice());
+        let others = self.only.is_empty().then_some(judged.as_slice());
         let last = judge_those(true, Context { judged: others, ..context });
         for (inserted, (place, claim)) in last.into_iter().enumerate() {
             judged.insert(inserted + places.partition_point(|p| *p < place), claim);
         }
         judged
     }
+}
+
+/// Whether `pattern` fits `id`: see [`Suite::keep_only`].
+fn fits(pattern: &str, id: &str) -> bool {
+    if !pattern.contains(['*', '?']) {
+        return id.contains(pattern);
+    }
+    let (pattern, id): (Vec<char>, Vec<char>) = (pattern.chars().collect(), id.chars().collect());
+    // Places in both, and behind the last star the places from which it may take one character more.
+    let (mut p, mut i, mut star) = (0, 0, None);
+    while i < id.len() {
+        match pattern.get(p) {
+            Some('*') => {
+                star = Some((p, i));
+                p += 1;
+            }
+            Some(symbol) if *symbol == '?' || *symbol == id[i] => (p, i) = (p + 1, i + 1),
+            _ => match star {
+                Some((at, taken)) => {
+                    star = Some((at, taken + 1));
+                    (p, i) = (at + 1, taken + 1);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern[p..].iter().all(|symbol| *symbol == '*')
 }
 
 /// Measures one claim and compares it with its limit.
@@ -245,4 +281,28 @@ pub(super) fn judge(subject: Subject<'_>) -> Judged {
         None => claim.check.measure(&subject),
     };
     Judged::new(claim.clone(), found, started.elapsed().as_secs_f64() * 1e3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fits;
+
+    #[test]
+    fn a_pattern_is_a_part_of_an_id_and_one_with_a_star_the_whole() {
+        for (pattern, id, is_fitting) in [
+            ("order", "exact/order/depth", true),
+            ("exact/", "exact/order/depth", true),
+            ("depth", "exact/order", false),
+            ("*/depth", "exact/order/depth", true),
+            ("*/order", "exact/order/depth", false),
+            ("exact/*/d?pth", "exact/order/depth", true),
+            ("exact/*", "inexact/order", false),
+            ("*a*b", "aabab", true),
+            ("*a*c", "aabab", false),
+            ("?", "ab", false),
+            ("**", "", true),
+        ] {
+            assert_eq!(fits(pattern, id), is_fitting, "{pattern} {id}");
+        }
+    }
 }

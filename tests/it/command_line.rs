@@ -195,6 +195,29 @@ fn the_scenes_that_ship_are_listed_and_one_is_printed_as_it_stands() {
     assert!(run("scenes tunel").refused().ends_with("help: did you mean `tunnel`?"));
 }
 
+#[test]
+fn claims_are_listed_with_what_they_say_and_several_patterns_choose_among_them() {
+    let ids = |line: &str| -> Vec<String> {
+        let text = run(&format!("{line} --list")).expect(0).out;
+        text.lines().filter(|line| !line.starts_with(' ')).map(str::to_owned).collect()
+    };
+    let all = ids("verify");
+    assert!(all.len() > 900 && run("verify --list").out.contains("\n    The closed form agrees"), "{}", all.len());
+    let count = |pattern: &dyn Fn(&str) -> bool| all.iter().filter(|id| pattern(id)).count();
+    let [orders, eq15] = [count(&|id| id.contains("order/")), count(&|id| id.starts_with("eq15"))];
+    assert!(orders > 0 && eq15 > 0);
+    assert_eq!(ids("verify --only order/ --only 'eq15*'").len(), orders + eq15);
+    assert!(ids("stress").iter().any(|id| id.starts_with("E1/")) && run("stress --list").out.contains("\n    "));
+    let folder = tempfile::tempdir().unwrap();
+    for (pattern, words) in
+        [("none-such", "that contains `none-such` help: see"), ("'*none-such'", "that is `*none-such`")]
+    {
+        let said = run_in(folder.path(), &format!("verify --only eq15 --only {pattern}"));
+        assert!(said.refused().contains(words), "{said:?}");
+    }
+    assert_eq!(names(folder.path()), [""; 0]);
+}
+
 /// Each request, and words of the refusal.
 #[test]
 fn a_request_that_cannot_be_served_is_refused_with_its_cause_and_writes_nothing() {
