@@ -2,8 +2,6 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 fn main() -> ExitCode {
-    ExitCode::from(penetrode::cli::Cli::parse().run() as u8)
+    ExitCode::from(penetrode::cli::Cli::of_process().run() as u8)
 }

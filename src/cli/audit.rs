@@ -21,24 +21,29 @@ use crate::text::{digits_text, or_dash};
 
 /// Arguments of `audit`.
 #[derive(Args, Debug)]
-#[command(after_help = "Example: penetrode audit results.csv --scene slab.toml --order 2")]
+#[command(after_help = "Example: penetrode audit results.csv --scene tunnel --order 2")]
 #[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct AuditArgs {
-    /// CSV with dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
-    /// critical_velocity_m_s, or with other units (dt_us, depth_mm), and other columns of numbers; - for standard input.
+    /// CSV with steps and values, such as dt_s,depth_m; - for standard input.
+    ///
+    /// Columns are dt_s and any of depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s,
+    /// critical_velocity_m_s, in these or other units (dt_us, depth_mm), and others of numbers.
     #[arg(required_unless_present = "runs", conflicts_with = "runs")]
     pub results: Option<PathBuf>,
     /// Runs in place of a table.
     #[command(flatten)]
     pub runs: RunArgs,
-    /// Scene, file or name of a shipped one, whose exact answer the results must approach.
+    /// Scene whose exact answer the results must approach.
+    ///
+    /// A file, or the name of a scene that ships.
     #[arg(long)]
     pub scene: Option<String>,
     /// What is set in it.
     #[command(flatten)]
     pub settings: Settings,
-    /// Formal order of the code, of all quantities or of each: 2, or depth=2,time=1; without it any order above zero
-    /// converges.
+    /// Formal order of the code: 2, or depth=2,time=1.
+    ///
+    /// Of all quantities or of each; without it any order above zero converges.
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub order: Option<FormalOrders>,
 }

@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 
 use super::method_args::MethodArgs;
-use super::output::{Destination, check_format, check_outputs, is_parquet, say, show_progress};
+use super::output::{Destination, check_format, check_outputs, is_parquet, new_progress, say, show_progress};
 use super::{CliError, Exit, Run};
 use crate::exchange::input::{is_standard, name_of};
 #[cfg(feature = "parquet")]
@@ -29,10 +29,13 @@ const CHUNK: usize = 128 * PART;
 #[derive(Args, Debug)]
 #[command(after_help = "Example: penetrode batch scenes.csv --out results.csv --critical")]
 pub struct BatchArgs {
-    /// Scenes: a .csv or .parquet table, - for standard input (CSV), or random:N or random:N:SEED for N random
-    /// scenes.
+    /// Table of scenes, - for standard input, or random:N for N random ones.
+    ///
+    /// A .csv or .parquet table; standard input is CSV. random:N:SEED has another seed than 1.
     pub scenes: PathBuf,
-    /// Results: a .csv or .parquet table, written whole or not at all; - for standard output (CSV).
+    /// Table of results; - for standard output.
+    ///
+    /// A .csv or .parquet table, written whole or not at all; standard output is CSV.
     #[arg(long, value_name = "RESULTS.csv")]
     pub out: PathBuf,
     /// Method and its options.
@@ -56,7 +59,7 @@ impl Run for BatchArgs {
             .num_threads(self.threads.map_or(0, usize::from))
             .build()
             .map_err(|error| CliError::failed(error.to_string(), ""))?;
-        let progress = ProgressBar::no_length();
+        let progress = new_progress();
         let mut source = Source::open(&self.scenes, &progress)?;
         // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
         let first = source.next_scenes(None)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use indicatif::ProgressBar;
 
-use super::output::{Text, error_text, escape_terminal, say_line, show_progress, wrapped};
+use super::output::{Text, error_text, escape_terminal, new_progress, say_line, show_progress, wrapped};
 use super::verify::report_line;
 use super::{Answer, Ask, CliError, Exit, Settings, command_typed, end_peers_with_program};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
@@ -33,7 +33,9 @@ const VARIED: usize = 1000;
 #[command(after_help = include_str!("help/bench.txt"))]
 #[command(mut_arg("set", |set| set.requires("scenes")))]
 pub struct BenchArgs {
-    /// Scene files or names of shipped scenes [default: crater, tunnel, perforate, graze, stiff, and 1000 varied].
+    /// Scene files or names of scenes that ship [default: five, and varied].
+    ///
+    /// The five are crater, tunnel, perforate, graze and stiff; 1000 varied ones stand beside them.
     pub scenes: Vec<String>,
     /// What is set in each of them.
     #[command(flatten)]
@@ -42,16 +44,18 @@ pub struct BenchArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,..",
           default_values_t = [Part::WorkPrecision, Part::StepSize])]
     pub parts: Vec<Part>,
-    /// Also heyoka, scipy and scikit-sundae (needs Python 3.11).
+    /// Also heyoka, scipy and scikit-sundae (Python 3.11).
     #[arg(long)]
     pub peers: bool,
-    /// Also another solver: a program that speaks the peer protocol.
+    /// Also this solver, which speaks the peer protocol.
     #[arg(long, value_name = "CMD")]
     pub peer: Vec<String>,
-    /// How many varied scenes [default: 1000 where no scene is given, else none].
+    /// How many varied scenes.
+    ///
+    /// By default 1000 where no scene is given, else none.
     #[arg(long, value_name = "N")]
     pub varied: Option<u16>,
-    /// Seed of the varied scenes and of random steps.
+    /// Seed of varied scenes and random steps.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Samples of each time.
@@ -145,7 +149,7 @@ impl BenchArgs {
 
     fn measure(&self, scenes: &[(String, Scene)], peers: &mut [(String, Peer)]) -> Result<BenchJson, CliError> {
         let effort = Effort { samples: usize::from(self.repeats) };
-        let progress = ProgressBar::new(0);
+        let progress = new_progress();
         show_progress(&progress, 0, "{bar:30} {pos}/{len}, {eta} left {msg}");
         let mut cases = Vec::new();
         if self.has(Part::WorkPrecision) {

@@ -21,23 +21,25 @@ use crate::text::or_dash;
 
 /// Arguments of `converge`.
 #[derive(Args, Debug)]
-#[command(after_help = "Example: penetrode converge slab.toml --velocity centred --events interpolated --dt 10ns:10us")]
+#[command(after_help = "Example: penetrode converge tunnel --velocity centred --events interpolated --dt 10ns:10us")]
 pub struct ConvergeArgs {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// Method of integration [default: central-difference].
+    /// Method of integration.
     #[arg(long, value_enum, default_value_t = MethodName::CentralDifference)]
     pub method: MethodName,
-    /// Velocity in the drag of central-difference [default: lagged].
+    /// central-difference: V in the drag [default: lagged].
     #[arg(long, value_enum)]
     pub velocity: Option<crate::integrators::VelocityAt>,
-    /// Where central-difference sees boundaries and rest [default: step-end].
+    /// central-difference: boundaries [default: step-end].
+    ///
+    /// Where it sees stage ends, exit and rest.
     #[arg(long, value_enum)]
     pub events: Option<crate::integrators::Boundaries>,
-    /// Smallest and largest step, such as 10ns:10us [default: 1e-5 to 1e-2 of the time to the end].
+    /// Smallest and largest step, such as 10ns:10us.
     ///
-    /// Without it, quantities that these do not decide have other steps, once.
+    /// By default 1e-5 to 1e-2 of the time to the end. Without it, quantities that these do not decide have other steps, once.
     #[arg(long, value_name = "A:B")]
     pub dt: Option<String>,
     /// How many step sizes or tolerances.

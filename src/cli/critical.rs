@@ -15,7 +15,7 @@ use crate::studies::{applicability, critical_velocity};
 
 /// Arguments of `critical`.
 #[derive(Args, Debug)]
-#[command(after_help = "Example: penetrode critical slab.toml --spread target.strength=5% --spread projectile.mass=1%")]
+#[command(after_help = "Example: penetrode critical paper-slab --spread target.strength=5%")]
 pub struct CriticalArgs {
     /// The scene.
     #[command(flatten)]
@@ -23,10 +23,12 @@ pub struct CriticalArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Relative standard deviation of an input, such as target.strength=5%; repeatable, for the uncertainty of V_c.
+    /// Uncertainty for target.strength=5%; repeatable.
+    ///
+    /// Each gives the relative standard deviation of a number of the scene.
     #[arg(long, value_name = "PATH=REL")]
     pub spread: Vec<String>,
-    /// Random scenes behind that uncertainty.
+    /// Random scenes behind it.
     #[arg(long, default_value_t = 100_000, requires = "spread", value_parser = clap::value_parser!(u32).range(2..=100_000_000))]
     pub samples: u32,
     /// Seed of the random scenes.

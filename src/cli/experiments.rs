@@ -21,16 +21,20 @@ use crate::studies::sensitivity;
 pub struct ExperimentsArgs {
     /// Tables of measured tests; those that ship when left out.
     pub tables: Vec<PathBuf>,
-    /// Crater depth in diameters for every test [default: 0.707 + h/d].
+    /// Crater depth in diameters [default: 0.707 + h/d].
     #[arg(long, allow_hyphen_values = true)]
     pub k: Option<f64>,
-    /// Relative standard deviation of an input, such as target.strength=5%; repeatable, for the input uncertainty.
+    /// Uncertainty for target.strength=5%; repeatable.
+    ///
+    /// Each gives the relative standard deviation of a number of the tests.
     #[arg(long, value_name = "PATH=REL")]
     pub spread: Vec<String>,
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write the comparison to this CSV file and the figure beside it; - for standard output, without a figure.
+    /// Write this CSV file and a figure beside it.
+    ///
+    /// - is standard output, without a figure.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
 }

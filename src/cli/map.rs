@@ -22,7 +22,9 @@ pub struct MapArgs {
     /// Crater depth in diameters.
     #[arg(long, default_value_t = 2.0, allow_hyphen_values = true)]
     pub k: f64,
-    /// Write the lines to this CSV file and the figure beside it; - for standard output, without a figure.
+    /// Write the lines to this CSV file and the figure beside it.
+    ///
+    /// - is standard output, without a figure.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
 }

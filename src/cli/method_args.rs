@@ -18,16 +18,22 @@ pub struct MethodArgs {
     /// Method of integration.
     #[arg(long, value_enum, default_value_t = MethodName::Taylor)]
     pub method: MethodName,
-    /// Relative tolerance, of methods that have one.
-    #[arg(long, help = rtol_help(), value_name = "R", allow_hyphen_values = true)]
+    /// Relative tolerance of methods that have one.
+    #[arg(long, long_help = rtol_help(), value_name = "R", allow_hyphen_values = true)]
     pub rtol: Option<f64>,
-    /// Time step of central-difference, such as "1 us" or seconds; from the stages when left out.
+    /// central-difference: time step, such as 1us.
+    ///
+    /// A number alone is in seconds; when left out, it follows from the stages.
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub dt: Option<String>,
-    /// Velocity in the drag of central-difference [default: lagged, as in the paper].
+    /// central-difference: V in the drag [default: lagged].
+    ///
+    /// The default is that of the paper.
     #[arg(long, value_enum)]
     pub velocity: Option<VelocityAt>,
-    /// Where central-difference sees boundaries and rest [default: step-end, as in the paper].
+    /// central-difference: boundaries [default: step-end].
+    ///
+    /// Where it sees stage ends, exit and rest; the default is that of the paper.
     #[arg(long, value_enum)]
     pub events: Option<Boundaries>,
 }

@@ -25,7 +25,7 @@ pub mod verify;
 use std::io::{self, IsTerminal};
 use std::path::Path;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use schemars::{JsonSchema, Schema, schema_for};
 use serde::Serialize;
 use serde_json::json;
@@ -299,35 +299,35 @@ macro_rules! commands {
 }
 
 commands! {
-    /// One scene solved: depth, times and velocities, beside the exact answer.
+    /// A scene solved: depth, times, velocities, beside the exact answer.
     Solve = "solve": Printing<solve::SolveArgs>,
-    /// Critical velocity V_c and energy E_c by argmin, closed form and Eq. 15 beside them.
+    /// Critical velocity and energy, beside the closed form and Eq. 15.
     Critical = "critical": Printing<critical::CriticalArgs>,
     /// Many scenes from a table, one line of results each.
     Batch = "batch": batch::BatchArgs,
     /// Order of convergence of every quantity, fitted and classified.
     Converge = "converge": Printing<converge::ConvergeArgs>,
-    /// V_c, E_c/(d³ fc), depth and Eq. 15 along one number of a scene, or over two.
+    /// V_c, energy, depth and Eq. 15 along one number of a scene or two.
     Sweep = "sweep": Printing<sweep::SweepArgs>,
-    /// How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
+    /// How far Eq. 11-12 may be trusted: lines of equal error.
     Map = "map": Printing<map::MapArgs>,
-    /// What an accuracy costs: time and work against error, and the largest steps.
+    /// What an accuracy costs: time and work, and the largest steps.
     Bench = "bench": Printing<bench::BenchArgs>,
-    /// Measured penetration depths beside predicted ones: shipped data or your own.
+    /// Measured depths beside predicted ones: shipped data or your own.
     Experiments = "experiments": Printing<experiments::ExperimentsArgs>,
-    /// Order, error band and verdict for step-size results of another code.
+    /// Order, error bar and verdict for results of another code.
     Audit = "audit": Printing<audit::AuditArgs>,
     /// Is a solver right, and if not, what is wrong with it?
     Diagnose = "diagnose": Printing<diagnose::DiagnoseArgs>,
     /// The verification suite and its report.
     Verify = "verify": Printing<verify::VerifyArgs>,
-    /// Numerical stability and event stress cases, and random scenes by the million.
+    /// Cases at the edges of numbers and events, and random scenes.
     Stress = "stress": Printing<stress::StressArgs>,
     /// The scenes that ship: one line each, or the file of one.
     Scenes = "scenes": Printing<scenes::ScenesArgs>,
-    /// A file to begin with: a solver of your own, a scene, a suite, or data.
+    /// A file to begin with: a solver, a scene, a suite or data.
     Init = "init": init::InitArgs,
-    /// JSON schema of what a command prints, or of a scene or suite file.
+    /// JSON schema of what a command prints, or of a file it reads.
     Schema = "schema": schema::SchemaArgs,
     /// Shell completion.
     Completions = "completions": completions::CompletionsArgs,
@@ -343,11 +343,25 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
+    /// No warnings and no progress on standard error.
+    #[arg(long, global = true, display_order = 1000)]
+    pub quiet: bool,
 }
 
 impl Cli {
+    /// The arguments of this process; a mistake in them, and a wish for help, end it.
+    pub fn of_process() -> Self {
+        // What is cut off for `-h` alone would be missing nowhere else.
+        let is_brief = std::env::args_os().any(|word| word == "-h");
+        let commands = if is_brief { Self::command().mut_subcommands(brief) } else { Self::command() };
+        Self::from_arg_matches(&commands.get_matches()).unwrap_or_else(|error| error.exit())
+    }
+
     /// Runs the command, reports an error on standard error, and says how it ended.
     pub fn run(&self) -> Exit {
+        if self.quiet {
+            output::be_quiet();
+        }
         let (name, command) = self.command.entry();
         command.run().unwrap_or_else(|error| {
             if matches!(error.exit(), Exit::Failed | Exit::Undecided) && command.wants_json() {
@@ -355,16 +369,29 @@ impl Cli {
                 let _ = output::print_json(&error.json(name));
             }
             let color = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-            output::say_line(error.render(color).trim_end_matches('\n'));
+            output::say_error(error.render(color).trim_end_matches('\n'));
             error.exit()
         })
     }
 }
 
+/// `command` with a help that fits a screen: an option without the list of its values, an example without what follows it.
+fn brief(command: clap::Command) -> clap::Command {
+    let has_list = |arg: &clap::Arg| arg.get_action().takes_values() && !arg.is_positional();
+    let text = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    let example = text.split("\n\n").next().unwrap_or_default().to_owned();
+    let is_cut =
+        example != text || command.get_arguments().any(|arg| has_list(arg) && !arg.get_possible_values().is_empty());
+    let hidden = |arg: clap::Arg| if has_list(&arg) { arg.hide_possible_values(true) } else { arg };
+    let command = command.mut_args(hidden).after_help(example);
+    // It says then that there is more to see.
+    if is_cut { command.after_long_help(text) } else { command }
+}
+
 /// The scene of a command.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// Scene file (TOML), name of a shipped scene, or - for standard input.
+    /// Scene file, name of a scene that ships, or - for standard input.
     #[arg(value_name = "SCENE")]
     pub path: String,
     /// What is set in the scene.
@@ -375,7 +402,9 @@ pub struct SceneArgs {
 /// What is set in each scene of a command, as if its file gave it.
 #[derive(Args, Debug)]
 pub struct Settings {
-    /// Set a number or word of the scene, such as impact.velocity=400m/s, as if the file gave it; repeatable.
+    /// Set impact.velocity=400m/s and the like; repeatable.
+    ///
+    /// Any number or word of a scene file, as if the file gave it.
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<String>,
 }

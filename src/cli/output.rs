@@ -5,8 +5,9 @@ use std::fmt::Display;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::CliError;
@@ -56,13 +57,28 @@ pub fn wrapped(head: &str, text: &str) -> String {
     format!("{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
 }
 
-/// Prints for a person on standard error, `head` (`warning: `) in front.
+/// Whether nothing but errors is said on standard error.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From now on nothing but errors is said on standard error.
+pub fn be_quiet() {
+    IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Prints for a person on standard error, `head` (`warning: `) in front, unless all is to be quiet.
 pub fn say(head: &str, text: &str) {
     say_line(&wrapped(head, text));
 }
 
-/// A line as it is on standard error. Where it is closed the work goes on.
+/// A line as it is on standard error, unless all is to be quiet.
 pub fn say_line(line: &str) {
+    if !IS_QUIET.load(Ordering::Relaxed) {
+        say_error(line);
+    }
+}
+
+/// A line as it is on standard error. Where it is closed the work goes on.
+pub fn say_error(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
@@ -352,7 +368,16 @@ pub fn table_lines(table: &comfy_table::Table) -> Vec<String> {
     table.to_string().lines().map(|line| format!(" {line}").trim_end().to_owned()).collect()
 }
 
-/// Gives `bar` a length and a look, by the `template` of a [`ProgressStyle`]; it shows on a terminal only.
+/// A bar without a length yet; it shows on a terminal only, and not where all is to be quiet.
+pub fn new_progress() -> ProgressBar {
+    let bar = ProgressBar::no_length();
+    if IS_QUIET.load(Ordering::Relaxed) {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    bar
+}
+
+/// Gives `bar` a length and a look, by the `template` of a [`ProgressStyle`].
 pub fn show_progress(bar: &ProgressBar, length: u64, template: &str) {
     bar.set_length(length);
     if let Ok(style) = ProgressStyle::with_template(template) {

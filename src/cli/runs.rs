@@ -15,9 +15,11 @@ const SIZE_MAX: u64 = 256 << 20;
 /// Runs in place of a table, and how their files are read.
 #[derive(Args, Debug)]
 pub struct RunArgs {
-    /// A run and its step in place of a table, once for each: an X-Y report of Abaqus/CAE with the curves U1 and V1 (or 2,
-    /// 3) of the projectile, or rbdout or nodout of LS-DYNA. A run ends where its depth reaches the thickness of the
-    /// scene or of --thickness, else where it comes to rest, interpolated between two lines.
+    /// A run of Abaqus or LS-DYNA and its step; repeatable.
+    ///
+    /// In place of a table: an X-Y report of Abaqus/CAE with the curves U1 and V1 (or 2, 3) of the projectile, or rbdout or
+    /// nodout of LS-DYNA. A run ends where its depth reaches the thickness of the scene or of --thickness, else where it
+    /// comes to rest, interpolated between two lines.
     #[arg(long = "run", value_name = "FILE=DT", value_parser = run)]
     pub runs: Vec<(PathBuf, f64)>,
     /// Thickness in place of a scene: 0.18 (m) or 180mm.
@@ -26,10 +28,12 @@ pub struct RunArgs {
     /// Units of length and time in the files.
     #[arg(long, value_name = "LENGTH,TIME", default_value = "m,s", value_parser = units)]
     pub units: (f64, f64),
-    /// Axis of the flight; without it that of the largest velocity in the first line.
+    /// Axis of the flight.
+    ///
+    /// Without it that of the largest velocity in the first line.
     #[arg(long, requires = "runs")]
     pub axis: Option<Axis>,
-    /// Number of the rigid body or node, where a file has several.
+    /// Number of the body or node, of several.
     #[arg(long, value_name = "N", requires = "runs")]
     pub id: Option<u64>,
 }

@@ -24,7 +24,7 @@ use crate::text::count;
 
 /// Arguments of `solve`.
 #[derive(Args, Debug)]
-#[command(after_help = "Example: penetrode solve scene.toml --points 200 --trajectory path.csv")]
+#[command(after_help = "Example: penetrode solve tunnel --points 200 --trajectory path.csv")]
 pub struct SolveArgs {
     /// The scene.
     #[command(flatten)]
@@ -32,23 +32,29 @@ pub struct SolveArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write every step and event to this CSV file; - for standard output, in place of the answer.
+    /// Write every step and event to this CSV file.
+    ///
+    /// - is standard output, in place of the answer.
     #[arg(long, value_name = "F.csv")]
     pub trajectory: Option<PathBuf>,
-    /// In place of steps and events N states, evenly in time from impact to the end.
+    /// In place of steps N states, evenly in time.
     ///
-    /// They are the method's own solution inside its steps, as accurate as the steps themselves; central-difference has
+    /// From impact to the end, both included. They are the method's own solution inside its steps, as accurate as the steps themselves; central-difference has
     /// none, and runs V linearly and x along the parabola that meets both nodes. Without --trajectory they are in the
     /// answer.
     #[arg(long, value_name = "N", conflicts_with = "times", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     pub points: Option<u32>,
-    /// The same at the times of this CSV file, in its column time_s.
+    /// The same at the times (time_s) of this CSV file.
+    ///
+    /// Times behind the end are left out, with a warning.
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
     /// Say what the scene let the method skip, and why.
     #[arg(long)]
     pub explain: bool,
-    /// Derivatives of depth, residual and critical velocity with respect to every number of the scene.
+    /// Derivatives with respect to every number.
+    ///
+    /// Of the depth or the residual velocity, and of the critical velocity.
     #[arg(long)]
     pub sensitivities: bool,
 }

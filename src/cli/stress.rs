@@ -26,17 +26,20 @@ pub struct StressArgs {
     /// Seed of every random number.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Put another solver through the events at their edges and N random problems: a program that speaks the peer
-    /// protocol and is told a tolerance.
+    /// Put this solver through events at their edges.
+    ///
+    /// And through N random problems: a program that speaks the peer protocol and is told a tolerance.
     #[arg(long, value_name = "CMD")]
     pub peer: Option<String>,
     /// List the cases with what they say, and run none.
     #[arg(long, conflicts_with_all = ["cases", "out", "json", "peer"])]
     pub list: bool,
-    /// Print random scene N of the seed as a scene file, and run nothing.
+    /// Print random scene N as a scene file, and run nothing.
     #[arg(long, value_name = "N", conflicts_with_all = ["cases", "out", "json", "peer", "list"])]
     pub show: Option<u64>,
-    /// Write the report to this folder: every case with its limit and reason, figures, JSON.
+    /// Write the report to this folder.
+    ///
+    /// Every case with its limit and reason, figures, JSON.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

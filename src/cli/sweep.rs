@@ -31,16 +31,22 @@ pub struct SweepArgs {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneArgs,
-    /// What to vary: N values from A to B, both included. Once or twice; the last runs fastest.
+    /// What to vary, such as H/d=0.5:18:200; once or twice.
+    ///
+    /// N values from A to B, both included; the last of two runs fastest.
     #[arg(long, value_name = "PATH=A:B:N[:log]", required = true)]
     pub vary: Vec<String>,
-    /// Measured points for Figure 4: a CSV with the columns `H/d` and `E_c/(d3 fc)`.
+    /// Measured points for Figure 4.
+    ///
+    /// A CSV with the columns `H/d` and `E_c/(d3 fc)`.
     #[arg(long, value_name = "POINTS.csv")]
     pub data: Option<PathBuf>,
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
-    /// Write the table to this file (.csv or .parquet) and the figures beside it; - for standard output, without figures.
+    /// Write the table to this file and figures beside it.
+    ///
+    /// A .csv or .parquet file; - is standard output, without figures.
     #[arg(long, value_name = "F.csv")]
     pub out: Option<PathBuf>,
 }

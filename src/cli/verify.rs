@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::output::{Text, escape_terminal, say, say_line, show_progress};
+use super::output::{Text, escape_terminal, new_progress, say, say_line, show_progress};
 use super::sweep::read_data;
 use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
@@ -20,25 +20,33 @@ use crate::suite::{Check, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite,
 pub struct VerifyArgs {
     /// Suite file (TOML) [default: the suite that ships].
     pub suite: Option<String>,
-    /// Folder of the report [default: penetrode-report, or with --only penetrode-report-part].
+    /// Folder of the report [default: penetrode-report].
+    ///
+    /// With --only the default is penetrode-report-part.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Only claims whose id contains this, or with * and ? is this; repeatable.
+    /// Only claims whose id contains this; repeatable.
+    ///
+    /// With * for any text and ? for any character it is the whole id.
     #[arg(long, value_name = "PATTERN")]
     pub only: Vec<String>,
-    /// List the ids of the claims with what they say, and judge none.
+    /// List the claims with their ids, and judge none.
     #[arg(long, conflicts_with_all = ["out", "live_peers", "peer", "data", "json"])]
     pub list: bool,
     /// Seed of every random number.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Ask scikit-sundae and heyoka now instead of comparing with recorded answers (needs Python 3.11).
+    /// Ask scikit-sundae and heyoka live.
+    ///
+    /// Instead of comparing with recorded answers; needs Python 3.11.
     #[arg(long)]
     pub live_peers: bool,
-    /// Put another solver through the suite: a program that speaks the peer protocol.
+    /// Another solver, which speaks the peer protocol.
     #[arg(long, value_name = "CMD")]
     pub peer: Option<String>,
-    /// Measured points to show with the paper's curve: a CSV with the columns `H/d` and `E_c/(d3 fc)`.
+    /// Measured points to show with the paper's curve.
+    ///
+    /// A CSV with the columns `H/d` and `E_c/(d3 fc)`.
     #[arg(long, value_name = "POINTS.csv")]
     pub data: Option<PathBuf>,
 }
@@ -212,7 +220,7 @@ pub(super) fn judge_all(suite: &Suite, inputs: Inputs<'_>, what: &str) -> Vec<Ju
 
 /// A bar that counts `what`.
 pub(super) fn progress_bar(length: u64, what: &str) -> ProgressBar {
-    let bar = ProgressBar::new(length);
+    let bar = new_progress();
     show_progress(&bar, length, &format!("{{bar:30}} {{pos}}/{{len}} {what}, {{eta}} left {{msg}}"));
     bar
 }

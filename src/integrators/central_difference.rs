@@ -95,7 +95,7 @@ pub enum Boundaries {
     /// V(i) <= 0, its depth the larger of the last two x.
     #[default]
     StepEnd,
-    /// Located inside the step afterwards; the steps themselves are those of [`Boundaries::StepEnd`].
+    /// Located inside the step afterwards; the steps themselves are those of `step-end`.
     Interpolated,
     /// Stage ends are landed on: the step is shortened to `x(i) + V(i) dt + a(i) dt²/2 = end`, and the scheme starts
     /// afresh there, each half step with the force of its own side; the next step has its regular size again. Exit

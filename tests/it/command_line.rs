@@ -218,6 +218,16 @@ fn claims_are_listed_with_what_they_say_and_several_patterns_choose_among_them()
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
+#[test]
+fn quiet_leaves_the_answer_and_the_errors() {
+    let [loud, quiet] = ["", "--quiet"].map(|option| run(&format!("solve tunnel {option}")).expect(0));
+    assert!(loud.err.contains("warning: ") && quiet.err.is_empty(), "{quiet:?}");
+    let answer = |said: &Said| said.out.lines().take(8).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(answer(&loud), answer(&quiet));
+    assert_eq!(run("--quiet batch random:1 --out -").expect(0).err, "");
+    assert!(run("--quiet solve nowhere").refused().contains("nowhere"));
+}
+
 /// Each request, and words of the refusal.
 #[test]
 fn a_request_that_cannot_be_served_is_refused_with_its_cause_and_writes_nothing() {
@@ -407,11 +417,27 @@ fn bad_convergence_data_never_passes() {
 
 #[test]
 fn help_and_completion_are_there_for_every_command() {
-    for command in ["solve", "critical", "converge", "audit", "bench", "verify", "init", "schema", "completions"] {
-        let text = run(&format!("{command} --help")).expect(0).out;
-        let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
-        assert!(widest <= 80, "{command}: a line of {widest} characters");
+    let commands = run("-h").expect(0).out;
+    let commands: Vec<_> = commands.lines().skip_while(|line| *line != "Commands:").skip(1).collect();
+    let names = commands.iter().map_while(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    let names: Vec<_> = [""].into_iter().chain(names).collect();
+    assert!(names.len() > 15 && names.contains(&"completions"), "{names:?}");
+    for name in names {
+        for (option, rows) in [("-h", 40), ("--help", 150)] {
+            let text = run(&format!("{name} {option}")).expect(0).out;
+            let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
+            assert!(widest <= 80, "{name}: a line of {widest} characters");
+            assert!(text.lines().count() <= rows, "{name} {option}: {} rows", text.lines().count());
+            assert!(text.contains("\nExample") && text.contains("penetrode "), "{name} {option} has no example");
+            assert!(!text.contains("[`"), "{name}: a link of the sources");
+        }
     }
+    // What `-h` leaves out is there, and `-h` says so.
+    let [brief, whole] = ["-h", "--help"].map(|option| run(&format!("sweep {option}")).out);
+    for words in ["Possible values", "moves the thickness"] {
+        assert!(whole.contains(words) && !brief.contains(words), "{words}");
+    }
+    assert!(brief.contains("(see more with '--help')"), "{brief}");
     for shell in ["bash", "zsh", "fish"] {
         assert!(run(&format!("completions {shell}")).out.len() > 1000, "{shell}");
     }
