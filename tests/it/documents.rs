@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 use penetrode::physics::Range;
 use penetrode::physics::parameter::{Absence, Entry, Parameter};
 
+use crate::program::run_in;
+
 /// Folders and files in which a document may be cited.
 const PLACES: [&str; 17] = [
     "src",
@@ -141,6 +143,24 @@ fn no_file_name_is_refused_by_windows() -> io::Result<()> {
         }
         assert!(seen.insert(path.to_string_lossy().to_lowercase()), "{}: two names in one", path.display());
     }
+    Ok(())
+}
+
+/// What a terminal shows of each command of the README with an answer behind it, and the file of the scene in it.
+#[test]
+fn the_commands_of_the_readme_print_what_stands_there() -> io::Result<()> {
+    let readme = fs::read_to_string(root().join("README.md"))?;
+    let mut commands = 0;
+    for block in readme.split("```console\n$ penetrode ").skip(1) {
+        let block = block.split("```").next().unwrap_or_default();
+        let (line, shown) = block.split_once('\n').unwrap_or_default();
+        let said = run_in(&std::env::temp_dir(), line);
+        assert_eq!(said.err + &said.out, shown, "penetrode {line}");
+        commands += 1;
+    }
+    assert_eq!(commands, 2);
+    let file = run_in(root(), "scenes forrestal-1994-shot-14").out;
+    assert!(readme.contains(&format!("```toml\n{}\n```", file.trim_end())), "{file}");
     Ok(())
 }
 
