@@ -245,6 +245,78 @@ fn an_interrupted_run_leaves_the_old_results_or_none() {
     assert!(report.exists());
 }
 
+/// `line` in `folder`, begun to make temporary files there or in `folder/tmp`.
+#[cfg(target_os = "linux")]
+fn begun(folder: &Path, line: &str) -> std::process::Child {
+    let names_of_both = || (names(folder), names(&folder.join("tmp")));
+    let before = names_of_both();
+    let mut command = program(folder, line);
+    command.env("TMPDIR", folder.join("tmp")).stdout(Stdio::null()).stderr(Stdio::null());
+    let child = command.spawn().unwrap();
+    let started = Instant::now();
+    while names_of_both() == before {
+        assert!(started.elapsed() < Duration::from_secs(20), "{line}: nothing is made");
+        thread::sleep(Duration::from_millis(1));
+    }
+    child
+}
+
+#[cfg(target_os = "linux")]
+fn send(signal: &str, child: &std::process::Child) {
+    assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+#[cfg(target_os = "linux")]
+fn an_interrupted_run_leaves_nothing_behind() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = workplace();
+    fs::create_dir(folder.path().join("tmp")).unwrap();
+    let before = names(folder.path());
+    for (signal, number) in [("INT", 2), ("TERM", 15), ("HUP", 1)] {
+        for line in ["batch random:3000000 --out out.csv", "verify --only recorded --out report"] {
+            let mut child = begun(folder.path(), line);
+            thread::sleep(Duration::from_millis(100));
+            send(signal, &child);
+            assert_eq!(child.wait().unwrap().signal(), Some(number), "{line}");
+            assert_eq!(names(folder.path()), before, "{signal}: {line}");
+            // What `verify` had started ends by itself.
+            let ended = Instant::now();
+            while !names(&folder.path().join("tmp")).is_empty() {
+                assert!(ended.elapsed() < Duration::from_secs(30), "{signal}: {:?}", names(&folder.path().join("tmp")));
+                thread::sleep(Duration::from_millis(10));
+            }
+        }
+    }
+}
+
+/// As `nohup` starts it.
+#[cfg(target_os = "linux")]
+fn a_signal_that_is_ignored_stays_so() {
+    let folder = workplace();
+    let script = format!("trap '' HUP; exec {} batch random:30000 --out out.csv", env!("CARGO_BIN_EXE_penetrode"));
+    let mut command = Command::new("sh");
+    command.args(["-c", &script]).current_dir(folder.path()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    thread::sleep(Duration::from_millis(100));
+    send("HUP", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(folder.path().join("out.csv").exists());
+}
+
+fn no_output_has_the_name_of_a_scene() {
+    let folder = workplace();
+    let scene = fs::read(folder.path().join("slab.toml")).unwrap();
+    let before = names(folder.path());
+    for (line, path) in TABLES.into_iter().flat_map(|line| [(line, "new.toml"), (line, "slab.TOML")]) {
+        let refused = run_in(folder.path(), &format!("{line} {path}")).refused();
+        assert!(refused.contains("such a file is a scene or a suite"), "{line}: {refused}");
+    }
+    let refused = run_in(folder.path(), "map --out slab.toml").refused();
+    assert!(refused.contains("the table cannot go to slab.toml"), "{refused}");
+    assert!(fs::read(folder.path().join("slab.toml")).unwrap() == scene);
+    assert_eq!(names(folder.path()), before);
+}
+
 /// A tmpfs of 256 KiB, unmounted when dropped; `None` where this user may not mount.
 struct SmallDisk(PathBuf, #[expect(dead_code, reason = "its folder lives as long")] tempfile::TempDir);
 
@@ -348,9 +420,10 @@ fn main() -> ExitCode {
             })
         };
     }
-    #[cfg_attr(not(target_os = "linux"), expect(unused_mut, reason = "two more trials on Linux"))]
+    #[cfg_attr(not(target_os = "linux"), expect(unused_mut, reason = "more trials on Linux"))]
     let mut trials = vec![
         trial!(an_input_is_never_replaced),
+        trial!(no_output_has_the_name_of_a_scene),
         trial!(what_cannot_be_written_says_why_and_leaves_nothing),
         trial!(a_report_goes_into_a_new_an_empty_or_its_own_folder_alone),
         trial!(a_table_may_go_to_standard_output),
@@ -363,6 +436,8 @@ fn main() -> ExitCode {
     trials.extend([
         trial!(a_pipe_and_a_broken_link_are_no_files_and_a_link_stays),
         trial!(a_standard_error_that_cannot_be_written_changes_no_exit_code),
+        trial!(an_interrupted_run_leaves_nothing_behind),
+        trial!(a_signal_that_is_ignored_stays_so),
     ]);
     libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
 }

@@ -12,6 +12,7 @@ use super::method_args::MethodArgs;
 use super::output::{Destination, check_format, check_outputs, is_parquet, new_progress, say, show_progress};
 use super::{CliError, Exit, Run};
 use crate::exchange::input::{is_standard, name_of};
+use crate::exchange::interruption::whole;
 #[cfg(feature = "parquet")]
 use crate::exchange::tables::parquet::ParquetReader;
 use crate::exchange::tables::{self, Block, CsvTable, TableWriter};
@@ -73,7 +74,7 @@ impl Run for BatchArgs {
             other => other?,
         };
         let written = sink.finish().and_then(|output| Ok(output.into_inner()?));
-        written.and_then(|output| output.finish(&self.out)).map_err(unwritable)?;
+        written.and_then(|output| whole(|| output.finish(&self.out))).map_err(unwritable)?;
         progress.finish_and_clear();
         say("", &summary(&tally));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::output::{Text, check_outputs, print_text, write_all};
+use super::output::{Text, check_place, print_text, write_all};
 use super::{CliError, Exit, Run};
 use crate::exchange::input::is_standard;
 
@@ -86,10 +86,13 @@ impl Run for InitArgs {
     fn run(&self) -> Result<Exit, CliError> {
         let template = self.template()?;
         let path = self.path.clone().unwrap_or_else(|| template.name.into());
-        check_outputs(&[], &[("the file", &path)])?;
-        if !is_standard(&path) && fs::symlink_metadata(&path).is_ok() {
-            let message = format!("{} is there already, and no file is replaced", path.display());
-            return Err(CliError::usage(message, format!("name another: `penetrode init {} PATH`", self.kind_name())));
+        if !is_standard(&path) {
+            check_place("the file", &path)?;
+            if fs::symlink_metadata(&path).is_ok() {
+                let message = format!("{} is there already, and no file is replaced", path.display());
+                let help = format!("name another: `penetrode init {} PATH`", self.kind_name());
+                return Err(CliError::usage(message, help));
+            }
         }
         let named = template.text_for(&path);
         let text = named.as_deref().unwrap_or(template.text);

@@ -32,7 +32,7 @@ use serde_json::json;
 
 use crate::exchange::SceneError;
 use crate::exchange::input::{is_standard, name_of};
-use crate::exchange::peers::end_with_program;
+use crate::exchange::interruption::clean_up_when_interrupted;
 use crate::physics::{Advice, Problem, Scene, State};
 use crate::report::folder::{FolderError, without_temporary_name};
 use crate::suite::Verdict;
@@ -362,6 +362,8 @@ impl Cli {
         if self.quiet {
             output::be_quiet();
         }
+        // Without it an interrupt leaves a temporary file behind, and no more; for a peer it is required.
+        let _ = clean_up_when_interrupted();
         let (name, command) = self.command.entry();
         command.run().unwrap_or_else(|error| {
             if matches!(error.exit(), Exit::Failed | Exit::Undecided) && command.wants_json() {
@@ -426,7 +428,7 @@ impl Settings {
 /// Lets the peers of this run end with it, however it ends.
 fn end_peers_with_program() -> Result<(), CliError> {
     let failed = |cause| CliError::failed(format!("signals cannot be received: {cause}"), "run without a peer");
-    end_with_program().map_err(failed)
+    clean_up_when_interrupted().map_err(failed)
 }
 
 /// The command of this run as it was typed, its words quoted as for a shell.

@@ -9,11 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
 use super::CliError;
 use crate::exchange::input::is_standard;
+use crate::exchange::interruption::{self, Temporary};
 use crate::report::figure::Figure;
-use crate::report::folder::TEMPORARY;
 pub use crate::text::{engineering, error_text, harmless as escape_terminal, significant};
 
 /// Prints `value` as pretty JSON on standard output.
@@ -93,8 +94,8 @@ pub type Named<'a> = (&'static str, &'a Path);
 /// Refuses `outputs`, before any work is done, that would replace an input or one another, or have no folder to go to.
 ///
 /// # Errors
-/// A file that would be replaced, or that is none, such as a device; a folder that is missing, or in the place of a file
-/// (exit 2). A folder in which the system allows no new file (exit 1).
+/// A file that would be replaced, or that is none, such as a device; the name of a scene or a suite; a folder that is
+/// missing, or in the place of a file (exit 2). A folder in which the system allows no new file (exit 1).
 pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), CliError> {
     for (index, (what, path)) in outputs.iter().enumerate() {
         let others = inputs.iter().chain(&outputs[..index]);
@@ -108,13 +109,26 @@ pub fn check_outputs(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), 
         if is_standard(path) {
             continue;
         }
-        if let Some((why, help)) = obstacle(path) {
-            return Err(CliError::usage(format!("{what} cannot go to {}: {why}", path.display()), help));
+        let is_toml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+        if is_toml {
+            let message = format!("{what} cannot go to {}: such a file is a scene or a suite", path.display());
+            return Err(CliError::usage(message, "name a file with another ending, such as .csv"));
         }
-        // What the system refuses is known by trying alone; the file of the trial vanishes.
-        Destination::open(path).map_err(|cause| CliError::write(path, cause))?;
+        check_place(what, path)?;
     }
     Ok(())
+}
+
+/// Refuses `path`, which is not standard output, for `what` where no file can be written.
+///
+/// # Errors
+/// As [`check_outputs`].
+pub fn check_place(what: &str, path: &Path) -> Result<(), CliError> {
+    if let Some((why, help)) = obstacle(path) {
+        return Err(CliError::usage(format!("{what} cannot go to {}: {why}", path.display()), help));
+    }
+    // What the system refuses is known by trying alone; the file of the trial vanishes.
+    Destination::open(path).map(drop).map_err(|cause| CliError::write(path, cause))
 }
 
 /// Why no file can be written at `path`, as far as is known before trying, and what to do.
@@ -190,7 +204,12 @@ pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), CliError> {
         };
         written.push((path, write().map_err(|cause| CliError::write(path, cause))?));
     }
-    written.into_iter().try_for_each(|(path, output)| output.finish(path).map_err(|cause| CliError::write(path, cause)))
+    // Table and figures together.
+    interruption::whole(|| {
+        written
+            .into_iter()
+            .try_for_each(|(path, output)| output.finish(path).map_err(|cause| CliError::write(path, cause)))
+    })
 }
 
 /// The file itself where `path` is a link to it, which stays.
@@ -204,7 +223,7 @@ pub enum Destination {
     /// Standard output.
     Standard(io::Stdout),
     /// A temporary file.
-    File(tempfile::NamedTempFile),
+    File(Temporary<NamedTempFile>),
 }
 
 impl Destination {
@@ -221,7 +240,7 @@ impl Destination {
         }
         let path = followed(path);
         let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder).map(Self::File)
+        interruption::file_in(folder).map(Self::File)
     }
 
     /// Lets the file appear at `path`, with the permissions that an ordinary new file has.
@@ -238,7 +257,7 @@ impl Destination {
             let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
             fs::set_permissions(file.path(), fs::Permissions::from_mode(mode))?;
         }
-        file.persist(followed(path)).map(|_| ()).map_err(|e| e.error)
+        file.settle(|file| file.persist(followed(path))).map(|_| ()).map_err(|e| e.error)
     }
 }
 

@@ -4,6 +4,7 @@
 pub(crate) mod decode;
 pub mod diagnostic;
 pub mod input;
+pub mod interruption;
 pub mod peers;
 pub mod scene_file;
 pub mod tables;

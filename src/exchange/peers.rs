@@ -19,8 +19,8 @@ pub mod references;
 pub mod wire;
 
 pub use environment::{BundledPeer, Environment, PeerSetupError};
-pub use process::{
-    ORDER_OF_ALL, ORDER_QUANTITIES, Peer, PeerFailure, PeerFault, PeerIdentity, PeerStartError, end_with_program,
-};
+#[cfg(unix)]
+pub(super) use process::end_all;
+pub use process::{ORDER_OF_ALL, ORDER_QUANTITIES, Peer, PeerFailure, PeerFault, PeerIdentity, PeerStartError};
 pub use references::{RecordedFlight, Recording, recordings};
 pub use wire::{Difference, PeerAnswer, PeerRequest};

@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::figure::Figure;
 use super::{Run, VerifyJson, figures, junit, summary, verify_page};
+use crate::exchange::interruption;
 
 /// Why there is no report.
 #[derive(Debug, Error)]
@@ -75,8 +76,7 @@ pub fn check(folder: &Path) -> Result<(), FolderError> {
 fn try_to_write(folder: &Path) -> Result<(), FolderError> {
     let is_there = |place: &&Path| !place.as_os_str().is_empty() && place.exists();
     let place = folder.ancestors().skip(1).find(is_there).unwrap_or(Path::new("."));
-    let made = tempfile::Builder::new().prefix(TEMPORARY).tempdir_in(place);
-    made.map(drop).map_err(|cause| FolderError::write(folder, cause))
+    interruption::folder_in(place).map(drop).map_err(|cause| FolderError::write(folder, cause))
 }
 
 /// Every file under `folder` by its path in it, parts joined by `/`; a folder without files by its own name.
@@ -141,13 +141,20 @@ pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError>
     let list: String =
         files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
     files.push((MANIFEST.to_owned(), list.into_bytes()));
-    let failed = FolderError::write;
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(parent).map_err(|cause| failed(parent, cause))?;
-    let prefix = format!("{TEMPORARY}report-");
-    let stage = tempfile::Builder::new().prefix(&prefix).tempdir_in(parent).map_err(|cause| failed(parent, cause))?;
+    fs::create_dir_all(parent).map_err(|cause| FolderError::write(parent, cause))?;
+    interruption::whole(|| {
+        let stage = interruption::folder_in(parent).map_err(|cause| FolderError::write(parent, cause))?;
+        fill(stage.path(), files, folder)?;
+        stage.settle(|stage| move_into_place(stage, folder)).map_err(|cause| FolderError::write(folder, cause))
+    })
+}
+
+/// Writes `files` to `stage`, which will become `folder`.
+fn fill(stage: &Path, files: Files, folder: &Path) -> Result<(), FolderError> {
+    let failed = FolderError::write;
     for (name, bytes) in files {
-        let path = stage.path().join(&name);
+        let path = stage.join(&name);
         if let Some(part) = path.parent() {
             fs::create_dir_all(part).map_err(|cause| failed(part, cause))?;
         }
@@ -157,17 +164,14 @@ pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError>
     {
         use std::os::unix::fs::PermissionsExt;
         // A temporary folder is private; a report is to be shown.
-        fs::set_permissions(stage.path(), fs::Permissions::from_mode(0o755)).map_err(|cause| failed(folder, cause))?;
+        fs::set_permissions(stage, fs::Permissions::from_mode(0o755)).map_err(|cause| failed(folder, cause))?;
     }
-    move_into_place(stage, folder).map_err(|cause| failed(folder, cause))
+    Ok(())
 }
-
-/// Beginning of the names of temporary files and folders, which lie beside what they will become.
-pub const TEMPORARY: &str = ".penetrode-";
 
 /// What the system said, without the name of a temporary file that `error` may carry: nobody asked for that file.
 pub fn without_temporary_name(error: io::Error) -> io::Error {
-    if error.to_string().contains(TEMPORARY) { error.kind().into() } else { error }
+    if error.to_string().contains(interruption::PREFIX) { error.kind().into() } else { error }
 }
 
 /// The files of a report: path in its folder, and bytes.

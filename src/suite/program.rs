@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 use super::claim::{Found, NotMeasured};
+use crate::exchange::interruption::{self, Temporary};
 use crate::exchange::scene_file::SHIPPED;
 
 /// Longest run of a command that a claim asks for.
@@ -23,7 +24,7 @@ const POLL: Duration = Duration::from_millis(2);
 #[derive(Debug)]
 pub struct Program {
     path: PathBuf,
-    folder: TempDir,
+    folder: Temporary<TempDir>,
     runs: AtomicUsize,
 }
 
@@ -44,7 +45,7 @@ impl Program {
     /// # Errors
     /// The system refuses a temporary folder, or to write the scenes there.
     pub fn new(path: &Path) -> io::Result<Self> {
-        let folder = tempfile::tempdir()?;
+        let folder = interruption::folder()?;
         for (name, text) in SHIPPED {
             fs::write(folder.path().join(format!("{name}.toml")), text)?;
         }

@@ -76,7 +76,7 @@ fn a_peer_that_dies_or_answers_nonsense_fails_its_claim() {
 #[test]
 fn a_failure_of_a_peer_is_told_once() {
     let folder = tempfile::tempdir().unwrap();
-    for (deed, reason, lines) in [("echo oops >&2; exit 7", "`oops`", 10), ("echo hello", "it printed `hello`", 10)] {
+    for (deed, reason, lines) in [("echo oops >&2; exit 7", "`oops`", 11), ("echo hello", "it printed `hello`", 11)] {
         fs::write(folder.path().join("peer.sh"), at_a_question(deed)).unwrap();
         let said = || run_in(folder.path(), "verify --only peer/user --out report --peer 'sh peer.sh'").expect(3);
         let Said { out, err, .. } = said();

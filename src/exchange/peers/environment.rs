@@ -11,8 +11,10 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use std::{env, fs, io, thread};
 
+use tempfile::TempDir;
 use thiserror::Error;
 
+use crate::exchange::interruption;
 use crate::physics::Advice;
 
 /// Environment variable that names the cache folder.
@@ -212,12 +214,11 @@ fn published(
         return Ok(folder);
     }
     fs::create_dir_all(cache).map_err(|error| unwritable(cache, &error))?;
-    let draft =
-        tempfile::Builder::new().prefix(".draft-").tempdir_in(cache).map_err(|error| unwritable(cache, &error))?;
+    let draft = interruption::folder_in(cache).map_err(|error| unwritable(cache, &error))?;
     fill(draft.path())?;
     match fs::rename(draft.path(), &folder) {
         // Renamed: there is nothing left to delete.
-        Ok(()) => drop(draft.keep()),
+        Ok(()) => drop(draft.settle(TempDir::keep)),
         Err(error) if !folder.is_dir() => return Err(unwritable(&folder, &error)),
         Err(_) => {}
     }

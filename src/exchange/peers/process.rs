@@ -23,7 +23,8 @@ use crate::text::clipped;
 
 mod group;
 
-pub use group::end_with_program;
+#[cfg(unix)]
+pub(in crate::exchange) use self::group::end_all;
 
 /// Exit code by which a peer says, before its greeting, that a program it needs is missing.
 pub const EXIT_CODE_MISSING: i32 = 5;

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::exchange::interruption;
 use crate::exchange::tables::push_line;
 use crate::studies::batch::{PART, SCENES, cells_of, random_rows};
 
@@ -63,7 +64,7 @@ pub fn counts(most: u64) -> Vec<u64> {
 /// # Errors
 /// Where the table of scenes cannot be written, or the program cannot be run or fails.
 pub fn measure(program: &Path, counts: &[u64], threads: &[u16], seed: u64, done: &dyn Fn()) -> io::Result<Vec<Growth>> {
-    let folder = tempfile::tempdir().map_err(during("a temporary folder"))?;
+    let folder = interruption::folder().map_err(during("a temporary folder"))?;
     let mut growths = Vec::new();
     for &scenes in counts {
         let table = folder.path().join("scenes.csv");

@@ -1,7 +1,8 @@
 //! A peer and the processes it starts, ended together.
 //!
 //! On Unix a peer leads a process group of its own, and its children belong to it unless they leave it. An interrupt at
-//! the terminal then reaches this program alone: [`end_with_program`]. Elsewhere the peer alone is ended.
+//! the terminal then reaches this program alone, which ends them ([`crate::exchange::interruption`]). Elsewhere the peer
+//! alone is ended.
 
 use std::io;
 use std::process::{Child, Command};
@@ -21,34 +22,12 @@ fn running() -> MutexGuard<'static, Vec<Pid>> {
     RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Lets every peer end with this program also where an interrupt, a hang-up or a request to terminate ends it.
-///
-/// For a program to call once, before it starts a peer; a library leaves signals to its program.
-///
-/// # Errors
-/// When the system allows no handler or no thread.
+/// Ends every peer; none starts as long as what is returned lives.
 #[cfg(unix)]
-pub fn end_with_program() -> io::Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGHUP, SIGINT, SIGTERM])?;
-    let wait = move || {
-        for signal in &mut signals {
-            // Locked until the program has ended: no peer starts any more.
-            let running = running();
-            running.iter().copied().for_each(end);
-            let _ = signal_hook::low_level::emulate_default_handler(signal);
-        }
-    };
-    std::thread::Builder::new().spawn(wait).map(drop)
-}
-
-/// As on Unix, where it does something.
-///
-/// # Errors
-/// None.
-#[cfg(not(unix))]
-pub fn end_with_program() -> io::Result<()> {
-    Ok(())
+pub(in crate::exchange) fn end_all() -> MutexGuard<'static, Vec<Pid>> {
+    let running = running();
+    running.iter().copied().for_each(end);
+    running
 }
 
 /// A peer with the processes that it starts.
