@@ -1,4 +1,4 @@
-//! The reports of the suite and of the stress cases in headless Chromium: each loads without a message, asks for nothing, and fits a phone and a desk.
+//! The reports of the suite, of the stress cases and of a user's code in headless Chromium: each loads without a message, asks for nothing, and fits a phone and a desk.
 //!
 //! Where Chromium is missing, the tests say so in one line and count as ignored; with `CI=true` they fail, so that a
 //! build server cannot quietly check nothing.
@@ -35,17 +35,40 @@ const FLAGS: &str = "--headless --no-sandbox --disable-gpu --disable-background-
                      --disable-default-apps --disable-extensions --disable-sync --no-first-run --no-pings \
                      --hide-scrollbars --virtual-time-budget=10000";
 
-/// Folders of the pages: the report of the suite, and that of the stress cases.
-const PAGES: [&str; 2] = ["report", "stress"];
+/// Folders of the pages: the report of the suite, that of the stress cases, and those of a user's code.
+const PAGES: [&str; 7] = ["report", "stress", "scheme", "good-table", "bad-table", "good-solver", "faulty-solver"];
+
+/// The commands that write the last of them; `SCENES/` is the folder of the shipped scenes.
+const STUDIES: [(&str, &str); 5] = [
+    ("scheme", "converge SCENES/tunnel.toml --points 30"),
+    ("good-table", "audit good.csv --scene SCENES/perforate.toml"),
+    ("bad-table", "audit bad.csv --scene SCENES/tunnel.toml"),
+    ("good-solver", "diagnose 'python3 peer.py'"),
+    ("faulty-solver", "diagnose 'python3 faulty.py'"),
+];
+
+/// Rows of the lagged scheme, with a column that no scene knows.
+const GOOD: &str = "dt_s,time_s,velocity_m_s,peak_force_kn\n4e-6,6.284666391876777e-4,134.60298957430106,810.32\n\
+                    2e-6,6.2828134204179e-4,134.80502593865666,810.08\n1e-6,6.281868603759894e-4,134.90686342544095,810.02\n\
+                    5e-7,6.281391621356539e-4,134.95798652400637,810.005\n";
+
+/// Scatter, a wrong limit, and what is no number.
+const BAD: &str = "dt_s,depth_m,velocity_m_s,a_column_with_quite_a_long_name\n4e-6,0.1461,136,1\n2e-6,0.1452,135.5,2\n\
+                   1e-6,0.1461,135.25,4\n5e-7,0.1449,135.125,nan\n";
 
 /// Figures that a report must have, by their names.
-const FIGURES: [(&str, &str); 2] = [
+const FIGURES: [(&str, &str); 7] = [
     (
         "report",
         "flights approach-with-n observed-orders energy-residual peer-differences stability-map rounding-floor \
          critical-energy critical-energy-difference applicability-map measured-depths layers-layered",
     ),
     ("stress", "stability-map rounding-floor stiffness"),
+    ("scheme", "error values"),
+    ("good-table", "error values"),
+    ("bad-table", "error values"),
+    ("good-solver", "right-by-content errors-by-question"),
+    ("faulty-solver", "right-by-content errors-by-question"),
 ];
 
 /// A claim and how it is checked.
@@ -109,6 +132,7 @@ impl Stage {
         let environment = Environment::here(1, "penetrode stress --seed 1".to_owned(), &suite, Vec::new());
         let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: Some((&summary, 1.0)) };
         folder::write(files(&run), &folder.path().join(PAGES[1]))?;
+        write_studies(folder.path())?;
         Ok(Self { browser, folder })
     }
 
@@ -230,6 +254,27 @@ impl Stage {
     }
 }
 
+/// Writes the reports of a user's code to `folder`.
+fn write_studies(folder: &Path) -> Check {
+    let solver = include_str!("../src/cli/templates/peer.py");
+    let faulty = solver.replace("(r + q * v) * v)", "(r + 0.5 * q * v) * v)");
+    ensure!(faulty != solver, "there is no drag to halve");
+    for (name, text) in [("good.csv", GOOD), ("bad.csv", BAD), ("peer.py", solver), ("faulty.py", faulty.as_str())] {
+        fs::write(folder.join(name), text)?;
+    }
+    let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/verification/scenes/");
+    for (name, line) in STUDIES {
+        let words = shlex::split(&line.replace("SCENES/", scenes)).ok_or("an open quote")?;
+        let run = Command::new(env!("CARGO_BIN_EXE_penetrode"))
+            .args(words)
+            .args(["--out", name])
+            .current_dir(folder)
+            .output()?;
+        ensure!(folder.join(name).is_dir(), "{line}: {}", String::from_utf8_lossy(&run.stderr));
+    }
+    Ok(())
+}
+
 /// Measures the page that it stands in, everything unfolded, and tells its frame.
 const MEASURE: &str = include_str!("browser/measure.html");
 
@@ -284,7 +329,7 @@ fn asks_for_nothing(stage: &Stage) -> Check {
         let asked = stage.requests(&stage.page(folder))?;
         ensure!(asked.is_empty(), "{folder}: {}", asked.join("\n"));
         // And there is nothing in it that could ask, whatever the policy says.
-        let page = fs::read_to_string(stage.page(folder))?;
+        let page = fs::read_to_string(stage.page(folder))?.replace("href=\"https://doi.org/", "");
         for word in
             ["<script", "<img", "<link rel=\"stylesheet", " src=", "url(", "@import", "href=\"http", "href=\"//"]
         {
@@ -303,14 +348,15 @@ fn catches_a_planted_request(stage: &Stage) -> Check {
 
 fn fits(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
-        for width in [375, 1440] {
+        for width in [375, 768, 1440] {
             let found = stage.measure(folder, width, false)?;
             ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
             for key in ["folded", "unfolded"] {
                 ensure!(
                     found[key].as_u64().is_some_and(|extent| extent <= u64::from(width)),
-                    "{folder}, {width} px: {key} the page is {} px wide",
-                    found[key]
+                    "{folder}, {width} px: {key} the page is {} px wide: {}",
+                    found[key],
+                    found["beyond"]
                 );
             }
             for key in ["beyond", "texts"] {

@@ -1,15 +1,18 @@
 //! `penetrode audit`: order, error band and verdict for step-size results that another code produced.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use super::output::{Text, escape_terminal, interval_text, significant};
+use super::report_args::ReportArgs;
 use super::runs::RunArgs;
 use super::{Answer, Ask, CliError, Settings};
 use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::tables::read_bytes;
 use crate::physics::{Problem, Scene};
+use crate::report::environment::hash;
+use crate::report::refinement::Refinement;
 use crate::studies::audit::{Audit, ErrorBand, Exact, ExactValues, FormalOrders, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::critical_velocity;
 use crate::studies::error::Truth;
@@ -46,6 +49,9 @@ pub struct AuditArgs {
     /// Of all quantities or of each; without it any order above zero converges.
     #[arg(long, value_name = "P", allow_hyphen_values = true)]
     pub order: Option<FormalOrders>,
+    /// Where the report goes.
+    #[command(flatten)]
+    pub report: ReportArgs,
 }
 
 impl Ask for AuditArgs {
@@ -58,17 +64,29 @@ impl Ask for AuditArgs {
                 "name a file for one",
             ));
         }
+        let runs = self.runs.runs.iter().map(|(path, _)| path.as_path());
+        let inputs = runs.chain(self.results.as_deref()).chain(self.scene.as_deref().map(Path::new));
+        self.report.check("audit", &inputs.collect::<Vec<_>>())?;
         let scene = self.scene.as_deref().map(|path| self.settings.read_problem(path)).transpose()?;
         let file = self.results.as_deref().map_or_else(|| format!("{} runs", self.runs.runs.len()), name_of);
-        let results = if let Some(path) = &self.results {
-            Table::read(&file, &read_bytes(path, &RESULTS)?)?
+        let (results, hashed) = if let Some(path) = &self.results {
+            let bytes = read_bytes(path, &RESULTS)?;
+            (Table::read(&file, &bytes)?, ("Table (BLAKE3)", hash(&bytes)))
         } else {
-            self.runs.table(scene.as_ref().map(|(_, problem)| problem.exit_depth))?
+            let table = self.runs.table(scene.as_ref().map(|(_, problem)| problem.exit_depth))?;
+            let hashed = hash(format!("{table:?}"));
+            (table, ("Ends of the runs, as they were read (BLAKE3)", hashed))
         };
         let exact = scene.as_ref().map(|(scene, problem)| exact_values(scene, problem)).transpose()?;
         let scheme = scene.and_then(|(_, problem)| identify(&problem, &results));
         let judged = audit(&results, &self.order.clone().unwrap_or_default(), exact.as_ref(), scheme)?;
-        Ok(Answer { text: text(&file, &judged), exit: judged.verdict.into(), data: Some(judged) })
+        let written = self.report.write(&judged, |environment| {
+            let scene = self.scene.as_deref().map(|path| name_of(Path::new(path)));
+            let exact = exact.map(|exact| ("Exact values (BLAKE3)", hash(format!("{exact:?}"))));
+            let inputs = [hashed].into_iter().chain(exact).collect();
+            Refinement::of_audit(&judged, &file, scene.as_deref(), environment, inputs).report()
+        })?;
+        Ok(Answer { text: text(&file, &judged) + &written, exit: judged.verdict.into(), data: Some(judged) })
     }
 }
 

@@ -84,7 +84,7 @@ impl Ask for BenchArgs {
     type Answer = BenchJson;
 
     fn ask(&self) -> Result<Answer<BenchJson>, CliError> {
-        self.out.as_deref().map(folder::check).transpose()?;
+        self.out.as_deref().map(|folder| folder::check(folder, "bench")).transpose()?;
         let scenes = self.scenes()?;
         let mut peers = self.start_peers()?;
         let report = self.measure(&scenes, &mut peers)?;

@@ -1,23 +1,33 @@
 //! `penetrode converge`: order of convergence of every quantity, fitted and classified.
 
+use std::path::Path;
+
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson, time_option};
 use super::output::{Text, interval_text};
+use super::report_args::ReportArgs;
 use super::verify::progress_bar;
 use super::{Answer, Ask, CliError, SceneArgs};
+use crate::exchange::input::name_of;
 use crate::integrators::{MethodName, MethodOptions};
-use crate::physics::Shown;
+use crate::physics::{Problem, Shown};
+use crate::report::Environment;
+use crate::report::environment::hash;
+use crate::report::refinement::{Refinement, Series, SeriesPoint, Size, words_of};
+use crate::report::study::Prose;
 use crate::studies::asymptotic::TwoPowers;
+use crate::studies::audit::ErrorBand;
 use crate::studies::convergence::{
     FixedSteps, Ladder, POINTS_DEFAULT, QuantityStudy, TOLERANCES, of_fixed_steps, of_tolerances,
 };
 use crate::studies::error::Truth;
+use crate::studies::grid_convergence::ThreeGrids;
 use crate::studies::order::{Class, Exclusion, FittedPoint};
 use crate::studies::{Quantity, Verdict};
-use crate::text::or_dash;
+use crate::text::{count, or_dash};
 
 /// Arguments of `converge`.
 #[derive(Args, Debug)]
@@ -48,6 +58,9 @@ pub struct ConvergeArgs {
     /// Seed of the random sizes.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Where the report goes.
+    #[command(flatten)]
+    pub report: ReportArgs,
 }
 
 /// What `converge --json` prints.
@@ -73,6 +86,14 @@ pub struct QuantityJson {
     observed_order: Option<f64>,
     interval: Option<[f64; 2]>,
     error_constant: Option<f64>,
+    /// Exact value, in SI units.
+    exact: f64,
+    /// Error band of the value at the finest size in the fit; `null` where no law was found.
+    error_band: Option<ErrorBand>,
+    /// The rule for three grids on the finest, the coarsest and a middle size in the fit; absent for tolerances, `null` where
+    /// no law was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub three_grids: Option<Option<ThreeGrids>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     /// Order against the force evaluations; absent for fixed steps, `null` where none was found.
     pub work_order: Option<Option<f64>>,
@@ -97,6 +118,8 @@ pub struct PointJson {
     rtol: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     force_evaluations: Option<u64>,
+    /// Value, in SI units.
+    value: f64,
     error: f64,
     used: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -107,6 +130,7 @@ impl Ask for ConvergeArgs {
     type Answer = ConvergeJson;
 
     fn ask(&self) -> Result<Answer<ConvergeJson>, CliError> {
+        self.report.check("converge", &[Path::new(&self.scene.path)])?;
         let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
         let method =
             MethodArgs { method: self.method, rtol: None, dt: None, velocity: self.velocity, events: self.events };
@@ -165,7 +189,9 @@ impl Ask for ConvergeArgs {
             quantities: study.quantities.into_iter().map(|study| QuantityJson::new(study, fixed)).collect(),
             skipped: study.no_critical_velocity.map(without).into_iter().collect(),
         };
-        Ok(Answer { text: data.text(problem.impact_speed), exit: verdict.into(), data: Some(data) })
+        let mut text = data.text(problem.impact_speed);
+        text += &self.report.write(&data, |e| data.refinement(&self.scene.path, &problem, e).report())?;
+        Ok(Answer { text, exit: verdict.into(), data: Some(data) })
     }
 }
 
@@ -186,7 +212,44 @@ impl ConvergeArgs {
 }
 
 impl QuantityJson {
+    fn series(&self) -> Series {
+        let point = |point: &PointJson| SeriesPoint {
+            size: point.dt_s.or(point.rtol).unwrap_or(f64::NAN),
+            value: point.value,
+            error: Some(point.error),
+            used: point.used,
+            excluded: point.excluded,
+        };
+        let points: Vec<SeriesPoint> = self.points.iter().map(point).collect();
+        let finest = points.iter().find(|point| point.used).or(points.first());
+        Series {
+            name: words_of(self.quantity),
+            unit: self.quantity.unit(),
+            verdict: self.verdict,
+            class: self.class.name(),
+            reason: self.reason.clone(),
+            advice: None,
+            formal_order: self.formal_order,
+            observed_order: self.observed_order,
+            interval: self.interval,
+            error_constant: self.error_constant,
+            fixed: false,
+            limit: None,
+            exact: Some(self.exact),
+            agrees: self.class == Class::Converging,
+            relative_error: self.points.first().map(|point| point.error),
+            is_against_exact: true,
+            finest: finest.map(|point| (point.size, point.value)),
+            error_band: self.error_band,
+            error_bands: Vec::new(),
+            three_grids: self.three_grids.flatten(),
+            points,
+        }
+    }
+
     fn new(study: QuantityStudy, fixed: bool) -> Self {
+        let (against, error_band) = (study.against, study.error_band());
+        let three_grids = fixed.then(|| study.three_grids());
         let work = study.work.and_then(Result::ok).and_then(|fit| fit.line);
         let (line, class, fitted, points) = match study.fit {
             Ok(fit) => (fit.line, fit.class, fit.reason, fit.points),
@@ -198,6 +261,7 @@ impl QuantityJson {
             dt_s: fixed.then_some(point.step),
             rtol: (!fixed).then_some(point.step),
             force_evaluations: study.evaluations.get(index).copied(),
+            value: against.value(point.error),
             error: point.error.abs(),
             used: point.used,
             excluded: point.excluded,
@@ -208,6 +272,9 @@ impl QuantityJson {
             observed_order: line.map(|line| line.order),
             interval: line.map(|line| line.interval95),
             error_constant: line.map(|line| line.error_constant),
+            exact: against.exact,
+            error_band,
+            three_grids,
             work_order: (!fixed).then(|| work.map(|line| line.order)),
             powers: study.powers,
             class,
@@ -220,6 +287,58 @@ impl QuantityJson {
 }
 
 impl ConvergeJson {
+    /// The study of the scheme on the scene at `path`, for its report.
+    fn refinement(&self, path: &str, problem: &Problem, environment: Environment) -> Refinement {
+        let file = name_of(Path::new(path));
+        let size = if self.method.name == MethodName::CentralDifference.name() { Size::Step } else { Size::Tolerance };
+        let reference = match self.reference {
+            "closed-form" => "the closed form",
+            _ => "the Taylor series to round-off, for there is no closed form",
+        };
+        let scene = self.title.as_deref().unwrap_or(&file);
+        let subject = Prose::new(
+            "Code verification of `{0}`{1} on the scene `{2}`: {3} at {4} against {5}.",
+            &[
+                &self.method.name,
+                &self.method.rules(),
+                &file,
+                &if self.quantities.len() == 1 {
+                    "1 quantity".to_owned()
+                } else {
+                    format!("{} quantities", self.quantities.len())
+                },
+                &match (size, self.quantities.iter().map(|q| q.points.len()).max().unwrap_or(0)) {
+                    (Size::Step, sizes) => count(sizes, "step size"),
+                    (Size::Tolerance, 1) => "1 tolerance".to_owned(),
+                    (Size::Tolerance, sizes) => format!("{sizes} tolerances"),
+                },
+                &reference,
+            ],
+        );
+        Refinement {
+            title: format!("{}: {scene}", self.method.name),
+            subject,
+            size,
+            verdict: self.verdict,
+            series: self.quantities.iter().map(QuantityJson::series).collect(),
+            judged: vec![
+                ("Scheme", format!("{}{}", self.method.name, self.method.rules())),
+                (
+                    "Scene",
+                    format!("{scene}, in {file}, with an impact velocity of {} m/s", Shown(problem.impact_speed)),
+                ),
+                ("Exact values", reference.to_owned()),
+                ("Sizes", format!("log-uniform with random ratios, seed {}", self.seed)),
+            ],
+            remarks: self.skipped.iter().map(|note| Prose::text(format!("{note}."))).collect(),
+            environment,
+            inputs: vec![
+                ("Seed", self.seed.to_string()),
+                ("Problem (BLAKE3 of its stages in SI units)", hash(format!("{problem:?}"))),
+            ],
+        }
+    }
+
     fn text(&self, impact_speed: f64) -> String {
         let mut text = Text::titled(self.title.as_deref());
         text.line(format!("  method     {}{}", self.method.name, self.method.rules()));

@@ -5,9 +5,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::output::{Text, escape_terminal};
+use super::report_args::ReportArgs;
 use super::verify::progress_bar;
 use super::{Answer, Ask, CliError, end_peers_with_program};
 use crate::exchange::peers::Peer;
+use crate::report::diagnosis::report;
 use crate::studies::Verdict;
 use crate::studies::diagnosis::{Asked, Cause, Diagnosis, Plan, diagnose};
 use crate::text::{count, digits_text, or_dash};
@@ -28,6 +30,9 @@ pub struct DiagnoseArgs {
     /// Questions to ask at most.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(24..=10_000))]
     pub questions: u32,
+    /// Where the report goes.
+    #[command(flatten)]
+    pub report: ReportArgs,
 }
 
 /// What `diagnose --json` prints.
@@ -42,6 +47,7 @@ impl Ask for DiagnoseArgs {
     type Answer = DiagnoseJson;
 
     fn ask(&self) -> Result<Answer<DiagnoseJson>, CliError> {
+        self.report.check("diagnose", &[])?;
         end_peers_with_program()?;
         let mut peer = Peer::start(&self.command)?;
         let bar = progress_bar(u64::from(self.questions), "questions");
@@ -51,8 +57,11 @@ impl Ask for DiagnoseArgs {
             bar.set_position(asked as u64);
         });
         bar.finish_and_clear();
-        let (text, exit) = (text(&diagnosis), diagnosis.verdict.into());
-        Ok(Answer { data: Some(DiagnoseJson { schema: "penetrode/diagnose/1", diagnosis }), text, exit })
+        let data = DiagnoseJson { schema: "penetrode/diagnose/1", diagnosis };
+        let diagnosis = &data.diagnosis;
+        let written = self.report.write(&data, |environment| report(diagnosis, self.seed, environment))?;
+        let (text, exit) = (text(diagnosis) + &written, diagnosis.verdict.into());
+        Ok(Answer { data: Some(data), text, exit })
     }
 }
 

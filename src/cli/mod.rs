@@ -12,6 +12,7 @@ pub mod init;
 pub mod map;
 pub mod method_args;
 pub mod output;
+pub mod report_args;
 pub mod runs;
 pub mod scene_json;
 pub mod scenes;

@@ -57,7 +57,7 @@ impl Ask for StressArgs {
         if self.list {
             return Ok(Answer { data: None, text: list(&suite), exit: Exit::Success });
         }
-        self.out.as_deref().map(folder::check).transpose()?;
+        self.out.as_deref().map(|folder| folder::check(folder, "stress")).transpose()?;
         // No case is about commands.
         let inputs = Inputs { seed: self.seed, peers: &PeerAnswers::default(), program: None };
         let mut peers = Vec::new();

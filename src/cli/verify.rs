@@ -60,7 +60,7 @@ impl Ask for VerifyArgs {
             .as_deref()
             .unwrap_or_else(|| Path::new(if self.only.is_empty() { folder::DEFAULT } else { folder::DEFAULT_OF_PART }));
         if !self.list {
-            folder::check(out)?;
+            folder::check(out, "verify")?;
             self.only.first().map(|_| folder::check_for_part(out)).transpose()?;
         }
         let mut suite = match &self.suite {

@@ -79,9 +79,9 @@ impl Environment {
     }
 }
 
-/// BLAKE3 of a text, in hexadecimal.
-pub fn hash(text: &str) -> String {
-    blake3::hash(text.as_bytes()).to_hex().to_string()
+/// BLAKE3 of a text or of bytes, in hexadecimal.
+pub fn hash(of: impl AsRef<[u8]>) -> String {
+    blake3::hash(of.as_ref()).to_hex().to_string()
 }
 
 /// Name of the processor, where the system states it.

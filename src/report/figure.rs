@@ -33,8 +33,8 @@ const LINE: f64 = 22.0;
 pub struct Figure {
     /// Name of its files, in letters, digits and hyphens.
     pub name: String,
-    /// Where it stands.
-    pub section: Section,
+    /// The section of a suite where it stands, if it does.
+    pub section: Option<Section>,
     /// What it shows: one sentence.
     pub message: String,
     /// How to read it.
@@ -88,7 +88,7 @@ impl Figure {
         let claims = grouped(judged.iter().map(|judged| judged.claim.table.as_str()), |table| *table);
         let figure = Self {
             name: name_of(kind, of),
-            section: section(head.split_once(' ')?.1)?,
+            section: section(head.split_once(' ')?.1),
             message,
             reading: filled(&reading.join(" ")),
             claims: claims.into_iter().map(|(table, _)| table.to_owned()).collect(),

@@ -8,6 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::figure::Figure;
+use super::text::shortened;
 use super::{Run, VerifyJson, figures, junit, summary, verify_page};
 use crate::exchange::interruption;
 
@@ -44,11 +45,11 @@ pub const DEFAULT: &str = "penetrode-report";
 /// The same of a run of a part of the claims.
 pub const DEFAULT_OF_PART: &str = "penetrode-report-part";
 
-/// Refuses a folder that exists and is not a report of ours or cannot be written, before any work is done.
+/// Refuses a folder that exists and is no report of `command`, or cannot be written, before any work is done.
 ///
 /// # Errors
 /// [`FolderError`].
-pub fn check(folder: &Path) -> Result<(), FolderError> {
+pub fn check(folder: &Path, command: &str) -> Result<(), FolderError> {
     let refuse = |why: String| Err(FolderError::NotOurs { path: folder.display().to_string(), why });
     let failed = |cause| FolderError::write(folder, cause);
     // Reading would follow a link, and writing would replace it: it is refused like any other foreign entry.
@@ -63,9 +64,12 @@ pub fn check(folder: &Path) -> Result<(), FolderError> {
     if contents.is_empty() {
         return try_to_write(folder);
     }
-    let Some(written) = manifest(folder) else {
+    let Some((author, written)) = manifest(folder) else {
         return refuse("exists and is not a report of penetrode".to_owned());
     };
+    if author != command {
+        return refuse(format!("holds a report of `{author}`, which one of `{command}` does not replace"));
+    }
     match contents.iter().find(|name| !written.contains(name)) {
         Some(foreign) => refuse(format!("holds `{foreign}`, which is no part of the report there and would be lost")),
         None => try_to_write(folder),
@@ -120,12 +124,18 @@ fn report_in(folder: &Path) -> Option<serde_json::Value> {
     serde_json::from_slice(&fs::read(folder.join("report.json")).ok()?).ok()
 }
 
-/// What the report in `folder` consists of, by the list in it; `None` where there is no report.
-fn manifest(folder: &Path) -> Option<Vec<String>> {
+/// The command that wrote the report in `folder`, and what it consists of by the list in it; `None` where there is none.
+fn manifest(folder: &Path) -> Option<(String, Vec<String>)> {
     let report = report_in(folder)?;
-    let is_ours = report.get("schema")?.as_str()?.starts_with("penetrode/");
+    let command = command_of(&report)?;
     let list = fs::read_to_string(folder.join(MANIFEST)).unwrap_or_default();
-    is_ours.then(|| list.lines().map(str::to_owned).chain(["report.json".to_owned()]).collect())
+    Some((command, list.lines().map(str::to_owned).chain(["report.json".to_owned()]).collect()))
+}
+
+/// The command whose answer `report` is, by its schema: `audit` of `penetrode/audit/1`.
+fn command_of(report: &serde_json::Value) -> Option<String> {
+    let command = report.get("schema")?.as_str()?.strip_prefix("penetrode/")?.split('/').next()?;
+    Some(shortened(command))
 }
 
 /// The file that lists the files of a report, one a line: what is not in it is somebody else's.
@@ -137,7 +147,9 @@ const MANIFEST: &str = "contents.txt";
 /// [`FolderError`]; the old report then stands untouched.
 pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError> {
     let mut files = files.map_err(|cause| FolderError::write(folder, cause))?;
-    check(folder)?;
+    let report = files.iter().find(|(name, _)| name == "report.json");
+    let command = report.and_then(|(_, bytes)| command_of(&serde_json::from_slice(bytes).ok()?));
+    check(folder, &command.unwrap_or_default())?;
     let list: String =
         files.iter().map(|(name, _)| name.as_str()).chain([MANIFEST]).flat_map(|name| [name, "\n"]).collect();
     files.push((MANIFEST.to_owned(), list.into_bytes()));

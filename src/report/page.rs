@@ -10,7 +10,6 @@
 //! ```
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
@@ -26,24 +25,54 @@ pub(super) struct Page<'a> {
     pub(super) title: Cow<'a, str>,
     /// What the title of its window adds to that.
     pub(super) outcome: &'a str,
-    /// One sentence below the title: what the report is for.
+    /// What it is about, in a sentence; empty where the title says it.
+    pub(super) subject: Markup,
+    /// One sentence beside program and date: what the report is for.
     pub(super) purpose: &'a str,
     /// Program and machine.
     pub(super) environment: &'a Environment,
-    /// Sections, prose and slots.
-    pub(super) text: &'a str,
-    /// Contents of a slot, by its name and the words behind it.
-    pub(super) slot: &'a dyn Fn(&str, &str) -> Markup,
+    /// Its sections.
+    pub(super) parts: Vec<Part<'a>>,
     /// Other files with the same numbers.
     pub(super) files: Markup,
 }
 
-/// A section of a page, its slots filled.
-struct Part<'a> {
+/// A section of a page.
+pub(super) struct Part<'a> {
     id: &'a str,
     title: &'a str,
     body: String,
-    is_shown: bool,
+}
+
+impl<'a> Part<'a> {
+    /// A section with its anchor, its heading and what stands in it.
+    pub(super) fn new(id: &'a str, title: &'a str, body: Markup) -> Self {
+        Self { id, title, body: body.into_string() }
+    }
+
+    /// The sections of a text of `pages/` that have something to show; `slot` gives the contents of a slot, by its name and
+    /// the words behind it.
+    pub(super) fn of_text(text: &'a str, slot: &dyn Fn(&str, &str) -> Markup) -> Vec<Self> {
+        let mut parts: Vec<(Self, bool)> = Vec::new();
+        for line in text.lines() {
+            if let Some(head) = line.strip_prefix('#') {
+                let is_shown = !head.starts_with('?');
+                let (id, title) = head.trim_start_matches(['?', ' ']).split_once(' ').unwrap_or((head, head));
+                parts.push((Self { id, title, body: String::new() }, is_shown));
+            } else if let Some((part, is_shown)) = parts.last_mut() {
+                if let Some(slot_line) = line.strip_prefix('@') {
+                    let (name, words) = slot_line.split_once(' ').unwrap_or((slot_line, ""));
+                    let filled = slot(name, words).into_string();
+                    *is_shown |= !filled.is_empty();
+                    part.body.push_str(&filled);
+                } else {
+                    part.body.push_str(line);
+                }
+                part.body.push('\n');
+            }
+        }
+        parts.into_iter().filter(|(_, is_shown)| *is_shown).map(|(part, _)| part).collect()
+    }
 }
 
 impl<'a> Page<'a> {
@@ -52,40 +81,17 @@ impl<'a> Page<'a> {
         run: &'a Run<'_>,
         purpose: &'a str,
         text: &'a str,
-        slot: &'a dyn Fn(&str, &str) -> Markup,
+        slot: &dyn Fn(&str, &str) -> Markup,
         files: Markup,
     ) -> Self {
         let outcome = Counts::of_claims(run.judged).verdict().name();
         let title = one_line(&run.suite.title).into();
-        Self { title, outcome, purpose, environment: &run.environment, text, slot, files }
-    }
-
-    /// The sections of the text that have something to show.
-    fn parts(&self) -> Vec<Part<'_>> {
-        let mut parts: Vec<Part<'_>> = Vec::new();
-        for line in self.text.lines() {
-            if let Some(head) = line.strip_prefix('#') {
-                let is_shown = !head.starts_with('?');
-                let (id, title) = head.trim_start_matches(['?', ' ']).split_once(' ').unwrap_or((head, head));
-                parts.push(Part { id, title, body: String::new(), is_shown });
-            } else if let Some(part) = parts.last_mut() {
-                if let Some(slot) = line.strip_prefix('@') {
-                    let (name, words) = slot.split_once(' ').unwrap_or((slot, ""));
-                    let filled = (self.slot)(name, words).into_string();
-                    part.is_shown |= !filled.is_empty();
-                    part.body.push_str(&filled);
-                } else {
-                    part.body.push_str(line);
-                }
-                part.body.push('\n');
-            }
-        }
-        parts.retain(|part| part.is_shown);
-        parts
+        let parts = Part::of_text(text, slot);
+        Self { title, outcome, subject: html! {}, purpose, environment: &run.environment, parts, files }
     }
 
     pub(super) fn to_html(&self) -> String {
-        let (e, parts) = (self.environment, self.parts());
+        let (e, parts) = (self.environment, &self.parts);
         let page = html! {
             (DOCTYPE)
             html lang="en" {
@@ -104,6 +110,7 @@ impl<'a> Page<'a> {
                     @if let Some(first) = parts.first() { a.skip href={ "#" (first.id) } { "Skip to: " (first.title) } }
                     header {
                         h1 { (self.title) }
+                        @if !self.subject.0.is_empty() { p.subject { (self.subject) } }
                         p.quiet {
                             "penetrode " (e.version) ", commit " code { (e.commit) } ", "
                             time datetime=(e.date) { (e.date) } ". " (self.purpose)
@@ -111,10 +118,13 @@ impl<'a> Page<'a> {
                     }
                     main {
                         @for (index, part) in parts.iter().enumerate() {
-                            section aria-labelledby=(part.id) { h2 id=(part.id) { (part.title) } (PreEscaped(&part.body)) }
+                            section aria-labelledby=(part.id) {
+                                h2 id=(part.id) { span.no { (index + 1) } " " (part.title) }
+                                (PreEscaped(&part.body))
+                            }
                             @if index == 0 {
                                 nav aria-label="Contents" { ol {
-                                    @for part in &parts { li { a href={ "#" (part.id) } { (part.title) } } }
+                                    @for part in parts { li { a href={ "#" (part.id) } { (part.title) } } }
                                 } }
                             }
                         }
@@ -137,8 +147,8 @@ pub(super) fn slot(run: &Run<'_>, figures: &[Figure], name: &str, words: &str) -
         "verdict" => verdict(run.judged, words),
         "criteria" if section.is_some() => criteria(caption, &claims().collect::<Vec<_>>()),
         "criteria" => every_criterion(&claims().collect::<Vec<_>>()),
-        "figures" => html! { @for shown in figures.iter().filter(|f| Some(f.section) == section) {
-            (figure(shown, &run.environment.command))
+        "figures" => html! { @for shown in figures.iter().filter(|f| f.section.is_some() && f.section == section) {
+            (figure(None, shown, &run.environment.command))
         } },
         "results" => results(caption, &claims().collect::<Vec<_>>()),
         "each" => {
@@ -146,36 +156,54 @@ pub(super) fn slot(run: &Run<'_>, figures: &[Figure], name: &str, words: &str) -
             html! { @if !each.is_empty() { (folded(caption, true, claims_table("", each))) } }
         }
         "every-claim" => every_claim(run.judged),
-        "reproduction" => reproduction(&run.environment),
+        "reproduction" => reproduction(&run.environment, suite_inputs(&run.environment)),
         _ => html! { "@" (name) },
     }
 }
 
+/// Columns of a table whose rows need no cards on a tablet.
+const CARDS_MAX: usize = 5;
+
 /// A table: on a wide page a grid, which scrolls by itself, or cards, which a narrow screen shows row by row.
 pub(super) struct Table {
-    caption: String,
+    caption: Markup,
     is_grid: bool,
-    header: Vec<String>,
+    /// Heads of the columns, and their names beside the cells of a narrow screen.
+    header: Vec<(Markup, String)>,
     rows: Vec<Vec<Markup>>,
-    numbers: Range<usize>,
+    numbers: Vec<usize>,
+    name: String,
 }
 
 impl Table {
     /// A table whose rows turn into cards on a narrow screen.
     pub(super) fn cards<T: ToString>(caption: impl Into<String>, header: impl IntoIterator<Item = T>) -> Self {
-        let header = header.into_iter().map(|title| title.to_string()).collect();
-        Self { caption: caption.into(), is_grid: false, header, rows: Vec::new(), numbers: 0..0 }
+        let caption: String = caption.into();
+        let header = header.into_iter().map(|title| title.to_string());
+        let table = Self::cards_of(html! { (caption) }, header.map(|title| (html! { (title) }, title.clone())));
+        Self { name: caption, ..table }
     }
 
     /// A table of numbers that scrolls on a narrow screen.
     pub(super) fn grid<T: ToString>(caption: impl Into<String>, header: impl IntoIterator<Item = T>) -> Self {
         let table = Self { is_grid: true, ..Self::cards(caption, header) };
-        Self { numbers: 1..table.header.len(), ..table }
+        Self { numbers: (1..table.header.len()).collect(), ..table }
+    }
+
+    /// As [`Self::cards`], with words that are set: the head of each column, and its name as text.
+    pub(super) fn cards_of(caption: Markup, header: impl IntoIterator<Item = (Markup, String)>) -> Self {
+        let header = header.into_iter().collect();
+        Self { caption, is_grid: false, header, rows: Vec::new(), numbers: Vec::new(), name: String::new() }
+    }
+
+    /// The same as a grid; `name` is read out in place of its caption.
+    pub(super) fn into_grid(self, name: String) -> Self {
+        Self { is_grid: true, name, ..self }
     }
 
     /// The same with numbers in these columns alone.
-    pub(super) fn numbers(self, numbers: Range<usize>) -> Self {
-        Self { numbers, ..self }
+    pub(super) fn numbers(self, numbers: impl IntoIterator<Item = usize>) -> Self {
+        Self { numbers: numbers.into_iter().collect(), ..self }
     }
 
     /// The same with one more row.
@@ -197,13 +225,13 @@ impl Table {
 impl Render for Table {
     fn render(&self) -> Markup {
         let table = html! {
-            table.(if self.is_grid { "grid" } else { "cards" }) {
-                @if !self.caption.is_empty() { caption { (self.caption) } }
-                thead { tr { @for title in &self.header { th scope="col" { (title) } } } }
+            table.(if self.is_grid { "grid" } else { "cards" }).wide[!self.is_grid && self.header.len() > CARDS_MAX] {
+                @if !self.caption.0.is_empty() { caption { (self.caption) } }
+                thead { tr { @for (title, _) in &self.header { th scope="col" { (title) } } } }
                 tbody { @for row in &self.rows { tr {
                     @for (index, cell) in row.iter().enumerate() {
                         @if index == 0 { th scope="row" { (cell) } }
-                        @else { td.num[self.numbers.contains(&index)] data-label=(self.header[index]) { (cell) } }
+                        @else { td.num[self.numbers.contains(&index)] data-label=(self.header.get(index).map_or("", |(_, name)| name)) { (cell) } }
                     }
                 } } }
             }
@@ -211,7 +239,7 @@ impl Render for Table {
         if !self.is_grid {
             return table;
         }
-        html! { div.scroll tabindex="0" role="region" aria-label=(self.caption) { (table) } }
+        html! { div.scroll tabindex="0" role="region" aria-label=(self.name) { (table) } }
     }
 }
 
@@ -250,7 +278,8 @@ pub(super) fn counts_cell(counts: Counts) -> Markup {
     html! { (badge(counts.of_group())) br; span.quiet { (tally(counts)) } }
 }
 
-fn badge(verdict: Verdict) -> Markup {
+/// A verdict with its sign.
+pub(super) fn badge(verdict: Verdict) -> Markup {
     html! { span.badge.(verdict.name()) { (sign(verdict)) " " (verdict.name()) } }
 }
 
@@ -361,14 +390,15 @@ fn every_claim(judged: &[Judged]) -> Markup {
     } }
 }
 
-/// A figure with its message, how to read it, the claims that judge it and the command that remakes them, and its files.
-pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
+/// A figure with its number, if it has one, its message, how to read it, the claims that judge it and the command that remakes
+/// them, and its files.
+pub(super) fn figure(index: Option<usize>, figure: &Figure, command: &str) -> Markup {
     const NAMED: usize = 3;
     let is_whole = command.starts_with("penetrode verify") && !command.contains("--only");
     html! {
         figure id={ "figure-" (figure.name) } {
             figcaption {
-                b { (one_line(&figure.message)) }
+                b { @if let Some(index) = index { "Figure " (index) ". " } (one_line(&figure.message)) }
                 (figure.reading) " "
                 span.quiet {
                     @if let Some(first) = figure.claims.first() {
@@ -389,22 +419,28 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
     }
 }
 
-/// The command that remakes a run, and what it ran on.
-pub(super) fn reproduction(e: &Environment) -> Markup {
-    let code = |text: &str| html! { code { (text) } };
+/// The command that remakes a run, what went into it, and what it ran on.
+pub(super) fn reproduction<'t>(e: &'t Environment, inputs: impl IntoIterator<Item = (&'t str, Markup)>) -> Markup {
     let features = if e.features.is_empty() { "none".to_owned() } else { e.features.join(", ") };
     let mut list = vec![
         ("Program", html! { "penetrode " (e.version) ", commit " code { (e.commit) } }),
         ("Built by", html! { (e.rustc) ", profile " (e.profile) ", for " (e.target) }),
         ("Features", cell(features)),
-        ("Seed", cell(e.seed)),
         ("Processor", html! { (one_line(&e.cpu)) ", " (count(e.threads, "thread")) }),
         ("Floating point", cell(&e.floating_point)),
-        ("Lock file (BLAKE3)", code(&e.lock_file_hash)),
+        ("Lock file (BLAKE3)", html! { code { (e.lock_file_hash) } }),
     ];
-    list.extend(e.suite_hash.iter().map(|hash| ("Suite (BLAKE3)", code(hash))));
-    list.push(("Scenes (BLAKE3)", code(&e.scenes_hash)));
+    list.extend(inputs);
     list.extend(e.peers.iter().map(|(name, text)| (name.as_str(), cell(text))));
     list.push(("Date", html! { time datetime=(e.date) { (e.date) } }));
     html! { pre { code { (one_line(&e.command)) } } (facts(list)) }
+}
+
+/// What goes into a run of scenes.
+pub(super) fn suite_inputs(e: &Environment) -> Vec<(&'static str, Markup)> {
+    let code = |text: &str| html! { code { (text) } };
+    let mut list = vec![("Seed", cell(e.seed))];
+    list.extend(e.suite_hash.iter().map(|hash| ("Suite (BLAKE3)", code(hash))));
+    list.push(("Scenes (BLAKE3)", code(&e.scenes_hash)));
+    list
 }

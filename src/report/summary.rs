@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::Run;
 use super::page::{sign, tally};
 use super::text::{number, one_line};
+use super::{Environment, Run};
 use crate::suite::{Counts, tables, worst};
 
 /// Claims listed one by one at most; the others are in `report.html`.
@@ -54,21 +54,24 @@ pub fn to_markdown(run: &Run<'_>) -> String {
             claim.unit
         );
     }
-    let environment = &run.environment;
-    let _ = write!(
-        text,
-        "\n</details>\n\n{} with penetrode {} ({}), {}, {}\n",
+    text.push_str("\n</details>\n\n");
+    text + &origin(&run.environment)
+}
+
+/// The command, the program, the machine and the date, in a line.
+pub(super) fn origin(environment: &Environment) -> String {
+    format!(
+        "{} with penetrode {} ({}), {}, {}\n",
         code(&environment.command),
         escape(environment.version),
         escape(environment.commit),
         escape(&environment.cpu),
         escape(&environment.date)
-    );
-    text
+    )
 }
 
 /// `text` in which nothing is Markdown, HTML, a mention or a reference.
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::new();
     for c in one_line(text).chars() {
         match c {
@@ -89,7 +92,7 @@ fn escape(text: &str) -> String {
 }
 
 /// `text` as code in a cell of a table.
-fn code(text: &str) -> String {
+pub(super) fn code(text: &str) -> String {
     format!("<code>{}</code>", escape(text))
 }
 

@@ -230,8 +230,8 @@ fn a_report_that_cannot_be_made_is_refused_before_the_work() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("file");
     std::fs::write(&file, "").unwrap();
-    let error = folder::check(&file.join("report")).unwrap_err();
+    let error = folder::check(&file.join("report"), "verify").unwrap_err();
     assert!(matches!(error, folder::FolderError::Write { .. }), "{error}");
-    folder::check(&place.path().join("a/b/report")).unwrap();
+    folder::check(&place.path().join("a/b/report"), "verify").unwrap();
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
 }

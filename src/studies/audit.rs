@@ -289,6 +289,8 @@ pub struct QuantityAudit {
     pub limit_band: Option<[f64; 2]>,
     /// Exact value, if known.
     pub exact: Option<f64>,
+    /// Relative error of the finest value, as in `converge`; `null` where no exact value is known.
+    pub relative_error: Option<f64>,
     /// Whether the scene fixes it, whatever the step.
     pub fixed: bool,
     /// Whether the values approach it; `null` where it or the limit is not known.
@@ -485,6 +487,8 @@ impl<'a> Judge<'a> {
         let said = self.exact.zip(quantity).map_or(Exact::Unknown, |(exact, quantity)| exact.values[quantity as usize]);
         if let Exact::Free(value) | Exact::Fixed(value) = said {
             self.judged.exact = Some(value);
+            let scale = self.exact.zip(quantity).and_then(|(exact, quantity)| exact.scale(quantity, value));
+            self.judged.relative_error = scale.map(|scale| (self.finest().value - value).abs() / scale);
         }
         if let Exact::Fixed(value) = said {
             self.judged.fixed = true;

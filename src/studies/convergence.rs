@@ -7,9 +7,11 @@
 use std::cell::Cell;
 
 use super::asymptotic::{Judged, Sample, TwoPowers, judge};
+use super::audit::ErrorBand;
 use super::critical_velocity;
-use super::error::{Studied, StudyError, Truth, flight_error, free_quantities, signed_error};
+use super::error::{Studied, StudyError, Truth, error_scale, flight_error, free_quantities, signed_error, value_of};
 use super::formal_order::{Path, formal_order};
+use super::grid_convergence::{GridValue, ThreeGrids, three_grids};
 use super::order::{Class, Exclusion, FitError, FittedPoint, OrderFit, StepError, fit};
 use super::quantity::Quantity;
 use super::random::Random;
@@ -79,11 +81,36 @@ impl Ladder {
     }
 }
 
+/// What errors are measured against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Against {
+    /// The exact value, in the unit of the quantity.
+    pub exact: f64,
+    /// What errors are relative to, in that unit.
+    pub scale: f64,
+}
+
+impl Against {
+    /// Of a quantity of the flight `exact` with that impact speed (m/s).
+    fn of_flight(quantity: Quantity, exact: &Flight, impact_speed: f64) -> Self {
+        // What a flight lacks is not studied.
+        let exact = value_of(quantity, exact).unwrap_or(f64::NAN);
+        Self { exact, scale: error_scale(quantity, exact, impact_speed) }
+    }
+
+    /// The value with this error.
+    pub fn value(&self, error: f64) -> f64 {
+        self.exact + error * self.scale
+    }
+}
+
 /// The convergence of one quantity.
 #[derive(Clone, Debug)]
 pub struct QuantityStudy {
     /// Which.
     pub quantity: Quantity,
+    /// What its errors are measured against.
+    pub against: Against,
     /// Order expected.
     pub formal: Option<f64>,
     /// Error over the step or the tolerance.
@@ -105,14 +132,43 @@ pub struct QuantityStudy {
 
 impl QuantityStudy {
     /// Of the samples of a fixed step.
-    fn of_steps(quantity: Quantity, formal: Option<f64>, samples: &Samples) -> Self {
+    fn of_steps(quantity: Quantity, against: Against, formal: Option<f64>, samples: &Samples) -> Self {
         let Judged { fit, verdict, mut reason, powers } = judge(&samples.found, formal);
         if verdict == Verdict::Undecided && samples.found.len() <= samples.lost {
             let why = samples.why.as_deref().unwrap_or("another outcome than the exact one");
             reason = format!("{} of {} runs are lost: {why}", samples.lost, samples.lost + samples.found.len());
         }
         let evaluations = Vec::new();
-        Self { quantity, formal, fit, work: None, evaluations, lost: samples.lost, verdict, reason, powers }
+        Self { quantity, against, formal, fit, work: None, evaluations, lost: samples.lost, verdict, reason, powers }
+    }
+
+    /// The points that the order rests on, ascending; none where it converges to nothing.
+    fn used(&self) -> Vec<FittedPoint> {
+        let fit = self.fit.as_ref().ok().filter(|fit| fit.class == Class::Converging);
+        fit.map_or(Vec::new(), |fit| fit.points.iter().filter(|point| point.used).copied().collect())
+    }
+
+    /// The error band of the value at the finest size that the order rests on: the law that was fitted, times what the worst
+    /// of all errors has over it.
+    pub fn error_band(&self) -> Option<ErrorBand> {
+        let (used, line) = (self.used(), self.fit.as_ref().ok()?.line?);
+        let law = |size: f64| line.error_constant * size.powf(line.order);
+        let worst = used.iter().map(|point| point.error.abs() / law(point.step)).fold(0.0, f64::max);
+        let half_width = worst * law(used.first()?.step) * self.against.scale.abs();
+        let rule = "the fitted law times the worst of all errors over it";
+        half_width.is_finite().then_some(ErrorBand { half_width, rule })
+    }
+
+    /// The rule for three grids on three of the sizes that the order rests on: the finest, the coarsest, and the one nearest
+    /// to the middle between them. Neighbours would show how errors jump from step to step, and not how they fall.
+    pub fn three_grids(&self) -> Option<ThreeGrids> {
+        let used = self.used();
+        let [first, last] = [used.first()?, used.last()?];
+        let middle = (first.step * last.step).sqrt();
+        let off = |point: &FittedPoint| (point.step / middle).ln().abs();
+        let second = used.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let grid = |point: &FittedPoint| GridValue::new(point.step, self.against.value(point.error));
+        three_grids([first, second, last].map(grid)).ok()
     }
 
     /// Whether other steps may decide what is not passed.
@@ -195,7 +251,9 @@ pub fn of_fixed_steps(
         };
         Ok((quantities.iter().map(sample).collect(), flight.cost.steps))
     };
-    let motion = Motion { quantities: &quantities, exact, path: Path::of(problem, exact), run: &solve };
+    let against = |quantity| Against::of_flight(quantity, exact, problem.impact_speed);
+    let path = Path::of(problem, exact);
+    let motion = Motion { quantities: &quantities, against: &against, exact, path, run: &solve };
     let mut found = Convergence { quantities: motion.study(study, &runs)?, no_critical_velocity: None };
     if has_critical {
         match of_critical_velocity(scene, study, &runs)? {
@@ -243,7 +301,9 @@ fn of_critical_velocity(
         Ok((vec![sample], steps))
     };
     let quantities = &[Quantity::CriticalVelocity];
-    let motion = Motion { quantities, exact: &exact, path: Path::of(&critical, &exact), run: &search };
+    let against = |_| Against { exact: velocity, scale: velocity };
+    let path = Path::of(&critical, &exact);
+    let motion = Motion { quantities, against: &against, exact: &exact, path, run: &search };
     let mut studies = motion.study(study, runs)?;
     // The motion at V_c then has no end but the one that round-off gives it: no range of steps establishes an order.
     for study in studies.iter_mut().filter(|study| is_approached && study.verdict == Verdict::Failed) {
@@ -324,6 +384,8 @@ struct Samples {
 /// One motion that is run at many step sizes: the flight of the scene, or those that find its critical velocity.
 struct Motion<'a> {
     quantities: &'a [Quantity],
+    /// What the errors of each are measured against.
+    against: &'a dyn Fn(Quantity) -> Against,
     /// The exact flight, and the facts about it.
     exact: &'a Flight,
     path: Path,
@@ -342,7 +404,8 @@ impl Motion<'_> {
         let CentralDifference { velocity, boundaries, .. } = (study.scheme)(to);
         let judged = |samples: &[Samples]| -> Vec<QuantityStudy> {
             let of = |(&quantity, samples)| {
-                QuantityStudy::of_steps(quantity, formal_order(velocity, boundaries, &self.path, quantity), samples)
+                let formal = formal_order(velocity, boundaries, &self.path, quantity);
+                QuantityStudy::of_steps(quantity, (self.against)(quantity), formal, samples)
             };
             self.quantities.iter().zip(samples).map(of).collect()
         };
@@ -483,6 +546,7 @@ pub fn of_tolerances(problem: &Problem, exact: &Flight, method: MethodName, ladd
         };
         QuantityStudy {
             quantity,
+            against: Against::of_flight(quantity, exact, problem.impact_speed),
             formal: Some(1.0),
             lost: flights.len() - measured.len(),
             reason: fit.as_ref().map_or_else(ToString::to_string, |fit| fit.reason.clone()),

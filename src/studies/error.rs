@@ -110,8 +110,13 @@ pub fn value_of<S: Scalar>(quantity: Quantity, flight: &Flight<S>) -> Option<S> 
 ///
 /// Zero when both are the same number, also where the scale is zero.
 pub fn signed_error(quantity: Quantity, value: f64, exact: f64, impact_speed: f64) -> f64 {
-    let scale = if quantity.is_over_impact_speed() { impact_speed } else { exact };
+    let scale = error_scale(quantity, exact, impact_speed);
     if value == exact { 0.0 } else { (value - exact) / scale }
+}
+
+/// What the errors of `quantity` are relative to: its `exact` value, or `impact_speed` (m/s) for velocities of a flight.
+pub fn error_scale(quantity: Quantity, exact: f64, impact_speed: f64) -> f64 {
+    if quantity.is_over_impact_speed() { impact_speed } else { exact }
 }
 
 /// Error with its sign of `quantity` of `flight` against `exact`; `None` where the outcomes differ, where either

@@ -49,6 +49,18 @@ pub enum Behaviour {
 }
 
 impl Behaviour {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MonotoneConverging => "monotone",
+            Self::MonotoneDiverging => "diverging",
+            Self::OscillatingConverging => "oscillating",
+            Self::OscillatingDiverging => "oscillating, diverging",
+            Self::Constant => "constant",
+            Self::Undecided => "undecided",
+        }
+    }
+
     /// The class in reports.
     pub fn class(self) -> Class {
         match self {

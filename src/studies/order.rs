@@ -140,6 +140,17 @@ pub enum Exclusion {
     PreAsymptotic,
 }
 
+impl Exclusion {
+    /// Why, in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::ZeroError => "its error is zero",
+            Self::RoundOffFloor => "its error is round-off",
+            Self::PreAsymptotic => "too coarse",
+        }
+    }
+}
+
 /// One point, and whether the fit uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FittedPoint {

@@ -19,6 +19,7 @@ mod program;
 mod properties;
 mod schemas;
 mod stress;
+mod study_reports;
 mod suite;
 mod sweep;
 mod transcript;

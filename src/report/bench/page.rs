@@ -6,7 +6,7 @@ use super::figures::step_figure_of;
 use super::{BenchJson, CaseJson};
 use crate::report::figure::{Figure, name_of};
 use crate::report::figures::words_for;
-use crate::report::page::{Page, Table, cell, figure, folded, number_cell, reproduction};
+use crate::report::page::{Page, Part, Table, cell, figure, folded, number_cell, reproduction, suite_inputs};
 use crate::report::text::{clipped, count, number, one_line};
 use crate::report::{Environment, cells};
 use crate::studies::Quantity;
@@ -19,17 +19,17 @@ pub(super) fn to_html(report: &BenchJson, figures: &[Figure]) -> String {
     Page {
         title: "What an accuracy costs".into(),
         outcome: "penetrode bench",
+        subject: html! {},
         purpose: &format!("On {}, profile {}.", one_line(&e.cpu), e.profile),
         environment: e,
-        text: include_str!("../pages/bench.txt"),
-        slot: &|name, _| match name {
+        parts: Part::of_text(include_str!("../pages/bench.txt"), &|name, _| match name {
             "profile" => profile(e),
             "fastest" => html! { @for case in &report.scenes { (fastest(report, case, figures)) } },
             "steps" => html! { @for study in &report.step_size { (step_size(study, figures)) } },
             "growth" => html! { @if !report.growth.is_empty() { (growth(report, figures)) } },
-            "reproduction" => reproduction(e),
+            "reproduction" => reproduction(e, suite_inputs(e)),
             _ => html! { "@" (name) },
-        },
+        }),
         files: html! { a href="report.json" { "JSON" } },
     }
     .to_html()
@@ -43,7 +43,7 @@ fn profile(e: &Environment) -> Markup {
 
 fn figure_named(figures: &[Figure], kind: &str, of: &str) -> Markup {
     let name = name_of(kind, of);
-    html! { @for shown in figures.iter().filter(|shown| shown.name == name) { (figure(shown, "")) } }
+    html! { @for shown in figures.iter().filter(|shown| shown.name == name) { (figure(None, shown, "")) } }
 }
 
 /// Whole microseconds where they are many, else three digits.

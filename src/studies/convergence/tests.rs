@@ -132,7 +132,9 @@ fn a_scheme_of_a_lower_order_than_the_formal_one_fails() {
         };
         Ok((quantities.map(sample).to_vec(), flight.cost.steps))
     };
-    let motion = Motion { quantities: &quantities, exact: &exact, path: Path::of(&problem, &exact), run: &run };
+    let against = |quantity| Against::of_flight(quantity, &exact, problem.impact_speed);
+    let path = Path::of(&problem, &exact);
+    let motion = Motion { quantities: &quantities, against: &against, exact: &exact, path, run: &run };
     let runs = Runs { counts: Cell::default(), progress: &|_, _| {} };
     for range in [None, Some(STEPS_OVER_TIME.map(|share| share * exact.end.time))] {
         let study =
