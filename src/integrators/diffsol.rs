@@ -583,17 +583,8 @@ where
                 Some(StageEnd::Limit(place) | StageEnd::Rest(place) | StageEnd::Approach(place, _)) => place,
                 None => after,
             };
-            let mut lost = Ok(());
-            course.sample_until(state_at(epoch, place), |time| {
-                let local = (time - stage.start.time) / (stage.length / stage.unit_speed) - epoch;
-                let local = local.max(before.time).min(place.time);
-                let (depth, velocity) = interpolant(local).unwrap_or_else(|cause| {
-                    lost = Err(failure(cause, epoch, before));
-                    (place.depth, place.velocity)
-                });
-                state_at(epoch, Node { time: local, depth, velocity })
-            });
-            lost?;
+            let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
+            sampled.map_err(|e| failure(e, epoch, before))?;
             energy_max = energy_max.max(place.velocity * place.velocity);
             if let Some(end) = end {
                 break end;
@@ -625,6 +616,28 @@ where
             StageEnd::Approach(at, why) => StageEnd::Approach(state_at(epoch, at), why),
         })
     }
+}
+
+/// Adds the states at the times asked for between two nodes, whose times count from `epoch`, by the library's `interpolant`.
+fn sample_inside(
+    stage: &Reduced,
+    course: &mut Course<'_>,
+    epoch: f64,
+    [from, to]: [Node; 2],
+    mut interpolant: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
+) -> Result<(), DiffsolError> {
+    let state = |at: Node| stage.state(Node { time: epoch + at.time, ..at });
+    let mut lost = Ok(());
+    course.sample_until(state(to), |time| {
+        let local = (time - stage.start.time) / (stage.length / stage.unit_speed) - epoch;
+        let local = local.max(from.time).min(to.time);
+        let (depth, velocity) = interpolant(local).unwrap_or_else(|cause| {
+            lost = Err(cause);
+            (to.depth, to.velocity)
+        });
+        state(Node { time: local, depth, velocity })
+    });
+    lost
 }
 
 /// Whether speed `u` is lost in the tolerance where `energy_max` is the largest u² so far.

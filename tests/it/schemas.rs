@@ -43,7 +43,7 @@ fn taken(folder: &str) -> Vec<File> {
         let bytes = fs::read(root().join(folder).join(&name)).unwrap();
         (format!("{}-{name}", folder.replace('/', "-")), bytes, true)
     };
-    names(&root().join(folder)).into_iter().filter(|name| name.ends_with(".toml")).map(file).collect()
+    names(&root().join(folder)).into_iter().map(file).collect()
 }
 
 /// The hostile files of `kind`, those with the names `of_value` to be taken: only the reader can refuse them.
