@@ -237,7 +237,7 @@ impl QuantityJson {
             limit: None,
             exact: Some(self.exact),
             agrees: self.class == Class::Converging,
-            relative_error: self.points.first().map(|point| point.error),
+            relative_error: finest.and_then(|point| point.error),
             is_against_exact: true,
             finest: finest.map(|point| (point.size, point.value)),
             error_band: self.error_band,
@@ -323,10 +323,7 @@ impl ConvergeJson {
             series: self.quantities.iter().map(QuantityJson::series).collect(),
             judged: vec![
                 ("Scheme", format!("{}{}", self.method.name, self.method.rules())),
-                (
-                    "Scene",
-                    format!("{scene}, in {file}, with an impact velocity of {} m/s", Shown(problem.impact_speed)),
-                ),
+                ("Scene", format!("{scene} ({file}), impact velocity {} m/s", Shown(problem.impact_speed))),
                 ("Exact values", reference.to_owned()),
                 ("Sizes", format!("log-uniform with random ratios, seed {}", self.seed)),
             ],

@@ -263,20 +263,26 @@ fn result(found: &Diagnosis) -> Vec<Element> {
     if let Some(separation) = &found.separation {
         parts.push(Element::Text(Prose::new("{0}.", &[separation])));
     }
-    let header =
-        ["quantity", "answers right", "largest error", "relative to", "over its limit", "question"].map(Prose::from);
-    let sheet = Sheet::cards("quantities", "Result by quantity, over all questions".into(), header).for_papers(1..5);
+    // Fixed steps are judged by their limit for small steps, and have no share of another.
+    let has_limits = asked(found).any(|asked| worst_share(asked).is_some());
+    let limited = |columns: [Cell; 2]| if has_limits { columns.to_vec() } else { Vec::new() };
+    let mut header: Vec<Prose> = ["quantity", "largest error", "relative to", "question"].map(Prose::from).into();
+    if has_limits {
+        header.extend(["answers within the limit", "largest error over its limit"].map(Prose::from));
+    }
+    let papers = 1..header.len();
+    let sheet = Sheet::cards("quantities", "Result by quantity, over all questions".into(), header).for_papers(papers);
     parts.push(Element::Table(sheet.rows(0..3, |quantity| {
         let (right, all) = right(asked(found), quantity);
         let worst = largest(found, quantity);
-        [
+        let mut cells = vec![
             Cell::text(QUANTITIES[quantity]),
-            Cell::Of(right, all),
             Cell::Number(worst.map(|worst| worst.0), 2),
             Cell::text(relative_to(quantity)),
-            Cell::Number(worst.and_then(|worst| worst.1), 2),
             Cell::text(worst.map_or("", |worst| worst.2.id.as_str())),
-        ]
+        ];
+        cells.extend(limited([Cell::Of(right, all), Cell::Number(worst.and_then(|worst| worst.1), 2)]));
+        cells
     })));
     parts
 }
@@ -362,24 +368,28 @@ fn coverage(found: &Diagnosis) -> Vec<Element> {
         return Vec::new();
     }
     let mut parts: Vec<Element> = figures(found, &met).into_iter().map(Element::Figure).collect();
+    let has_limits = asked(found).any(|asked| worst_share(asked).is_some());
     let header =
         ["the flight meets", "answers right", "depth", "time", "velocity", "worst over its limit"].map(Prose::from);
-    let sheet =
-        Sheet::grid("contents", "Terms and events: answers right, and quantities within their limit".into(), header);
-    let sheet = sheet.for_papers(1..6).rows(&met, |content| {
+    let columns = if has_limits { header.len() } else { 2 };
+    let caption = if has_limits {
+        "Terms and events: answers right, and quantities within their limit"
+    } else {
+        "Terms and events: answers right"
+    };
+    let sheet = Sheet::grid("contents", caption.into(), header.into_iter().take(columns)).for_papers(1..columns);
+    let sheet = sheet.rows(&met, |content| {
         let meeting = [*content];
         let questions = || with(found, &meeting);
-        let of = |(right, all)| Cell::Of(right, all);
-        let worst = questions().filter_map(worst_share).max_by(|a, b| compare(*a, *b));
         let (right_all, all) = passed(questions());
-        [
-            Cell::text(words(*content)),
-            Cell::Of(right_all, all),
-            of(right(questions(), 0)),
-            of(right(questions(), 1)),
-            of(right(questions(), 2)),
-            Cell::Number(worst, 2),
-        ]
+        let of = |quantity| {
+            let (right, all) = right(questions(), quantity);
+            Cell::Of(right, all)
+        };
+        let worst = questions().filter_map(worst_share).max_by(|a, b| compare(*a, *b));
+        let cells =
+            [Cell::text(words(*content)), Cell::Of(right_all, all), of(0), of(1), of(2), Cell::Number(worst, 2)];
+        cells.into_iter().take(columns).collect::<Vec<_>>()
     });
     parts.push(Element::Table(sheet));
     let terms: Vec<Content> = TERMS.into_iter().filter(|term| met.contains(term)).collect();

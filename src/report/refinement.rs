@@ -222,9 +222,14 @@ impl Series {
         self.finest.map_or_else(|| "—".to_owned(), |(_, value)| with_unit(&number(value, self.digits()), self.unit))
     }
 
+    /// One point in so many is drawn.
+    fn thinned(&self) -> usize {
+        self.points.len().div_ceil(DRAWN_MAX).max(1)
+    }
+
     /// The points that are drawn.
     fn drawn(&self) -> impl Iterator<Item = &SeriesPoint> {
-        self.points.iter().step_by(self.points.len().div_ceil(DRAWN_MAX).max(1))
+        self.points.iter().step_by(self.thinned())
     }
 }
 
@@ -359,8 +364,7 @@ impl Refinement {
         let error = |series: &Series| if is_number(series) { series.relative_error } else { Some(f64::NAN) };
         let errors = self.series.iter().filter_map(|series| Some((series, error(series)?)));
         let largest = errors.max_by(|a, b| compare(a.1, b.1));
-        let finest =
-            |series: &Series| series.points.first().map_or_else(Prose::default, |point| self.size.at(point.size));
+        let finest = |series: &Series| series.finest.map_or_else(Prose::default, |(size, _)| self.size.at(size));
         let error = match largest {
             Some((series, error)) => Headline {
                 label: "Largest error",
@@ -489,13 +493,17 @@ impl Refinement {
                 (true, false) => "Error against the exact value, or against the limit where that is another,",
                 (false, _) => "Error against the limit of the values",
             };
+        let thinned = match self.series.iter().map(Series::thinned).max() {
+            Some(each @ 2..) => format!(" One point in {each} is drawn; `report.json` has all."),
+            _ => String::new(),
+        };
         let figure = |name, message: String, reading: &str, mut panels: Vec<Panel>| {
             panels.retain(|panel| !panel.is_empty());
             let figure = Figure {
                 name: name_of(name, ""),
                 section: None,
                 message,
-                reading: reading.to_owned(),
+                reading: format!("{reading}{thinned}"),
                 claims: Vec::new(),
                 panels,
             };

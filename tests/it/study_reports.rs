@@ -22,10 +22,10 @@ const GOOD: &str = "dt_s,depth_m,time_s,velocity_m_s,peak_force_kn\n\
 const BAD: &str =
     "dt_s,depth_m,velocity_m_s\n4e-6,0.1461,136\n2e-6,0.1452,135.5\n1e-6,0.1461,135.25\n5e-7,0.1449,135.125\n";
 
-/// Semi-implicit Euler steps under constant force: `dt_s` is asked for in the greeting.
+/// A solver that has no answer, and a name that means something to each format.
 #[cfg(unix)]
-const SOLVER: &str = "read hello; echo '{\"name\":\"shell <b>\",\"version\":\"1_0\",\"method\":\"none & all\"}'; \
-                      while read -r line; do id=${line#*\"id\":}; id=${id%%[,\\}]*}; \
+const SOLVER: &str = "read hello; printf '%s\\n' '{\"name\":\"=1 <script>a()</script> \\u001b[2J\\u202e @me ]]> #7\",\"version\":\"1_0\",\"method\":\"none & all\"}'; \
+                      while read -r line; do id=${line#*\\\"id\\\":}; id=${id%%[,\\}]*}; \
                       echo \"{\\\"id\\\":$id,\\\"error\\\":\\\"no idea\\\"}\"; done";
 
 /// A report as it was written, and what the command said.
@@ -182,7 +182,20 @@ fn the_report_of_a_solver_counts_its_answers() {
     let page = report.page();
     let asked = report.json["counts"]["asked"].as_u64().unwrap();
     assert!(page.contains(&format!("Wrong: {asked} of {asked} answers fail.")), "{page:.900}");
-    assert!(page.contains("shell <b> 1_0") && page.contains(&format!("Answers right0 of {asked}")), "{page:.900}");
+    // The greeting keeps no control characters.
+    let name = "=1 <script>a()</script> \\u{1b}[2J\u{fffd} @me ]]> #7";
+    assert!(
+        page.contains(&format!("{name} 1_0")) && page.contains(&format!("Answers right0 of {asked}")),
+        "{page:.900}"
+    );
+    // Nothing in a name acts: no script, no control of a terminal or of the direction of writing, no mention, no formula.
+    for name in report.file("contents.txt").lines() {
+        let text = report.file(name);
+        let is_data = name == "report.json";
+        assert!(is_data || !text.contains("<script") && !text.contains(['\u{1b}', '\u{202e}']), "{name}");
+        assert!(!name.starts_with("tables/") || !text.lines().any(|line| line.starts_with('=')), "{name}");
+    }
+    assert!(!report.file("summary.md").contains("@me") && !report.file("junit.xml").contains("]]> #"));
     assert_eq!(report.file("uncertainty.tex"), "");
     let cases = report.file("junit.xml").matches("<testcase ").count();
     assert_eq!(cases, report.json["questions"].as_array().unwrap().len());
