@@ -75,7 +75,7 @@ fn text_at(path: &Path) -> Result<(String, String), Box<SceneError>> {
     read_text(path).map_err(|mut error| {
         if !path.exists() {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            "a scene file, the name of a scene that ships, or `-` for standard input".clone_into(&mut error.allowed);
+            "a file, the name of a scene that ships, or `-` for standard input".clone_into(&mut error.allowed);
             error.help = shipped_like(&name, "check the path; `penetrode scenes` lists the scenes that ship");
         }
         error

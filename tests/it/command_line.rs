@@ -159,8 +159,8 @@ fn a_scene_that_ships_goes_by_its_name_wherever_a_scene_is_read_and_a_file_of_th
         let of_file = answer(&line.replace("perforate", "@perforate"));
         assert!(of_file.is_object() && answer(line) == of_file, "{line}");
     }
-    let bench = answer("bench graze --parts step-size --repeats 1");
-    assert_eq!(bench["step_size"][0]["scene"], "graze", "{bench}");
+    let bench = answer("bench constant-force --parts step-size --repeats 1");
+    assert_eq!(bench["step_size"][0]["scene"], "constant-force", "{bench}");
 
     // A folder is no scene; a file is what is named.
     fs::create_dir(folder.path().join("tunnel")).unwrap();
