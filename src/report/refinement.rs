@@ -744,16 +744,22 @@ impl Refinement {
             let text = "There are {0}: `report.json` has all of them.";
             return vec![Element::Text(Prose::new(text, &[&count(rows.len(), "row")]))];
         }
-        let header = ["quantity", "size", "value", "relative error", "in the fit", "why not"].map(Prose::from);
+        let header =
+            ["quantity", "size", "value", "relative error", "against", "in the fit", "why not"].map(Prose::from);
         let header =
             header.into_iter().enumerate().map(|(column, head)| if column == 1 { self.size.symbol() } else { head });
-        let caption = "Every size of every quantity; errors as in Figure 1".into();
+        let caption = "Every size of every quantity".into();
         let sheet = Sheet::grid("sizes", caption, header).rows(rows, |(series, point)| {
             [
                 Cell::text(series.head()),
                 Cell::Number(Some(point.size), 5),
                 Cell::Number(Some(point.value), series.digits().max(6)),
                 Cell::Number(point.error, 3),
+                Cell::text(match point.error {
+                    None => "",
+                    Some(_) if series.is_against_exact => "the exact value",
+                    Some(_) => "the limit",
+                }),
                 Cell::text(if point.used { "yes" } else { "no" }),
                 Cell::text(point.excluded.map_or("", Exclusion::words)),
             ]
@@ -766,7 +772,8 @@ impl Refinement {
             let order = series.observed_order.map_or("none".to_owned(), |order| format!("{order:e}"));
             let band = series.error_band.map_or("none".to_owned(), |band| format!("{:e}", band.half_width));
             let value = series.finest.map_or(f64::NAN, |(_, value)| value);
-            let numbers = format!("{} {value:e} {}, error band {band}, order {order}", series.name, series.unit);
+            let value = with_unit(&format!("{value:e}"), series.unit).replace('\u{a0}', " ");
+            let numbers = format!("{} {value}, error band {band}, order {order}", series.name);
             let text = format!("{numbers}\n{}: {}", series.class, series.reason);
             Case { name: series.name.clone(), verdict: series.verdict, numbers, text, wall_ms: 0.0 }
         };

@@ -121,13 +121,13 @@ impl Transcript {
         self.0.par_iter().enumerate().map(again).collect::<Found<_>>().map(Self)
     }
 
-    /// The runs that this build can make: those that use no method that it leaves out, and `bench` uses each. Solvers given
-    /// with `--peer` are shell scripts.
+    /// The runs that this build can make: those that use no method that it leaves out, and `bench` uses each. Solvers that
+    /// are given with `--peer` or diagnosed are shell scripts.
     #[must_use]
     pub fn possible(self) -> Self {
         let is_whole = MethodName::ALL.iter().all(|name| name.is_built());
         let is_left_out = |word: &str| match word {
-            "--peer" => !cfg!(unix),
+            "--peer" | "diagnose" => !cfg!(unix),
             "bench" => !is_whole,
             _ => word.parse::<MethodName>().is_ok_and(|name| !name.is_built()),
         };
