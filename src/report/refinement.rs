@@ -326,7 +326,7 @@ impl Refinement {
     fn meaning(&self) -> Prose {
         let all = self.series.len();
         let open: Vec<&Series> = self.series.iter().filter(|series| series.verdict == self.verdict).collect();
-        let of_all = format!("{} of {}", open.len(), quantities(all).replace("quantity", "one quantity"));
+        let of_all = if all == 1 { "The quantity".to_owned() } else { format!("{} of {all} quantities", open.len()) };
         match self.verdict {
             Verdict::Passed => {
                 // The order of an adaptive method decides nothing: a controller holds the error of a step, not of the flight.
@@ -684,7 +684,10 @@ impl Refinement {
         for series in unstated {
             let (name, verdict, reason) = (&series.name, series.verdict.name(), &series.reason);
             let gaps: [&dyn Display; 3] = [name, &verdict, reason];
-            parts.push(Element::Text(Prose::new("For {0} no uncertainty is stated, for it {1}: {2}.", &gaps)));
+            parts.push(Element::Text(Prose::new(
+                "For {0} no uncertainty is stated, for its verdict is {1}: {2}.",
+                &gaps,
+            )));
         }
         parts
     }

@@ -169,7 +169,7 @@ fn the_report_of_a_table_names_it_and_what_is_wrong_with_it() {
     assert!(page.contains("1 of 2 quantities fail"), "{page:.900}");
     // The values approach 135 m/s where the projectile rests: the error is 135.125/300, and not that against their limit.
     assert!(page.contains("Largest error0.45relative, of velocity at Δt = 500 ns"), "{page:.900}");
-    let unstated = "For velocity no uncertainty is stated, for it failed";
+    let unstated = "For velocity no uncertainty is stated, for its verdict is failed";
     assert!(page.contains(unstated) && !bad.file("uncertainty.tex").contains("velocity"));
     assert!(bad.file("junit.xml").contains("<failure message=\"velocity 1.35125e2 m/s, error band "));
 }
