@@ -51,10 +51,13 @@ impl Ask for DiagnoseArgs {
         end_peers_with_program()?;
         let mut peer = Peer::start(&self.command)?;
         let bar = progress_bar(u64::from(self.questions), "questions");
-        let plan = Plan { seed: self.seed, questions: self.questions as usize };
+        let plan = Plan { seed: self.seed, questions: self.questions as usize, asks_edges: true };
         let diagnosis = diagnose(&mut peer, plan, &|asked, all| {
             bar.set_length(all as u64);
             bar.set_position(asked as u64);
+            if asked == all {
+                bar.set_message("looking for the cause");
+            }
         });
         bar.finish_and_clear();
         let data = DiagnoseJson { schema: "penetrode/diagnose/1", diagnosis };

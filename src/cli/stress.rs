@@ -103,10 +103,11 @@ impl StressArgs {
         let bar = progress_bar(0, "problems");
         let started = Instant::now();
         let questions = self.cases.map_or(0, |cases| cases as usize);
-        let asked = diagnosis::at_edges(&mut peer, Plan { seed: self.seed, questions }, &|asked, all| {
-            bar.set_length(all as u64);
-            bar.set_position(asked as u64);
-        });
+        let asked =
+            diagnosis::at_edges(&mut peer, Plan { seed: self.seed, questions, asks_edges: true }, &|asked, all| {
+                bar.set_length(all as u64);
+                bar.set_position(asked as u64);
+            });
         bar.finish_and_clear();
         Ok((identity, judged_answers(suite, &asked, started.elapsed().as_secs_f64() * 1e3)))
     }

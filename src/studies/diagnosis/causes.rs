@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
-use super::questions::Question;
+use super::questions::{Content, Question};
 use super::simulation::Simulated;
 use crate::exchange::peers::wire::{conditioning, errors};
 use crate::physics::{Problem, State};
@@ -19,6 +19,8 @@ const FITTED: usize = 6;
 const FITTED_OF_SECOND: usize = 2;
 /// Failing answers that a number must explain before all of them are compared.
 const TRIED: usize = 8;
+/// Of so many numbers one is tried, and those between where it seems worth it.
+const COARSE: usize = 4;
 /// What is so near to zero, in units of the accuracy, is a root.
 const NEAR_ROOT: f64 = 1e-4;
 /// Rounds of a search between two numbers.
@@ -33,6 +35,8 @@ const LISTED: usize = 5;
 /// may err more than a sound one does on the same question.
 const LEFT: f64 = 1e-4;
 const LEFT_MAX: f64 = 100.0;
+/// Largest relative difference that an explanation may leave, whatever the condition.
+const EXPLAINED_MAX: f64 = 0.02;
 /// An error that is so many times the allowed one tells a fault from the accuracy of a solver.
 const TELLING: f64 = 10.0;
 
@@ -92,6 +96,10 @@ type Mask = [bool; 3];
 const ALL_THREE: Mask = [true; 3];
 
 impl Seen<'_> {
+    fn is_stiff(&self) -> bool {
+        self.question.contains.contains(&Content::Stiff)
+    }
+
     /// Errors of the answer against `end`, the end of a flight through `problem`, each over what is allowed.
     fn excess(&self, problem: &Problem, end: State) -> [f64; 3] {
         let errors = errors(self.answer, end, self.question.problem.impact_speed);
@@ -116,7 +124,8 @@ impl Seen<'_> {
         let excess = self.excess(&problem, end);
         let is_near = self.is_near(excess, mask);
         let errors = errors(self.answer, end, self.question.problem.impact_speed);
-        is_near.then(|| (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max))
+        let largest = (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max);
+        (is_near && largest <= EXPLAINED_MAX).then_some(largest)
     }
 
     /// Whether `faults` give another answer. Where none can be computed, nothing is contradicted.
@@ -134,12 +143,12 @@ impl Seen<'_> {
         let is_fitted = |(fault, _): &Fault<'_>| {
             matches!(fault.parameter, Parameter::Delay | Parameter::Lateness | Parameter::Nearness)
         };
-        let is_time = |(fault, _): &Fault<'_>| fault.id.starts_with("event-time");
-        told > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_time))
+        let is_of_one = |(fault, _): &Fault<'_>| is_of_one_number(fault);
+        told > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_of_one))
     }
 
-    /// Numbers of `hypothesis` that explain the answer, together with `others`.
-    fn fit(&self, hypothesis: &Hypothesis, others: &[Fault<'_>], mask: Mask) -> Vec<f64> {
+    /// Numbers of `hypothesis` that explain the answer, together with `others`; `None` where no number changes it.
+    fn fit(&self, hypothesis: &Hypothesis, others: &[Fault<'_>], mask: Mask) -> Option<Vec<f64>> {
         let with =
             |number: f64| -> Vec<(&Hypothesis, f64)> { others.iter().copied().chain([(hypothesis, number)]).collect() };
         let excess = |number: f64| {
@@ -148,7 +157,7 @@ impl Seen<'_> {
         };
         let mut fitting: Vec<f64> = Vec::new();
         if hypothesis.changes.is_empty() {
-            return if self.explained_by(&with(1.0), mask).is_some() { vec![1.0] } else { fitting };
+            return Some(if self.explained_by(&with(1.0), mask).is_some() { vec![1.0] } else { fitting });
         }
         let mut add = |number: f64| {
             let is_new = fitting.iter().all(|known| (known - number).abs() > 1e-9 * number.abs());
@@ -157,38 +166,59 @@ impl Seen<'_> {
             }
         };
         let grid = hypothesis.parameter.grid(self.question);
+        let is_discrete = matches!(hypothesis.parameter, Parameter::None | Parameter::Choice(_) | Parameter::OneOf(_));
+        let coarse = if is_discrete { 1 } else { COARSE };
+        let ends = || (0..grid.len()).step_by(coarse).chain(std::iter::once(grid.len() - 1));
+        let mut values: Vec<Option<Option<[f64; 3]>>> = vec![None; grid.len()];
+        ends().for_each(|index| values[index] = Some(excess(grid[index])));
         // What does not concern this flight leaves it as it is, whatever the number.
-        if grid.len() > 4
-            && matches!(
-                [grid[0], grid[grid.len() / 3], grid[grid.len() - 1]].map(&excess),
-                [Some(a), Some(b), Some(c)] if a == b && b == c
-            )
-        {
-            return fitting;
+        let is_moved = ends().any(|index| values[index] != values[0]);
+        if grid.len() > 1 && !is_moved {
+            return None;
         }
-        let values: Vec<_> = grid.iter().map(|number| excess(*number)).collect();
-        for (index, number) in grid.iter().enumerate() {
-            if values[index].is_some_and(|excess| self.is_near(excess, mask)) {
+        let crosses = |low: [f64; 3], high: [f64; 3]| (0..3).filter(move |i| mask[*i] && low[*i] * high[*i] < 0.0);
+        if !is_discrete {
+            // Finer between those where a quantity passes the answer, or where no flight is known.
+            let bounds: Vec<usize> = ends().collect();
+            for pair in bounds.windows(2) {
+                let is_passed = match (values[pair[0]].flatten(), values[pair[1]].flatten()) {
+                    (Some(low), Some(high)) => crosses(low, high).next().is_some(),
+                    (None, None) => false,
+                    _ => true,
+                };
+                if is_passed {
+                    (pair[0] + 1..pair[1]).for_each(|index| values[index] = Some(excess(grid[index])));
+                }
+            }
+        }
+        let known: Vec<(f64, [f64; 3])> =
+            grid.iter().zip(&values).filter_map(|(number, value)| Some((*number, value.flatten()?))).collect();
+        for (number, excess) in &known {
+            if self.is_near(*excess, mask) {
                 add(*number);
             }
         }
-        if matches!(hypothesis.parameter, Parameter::Choice(_) | Parameter::OneOf(_)) {
-            return fitting;
+        if is_discrete {
+            return Some(fitting);
         }
-        for index in 1..grid.len() {
-            let (Some(low), Some(high)) = (values[index - 1], values[index]) else { continue };
+        for pair in known.windows(2) {
+            let [(low_number, low), (high_number, high)] = [pair[0], pair[1]];
             // The number is a root in every quantity that it moves: the one that it moves most tells.
             let moves = |i: &usize| (high[*i] - low[*i]).abs();
-            let crossing = (0..3).filter(|i| mask[*i] && low[*i] * high[*i] < 0.0);
-            if let Some(quantity) = crossing.max_by(|a, b| moves(a).total_cmp(&moves(b))) {
-                let ends = (grid[index - 1], low[quantity], grid[index], high[quantity]);
+            if let Some(quantity) = crosses(low, high).max_by(|a, b| moves(a).total_cmp(&moves(b))) {
+                let ends = (low_number, low[quantity], high_number, high[quantity]);
                 if let Some(root) = root(ends, |number| Some(excess(number)?[quantity])) {
                     add(root);
                 }
             }
         }
-        fitting
+        Some(fitting)
     }
+}
+
+/// Whether a number of its own in every answer moves one number of that answer alone: that proves little.
+fn is_of_one_number(fault: &Hypothesis) -> bool {
+    fault.id.starts_with("event-time") || fault.id == "velocity-stale"
 }
 
 /// A root of `g` between two numbers at which its signs differ.
@@ -234,8 +264,8 @@ fn rounded(number: f64) -> impl Iterator<Item = f64> {
 #[derive(Clone, Debug)]
 struct Explanation {
     faults: Vec<(&'static Hypothesis, f64)>,
-    /// Failing answers explained.
-    explained: Vec<bool>,
+    /// Whether each failing answer is explained; `None` where what the faults give cannot be computed.
+    explained: Vec<Option<bool>>,
     /// Failing answers explained that differ from the right ones.
     told_apart: usize,
     /// Passing answers that it would have failed.
@@ -245,11 +275,12 @@ struct Explanation {
 
 impl Explanation {
     fn count(&self) -> usize {
-        self.explained.iter().filter(|is| **is).count()
+        self.explained.iter().filter(|is| **is == Some(true)).count()
     }
 
+    /// Whether it explains every answer that it can, and there is something to explain.
     fn is_full(&self) -> bool {
-        self.contradicted == 0 && self.explained.iter().all(|is| *is) && self.told_apart > 0
+        self.contradicted == 0 && self.told_apart > 0 && self.explained.iter().all(|is| *is != Some(false))
     }
 
     fn freedom(&self) -> u32 {
@@ -277,11 +308,19 @@ impl Evidence<'_> {
         let mut told_apart = 0;
         let mut explained = Vec::with_capacity(self.failing.len());
         for seen in &self.failing {
-            let number = if is_per_answer { seen.fit(hypothesis, others, mask).first().copied() } else { Some(number) };
+            let fitted = || seen.fit(hypothesis, others, mask)?.first().copied();
+            let number = if is_per_answer { fitted() } else { Some(number) };
             let faults: Option<Vec<_>> =
                 number.map(|number| others.iter().copied().chain([(hypothesis, number)]).collect());
             let found = faults.as_ref().and_then(|faults| Some((seen.explained_by(faults, mask)?, faults)));
-            explained.push(found.is_some());
+            // A stiff flight may take more steps than a simulation has.
+            let is_open =
+                |faults: &Vec<Fault<'_>>| seen.is_stiff() && predict(seen.question, faults, seen.how).is_none();
+            explained.push(if found.is_none() && faults.as_ref().is_some_and(is_open) {
+                None
+            } else {
+                Some(found.is_some())
+            });
             if let Some((difference, faults)) = found {
                 largest = largest.max(difference);
                 told_apart += usize::from(seen.is_misnamed || seen.is_told_apart(faults));
@@ -307,14 +346,29 @@ impl Evidence<'_> {
         mask: Mask,
     ) -> Option<Explanation> {
         let fitted = if others.is_empty() { FITTED } else { FITTED_OF_SECOND };
+        // Those that meet least, and some of all.
+        let step = (unexplained.len() / TRIED).max(1);
+        let spread = unexplained.iter().skip(TRIED).step_by(step).take(TRIED);
+        let sample: Vec<usize> = unexplained.iter().take(TRIED).chain(spread).copied().collect();
+        let needed = if sample.len() > TRIED { 2 } else { 1 };
         if hypothesis.parameter.is_per_answer() {
-            let is_tried = |index: &&usize| !self.failing[**index].fit(hypothesis, others, mask).is_empty();
-            let any = unexplained.iter().take(fitted).any(|index| is_tried(&index));
-            return any.then(|| self.explain(hypothesis, 1.0, others, mask)).filter(|found| found.count() > 0);
+            let is_fitted =
+                |index: &&usize| self.failing[**index].fit(hypothesis, others, mask).is_some_and(|all| !all.is_empty());
+            let some = sample.iter().take(fitted).filter(is_fitted).count();
+            return (some >= needed.min(fitted / 2))
+                .then(|| self.explain(hypothesis, 1.0, others, mask))
+                .filter(|found| found.count() > 0);
         }
         let mut numbers: Vec<f64> = Vec::new();
+        let mut unfitted = 0;
         for index in unexplained.iter().take(fitted) {
-            for number in self.failing[*index].fit(hypothesis, others, mask) {
+            let Some(fitting) = self.failing[*index].fit(hypothesis, others, mask) else { continue };
+            unfitted += usize::from(fitting.is_empty());
+            // What changes three answers and explains none explains few.
+            if unfitted > 2 && numbers.is_empty() {
+                return None;
+            }
+            for number in fitting {
                 if numbers.iter().all(|known| (known - number).abs() > 1e-12 * number.abs()) {
                     numbers.push(number);
                 }
@@ -323,10 +377,13 @@ impl Evidence<'_> {
         let tried = |number: f64| {
             let faults: Vec<_> = others.iter().copied().chain([(hypothesis, number)]).collect();
             let explained = |index: &&usize| self.failing[**index].explained_by(&faults, mask).is_some();
-            unexplained.iter().take(TRIED).filter(explained).count()
+            sample.iter().filter(explained).count()
         };
         let all = numbers.into_iter().flat_map(rounded);
-        let number = all.map(|number| (tried(number), number)).max_by_key(|(count, _)| *count)?.1;
+        let (count, number) = all.map(|number| (tried(number), number)).max_by_key(|(count, _)| *count)?;
+        if count < needed {
+            return None;
+        }
         Some(self.explain(hypothesis, number, others, mask)).filter(|found| found.count() > 0)
     }
 }
@@ -347,8 +404,8 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
         failing: seen.iter().filter(|seen| seen.fails).collect(),
         passing: seen.iter().filter(|seen| !seen.fails).collect(),
     };
-    // What meets least says most.
-    evidence.failing.sort_by_key(|seen| seen.question.contains.len());
+    // What meets least says most; a stiff flight takes the longest.
+    evidence.failing.sort_by_key(|seen| (seen.is_stiff(), seen.question.contains.len()));
     let of = evidence.failing.len();
     if of == 0 {
         return Vec::new();
@@ -375,10 +432,15 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
     }
     // What explains a few answers by its freedom explains nothing.
     found.retain(|explanation| explanation.contradicted == 0 && 4 * explanation.told_apart >= of);
-    found.sort_by_key(|explanation| (of - explanation.count(), explanation.freedom()));
+    let is_of_nearly_all = |found: &Explanation| found.count() * 10 >= of * 9 && found.count() >= CERTAIN_FROM;
+    // Of those that explain nearly all the one of least freedom says most.
+    found.sort_by_key(|found| {
+        let nearly_all = is_of_nearly_all(found);
+        (!nearly_all, if nearly_all { found.freedom() } else { 0 }, of - found.count(), found.freedom())
+    });
     let mut causes: Vec<Cause> = Vec::new();
     for explanation in found.iter().take(LISTED) {
-        let nearly_all = explanation.count() * 10 >= of * 9 && explanation.count() >= CERTAIN_FROM;
+        let nearly_all = is_of_nearly_all(explanation);
         let certainty = if nearly_all { Certainty::Likely } else { Certainty::Possible };
         causes.extend(explanation.faults.iter().map(|fault| cause(*fault, explanation, certainty)));
     }
@@ -425,10 +487,10 @@ fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], o
     };
     let is_alone = rivals.iter().all(|rival| is_same(&rival));
     // One number fitted to one number proves nothing.
-    let by_time_alone = first.faults.iter().any(|(fault, _)| fault.id.starts_with("event-time"));
+    let is_of_one = first.faults.iter().any(|(fault, _)| is_of_one_number(fault));
     let is_enough = first.told_apart >= if evidence.passing.is_empty() { 2 * CERTAIN_FROM } else { CERTAIN_FROM };
     let is_rounding = first.faults.iter().any(|(fault, _)| matches!(fault.parameter, Parameter::Nearness));
-    let is_certain = is_alone && !by_time_alone && !is_rounding && is_enough;
+    let is_certain = is_alone && !is_of_one && !is_rounding && is_enough;
     let certainty = if is_certain { Certainty::Certain } else { Certainty::Likely };
     let mut causes: Vec<Cause> = Vec::new();
     // Those that cannot be told apart are one cause.
@@ -470,7 +532,7 @@ fn pairs(evidence: &Evidence<'_>, usable: &[&'static Hypothesis], singles: &[Exp
         firsts.iter().filter(|(single, _)| !single.faults[0].0.parameter.is_per_answer()).take(FIRST_OF_TWO)
     {
         let missing: Vec<usize> = if *mask == ALL_THREE {
-            first.explained.iter().enumerate().filter_map(|(index, is)| (!is).then_some(index)).collect()
+            first.explained.iter().enumerate().filter_map(|(index, is)| (*is == Some(false)).then_some(index)).collect()
         } else {
             (0..of).collect()
         };

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::exchange::peers::wire::PeerScene;
 use crate::integrators::Flight;
-use crate::physics::{CraterStiffness, Outcome, Problem, Resistance, Scene, Stage};
+use crate::physics::{CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, Stage};
 use crate::studies::edge_problems::{Case, cases};
 use crate::studies::error::{Truth, conditions_in_dual_numbers};
 use crate::studies::random::Random;
@@ -15,6 +15,8 @@ use crate::studies::random_scenes::Generator;
 const CONDITION_MAX: f64 = 1e3;
 /// Largest condition number where the exit is grazed.
 const CONDITION_AT_GRAZING: f64 = 1e6;
+/// Distance from the end of a stage, relative to the depth, within which a flight ends on its border.
+const BORDER: f64 = 1e-7;
 /// Draws for one question at most.
 const DRAWS_MAX: usize = 200;
 /// Relative distance from rest within which an exit is grazed.
@@ -109,6 +111,12 @@ impl Question {
         };
         let is_usable = exact.outcome != Outcome::Undecided && conditions.iter().all(|condition| *condition <= allowed);
         is_usable.then_some(Self { id, problem, scene, exact, contains, conditions })
+    }
+
+    /// Whether the flight ends so near the end of a stage that a fault there decides it by round-off.
+    pub(super) fn is_on_a_border(&self) -> bool {
+        let depth = self.exact.end.depth;
+        self.problem.stages.iter().any(|law| law.end != depth && (law.end - depth).abs() <= BORDER * depth)
     }
 
     /// The scene as a peer is told of it.
@@ -397,10 +405,16 @@ pub(super) fn edge_questions() -> Vec<Question> {
 /// `scene` with groups of a usual range, and in half of the cases with S left to Eq. 14.
 fn varied(mut scene: Scene, random: &mut Random) -> Scene {
     let leaves_static_factor = random.chance(0.5);
+    let asks_ndrc = random.chance(0.25);
     if let Resistance::Concrete(concrete) = &mut scene.resistance {
         // N* B below one, so that neither is mistaken for the other's absence.
         concrete.inertia_factor = random.uniform(0.5, 1.5);
         concrete.crater_ratio = random.uniform(0.5, 4.0);
+        // Some by the criterion that lays the exit before the far side.
+        if let Some(thickness) = scene.thickness.filter(|_| asks_ndrc) {
+            scene.criterion = Criterion::Ndrc;
+            scene.thickness = Some(thickness.max(concrete.diameter));
+        }
         if leaves_static_factor {
             concrete.follows_eq14 = true;
             concrete.static_factor = crate::physics::semi_empirical::static_factor(concrete.strength);

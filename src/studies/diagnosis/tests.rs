@@ -109,13 +109,13 @@ fn a_right_solver_is_sound_and_has_no_cause() {
         let plan = Plan { seed, ..Plan::default() };
         let found = diagnose(&mut Faulty::new(Vec::new(), plan), plan, &|_, _| {});
         assert_eq!(found.verdict, Verdict::Passed);
-        assert_eq!((found.counts.asked, found.causes.len()), (200, 0));
+        assert!(found.counts.asked > 200 && found.causes.is_empty());
     }
 }
 
 #[test]
 fn every_fault_that_is_known_is_named() {
-    let plan = Plan { questions: 60, ..Plan::default() };
+    let plan = Plan { questions: 60, asks_edges: false, ..Plan::default() };
     let is_tried = |hypothesis: &&Hypothesis| {
         hypothesis.id != "outcome-name" && !matches!(hypothesis.parameter, Parameter::Choice(_))
     };
@@ -186,10 +186,11 @@ fn a_fault_that_no_hypothesis_knows_is_found_and_not_named_with_certainty() {
     let faults: [fn(&mut Problem); 3] = [
         |problem| problem.stages.iter_mut().filter(|law| law.static_force < 0.0).for_each(|law| law.drag = 0.0),
         |problem| problem.stages.iter_mut().filter(|law| law.viscosity < 1.0).for_each(|law| law.viscosity = 0.0),
-        |problem| problem.exit_depth -= 1e-6,
+        |problem| problem.stages[0].static_force *= 1.0 + 1e-3 * problem.impact_speed,
     ];
     for fault in faults {
-        let found = diagnose(&mut Strange(fault), Plan::default(), &|_, _| {});
+        let plan = Plan { asks_edges: false, ..Plan::default() };
+        let found = diagnose(&mut Strange(fault), plan, &|_, _| {});
         assert_eq!(found.verdict, Verdict::Failed);
         let is_certain = |cause: &Cause| cause.certainty == Certainty::Certain;
         assert!(!found.causes.iter().any(is_certain), "{:?}", found.causes);
@@ -256,5 +257,16 @@ fn a_fault_in_a_scheme_of_fixed_steps_is_named_with_its_factor() {
         let cause = &found.causes[0];
         assert_eq!((cause.id.as_str(), cause.certainty), ("term:drag", Certainty::Certain), "{:?}", found.causes);
         assert!((cause.factor.unwrap() - 2.0).abs() < 1e-6, "{cause:?}");
+    }
+}
+
+#[test]
+fn every_cause_has_its_row_in_the_reference() {
+    let reference = include_str!("../../../docs/reference.md");
+    for hypothesis in hypotheses() {
+        // Parameters stand in one row, the first with its prefix.
+        let id = hypothesis.id.strip_prefix("parameter:").unwrap_or(hypothesis.id);
+        let is_there = reference.contains(&format!("`{id}`")) || reference.contains(&format!("`parameter:{id}`"));
+        assert!(is_there, "{}", hypothesis.id);
     }
 }

@@ -1,0 +1,291 @@
+//! Faults of a solver that reads the physical scene: its parameters, and what is formed of them.
+
+use super::{Change, GRAINS, Hypothesis, Parameter, of, to_grain};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, Scene, Stage};
+
+/// The same of strengths (Pa).
+const STRENGTHS: &[f64] = &[1e3, 1e4, 1e5, 1e6, 1e7];
+
+fn concrete(scene: &mut Scene, alter: impl FnOnce(&mut Concrete)) {
+    if let Resistance::Concrete(concrete) = &mut scene.resistance {
+        alter(concrete);
+    }
+}
+
+/// The tunnel of a scene, its impact speed and its mass.
+fn set_crater(scene: &mut Scene, stiffness: impl FnOnce(&Stage, f64, f64, f64) -> f64) {
+    let Ok(problem) = scene.problem() else { return };
+    let (depth, tunnel) = problem.crater_depth_and_tunnel();
+    concrete(scene, |concrete| {
+        if concrete.crater_stiffness == CraterStiffness::Continuous && depth > 0.0 {
+            let stiffness = stiffness(&tunnel, depth, problem.impact_speed, problem.mass);
+            concrete.crater_stiffness = CraterStiffness::Given(stiffness);
+        }
+    });
+}
+
+fn scale_area(scene: &mut Scene, factor: f64) {
+    concrete(scene, |concrete| {
+        concrete.density *= factor;
+        concrete.static_factor *= factor;
+    });
+}
+
+fn scale_static_factor(scene: &mut Scene, factor: f64, is_meant: impl Fn(&Concrete) -> bool) {
+    concrete(scene, |concrete| {
+        if is_meant(concrete) {
+            concrete.static_factor *= factor;
+        }
+    });
+}
+/// Faults of parameters.
+pub(super) static FAULTS: &[Hypothesis] = &[
+    of(
+        "input-rounded",
+        "the density is rounded to a multiple of {} kg/m³",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, grain| concrete(s, |c| c.density = to_grain(c.density, grain)))],
+    ),
+    of(
+        "input-rounded",
+        "the strength is rounded to a multiple of {} Pa",
+        Parameter::OneOf(STRENGTHS),
+        &[Change::Scene(|s, grain| {
+            concrete(s, |c| {
+                let rounded = to_grain(c.strength, grain);
+                if c.follows_eq14 {
+                    c.static_factor = crate::physics::semi_empirical::static_factor(rounded);
+                }
+                c.strength = rounded;
+            });
+        })],
+    ),
+    of(
+        "input-rounded",
+        "the diameter is rounded to a multiple of {} m",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, grain| concrete(s, |c| c.diameter = to_grain(c.diameter, grain)))],
+    ),
+    of(
+        "parameter:diameter",
+        "the diameter is {} times the right one",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| concrete(s, |c| c.diameter *= f))],
+    ),
+    of(
+        "parameter:area",
+        "the area pi d²/4 is {} times the right one (4 is pi d²)",
+        Parameter::Factor,
+        &[Change::Scene(scale_area)],
+    ),
+    of(
+        "parameter:density",
+        "density, nose factor or B, which act as one product, is {} times the right one",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| concrete(s, |c| c.density *= f))],
+    ),
+    of(
+        "parameter:nose-factor",
+        "the nose factor is left out: N* = 1",
+        Parameter::None,
+        &[Change::Scene(|s, _| concrete(s, |c| c.nose_factor = 1.0))],
+    ),
+    of(
+        "parameter:nose-factor",
+        "the nose factor enters as N*^{}",
+        Parameter::Exponent,
+        &[Change::Scene(|s, n| {
+            concrete(s, |c| {
+                c.density *= c.nose_factor.powf(n - 1.0);
+            });
+        })],
+    ),
+    of(
+        "parameter:B",
+        "B is left out: B = 1",
+        Parameter::None,
+        &[Change::Scene(|s, _| concrete(s, |c| c.inertia_factor = 1.0))],
+    ),
+    of(
+        "parameter:B",
+        "B enters as B^{}",
+        Parameter::Exponent,
+        &[Change::Scene(|s, n| concrete(s, |c| c.inertia_factor = c.inertia_factor.powf(n)))],
+    ),
+    of(
+        "parameter:strength",
+        "the strength is {} times the right one, in Eq. 14 too",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| {
+            concrete(s, |c| {
+                c.strength *= f;
+                if c.follows_eq14 {
+                    c.static_factor /= f.abs().sqrt();
+                }
+            });
+        })],
+    ),
+    of(
+        "parameter:S",
+        "S, or the strength it multiplies, is {} times the right one",
+        Parameter::Unit,
+        &[Change::Scene(|s, f| scale_static_factor(s, f, |_| true))],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 is {} times the right one; 0.001 is a strength in Pa",
+        Parameter::Unit,
+        &[Change::Scene(|s, f| scale_static_factor(s, f, |c| c.follows_eq14))],
+    ),
+    of(
+        "parameter:S",
+        "S is {} times the right one where it is stated",
+        Parameter::Unit,
+        &[Change::Scene(|s, f| scale_static_factor(s, f, |c| !c.follows_eq14))],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 holds (fc/MPa)^{}, not ^-0.5",
+        Parameter::Exponent,
+        &[Change::Scene(|s, n| {
+            concrete(s, |c| {
+                if c.follows_eq14 {
+                    c.static_factor *= (1e-6 * c.strength).powf(0.5 - n);
+                }
+            });
+        })],
+    ),
+    of(
+        "parameter:S",
+        "a stated S is ignored: Eq. 14 is used",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            concrete(s, |c| {
+                c.static_factor = crate::physics::semi_empirical::static_factor(c.strength);
+            });
+        })],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 is that of another formula: 82.6 (fc/MPa)^-0.544",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            concrete(s, |c| {
+                if c.follows_eq14 {
+                    c.static_factor = 82.6 * (1e-6 * c.strength).powf(-0.544);
+                }
+            });
+        })],
+    ),
+    of(
+        "parameter:S",
+        "S is always {}",
+        Parameter::Value,
+        &[Change::Scene(|s, value| concrete(s, |c| c.static_factor = value))],
+    ),
+    of(
+        "parameter:density",
+        "the density is always {} kg/m³",
+        Parameter::Value,
+        &[Change::Scene(|s, value| concrete(s, |c| c.density = value))],
+    ),
+    of(
+        "parameter:nose-factor",
+        "the nose factor is always {}",
+        Parameter::Value,
+        &[Change::Scene(|s, value| concrete(s, |c| c.nose_factor = value))],
+    ),
+    of(
+        "parameter:k",
+        "k is always {}",
+        Parameter::Value,
+        &[Change::Scene(|s, value| concrete(s, |c| c.crater_ratio = value))],
+    ),
+    of(
+        "parameter:k",
+        "k is {} times the right one",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| concrete(s, |c| c.crater_ratio *= f))],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "the crater stiffness c is {} times the right one",
+        Parameter::Factor,
+        &[Change::Problem(|p, f| {
+            if let Some(crater) = p.crater {
+                p.stages[crater].stiffness *= f;
+            }
+        })],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "a stated crater stiffness is ignored: the continuous one is used",
+        Parameter::None,
+        &[Change::Scene(|s, _| concrete(s, |c| c.crater_stiffness = CraterStiffness::Continuous))],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is continued with the impact speed: c = (P + Q V0²)/(k d)",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            set_crater(s, |tunnel, depth, speed, _| (tunnel.static_force + tunnel.drag * speed * speed) / depth);
+        })],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is P/(k d) where the continuous one means rest in the crater",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            set_crater(s, |tunnel, depth, speed, mass| {
+                let right = Stage::continuous_crater(depth, tunnel, mass, speed).stiffness;
+                if right * depth >= tunnel.static_force { right } else { tunnel.static_force / depth }
+            });
+        })],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is that without drag: c = P/(k d)",
+        Parameter::None,
+        &[Change::Scene(|s, _| set_crater(s, |tunnel, depth, _, _| tunnel.static_force / depth))],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is continued with a wrong sign: M (P + Q V0²)/(k d (M - k d Q))",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            set_crater(s, |tunnel, depth, speed, mass| {
+                (tunnel.static_force + tunnel.drag * speed * speed) / (1.0 - depth * tunnel.drag / mass) / depth
+            });
+        })],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is continued without V0: c = M P/(k d (M + k d Q))",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            set_crater(s, |tunnel, depth, _, mass| tunnel.static_force / (1.0 + depth * tunnel.drag / mass) / depth);
+        })],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is {} times the continuous one where none is stated",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| {
+            set_crater(s, |tunnel, depth, speed, mass| {
+                f * Stage::continuous_crater(depth, tunnel, mass, speed).stiffness
+            });
+        })],
+    ),
+    of(
+        "parameter:criterion",
+        "the criterion is ignored: the exit is the far side",
+        Parameter::None,
+        &[Change::Scene(|s, _| s.criterion = Criterion::FullDepth)],
+    ),
+    of(
+        "parameter:criterion",
+        "the criterion is always ndrc",
+        Parameter::None,
+        &[Change::Scene(|s, _| s.criterion = Criterion::Ndrc)],
+    ),
+];
