@@ -10,6 +10,7 @@
 //! ```
 
 use std::borrow::Cow;
+use std::fmt::Write as _;
 
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
@@ -90,6 +91,21 @@ impl<'a> Page<'a> {
         Self { title, outcome, subject: html! {}, purpose, environment: &run.environment, parts, files }
     }
 
+    /// The margins of paper: what was judged, what it came to and by which program above, the page below.
+    fn margins(&self) -> String {
+        let [head, program] = [
+            format!("{}: {}", self.title, self.outcome),
+            format!("penetrode {}, {}", self.environment.version, self.environment.commit),
+        ]
+        .map(|text| css_string(&text));
+        let font = "font:9px system-ui,sans-serif;color:#5a6470";
+        format!(
+            "@page{{size:A4;margin:18mm 15mm 16mm;@top-left{{content:{head};{font};width:70%}}\
+             @top-right{{content:{program};{font}}}\
+             @bottom-right{{content:\"page \" counter(page) \" of \" counter(pages);{font}}}}}"
+        )
+    }
+
     pub(super) fn to_html(&self) -> String {
         let (e, parts) = (self.environment, &self.parts);
         let page = html! {
@@ -104,7 +120,7 @@ impl<'a> Page<'a> {
                     meta name="color-scheme" content="light dark";
                     link rel="icon" href="data:,";
                     title { (self.title) ": " (self.outcome) }
-                    style { (PreEscaped(Ink::style_sheet())) (PreEscaped(include_str!("page.css"))) }
+                    style { (PreEscaped(Ink::style_sheet())) (PreEscaped(include_str!("page.css"))) (PreEscaped(self.margins())) }
                 }
                 body {
                     @if let Some(first) = parts.first() { a.skip href={ "#" (first.id) } { "Skip to: " (first.title) } }
@@ -136,6 +152,20 @@ impl<'a> Page<'a> {
         };
         page.into_string()
     }
+}
+
+/// `text` as a string of CSS inside a page, 80 characters at most: whatever could end the string or the sheet is written
+/// as its number.
+fn css_string(text: &str) -> String {
+    let mut quoted = "\"".to_owned();
+    for c in one_line(text).chars().take(80) {
+        if c.is_alphanumeric() || " .,:-".contains(c) {
+            quoted.push(c);
+        } else {
+            let _ = write!(quoted, "\\{:x} ", u32::from(c));
+        }
+    }
+    quoted + "\""
 }
 
 /// A slot that the pages of all judged suites share; another is shown by its name, which a test excludes.
@@ -443,4 +473,15 @@ pub(super) fn suite_inputs(e: &Environment) -> Vec<(&'static str, Markup)> {
     list.extend(e.suite_hash.iter().map(|hash| ("Suite (BLAKE3)", code(hash))));
     list.push(("Scenes (BLAKE3)", code(&e.scenes_hash)));
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::css_string;
+
+    #[test]
+    fn nothing_ends_a_string_of_the_style_sheet() {
+        assert_eq!(css_string("a \"b\\</style>"), r#""a \22 b\5c \3c \2f style\3e ""#);
+        assert_eq!(css_string(&"\u{202e}x".repeat(200)).matches('x').count(), 40);
+    }
 }

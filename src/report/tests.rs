@@ -222,7 +222,12 @@ fn an_empty_run_has_a_report() {
     let html = files(&suite, &[]).into_iter().find(|(name, _)| name == "report.html").unwrap().1;
     assert!(html.contains("Nothing was decided"));
     // A slot without contents of that name would be shown as it is written.
-    assert_eq!(html.lines().filter(|line| line.starts_with('@') && !line.starts_with("@media")).count(), 0);
+    assert_eq!(
+        html.lines()
+            .filter(|line| line.starts_with('@') && !line.starts_with("@media") && !line.starts_with("@page"))
+            .count(),
+        0
+    );
 }
 
 #[test]
@@ -234,4 +239,22 @@ fn a_report_that_cannot_be_made_is_refused_before_the_work() {
     assert!(matches!(error, folder::FolderError::Write { .. }), "{error}");
     folder::check(&place.path().join("a/b/report"), "verify").unwrap();
     assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn the_largest_error_is_read_first() {
+    let mut suite = Suite::embedded().unwrap();
+    suite.claims.retain(|claim| claim.id.starts_with("agreement/taylor"));
+    let mut judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::default(), program: None }, &|_| ());
+    let first_screen = |judged: &[Judged]| {
+        let page = files(&suite, judged).into_iter().find(|(name, _)| name == "report.html").unwrap().1;
+        let head = page.split("<nav").next().unwrap();
+        head[head.find("<body").unwrap()..].to_owned()
+    };
+    assert!(first_screen(&judged).contains("the scene fixes this quantity"));
+    let planted = judged.iter().position(|j| j.measured.is_some()).unwrap();
+    for (error, shown) in [(0.25, "<b>0.25</b>"), (f64::NAN, "<b>not a number</b>")] {
+        judged[planted].measured = Some(error);
+        assert!(first_screen(&judged).contains(shown), "{}", first_screen(&judged));
+    }
 }

@@ -3,6 +3,7 @@
 use maud::{Markup, Render, html};
 
 use super::cells;
+use super::chart::extremes;
 use super::figure::Figure;
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
@@ -13,7 +14,7 @@ use crate::physics::groups::Groups;
 use crate::studies::experiments;
 use crate::studies::sweep::{WHY, explanation};
 use crate::studies::{Path, Quantity, Stretch, formal_order};
-use crate::suite::checks::{Order, StepPattern};
+use crate::suite::checks::{FIXED, Order, StepPattern};
 use crate::suite::{
     Check, Counts, Evidence, Judged, LOOSENESS_MAX, SeededFault, grouped, looseness, seeded_faults, skipped,
 };
@@ -32,6 +33,8 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
         "layered-claims" => layered_claims(run),
         "faults" if run.suite.is_embedded => faults(),
         "faults" => html! {},
+        "headline" => headline(run.judged),
+        "why-skipped" => why_skipped(run.judged),
         "deviations" => deviations(run.judged),
         _ => slot(run, figures, name, words),
     };
@@ -39,7 +42,108 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
     let files = html! {
         a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", " a href="summary.md" { "Markdown" }
     };
-    Page::of_run(run, purpose, include_str!("pages/verify.txt"), &filled, files).to_html()
+    let page = Page::of_run(run, purpose, include_str!("pages/verify.txt"), &filled, files);
+    Page { subject: subject(run), ..page }.to_html()
+}
+
+/// What was judged, and how widely.
+fn subject(run: &Run<'_>) -> Markup {
+    let scenes = grouped(run.judged.iter().filter_map(|judged| judged.claim.scene.as_deref()), |scene| *scene).len();
+    let methods = grouped(run.judged.iter().filter_map(|judged| judged.claim.method), |method| *method).into_iter();
+    let methods: Vec<_> = methods.map(|(method, _)| method.name()).collect();
+    let programs = grouped(peers(run.judged), |(name, ..)| *name).len();
+    html! {
+        "Judged: penetrode " (run.environment.version)
+        @if !methods.is_empty() { ", its " (if methods.len() == 1 { "method " } else { "methods " }) (methods.join(", ")) }
+        ", by " (count(run.judged.len(), "claim")) " on " (count(scenes, "scene"))
+        @if programs > 0 { ", and beside " (count(programs, "other program")) } "."
+    }
+}
+
+/// The claims that compare with another program: its name, the difference, and the claim.
+fn peers(judged: &[Judged]) -> impl Iterator<Item = (&str, f64, &Judged)> {
+    judged.iter().filter_map(|judged| match (&judged.claim.check, judged.measured) {
+        (Check::Peer(peer), Some(measured)) => Some((peer.name.as_str(), measured, judged)),
+        _ => None,
+    })
+}
+
+/// The numbers that are read first: errors against the exact answer, orders, and other programs.
+fn headline(judged: &[Judged]) -> Markup {
+    let exact = |is_critical: bool| {
+        let is_of = move |j: &&Judged| {
+            let is_of_critical = j.claim.quantity == Some(Quantity::CriticalVelocity);
+            matches!(j.claim.check, Check::Agreement(_)) && is_of_critical == is_critical
+        };
+        let errors = judged.iter().filter(is_of).filter_map(|j| Some((j.claim.method?, j.measured?)));
+        let mut methods: Vec<(MethodName, f64)> = grouped(errors, |(method, _)| *method)
+            .into_iter()
+            .filter_map(|(method, errors)| Some((method, errors.into_iter().map(|(_, e)| e).max_by(f64::total_cmp)?)))
+            .collect();
+        methods.sort_by(|a, b| b.1.total_cmp(&a.1));
+        methods
+    };
+    let error = |label: &str, methods: &[(MethodName, f64)]| {
+        let (worst, best) = (methods.first()?, methods.last()?);
+        let note = html! {
+            "relative to the exact answer and its conditioning, by " (worst.0.name())
+            @if worst.0 != best.0 { "; " (best.0.name()) ": " (number(best.1, 2)) }
+        };
+        Some((label.to_owned(), number(worst.1, 2), note))
+    };
+    let orders = || {
+        let is_order = |j: &&Judged| matches!(j.claim.check, Check::Order(_));
+        let fits = judged.iter().filter(is_order).filter_map(fit_of);
+        let mut fits: Vec<_> = fits.filter_map(|(formal, fit)| Some((formal, fit.line?.order))).collect();
+        fits.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let number_of_fits = fits.len();
+        let groups = grouped(fits, |(formal, _)| *formal);
+        let formal: Vec<_> = groups.iter().map(|(formal, _)| number(*formal, 2)).collect();
+        let ranges = groups.iter().filter_map(|(_, fits)| extremes(fits.iter().map(|(_, order)| *order)));
+        let ranges: Vec<_> = ranges.map(|[low, high]| format!("{low:.2} to {high:.2}")).collect();
+        let note = html! {
+            "observed in " (count(number_of_fits, "fit")) "; formal: " (formal.join(", "))
+        };
+        (!ranges.is_empty()).then(|| ("Orders in the step".to_owned(), ranges.join(", "), note))
+    };
+    let others = || {
+        let (name, worst, claim) = peers(judged).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let programs = grouped(peers(judged), |(name, ..)| *name).len();
+        let note = html! {
+            "of the tolerance, " (one_line(name)) "; limit " (number(claim.claim.limit, 2)) "; " (count(programs, "program"))
+        };
+        Some(("Farthest from another program".to_owned(), number(worst, 2), note))
+    };
+    let shown = [
+        error("Largest error of the solvers", &exact(false)),
+        error("Largest error of V_c", &exact(true)),
+        orders(),
+        others(),
+    ];
+    let shown: Vec<_> = shown.into_iter().flatten().collect();
+    html! { @if !shown.is_empty() { ul.counts.headline {
+        @for (label, value, note) in shown { li { span.quiet { (label) } b { (value) } span.quiet { (note) } } }
+    } } }
+}
+
+/// Why claims were skipped, in a line: the two reasons of most claims, and how many have another.
+fn why_skipped(judged: &[Judged]) -> Markup {
+    let mut reasons = skipped(judged);
+    // Stable: among equals the first that occurred.
+    reasons.sort_by_key(|(_, claims)| std::cmp::Reverse(*claims));
+    let (named, others) = reasons.split_at(reasons.len().min(2));
+    let others: usize = others.iter().map(|(_, claims)| claims).sum();
+    html! { @if !named.is_empty() { p.quiet {
+        "Skipped: "
+        @for (index, (reason, claims)) in named.iter().enumerate() {
+            @if index > 0 { "; " }
+            (one_line(reason))
+            @if *reason == FIXED { ", as it does the speed at rest and the depth at the exit" }
+            " (" (claims) ")"
+        }
+        @if others > 0 { "; " a href="#deviations" { "other reasons" } " (" (others) ")" }
+        "."
+    } } }
 }
 
 /// Methods that this build leaves out, and for what it was built.

@@ -274,7 +274,7 @@ fn refusal_or_failure(error: impl Advice) -> NotMeasured {
 }
 
 /// Why a claim about a quantity is skipped.
-const FIXED: &str = "the scene fixes this quantity";
+pub const FIXED: &str = "the scene fixes this quantity";
 const NO_FAR_SIDE: &str = "a target without a far side has no critical velocity";
 
 /// Relative difference of `value` from `exact`.
