@@ -311,13 +311,15 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
     let behind: Vec<&Judged> =
         scenes.iter().flat_map(|(_, members)| members.iter().map(|(judged, _)| *judged)).collect();
     let panel = |(scene, members): (&str, Vec<&(&Judged, &[Point])>)| {
-        let mut limits: Vec<f64> = members.iter().map(|(judged, _)| judged.claim.limit).collect();
-        limits.sort_by(f64::total_cmp);
-        limits.dedup();
-        let residuals =
-            Axis::log("|residual| / (M V₀²/2)", "").from(LEAST).including(limits.iter().copied().chain([0.0]));
+        let limits = grouped(&members, |(judged, _)| judged.claim.limit);
+        let values = limits.iter().map(|(limit, _)| *limit);
+        let residuals = Axis::log("|residual| / (M V₀²/2)", "").from(LEAST).including(values.chain([0.0]));
         let panel = Panel::new(format!("scene {scene}"), Axis::linear("depth", "mm").including([0.0]), residuals);
-        let panel = limits.into_iter().fold(panel, |panel, limit| panel.slope("limit", 0.0, (0.0, limit)));
+        let panel = limits.into_iter().fold(panel, |panel, (limit, members)| {
+            let methods = grouped(members, |(judged, _)| judged.claim.method.unwrap_or_default().name());
+            let methods: Vec<_> = methods.into_iter().map(|(name, _)| name).collect();
+            panel.slope(format!("limit, {}", methods.join(", ")), 0.0, (0.0, limit))
+        });
         members.into_iter().enumerate().fold(panel, |panel, (index, (judged, points))| {
             let points = points.iter().map(|(x, r)| (x * 1e3, r.abs()));
             panel.series(judged.claim.method.unwrap_or_default().name(), Style::marks(index), points)

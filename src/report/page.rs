@@ -359,15 +359,33 @@ fn limit_of(claim: &Claim) -> Markup {
     html! { (number(claim.limit, 3)) " " (claim.unit) }
 }
 
-/// One row a claim; the statement stands with the first claim of its table.
+/// The anchor of a claim, or of the first claim of a table, among all claims.
+fn anchor(kind: &str, id: &str) -> String {
+    format!("{kind}-{}", one_line(id).replace(' ', "_"))
+}
+
+/// One row a claim, whose name leads to its place among all claims; the statement stands with the first of its table.
 pub(super) fn claims_table<'a>(caption: &str, judged: impl IntoIterator<Item = &'a Judged>) -> Table {
+    claims_rows(caption, judged, |claim, _| {
+        html! {
+            a href={ "#" (anchor("claim", &claim.id)) } { code { (one_line(&claim.id)) } }
+        }
+    })
+}
+
+/// One row a claim, whose name is shown by `name`, which is told whether it is the first of its table.
+fn claims_rows<'a>(
+    caption: &str,
+    judged: impl IntoIterator<Item = &'a Judged>,
+    name: fn(&Claim, bool) -> Markup,
+) -> Table {
     let mut table = Table::cards(caption, ["claim", "verdict", "measured", "limit", "what was seen"]).numbers(2..3);
     let mut last = "";
     for judged in judged {
         let claim = &judged.claim;
         let is_first = std::mem::replace(&mut last, &claim.table) != claim.table;
         table = table.row([
-            html! { code { (one_line(&claim.id)) } @if is_first { br; (one_line(&claim.statement)) } },
+            html! { (name(claim, is_first)) @if is_first { br; (one_line(&claim.statement)) } },
             badge(judged.verdict),
             number_cell(judged.measured, 3),
             limit_of(claim),
@@ -415,7 +433,10 @@ fn every_claim(judged: &[Judged]) -> Markup {
         (folded(
             html! { (name) ": " (tally(Counts::of_claims(claims))) },
             true,
-            claims_table(&format!("Claims of {name}"), claims),
+            claims_rows(&format!("Claims of {name}"), claims, |claim, is_first| html! {
+                @if is_first { span id=(anchor("claims", &claim.table)) {} }
+                code id=(anchor("claim", &claim.id)) { (one_line(&claim.id)) }
+            }),
         ))
     } }
 }
@@ -435,7 +456,7 @@ pub(super) fn figure(index: Option<usize>, figure: &Figure, command: &str) -> Ma
                         "Judged by "
                         @for (index, id) in figure.claims.iter().take(NAMED).enumerate() {
                             @if index > 0 { ", " }
-                            code { (one_line(id)) }
+                            a href={ "#" (anchor("claims", id)) } { code { (one_line(id)) } }
                         }
                         @if figure.claims.len() > NAMED { " and " (figure.claims.len() - NAMED) " more" }
                         "; remade by " code { (one_line(command)) @if is_whole { " --only " (one_line(first)) } } ". "
