@@ -677,7 +677,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     }
     let mut found = named(&exactly, Effort::Singles);
     // Small errors alone are those of a solver that does not do what the tolerance asks for.
-    if found.is_none() && silent == 0 && failing(&at(ACCURACIES[3])) == 0 && failing(&exactly) > 0 {
+    if found.is_none() && 10 * silent <= failed && failing(&at(ACCURACIES[3])) == 0 && failing(&exactly) > 0 {
         let (same, compared) = sameness(answered);
         return vec![of_numbers.unwrap_or_else(|| {
             if compared >= 10 && same * 10 >= compared * 9 {
@@ -691,15 +691,16 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     if found.is_none() && converges(answered) {
         return vec![inaccurate(answered, failed)];
     }
+    // An input that is off a little, in every answer by another factor, is what an inaccurate solver looks like.
     let as_likely = |mut causes: Vec<Cause>| {
         for cause in &mut causes {
             cause.certainty = cause.certainty.max(Certainty::Likely);
         }
-        causes
+        (causes.first()?.id != "input-rounded").then_some(causes)
     };
-    // To within what its answers at two tolerances differ by.
-    if found.is_none() {
-        found = named(&seen(answered, |one| spread(one).max(ACCURACIES[0])), Effort::Singles).map(as_likely);
+    // To within what its answers at two tolerances differ by, unless the numbers themselves say why they differ.
+    if found.is_none() && of_numbers.is_none() {
+        found = named(&seen(answered, |one| spread(one).max(ACCURACIES[0])), Effort::Singles).and_then(as_likely);
     }
     // Behind small errors of everything there may be a great one of something.
     let mut before = failing(&exactly);
@@ -708,7 +709,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         let now = failing(&seen);
         if found.is_none() && now > 0 && 10 * now < 9 * before {
             before = now;
-            found = named(&seen, Effort::Singles).map(as_likely).map(|mut causes| {
+            found = named(&seen, Effort::Singles).and_then(as_likely).map(|mut causes| {
                 causes.extend(of_numbers.clone());
                 causes
             });
