@@ -1,4 +1,4 @@
-//! Records what a report must name: compiler, commit and whether the tree was clean.
+//! Records what a report must name: compiler and what it was told, commit, and whether what is built was changed since.
 
 use std::path::Path;
 use std::process::Command;
@@ -22,11 +22,22 @@ fn main() {
     set("PENETRODE_PROFILE", std::env::var("PROFILE").ok());
     // A source package has no repository: the version then has to do.
     set("PENETRODE_COMMIT", run("git", &["rev-parse", "--short=12", "HEAD"]));
+    // Lists of flags are parted by a character that no flag holds.
+    let flags = std::env::var("CARGO_ENCODED_RUSTFLAGS").ok().map(|flags| flags.replace('\u{1f}', " "));
+    set("PENETRODE_RUSTFLAGS", flags.filter(|flags| !flags.is_empty()).or(Some("none".to_owned())));
+    set("PENETRODE_TARGET_FEATURES", std::env::var("CARGO_CFG_TARGET_FEATURE").ok());
+    set("PENETRODE_OPT_LEVEL", std::env::var("OPT_LEVEL").ok());
+    // What goes into the program; documents may differ.
+    let built = ["src", "verification", "build.rs", "Cargo.toml", "Cargo.lock"];
+    let status = run("git", &[&["status", "--porcelain", "--untracked-files=no", "--"], &built[..]].concat());
+    set("PENETRODE_TREE", status.map(|changes| if changes.is_empty() { "clean" } else { "changed" }.to_owned()));
+    for path in built {
+        println!("cargo:rerun-if-changed={path}");
+    }
     // A path that is not there would build the crate anew each time; in a worktree or a source package it is not `.git`.
     for path in ["HEAD", "logs/HEAD"] {
         if let Some(path) = run("git", &["rev-parse", "--git-path", path]).filter(|path| Path::new(path).exists()) {
             println!("cargo:rerun-if-changed={path}");
         }
     }
-    println!("cargo:rerun-if-changed=build.rs");
 }

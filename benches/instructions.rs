@@ -14,7 +14,7 @@ use std::process::Command;
 use penetrode::exchange::scene_file::SHIPPED;
 use penetrode::integrators::lanes::Batch;
 use penetrode::integrators::{Accuracy, Detail, Method, MethodName, MethodOptions};
-use penetrode::physics::{Problem, Scene, Stage, Target};
+use penetrode::physics::{Problem, Scene, Stage};
 use penetrode::studies::critical_velocity;
 use penetrode::studies::error::Truth;
 use penetrode::studies::error::{flight_error, is_fixed};
@@ -180,8 +180,7 @@ struct Saving {
 
 /// One stage to rest.
 fn of_stage(law: Stage) -> Problem {
-    let stages = [law].into_iter().collect();
-    Problem { mass: 1.0, impact_speed: 2.0, exit_depth: f64::INFINITY, stages, crater: None, target: Target::Stages }
+    Problem::of_stages(1.0, 2.0, [law])
 }
 
 /// A term of the force that changes no digit, and yet is not left out.

@@ -4,6 +4,8 @@ use dashu_int::ops::Gcd;
 use dashu_int::{IBig, Sign};
 use penetrode::exchange::tables::CsvTable;
 use penetrode::integrators::locate::{COEFFICIENTS_MAX, first_root};
+use penetrode::physics::expression::{Jets, Known, LENGTH_MAX, Tape, Unit};
+use penetrode::physics::units::Dimension;
 use penetrode::physics::{Advice, Scene};
 use penetrode::studies::Verdict;
 use penetrode::studies::audit::{FormalOrders, Table, audit as judge};
@@ -14,8 +16,14 @@ use penetrode::studies::order::{Class, StepError, fit};
 type Check = fn(&[u8]);
 
 /// The targets by name.
-pub const TARGETS: [(&str, Check); 5] =
-    [("scene", scene), ("batch", batch), ("audit", audit), ("locate", locate), ("order", order)];
+pub const TARGETS: [(&str, Check); 6] = [
+    ("scene", scene),
+    ("expression", expression),
+    ("batch", batch),
+    ("audit", audit),
+    ("locate", locate),
+    ("order", order),
+];
 
 /// A text is a scene that has an equation of motion, or is refused at a place in it, with a remedy.
 pub fn scene(data: &[u8]) {
@@ -43,6 +51,47 @@ pub fn scene(data: &[u8]) {
             let shown = error.render(false);
             assert!(!shown.chars().any(|c| c.is_control() && !matches!(c, '\n' | '\t')), "{shown:?}");
         }
+    }
+}
+
+/// A text is a force that means the same in its own words, and says why it has no value or series where it has none, or it
+/// is refused at a place in it, with a remedy.
+pub fn expression(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let known = |name, value, unit| Known { name, value, unit };
+    let known = [
+        known("P", 848e3, Dimension::Force.into()),
+        known("Q", 3.25, Dimension::Drag.into()),
+        known("b", 0.15, Unit::NONE),
+        known("v1", 50.0, Dimension::Velocity.into()),
+        known("l", 0.05, Dimension::Length.into()),
+    ];
+    let read = |text: &str| Tape::read(text, &known, Dimension::Force.into());
+    let tape = match read(text) {
+        Ok(tape) => tape,
+        Err(error) => {
+            assert!(text.get(error.span.clone()).is_some(), "{text:?}: {error:?}");
+            assert!(!error.message.is_empty() && !error.label.is_empty() && !error.help.is_empty(), "{error:?}");
+            assert!(error.message.len() < 1000 && !error.message.contains(char::is_control), "{error:?}");
+            return;
+        }
+    };
+    let bound = tape.bind(tape.parameters());
+    let own = tape.to_text();
+    // More spaces may be more than are read.
+    let again = (own.len() <= LENGTH_MAX).then(|| read(&own).expect("its own words are read"));
+    for (x, v) in [(0.0, 0.0), (0.1, 300.0), (-1.0, 0.5)] {
+        let value = bound.eval(x, v);
+        assert!(value.is_finite() || bound.explain(x, v).is_some(), "{text:?}: {value}");
+        if let Some(again) = &again {
+            let other = again.bind(tape.parameters()).eval(x, v);
+            assert!(other == value || (other.is_nan() && value.is_nan()), "{text:?} and {own:?}: {value} and {other}");
+        }
+        let mut jets = Jets::default();
+        jets.start(&bound, &bound.sides(x, v));
+        let first = jets.push(&bound, x, v);
+        assert!(first == value || (first.is_nan() && value.is_nan()), "{text:?}: {first} and {value}");
+        jets.push(&bound, v, -30.0);
     }
 }
 

@@ -114,6 +114,11 @@ fn trimmed(digits: &str) -> &str {
 
 /// `10⁻⁵`.
 pub fn power_of_ten(exponent: i32) -> String {
+    format!("10{}", superscript(exponent))
+}
+
+/// `⁻⁵`.
+pub fn superscript(number: i32) -> String {
     let raise = |c| match c {
         '-' => '⁻',
         '1' => '¹',
@@ -121,7 +126,7 @@ pub fn power_of_ten(exponent: i32) -> String {
         '3' => '³',
         digit => char::from_u32(u32::from(digit) - u32::from('0') + 0x2070).unwrap_or(digit),
     };
-    "10".chars().chain(exponent.to_string().chars().map(raise)).collect()
+    number.to_string().chars().map(raise).collect()
 }
 
 /// `3 claims`, `1 claim`.
@@ -172,6 +177,25 @@ pub fn wrapped(text: &str, most: usize) -> Vec<String> {
         }
     }
     lines
+}
+
+/// Longest word that may be a misspelling, in bytes.
+const WORD_LENGTH_MAX: usize = 60;
+
+/// Remedy for a misspelt word.
+pub(crate) fn did_you_mean(known: &str) -> String {
+    format!("did you mean `{known}`?")
+}
+
+/// The one of `known` that `text` is most likely a misspelling of.
+pub(crate) fn nearest<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
+    let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
+    // A long text is no misspelling.
+    let candidates = known.iter().copied().filter(|_| text.len() <= WORD_LENGTH_MAX);
+    let best = candidates.min_by_key(distance)?;
+    let length = best.chars().count();
+    // One slip in three letters; in two letters one; a unit of one letter has no misspelling.
+    (distance(&best) <= (length / 3).max(1).min(length.saturating_sub(1))).then_some(best)
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::io::ErrorKind::BrokenPipe;
 use std::io::{self, BufWriter, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use indicatif::ProgressBar;
@@ -15,9 +16,10 @@ use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::interruption::whole;
 #[cfg(feature = "parquet")]
 use crate::exchange::tables::parquet::ParquetReader;
-use crate::exchange::tables::{self, Block, CsvTable, TableWriter};
+use crate::exchange::tables::{self, Block, CsvTable, Rows, TableWriter};
 use crate::integrators::Method;
-use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, answers};
+use crate::physics::Scene;
+use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, Varied, answers};
 use crate::text::count;
 
 /// Progress over a known number of rows.
@@ -39,6 +41,9 @@ pub struct BatchArgs {
     /// A .csv or .parquet table, written whole or not at all; standard output is CSV.
     #[arg(long, value_name = "RESULTS.csv")]
     pub out: PathBuf,
+    /// Scene of which each row varies numbers: columns are paths, such as parameters.P or impact.velocity, in SI units.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
@@ -54,14 +59,17 @@ impl Run for BatchArgs {
     fn run(&self) -> Result<Exit, CliError> {
         check_format(&self.scenes)?;
         check_format(&self.out)?;
-        check_outputs(&[("the scenes", &self.scenes)], &[("the results", &self.out)])?;
+        let scene = self.scene.as_ref().map(|path| ("the scene", path.as_path()));
+        let inputs: Vec<_> = [("the scenes", self.scenes.as_path())].into_iter().chain(scene).collect();
+        check_outputs(&inputs, &[("the results", &self.out)])?;
         let method = self.method.build()?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, usize::from))
             .build()
             .map_err(|error| CliError::failed(error.to_string(), ""))?;
         let progress = new_progress();
-        let mut source = Source::open(&self.scenes, &progress)?;
+        let varied = self.scene.as_deref().map(|path| Scene::read(path).map(Varied::new)).transpose()?.map(Arc::new);
+        let mut source = Source::open(&self.scenes, varied, &progress)?;
         // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
         let first = source.next_scenes(None)?;
         let unwritable = |cause| CliError::write(&self.out, cause);
@@ -161,9 +169,9 @@ fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parque
 
 /// Where the scenes come from.
 enum Source {
-    Csv(CsvTable<Box<dyn Read + Send>>),
+    Csv(CsvTable<Box<dyn Read + Send>>, Option<Arc<Varied>>),
     #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetReader>, ProgressBar),
+    Parquet(Box<ParquetReader>, ProgressBar, Option<Arc<Varied>>),
     Random {
         seed: u64,
         next: u64,
@@ -173,19 +181,24 @@ enum Source {
 }
 
 impl Source {
-    fn open(path: &Path, progress: &ProgressBar) -> Result<Self, CliError> {
+    fn open(path: &Path, varied: Option<Arc<Varied>>, progress: &ProgressBar) -> Result<Self, CliError> {
+        let format = varied.as_ref().map_or(&SCENES, |varied| varied.format());
         if let Some((count, seed)) = random_table(path)? {
+            if varied.is_some() {
+                let help = "give a table whose columns are paths, such as impact.velocity";
+                return Err(CliError::usage("random scenes vary no scene of a file", help));
+            }
             show_progress(progress, count, ROWS_BAR);
             return Ok(Self::Random { seed, next: 0, end: count, progress: progress.clone() });
         }
         let name = name_of(path);
-        let input: Box<dyn Read + Send> = match tables::open(path, &SCENES)? {
+        let input: Box<dyn Read + Send> = match tables::open(path, format)? {
             None => Box::new(progress.wrap_read(io::stdin())),
             #[cfg(feature = "parquet")]
             Some(file) if is_parquet(path) => {
-                let table = ParquetReader::new(&name, file, &SCENES)?;
+                let table = ParquetReader::new(&name, file, format)?;
                 show_progress(progress, table.rows(), ROWS_BAR);
-                return Ok(Self::Parquet(Box::new(table), progress.clone()));
+                return Ok(Self::Parquet(Box::new(table), progress.clone(), varied));
             }
             Some(file) => {
                 // A pipe or a device has no length.
@@ -195,24 +208,24 @@ impl Source {
                 Box::new(progress.wrap_read(file))
             }
         };
-        Ok(Self::Csv(CsvTable::new(&name, input, &SCENES)?))
+        Ok(Self::Csv(CsvTable::new(&name, input, format)?, varied))
     }
 
     /// The next chunk, `None` at the end; the memory of `used` is reused.
     fn next_scenes(&mut self, used: Option<Scenes>) -> Result<Option<Scenes>, CliError> {
         let scenes = match self {
-            Self::Csv(table) => {
+            Self::Csv(table, varied) => {
                 let used = match used {
-                    Some(Scenes::Table(rows)) => Some(rows),
+                    Some(Scenes::Table(rows) | Scenes::Varied(rows, _)) => Some(rows),
                     _ => None,
                 };
-                Scenes::Table(table.next_rows(CHUNK, used)?)
+                of_rows(table.next_rows(CHUNK, used)?, varied.as_ref())
             }
             #[cfg(feature = "parquet")]
-            Self::Parquet(table, progress) => {
+            Self::Parquet(table, progress, varied) => {
                 let rows = table.next_rows(CHUNK)?;
                 progress.inc(rows.len() as u64);
-                Scenes::Table(rows)
+                of_rows(rows, varied.as_ref())
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;
@@ -222,6 +235,14 @@ impl Source {
             }
         };
         Ok(Some(scenes).filter(|scenes| !scenes.is_empty()))
+    }
+}
+
+/// Scenes that are rows, or that rows vary.
+fn of_rows(rows: Rows, varied: Option<&Arc<Varied>>) -> Scenes {
+    match varied {
+        Some(varied) => Scenes::Varied(rows, Arc::clone(varied)),
+        None => Scenes::Table(rows),
     }
 }
 

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::physics::scene::Force;
 use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Stage};
 
 /// The scene in SI units; what a scene of stages does not have is `null`.
@@ -29,6 +30,35 @@ pub struct SceneJson {
     pub exit_depth_m: Option<f64>,
     pub follows: Vec<String>,
     pub stages: Vec<Stage>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<ForceJson>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<OwnParameterJson>,
+}
+
+/// The force of a stage that is an expression.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
+pub struct ForceJson {
+    pub stage: usize,
+    pub force: String,
+}
+
+/// A parameter of the forces, in SI units.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
+pub struct OwnParameterJson {
+    pub name: &'static str,
+    pub value: f64,
+    pub unit: String,
+}
+
+/// The forces of `scene` that are expressions.
+pub fn forces(scene: &Scene) -> impl Iterator<Item = ForceJson> {
+    scene.forces.iter().filter_map(|(stage, force)| match force {
+        Force::Expression(tape) => Some(ForceJson { stage: *stage, force: tape.to_text() }),
+        Force::Table(_) => None,
+    })
 }
 
 impl SceneJson {
@@ -61,6 +91,12 @@ impl SceneJson {
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
             follows: scene.follows(),
             stages: problem.stages.to_vec(),
+            forces: forces(scene).collect(),
+            parameters: scene
+                .parameters
+                .iter()
+                .map(|one| OwnParameterJson { name: one.name.text(), value: one.value, unit: one.unit.to_string() })
+                .collect(),
         }
     }
 }

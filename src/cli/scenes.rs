@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::output::Text;
+use super::scene_json::{ForceJson, forces};
 use super::{Answer, Ask, CliError, Exit};
 use crate::exchange::scene_file::{SHIPPED, shipped_like};
 use crate::physics::Scene;
@@ -12,10 +13,14 @@ use crate::physics::Scene;
 /// Arguments of `scenes`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples: penetrode scenes\n          penetrode scenes tunnel > mine.toml\n          \
+    penetrode scenes --laws\n          \
     penetrode solve tunnel --set impact.velocity=400m/s")]
 pub struct ScenesArgs {
     /// Print the file of this scene.
     pub name: Option<String>,
+    /// List those whose force is an expression, with their formulas.
+    #[arg(long, conflicts_with = "name")]
+    pub laws: bool,
 }
 
 /// What `scenes --json` prints.
@@ -30,6 +35,9 @@ pub struct ScenesJson {
 pub struct ShippedJson {
     name: &'static str,
     title: String,
+    /// Its forces that are expressions.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    forces: Vec<ForceJson>,
     /// Its file.
     toml: &'static str,
 }
@@ -40,16 +48,19 @@ impl Ask for ScenesArgs {
     fn ask(&self) -> Result<Answer<ScenesJson>, CliError> {
         let wanted = SHIPPED.iter().filter(|(name, _)| self.name.as_deref().is_none_or(|wanted| wanted == *name));
         let scene = |&(name, toml): &(&'static str, &'static str)| {
-            let title = Scene::from_toml(toml, name)?.title.unwrap_or_default();
-            Ok(ShippedJson { name, title, toml })
+            let scene = Scene::from_toml(toml, name)?;
+            let forces = forces(&scene).collect();
+            Ok(ShippedJson { name, title: scene.title.unwrap_or_default(), forces, toml })
         };
-        let scenes = wanted.map(scene).collect::<Result<Vec<_>, CliError>>()?;
+        let mut scenes = wanted.map(scene).collect::<Result<Vec<_>, CliError>>()?;
+        scenes.retain(|scene| !self.laws || !scene.forces.is_empty());
         let text = match (&self.name, scenes.first()) {
             (Some(name), None) => {
                 let help = shipped_like(name, "`penetrode scenes` lists those that ship");
                 return Err(CliError::usage(format!("no scene `{name}` ships"), help));
             }
             (Some(_), Some(scene)) => scene.toml.to_owned(),
+            (None, _) if self.laws => formulas(&scenes),
             (None, _) => {
                 let mut text = Text::default();
                 text.table(&["scene", "what happens"], scenes.iter().map(|scene| [scene.name, &scene.title]));
@@ -59,4 +70,17 @@ impl Ask for ScenesArgs {
         let data = ScenesJson { schema: "penetrode/scenes/1", scenes };
         Ok(Answer { data: Some(data), text, exit: Exit::Success })
     }
+}
+
+/// Title and formulas of each scene, one line for each stage.
+fn formulas(scenes: &[ShippedJson]) -> String {
+    let mut text = Text::default();
+    for scene in scenes {
+        text.line(format!("{}: {}", scene.name, scene.title));
+        for ForceJson { stage, force } in &scene.forces {
+            let whose = if scene.forces.len() > 1 { format!("stage {stage}: ") } else { String::new() };
+            text.wrapped("  ", &format!("{whose}F = {force}"));
+        }
+    }
+    text.finish()
 }

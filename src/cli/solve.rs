@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{Text, check_outputs, engineering, error_text, say, significant, write_table};
-use super::scene_json::SceneJson;
+use super::scene_json::{ForceJson, SceneJson};
 use super::sensitivities::SensitivitiesJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::input::name_of;
@@ -248,6 +248,10 @@ impl SolveArgs {
         };
         text.line(format!("  outcome  {}{margin}", data.outcome));
         text.lines(data.groups.text(data.scene.velocity_m_s));
+        for ForceJson { stage, force } in &data.scene.forces {
+            let whose = if data.scene.stages.len() > 1 { format!("stage {stage}: ") } else { String::new() };
+            text.wrapped("  force    ", &format!("{whose}{force}"));
+        }
         text.gap();
         let row = |event: &Event| {
             let name = match event.kind {
@@ -257,7 +261,16 @@ impl SolveArgs {
             let State { time, depth, velocity } = event.state;
             [name, engineering(time, "s"), engineering(depth, "m"), engineering(velocity, "m/s")]
         };
-        text.table(&["event", "time", "depth", "velocity"], flight.events.iter().map(row));
+        let (first, last) = match flight.events.len() {
+            count if count > EVENTS_MAX => (&flight.events[..EVENTS_SHOWN], &flight.events[count - EVENTS_SHOWN..]),
+            _ => (&flight.events[..], &flight.events[..0]),
+        };
+        let left_out = (!last.is_empty()).then(|| {
+            let between = count(flight.events.len() - first.len() - last.len(), "stage end");
+            [format!("({between})"), String::new(), String::new(), String::new()]
+        });
+        let rows = first.iter().map(row).chain(left_out).chain(last.iter().map(row));
+        text.table(&["event", "time", "depth", "velocity"], rows);
         if let Some(rows) = data.trajectory.as_ref().filter(|_| self.trajectory.is_none()) {
             text.gap();
             let row = |Sample { state: State { time, depth, velocity }, force, .. }: &Sample| {
@@ -326,6 +339,12 @@ impl SolveJson {
         text.lines(errors.is_none().then(|| format!("  the closed form says {}", exact.outcome)));
     }
 }
+
+/// Most events that are shown one by one; a table of a force has thousands.
+const EVENTS_MAX: usize = 60;
+
+/// How many of more are shown from each end.
+const EVENTS_SHOWN: usize = 8;
 
 /// What would decide an outcome that is undecided.
 const UNDECIDED: &str = "the exit margin lies within its error bound: this speed is V_c to the accuracy of the method. A \

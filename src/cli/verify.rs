@@ -174,8 +174,9 @@ pub(super) fn add_not_passed(text: &mut Text, judged: &[Judged]) {
     });
     for (_, claims) in told {
         let Judged { claim, verdict, measured, remark, .. } = claims[0];
-        let measured = measured
-            .map_or("nothing measured".to_owned(), |m| format!("{m:.3e}, limit {:.1e} {}", claim.limit, claim.unit));
+        let measured = measured.map_or("nothing measured".to_owned(), |m| {
+            format!("{m:.3e}, limit {:.1e} {}", claim.limit, claim.unit_in_words())
+        });
         text.line(format!("{:<9} {}", verdict.name(), escape_terminal(&claim.id)));
         if claims.len() > 1 {
             let others = format!("and {} more of {}", claims.len() - 1, escape_terminal(&claim.table));

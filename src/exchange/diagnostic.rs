@@ -11,6 +11,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::input::{self, Unread};
 use crate::text::{clipped, steers};
+pub(crate) use crate::text::{did_you_mean, nearest};
 
 /// Largest scene file that is read, 1 MiB. A scene takes about one KiB; more is a mistaken path.
 pub const SIZE_MAX: u64 = 1 << 20;
@@ -128,6 +129,8 @@ pub(crate) struct Fault {
     message: String,
     allowed: String,
     help: String,
+    /// The error as a whole, where it stands in another file.
+    placed: Option<Box<SceneError>>,
 }
 
 impl Fault {
@@ -138,11 +141,24 @@ impl Fault {
         allowed: impl Into<String>,
         help: impl Into<String>,
     ) -> Self {
-        Self { span, message: message.into(), allowed: allowed.into(), help: help.into() }
+        Self { span, message: message.into(), allowed: allowed.into(), help: help.into(), placed: None }
     }
 
-    /// The same in `file`, whose content is `text`.
+    /// `error`, which stands in another file.
+    pub(super) fn elsewhere(error: Box<SceneError>) -> Self {
+        Self { placed: Some(error), ..Self::new(0..0, "", "", "") }
+    }
+
+    /// The same in the table `file` that the scene names, whose content is `text`.
+    pub(super) fn in_table(self, file: &str, text: &str) -> Self {
+        Self::elsewhere(self.in_file(file, text))
+    }
+
+    /// The same in `file`, whose content is `text`, unless it stands in another file.
     pub(crate) fn in_file(self, file: &str, text: &str) -> Box<SceneError> {
+        if let Some(error) = self.placed {
+            return error;
+        }
         let mut start = self.span.start.min(text.len());
         while !text.is_char_boundary(start) {
             start -= 1;
@@ -205,22 +221,6 @@ pub(super) fn text_of(mut bytes: Vec<u8>, file: &str) -> Result<String, Box<Scen
         )
         .in_file(file, &text)
     })
-}
-
-/// Remedy for a misspelt word.
-pub(crate) fn did_you_mean(known: &str) -> String {
-    format!("did you mean `{known}`?")
-}
-
-/// The one of `known` that `text` is most likely a misspelling of.
-pub(crate) fn nearest<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
-    let distance = |known: &&str| strsim::damerau_levenshtein(&text.to_lowercase(), &known.to_lowercase());
-    // A long text is no misspelling.
-    let candidates = known.iter().copied().filter(|_| text.len() <= QUOTE_LENGTH_MAX);
-    let best = candidates.min_by_key(distance)?;
-    let length = best.chars().count();
-    // One slip in three letters; in two letters one; a unit of one letter has no misspelling.
-    (distance(&best) <= (length / 3).max(1).min(length.saturating_sub(1))).then_some(best)
 }
 
 /// What differs between the kinds of TOML files: the words of their errors.

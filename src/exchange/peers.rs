@@ -23,4 +23,6 @@ pub use environment::{BundledPeer, Environment, PeerSetupError};
 pub(super) use process::end_all;
 pub use process::{ORDER_OF_ALL, ORDER_QUANTITIES, Peer, PeerFailure, PeerFault, PeerIdentity, PeerStartError};
 pub use references::{RecordedFlight, Recording, recordings};
+#[cfg(feature = "report")]
+pub(crate) use wire::NO_LAWS;
 pub use wire::{Difference, PeerAnswer, PeerRequest};

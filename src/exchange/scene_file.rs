@@ -5,6 +5,7 @@
 //! Tables and keys are the [`paths`] of the numbers of a scene; dimension, range and default of a number are those of
 //! [`Parameter::entry`].
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use strum::VariantNames;
@@ -14,13 +15,18 @@ use toml::de::{DeTable, DeValue};
 use super::diagnostic::{
     Dialect, Fault, SceneError, Span, did_you_mean, key_of, nearest, parse, quoted, read_text, type_of,
 };
+use crate::physics::expression::{Known, RESERVED, Tape, Unit, is_name};
+use crate::physics::law::{Name, OwnParameter};
 use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, LayerNumber, Parameter, StageNumber};
-use crate::physics::scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, Scene, layer_beyond};
+use crate::physics::scene::{
+    Concrete, CraterStiffness, Criterion, Force, Layer, Range, Resistance, Scene, layer_beyond,
+};
 use crate::physics::units::{self, Dimension, Quantity, QuantityError};
 use crate::physics::{Stage, semi_empirical};
 use crate::text::Shown;
 
+mod force_table;
 mod schema;
 
 pub use schema::schema;
@@ -53,6 +59,22 @@ pub const SHIPPED: &[(&str, &str)] = shipped![
     "spring-and-drag",
     "overdamped",
     "constant-force",
+    "softening",
+    "law-robins-euler",
+    "law-poncelet",
+    "law-resal",
+    "law-power",
+    "law-forrestal-1994",
+    "law-frew",
+    "law-cavity-expansion",
+    "law-vitman-stepanov",
+    "law-rosenberg-dekel",
+    "law-petry",
+    "law-ndrc",
+    "law-ceb-rate",
+    "law-johnson-cook-rate",
+    "law-free-surface",
+    "law-two-layers",
 ];
 
 /// The text of the shipped scene `name`.
@@ -132,7 +154,7 @@ impl Scene {
 pub struct SceneFile {
     /// The scene.
     pub scene: Scene,
-    /// Every number that the file gives and the scene holds, in the order read. A computation that must enclose the
+    /// Every number that the file itself gives and the scene holds, in the order read; rows of tables beside it are not. A computation that must enclose the
     /// numbers as written, and not as rounded to `f64`, starts from these.
     pub given: Vec<(Parameter, Quantity)>,
 }
@@ -150,12 +172,13 @@ impl SceneFile {
         let whole = [text].into_iter().chain(lines()).collect::<Vec<_>>().join("\n");
         let read = parse(&whole[..text.len()]).and_then(|mut root| {
             check(root.get_ref(), "")?;
+            let units = units_of_parameters(root.get_ref());
             let mut start = text.len() + 1;
             for line in lines() {
                 set(root.get_mut(), &whole, start..start + line.len(), text.len())?;
                 start += line.len() + 1;
             }
-            let mut reader = Reader { text: &whole, root, given: Vec::new() };
+            let mut reader = Reader { file, text: &whole, root, units, given: Vec::new() };
             Ok(Self { scene: reader.scene()?, given: reader.given })
         });
         read.map_err(|mut fault| {
@@ -173,7 +196,21 @@ impl SceneFile {
 }
 
 /// Paths of texts.
-const WORDS: [&str; 3] = ["projectile.nose.shape", "perforation.criterion", "title"];
+const WORDS: [&str; 7] = [
+    "projectile.nose.shape",
+    "perforation.criterion",
+    "title",
+    "stage.*.force.table",
+    "stage.*.force.x",
+    "stage.*.force.V",
+    "stage.*.force.force",
+];
+
+/// Path of the force of a stage in place of its coefficients.
+const FORCE: &str = "stage.*.force";
+
+/// The table of parameters, whose keys are names of the file's own.
+const PARAMETERS: &str = "parameters";
 
 /// Paths of numbers that shape a nose, and are none of the scene itself.
 const RATIOS: [&str; 3] =
@@ -226,6 +263,7 @@ const DIALECT: Dialect = Dialect {
     root: "the scene",
     table: |path| match path {
         "projectile.nose" => "the nose".to_owned(),
+        "stage.force" => "the force of a stage".to_owned(),
         "stage" | "target.layer" => format!("[[{path}]]"),
         _ => format!("[{path}]"),
     },
@@ -234,6 +272,7 @@ const DIALECT: Dialect = Dialect {
         "projectile.nose" => "write nose = { factor = 0.72 }".to_owned(),
         "projectile.nose.shape" => "write shape = \"flat\"".to_owned(),
         "perforation.criterion" => "write criterion = \"full-depth\"".to_owned(),
+        path if path.starts_with("stage.force") => format!("write {}", force_table::EXAMPLE),
         "stage" | "target.layer" => format!("write each as [[{path}]]"),
         _ => format!("write [{path}]"),
     },
@@ -263,7 +302,10 @@ fn check(table: &DeTable<'_>, home: &str) -> Result<(), Fault> {
             }
             (Some(keys), _) if keys.starts_with("*.") => return mistyped(value, "an array"),
             (Some(_), DeValue::Table(table)) => check(table, &path)?,
+            (Some(_), DeValue::String(_)) if path == FORCE => {}
             (Some(_), _) => return mistyped(value, "a table"),
+            (None, DeValue::Table(_)) if path == PARAMETERS => {}
+            (None, _) if path == PARAMETERS => return mistyped(value, "a table"),
             (None, found) if WORDS.contains(&path.as_str()) => {
                 if !found.is_str() {
                     return mistyped(value, "a string");
@@ -272,7 +314,8 @@ fn check(table: &DeTable<'_>, home: &str) -> Result<(), Fault> {
             (None, _) if paths().any(|known| known == path) => {}
             (None, _) => {
                 let mut known = Vec::new();
-                for word in below(home).filter_map(|rest| rest.split('.').next()) {
+                let parameters = home.is_empty().then_some(PARAMETERS);
+                for word in below(home).filter_map(|rest| rest.split('.').next()).chain(parameters) {
                     if !known.contains(&word) {
                         known.push(word);
                     }
@@ -294,7 +337,8 @@ fn set<'t>(root: &mut DeTable<'t>, text: &'t str, span: Span, file_length: usize
     let value_place = span.end - value.len()..span.end;
     let is_index = |word: &str| word.parse::<usize>().is_ok();
     let general = path.split('.').map(|word| if is_index(word) { "*" } else { word }).collect::<Vec<_>>().join(".");
-    if !paths().any(|known| known == general) {
+    let is_parameter = path.strip_prefix(PARAMETERS).and_then(|rest| rest.strip_prefix('.')).is_some_and(is_name);
+    if !is_parameter && !paths().any(|known| known == general) {
         let index = path.split('.').find(|word| is_index(word)).unwrap_or("0");
         let of_that_key = || paths().find(|known| key_of(known) == key_of(path));
         let near = nearest(&general, &paths().collect::<Vec<_>>()).or_else(of_that_key);
@@ -307,7 +351,7 @@ fn set<'t>(root: &mut DeTable<'t>, text: &'t str, span: Span, file_length: usize
         return Err(Fault::new(place, format!("no scene file has {}", quoted(path)), allowed, help));
     }
     let value = match DeValue::parse(text).map(Spanned::into_inner) {
-        Ok(value) if value.is_str() || (bare(&value).is_some() && !WORDS.contains(&path)) => value,
+        Ok(value) if value.is_str() || (bare(&value).is_some() && !WORDS.contains(&general.as_str())) => value,
         _ => DeValue::String(text.into()),
     };
     let (homes, key) = path.rsplit_once('.').unwrap_or(("", path));
@@ -324,6 +368,14 @@ fn set<'t>(root: &mut DeTable<'t>, text: &'t str, span: Span, file_length: usize
     }
     home.insert(Spanned::new(place, key.into()), Spanned::new(value_place, value));
     Ok(())
+}
+
+/// The units of the parameters that the file gives with one; a setting without a unit is of it.
+fn units_of_parameters(root: &DeTable<'_>) -> BTreeMap<String, Unit> {
+    let parameters = root.get(PARAMETERS).and_then(|table| table.get_ref().as_table());
+    let unit = |value: &Value<'_>| Unit::of(&Quantity::with_any_unit(value.get_ref().as_str()?).ok()?.1);
+    let units = parameters.into_iter().flatten().map(|(key, value)| (key.get_ref().to_string(), unit(value)));
+    units.filter_map(|(key, unit)| Some((key, unit?))).collect()
 }
 
 /// The table at `homes`, made where it is none of a list; its keys stand at `place`.
@@ -346,10 +398,22 @@ fn home_of<'a, 't>(
     home_of(inner, homes, place)
 }
 
+/// What the tables [[stage]] give.
+struct Staged {
+    stages: Vec<Stage>,
+    forces: Vec<(usize, Force)>,
+    parameters: Vec<OwnParameter>,
+    thickness: Option<f64>,
+}
+
 /// A file as it stands, and the numbers read from it.
 struct Reader<'t> {
+    /// Its name, beside which its tables are.
+    file: &'t str,
     text: &'t str,
     root: Spanned<DeTable<'t>>,
+    /// Of parameters, before settings.
+    units: BTreeMap<String, Unit>,
     given: Vec<(Parameter, Quantity)>,
 }
 
@@ -527,17 +591,20 @@ impl<'t> Reader<'t> {
             return missing("[projectile]", "[projectile] with mass, diameter and nose");
         }
         let mass = self.value(Parameter::Mass)?;
-        let (resistance, thickness) = if self.at("stage").is_some() {
+        let (resistance, thickness, forces, parameters) = if self.at("stage").is_some() {
             self.without("[projectile]", &MATERIAL_OF_PROJECTILE, "with [[stage]], [projectile] has only `mass`")?;
             self.without("the scene", &["resistance"], "with [[stage]] there is no [resistance]")?;
-            self.stages()?
+            let Staged { stages, forces, parameters, thickness } = self.stages()?;
+            (Resistance::Stages(stages), thickness, forces, parameters)
         } else if self.at("target").is_some() {
-            self.concrete()?
+            self.without("the scene", &[PARAMETERS], "[parameters] are those of a `force` in a [[stage]]")?;
+            let (resistance, thickness) = self.concrete()?;
+            (resistance, thickness, Vec::new(), Vec::new())
         } else {
             return missing("[target]", "[target] with strength and density, or stages");
         };
         let title = self.word("title").map(|(title, _)| title);
-        Ok(Scene { title, mass, resistance, thickness, criterion, velocity })
+        Ok(Scene { title, mass, resistance, forces, thickness, criterion, velocity, parameters })
     }
 
     fn criterion(&self) -> Result<Criterion, Fault> {
@@ -556,19 +623,29 @@ impl<'t> Reader<'t> {
     }
 
     /// The resistance of stages given outright, and the thickness of the target.
-    fn stages(&mut self) -> Result<(Resistance, Option<f64>), Fault> {
+    fn stages(&mut self) -> Result<Staged, Fault> {
         let count = self.at_least_one("stage")?;
         self.without("[target]", &MATERIAL_OF_TARGET, "with [[stage]], [target] has only `thickness`")?;
         let thickness = self.number(Parameter::Thickness)?;
         let mut stages: Vec<Stage> = Vec::with_capacity(count);
+        let parameters = self.parameters()?;
+        let mut forces = Vec::new();
         for index in 0..count {
+            let previous = stages.last().map_or(0.0, |previous| previous.end);
+            let force = self.force(index, previous, &parameters)?;
+            let is_law = matches!(force, Some(Force::Expression(_)));
+            forces.extend(force.map(|force| (index, force)));
             let mut value = |which| self.value(Parameter::Stage(index, which));
-            let stage = Stage {
-                static_force: value(StageNumber::StaticForce)?,
-                stiffness: value(StageNumber::Stiffness)?,
-                viscosity: value(StageNumber::Viscosity)?,
-                drag: value(StageNumber::Drag)?,
-                end: value(StageNumber::End)?,
+            let stage = if is_law {
+                Stage::of_law(value(StageNumber::End)?)
+            } else {
+                Stage {
+                    static_force: value(StageNumber::StaticForce)?,
+                    stiffness: value(StageNumber::Stiffness)?,
+                    viscosity: value(StageNumber::Viscosity)?,
+                    drag: value(StageNumber::Drag)?,
+                    end: value(StageNumber::End)?,
+                }
             };
             if stage.end.is_infinite() && index + 1 < count {
                 return Err(Fault::new(
@@ -579,7 +656,6 @@ impl<'t> Reader<'t> {
                 ));
             }
             let end = self.place(&format!("stage.{index}.end"));
-            let previous = stages.last().map_or(0.0, |previous| previous.end);
             if stage.end < previous {
                 return Err(Fault::new(
                     end,
@@ -598,7 +674,125 @@ impl<'t> Reader<'t> {
             }
             stages.push(stage);
         }
-        Ok((Resistance::Stages(stages), thickness))
+        self.used(&parameters, &forces)?;
+        Ok(Staged { stages, forces, parameters, thickness })
+    }
+
+    /// The parameters, in the order of the file.
+    fn parameters(&mut self) -> Result<Vec<OwnParameter>, Fault> {
+        let mut parameters = Vec::new();
+        let Some((_, table)) = self.at(PARAMETERS) else { return Ok(parameters) };
+        let mut given = Vec::new();
+        for (key, number) in table.get_ref().as_table().into_iter().flatten() {
+            let name = key.get_ref();
+            let (Some(name), false) = (Name::new(name), RESERVED.contains(&&**name)) else {
+                let allowed = "a letter, then letters, digits and _, and none of x, V, pi, e or a function";
+                let message = format!("no parameter can have the name {}", quoted(name));
+                return Err(Fault::new(key.span(), message, allowed, "give it another name"));
+            };
+            let (quantity, unit) = self.own_quantity(name.text(), number)?;
+            parameters.push(OwnParameter { name, value: quantity.value, unit });
+            given.push((Parameter::Own(name), quantity));
+        }
+        self.given.extend(given);
+        Ok(parameters)
+    }
+
+    /// A number with any unit, or a plain one.
+    fn own_quantity(&self, key: &str, number: &Value<'t>) -> Result<(Quantity, Unit), Fault> {
+        const ALLOWED: &str = "a plain number, or \"number unit\", such as 0.15, \"848 kN\" and \"1.2 kN s/m\"";
+        let value = number.get_ref();
+        let read = match (value.as_str(), bare(value)) {
+            (_, Some(bare)) => {
+                let unit = self.units.get(key).copied().unwrap_or(Unit::NONE);
+                bare.map(|quantity| (quantity, Some(unit)))
+            }
+            (Some(text), None) => Quantity::with_any_unit(text).map(|(quantity, powers)| (quantity, Unit::of(&powers))),
+            (None, None) => {
+                let message = format!("`{key}` is {}", type_of(value));
+                return Err(Fault::new(number.span(), message, ALLOWED, format!("write for instance {key} = 0.15")));
+            }
+        };
+        let (quantity, unit) = read.map_err(|error| {
+            let text = value.as_str().unwrap_or_default();
+            let (span, help) = match &error {
+                QuantityError::UnknownUnit { unit } => {
+                    (self.part(number, text, unit), "units are those of docs/reference.md")
+                }
+                QuantityError::NoUnit => (number.span(), "append a unit, or leave out the quotes for a plain number"),
+                _ => (number.span(), "correct the number"),
+            };
+            Fault::new(span, format!("`{key}`: {error}"), ALLOWED, help)
+        })?;
+        let unit = unit.ok_or_else(|| {
+            Fault::new(number.span(), format!("the unit of `{key}` has too high a power"), ALLOWED, "correct the unit")
+        })?;
+        Ok((quantity, unit))
+    }
+
+    /// The force `text` at `whole` in the file, an expression of `parameters`.
+    fn expression(&self, text: &str, whole: Span, parameters: &[OwnParameter]) -> Result<Tape, Fault> {
+        let known = |one: &OwnParameter| Known { name: one.name.text(), value: one.value, unit: one.unit };
+        let known: Vec<_> = parameters.iter().map(known).collect();
+        Tape::read(text, &known, Dimension::Force.into()).map_err(|error| {
+            // Where escapes moved the text, the whole is underlined.
+            let raw = self.text.get(whole.clone()).unwrap_or_default();
+            let span = raw.find(text).map_or(whole.clone(), |start| {
+                let start = whole.start + start;
+                start + error.span.start..start + error.span.end
+            });
+            Fault::new(span, error.message, error.label, error.help)
+        })
+    }
+
+    /// Refuses a parameter that no force uses.
+    fn used(&self, parameters: &[OwnParameter], forces: &[(usize, Force)]) -> Result<(), Fault> {
+        let uses = |force: &Force, index: usize| matches!(force, Force::Expression(tape) if tape.uses(index));
+        let is_used = |index: usize| forces.iter().any(|(_, force)| uses(force, index));
+        match parameters.iter().enumerate().find(|(index, _)| !is_used(*index)) {
+            None => Ok(()),
+            Some((_, one)) => {
+                let name = one.name.text();
+                let place = self.at(&format!("{PARAMETERS}.{name}")).map_or(0..0, |(key, _)| key);
+                let message = format!("no force uses the parameter `{name}`");
+                Err(Fault::new(place, message, "parameters that a `force` uses", format!("remove `{name}`, or use it")))
+            }
+        }
+    }
+
+    /// The force of the stage `index`, which begins at depth `start` (m), where it gives no coefficients.
+    fn force(&self, index: usize, start: f64, parameters: &[OwnParameter]) -> Result<Option<Force>, Fault> {
+        let home = format!("stage.{index}.force");
+        if self.at(&home).is_none() {
+            return Ok(None);
+        }
+        let coefficients = StageNumber::ALL.into_iter().filter(|which| *which != StageNumber::End);
+        let coefficients: Vec<_> = coefficients.map(|which| Parameter::Stage(index, which).to_string()).collect();
+        let coefficients: Vec<_> = coefficients.iter().map(String::as_str).collect();
+        self.without("a stage with `force`", &coefficients, "`force` and `end`, or coefficients")?;
+        if let Some((text, whole)) = self.word(&home) {
+            return Ok(Some(Force::Expression(self.expression(&text, whole, parameters)?)));
+        }
+        if let Some((key, _)) = self.at(&format!("{home}.V")) {
+            let help = "give the force over the depth: x = \"depth_mm\"";
+            return Err(Fault::new(key, "a table of the velocity is not known yet", "`x`, a column of depths", help));
+        }
+        let word = |key: &str, example: &str| {
+            self.word(&format!("{home}.{key}")).ok_or_else(|| {
+                let help = format!("add {key} = \"{example}\"");
+                DIALECT.missing("stage.force", self.place(&home), key, help)
+            })
+        };
+        let (name, x, load) = (word("table", "r.csv")?, word("x", "depth_mm")?, word("force", "force_kN")?);
+        let table = force_table::read(self.file, &name, &x, &load)?;
+        let (first, last) = (table.first(), table.last());
+        if first <= start && start < last {
+            return Ok(Some(Force::Table(table)));
+        }
+        let message = format!("the table goes from x = {} m to {} m", Shown(first), Shown(last));
+        let allowed =
+            format!("a first row at or before {} m, where the stage begins, and a last one behind it", Shown(start));
+        Err(Fault::new(name.1, message, allowed, "add rows to the table; depths count from the impact face"))
     }
 
     /// How many tables the array at `path` has.

@@ -28,7 +28,7 @@ pub use error::{At, Fault, Place, TableError};
 
 use super::input::{self, Unread, name_of};
 use crate::physics::Range;
-use crate::physics::units::{QuantityError, number};
+use crate::physics::units::{Dimension, QuantityError, number};
 use crate::text::{Shown, shortened, steers};
 
 /// Largest table that is read whole (bytes): a study of step sizes or a series of tests is some kilobytes.
@@ -93,6 +93,32 @@ impl Column {
     }
 }
 
+/// The unit of `dimension` at the end of the name of a column, as units are written: `mm` of `depth_mm` and `x (mm)`, `m/s`
+/// of `v_m_s`. The longest that is one.
+pub fn unit_at_end(name: &str, dimension: Dimension) -> Option<String> {
+    let starts = name.char_indices().filter(|(_, c)| "_ ([".contains(*c));
+    starts
+        .filter_map(|(start, _)| unit_of(&name[start..]))
+        .find_map(|unit| spellings(unit).into_iter().find(|unit| dimension.coefficient(unit).is_some()))
+}
+
+/// The unit in the end of a name: `mm` of `_mm`, ` (mm)` and `[mm]`; empty where there is none, `None` where the name
+/// goes on as a word.
+pub(crate) fn unit_of(rest: &str) -> Option<&str> {
+    let bare = rest.trim_start_matches(['_', ' ']);
+    let inside = |open, close| bare.strip_prefix(open).and_then(|rest: &str| rest.strip_suffix(close));
+    match inside('(', ')').or_else(|| inside('[', ']')) {
+        Some(unit) => Some(unit.trim()),
+        None if bare.len() < rest.len() || rest.is_empty() => Some(bare),
+        None => None,
+    }
+}
+
+/// A unit as a name writes it, and as units are written: `m_s` and `m_per_s` for `m/s`.
+pub(crate) fn spellings(unit: &str) -> [String; 2] {
+    [unit.to_owned(), unit.replace("_per_", "/").replace('_', "/")]
+}
+
 /// What becomes of columns that a [`Format`] does not name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Others {
@@ -127,11 +153,12 @@ impl Format {
             let of_kind = self.columns.iter().filter(|column| (column.need == Need::Required) == is_needed);
             of_kind.map(|column| column.name).collect::<Vec<_>>().join(", ")
         };
-        let mut text = format!("columns {}", names(true));
-        let optional = names(false);
-        if !optional.is_empty() {
-            text.push_str(&format!("; these may be left out: {optional}"));
-        }
+        let (needed, optional) = (names(true), names(false));
+        let mut text = match (needed.is_empty(), optional.is_empty()) {
+            (true, _) => format!("any of the columns {optional}"),
+            (false, true) => format!("columns {needed}"),
+            (false, false) => format!("columns {needed}; these may be left out: {optional}"),
+        };
         if self.others == Others::Read {
             text.push_str("; units as in dt_us and depth_mm, and further columns of numbers, are read too");
         }

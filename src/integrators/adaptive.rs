@@ -19,7 +19,7 @@
 use super::diffsol::Scheme;
 use super::flight::Course;
 use super::outcome::Detail;
-use crate::physics::{Problem, Stage};
+use crate::physics::{Problem, Stage, State};
 
 /// Stiffness Z above which a stage is solved by the implicit method.
 ///
@@ -27,6 +27,9 @@ use crate::physics::{Problem, Stage};
 /// linear algebra and at the same rtol with a larger error. Both take the same time at Z = 60 (rtol 1e-6), 250 (1e-10)
 /// and 400 (1e-12).
 pub const STIFFNESS_LIMIT: f64 = 200.0;
+
+/// Most stages whose choice is noted; a table has thousands.
+const EXPLAINED_MAX: usize = 64;
 
 /// The explicit method.
 pub(super) const EXPLICIT: Scheme = Scheme::Tsit45;
@@ -46,10 +49,13 @@ pub struct Choice {
 impl Choice {
     /// The choice for a stage of `problem` entered at `depth` (m) with `velocity` (m/s).
     ///
-    /// From the coefficients alone: no force is evaluated.
+    /// From the coefficients alone; of a law of its own, from its force and slopes there.
     pub fn of(problem: &Problem, stage: usize, depth: f64, velocity: f64) -> Self {
-        let law = &problem.stages[stage];
         let distance = problem.limit_of(stage) - depth;
+        if problem.laws.of(stage).is_some_and(|law| law.force(depth, 0.0) >= 0.0) {
+            return Self { scheme: EXPLICIT, stiffness: None };
+        }
+        let law = &problem.linear(stage, State { time: 0.0, depth, velocity });
         match stiffness(law, problem.mass, depth, velocity, distance) {
             Some(z) if z > STIFFNESS_LIMIT => Self { scheme: IMPLICIT, stiffness: Some(z) },
             z => Self { scheme: EXPLICIT, stiffness: z },
@@ -59,7 +65,7 @@ impl Choice {
     /// The method for the present stage of `course`, which notes the reason.
     pub(super) fn note(course: &mut Course<'_>) -> Scheme {
         let choice = Self::of(course.problem, course.stage, course.state.depth, course.state.velocity);
-        if course.detail >= Detail::Events {
+        if course.detail >= Detail::Events && course.stage < EXPLAINED_MAX {
             course.notes.push(choice.explain(course.stage));
         }
         choice.scheme

@@ -3,7 +3,7 @@
 //! [`crate::physics::closed_form`] has the formulas of one stage. A scene that enters a stage without one is refused.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample, Solved};
+use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample, Solved, refuse_laws};
 use crate::physics::closed_form::{cross, cross_continuous_crater, margin_error};
 use crate::physics::{CraterStiffness, Problem, Stage, State};
 
@@ -37,6 +37,7 @@ impl Integrator for ClosedForm {
     }
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
+        refuse_laws(problem, self.name())?;
         let is_path = matches!(detail, Detail::Trajectory);
         let listed = if is_path { Detail::Events } else { detail };
         let mut flight = flight::solve(problem, listed, &mut Exact { continuous: false })?;
@@ -74,6 +75,7 @@ impl Integrator for ClosedForm {
 /// # Errors
 /// As [`ClosedForm`].
 pub fn solve_crater_and_tunnel(problem: &Problem, stiffness: CraterStiffness) -> Solved {
+    refuse_laws(problem, ClosedForm.name())?;
     let continuous = stiffness == CraterStiffness::Continuous;
     flight::solve(problem, Detail::Events, &mut Exact { continuous })
 }
@@ -88,6 +90,7 @@ pub fn state_at(problem: &Problem, depth: f64) -> Solved<Option<State>> {
     if !(0.0..=problem.exit_depth).contains(&depth) || depth.is_infinite() {
         return Ok(None);
     }
+    refuse_laws(problem, ClosedForm.name())?;
     let end = flight::solve(&problem.clone().with_exit(depth), Detail::End, &mut Exact { continuous: false })?.end;
     Ok((end.depth == depth).then_some(end))
 }

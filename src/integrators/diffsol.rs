@@ -36,9 +36,9 @@ use diffsol::{
 use self_cell::self_cell;
 
 use super::adaptive::{Choice, EXPLICIT, IMPLICIT};
-use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
+use super::flight::{self, Bounded, Course, SLOW, StageEnd, StageSolver, VANISHES};
 use super::outcome::{Cost, Detail, IntegrationError, Integrator, Solved};
-use crate::physics::{Problem, Stage, State};
+use crate::physics::{Law, Problem, Stage, State};
 
 type Matrix = NalgebraMat<f64>;
 type Pair = NalgebraVec<f64>;
@@ -161,6 +161,15 @@ impl Diffsol {
         let solvers = schemes.into_iter().map(|scheme| Solver::of(scheme, self.rtol)).collect::<Result<_, _>>()?;
         Ok(Reusing { of: *self, solvers: RefCell::new(solvers) })
     }
+
+    fn budget_spent(&self, last: State) -> IntegrationError {
+        let remedy = if self.scheme == Some(Scheme::Tsit45) {
+            "take --method adaptive, or a looser --rtol"
+        } else {
+            "take a looser --rtol, or --method taylor"
+        };
+        IntegrationError::StepBudgetSpent { max_steps: self.max_steps, remedy, last }
+    }
 }
 
 impl Integrator for Diffsol {
@@ -216,7 +225,7 @@ impl StageSolver<f64> for &Reusing {
     fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
         // A depth has 53 bits, and what is left of the target behind a stop may be no longer than its rounding.
         let Problem { mass, impact_speed, .. } = *course.problem;
-        let force = course.problem.stages[course.stage].force(course.state.depth, 0.0).abs();
+        let force = course.problem.force(course.stage, course.state.depth, 0.0).abs();
         let rounding = f64::EPSILON * (2.0 * force / mass) * course.state.depth / impact_speed / impact_speed;
         let bound = course.error_bound + if course.state.velocity > 0.0 { 0.0 } else { rounding };
         Ok(Bounded { bound, ..course.margin() })
@@ -228,7 +237,7 @@ impl Stage {
     /// The longest step that cannot hide two zeros of u: `1/w` for an underdamped spring, else none is needed.
     ///
     /// Between two zeros of u lies half a period, `pi/w` at least. Without a spring, or with an overdamped one, the
-    /// static force at rest has one sign and u has one zero at most.
+    /// static force at rest has one sign and u has one zero at most; so has the sum of two exponentials where s < 0.
     fn longest_step(&self) -> f64 {
         let Self { stiffness: s, viscosity: r, .. } = *self;
         if s > 0.0 && r * r < 4.0 * s { 1.0 / s.sqrt() } else { f64::INFINITY }
@@ -261,7 +270,7 @@ impl Stage {
     fn meaning_of_standstill(&self, at: Node, noise: f64) -> StageEnd {
         let Self { static_force: p, stiffness: s, end: distance, .. } = *self;
         let resists = p > 0.0 || (p == 0.0 && s > 0.0);
-        let least_brake = if self.may_hang() { noise * (p.abs() + s * at.depth.abs()) } else { 0.0 };
+        let least_brake = if self.may_hang() { noise * (p.abs() + s.abs() * at.depth.abs()) } else { 0.0 };
         if resists || p + s * at.depth > least_brake {
             return StageEnd::Rest(Node { depth: at.depth.max(0.0), velocity: 0.0, ..at });
         }
@@ -278,7 +287,7 @@ impl Stage {
             u / self.end.max(f64::MIN_POSITIVE),
             self.force(0.0, u).abs() / u.max(f64::MIN_POSITIVE),
             self.static_force.abs(),
-            self.stiffness.sqrt(),
+            self.stiffness.abs().sqrt(),
             self.viscosity + 2.0 * self.drag * u,
         ];
         let fastest = rates.into_iter().fold(0.0, f64::max);
@@ -297,11 +306,11 @@ fn length_of(problem: &Problem) -> f64 {
         .chain([problem.exit_depth])
         .filter(|&depth| depth > 0.0 && depth.is_finite())
         .reduce(f64::min);
-    let law = problem.stages[0];
+    let law = problem.linear(0, State::at_impact(problem));
     let (m, w) = (problem.mass, speed * speed);
     let own = [
         m * w / (2.0 * law.static_force.abs()),
-        speed * (m / law.stiffness).sqrt(),
+        speed * (m / law.stiffness.abs()).sqrt(),
         m * speed / law.viscosity,
         m / law.drag,
     ];
@@ -311,7 +320,9 @@ fn length_of(problem: &Problem) -> f64 {
 
 /// One stage in its own units.
 struct Reduced {
+    /// Its coefficients; where it has a law of its own, those of the law made linear at the start.
     law: Stage,
+    own: Option<OwnLaw>,
     /// Unit of depth L (m).
     length: f64,
     /// Unit of speed V0 (m/s).
@@ -328,7 +339,7 @@ impl Reduced {
         let limit = problem.limit_of(course.stage);
         // What the tolerance leaves open in x must be little beside the stage: a thin rest of a slab is its own unit.
         let (length, speed) = (length_of(problem).min(limit - start.depth), problem.impact_speed);
-        let (stage, mass) = (&problem.stages[course.stage], problem.mass);
+        let (stage, mass) = (&problem.linear(course.stage, start), problem.mass);
         let law = Stage {
             static_force: (stage.static_force + stage.stiffness * start.depth) / mass * length / speed / speed,
             stiffness: stage.stiffness / mass * (length / speed) * (length / speed),
@@ -341,7 +352,14 @@ impl Reduced {
             return Err(IntegrationError::NotFinite { what: "the force over the mass", last: start });
         }
         course.limit()?;
-        Ok(Self { law, length, unit_speed: speed, start, speed: start.velocity / speed })
+        let own = problem.laws.of(course.stage).map(|law| OwnLaw {
+            law: law.clone(),
+            start: start.depth,
+            length,
+            speed,
+            acceleration: length / mass / speed / speed,
+        });
+        Ok(Self { law, own, length, unit_speed: speed, start, speed: start.velocity / speed })
     }
 
     /// The state at `node`.
@@ -352,11 +370,130 @@ impl Reduced {
             velocity: node.velocity * self.unit_speed,
         }
     }
+
+    /// What `end`, found in these units with times that count from `epoch` and `noise` in its speed, means.
+    fn end_of(&self, course: &Course<'_>, end: StageEnd, epoch: f64, noise: f64) -> Solved<StageEnd> {
+        let end = match (end, &self.own) {
+            (StageEnd::Rest(place), Some(own)) if !own.stops(place) => StageEnd::Approach(place, VANISHES),
+            (StageEnd::Rest(place), None) => self.law.meaning_of_standstill(place, noise),
+            (found, _) => found,
+        };
+        let state = |at: Node| self.state(Node { time: epoch + at.time, ..at });
+        Ok(match end {
+            StageEnd::Limit(at) => StageEnd::Limit(State { depth: course.limit()?, ..state(at) }),
+            StageEnd::Rest(at) => StageEnd::Rest(state(at)),
+            StageEnd::Approach(at, why) => StageEnd::Approach(state(at), why),
+        })
+    }
+}
+
+/// A law of its own in the units of a stage.
+#[derive(Clone)]
+struct OwnLaw {
+    law: Law,
+    /// Depth (m) at the start of the stage.
+    start: f64,
+    /// Unit of depth L (m).
+    length: f64,
+    /// Unit of speed V0 (m/s).
+    speed: f64,
+    /// `L/(M V0²)`, which makes a force a deceleration in these units.
+    acceleration: f64,
+}
+
+impl OwnLaw {
+    /// Depth (m) and velocity (m/s); the velocity not below zero, where a power of it has no value.
+    fn place(&self, y: &[f64]) -> (f64, f64) {
+        (self.start + y[0] * self.length, (y[1] * self.speed).max(0.0))
+    }
+
+    /// Whether a standstill at `place` is a rest.
+    fn stops(&self, place: Node) -> bool {
+        let (depth, _) = self.place(&[place.depth, 0.0]);
+        self.law.stops(depth, self.speed)
+    }
+
+    /// Length of a step that ends at the kink which the step from `before` to `after` has passed; `None` where it has
+    /// passed none, or one that lies at an end of it.
+    fn to_kink(
+        &self,
+        before: Node,
+        after: Node,
+        mut at: impl FnMut(f64) -> Result<[f64; 2], DiffsolError>,
+    ) -> Result<Option<f64>, DiffsolError> {
+        let sides = |y: [f64; 2]| {
+            let (depth, velocity) = self.place(&y);
+            self.law.sides(depth, velocity)
+        };
+        let first = sides([before.depth, before.velocity]);
+        if first.is_empty() || first == sides([after.depth, after.velocity]) {
+            return Ok(None);
+        }
+        let (mut low, mut high) = (before.time, after.time);
+        for _ in 0..KINK_HALVINGS {
+            let middle = 0.5 * (low + high);
+            if sides(at(middle)?) == first { low = middle } else { high = middle }
+        }
+        let share = (high - before.time) / (after.time - before.time);
+        Ok((AT_AN_END..1.0 - AT_AN_END).contains(&share).then_some(high - before.time))
+    }
+
+    /// Length of a shorter step, where this one passed a kink or may hide a part of the force.
+    ///
+    /// As [`Self::to_kink`], but for `kink`, the time of the one that a step was shortened to: a step that starts there
+    /// passes it. Times of nodes count from `epoch`.
+    fn to_new_kink(
+        &self,
+        kink: &mut Option<f64>,
+        epoch: f64,
+        before: Node,
+        after: Node,
+        at: impl FnMut(f64) -> Result<[f64; 2], DiffsolError>,
+    ) -> Result<Option<f64>, DiffsolError> {
+        let start = epoch + before.time;
+        let is_at_kink = kink.is_some_and(|kink| (start - kink).abs() <= 1e-3 * (after.time - before.time));
+        let length = self.to_kink(before, after, at)?.filter(|_| !is_at_kink);
+        *kink = length.map_or(kink.filter(|_| !is_at_kink), |length| Some(start + length));
+        let step = after.time - before.time;
+        let may_hide = length.is_none() && step > NARROWEST * start && !self.hides_nothing(before, after);
+        Ok(if may_hide { Some(SHORTENING * step) } else { length })
+    }
+
+    /// Whether the step from `before` to `after` shows its force ([`Law::shown_in`]).
+    fn hides_nothing(&self, before: Node, after: Node) -> bool {
+        let ends = [before, after].map(|node| self.place(&[node.depth, node.velocity]));
+        let between = |share: f64, a: f64, b: f64| a + share * (b - a);
+        let place = |share| (between(share, ends[0].0, ends[1].0), between(share, ends[0].1, ends[1].1));
+        let mass = self.length / self.acceleration / self.speed / self.speed;
+        self.law.shown_in(place, mass * self.speed * self.speed) == Some(1)
+    }
+
+    /// Whether it only goes on slowing down from `at` (in the units of the stage) to the limit at `end`.
+    fn is_approach(&self, at: Node, end: f64) -> bool {
+        let (depth, velocity) = self.place(&[at.depth, at.velocity]);
+        let mass = self.length / self.acceleration / self.speed / self.speed;
+        let place = State { time: at.time, depth, velocity };
+        self.law.is_approach(mass, place, (end - at.depth) * self.length)
+    }
+
+    fn force(&self, y: &[f64]) -> f64 {
+        let (depth, velocity) = self.place(y);
+        self.law.force(depth, velocity) * self.acceleration
+    }
+
+    /// Derivatives of the force by depth and velocity; zero where it has none, as a power below one at rest.
+    fn slopes(&self, y: &[f64]) -> (f64, f64) {
+        let (depth, velocity) = self.place(y);
+        let (by_depth, by_velocity) = self.law.slopes(depth, velocity);
+        let scaled = |slope: f64, unit: f64| if slope.is_finite() { slope * self.acceleration * unit } else { 0.0 };
+        (scaled(by_depth, self.length), scaled(by_velocity, self.speed))
+    }
 }
 
 /// The law that the library's closures read, and what they count.
 struct Force {
     law: Cell<Stage>,
+    own: RefCell<Option<OwnLaw>>,
     start: Cell<(f64, f64)>,
     evaluations: Cell<u64>,
 }
@@ -366,13 +503,23 @@ impl Force {
     fn rate(&self, y: &[f64], dy: &mut [f64]) {
         self.evaluations.set(self.evaluations.get() + 1);
         dy[0] = y[1];
-        dy[1] = -self.law.get().force(y[0], y[1]);
+        dy[1] = -self.force(y);
+    }
+
+    #[inline]
+    fn force(&self, y: &[f64]) -> f64 {
+        self.own.borrow().as_ref().map_or_else(|| self.law.get().force(y[0], y[1]), |own| own.force(y))
     }
 
     #[inline]
     fn jacobian_product(&self, y: &[f64], v: &[f64], jv: &mut [f64]) {
-        let law = self.law.get();
         jv[0] = v[1];
+        if let Some(own) = &*self.own.borrow() {
+            let (by_depth, by_velocity) = own.slopes(y);
+            jv[1] = -(by_depth * v[0] + by_velocity * v[1]);
+            return;
+        }
+        let law = self.law.get();
         jv[1] = -(law.stiffness * v[0] + (law.viscosity + 2.0 * law.drag * y[1]) * v[1]);
     }
 
@@ -401,8 +548,12 @@ self_cell! {
 impl Solver {
     /// A solver by `scheme`, for tolerance `rtol`.
     fn of(scheme: Scheme, rtol: f64) -> Solved<Self> {
-        let force =
-            Rc::new(Force { law: Cell::new(Stage::free()), start: Cell::default(), evaluations: Cell::default() });
+        let force = Rc::new(Force {
+            law: Cell::new(Stage::free()),
+            own: RefCell::default(),
+            start: Cell::default(),
+            evaluations: Cell::default(),
+        });
         let [of_rate, of_jacobian, of_start] = [&force, &force, &force].map(Rc::clone);
         let tolerance = scheme.library_rtol(rtol);
         let mut problem = OdeBuilder::<Matrix>::new()
@@ -480,6 +631,17 @@ impl<Eqn: OdeEquations<V = Pair, T = f64>> OfScheme<Eqn> {
 /// Shortest step [L/V0]. Each stage starts at time zero, so no time swallows it.
 const STEP_MIN: f64 = 1e-30;
 
+/// Halvings of a step with a kink inside.
+const KINK_HALVINGS: u32 = 40;
+
+/// By what a step is shortened that may hide a part of its force, and how short beside the time since the start of the stage
+/// it is not.
+const SHORTENING: f64 = 0.3;
+const NARROWEST: f64 = 1e-9;
+
+/// Share of a step within which a kink lies at its end: what the force is off there does not count.
+const AT_AN_END: f64 = 1e-7;
+
 /// How often a step that ended in NaN is tried again, each time ten times shorter.
 const RETRIES_MAX: u32 = 60;
 
@@ -514,9 +676,10 @@ where
     }
 
     fn solve(&mut self, stage: &Reduced, method: &Diffsol, course: &mut Course<'_>) -> Solved<StageEnd> {
-        let (law, max_steps) = (stage.law, method.max_steps);
+        let law = stage.law;
         let &OfScheme { scheme, rtol, ref force, .. } = self.of;
         force.law.set(law);
+        force.own.replace(stage.own.clone());
         force.evaluations.set(0);
         let longest_step = law.longest_step();
         let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed);
@@ -526,6 +689,8 @@ where
         let mut epoch = 0.0;
         let mut h = first_step;
         let mut retries = 0;
+        // Time of the kink that a step was shortened to.
+        let mut kink = None;
         let mut energy_max = stage.speed * stage.speed;
         let mut cost = Cost::default();
         let state_at = |epoch: f64, at: Node| stage.state(Node { time: epoch + at.time, ..at });
@@ -538,13 +703,8 @@ where
         let mut rejected_before = rejected_by(&solver);
 
         let end = loop {
-            if course.cost.steps + cost.steps >= max_steps {
-                let remedy = if method.scheme == Some(Scheme::Tsit45) {
-                    "take --method adaptive, or a looser --rtol"
-                } else {
-                    "take a looser --rtol, or --method taylor"
-                };
-                return Err(IntegrationError::StepBudgetSpent { max_steps, remedy, last: state_at(epoch, before) });
+            if course.cost.steps + cost.steps >= method.max_steps {
+                return Err(method.budget_spent(state_at(epoch, before)));
             }
             // The stop reason says nothing here: there is neither a root function nor a stop time.
             let _ = solver.step().map_err(|e| failure(e, epoch, before))?;
@@ -558,14 +718,24 @@ where
                 cost.steps += 1;
                 break StageEnd::Rest(before);
             }
-            if backwards || !(after.is_finite() && next_step.is_finite() && after.time > before.time) {
+            let is_lost_step = backwards || !(after.is_finite() && next_step.is_finite() && after.time > before.time);
+            let shorter = if is_lost_step {
                 retries += 1;
                 if retries > RETRIES_MAX {
                     return Err(IntegrationError::NotFinite { what: "the state", last: state_at(epoch, before) });
                 }
+                Some(0.1 * h)
+            } else if let Some(own) = &stage.own {
+                let scratch = &mut self.scratch;
+                let at = |t| solver.interpolate_inplace(t, scratch).map(|()| [scratch[0], scratch[1]]);
+                own.to_new_kink(&mut kink, epoch, before, after, at).map_err(|e| failure(e, epoch, before))?
+            } else {
+                None
+            };
+            if let Some(shorter) = shorter {
                 cost.rejected_steps += rejected_by(&solver) - rejected_before;
                 drop(solver);
-                h *= 0.1;
+                h = shorter;
                 epoch += before.time;
                 before.time = 0.0;
                 solver = self.solver_at(before.depth, before.velocity, h).map_err(|e| failure(e, epoch, before))?;
@@ -577,7 +747,9 @@ where
             let scratch = &mut self.scratch;
             let mut interpolant = |t| solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]));
             let is_last = after.velocity <= 0.0 || after.depth >= law.end;
-            let end = is_last.then(|| locate(&law, before, after, &mut interpolant)).transpose();
+            let end = is_last
+                .then(|| locate(|x, v| force.force(&[x, v]), law.end, before, after, &mut interpolant))
+                .transpose();
             let end = end.map_err(|e| failure(e, epoch, before))?;
             let place = match end {
                 Some(StageEnd::Limit(place) | StageEnd::Rest(place) | StageEnd::Approach(place, _)) => place,
@@ -591,6 +763,9 @@ where
             }
             before = after;
             course.sample(state_at(epoch, after));
+            if after.velocity < SLOW && stage.own.as_ref().is_some_and(|own| own.is_approach(after, law.end)) {
+                break StageEnd::Approach(after, VANISHES);
+            }
             h = next_step;
             if h > longest_step {
                 h = longest_step;
@@ -606,15 +781,7 @@ where
         let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
         course.cost = course.cost + cost;
         course.error_bound += (noise + round_off) * energy_max;
-        let end = match end {
-            StageEnd::Rest(place) => law.meaning_of_standstill(place, noise),
-            reached => reached,
-        };
-        Ok(match end {
-            StageEnd::Limit(at) => StageEnd::Limit(State { depth: course.limit()?, ..state_at(epoch, at) }),
-            StageEnd::Rest(at) => StageEnd::Rest(state_at(epoch, at)),
-            StageEnd::Approach(at, why) => StageEnd::Approach(state_at(epoch, at), why),
-        })
+        stage.end_of(course, end, epoch, noise)
     }
 }
 
@@ -654,11 +821,12 @@ fn rejected_by<'a, Eqn: OdeEquations + 'a, S: OdeSolverMethod<'a, Eqn>>(solver: 
     (statistics.number_of_error_test_failures + statistics.number_of_nonlinear_solver_fails) as u64
 }
 
-/// Where a step that ends with `u <= 0` or past the end of `law` meets its event, on the library's interpolant `at`.
+/// Where a step that ends with `u <= 0` or past the `distance` to the limit meets its event, on the library's interpolant `at`.
 ///
 /// Rest is sought first. Up to there u > 0 and xi rises, so a boundary before it is crossed exactly once.
 fn locate(
-    law: &Stage,
+    force: impl Fn(f64, f64) -> f64,
+    distance: f64,
     before: Node,
     after: Node,
     mut at: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
@@ -670,12 +838,11 @@ fn locate(
             before,
             after,
             before.velocity,
-            |node| (node.velocity, -law.force(node.depth, node.velocity)),
+            |node| (node.velocity, -force(node.depth, node.velocity)),
             &mut node_at,
         )?;
         last = Node { velocity: 0.0, ..rest };
     }
-    let distance = law.end;
     if last.depth < distance {
         return Ok(StageEnd::Rest(last));
     }

@@ -24,7 +24,7 @@
 //! refused.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved};
+use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved, refuse_laws};
 use crate::physics::{Problem, Scalar, Stage, State};
 
 /// Name of the method.
@@ -105,6 +105,7 @@ impl Energy {
     /// - [`IntegrationError::NeverEnds`]: an unbounded last stage does not resist at rest;
     /// - [`IntegrationError::NotFinite`], [`IntegrationError::StepBudgetSpent`]: numbers beyond the range of `S`.
     pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
+        refuse_laws(problem, NAME)?;
         refuse_viscosity(problem)?;
         let now = State { time: S::zero(), depth: S::zero(), velocity: S::one() };
         let mut stages = Stages { walk: Walk::from_impact(self.tolerance::<S>()), now, clock: Cost::default() };
@@ -119,6 +120,7 @@ impl Energy {
     /// # Errors
     /// As [`Energy::solve_in`], save that a flight with an exit always ends here.
     pub fn exit_margin_in<S: Scalar>(&self, problem: &Problem<S>) -> Solved<Option<(S, f64, Cost)>> {
+        refuse_laws(problem, NAME)?;
         refuse_viscosity(problem)?;
         if !problem.has_exit() || problem.impact_speed.value() <= 0.0 {
             return Ok(None);
@@ -241,6 +243,11 @@ impl<S: Scalar> Loss<S> {
     /// Rest is not farther than this, since drag only takes more.
     fn static_reach(&self, x: f64, w: f64) -> f64 {
         let (growing, here) = (self.growing.value(), self.steady.value() + self.growing.value() * x);
+        if growing < 0.0 {
+            // Exact, as there is no drag; none where the force falls to zero before.
+            let left = here * here + 2.0 * growing * w;
+            return if here > 0.0 && left >= 0.0 { 2.0 * w / (here + left.sqrt()) } else { f64::INFINITY };
+        }
         let root = here.hypot((2.0 * growing * w).sqrt());
         if here >= 0.0 { 2.0 * w / (here + root) } else { (root - here) / growing }
     }
@@ -332,7 +339,7 @@ impl<S: Scalar> Walk<S> {
             }
 
             // Every term of the sum, and every part of the rate, is at most of this size.
-            let (a, b, drag) = (loss.steady.value().abs(), loss.growing.value(), loss.drag.value());
+            let (a, b, drag) = (loss.steady.value().abs(), loss.growing.value().abs(), loss.drag.value());
             let size = w.value().abs() + h.value() * (a + b * to.value() + drag * w.value().abs());
             let negligible = 0.5 * self.tolerance * size;
             let (change, terms) = loss.change(x, w, h, negligible);
@@ -463,7 +470,10 @@ impl<S: Scalar> Clock<S> {
             }
             let w = now.velocity * now.velocity;
             let rate = self.loss.rate(now.depth, w).value();
-            if rate > 0.0 && fall <= 0.0 {
+            let growing = self.loss.growing.value();
+            // A force that falls with depth and drives may begin at a rounding above zero.
+            let slows = rate > 0.0 && !(growing < 0.0 && rate + end_rate < 0.0);
+            if slows && fall <= 0.0 {
                 // The last speed is reached before the end by round-off alone: what is left is passed at it. Going on in
                 // depth would close in on a rest that the walk does not have, without ever coming there.
                 if velocity.value() > 0.0 {
@@ -475,6 +485,9 @@ impl<S: Scalar> Clock<S> {
             // one that drives does so to the end if it still does there.
             let monotone = (rate > 0.0 && fall > 0.0) || (rate < 0.0 && fall < 0.0 && end_rate < 0.0);
             let depth_radius = w.value() / rate.abs();
+            // Where the force falls with depth, w may have its zeros beside the path: as far away as this.
+            let depth_radius =
+                if growing < 0.0 { depth_radius.min((-2.0 * w.value() / growing).sqrt()) } else { depth_radius };
             let v = now.velocity.value();
             let rate_slope = 2.0 * v * (self.loss.drag.value() - self.loss.growing.value() / rate);
             let speed_radius = (rate / rate_slope).abs();

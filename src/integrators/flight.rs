@@ -13,11 +13,17 @@ use std::cmp::Ordering;
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample, Solved};
 use crate::physics::exit_energy::{energy_beyond_stop, speed_missing};
 pub(crate) use crate::physics::problem::StageEnd;
-use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State};
+use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
 
 /// What is said of a place that is reached without speed, if it is reached.
 const LEAST_TIME: &str = "the speed vanishes towards the end: the time is the least possible, until 2e-16 of the speed is \
                           left, and may be infinite";
+
+/// Velocity over the impact speed below which a force that vanishes with it is taken for its power.
+pub(crate) const SLOW: f64 = 1e-6;
+
+/// Why a law of its own brings nothing to rest.
+pub(crate) const VANISHES: &str = "its resistance vanishes with the velocity, so that it is only slowed for ever";
 
 /// A method, as the loop sees it.
 pub(crate) trait StageSolver<S: Scalar> {
@@ -82,7 +88,7 @@ pub(crate) struct Course<'a, S = f64> {
     trajectory: Vec<Sample>,
     /// How many of the times asked for are passed.
     passed: usize,
-    /// Least `W/V0²` at the stage ends passed so far.
+    /// Least `W/V0²` passed so far: at stage ends, or where a law of its own lets V rise again.
     least_at_ends: Bounded,
 }
 
@@ -115,14 +121,22 @@ impl<'a, S: Scalar> Course<'a, S> {
         let limit = self.problem.limit_of(self.stage);
         let Stage { static_force, stiffness, .. } = self.problem.stages[self.stage];
         // A static force that is positive far out brings every projectile to rest.
-        let stops_far_out = stiffness.value() > 0.0 || static_force.value() > 0.0;
-        if limit.value() == f64::INFINITY && !stops_far_out { self.never_ends() } else { Ok(limit) }
+        let stops_far_out = stiffness.value() > 0.0 || (static_force.value() > 0.0 && stiffness.value() == 0.0);
+        if limit.value() == f64::INFINITY && !stops_far_out { self.limitless() } else { Ok(limit) }
     }
 
+    /// No limit, where the force of the stage is an expression: the flight shows whether it ends.
+    ///
+    /// # Errors
+    /// [`IntegrationError::NeverEnds`] for coefficients that stop nothing.
     #[cold]
-    fn never_ends(&self) -> Solved<S> {
+    fn limitless(&self) -> Solved<S> {
+        self.refuse_unknown_force()?;
         let law = &self.problem.stages[self.stage];
-        let why = if law.static_force.value() < 0.0 {
+        if self.problem.laws.of(self.stage).is_some() {
+            return Ok(S::from_f64(f64::INFINITY));
+        }
+        let why = if law.static_force.value() < 0.0 || law.stiffness.value() < 0.0 {
             "the last stage drives the projectile and has no far side"
         } else if law.viscosity.value() == 0.0 && law.drag.value() == 0.0 {
             "the last stage has no resistance and no far side"
@@ -132,11 +146,20 @@ impl<'a, S: Scalar> Course<'a, S> {
         Err(IntegrationError::NeverEnds { why, last: self.state.values() })
     }
 
+    /// Error where the table of the force has ended.
+    fn refuse_unknown_force(&self) -> Solved<()> {
+        let is_last = self.stage + 1 == self.problem.stages.len();
+        if is_last && self.problem.target == Target::StagesToEndOfTable {
+            return Err(IntegrationError::TableEnds { last: self.state.values() });
+        }
+        Ok(())
+    }
+
     /// Adds a row to the trajectory, if one is wanted: `state`, in the present stage.
     #[inline(always)]
     pub(crate) fn sample(&mut self, state: State<S>) {
         if matches!(self.detail, Detail::Trajectory) {
-            self.push_sample(state, self.problem.stages[self.stage].force(state.depth, state.velocity));
+            self.push_sample(state, self.problem.force(self.stage, state.depth, state.velocity));
         }
     }
 
@@ -158,14 +181,13 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[cold]
     #[inline(never)]
     fn push_until(&mut self, times: &[f64], end: State<S>, mut at: impl FnMut(f64) -> State<S>) {
-        let law = self.problem.stages[self.stage];
         while let Some(&time) = times.get(self.passed).filter(|time| **time <= end.time.value()) {
             let inside = if time == end.time.value() { end } else { at(time) };
             // An event is placed to the last digit, the path in front of it is not.
             let depth = if inside.depth.value() > end.depth.value() { end.depth } else { inside.depth };
             let velocity = if inside.velocity.value() > 0.0 { inside.velocity } else { S::zero() };
             let state = State { time: S::from_f64(time), depth, velocity };
-            self.push_sample(state, law.force(depth, velocity));
+            self.push_sample(state, self.problem.force(self.stage, depth, velocity));
             self.passed += 1;
         }
     }
@@ -179,10 +201,21 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
     }
 
+    /// Notes a least velocity (m/s) inside a stage.
+    pub(crate) fn pass_least(&mut self, velocity: f64) {
+        self.least_at_ends = self.least_at_ends.min(self.energy_at(velocity));
+    }
+
     /// `W/V0²` here.
     #[inline(always)]
     fn energy(&self) -> Bounded {
-        let relative = self.state.velocity.value() / self.problem.impact_speed.value();
+        self.energy_at(self.state.velocity.value())
+    }
+
+    /// `W/V0²` at a velocity (m/s).
+    #[inline(always)]
+    fn energy_at(&self, velocity: f64) -> Bounded {
+        let relative = velocity / self.problem.impact_speed.value();
         Bounded { value: relative * relative, bound: self.error_bound }
     }
 
@@ -225,7 +258,15 @@ impl<'a, S: Scalar> Course<'a, S> {
             return self.least_at_ends.min(self.energy());
         }
         let scale = self.problem.impact_speed.value();
-        let value = energy_beyond_stop(self.problem, self.stage, self.state.depth.value()) / scale / scale;
+        let depth = self.state.depth.value();
+        let value = energy_beyond_stop(self.problem, self.stage, depth) / scale / scale;
+        if value == 0.0
+            && let Some(law) = self.problem.laws.of(self.stage)
+        {
+            let exit = self.problem.exit_depth.value();
+            let (value, bound) = law.margin_of_depth(self.state.values(), exit, scale, self.error_bound);
+            return Bounded { value, bound };
+        }
         Bounded { value, bound: self.error_bound + 8.0 * f64::EPSILON * value.abs() }
     }
 
@@ -266,6 +307,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// `-missing (2 V + missing)` below that of the present state, and the place itself is rounded.
     #[cold]
     fn arrive_in_doubt(&mut self, at: State<S>, why: &'static str) -> Solved<State<S>> {
+        self.refuse_unknown_force()?;
         let (last, limit) = (at.values(), self.problem.limit_of(self.stage));
         let (law, mass) = (self.problem.stages[self.stage].values(), self.problem.mass.value());
         let v = last.velocity.max(0.0);

@@ -2,7 +2,7 @@
 //!
 //! What an event is belongs to [`crate::physics::problem`]; here it is found on the polynomials of a step. No answer
 //! rests on signs at the ends of a step alone, unless a proof says that they suffice. The proofs, for a step inside
-//! one stage `M V' = -(p + s x + r V + q V²)` with `s, r, q >= 0`, starting at `V > 0`:
+//! one stage `M V' = -(p + s x + r V + q V²)` with `r, q >= 0`, starting at `V > 0`; `s >= 0` in 3 and 4:
 //!
 //! 1. `x` grows strictly while `V > 0`. So the first root of `V` decides: a boundary is reached on the flight exactly
 //!    when it lies at or before the depth of rest, and then once.
@@ -13,8 +13,12 @@
 //!    as in 2. The step rule ensures `w h <= 1.8`.
 //! 4. Otherwise (`s > 0` and `q > 0`) nothing is assumed: [`first_root`] isolates the earliest root of V on the whole
 //!    step by Bernstein coefficients, roots of even multiplicity included.
+//! 5. `s < 0`, which has `r = q = 0`: `V = A e^(l t) + B e^(-l t)`, `l² = -s/M`, has one root at most, where
+//!    `e^(2 l t) = -B/A`. The sign of `V(h)` therefore decides as in 2, however long the step, and V stays negative behind
+//!    its root.
 //!
-//! Inside a stage V has no minimum above zero: where `V' = 0`, `M V'' = -s V <= 0`.
+//! Inside a stage V has no minimum above zero: where `V' = 0`, `M V'' = -s V <= 0` for `s >= 0`; for `s < 0` the force
+//! keeps its sign up to the end of the stage, so V is monotone.
 //!
 //! `rest` and `passage` then solve for the place. At a trial time the polynomial gives `x` and `V`, and the law
 //! itself gives `V'`, `V''`, `V'''` at no further cost, so one trial is corrected to fourth order. Both corrections
@@ -322,6 +326,19 @@ fn at_depth<S: Scalar>(law: &Stage<S>, point: &State<S>, jet: &Jet<S>, step: S) 
     let velocity = point.velocity + step * (jet.first + step * (jet.second * half + step * jet.third * sixth()));
     let velocity = if velocity.value() > 0.0 { velocity } else { S::zero() };
     State { time: point.time + step, depth: law.end, velocity }
+}
+
+/// Whether the polynomial `c[0] + c[1] t + ...` is negative on the whole of `[0, span]`, as its Bernstein coefficients show:
+/// `false` says nothing.
+///
+/// # Panics
+/// As [`first_root`].
+pub(crate) fn is_negative(coefficients: &[f64], span: f64) -> bool {
+    let mut bernstein = [0.0; COEFFICIENTS_MAX];
+    let bernstein = &mut bernstein[..coefficients.len()];
+    let size = to_bernstein(coefficients, span, bernstein);
+    let noise = 4.0 * coefficients.len() as f64 * f64::EPSILON * size;
+    bernstein.iter().all(|b| *b < -noise)
 }
 
 /// Highest number of coefficients that [`first_root`] takes.

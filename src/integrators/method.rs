@@ -159,6 +159,9 @@ pub struct Method {
     integrator: Box<dyn Integrator + Sync>,
 }
 
+/// Most stages behind the end of a flight that are named one by one.
+const UNBUILT_MAX: usize = 64;
+
 impl Method {
     /// The method `name` with `options`.
     ///
@@ -189,9 +192,18 @@ impl Method {
     pub fn explain(&self, problem: &Problem, flight: &Flight, detail: Detail) -> Vec<String> {
         let mut notes = flight.notes.clone();
         notes.extend(self.integrator.explain(problem, flight));
-        for index in flight.stage + 1..problem.stages.len() {
+        let left = flight.stage + 1..problem.stages.len();
+        // Of very many, as of a table, the first stands for all.
+        let listed = if left.len() > UNBUILT_MAX { 1 } else { left.len() };
+        for index in left.clone().take(listed) {
+            let stage = if listed < left.len() {
+                format!("stages {index} to {}", left.end - 1)
+            } else {
+                format!("stage {index}")
+            };
+            let was = if listed < left.len() { "were" } else { "was" };
             notes.push(format!(
-                "stage {index} was not built: the flight ended in stage {} at x = {} m, before {} m",
+                "{stage} {was} not built: the flight ended in stage {} at x = {} m, before {} m",
                 flight.stage,
                 Shown(flight.end.depth),
                 Shown(problem.start_of(index))

@@ -17,6 +17,10 @@ pub mod energy;
 mod every_method;
 mod flight;
 pub mod lanes;
+#[cfg(test)]
+#[path = "tests/laws.rs"]
+#[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]
+mod laws;
 pub mod locate;
 pub mod method;
 pub mod outcome;

@@ -4,7 +4,7 @@ use serde::Serialize;
 use smallvec::SmallVec;
 use thiserror::Error;
 
-use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, State};
+use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, Shown, State};
 
 /// How much of a flight to compute. What is not asked for is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
@@ -162,6 +162,15 @@ pub enum IntegrationError {
         /// State reached.
         last: State,
     },
+    /// The table that gives the force ends where the projectile still moves.
+    #[error(
+        "the table of the force ends at x = {} m, and the projectile still has V = {} m/s there, t = {} s after impact",
+        Shown(.last.depth), Shown(.last.velocity), Shown(.last.time)
+    )]
+    TableEnds {
+        /// State at the last row.
+        last: State,
+    },
     /// The method cannot treat this problem: a mistake of the caller, exit code 2.
     #[error("{method} cannot treat this scene: {why}")]
     Refused {
@@ -179,6 +188,16 @@ pub enum IntegrationError {
         value: String,
         /// What is allowed.
         allowed: &'static str,
+    },
+    /// The expression of a stage's force has no value where the flight goes.
+    #[error("the force of stage {stage} has no value at x = {} m, V = {} m/s: {why}", Shown(last.depth), Shown(last.velocity))]
+    NoForce {
+        /// Index of the stage.
+        stage: usize,
+        /// Which part of the expression, and why.
+        why: String,
+        /// Where it has none.
+        last: State,
     },
     /// The library behind the method gave up.
     #[error("{method} gave up after {last}: {cause}")]
@@ -211,6 +230,12 @@ impl Advice for IntegrationError {
             Self::NeverEnds { .. } => {
                 "give each stage a force that resists at rest (static_force > 0), and the last one that or a thickness"
             }
+            Self::TableEnds { .. } => {
+                "add rows to the table, or end its stage (`end`) or the target (`thickness`) before its last row"
+            }
+            Self::NoForce { .. } => {
+                "bound the argument with max or min, end the stage before that place, or try --method tsit45"
+            }
             Self::SolverFailed { .. } => "loosen --rtol, or take --method taylor",
             _ => "",
         }
@@ -222,10 +247,24 @@ impl Advice for IntegrationError {
             Self::StepBudgetSpent { last, .. }
             | Self::NotFinite { last, .. }
             | Self::NeverEnds { last, .. }
+            | Self::TableEnds { last }
+            | Self::NoForce { last, .. }
             | Self::SolverFailed { last, .. } => Some(*last),
             _ => None,
         }
     }
+}
+
+/// Refuses a problem with a law of its own for `method`, which works with formulas of the four coefficients.
+///
+/// # Errors
+/// [`IntegrationError::Refused`].
+pub(crate) fn refuse_laws<S>(problem: &Problem<S>, method: &'static str) -> Solved<()> {
+    if problem.laws.is_empty() {
+        return Ok(());
+    }
+    let why = "its formulas are those of p + s x + r V + q V², and a stage has a law of its own; take --method taylor";
+    Err(IntegrationError::Refused { method, why: why.to_owned() })
 }
 
 /// The exit margin alone, without the flight around it.
@@ -285,11 +324,19 @@ pub trait Integrator {
 mod tests {
     use super::*;
     use crate::integrators::flight::at_once;
-    use crate::physics::{Stage, Target};
+    use crate::physics::{Laws, Stage, Target};
 
     fn problem(ends: &[f64], impact_speed: f64, exit_depth: f64) -> Problem {
         let stages = ends.iter().map(|&end| Stage { end, ..Stage::tunnel(1.0, 0.0) }).collect();
-        Problem { mass: 1.0, impact_speed, exit_depth, stages, crater: None, target: Target::Stages }
+        Problem {
+            mass: 1.0,
+            impact_speed,
+            exit_depth,
+            stages,
+            crater: None,
+            target: Target::Stages,
+            laws: Laws::none(),
+        }
     }
 
     #[test]

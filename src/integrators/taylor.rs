@@ -15,7 +15,8 @@
 //! **Step.** Truncating after order K leaves about `|v(K)| h^K`, so `h` makes that `tolerance` times the velocity, for
 //! the last two orders: every second coefficient may vanish (`docs/theory.md`, section 2). The series of the tunnel has its
 //! nearest pole on the real axis, in the past, and the coefficients see it. The series of a stage without drag is
-//! entire: its step is capped by `w h <= 1.8`, so that no oscillation hides inside (proof 3 of [`super::locate`]).
+//! entire: its step is capped by `w h <= 1.8`, so that no oscillation hides inside (proof 3 of [`super::locate`]). Where
+//! the force falls with depth, s < 0, the series is that of an exponential, `w² = |s|/M`, and the cap only bounds its growth.
 //!
 //! **Work.** Drag costs a convolution, half of it by symmetry, with the factor of `v[k]` taken out of the sum (it is
 //! `r + 2 q v[0]`, so viscosity is free). Without drag the recurrence has two terms, and for a constant force the
@@ -26,12 +27,15 @@
 
 #![expect(clippy::inline_always, reason = "measured: one flight is one function, 1.3 times faster than with calls")]
 
+mod law;
+
 use std::marker::PhantomData;
 
 use super::flight::{self, Course, StageEnd, StageSolver};
 use super::locate::{self, Closing, Found};
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use crate::physics::exit_energy;
+use crate::physics::scalar::reciprocal;
 use crate::physics::{Problem, Scalar, Stage, State};
 
 /// Steps allowed for one flight. A resisting scene takes two to a few dozen; a stiff driven one thousands.
@@ -50,6 +54,9 @@ const LEAST_UNIT_DEPTH: f64 = f64::from_bits((1023 - 900) << 52);
 /// How much nearer to the start of a step than to its end a boundary lies that is searched from the start.
 const NEAR_START: f64 = 16.0;
 
+/// Most stages that are explained one by one.
+const EXPLAINED_MAX: usize = 64;
+
 /// Most coefficients that are computed without a loop.
 const UNROLLED_MAX: usize = 24;
 
@@ -61,17 +68,10 @@ const UNROLLED_MAX: usize = 24;
 /// # Example
 /// ```
 /// use penetrode::integrators::{Detail, Integrator, taylor::Taylor};
-/// use penetrode::physics::{Outcome, Problem, Stage, Target};
+/// use penetrode::physics::{Outcome, Problem, Stage};
 ///
 /// // Constant resistance: X = M V0²/(2 P), T = M V0/P.
-/// let problem = Problem {
-///     mass: 2.0,
-///     impact_speed: 300.0,
-///     exit_depth: f64::INFINITY,
-///     stages: [Stage::tunnel(1.0e6, 0.0)].into_iter().collect(),
-///     crater: None,
-///     target: Target::CraterAndTunnel,
-/// };
+/// let problem = Problem::crater_and_tunnel(2.0, 300.0, None, Stage::tunnel(1.0e6, 0.0));
 /// let flight = Taylor::default().solve(&problem, Detail::Events)?;
 /// assert_eq!(flight.outcome, Outcome::StoppedInTunnel);
 /// assert!((flight.end.depth - 0.09).abs() < 1e-16);
@@ -155,15 +155,32 @@ impl Integrator for Taylor {
     }
 
     fn explain(&self, problem: &Problem, flight: &Flight) -> Vec<String> {
-        let treatment = |law: &Stage| match Shape::of(law) {
+        let treatment = |index: usize, law: &Stage| match Shape::of(law) {
+            _ if problem.laws.of(index).is_some() => {
+                "a law of its own: series of its expression, over time or velocity"
+            }
             Shape::Constant => "constant force: the series ends, one step serves",
+            Shape::Spring if law.stiffness < 0.0 => {
+                "a force that falls with depth: recurrence of one term, no convolution"
+            }
             Shape::Spring => "a spring alone: recurrence of one term, no convolution",
             Shape::Linear => "no drag: recurrence of two terms, no convolution",
             Shape::Drag => "no stiffness: V monotone, no search for hidden roots",
             Shape::General => "stiffness and drag: earliest root isolated on every step",
         };
         let solved = problem.stages.iter().take(flight.stage + 1);
-        solved.enumerate().map(|(index, law)| format!("stage {index}: {}", treatment(law))).collect()
+        let solved = solved.enumerate();
+        if flight.stage >= EXPLAINED_MAX {
+            let mut counts: Vec<(&str, usize)> = Vec::new();
+            for kind in solved.map(|(index, law)| treatment(index, law)) {
+                match counts.iter_mut().find(|(known, _)| *known == kind) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((kind, 1)),
+                }
+            }
+            return counts.into_iter().map(|(kind, count)| format!("{count} stages: {kind}")).collect();
+        }
+        solved.map(|(index, law)| format!("stage {index}: {}", treatment(index, law))).collect()
     }
 }
 
@@ -193,23 +210,6 @@ impl Shape {
             (false, false) => Self::General,
         }
     }
-}
-
-/// `1/k` for the recurrences, correctly rounded to `f64`.
-const RECIPROCALS: [f64; 64] = {
-    let mut table = [0.0; 64];
-    let mut k = 1;
-    while k < 64 {
-        table[k] = 1.0 / k as f64;
-        k += 1;
-    }
-    table
-};
-
-/// `1/k` in the number type: from the table unless the type is finer than `f64`.
-#[inline(always)]
-fn reciprocal<S: Scalar>(k: usize) -> S {
-    if S::EPSILON < f64::EPSILON { S::one().over(S::from_f64(k as f64)) } else { S::from_f64(RECIPROCALS[k]) }
 }
 
 /// The polynomials of one step, in the units of the step: coefficients of V and of depth/time.
@@ -361,8 +361,12 @@ struct Steps {
 impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> {
     #[inline(always)]
     fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError> {
-        let law = &course.problem.stages[course.stage];
+        let problem = course.problem;
+        let law = &problem.stages[course.stage];
         let limit = course.limit()?;
+        if let Some(law) = problem.laws.of(course.stage) {
+            return self.0.through_law::<S, K>(course, law, limit);
+        }
         match Shape::of(law) {
             Shape::Constant => self.0.step_through::<S, 4, false, false, false>(course, limit),
             Shape::Spring => self.0.step_through::<S, L, true, false, false>(course, limit),
@@ -387,7 +391,7 @@ impl Steps {
         let stage = &problem.stages[course.stage];
         // Coefficients per unit mass, once a stage.
         let Stage { static_force, stiffness, viscosity, drag, .. } = stage.per_mass(problem.mass);
-        let frequency = if SPRING { stiffness.value().sqrt() } else { 0.0 };
+        let frequency = if SPRING { stiffness.value().abs().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
         // Judged again at each step: what is a rounding at the start of a stage is all of the speed that is left.
@@ -514,7 +518,8 @@ impl Steps {
         let fastest = v0.max(v1);
         let distance = end.depth.value();
         let (r, q) = (law.viscosity.value(), law.drag.value());
-        let force = law.static_force.value().abs() + law.stiffness.value() * distance + (r + q * fastest) * fastest;
+        let force =
+            law.static_force.value().abs() + law.stiffness.value().abs() * distance + (r + q * fastest) * fastest;
         let relative = unit_velocity / course.problem.impact_speed.value();
         let rounding = 6.0 * fastest * fastest + 3.0 * force * (depth + 2.0 * distance);
         let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * fastest * fastest;
@@ -524,7 +529,7 @@ impl Steps {
     }
 }
 
-/// The event of a step on which the sign of V at the end shows whether V vanished (proofs 2 and 3 of `locate`).
+/// The event of a step on which the sign of V at the end shows whether V vanished (proofs 2, 3 and 5 of `locate`).
 #[inline(always)]
 fn search<S: Scalar, const N: usize>(
     law: &Stage<S>,

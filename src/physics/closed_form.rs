@@ -12,6 +12,7 @@
 //!                    rest at xi = (M/(2 q)) log1p(q V0²/p),  tau = M V0/p
 //! p, s (q = r = 0)   V² = V0² - xi (f0 + f),  t = atan2(w (f V0 - f0 V), w² V V0 + f0 f)/w,  w² = s/M
 //!                    rest at xi = V0²/(f0 + hypot(f0, w V0)),  T = atan2(w V0, f0)/w
+//! p, s (s < 0)       as before with hyperbolic functions: t = log1p(...)/l, l² = -s/M
 //! p, s, r (q = 0)    damped oscillation: xi(t) and V(t), rest at an elementary time; passing a depth is one scalar root
 //! ```
 //!
@@ -69,6 +70,8 @@ fn rests(entry: State, time: f64, distance: f64) -> StageEnd {
 /// One stage from `entry` (V > 0) to `limit` (beyond it, possibly infinite).
 pub(crate) fn cross(stage: &Stage, mass: f64, entry: State, limit: f64) -> Result<StageEnd, &'static str> {
     match (stage.stiffness > 0.0, stage.viscosity > 0.0, stage.drag > 0.0) {
+        (false, false, false) if stage.stiffness < 0.0 => Ok(cross_falling(stage, mass, entry, limit)),
+        (false, ..) if stage.stiffness < 0.0 => Err("its force falls with depth, and viscosity or drag acts beside"),
         (false, false, _) => Ok(cross_drag(stage, mass, entry, limit)),
         (true, false, false) => Ok(cross_spring(stage, mass, entry, limit)),
         (_, true, false) => Ok(cross_viscous(stage, mass, entry, limit)),
@@ -191,6 +194,44 @@ fn cross_slack_spring(w: f64, entry: State, limit: f64, squared_speed: f64) -> S
     } else {
         rests(entry, std::f64::consts::FRAC_PI_2 / w, entry.velocity / w)
     }
+}
+
+/// `F = p + s x`, s < 0, of one sign up to `limit`: a piece of a table (docs/theory.md, section 9).
+///
+/// With `l² = -s/M`, `l V + f` falls as `e^{-l t}` and `l V - f` rises as `e^{l t}`. Of the two, that one serves in which
+/// nothing cancels; and its change is a sum of terms of one sign, as f falls over x and V follows F:
+///
+/// ```text
+/// l t = log1p((l |V0 - V| + l² xi)/(l V + |f|)),   |V0 - V| = xi |f0 + f|/(V0 + V)
+/// ```
+///
+/// with V and f at the end where F resists, at the start where it drives.
+#[cold]
+#[inline(never)]
+fn cross_falling(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
+    let v0 = entry.velocity;
+    let rate = (-stage.stiffness / mass).sqrt();
+    let f0 = (stage.static_force + stage.stiffness * entry.depth) / mass;
+    let time = |xi: f64, change: f64, v: f64, f: f64| {
+        // Where one of the two is a rounding, of either sign, the other tells.
+        let (slow_v, slow_f) = if f0 + f > 0.0 { (v, f) } else { (v0, f0) };
+        ((rate * change + rate * rate * xi) / (rate * slow_v + slow_f.abs())).ln_1p() / rate
+    };
+    let xi = limit - entry.depth;
+    let f = (stage.static_force + stage.stiffness * limit) / mass;
+    let energy = v0 * v0 - xi * (f0 + f);
+    // What is left of f where V vanishes, as far as it does; with none it is only approached.
+    let left = (f0 - rate * v0) * (f0 + rate * v0);
+    if energy >= 0.0 || f0 <= 0.0 || left <= 0.0 {
+        let v = energy.max(0.0).sqrt();
+        let elapsed = time(xi, xi * ((f0 + f) / (v0 + v)).abs(), v, f);
+        // Where the force vanishes with the speed, until an epsilon of the speed is left.
+        let elapsed = if elapsed.is_finite() { elapsed } else { -f64::EPSILON.ln() / rate };
+        return passes(entry, limit, elapsed, v);
+    }
+    let f = left.sqrt();
+    let xi = v0 * (v0 / (f0 + f));
+    rests(entry, time(xi, v0, 0.0, f), xi)
 }
 
 /// `F = p + s x + r V`, r > 0: a damped oscillator, or drag in proportion to speed when s = 0.
@@ -403,13 +444,49 @@ fn atanh_over(z: f64) -> f64 {
 /// for each stage before the exit.
 pub(crate) fn margin_error(problem: &Problem, stage: usize, depth: f64, margin: f64) -> f64 {
     let v0 = problem.impact_speed;
+    // Crater and tunnel are asked nothing.
+    let count = problem.stages.len();
+    if count > 2 && (count > FEW_STAGES || problem.stages.iter().any(|law| law.stiffness < 0.0)) {
+        return margin_error_of_many(problem, stage, depth, margin);
+    }
     let mut size = 1.0 + margin.abs();
     for law in &problem.stages[..=stage] {
         let to = if law.end < depth { law.end } else { depth };
-        size += 2.0 * (law.static_force.abs() + 0.5 * law.stiffness * to) * to / problem.mass / v0 / v0;
+        size += 2.0 * (law.static_force.abs() + 0.5 * law.stiffness.abs() * to) * to / problem.mass / v0 / v0;
     }
     let before_exit = problem.stages.iter().take_while(|law| law.end < problem.exit_depth).count() + 1;
     8.0 * f64::EPSILON * size * before_exit as f64
+}
+
+/// Stages of which each may count with the work from the face to its end; there are more in tables.
+const FEW_STAGES: usize = 64;
+
+/// As [`margin_error`], for pieces of a table: p and s x, which nearly cancel, count over the length of the piece alone.
+///
+/// ```text
+/// 8 eps sum over stages entered of W/V0² + (2/(M V0²)) (|p| + |s| b) (b - a)    from a to b
+/// ```
+///
+/// and 8 eps of the largest of these for each stage beyond, up to the exit.
+#[cold]
+fn margin_error_of_many(problem: &Problem, stage: usize, depth: f64, margin: f64) -> f64 {
+    let per_energy = |work: f64| 2.0 * work / problem.mass / problem.impact_speed / problem.impact_speed;
+    let (mut w, mut greatest, mut sum, mut ahead) = (1.0_f64, 1.0_f64, margin.abs(), 0.0);
+    for (index, law) in problem.stages.iter().enumerate() {
+        let (from, to) = (problem.start_of(index), problem.limit_of(index));
+        let to = if to.is_finite() { to } else { depth };
+        if to > from {
+            let size = (law.static_force.abs() + law.stiffness.abs() * to) * (to - from);
+            w = (w - per_energy(law.static_work(from, to))).abs();
+            greatest = greatest.max(w + per_energy(size));
+            sum += greatest;
+            ahead += f64::from(u8::from(index > stage));
+        }
+        if law.end >= problem.exit_depth || (index >= stage && !problem.has_exit()) {
+            break;
+        }
+    }
+    8.0 * f64::EPSILON * (sum + ahead * greatest)
 }
 
 /// The continuous crater from the face to `limit`, without c.

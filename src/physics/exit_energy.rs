@@ -2,11 +2,12 @@
 //!
 //! With `W = V²` the equation of motion reads `dW/dx = -2 F/M`. For `r = 0` it is linear in W and goes on smoothly
 //! through `W < 0`, so `W(exit)` is one affine function of `V0²` for stops and perforations alike; its root is the
-//! critical velocity, and its sign decides the outcome (docs/theory.md, section 6). Across a stage with `r > 0` a stop is
-//! continued by minus twice the static work per mass.
+//! critical velocity, and its sign decides the outcome (docs/theory.md, section 6). Across a stage with `r > 0`, or with a
+//! [`Law`](super::Law) of its own, a stop is continued by minus twice the static work per mass.
 //!
 //! A target may hold a barrier and drive the projectile beyond it. Then the least W over the path decides. It occurs
-//! at a stage end, because inside a stage with `s >= 0` the velocity may have a maximum but no minimum. The margin is
+//! at a stage end, because inside a stage with `s >= 0` the velocity may have a maximum but no minimum, and a stage with
+//! `s < 0` ends where its force would fall through zero (docs/theory.md, section 9). The margin is
 //! therefore the least W over the stage ends ahead and the exit; for a target that only resists, that is W(exit).
 
 use super::problem::{Problem, Stage, State};
@@ -58,9 +59,13 @@ pub fn propagate<S: Differentiable>(stage: &Stage<S>, mass: S, w: S, from: S, to
         - two * xi / mass * (static_at_start * expm1_over(-y) + stage.stiffness * xi * second_exponential_integral(y))
 }
 
-/// Least W (m²/s²) over the stage ends ahead and the exit, continued from rest at `depth` in stage `stage`.
+/// Least W (m²/s²) over the stop itself, the stage ends ahead and the exit, continued from rest at `depth` in stage `stage`.
+///
+/// Ahead of a stop W is negative, save where the force vanishes with the speed and round-off decides that it drives.
 pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64) -> f64 {
-    continued(problem, stage, depth, 0.0, f64::INFINITY)
+    let least = continued(problem, stage, depth, 0.0, f64::INFINITY);
+    // A NaN stays what it is.
+    if least > 0.0 { 0.0 } else { least }
 }
 
 /// Least W (m²/s²) of a flight that never ends, the counterpart of [`energy_beyond_stop`].
@@ -69,11 +74,17 @@ pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: 
 ///
 /// - Viscosity and drag alone: V vanishes at `X = x + (M/q) ln(1 + q V/r)`. W at the end of the stage is taken as
 ///   `-(r (end - X)/M)²`, which has the sign of the missing speed.
+/// - A law of its own whose force vanishes with the velocity: `V0² (X - H)/H`.
 /// - A spring that balances a drive at `X = -p/s`: minus twice the static work per mass from X to the end.
 ///
 /// `None` without an exit, or in a stage of another kind.
 pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
     let index = (0..problem.stages.len()).find(|&index| problem.limit_of(index) > at.depth)?;
+    if let Some(law) = problem.laws.of(index) {
+        let (speed, exit) = (problem.impact_speed, problem.exit_depth);
+        let beyond = speed * speed * ((at.depth + law.reach(problem.mass, at)) / exit - 1.0);
+        return (problem.has_exit() && beyond < 0.0).then_some(beyond);
+    }
     let (law, limit) = (&problem.stages[index], problem.limit_of(index));
     let w = if let Some(missing) = speed_missing(law, problem.mass, at, limit) {
         -missing * missing
@@ -108,7 +119,11 @@ fn continued<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, 
         let law = &problem.stages[index].values();
         let mass = problem.mass.value();
         let to = problem.limit_of(index).value().max(from);
-        w = if law.viscosity > 0.0 {
+        w = if let Some(law) = problem.laws.of(index) {
+            let (work, most) = law.static_work(from, to);
+            least = least.min(w - 2.0 * most / mass);
+            w - 2.0 * work / mass
+        } else if law.viscosity > 0.0 {
             w - 2.0 * law.static_work(from, to) / mass
         } else {
             propagate(law, mass, w, from, to)

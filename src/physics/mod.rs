@@ -2,8 +2,12 @@
 
 pub mod advice;
 pub mod closed_form;
+pub mod elementary;
 pub mod exit_energy;
+pub mod expression;
+pub mod force_table;
 pub mod groups;
+pub mod law;
 pub mod nose;
 pub mod parameter;
 pub mod problem;
@@ -15,7 +19,9 @@ pub mod units;
 
 pub use crate::text::Shown;
 pub use advice::Advice;
+pub use force_table::ForceTable;
+pub use law::{Law, Laws};
 pub use parameter::Parameter;
 pub use problem::{Event, EventKind, Outcome, Problem, Stage, Stages, State, Target};
 pub use scalar::Scalar;
-pub use scene::{Concrete, CraterStiffness, Criterion, Layer, Range, Resistance, ResolveError, Resolved, Scene};
+pub use scene::{Concrete, CraterStiffness, Criterion, Force, Layer, Range, Resistance, ResolveError, Resolved, Scene};

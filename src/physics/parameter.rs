@@ -14,6 +14,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::advice::Advice;
+use super::law::Name;
 use super::problem::Stage;
 use super::scene::Resistance::{Concrete, Stages};
 use super::scene::{CraterStiffness, Layer, Range, ResolveError, Resolved, Scene};
@@ -52,6 +53,8 @@ pub enum Parameter {
     Layer(usize, LayerNumber),
     /// A number of the stage `.0`, counted from 0.
     Stage(usize, StageNumber),
+    /// A parameter of a law of one's own, in SI units.
+    Own(Name),
     /// H/d, which sets the thickness.
     ThicknessRatio,
     /// Geometry function N, which sets the density.
@@ -174,6 +177,7 @@ impl Parameter {
             Self::Stage(_, S::Viscosity) => ("stage.*.viscosity", "viscosity r", Some(Viscosity), NotNegative, Is(0.0)),
             Self::Stage(_, S::Drag) => ("stage.*.drag", "drag q", Some(Drag), NotNegative, Is(0.0)),
             Self::Stage(_, S::End) => ("stage.*.end", "end x", Some(Length), NotNegative, Is(f64::INFINITY)),
+            Self::Own(_) => ("parameters.*", "parameter", None, Finite, Refused("\"1 N\"")),
             Self::ThicknessRatio => ("H/d", "thickness ratio H/d", None, NotNegative, GROUP),
             Self::Geometry => ("N", "geometry function N", None, Positive, GROUP),
             Self::Impact => ("I", "impact function I", None, NotNegative, GROUP),
@@ -183,6 +187,9 @@ impl Parameter {
 
     /// Last word of its path, the key in a scene file.
     pub fn key(self) -> &'static str {
+        if let Self::Own(name) = self {
+            return name.text();
+        }
         let path = self.entry().path;
         path.rsplit('.').next().unwrap_or(path)
     }
@@ -256,15 +263,22 @@ impl Parameter {
                 (0..stages.len()).flat_map(|index| StageNumber::ALL.map(|which| Self::Stage(index, which))).collect()
             }
         };
-        plain.chain(listed).filter(|parameter| parameter.get(scene).is_ok_and(f64::is_finite)).collect()
+        let own = scene.parameters.iter().map(|parameter| Self::Own(parameter.name));
+        plain.chain(listed).chain(own).filter(|parameter| parameter.get(scene).is_ok_and(f64::is_finite)).collect()
     }
 
     /// Why a scene of this kind cannot have the number; `None` if it has it, or leaves it out.
     fn obstacle(self, scene: &Scene) -> Option<&'static str> {
         match (self, &scene.resistance) {
+            (Self::Own(name), _) => {
+                let is_there = scene.parameters.iter().any(|one| one.name == name);
+                (!is_there).then_some("its forces have no such parameter")
+            }
             (Self::Mass | Self::Velocity, _) | (Self::Thickness, Stages(_)) => None,
-            (Self::Stage(index, _), Stages(stages)) => {
-                (index >= stages.len()).then_some("it has fewer stages, counted from 0")
+            (Self::Stage(index, which), Stages(stages)) => {
+                let is_table = which != StageNumber::End && scene.force_of(index).is_some();
+                let why = is_table.then_some("that stage gives its force as a table");
+                if index >= stages.len() { Some("it has fewer stages, counted from 0") } else { why }
             }
             (Self::Stage(..), _) => Some("it gives no stages"),
             (_, Stages(_)) => Some("it gives its stages outright"),
@@ -293,6 +307,9 @@ impl Parameter {
         let velocity = || scene.velocity.ok_or(absent("it gives no impact velocity"));
         let thickness = || scene.thickness.ok_or(absent("its target is semi-infinite"));
         Ok(match (self, &scene.resistance) {
+            (Self::Own(name), _) => {
+                scene.parameters.iter().find(|one| one.name == name).map_or(f64::NAN, |one| one.value)
+            }
             (Self::Mass, _) => scene.mass,
             (Self::Velocity, _) => velocity()?,
             (Self::Stage(index, which), Stages(stages)) => which.of(stages[index]),
@@ -331,6 +348,9 @@ impl Parameter {
         }
         let (mass, follows_eq14) = (scene.mass, self.moves_static_factor(scene));
         match (self, &mut scene.resistance) {
+            (Self::Own(name), _) => {
+                scene.parameters.iter_mut().filter(|one| one.name == name).for_each(|one| one.value = value);
+            }
             (Self::Mass, _) => scene.mass = value,
             (Self::Velocity, _) => scene.velocity = Some(value),
             (Self::Stage(index, which), Stages(stages)) => *which.field(&mut stages[index]) = value,
@@ -453,6 +473,7 @@ impl fmt::Display for Parameter {
         let path = self.entry().path;
         match self {
             Self::Layer(index, _) | Self::Stage(index, _) => f.write_str(&path.replace('*', &index.to_string())),
+            Self::Own(name) => f.write_str(&path.replace('*', name.text())),
             _ => f.write_str(path),
         }
     }
@@ -462,6 +483,9 @@ impl FromStr for Parameter {
     type Err = ParameterError;
 
     fn from_str(path: &str) -> Result<Self, ParameterError> {
+        if let Some(name) = path.strip_prefix("parameters.").and_then(Name::new) {
+            return Ok(Self::Own(name));
+        }
         let index = path.split('.').find_map(|word| word.parse().ok()).unwrap_or(0);
         let words = path.split('.').map(|word| word.parse::<usize>().map_or(word, |_| "*"));
         let general = words.collect::<Vec<_>>().join(".");

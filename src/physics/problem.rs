@@ -13,32 +13,52 @@
 use serde::{Deserialize, Deserializer, Serialize};
 use smallvec::SmallVec;
 
+use super::law::Laws;
 use super::scalar::Scalar;
 use crate::text::Shown;
 
 /// Resistance `F = p + s x + r V + q V²` (N) until `x = end`; positive `F` slows the projectile.
 ///
 /// Depth `x` counts from the impact face in every stage, not from the stage's own start.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(bound(deserialize = "S: Scalar + Deserialize<'de>"))]
 pub struct Stage<S = f64> {
     /// Static force p (N), of any sign; negative drives the projectile.
     #[serde(rename = "static_force_n")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<S>"))]
     pub static_force: S,
-    /// Stiffness s (N/m), not negative.
+    /// Stiffness s (N/m). Negative only without viscosity and drag, and only where the force does not fall through zero
+    /// inside the stage: it is a piece of a table then ([`super::force_table`]).
     #[serde(rename = "stiffness_n_m")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<S>"))]
     pub stiffness: S,
     /// Viscosity r (kg/s), not negative.
     #[serde(rename = "viscosity_kg_s")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<S>"))]
     pub viscosity: S,
     /// Drag q (kg/m), not negative.
     #[serde(rename = "drag_kg_m")]
+    #[cfg_attr(feature = "report", schemars(with = "Option<S>"))]
     pub drag: S,
     /// Depth where the stage ends (m), from the impact face; infinite, `null` in JSON, when it does not end.
     #[serde(rename = "end_m", deserialize_with = "infinite_if_null")]
     #[cfg_attr(feature = "report", schemars(with = "Option<S>"))]
     pub end: S,
+}
+
+/// Two stages with a law of their own, whose coefficients are NaN, are the same.
+impl<S: PartialEq> PartialEq for Stage<S> {
+    #[expect(clippy::eq_op, reason = "NaN")]
+    fn eq(&self, other: &Self) -> bool {
+        let is_same = |a: &S, b: &S| a == b || (a != a && b != b);
+        let Self { static_force, stiffness, viscosity, drag, end } = self;
+        is_same(static_force, &other.static_force)
+            && is_same(stiffness, &other.stiffness)
+            && is_same(viscosity, &other.viscosity)
+            && is_same(drag, &other.drag)
+            && is_same(end, &other.end)
+    }
 }
 
 fn infinite_if_null<'de, S: Scalar + Deserialize<'de>, D: Deserializer<'de>>(depth: D) -> Result<S, D::Error> {
@@ -70,6 +90,14 @@ impl<S: Scalar> Stage<S> {
     pub fn free() -> Self {
         let zero = S::zero();
         Self { static_force: zero, stiffness: zero, viscosity: zero, drag: zero, end: S::from_f64(f64::INFINITY) }
+    }
+
+    /// A stage until x = `end` (m) whose force is a [`Law`](super::law::Law) of its own.
+    ///
+    /// Its coefficients are NaN: what reads them in place of the law gets no number, and no wrong one.
+    pub fn of_law(end: S) -> Self {
+        let none = S::from_f64(f64::NAN);
+        Self { static_force: none, stiffness: none, viscosity: none, drag: none, end }
     }
 
     /// The same stage until x = `end` (m).
@@ -120,9 +148,15 @@ impl<S: Scalar> Stage<S> {
         Self { end: self.end, ..self.map(|coefficient| coefficient.over(mass)) }
     }
 
-    /// Whether the stage can only slow the projectile (`p >= 0`); such a stage is never stiff.
+    /// Whether the stage can only slow the projectile wherever it is (`p, s >= 0`); such a stage is never stiff.
     pub fn resists(&self) -> bool {
-        self.static_force.value() >= 0.0
+        self.static_force.value() >= 0.0 && self.stiffness.value() >= 0.0
+    }
+
+    /// Whether the static part of the force does not drive the projectile between the depths `from` and `to` (m).
+    pub fn resists_between(&self, from: S, to: S) -> bool {
+        let at_rest = |x: S| (self.static_force + self.stiffness * x).value();
+        self.resists() || (at_rest(from) >= 0.0 && at_rest(to) >= 0.0)
     }
 }
 
@@ -133,6 +167,9 @@ pub enum Target {
     CraterAndTunnel,
     /// Stages given directly, or layers.
     Stages,
+    /// As `Stages`, without an exit; the last one, without force and end, stands for what lies behind the last row of a
+    /// table. A flight that gets there ends with an error, for no force is known there.
+    StagesToEndOfTable,
 }
 
 /// The stages of a problem in the order of their ends; two fit without an allocation.
@@ -144,7 +181,8 @@ pub type Stages<S = f64> = SmallVec<[Stage<S>; 2]>;
 /// [`Problem::crater_and_tunnel`] from numbers.
 ///
 /// Invariants: mass > 0; impact speed and exit depth >= 0; stage ends do not fall; at least one stage; the last stage
-/// has no end. Everything is finite except absent ends.
+/// has no end; where a stiffness is negative, viscosity and drag are zero, the stage has a limit, and the force keeps its
+/// sign on the way to it. Everything is finite except absent ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem<S = f64> {
     /// Mass M (kg).
@@ -159,13 +197,15 @@ pub struct Problem<S = f64> {
     pub crater: Option<usize>,
     /// How boundaries and stops are named.
     pub target: Target,
+    /// The laws of the stages whose force is an expression.
+    pub laws: Laws<S>,
 }
 
 impl<S> Problem<S> {
     /// Name of a stop in stage `index`.
     pub fn stop_in(&self, index: usize) -> Outcome {
         match (self.target, self.crater) {
-            (Target::Stages, _) => Outcome::Stopped,
+            (Target::Stages | Target::StagesToEndOfTable, _) => Outcome::Stopped,
             (Target::CraterAndTunnel, Some(crater)) if index <= crater => Outcome::StoppedInCrater,
             (Target::CraterAndTunnel, _) => Outcome::StoppedInTunnel,
         }
@@ -187,7 +227,11 @@ impl<S: Scalar> Problem<S> {
             assert!(ordered, "stage {} ends before the stage in front of it", index + 1);
         }
         assert!(stages.last().is_some_and(|last| last.end.value() == f64::INFINITY), "the last stage has an end");
-        Self { mass, impact_speed, exit_depth, stages, crater: None, target: Target::Stages }
+        for (index, law) in stages.iter().enumerate().filter(|(_, law)| law.stiffness.value() < 0.0) {
+            let is_static = law.viscosity.value() == 0.0 && law.drag.value() == 0.0;
+            assert!(is_static, "stage {index} has viscosity or drag beside a force that falls with depth");
+        }
+        Self { mass, impact_speed, exit_depth, stages, crater: None, target: Target::Stages, laws: Laws::none() }
     }
 
     /// As [`Problem::of_stages`], through a crater, if there is one, and a tunnel.
@@ -249,6 +293,28 @@ impl<S: Scalar> Problem<S> {
             stages: self.stages.iter().map(|stage| stage.map(to)).collect(),
             crater: self.crater,
             target: self.target,
+            laws: self.laws.cast(),
+        }
+    }
+
+    /// Stage `index` itself; where it has a law of its own, coefficients with the force of the law `at` a state and with its
+    /// slopes there, `s = F_x` and `r = F_V`, as far as they are not negative.
+    pub(crate) fn linear(&self, index: usize, at: State<S>) -> Stage<S> {
+        let Some(law) = self.laws.of(index) else { return self.stages[index] };
+        let number = |value: f64| S::from_f64(if value.is_finite() { value } else { 0.0 });
+        let (by_depth, by_velocity) = law.slopes(at.depth.value(), at.velocity.value());
+        let (stiffness, viscosity) = (number(by_depth.max(0.0)), number(by_velocity.max(0.0)));
+        let force = number(law.force(at.depth, at.velocity).value());
+        let static_force = force - stiffness * at.depth - viscosity * at.velocity;
+        Stage { static_force, stiffness, viscosity, drag: S::zero(), end: self.stages[index].end }
+    }
+
+    /// Force (N) of stage `index` at depth `x` (m) and velocity `v` (m/s): that of its coefficients or of its law.
+    #[inline(always)]
+    pub fn force(&self, index: usize, x: S, v: S) -> S {
+        match self.laws.of(index) {
+            None => self.stages[index].force(x, v),
+            Some(law) => law.force(x, v),
         }
     }
 }

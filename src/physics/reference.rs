@@ -8,6 +8,7 @@
 //! ```text
 //! p, q   W = (V0² + p/q) e^{-y} - p/q,  y = 2 q (x - x0)/M        t = (M/sqrt(p q)) [atan(V sqrt(q/p))] from V to V0
 //! p, s   W = V0² - (2 p xi + s (x² - x0²))/M                      t = [atan2(w u, V)]/w,  u = x + p/s,  w² = s/M
+//!        s < 0:                                                  t = [-ln(V - w u)]/w,  w² = -s/M
 //! p, r   V = (V0 + p/r) e^{-r t/M} - p/r                          x(t) its integral, inverted by root finding
 //! p, s, r  u = A e^{-l1 t} + B e^{-l2 t}, or damped sine           the same
 //! p, s, q  W = W_p(x) + (V0² - W_p(x0)) e^{-y},  W_p = s M/(2 q²) - (p + s x)/q;   t = ∫ dx/V by quadrature
@@ -24,8 +25,9 @@ use dashu_float::FBig;
 use dashu_float::round::mode::HalfEven;
 use thiserror::Error;
 
+use super::law::Laws;
 use super::problem::{Event, EventKind, Outcome, Problem, Stage, Stages, State, Target};
-use super::scene::{CraterStiffness, Criterion, Resistance, Scene};
+use super::scene::{CraterStiffness, Criterion, Force, Resistance, Scene};
 
 /// A binary float of any precision, rounding half to even.
 type Big = FBig<HalfEven, 2>;
@@ -402,6 +404,16 @@ impl Source<'_> {
     }
 
     fn read(self, inputs: &mut Inputs) -> Result<Problem<Big>, ReferenceError> {
+        let own = match self {
+            Self::Problem(problem) => (0..problem.stages.len()).find(|&index| problem.laws.of(index).is_some()),
+            Self::Scene(scene, _) => {
+                let is_law = |(_, force): &&(usize, Force)| matches!(force, Force::Expression(_));
+                scene.forces.iter().find(is_law).map(|(stage, _)| *stage)
+            }
+        };
+        if let Some(stage) = own {
+            return Err(ReferenceError::Unsupported { stage, why: "it has a law of its own" });
+        }
         let [mass, impact_speed] = match self {
             Self::Problem(problem) => [problem.mass, problem.impact_speed],
             Self::Scene(scene, impact_speed) => [scene.mass, impact_speed],
@@ -414,11 +426,22 @@ impl Source<'_> {
         let (scene, concrete) = match self {
             Self::Problem(&Problem { ref stages, crater, target, .. }) => {
                 let stages = inputs.stages(stages);
-                return Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target });
+                return Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target, laws: Laws::none() });
+            }
+            Self::Scene(Scene { forces, .. }, _) if !forces.is_empty() => {
+                return Err(ReferenceError::Scene("it has a table of a force; give the problem it resolves into"));
             }
             Self::Scene(Scene { resistance: Resistance::Stages(stages), .. }, _) => {
                 let stages = inputs.stages(stages);
-                return Ok(Problem { mass, impact_speed, exit_depth, stages, crater: None, target: Target::Stages });
+                return Ok(Problem {
+                    mass,
+                    impact_speed,
+                    exit_depth,
+                    stages,
+                    crater: None,
+                    target: Target::Stages,
+                    laws: Laws::none(),
+                });
             }
             Self::Scene(scene @ Scene { resistance: Resistance::Concrete(concrete), .. }, _) => (scene, concrete),
         };
@@ -459,7 +482,15 @@ impl Source<'_> {
             stages.push(law(Big::ZERO, stiffness, Big::ZERO, kd));
         }
         stages.push(law(p, Big::ZERO, q, Big::INFINITY));
-        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target: Target::CraterAndTunnel })
+        Ok(Problem {
+            mass,
+            impact_speed,
+            exit_depth,
+            stages,
+            crater,
+            target: Target::CraterAndTunnel,
+            laws: Laws::none(),
+        })
     }
 }
 
@@ -551,13 +582,13 @@ fn through(model: &Model, index: usize, from: &Point) -> Result<(Point, bool), R
         let touches = vanishes(&w, &(magnitude(gain) + magnitude(loss)), bits);
         if touches || is_positive(&w) {
             let velocity = if touches { int(0, bits) } else { w.sqrt() };
-            let time = &from.time + passage_time(model, law, from, limit, &velocity);
+            let time = &from.time + passage_time(model, law, from, limit, &velocity)?;
             return Ok((Point { time, depth: limit.clone(), velocity }, false));
         }
     }
     let depth = rest_depth(model, law, from)?;
     let velocity = int(0, bits);
-    let time = &from.time + passage_time(model, law, from, &depth, &velocity);
+    let time = &from.time + passage_time(model, law, from, &depth, &velocity)?;
     Ok((Point { time, depth, velocity }, true))
 }
 
@@ -585,6 +616,11 @@ fn rest_depth(model: &Model, law: &Stage<Big>, from: &Point) -> Result<Big, Refe
     let Stage { static_force: p, stiffness: s, drag: q, .. } = law;
     let (mass, w0, bits) = (&model.problem.mass, square(&from.velocity), model.bits);
     match (is_positive(s), is_positive(q)) {
+        // From V² - w² u² constant, w² = -s/M; u = 0 is at most approached.
+        (false, _) if is_negative(s) => {
+            let left = square(&(&from.depth + p / s)) + w0 * mass / s;
+            if is_positive(&left) { Ok(-left.sqrt() - p / s) } else { Err(ReferenceError::NeverEnds) }
+        }
         (false, _) if !is_positive(p) => Err(ReferenceError::NeverEnds),
         (false, false) => Ok(&from.depth + mass * w0 / twice(p.clone())),
         (false, true) => Ok(&from.depth + mass / twice(q.clone()) * ln(&(int(1, bits) + q * w0 / p))),
@@ -605,14 +641,21 @@ fn rest_depth(model: &Model, law: &Stage<Big>, from: &Point) -> Result<Big, Refe
 }
 
 /// Time from `from` to depth `to`, where the speed is `velocity`, in a stage without viscosity.
-fn passage_time(model: &Model, law: &Stage<Big>, from: &Point, to: &Big, velocity: &Big) -> Big {
+fn passage_time(
+    model: &Model,
+    law: &Stage<Big>,
+    from: &Point,
+    to: &Big,
+    velocity: &Big,
+) -> Result<Big, ReferenceError> {
     let Stage { static_force: p, stiffness: s, drag: q, .. } = law;
     let (mass, bits, v0) = (&model.problem.mass, model.bits, &from.velocity);
     let xi = to - &from.depth;
     if is_zero(&xi) {
-        return int(0, bits);
+        return Ok(int(0, bits));
     }
-    match (is_positive(s), is_positive(q)) {
+    Ok(match (is_positive(s), is_positive(q)) {
+        (false, _) if is_negative(s) => return exponential_time(model, law, from, to, velocity),
         (true, false) => {
             let w = (s / mass).sqrt();
             let phase = |x: &Big, v: &Big| atan2(&(&w * (x + p / s)), v, bits);
@@ -633,7 +676,27 @@ fn passage_time(model: &Model, law: &Stage<Big>, from: &Point, to: &Big, velocit
             let faster = (velocity + &terminal) / (v0 + &terminal);
             xi / &terminal + mass / (q * terminal) * ln(&faster)
         }
+    })
+}
+
+/// [`passage_time`] where the force falls with depth: of `V + w u`, which grows as `e^{w t}`, and `V - w u`, which falls as
+/// `e^{-w t}`, `w² = -s/M` and `u = x + p/s`, the one that is farther from zero.
+fn exponential_time(
+    model: &Model,
+    law: &Stage<Big>,
+    from: &Point,
+    to: &Big,
+    velocity: &Big,
+) -> Result<Big, ReferenceError> {
+    let Stage { static_force: p, stiffness: s, .. } = law;
+    let w = (-(s / &model.problem.mass)).sqrt();
+    let [u0, u] = [&from.depth, to].map(|x| &w * (x + p / s));
+    let (first, last) =
+        if is_negative(&u) { (&from.velocity - u0, velocity - u) } else { (velocity + u, &from.velocity + u0) };
+    if !is_positive(&last) {
+        return Err(ReferenceError::NeverEnds);
     }
+    Ok(ln(&(first / last)) / w)
 }
 
 /// `∫ dx/V` by the tanh-sinh rule, whose double exponential swallows the root of W at rest.

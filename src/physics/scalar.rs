@@ -1,10 +1,13 @@
-//! What a number must do for the time-domain integrators: ring operations, a square root, a value to compare.
+//! What a number must do for the time-domain integrators: ring operations, a square root, a value to compare, and the
+//! functions of [`Elementary`] for laws of one's own.
 //!
 //! The same integrator then runs in `f32`, `f64`, double-double (`twofloat`) and dual numbers (`num_dual`),
 //! none of which share a usable trait: dual numbers do not implement `num_traits::Float`.
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use super::elementary::Elementary;
 
 /// A real number, possibly carrying more than its value (derivatives, a low part).
 pub trait Scalar:
@@ -17,6 +20,7 @@ pub trait Scalar:
     + Neg<Output = Self>
     + AddAssign
     + SubAssign
+    + Elementary
 {
     /// Relative spacing of the values near one: the unit in which this number rounds.
     const EPSILON: f64;
@@ -41,6 +45,12 @@ pub trait Scalar:
         self / divisor
     }
 
+    /// Whether it has nothing but its value: all derivatives that it carries are zero.
+    #[inline(always)]
+    fn is_constant(self) -> bool {
+        true
+    }
+
     /// Zero.
     fn zero() -> Self {
         Self::from_f64(0.0)
@@ -52,19 +62,28 @@ pub trait Scalar:
     }
 }
 
+/// `1/k` for the recurrences, correctly rounded to `f64`.
+const RECIPROCALS: [f64; 64] = {
+    let mut table = [0.0; 64];
+    let mut k = 1;
+    while k < 64 {
+        table[k] = 1.0 / k as f64;
+        k += 1;
+    }
+    table
+};
+
+/// `1/k` in the number type: from the table unless the type is finer than `f64`.
+#[inline(always)]
+pub(crate) fn reciprocal<S: Scalar>(k: usize) -> S {
+    if S::EPSILON < f64::EPSILON { S::one().over(S::from_f64(k as f64)) } else { S::from_f64(RECIPROCALS[k]) }
+}
+
 /// A number to which smooth functions apply by value and slope: `f64`, and the dual numbers over it.
 pub trait Differentiable: Scalar {
     /// `f(self)`, from `value` = f at the value of `self`, and `slope` = f' there.
     #[must_use]
     fn apply(self, value: f64, slope: impl FnOnce() -> f64) -> Self;
-
-    /// `e^z`.
-    #[must_use]
-    #[inline]
-    fn exp(self) -> Self {
-        let value = self.value().exp();
-        self.apply(value, || value)
-    }
 
     /// `e^z - 1`, without cancellation at zero.
     #[must_use]
@@ -82,9 +101,16 @@ impl Differentiable for f64 {
     }
 }
 
+impl Differentiable for f32 {
+    fn apply(self, value: f64, _slope: impl FnOnce() -> f64) -> Self {
+        value as Self
+    }
+}
+
 impl Differentiable for num_dual::Dual64 {
     fn apply(self, value: f64, slope: impl FnOnce() -> f64) -> Self {
-        Self::new(value, slope() * self.eps)
+        // A constant has no derivative, also where the slope is infinite.
+        if self.eps == 0.0 { Self::from_re(value) } else { Self::new(value, slope() * self.eps) }
     }
 }
 
@@ -157,8 +183,13 @@ impl Scalar for num_dual::Dual64 {
         self.re
     }
 
+    fn is_constant(self) -> bool {
+        self.eps == 0.0
+    }
+
     fn sqrt(self) -> Self {
-        num_dual::DualNum::sqrt(&self)
+        let root = self.re.sqrt();
+        self.apply(root, || 0.5 / root)
     }
 }
 
@@ -187,6 +218,13 @@ mod tests {
             let a = TwoFloat::from(f64::from(n));
             let root = Scalar::sqrt(a);
             assert!((root * root - a).value().abs() < 8.0 * <TwoFloat as Scalar>::EPSILON * a.value(), "{n}");
+        }
+    }
+
+    #[test]
+    fn every_entry_of_the_table_is_the_reciprocal_of_its_place() {
+        for (k, entry) in RECIPROCALS.iter().enumerate().skip(1) {
+            assert!((entry * k as f64 - 1.0).abs() <= 0.5 * f64::EPSILON, "{k}: {entry}");
         }
     }
 }

@@ -8,6 +8,9 @@ use std::f64::consts::FRAC_PI_4;
 use thiserror::Error;
 
 use super::advice::Advice;
+use super::expression::Tape;
+use super::force_table::ForceTable;
+use super::law::{Law, Laws, OwnParameter};
 use super::parameter::{LayerNumber, Parameter, StageNumber};
 use super::problem::{Problem, Stage, Stages, Target};
 use super::scalar::Scalar;
@@ -19,8 +22,17 @@ use crate::text::Shown;
 pub enum Resistance {
     /// Eq. 4-5: a crater `F = c x` to k d, then a tunnel `F = P + Q V²`.
     Concrete(Concrete),
-    /// Stages given directly.
+    /// Stages given directly. Of one whose force stands in [`Scene::forces`], only the end counts.
     Stages(Vec<Stage>),
+}
+
+/// A force of a stage in place of its four coefficients.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Force {
+    /// A table of depth.
+    Table(ForceTable),
+    /// An expression of x, V and [`Scene::parameters`].
+    Expression(Tape),
 }
 
 /// The numbers of Eq. 4-5, 13 and 14.
@@ -96,12 +108,16 @@ pub struct Scene {
     pub mass: f64,
     /// What it meets.
     pub resistance: Resistance,
+    /// The forces of stages that have no coefficients, each with the index of its stage, from 0.
+    pub forces: Vec<(usize, Force)>,
     /// Target thickness H (m), with layers their sum; `None` for a semi-infinite target.
     pub thickness: Option<f64>,
     /// When it counts as perforated.
     pub criterion: Criterion,
     /// Impact velocity V0 (m/s), where the scene gives one.
     pub velocity: Option<f64>,
+    /// The quantities that expressions use by name.
+    pub parameters: Vec<OwnParameter>,
 }
 
 /// The values that a number of a scene may take.
@@ -186,6 +202,18 @@ pub enum ResolveError {
         /// End of the stage before it (m); infinite when that has no end.
         previous: f64,
     },
+    /// A table begins behind the start of its stage, or ends there.
+    #[error("the table of stage {stage} goes from x = {} m to {} m, and the stage begins at {} m", Shown(*.first), Shown(*.last), Shown(*.start))]
+    TableElsewhere {
+        /// Index of the stage, from 0.
+        stage: usize,
+        /// Depth of the first row (m).
+        first: f64,
+        /// Depth of the last row (m).
+        last: f64,
+        /// Where the stage begins (m).
+        start: f64,
+    },
     /// The last stage ends inside the target.
     #[error("the last stage ends at {} m, inside the target", Shown(*.0))]
     TargetGoesOn(f64),
@@ -219,6 +247,7 @@ impl Advice for ResolveError {
             Self::NoDiameter => "take the criterion `full-depth`",
             Self::NoStage => "give at least one stage",
             Self::StageEndsFall { .. } => "order the stages by their ends, and leave out only the last end",
+            Self::TableElsewhere { .. } => "add a row at or before the start of the stage, and one behind it",
             Self::TargetGoesOn(_) => "leave out the end of the last stage, or end the target there",
             Self::LayersDoNotSumUp { .. } => "leave out the thickness; it follows from the layers",
             Self::OutOfRange { .. } => "check the units of the scene; its numbers lie too far apart",
@@ -399,10 +428,19 @@ impl Layer {
 }
 
 /// Stages given directly, the last without an end.
-fn given<S: Scalar>(stages: &[Stage], exit_depth: f64, number: &impl Fn(Parameter, f64) -> S) -> Resolved<Stages<S>> {
+fn given<S: Scalar>(
+    scene: &Scene,
+    stages: &[Stage],
+    exit_depth: f64,
+    number: &impl Fn(Parameter, f64) -> S,
+) -> Resolved<Stages<S>> {
     let mut previous = 0.0;
     for (index, stage) in stages.iter().enumerate() {
+        let has_law = matches!(scene.force_of(index), Some(Force::Expression(_)));
         for which in [StageNumber::StaticForce, StageNumber::Stiffness, StageNumber::Viscosity, StageNumber::Drag] {
+            if has_law {
+                break;
+            }
             let (parameter, value) = (Parameter::Stage(index, which), which.of(*stage));
             parameter.admit(value)?;
             // A subnormal number has lost digits already, and any product with it loses more.
@@ -442,9 +480,11 @@ impl Scene {
             title: None,
             mass,
             resistance: Resistance::Concrete(concrete),
+            forces: Vec::new(),
             thickness: None,
             criterion: Criterion::FullDepth,
             velocity: None,
+            parameters: Vec::new(),
         }
     }
 
@@ -483,7 +523,16 @@ impl Scene {
         let impact_speed = number(Parameter::Velocity, impact_speed);
         let exit_depth = self.exit_depth_in(&number)?;
         let (stages, crater, target) = match &self.resistance {
-            Resistance::Stages(stages) => (given(stages, exit_depth.value(), &number)?, None, Target::Stages),
+            Resistance::Stages(stages) => {
+                let given = given(self, stages, exit_depth.value(), &number)?;
+                let (stages, laws, ends) = self.with_forces(&given, exit_depth.value(), &number)?;
+                let (exit_depth, target) = if ends {
+                    (S::from_f64(f64::INFINITY), Target::StagesToEndOfTable)
+                } else {
+                    (exit_depth, Target::Stages)
+                };
+                return Ok(Problem { mass, impact_speed, exit_depth, stages, crater: None, target, laws });
+            }
             Resistance::Concrete(concrete) => {
                 concrete.check(self.thickness)?;
                 let (stages, crater) = concrete.stages(mass, impact_speed, &number)?;
@@ -491,7 +540,75 @@ impl Scene {
                 (stages, crater, target)
             }
         };
-        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target })
+        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target, laws: Laws::none() })
+    }
+
+    /// The force of stage `index` that is no coefficients.
+    pub fn force_of(&self, index: usize) -> Option<&Force> {
+        self.forces.iter().find(|(stage, _)| *stage == index).map(|(_, force)| force)
+    }
+
+    /// `given` with the pieces of tables in place of their stages, and the laws of stages whose force is an expression; and
+    /// whether a table ends before its stage and the exit, so that the last stage stands for what lies behind it.
+    fn with_forces<S: Scalar>(
+        &self,
+        given: &[Stage<S>],
+        exit_depth: f64,
+        number: &impl Fn(Parameter, f64) -> S,
+    ) -> Resolved<(Stages<S>, Laws<S>, bool)> {
+        if self.forces.is_empty() {
+            return Ok((given.into(), Laws::none(), false));
+        }
+        let parameters: Vec<S> =
+            self.parameters.iter().map(|one| number(Parameter::Own(one.name), one.value)).collect();
+        let (mut stages, mut laws) = (Stages::new(), Vec::new());
+        for (index, stage) in given.iter().enumerate() {
+            laws.resize_with(stages.len(), || None);
+            let table = match self.force_of(index) {
+                Some(Force::Table(table)) => table,
+                other => {
+                    if let Some(Force::Expression(tape)) = other {
+                        laws.push(Some(Law::new(tape, parameters.clone())));
+                    }
+                    stages.push(*stage);
+                    continue;
+                }
+            };
+            let (start, end) =
+                (index.checked_sub(1).map_or(0.0, |before| given[before].end.value()), stage.end.value());
+            if !(table.first() <= start && start < table.last()) {
+                let (first, last) = (table.first(), table.last());
+                return Err(ResolveError::TableElsewhere { stage: index, first, last, start });
+            }
+            if end <= start {
+                stages.push(*stage);
+                continue;
+            }
+            let mut reached = start;
+            for piece in table.stages(start) {
+                representable("the stiffness between two rows of a table [N/m]", piece.stiffness, true)?;
+                representable("the static force of a piece of a table [N]", piece.static_force, true)?;
+                let is_last = piece.end >= end;
+                let until = if is_last { stage.end } else { S::from_f64(piece.end) };
+                stages.push(Stage { end: until, ..piece.map(S::from_f64) });
+                reached = piece.end;
+                if is_last || reached >= exit_depth {
+                    break;
+                }
+            }
+            if reached >= exit_depth && reached < end {
+                // Nothing behind the exit is met.
+                if let Some(last) = stages.last_mut() {
+                    last.end = S::from_f64(f64::INFINITY);
+                }
+                return Ok((stages, laws.into_iter().collect(), false));
+            }
+            if reached < end {
+                stages.push(Stage::free());
+                return Ok((stages, laws.into_iter().collect(), true));
+            }
+        }
+        Ok((stages, laws.into_iter().collect(), false))
     }
 
     /// As [`Scene::resolve`], from the `problem` of this scene at another speed: only a continuous crater constant depends
@@ -506,7 +623,7 @@ impl Scene {
         if let (Some(crater), true) = (problem.crater, continuous) {
             stages[crater] = continuous_crater(stages[crater].end, &stages[crater + 1], self.mass, impact_speed)?;
         }
-        Ok(Problem { impact_speed, stages, ..*problem })
+        Ok(Problem { impact_speed, stages, ..problem.clone() })
     }
 
     /// The equation of motion at the scene's own impact velocity.

@@ -224,27 +224,80 @@ impl Quantity {
     /// # Errors
     /// As [`quantity`].
     pub fn with_unit(text: &str, dimension: Dimension) -> Result<Self, QuantityError> {
-        let text = text.trim();
-        let (digits, unit) = split(text);
-        if digits.is_empty() {
-            let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
-            let word = word.split_whitespace().next().unwrap_or_default();
-            return Err(match word {
-                "nan" | "inf" | "infinity" => QuantityError::NotFinite,
-                _ => QuantityError::NoNumber,
-            });
-        }
-        number(digits)?;
-        let unit = unit.trim();
-        if unit.is_empty() {
-            return Err(QuantityError::NoUnit);
-        }
+        let (digits, unit) = number_and_unit(text)?;
         let coefficient = dimension.coefficient(unit).ok_or_else(|| match Dimension::of(unit) {
             Some(has) => QuantityError::WrongDimension { unit: unit.to_owned(), has },
             None => QuantityError::UnknownUnit { unit: unit.to_owned() },
         })?;
         Self::bare(&product(digits, coefficient))
     }
+
+    /// A number with any unit, and the powers of dimensions that the unit is made of ([`compound`]).
+    ///
+    /// # Errors
+    /// As [`quantity`].
+    pub fn with_any_unit(text: &str) -> Result<(Self, Vec<(Dimension, i8)>), QuantityError> {
+        let (digits, unit) = number_and_unit(text)?;
+        let unknown = || QuantityError::UnknownUnit { unit: unit.to_owned() };
+        let (coefficient, powers) = compound(unit).ok_or_else(unknown)?;
+        Ok((Self::bare(&product(digits, coefficient))?, powers))
+    }
+}
+
+/// The number and the unit of a text.
+fn number_and_unit(text: &str) -> Result<(&str, &str), QuantityError> {
+    let text = text.trim();
+    let (digits, unit) = split(text);
+    if digits.is_empty() {
+        let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+        let word = word.split_whitespace().next().unwrap_or_default();
+        return Err(match word {
+            "nan" | "inf" | "infinity" => QuantityError::NotFinite,
+            _ => QuantityError::NoNumber,
+        });
+    }
+    number(digits)?;
+    let unit = unit.trim();
+    if unit.is_empty() {
+        return Err(QuantityError::NoUnit);
+    }
+    Ok((digits, unit))
+}
+
+/// SI value of one `unit`, and the powers of dimensions that it is made of: of a known unit, or of a product or quotient of
+/// such, as in `Pa s`, `1/m`, `N s^2/m^2` and `kg/(m s)`.
+///
+/// `None` where a part is no known unit, or a power is no whole number from -9 to 9.
+///
+/// # Example
+/// ```
+/// use penetrode::physics::units::{Dimension, compound};
+/// assert_eq!(compound("kN/mm^2"), Some((1e9, vec![(Dimension::Force, 1), (Dimension::Length, -2)])));
+/// assert_eq!(compound("1/ms"), Some((1e3, vec![(Dimension::Time, -1)])));
+/// ```
+pub fn compound(unit: &str) -> Option<(f64, Vec<(Dimension, i8)>)> {
+    if let Some(dimension) = Dimension::of(unit) {
+        return Some((dimension.coefficient(unit)?, vec![(dimension, 1)]));
+    }
+    let (mut coefficient, mut powers) = (1.0, Vec::new());
+    for (index, part) in unit.split('/').enumerate() {
+        let part = part.trim();
+        let inner = part.strip_prefix('(').and_then(|part| part.strip_suffix(')')).unwrap_or(part);
+        let is_one = index == 0 && inner == "1";
+        for factor in inner.split([' ', '*', '·']).filter(|factor| !factor.is_empty() && !is_one) {
+            let base = factor.trim_end_matches(|symbol: char| symbol.is_ascii_digit() || "^-²³".contains(symbol));
+            let power = match factor[base.len()..].trim_start_matches('^') {
+                "" => 1,
+                "²" => 2,
+                "³" => 3,
+                digits => digits.parse::<i8>().ok().filter(|power| (-9..=9).contains(power))?,
+            };
+            let (dimension, power) = (Dimension::of(base)?, if index == 0 { power } else { -power });
+            coefficient *= dimension.coefficient(base)?.powi(i32::from(power));
+            powers.push((dimension, power));
+        }
+    }
+    (!powers.is_empty() && coefficient.is_normal()).then_some((coefficient, powers))
 }
 
 /// SI value of a text `number unit`, of `dimension`. White space around and between is free, and may be absent.
@@ -264,6 +317,16 @@ impl Quantity {
 /// ```
 pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
     Quantity::with_unit(text, dimension).map(|quantity| quantity.value)
+}
+
+/// The bare decimal `digits` in a unit of which `coefficient` is the SI value, as accurate as [`quantity`]; for a column of
+/// numbers, whose unit is looked up once.
+///
+/// # Errors
+/// As [`number`].
+pub fn scaled(digits: &str, coefficient: f64) -> Result<f64, QuantityError> {
+    number(digits)?;
+    number(&product(digits, coefficient))
 }
 
 /// Decimal text of `number · coefficient`, exact where 38 digits hold it.

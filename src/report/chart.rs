@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::text::{number, one_line, power_of_ten};
+use super::text::{number, power_of_ten};
+use super::typeset;
 use crate::exchange::tables::{Value, push_line};
 
 /// Width of a panel: it fits a phone of 375 px.
@@ -23,6 +24,10 @@ const TITLE: f64 = 22.0;
 const LINE: f64 = 16.0;
 const BOTTOM: f64 = 38.0;
 const SYMBOL: f64 = 22.0;
+/// Width of lines from which they let others be seen through them.
+const WIDE_FROM: f64 = 3.0;
+/// Height from which a panel without a scale at its left has an axis above it too.
+const HIGH: f64 = 300.0;
 
 /// A point in the units of the axes.
 pub type Point = (f64, f64);
@@ -113,21 +118,22 @@ pub struct Style {
     shape: Option<&'static [Point]>,
     is_hollow: bool,
     radius: f64,
+    width: f64,
 }
 
 impl Style {
     /// An area within the points.
     pub const fn area(ink: Ink) -> Self {
-        Self { ink, is_area: true, dash: None, shape: None, is_hollow: false, radius: 2.75 }
+        Self { ink, is_area: true, dash: None, shape: None, is_hollow: false, radius: 2.75, width: 1.75 }
     }
 
     /// A dashed line for what was not measured.
-    pub const REFERENCE: Self = Self { is_area: false, dash: Some("4 3"), ..Self::area(Ink::Muted) };
+    pub const REFERENCE: Self = Self { is_area: false, dash: Some("4 3"), width: 1.25, ..Self::area(Ink::Muted) };
 
     /// A line; each of the first four indices has a colour and dashes of its own.
     pub fn line(index: usize) -> Self {
         let ink = [Ink::Blue, Ink::Orange, Ink::Teal, Ink::Purple][index % 4];
-        Self { ink, dash: Some(DASHES[(index + index / 4) % 4]), ..Self::REFERENCE }
+        Self { is_area: false, dash: Some(DASHES[(index + index / 4) % 4]), ..Self::area(ink) }
     }
 
     /// Marks; each of the first twenty indices has its own pair of colour and shape.
@@ -143,6 +149,11 @@ impl Style {
     /// A solid line of the same colour, without marks.
     pub fn as_line(self) -> Self {
         Self { dash: Some(DASHES[0]), shape: None, ..self }
+    }
+
+    /// A solid line so wide and pale that another one on it is seen, and leaves its edges to be seen.
+    pub fn wide(self) -> Self {
+        Self { dash: Some(DASHES[0]), width: 5.0, ..self }
     }
 
     /// In this colour.
@@ -350,7 +361,8 @@ impl Panel {
         panel
     }
 
-    /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands at its left end.
+    /// Adds a dashed line of this slope, in decades where an axis is logarithmic. Its name stands beside it, where it hides
+    /// the fewest points.
     pub fn slope(mut self, name: impl Into<String>, slope: f64, through: Point) -> Self {
         self.references.push(Reference { name: name.into(), slope, through });
         self
@@ -404,6 +416,11 @@ impl Panel {
         }
     }
 
+    /// Whether its axis stands above it too: a reader of a high panel does not see both ends.
+    fn has_two_axes(&self) -> bool {
+        self.y.label.is_empty() && self.height > HIGH
+    }
+
     /// Rows in which the names of upright lines stand.
     fn upright_rows(&self) -> usize {
         if self.uprights.len() > 2 { 3 } else { self.uprights.len().min(1) }
@@ -434,7 +451,7 @@ impl Panel {
 
     fn frame(&self, legend_rows: usize) -> Frame {
         let left = if self.y.label.is_empty() { RIGHT } else { LEFT };
-        let label = if self.y.label.is_empty() { 0.5 } else { 1.5 };
+        let label = if self.y.label.is_empty() && !self.has_two_axes() { 0.5 } else { 1.5 };
         Frame {
             x: self.x.fitted(self.points().map(|p| p.0), 0.0),
             y: self.y.fitted(self.points().map(|p| p.1), 0.08 * self.upright_rows() as f64),
@@ -465,6 +482,55 @@ impl Panel {
         format!("{axes}.{names}")
     }
 
+    /// The names of the reference lines and their places: each beside its line, clear of other lines and of what is drawn
+    /// where that can be.
+    fn reference_names(&self, frame: &Frame) -> Vec<(&str, Point, Anchor)> {
+        let lines: Vec<(&Reference, [Point; 2])> = self
+            .references
+            .iter()
+            .filter_map(|line| Some((line, line.ends(frame)?.map(|end| frame.inside(end)))))
+            .collect();
+        let along =
+            |[from, to]: [Point; 2], share: f64| (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1));
+        let drawn: Vec<Point> = self.series.iter().flat_map(|series| self.drawn(series)).map(|p| frame.at(p)).collect();
+        let (mut taken, mut names): (Vec<[f64; 4]>, _) = (Vec::new(), Vec::new());
+        for (line, ends) in &lines {
+            let width = width_of(&line.name);
+            let rises = ends[1].1 < ends[0].1;
+            // Above a line that rises the name ends at it, below it begins there; it never lies across its own line.
+            let is_level = ends[0].1 == ends[1].1;
+            let candidates = [(-5.0, rises), (13.0, !rises)].into_iter().flat_map(|(shift, is_before)| {
+                (0..=20).map(move |part| {
+                    let (x, y) = along(*ends, f64::from(part) / 20.0);
+                    let left = if is_before && !is_level { x - 4.0 - width } else { x + 4.0 };
+                    (left, y + shift)
+                })
+            });
+            let hidden = |(left, base): &Point| {
+                let [right, top, bottom] = [left + width, base - 10.0, base + 3.0];
+                let holds =
+                    |(x, y): &Point| (*left - 3.0..=right + 3.0).contains(x) && (top - 3.0..=bottom + 3.0).contains(y);
+                let others = lines.iter().filter(|(other, _)| *other != *line);
+                let crossed = others.flat_map(|(_, ends)| (0..=100).map(|part| along(*ends, f64::from(part) / 100.0)));
+                let is_taken = taken.iter().any(|[l, r, t, b]| *left < *r && right > *l && top < *b && bottom > *t);
+                drawn.iter().filter(|p| holds(p)).count()
+                    + crossed.filter(|p| holds(p)).count()
+                    + 1000 * usize::from(is_taken)
+            };
+            let is_inside = |(left, base): &Point| {
+                *left >= frame.left
+                    && left + width <= frame.left + frame.width
+                    && *base >= frame.top + 10.0
+                    && *base <= frame.top + frame.height - 3.0
+            };
+            if let Some(place) = candidates.filter(is_inside).min_by_key(hidden) {
+                taken.push([place.0, place.0 + width, place.1 - 10.0, place.1 + 3.0]);
+                names.push((line.name.as_str(), place, Anchor::Start));
+            }
+        }
+        names
+    }
+
     /// The panel as SVG elements, the legend in `legend_rows` rows.
     pub(super) fn draw(&self, legend_rows: usize) -> Markup {
         let frame = self.frame(legend_rows);
@@ -486,14 +552,7 @@ impl Panel {
                 @for (index, (name, x)) in self.uprights.iter().enumerate() {
                     (frame.upright_name(name, *x, index % self.upright_rows()))
                 }
-                @for line in &self.references {
-                    @if let Some(ends) = line.ends(&frame) {
-                        @let (x, y) = frame.inside(ends[0]);
-                        // At the top of the diagram below its line: above it stands the name of the axis.
-                        @let above = if ends[0].1 > 0.9 { -12.0 } else { 5.0 };
-                        (text((x + 5.0, y - above), &line.name, Ink::Muted, Anchor::Start))
-                    }
-                }
+                @for (name, place, anchor) in self.reference_names(&frame) { (text(place, name, Ink::Muted, anchor)) }
                 @for (at, label, anchor) in &self.labels {
                     @let (x, y) = frame.at(*at);
                     (text((x, y + 4.0), label, Ink::Text, *anchor))
@@ -529,7 +588,9 @@ impl Panel {
             @for (u, label) in &columns {
                 @let (x, y) = frame.inside((*u, 0.0));
                 (text((x, y + 15.0), label, Ink::Muted, Anchor::Middle))
+                @if self.has_two_axes() { (text((x, frame.top - 5.0), label, Ink::Muted, Anchor::Middle)) }
             }
+            @if self.has_two_axes() { (path(&across(1.0), Ink::Muted, false, "none", 1.0)) }
             @for (v, label) in &rows {
                 @let (x, y) = frame.inside((0.0, *v));
                 (text((x - 6.0, y + 4.0), label, Ink::Muted, Anchor::End))
@@ -598,7 +659,7 @@ fn width_of(text: &str) -> f64 {
 fn text((x, y): Point, text: &str, ink: Ink, anchor: Anchor) -> Markup {
     let [x, y] = [x, y].map(|length| format!("{length:.1}"));
     html! {
-        text x=(x) y=(y) text-anchor=(<&str>::from(anchor)) fill=(ink.light()) class={ "f-" (ink.name()) } { (one_line(text)) }
+        text x=(x) y=(y) text-anchor=(<&str>::from(anchor)) fill=(ink.light()) class={ "f-" (ink.name()) } { (typeset::svg(text)) }
         (PreEscaped("\n"))
     }
 }
@@ -611,7 +672,7 @@ fn symbol(style: &Style, points: &[Point]) -> Markup {
         } @else if style.is_area {
             (path(&format!("{}Z", polyline(points)), style.ink, true, "none", 0.0))
         } @else {
-            @if let Some(dash) = style.dash { (path(&polyline(points), style.ink, false, dash, if *style == Style::REFERENCE { 1.25 } else { 1.75 })) }
+            @if let Some(dash) = style.dash { (path(&polyline(points), style.ink, false, dash, style.width)) }
             @if let Some(shape) = style.shape { (path(&marks(shape), style.ink, !style.is_hollow, "none", 1.4)) }
         }
     }
@@ -623,7 +684,7 @@ fn path(data: &str, ink: Ink, is_filled: bool, dash: &str, width: f64) -> Markup
             path d=(data) fill=(ink.light()) class={ "f-" (ink.name()) } {}
         } @else {
             path d=(data) fill="none" stroke=(ink.light()) class={ "s-" (ink.name()) } stroke-width=(width)
-                stroke-dasharray=(dash) stroke-linejoin="round" {}
+                stroke-dasharray=(dash) stroke-linejoin="round" stroke-opacity=[(width > WIDE_FROM).then_some("0.4")] {}
         }
         (PreEscaped("\n"))
     }
@@ -692,6 +753,28 @@ mod tests {
         }
         let outside = Reference { through: (1e-6, 1.0), ..line(0.0) };
         assert_eq!(outside.ends(&frame), None);
+    }
+
+    #[test]
+    fn names_of_reference_lines_hide_nothing_where_there_is_room() {
+        let steps = (0..=200).map(|i| 10f64.powf(-8.0 + 3.0 * f64::from(i) / 200.0));
+        let axes = [Axis::log("step", "s"), Axis::log("error", "").over([1e-14, 1e-3])];
+        let [x, y] = axes;
+        let panel = Panel::new("", x, y)
+            .slope("slope 1", 1.0, (1e-5, 1e-4))
+            .slope("slope 2", 2.0, (1e-5, 1e-4))
+            .series("second order", Style::marks(0), steps.map(|h| (h, 1e5 * h * h)));
+        let frame = panel.frame(1);
+        let names = panel.reference_names(&frame);
+        assert_eq!(names.iter().map(|(name, ..)| *name).collect::<Vec<_>>(), ["slope 1", "slope 2"]);
+        let inside = |(x, y): Point, (left, base): Point| {
+            x > left && x < left + width_of("slope 1") && y < base && y > base - 10.0
+        };
+        for (_, place, _) in &names {
+            assert!(panel.points().all(|point| !inside(frame.at(point), *place)), "{names:?}");
+        }
+        let [first, second] = [names[0].1, names[1].1];
+        assert!((first.0 - second.0).abs() > 40.0 || (first.1 - second.1).abs() > 12.0, "{names:?}");
     }
 
     #[test]

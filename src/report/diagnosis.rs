@@ -21,35 +21,6 @@ const LISTED_MAX: usize = 1000;
 /// Height of a row of the figure of contents (px).
 const ROW: f64 = 27.0;
 
-/// What a force is made of.
-const TERMS: [Content; 11] = [
-    Content::StaticForce,
-    Content::Drive,
-    Content::Stiffness,
-    Content::LaterStiffness,
-    Content::Viscosity,
-    Content::Drag,
-    Content::AirGap,
-    Content::Stiff,
-    Content::Scene,
-    Content::CraterStiffness,
-    Content::Eq14,
-];
-
-/// What a flight meets on its way.
-const EVENTS: [Content; 10] = [
-    Content::StageEnd,
-    Content::SeveralStageEnds,
-    Content::ForceJump,
-    Content::ShortStage,
-    Content::Exit,
-    Content::ExitBeforeLastStage,
-    Content::ExitAtStageEnd,
-    Content::Rest,
-    Content::Grazing,
-    Content::NoSpeed,
-];
-
 /// Depth, time and velocity in the order of [`QUANTITIES`].
 fn each(of: &Each) -> [f64; 3] {
     [of.depth, of.time, of.velocity]
@@ -78,11 +49,15 @@ fn asked(found: &Diagnosis) -> impl Iterator<Item = &Asked> + Clone {
     found.questions.iter().filter(|asked| asked.verdict != Verdict::Skipped)
 }
 
-/// The largest error of a quantity, its share of the limit, and its question.
-fn largest(found: &Diagnosis, quantity: usize) -> Option<(f64, Option<f64>, &Asked)> {
+/// The largest error of a quantity, and its question.
+fn largest(found: &Diagnosis, quantity: usize) -> Option<(f64, &Asked)> {
     let all = asked(found).filter_map(|asked| Some((error(asked, quantity)?, asked)));
-    let (error, asked) = all.max_by(|a, b| compare(a.0, b.0))?;
-    Some((error, share(asked, quantity), asked))
+    all.max_by(|a, b| compare(a.0, b.0))
+}
+
+/// The largest error of a quantity over its limit, which may be of another question than the largest error.
+fn largest_share(found: &Diagnosis, quantity: usize) -> Option<f64> {
+    asked(found).filter_map(|asked| share(asked, quantity)).max_by(|a, b| compare(*a, *b))
 }
 
 /// The setting at which an answer was given.
@@ -113,7 +88,7 @@ pub fn report(found: &Diagnosis, seed: u64, environment: Environment) -> StudyRe
         "Diagnosis of the solver `{0}`{1}: {2} whose right answers are known, {3}.",
         &[
             &peer.command,
-            &if peer.method.is_empty() { String::new() } else { format!(", {}", peer.method) },
+            &if peer.method.is_empty() { String::new() } else { format!(" (method {})", peer.method) },
             &count(found.counts.asked, "question"),
             &told,
         ],
@@ -181,7 +156,7 @@ fn headline(found: &Diagnosis) -> Vec<Headline> {
     let worst = (0..3).filter_map(|quantity| Some((quantity, largest(found, quantity)?)));
     let worst = worst.max_by(|a, b| compare(a.1.0, b.1.0));
     let error = match worst {
-        Some((quantity, (error, _, asked))) => Headline {
+        Some((quantity, (error, asked))) => Headline {
             label: "Largest error",
             value: number(error, 2),
             note: Prose::new(
@@ -235,7 +210,7 @@ fn headline(found: &Diagnosis) -> Vec<Headline> {
     };
     let skipped = match counts.skipped {
         0 => Prose::default(),
-        skipped => Prose::new("{0} were not needed", &[&skipped]),
+        skipped => Prose::new("{0} further questions were not needed", &[&skipped]),
     };
     let right =
         Headline { label: "Answers right", value: format!("{} of {}", counts.passed, counts.asked), note: skipped };
@@ -245,7 +220,8 @@ fn headline(found: &Diagnosis) -> Vec<Headline> {
 fn result(found: &Diagnosis) -> Vec<Element> {
     let mut parts = Vec::new();
     if !found.causes.is_empty() {
-        let header = ["cause", "certainty", "factor", "what is wrong", "explains", "to"].map(Prose::from);
+        let header =
+            ["cause", "certainty", "factor", "what is wrong", "explains", "largest difference left"].map(Prose::from);
         let caption =
             if found.verdict == Verdict::Passed { "What lowers the order" } else { "What is wrong, best first" };
         let sheet = Sheet::cards("causes", caption.into(), header).rows(&found.causes, |cause| {
@@ -266,7 +242,7 @@ fn result(found: &Diagnosis) -> Vec<Element> {
     // Fixed steps are judged by their limit for small steps, and have no share of another.
     let has_limits = asked(found).any(|asked| worst_share(asked).is_some());
     let limited = |columns: [Cell; 2]| if has_limits { columns.to_vec() } else { Vec::new() };
-    let mut header: Vec<Prose> = ["quantity", "largest error", "relative to", "question"].map(Prose::from).into();
+    let mut header: Vec<Prose> = ["quantity", "largest error", "relative to", "of question"].map(Prose::from).into();
     if has_limits {
         header.extend(["answers within the limit", "largest error over its limit"].map(Prose::from));
     }
@@ -279,9 +255,9 @@ fn result(found: &Diagnosis) -> Vec<Element> {
             Cell::text(QUANTITIES[quantity]),
             Cell::Number(worst.map(|worst| worst.0), 2),
             Cell::text(relative_to(quantity)),
-            Cell::text(worst.map_or("", |worst| worst.2.id.as_str())),
+            Cell::text(worst.map_or("", |worst| worst.1.id.as_str())),
         ];
-        cells.extend(limited([Cell::Of(right, all), Cell::Number(worst.and_then(|worst| worst.1), 2)]));
+        cells.extend(limited([Cell::Of(right, all), Cell::Number(largest_share(found, quantity), 2)]));
         cells
     })));
     parts
@@ -362,8 +338,11 @@ fn passed<'q>(questions: impl Iterator<Item = &'q Asked>) -> (usize, usize) {
 }
 
 fn coverage(found: &Diagnosis) -> Vec<Element> {
-    let met: Vec<Content> =
-        TERMS.into_iter().chain(EVENTS).filter(|content| with(found, &[*content]).next().is_some()).collect();
+    let met: Vec<Content> = Content::TERMS
+        .into_iter()
+        .chain(Content::EVENTS)
+        .filter(|content| with(found, &[*content]).next().is_some())
+        .collect();
     if met.is_empty() {
         return Vec::new();
     }
@@ -388,29 +367,24 @@ fn coverage(found: &Diagnosis) -> Vec<Element> {
         };
         let worst = questions().filter_map(worst_share).max_by(|a, b| compare(*a, *b));
         let cells =
-            [Cell::text(words(*content)), Cell::Of(right_all, all), of(0), of(1), of(2), Cell::Number(worst, 2)];
+            [Cell::text(content.words()), Cell::Of(right_all, all), of(0), of(1), of(2), Cell::Number(worst, 2)];
         cells.into_iter().take(columns).collect::<Vec<_>>()
     });
     parts.push(Element::Table(sheet));
-    let terms: Vec<Content> = TERMS.into_iter().filter(|term| met.contains(term)).collect();
-    let events: Vec<Content> = EVENTS.into_iter().filter(|event| met.contains(event)).collect();
-    let header = [Prose::default()].into_iter().chain(events.iter().map(|event| Prose::text(words(*event))));
+    let terms: Vec<Content> = Content::TERMS.into_iter().filter(|term| met.contains(term)).collect();
+    let events: Vec<Content> = Content::EVENTS.into_iter().filter(|event| met.contains(event)).collect();
+    let header = [Prose::default()].into_iter().chain(events.iter().map(|event| Prose::text(event.words())));
     let sheet = Sheet::grid("coverage", "Terms against events: answers right of those asked".into(), header);
     let sheet = sheet.for_papers(1..=events.len()).rows(terms, |term| {
         let cells = events.iter().map(|event| {
             let (right, all) = passed(with(found, &[term, *event]));
             Cell::Of(right, all)
         });
-        [Cell::text(words(term))].into_iter().chain(cells).collect::<Vec<_>>()
+        [Cell::text(term.words())].into_iter().chain(cells).collect::<Vec<_>>()
     });
     parts.push(Element::Table(sheet));
     parts.push(Element::Text("A dash: no question meets both.".into()));
     parts
-}
-
-/// `static force`.
-fn words(content: Content) -> String {
-    if content == Content::Eq14 { "S of Eq. 14".to_owned() } else { content.to_string().replace('-', " ") }
 }
 
 fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
@@ -447,9 +421,9 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
             panel = panel.series("wrong or undecided", Style::area(Ink::Red), bar(row, right, all));
         }
         let text = if right < all {
-            format!("{}: {} of {all} not right", words(content), all - right)
+            format!("{}: {} of {all} not right", content.words(), all - right)
         } else {
-            format!("{}: all {all} right", words(content))
+            format!("{}: all {all} right", content.words())
         };
         panel = panel.label((0.0, height - row as f64 - 0.24), text, Anchor::Start);
     }
@@ -486,7 +460,7 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
 
 /// What a question meets, in words.
 fn meets(asked: &Asked) -> String {
-    asked.contains.iter().map(|content| words(*content)).collect::<Vec<_>>().join(", ")
+    asked.contains.iter().map(|content| content.words()).collect::<Vec<_>>().join(", ")
 }
 
 /// A signed relative error of a quantity.
@@ -547,7 +521,7 @@ fn uncertainty(found: &Diagnosis) -> Vec<Element> {
         )
     });
     for (quantity, name) in QUANTITIES.iter().enumerate() {
-        let Some((error, ..)) = largest(found, quantity) else { continue };
+        let Some((error, _)) = largest(found, quantity) else { continue };
         let gaps: [&dyn Display; 3] = [name, &number(error, 2), &relative_to(quantity)];
         text = text.then(if quantity > 0 { ",".into() } else { Prose::default() });
         let told = if peer.fixed_step { " {1} of {2}" } else { " {u_num}({0}) = {1} of {2}" };
@@ -620,7 +594,7 @@ mod tests {
     #[test]
     fn every_content_of_a_question_is_a_term_or_an_event() {
         for content in Content::iter() {
-            assert_ne!(TERMS.contains(&content), EVENTS.contains(&content), "{content}");
+            assert_ne!(Content::TERMS.contains(&content), Content::EVENTS.contains(&content), "{content}");
         }
     }
 }

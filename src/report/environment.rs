@@ -18,12 +18,20 @@ pub struct Environment {
     pub version: &'static str,
     /// Commit that it was built from.
     pub commit: &'static str,
+    /// Whether what it was built from was that commit (`clean`) or was changed since (`changed`); `unknown` without a repository.
+    pub tree: &'static str,
     /// Compiler.
     pub rustc: &'static str,
     /// Target triple.
     pub target: &'static str,
     /// Build profile.
     pub profile: &'static str,
+    /// Level of optimisation, as the compiler was given it.
+    pub opt_level: &'static str,
+    /// Flags of the compiler beside those of the profile.
+    pub rustflags: &'static str,
+    /// Features of the processor that the compiler may use.
+    pub target_features: &'static str,
     /// Features that change what is run.
     pub features: Vec<&'static str>,
     /// BLAKE3 of the lock file.
@@ -33,6 +41,12 @@ pub struct Environment {
     pub suite_hash: Option<String>,
     /// BLAKE3 of the scenes as they were understood, in SI units.
     pub scenes_hash: String,
+    /// Operating system and its version.
+    pub os: String,
+    /// Kernel and its version.
+    pub kernel: String,
+    /// Library of C, which holds the elementary functions, and its version.
+    pub libc: String,
     /// Processor.
     pub cpu: String,
     /// Threads used.
@@ -61,13 +75,20 @@ impl Environment {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             commit: env!("PENETRODE_COMMIT"),
+            tree: env!("PENETRODE_TREE"),
             rustc: env!("PENETRODE_RUSTC"),
             target: env!("PENETRODE_TARGET"),
             profile: env!("PENETRODE_PROFILE"),
+            opt_level: env!("PENETRODE_OPT_LEVEL"),
+            rustflags: env!("PENETRODE_RUSTFLAGS"),
+            target_features: env!("PENETRODE_TARGET_FEATURES"),
             features: if cfg!(feature = "diffsol") { vec!["diffsol"] } else { Vec::new() },
             lock_file_hash: hash(LOCK_FILE),
             suite_hash: None,
             scenes_hash: hash(scenes),
+            os: os(),
+            kernel: kernel(),
+            libc: libc(),
             cpu: cpu(),
             threads: rayon::current_num_threads(),
             floating_point: floating_point(),
@@ -82,6 +103,44 @@ impl Environment {
 /// BLAKE3 of a text or of bytes, in hexadecimal.
 pub fn hash(of: impl AsRef<[u8]>) -> String {
     blake3::hash(of.as_ref()).to_hex().to_string()
+}
+
+/// Name of the operating system, where it states it.
+fn os() -> String {
+    let text = fs::read_to_string("/etc/os-release").unwrap_or_default();
+    let name = text.lines().find_map(|line| line.strip_prefix("PRETTY_NAME="));
+    name.map_or(std::env::consts::OS, |name| name.trim_matches('"')).to_owned()
+}
+
+/// Name and version of the kernel, where the system states them.
+fn kernel() -> String {
+    let stated = ["ostype", "osrelease"].map(|name| fs::read_to_string(format!("/proc/sys/kernel/{name}")));
+    match stated {
+        [Ok(name), Ok(version)] => format!("{} {}", name.trim(), version.trim()),
+        _ => "not stated".to_owned(),
+    }
+}
+
+/// The library of C that this process has loaded, as it names itself.
+fn libc() -> String {
+    /// How the text begins by which glibc names itself.
+    const GLIBC: &[u8] = b"GNU C Library ";
+    let kind = if cfg!(target_env = "gnu") {
+        "glibc"
+    } else if cfg!(target_env = "musl") {
+        "musl"
+    } else {
+        std::env::consts::OS
+    };
+    let maps = fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    let loaded = maps
+        .lines()
+        .filter_map(|line| line.split_whitespace().nth(5))
+        .find(|path| path.contains("/libc.so") || path.contains("/libc-"));
+    let bytes = loaded.and_then(|path| fs::read(path).ok()).unwrap_or_default();
+    let named = bytes.windows(GLIBC.len()).position(|window| window == GLIBC).map(|at| &bytes[at..]);
+    let name = named.and_then(|name| name.split(|byte| *byte == b'\n').next());
+    name.map_or_else(|| kind.to_owned(), |name| String::from_utf8_lossy(name).trim_end_matches('.').to_owned())
 }
 
 /// Name of the processor, where the system states it.

@@ -18,6 +18,7 @@ use serde::de::value::Error;
 
 use super::chart::{Ink, Panel, WIDTH};
 use super::text::{count, one_line, wrapped};
+use super::typeset;
 use crate::suite::{Judged, Section, Verdict, grouped};
 
 /// Panels beside each other in a file.
@@ -156,7 +157,7 @@ impl Figure {
                 rect width=(width) height=(y) fill="#ffffff" class="f-paper" {}
                 g font-size="15" font-weight="bold" fill="#1c222a" {
                     @for (line, text) in message.iter().enumerate() {
-                        text.f-text x=(GAP) y=(GAP - 8.0 + LINE * (line as f64 + 1.0)) { (text) }
+                        text.f-text x=(GAP) y=(GAP - 8.0 + LINE * (line as f64 + 1.0)) { (typeset::svg(text)) }
                     }
                 }
                 @for (x, y, panel) in places {

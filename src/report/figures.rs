@@ -23,6 +23,9 @@ use crate::suite::{Check, Evidence, Judged, Verdict, grouped};
 /// Scenes whose paths are shown at most, and scenes whose errors are.
 const SCENES_MAX: usize = 2;
 
+/// Height of the strips of one panel at most (px).
+const STRIPS_MAX: f64 = 700.0;
+
 /// Every figure of `run`, in the order of the report.
 pub fn all(run: &Run<'_>) -> Vec<Figure> {
     let mut figures = Vec::new();
@@ -147,6 +150,13 @@ pub fn words_for(quantity: Quantity) -> &'static str {
     }
 }
 
+/// Whether the points of two fits lie on each other in a drawing: nineteen of twenty by less than a tenth of a factor.
+fn coincide(one: &OrderFit, other: &OrderFit) -> bool {
+    let pairs: Vec<_> = one.points.iter().zip(&other.points).filter(|(a, b)| a.step == b.step).collect();
+    let near = pairs.iter().filter(|(a, b)| (a.error.abs() / b.error.abs()).ln().abs() < 0.1).count();
+    pairs.len() == one.points.len().max(other.points.len()) && near * 20 >= pairs.len() * 19
+}
+
 /// Error against the step for every variant of the scheme, one panel a velocity rule.
 fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Figure> {
     let fits = variants(run, scene, quantity);
@@ -167,12 +177,16 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
             .series("round-off", Style::area(Ink::Shade), round_off)
             .slope("slope 1", 1.0, (coarsest, largest * 3.0))
             .slope("slope 2", 2.0, (coarsest, largest * 3.0));
+        let mut drawn: Vec<(Boundaries, &OrderFit)> = Vec::new();
         for (index, boundaries) in Boundaries::ALL.into_iter().enumerate() {
             let is_this = |j: &Judged| j.claim.velocity == velocity && j.claim.boundaries == boundaries;
-            let Some((.., fit)) = fits.iter().find(|(j, ..)| is_this(j)) else { continue };
-            // Smaller from series to series, so that one shows behind another where they coincide.
-            let style = Style::marks(index).radius([4.0, 3.25, 2.0][index]);
-            panel = with_fit(panel, &format!("{boundaries}: {}", slope_of(fit, 2)), fit, style);
+            let Some(&(.., fit)) = fits.iter().find(|(j, ..)| is_this(j)) else { continue };
+            // Smaller from series to series, so that one shows around another where they coincide.
+            let style = Style::marks(index).radius([4.8, 3.0, 1.8][index]);
+            let same = drawn.iter().find(|(_, other)| coincide(other, fit));
+            let same = same.map_or_else(String::new, |(other, _)| format!(", as {other}"));
+            panel = with_fit(panel, &format!("{boundaries}: {}{same}", slope_of(fit, 2)), fit, style);
+            drawn.push((boundaries, fit));
         }
         panel
     };
@@ -189,25 +203,34 @@ struct Strip<'a> {
     dots: Vec<(f64, [f64; 2], &'a Judged)>,
 }
 
-/// Strips one below the other, each dot on a line of its own.
-fn strips(title: impl Into<String>, x: Axis, strips: &[Strip<'_>]) -> Panel {
-    // Heights (px): of a label, of a dot, between strips.
+impl Strip<'_> {
+    /// Height of its label (px).
     const LABEL: f64 = 16.0;
-    const LINE: f64 = 4.0;
+    /// Space below it (px).
     const GAP: f64 = 6.0;
-    let total: f64 = strips.iter().map(|strip| LABEL + LINE * strip.dots.len().max(2) as f64 + GAP).sum();
+
+    /// Height of its dots (px).
+    fn height_of_dots(&self) -> f64 {
+        4.0 * self.dots.len().max(2) as f64
+    }
+
+    /// Height with its label and the space below it (px).
+    fn height(&self) -> f64 {
+        Self::LABEL + self.height_of_dots() + Self::GAP
+    }
+}
+
+/// Strips one below the other, each dot on a line of its own.
+fn strips<'a>(title: impl Into<String>, x: Axis, strips: impl Iterator<Item = &'a Strip<'a>> + Clone) -> Panel {
+    let total: f64 = strips.clone().map(Strip::height).sum();
     let mut panel = Panel::new(title, x, Axis::linear("", "").over([-total, 0.0])).tall(total);
     let mut top = 0.0;
-    for Strip { label, allowed: [low, high], target, dots } in strips {
-        let bottom = top - LABEL - LINE * dots.len().max(2) as f64;
-        panel = panel.label((f64::NEG_INFINITY, top - 0.5 * LABEL), label, Anchor::Start);
-        top -= LABEL;
+    for strip @ Strip { label, allowed: [low, high], target, dots } in strips {
+        let bottom = top - Strip::LABEL - strip.height_of_dots();
+        panel = panel.label((f64::NEG_INFINITY, top - 0.5 * Strip::LABEL), label, Anchor::Start);
+        top -= Strip::LABEL;
         let corners = [(*low, top), (*low, bottom), (*high, bottom), (*high, top)];
-        panel = panel.unlisted(format!("{label}: allowed"), Style::area(Ink::Shade), corners).unlisted(
-            format!("{label}: expected"),
-            Style::REFERENCE,
-            target.iter().flat_map(|x| [(*x, bottom), (*x, top)]),
-        );
+        panel = panel.unlisted(format!("{label}: allowed"), Style::area(Ink::Shade), corners);
         for (index, (at, [low, high], judged)) in dots.iter().enumerate() {
             let y = top - (top - bottom) * (index as f64 + 0.5) / dots.len() as f64;
             let style = style_of(judged.verdict);
@@ -217,7 +240,10 @@ fn strips(title: impl Into<String>, x: Axis, strips: &[Strip<'_>]) -> Panel {
                 [(*at, y)],
             );
         }
-        top = bottom - GAP;
+        // On top of the dots, which would hide it.
+        let expected = target.iter().flat_map(|x| [(*x, bottom), (*x, top)]);
+        panel = panel.unlisted(format!("{label}: expected"), Style::REFERENCE, expected);
+        top = bottom - Strip::GAP;
     }
     panel
 }
@@ -245,8 +271,24 @@ fn observed_orders(run: &Run<'_>) -> Option<Figure> {
             });
         }
         // What leaves the panel ends at its edge.
-        let x = Axis::linear("observed order", "").over([formal - reach * 1.05, formal + reach * 1.05]);
-        panels.push(strips(format!("formal order {formal}"), x, &rows));
+        let x = || Axis::linear("observed order", "").over([formal - reach * 1.05, formal + reach * 1.05]);
+        // Strips of many claims are shared out to panels that a screen holds.
+        let parts = rows.iter().map(Strip::height).sum::<f64>().div_euclid(STRIPS_MAX) as usize + 1;
+        let share = rows.iter().map(Strip::height).sum::<f64>() / parts as f64;
+        let mut height = 0.0;
+        let placed: Vec<(usize, Strip<'_>)> = rows
+            .into_iter()
+            .map(|strip| {
+                let middle = height + 0.5 * strip.height();
+                height += strip.height();
+                (((middle / share) as usize).min(parts - 1), strip)
+            })
+            .collect();
+        for part in placed.chunk_by(|a, b| a.0 == b.0) {
+            let title = if parts == 1 { String::new() } else { format!(", part {} of {parts}", part[0].0 + 1) };
+            let strips_of_part = part.iter().map(|(_, strip)| strip);
+            panels.push(strips(format!("formal order {formal}{title}"), x(), strips_of_part));
+        }
     }
     let judged: Vec<_> = all.iter().map(|(_, judged, _)| *judged).collect();
     Figure::new("observed-orders", "", &judged, &[], panels)
@@ -338,8 +380,10 @@ fn stiffness(run: &Run<'_>) -> Option<Figure> {
         let panel = Panel::new(title, Axis::log("r/M", "1/s"), Axis::log("force evaluations", ""));
         members.iter().fold(panel, |panel, (judged, points)| {
             let method = judged.claim.method.unwrap_or_default();
-            // One colour a method, in both panels.
-            panel.series(method.name(), Style::marked_line(method as usize), points.iter().copied())
+            // One colour a method, in both panels. What chooses among others lies on one of them, around its marks.
+            let style = Style::marked_line(method as usize);
+            let style = if method == MethodName::Adaptive { style.hollow().radius(5.0) } else { style };
+            panel.series(method.name(), style, points.iter().copied())
         })
     };
     let panels = vec![panel("a stage that resists", &resisting), panel("a driven stage", &driven)];
@@ -366,7 +410,7 @@ fn peers<'a>(run: &Run<'a>) -> Option<Figure> {
     let rows: Vec<_> = strips_of_peers.collect();
     let x = Axis::log("largest difference / tolerance", "").from(LEAST).including([LEAST, 20.0]);
     let judged: Vec<&Judged> = all.iter().map(|(.., judged)| *judged).collect();
-    Figure::new("peer-differences", "", &judged, &[], vec![strips("differences by program", x, &rows)])
+    Figure::new("peer-differences", "", &judged, &[], vec![strips("differences by program", x, rows.iter())])
 }
 
 /// The path of `problem` from impact to its end, dense enough to be drawn, and its solution with the events.

@@ -62,7 +62,7 @@ fn suite_of(name: &str, cases: &[Case]) -> TestSuite {
 fn case_of(judged: &Judged) -> Case {
     let claim = &judged.claim;
     let measured = judged.measured.map_or_else(|| "nothing".to_owned(), |m| format!("{m:e}"));
-    let numbers = format!("measured {measured}, limit {:e} {}", claim.limit, claim.unit);
+    let numbers = format!("measured {measured}, limit {:e} {}", claim.limit, claim.unit_in_words());
     let text = format!("{}\n{numbers}\nwhy this limit: {}\n{}", claim.statement, claim.reason, judged.remark);
     let numbers = if judged.verdict == Verdict::Skipped { judged.remark.clone() } else { numbers };
     Case { name: claim.id.clone(), verdict: judged.verdict, numbers, text, wall_ms: judged.wall_ms }

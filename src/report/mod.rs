@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod cells;
 pub mod chart;
+mod coverage;
 pub mod diagnosis;
 pub mod environment;
 pub mod figure;
@@ -11,6 +12,7 @@ pub mod folder;
 pub mod json;
 pub mod junit;
 mod latex;
+mod nomenclature;
 mod page;
 pub mod references;
 pub mod refinement;
@@ -19,6 +21,7 @@ pub mod stress;
 pub mod study;
 pub mod summary;
 pub mod sweep_figures;
+mod typeset;
 mod verify_page;
 pub use crate::text;
 

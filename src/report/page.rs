@@ -16,9 +16,10 @@ use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 use super::chart::Ink;
 use super::figure::{self, Figure};
+use super::references::{self, Reference, reference};
 use super::text::{count, number, one_line};
-use super::{Environment, Run};
-use crate::suite::{Claim, Counts, Judged, Verdict, tables, worst};
+use super::{Environment, Run, typeset};
+use crate::suite::{Claim, Counts, Judged, Verdict, of_cases, tables, worst};
 
 /// A page.
 pub(super) struct Page<'a> {
@@ -42,13 +43,26 @@ pub(super) struct Page<'a> {
 pub(super) struct Part<'a> {
     id: &'a str,
     title: &'a str,
-    body: String,
+    body: Vec<Block<'a>>,
 }
+
+/// A part of a section.
+enum Block<'a> {
+    /// A line of a text of `pages/`, with its citations and references as they are written there.
+    Line(&'a str),
+    /// What was made of the run.
+    Shown(String),
+    /// The works that the lines cite.
+    References,
+}
+
+/// The name of the table that follows, `Table 3`: the page fills it in. No text of others can hold it, since it is markup.
+pub(super) const NEXT_TABLE: PreEscaped<&str> = PreEscaped("<span class=\"next-table\"></span>");
 
 impl<'a> Part<'a> {
     /// A section with its anchor, its heading and what stands in it.
     pub(super) fn new(id: &'a str, title: &'a str, body: Markup) -> Self {
-        Self { id, title, body: body.into_string() }
+        Self { id, title, body: vec![Block::Shown(body.into_string())] }
     }
 
     /// The sections of a text of `pages/` that have something to show; `slot` gives the contents of a slot, by its name and
@@ -59,17 +73,16 @@ impl<'a> Part<'a> {
             if let Some(head) = line.strip_prefix('#') {
                 let is_shown = !head.starts_with('?');
                 let (id, title) = head.trim_start_matches(['?', ' ']).split_once(' ').unwrap_or((head, head));
-                parts.push((Self { id, title, body: String::new() }, is_shown));
+                parts.push((Self { id, title, body: Vec::new() }, is_shown));
             } else if let Some((part, is_shown)) = parts.last_mut() {
                 if let Some(slot_line) = line.strip_prefix('@') {
                     let (name, words) = slot_line.split_once(' ').unwrap_or((slot_line, ""));
                     let filled = slot(name, words).into_string();
                     *is_shown |= !filled.is_empty();
-                    part.body.push_str(&filled);
+                    part.body.push(if name == "references" { Block::References } else { Block::Shown(filled) });
                 } else {
-                    part.body.push_str(line);
+                    part.body.push(Block::Line(line));
                 }
-                part.body.push('\n');
             }
         }
         parts.into_iter().filter(|(_, is_shown)| *is_shown).map(|(part, _)| part).collect()
@@ -108,6 +121,7 @@ impl<'a> Page<'a> {
 
     pub(super) fn to_html(&self) -> String {
         let (e, parts) = (self.environment, &self.parts);
+        let bodies = numbered(parts);
         let page = html! {
             (DOCTYPE)
             html lang="en" {
@@ -128,20 +142,23 @@ impl<'a> Page<'a> {
                         h1 { (self.title) }
                         @if !self.subject.0.is_empty() { p.subject { (self.subject) } }
                         p.quiet {
-                            "penetrode " (e.version) ", commit " code { (e.commit) } ", "
+                            "penetrode " (e.version) ", commit " code { (e.commit) } (changes(e)) ", "
                             time datetime=(e.date) { (e.date) } ". " (self.purpose)
                         }
                     }
                     main {
-                        @for (index, part) in parts.iter().enumerate() {
+                        @for (index, (part, body)) in parts.iter().zip(&bodies).enumerate() {
                             section aria-labelledby=(part.id) {
-                                h2 id=(part.id) { span.no { (index + 1) } " " (part.title) }
-                                (PreEscaped(&part.body))
+                                h2 id=(part.id) { a.no href="#contents" title="to the contents" { (index + 1) } " " (part.title) }
+                                (PreEscaped(body))
                             }
                             @if index == 0 {
-                                nav aria-label="Contents" { ol {
-                                    @for part in parts { li { a href={ "#" (part.id) } { (part.title) } } }
-                                } }
+                                nav id="contents" aria-label="Contents" {
+                                    ol { @for part in parts { li { a href={ "#" (part.id) } { (part.title) } } } }
+                                    @if bodies.iter().any(|body| body.contains("<details")) {
+                                        p.unfold { input id="unfold" type="checkbox"; label for="unfold" { " Show all that is folded" } }
+                                    }
+                                }
                             }
                         }
                     }
@@ -152,6 +169,102 @@ impl<'a> Page<'a> {
         };
         page.into_string()
     }
+}
+
+/// The bodies of `parts`, whose tables and figures are numbered, and whose citations and references are links.
+fn numbered(parts: &[Part<'_>]) -> Vec<String> {
+    let mut anchors: Vec<(String, String)> = Vec::new();
+    let (mut tables, mut figures) = (0, 0);
+    let mut shown = Vec::new();
+    for (index, part) in parts.iter().enumerate() {
+        anchors.push((part.id.to_owned(), format!("section {}", index + 1)));
+        for block in &part.body {
+            if let Block::Shown(html) = block {
+                shown.push(with_numbers(html, &mut tables, &mut figures, &mut anchors));
+            }
+        }
+    }
+    let mut cited = Vec::new();
+    for block in parts.iter().flat_map(|part| &part.body) {
+        if let Block::Line(line) = block {
+            linked(line, &anchors, &mut cited);
+        }
+    }
+    let mut shown = shown.into_iter();
+    let body = |part: &Part<'_>| {
+        let mut body = String::new();
+        for block in &part.body {
+            match block {
+                Block::Line(line) => body += &linked(line, &anchors, &mut cited),
+                Block::Shown(_) => body += &shown.next().unwrap_or_default(),
+                Block::References => body += &references::list(&cited).into_string(),
+            }
+            body.push('\n');
+        }
+        body
+    };
+    parts.iter().map(body).collect()
+}
+
+/// `html` with the numbers of its tables and figures, which go on from `tables` and `figures`; their ids and names are added to
+/// `anchors`.
+fn with_numbers(html: &str, tables: &mut usize, figures: &mut usize, anchors: &mut Vec<(String, String)>) -> String {
+    const TABLE: &str = "<caption";
+    const FIGURE: &str = "<figure id=\"";
+    const MESSAGE: &str = "<figcaption><b>";
+    let (mut numbered, mut rest) = (String::new(), html);
+    while let Some(at) = [TABLE, FIGURE, NEXT_TABLE.0].iter().filter_map(|start| rest.find(start)).min() {
+        let (before, from) = rest.split_at(at);
+        numbered += before;
+        if let Some(after) = from.strip_prefix(NEXT_TABLE.0) {
+            numbered += &format!("Table {}", *tables + 1);
+            rest = after;
+            continue;
+        }
+        let (head, name) = if from.starts_with(TABLE) {
+            *tables += 1;
+            (from.find('>').map_or(from.len(), |end| end + 1), format!("Table {tables}"))
+        } else {
+            *figures += 1;
+            (from.find(MESSAGE).map_or(from.len(), |start| start + MESSAGE.len()), format!("Figure {figures}"))
+        };
+        let (head, after) = from.split_at(head);
+        numbered += head;
+        numbered += &if head.starts_with(TABLE) { format!("<b>{name}.</b> ") } else { format!("{name}. ") };
+        if let Some((id, _)) = head.split_once("id=\"").and_then(|(_, id)| id.split_once('"')) {
+            anchors.push((id.to_owned(), name));
+        }
+        rest = after;
+    }
+    numbered + rest
+}
+
+/// A line of a text of `pages/`: `[@key]` cites, `[ (#anchor)]` refers to what `anchors` name, and is left out with all between its
+/// brackets where that is not on the page. What is cited for the first time is added to `cited`.
+fn linked(line: &str, anchors: &[(String, String)], cited: &mut Vec<&'static Reference>) -> String {
+    let (mut text, mut rest) = (String::new(), line);
+    while let Some((before, (inside, after))) = rest.split_once('[').and_then(|(a, b)| Some((a, b.split_once(']')?))) {
+        text += before;
+        rest = after;
+        if let Some(keys) = inside.strip_prefix('@') {
+            let works: Vec<_> = keys.split(',').filter_map(|key| reference(key.trim())).collect();
+            for work in &works {
+                if !cited.contains(work) {
+                    cited.push(work);
+                }
+            }
+            text += &references::citation(&works, cited).into_string();
+        } else if let Some((start, from)) = inside.split_once('#') {
+            let (id, end) =
+                from.split_at(from.find(|c: char| !c.is_ascii_alphanumeric() && c != '-').unwrap_or(from.len()));
+            if let Some((_, name)) = anchors.iter().find(|(known, _)| known == id) {
+                text += &html! { (PreEscaped(start)) a href={ "#" (id) } { (name) } (PreEscaped(end)) }.into_string();
+            }
+        } else {
+            text += &format!("[{inside}]");
+        }
+    }
+    text + rest
 }
 
 /// `text` as a string of CSS inside a page, 80 characters at most: whatever could end the string or the sheet is written
@@ -178,9 +291,12 @@ pub(super) fn slot(run: &Run<'_>, figures: &[Figure], name: &str, words: &str) -
         "criteria" if section.is_some() => criteria(caption, &claims().collect::<Vec<_>>()),
         "criteria" => every_criterion(&claims().collect::<Vec<_>>()),
         "figures" => html! { @for shown in figures.iter().filter(|f| f.section.is_some() && f.section == section) {
-            (figure(None, shown, &run.environment.command))
+            (figure(shown, &run.environment.command))
         } },
-        "results" => results(caption, &claims().collect::<Vec<_>>()),
+        "results" => {
+            let id = words.split(' ').next().unwrap_or_default();
+            results(id, caption, &claims().collect::<Vec<_>>())
+        }
         "each" => {
             let each: Vec<_> = claims().flatten().collect();
             html! { @if !each.is_empty() { (folded(caption, true, claims_table("", each))) } }
@@ -203,6 +319,7 @@ pub(super) struct Table {
     rows: Vec<Vec<Markup>>,
     numbers: Vec<usize>,
     name: String,
+    id: String,
 }
 
 impl Table {
@@ -210,7 +327,7 @@ impl Table {
     pub(super) fn cards<T: ToString>(caption: impl Into<String>, header: impl IntoIterator<Item = T>) -> Self {
         let caption: String = caption.into();
         let header = header.into_iter().map(|title| title.to_string());
-        let table = Self::cards_of(html! { (caption) }, header.map(|title| (html! { (title) }, title.clone())));
+        let table = Self::cards_of(typeset::html(&caption), header.map(|title| (typeset::html(&title), title)));
         Self { name: caption, ..table }
     }
 
@@ -223,12 +340,25 @@ impl Table {
     /// As [`Self::cards`], with words that are set: the head of each column, and its name as text.
     pub(super) fn cards_of(caption: Markup, header: impl IntoIterator<Item = (Markup, String)>) -> Self {
         let header = header.into_iter().collect();
-        Self { caption, is_grid: false, header, rows: Vec::new(), numbers: Vec::new(), name: String::new() }
+        Self {
+            caption,
+            is_grid: false,
+            header,
+            rows: Vec::new(),
+            numbers: Vec::new(),
+            name: String::new(),
+            id: String::new(),
+        }
     }
 
     /// The same as a grid; `name` is read out in place of its caption.
     pub(super) fn into_grid(self, name: String) -> Self {
         Self { is_grid: true, name, ..self }
+    }
+
+    /// The same with an anchor, by which texts refer to it.
+    pub(super) fn id(self, id: impl Into<String>) -> Self {
+        Self { id: id.into(), ..self }
     }
 
     /// The same with numbers in these columns alone.
@@ -256,7 +386,7 @@ impl Render for Table {
     fn render(&self) -> Markup {
         let table = html! {
             table.(if self.is_grid { "grid" } else { "cards" }).wide[!self.is_grid && self.header.len() > CARDS_MAX] {
-                @if !self.caption.0.is_empty() { caption { (self.caption) } }
+                @if !self.caption.0.is_empty() { caption id=[Some(&self.id).filter(|id| !id.is_empty())] { (self.caption) } }
                 thead { tr { @for (title, _) in &self.header { th scope="col" { (title) } } } }
                 tbody { @for row in &self.rows { tr {
                     @for (index, cell) in row.iter().enumerate() {
@@ -291,7 +421,7 @@ pub(super) fn folded(summary: impl Render, long: bool, body: impl Render) -> Mar
 
 /// Names and what is said of each.
 pub(super) fn facts<'t>(facts: impl IntoIterator<Item = (&'t str, Markup)>) -> Markup {
-    html! { dl.facts { @for (name, fact) in facts { dt { (one_line(name)) } dd { (fact) } } } }
+    html! { dl.facts { @for (name, fact) in facts { dt { (typeset::html(name)) } dd { (fact) } } } }
 }
 
 pub(super) fn sign(verdict: Verdict) -> &'static str {
@@ -356,7 +486,12 @@ fn verdict(judged: &[Judged], noun: &str) -> Markup {
 
 /// Limit of a claim with its unit.
 fn limit_of(claim: &Claim) -> Markup {
-    html! { (number(claim.limit, 3)) " " (claim.unit) }
+    html! { (number(claim.limit, 3)) " " (claim.unit_in_words()) }
+}
+
+/// A measured value; a number of things with the number of cases that it is of.
+fn measured_cell(value: Option<f64>, cases: Option<usize>) -> Markup {
+    html! { (number_cell(value, 3)) @if value.is_some() && let Some(cases) = cases { span.quiet { " in " (count(cases, "case")) } } }
 }
 
 /// The anchor of a claim, or of the first claim of a table, among all claims.
@@ -385,9 +520,9 @@ fn claims_rows<'a>(
         let claim = &judged.claim;
         let is_first = std::mem::replace(&mut last, &claim.table) != claim.table;
         table = table.row([
-            html! { (name(claim, is_first)) @if is_first { br; (one_line(&claim.statement)) } },
+            html! { (name(claim, is_first)) @if is_first { br; (typeset::html(&claim.statement)) } },
             badge(judged.verdict),
-            number_cell(judged.measured, 3),
+            measured_cell(judged.measured, of_cases([judged])),
             limit_of(claim),
             cell(&judged.remark),
         ]);
@@ -397,15 +532,20 @@ fn claims_rows<'a>(
 
 /// What the claims of a table of the suite have in common.
 fn head_of(claim: &Claim) -> Markup {
-    html! { code { (one_line(&claim.table)) } br; (one_line(&claim.statement)) }
+    html! { code { (one_line(&claim.table)) } br; (typeset::html(&claim.statement)) }
 }
 
 /// One row a table of the suite; a sentence where there are none.
-fn results(caption: &str, tables: &[&[Judged]]) -> Markup {
-    let table = Table::cards(caption, ["claims", "verdict", "worst measured", "limit"]).numbers(2..3);
-    let table = table.rows(tables, |claims| {
+fn results(section: &str, caption: &str, tables: &[&[Judged]]) -> Markup {
+    let table = Table::cards(caption, ["claims", "verdict", "worst measured", "limit"]);
+    let table = table.id(format!("table-{section}")).numbers(2..3).rows(tables, |claims| {
         let claim = &claims[0].claim;
-        [head_of(claim), counts_cell(Counts::of_claims(*claims)), number_cell(worst(claims), 3), limit_of(claim)]
+        [
+            head_of(claim),
+            counts_cell(Counts::of_claims(*claims)),
+            measured_cell(worst(claims), of_cases(*claims)),
+            limit_of(claim),
+        ]
     });
     html! { @if tables.is_empty() { p { "This suite claims nothing of this kind." } } @else { (table) } }
 }
@@ -414,7 +554,7 @@ fn results(caption: &str, tables: &[&[Judged]]) -> Markup {
 fn criteria(heading: &str, tables: &[&[Judged]]) -> Markup {
     let rows = Table::cards("", ["claim", "limit", "why this limit"]).rows(tables, |claims| {
         let claim = &claims[0].claim;
-        [head_of(claim), limit_of(claim), cell(&claim.reason)]
+        [head_of(claim), limit_of(claim), typeset::html(&claim.reason)]
     });
     let number = count(tables.len(), "criterion").replace("criterions", "criteria");
     folded(html! { (one_line(heading)) " (" (number) ")" }, false, rows)
@@ -423,12 +563,12 @@ fn criteria(heading: &str, tables: &[&[Judged]]) -> Markup {
 /// The criteria of a suite, by the first part of their ids.
 fn every_criterion(tables: &[&[Judged]]) -> Markup {
     let groups = tables.chunk_by(|a, b| a[0].claim.group() == b[0].claim.group());
-    html! { @for group in groups { (criteria(group[0][0].claim.group(), group)) } }
+    html! { div.groups { @for group in groups { (criteria(group[0][0].claim.group(), group)) } } }
 }
 
 /// Every claim, by the first part of the ids.
 fn every_claim(judged: &[Judged]) -> Markup {
-    html! { @for claims in judged.chunk_by(|a, b| a.claim.group() == b.claim.group()) {
+    html! { div.groups { @for claims in judged.chunk_by(|a, b| a.claim.group() == b.claim.group()) {
         @let name = one_line(claims[0].claim.group());
         (folded(
             html! { (name) ": " (tally(Counts::of_claims(claims))) },
@@ -438,19 +578,19 @@ fn every_claim(judged: &[Judged]) -> Markup {
                 code id=(anchor("claim", &claim.id)) { (one_line(&claim.id)) }
             }),
         ))
-    } }
+    } } }
 }
 
-/// A figure with its number, if it has one, its message, how to read it, the claims that judge it and the command that remakes
+/// A figure with its message, how to read it, the claims that judge it and the command that remakes
 /// them, and its files.
-pub(super) fn figure(index: Option<usize>, figure: &Figure, command: &str) -> Markup {
+pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
     const NAMED: usize = 3;
     let is_whole = command.starts_with("penetrode verify") && !command.contains("--only");
     html! {
-        figure id={ "figure-" (figure.name) } {
+        figure id={ "figure-" (figure.name) } class={ "panels-" (figure.panels.len()) } {
             figcaption {
-                b { @if let Some(index) = index { "Figure " (index) ". " } (one_line(&figure.message)) }
-                (figure.reading) " "
+                b { (typeset::html(&figure.message)) }
+                (typeset::html(&figure.reading)) " "
                 span.quiet {
                     @if let Some(first) = figure.claims.first() {
                         "Judged by "
@@ -474,9 +614,18 @@ pub(super) fn figure(index: Option<usize>, figure: &Figure, command: &str) -> Ma
 pub(super) fn reproduction<'t>(e: &'t Environment, inputs: impl IntoIterator<Item = (&'t str, Markup)>) -> Markup {
     let features = if e.features.is_empty() { "none".to_owned() } else { e.features.join(", ") };
     let mut list = vec![
-        ("Program", html! { "penetrode " (e.version) ", commit " code { (e.commit) } }),
-        ("Built by", html! { (e.rustc) ", profile " (e.profile) ", for " (e.target) }),
+        (
+            "Program",
+            html! {
+                "penetrode " (e.version) ", commit " code { (e.commit) } (changes(e)) @if e.tree == "clean" { ", unchanged" }
+            },
+        ),
+        ("Built by", html! { (e.rustc) ", profile " (e.profile) ", optimisation " (e.opt_level) ", for " (e.target) }),
+        ("Flags of the compiler", html! { code { (one_line(e.rustflags)) } }),
         ("Features", cell(features)),
+        ("Processor features used", cell(e.target_features.replace(',', ", "))),
+        ("Operating system", html! { (one_line(&e.os)) ", " (one_line(&e.kernel)) }),
+        ("C library", html! { (one_line(&e.libc)) ", with the elementary functions" }),
         ("Processor", html! { (one_line(&e.cpu)) ", " (count(e.threads, "thread")) }),
         ("Floating point", cell(&e.floating_point)),
         ("Lock file (BLAKE3)", html! { code { (e.lock_file_hash) } }),
@@ -485,6 +634,11 @@ pub(super) fn reproduction<'t>(e: &'t Environment, inputs: impl IntoIterator<Ite
     list.extend(e.peers.iter().map(|(name, text)| (name.as_str(), cell(text))));
     list.push(("Date", html! { time datetime=(e.date) { (e.date) } }));
     html! { pre { code { (one_line(&e.command)) } } (facts(list)) }
+}
+
+/// What stands behind a commit that was not all that was built.
+fn changes(e: &Environment) -> Markup {
+    html! { @if e.tree == "changed" { " " b { "and changes since" } } }
 }
 
 /// What goes into a run of scenes.
@@ -498,7 +652,49 @@ pub(super) fn suite_inputs(e: &Environment) -> Vec<(&'static str, Markup)> {
 
 #[cfg(test)]
 mod tests {
-    use super::css_string;
+    use super::{NEXT_TABLE, css_string, linked, with_numbers};
+
+    #[test]
+    fn tables_and_figures_are_numbered_in_their_order_and_found_by_their_anchors() {
+        let (mut tables, mut figures, mut anchors) = (1, 0, Vec::new());
+        let html = format!(
+            "{}: a<caption id=\"table-x\">X</caption><caption>&lt;caption&gt;</caption><figure id=\"figure-y\" class=\"panels-1\"><figcaption><b>Y",
+            NEXT_TABLE.0
+        );
+        let numbered = with_numbers(&html, &mut tables, &mut figures, &mut anchors);
+        assert_eq!(
+            numbered,
+            "Table 2: a<caption id=\"table-x\"><b>Table 2.</b> X</caption><caption><b>Table 3.</b> &lt;caption&gt;</caption><figure \
+             id=\"figure-y\" class=\"panels-1\"><figcaption><b>Figure 1. Y"
+        );
+        assert_eq!((tables, figures), (3, 1));
+        let names: Vec<_> = anchors.iter().map(|(id, name)| (id.as_str(), name.as_str())).collect();
+        assert_eq!(names, [("table-x", "Table 2"), ("figure-y", "Figure 1")]);
+    }
+
+    #[test]
+    fn texts_refer_to_what_is_on_the_page_and_say_nothing_of_the_rest() {
+        let anchors = [("table-x".to_owned(), "Table 2".to_owned())];
+        let mut cited = Vec::new();
+        let line = "is so[ (#table-x)][ and #figure-y too] [@celik2008] [0, 1]";
+        assert_eq!(
+            linked(line, &anchors, &mut cited),
+            "is so (<a href=\"#table-x\">Table 2</a>) [<a href=\"#ref-celik2008\">1</a>] [0, 1]"
+        );
+        assert_eq!(cited.len(), 1);
+    }
+
+    /// A key that no work has would be left out without a word.
+    #[test]
+    fn every_citation_of_the_texts_is_a_work() {
+        let texts =
+            [include_str!("pages/verify.txt"), include_str!("pages/stress.txt"), include_str!("pages/bench.txt")];
+        for key in texts.iter().flat_map(|text| text.split("[@").skip(1)).filter_map(|rest| rest.split(']').next()) {
+            for key in key.split(',') {
+                assert!(super::reference(key.trim()).is_some(), "{key}");
+            }
+        }
+    }
 
     #[test]
     fn nothing_ends_a_string_of_the_style_sheet() {

@@ -26,9 +26,10 @@ pub struct Reference {
 }
 
 const FLUIDS: &str = "Journal of Fluids Engineering";
+const IMPACT: &str = "International Journal of Impact Engineering";
 
 /// Every work that a report may cite.
-pub const REFERENCES: [Reference; 11] = [
+pub const REFERENCES: [Reference; 18] = [
     Reference {
         key: "zaidi2009",
         kind: "article",
@@ -130,11 +131,100 @@ pub const REFERENCES: [Reference; 11] = [
         year: 2000,
         doi: Some("10.2172/759450"),
     },
+    Reference {
+        key: "chen2002",
+        kind: "article",
+        authors: "X. W. Chen and Q. M. Li",
+        title: "Deep penetration of a non-deformable projectile with different geometrical characteristics",
+        place: &[("journal", IMPACT), ("volume", "27"), ("number", "6"), ("pages", "619--637")],
+        year: 2002,
+        doi: None,
+    },
+    Reference {
+        key: "li2003",
+        kind: "article",
+        authors: "Q. M. Li and X. W. Chen",
+        title: "Dimensionless formulae for penetration depth of concrete target impacted by a non-deformable projectile",
+        place: &[("journal", IMPACT), ("volume", "28"), ("number", "1"), ("pages", "93--116")],
+        year: 2003,
+        doi: None,
+    },
+    Reference {
+        key: "tong2003",
+        kind: "article",
+        authors: "Q. M. Li and D. J. Tong",
+        title: "Perforation thickness and ballistic performance of concrete target subjected to rigid projectile impact",
+        place: &[
+            ("journal", "Journal of Engineering Mechanics"),
+            ("volume", "129"),
+            ("number", "9"),
+            ("pages", "1083--1091"),
+        ],
+        year: 2003,
+        doi: None,
+    },
+    Reference {
+        key: "forrestal1994",
+        kind: "article",
+        authors: "M. J. Forrestal and B. S. Altman and J. D. Cargile and S. J. Hanchak",
+        title: "An empirical equation for penetration depth of ogive-nose projectiles into concrete targets",
+        place: &[("journal", IMPACT), ("volume", "15"), ("number", "4"), ("pages", "395--405")],
+        year: 1994,
+        doi: None,
+    },
+    Reference {
+        key: "kennedy1976",
+        kind: "article",
+        authors: "R. P. Kennedy",
+        title: "A review of procedures for the analysis and design of concrete structures to resist missile impact effects",
+        place: &[
+            ("journal", "Nuclear Engineering and Design"),
+            ("volume", "37"),
+            ("number", "2"),
+            ("pages", "183--203"),
+        ],
+        year: 1976,
+        doi: None,
+    },
+    Reference {
+        key: "bainbridge1988",
+        kind: "misc",
+        authors: "P. Bainbridge",
+        title: "Measured critical energies, cited in the text of the paper and absent from its list of references",
+        place: &[],
+        year: 1988,
+        doi: None,
+    },
+    Reference {
+        key: "jorba2005",
+        kind: "article",
+        authors: "À. Jorba and M. Zou",
+        title: "A software package for the numerical integration of ODEs by means of high-order Taylor methods",
+        place: &[("journal", "Experimental Mathematics"), ("volume", "14"), ("number", "1"), ("pages", "99--117")],
+        year: 2005,
+        doi: None,
+    },
 ];
 
 /// The work of this key.
 pub fn reference(key: &str) -> Option<&'static Reference> {
     REFERENCES.iter().find(|reference| reference.key == key)
+}
+
+/// A list of works on a page, numbered from 1.
+pub(super) fn list(works: &[&Reference]) -> Markup {
+    html! { ol.references { @for work in works { li id={ "ref-" (work.key) } { (work.to_html()) } } } }
+}
+
+/// A citation on a page: numbers of `works` by their place in `cited`.
+pub(super) fn citation(works: &[&Reference], cited: &[&Reference]) -> Markup {
+    let number = |work: &Reference| 1 + cited.iter().position(|other| other.key == work.key).unwrap_or(cited.len());
+    html! { "["
+        @for (index, work) in works.iter().enumerate() {
+            @if index > 0 { ", " }
+            a href={ "#ref-" (work.key) } { (number(work)) }
+        }
+    "]" }
 }
 
 impl Reference {
@@ -172,7 +262,11 @@ impl Reference {
         fields.extend(self.doi.map(|doi| ("doi", doi)));
         let mut entry = format!("@{}{{{}", self.kind, self.key);
         for (name, value) in fields {
-            let _ = write!(entry, ",\n  {name} = {{{}}}", value.replace('&', "\\&").replace('ç', "{\\c c}"));
+            let _ = write!(
+                entry,
+                ",\n  {name} = {{{}}}",
+                value.replace('&', "\\&").replace('ç', "{\\c c}").replace('À', "{\\`A}")
+            );
         }
         entry + "\n}\n"
     }

@@ -335,7 +335,7 @@ impl Refinement {
                 let said = [
                     (many(&|series| series.observed_order.is_some() && is_expected(series)), "of the order expected"),
                     (many(&|series| series.observed_order.is_some() && !is_expected(series)), "converging"),
-                    (many(&|series| series.agrees && !series.fixed), "with the exact value in the limit"),
+                    (many(&|series| series.agrees && !series.fixed), "with the exact value as limit for small steps"),
                     (many(&|series| series.fixed), "fixed by the scene and met"),
                 ];
                 let said = said.into_iter().filter(|(many, _)| *many > 0).map(|(many, what)| format!("{many} {what}"));

@@ -14,7 +14,7 @@ pub fn boundary(points: &[BoundaryPoint], judged: &[&Judged]) -> Option<Figure> 
     let off = points.iter().map(|p| (p.measured / p.theory - 1.0).abs()).reduce(f64::max)?;
     let off = number(100.0 * off, 2);
     let origin = |title| Axis::linear(title, "").including([0.0]);
-    let mut panel = Panel::new("onset of growth, w dt over Q V dt/M", origin("Q V dt/M"), origin("w dt"));
+    let mut panel = Panel::new("onset of growth, ω Δt over Q V Δt/M", origin("Q V Δt/M"), origin("ω Δt"));
     for (index, (rule, members)) in grouped(points, |p| p.velocity).into_iter().enumerate() {
         let style = Style::marks(index);
         panel = panel
@@ -27,7 +27,7 @@ pub fn boundary(points: &[BoundaryPoint], judged: &[&Judged]) -> Option<Figure> 
 /// The series of the rounding figure: numbers, sums, style, and their errors.
 type Series = (&'static str, &'static str, Style, fn(&Floor) -> Errors);
 
-/// Error of the depth against dt down to the floor of each number type, and the rounding in it alone.
+/// Error of the depth against Δt down to the floor of each number type, and the rounding in it alone.
 ///
 /// `None` without a row.
 pub fn rounding(rows: &[Floor], judged: &[&Judged]) -> Option<Figure> {

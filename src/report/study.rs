@@ -19,8 +19,8 @@ pub use self::sheet::{Cell, Sheet, interval_text, order_text};
 use super::figure::Figure;
 use super::folder::{Files, files_of};
 use super::junit::{self, Case};
-use super::page::{Page, Part, facts, figure, folded, reproduction, sign};
-use super::references::Reference;
+use super::page::{NEXT_TABLE, Page, Part, facts, figure, folded, reproduction, sign};
+use super::references::{self, Reference};
 use super::text::one_line;
 use super::{Environment, latex, summary};
 use crate::studies::Verdict;
@@ -156,24 +156,16 @@ impl StudyReport {
 
     fn to_html(&self) -> String {
         let cited = self.cited();
-        let (mut tables, mut figures) = (0, 0);
-        let mut element = |element: &Element| match element {
+        let element = |element: &Element| match element {
             Element::Text(text) => html! { p { (text.html(&cited)) } },
             Element::Facts(all) => facts(all.iter().map(|(name, fact)| (*name, fact.html(&cited)))),
             Element::Paste(text) => html! { blockquote.paste { p { (text.html(&cited)) } } },
-            Element::Table(sheet) => {
-                tables += 1;
-                html! { (sheet.to_html(tables, &cited)) (sheet.file_line()) }
-            }
+            Element::Table(sheet) => html! { (sheet.to_html(&cited)) (sheet.file_line()) },
             Element::Folded(sheet) => {
-                tables += 1;
-                let table = html! { (sheet.to_html(tables, &cited)) (sheet.file_line()) };
-                folded(html! { "Table " (tables) ": " (sheet.caption.html(&cited)) }, true, table)
+                let table = html! { (sheet.to_html(&cited)) (sheet.file_line()) };
+                folded(html! { (NEXT_TABLE) ": " (sheet.caption.html(&cited)) }, true, table)
             }
-            Element::Figure(shown) => {
-                figures += 1;
-                figure(Some(figures), shown, "")
-            }
+            Element::Figure(shown) => figure(shown, ""),
         };
         let mut parts = Vec::new();
         for section in &self.sections {
@@ -188,9 +180,7 @@ impl StudyReport {
         let inputs = self.inputs.iter().map(|(name, text)| (*name, html! { code { (one_line(text)) } }));
         parts.push(Part::new("reproduction", "Reproduction", reproduction(&self.environment, inputs)));
         if !cited.is_empty() {
-            let list =
-                html! { ol.references { @for work in &cited { li id={ "ref-" (work.key) } { (work.to_html()) } } } };
-            parts.push(Part::new("references", "References", list));
+            parts.push(Part::new("references", "References", references::list(&cited)));
         }
         Page {
             title: one_line(&self.title).into(),

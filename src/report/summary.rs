@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 
 use super::page::{sign, tally};
-use super::text::{number, one_line};
+use super::text::{count, number, one_line};
+use super::typeset;
 use super::{Environment, Run};
-use crate::suite::{Counts, tables, worst};
+use crate::suite::{Counts, of_cases, tables, worst};
 
 /// Claims listed one by one at most; the others are in `report.html`.
 const LISTED_MAX: usize = 30;
@@ -23,14 +24,15 @@ pub fn to_markdown(run: &Run<'_>) -> String {
             let claim = &judged.claim;
             let _ = writeln!(
                 text,
-                "| {} {} | {}<br>{} | {} | {} {} | {} |",
+                "| {} {} | {}<br>{} | {}{} | {} {} | {} |",
                 sign(judged.verdict),
                 judged.verdict.name(),
                 code(&claim.id),
-                escape(&claim.statement),
+                typeset::markdown(&claim.statement),
                 judged.measured.map_or_else(|| "—".to_owned(), |m| number(m, 3)),
+                of_cases([*judged]).map_or_else(String::new, |cases| format!(" in {}", count(cases, "case"))),
                 number(claim.limit, 3),
-                claim.unit,
+                claim.unit_in_words(),
                 escape(&judged.remark)
             );
         }
@@ -44,14 +46,15 @@ pub fn to_markdown(run: &Run<'_>) -> String {
         let claim = &claims[0].claim;
         let _ = writeln!(
             text,
-            "| {} | {} ({})<br>{} | {} | {} {} |",
+            "| {} | {} ({})<br>{} | {}{} | {} {} |",
             sign(Counts::of_claims(claims).of_group()),
             code(&claim.table),
             claims.len(),
-            escape(&claim.statement),
+            typeset::markdown(&claim.statement),
             worst(claims).map_or_else(|| "—".to_owned(), |m| number(m, 3)),
+            of_cases(claims).map_or_else(String::new, |cases| format!(" in {}", count(cases, "case"))),
             number(claim.limit, 3),
-            claim.unit
+            claim.unit_in_words()
         );
     }
     text.push_str("\n</details>\n\n");

@@ -8,6 +8,7 @@ use super::chart::{Anchor, Axis, Ink, Panel, Point, Style, extremes};
 use super::figure::Figure;
 use super::text::{count, number};
 use crate::exchange::tables::{Value, push_line};
+use crate::physics::semi_empirical::{NDRC_FIRST_BRANCH_END, eq15_printed, eq15_unrounded, jumps};
 use crate::studies::applicability::{ERROR_ALLOWED, Line};
 use crate::studies::experiments::{BAND, Comparison, MarkedScene, summaries};
 use crate::studies::sweep::{self, Plan, Row};
@@ -57,14 +58,54 @@ pub fn critical_energy(rows: &[Row], points: &[Point], judged: &[&Judged]) -> Op
     heights(&energies)?;
     let origin = |title| Axis::linear(title, "").including([0.0]);
     let panel = Panel::new("critical impact energy", origin("H/d"), origin("E_c/(d³ f_c)"))
-        .series("simulation, full depth x = H", Style::line(0), energies)
-        .series("simulation, ndrc x = x_p(H)", Style::line(3), along(rows, |row| row.energy_ndrc))
+        .series("Eq. 15, unrounded", Style::line(2).wide(), along(rows, |row| row.eq15_unrounded))
         .series("Eq. 15, printed", Style::line(1), along(rows, |row| row.eq15_printed))
-        .series("Eq. 15, unrounded", Style::line(2), along(rows, |row| row.eq15_unrounded))
+        .series("simulation, ndrc x = x_p(H)", Style::line(3), along(rows, |row| row.energy_ndrc))
+        .series("simulation, full depth x = H", Style::line(0), energies)
         .tall(TALL);
     let measured = Style::marks(0).ink(Ink::Red);
     let panel = if points.is_empty() { panel } else { panel.series("measured", measured, points.iter().copied()) };
-    Figure::new("critical-energy", "", judged, &[&full, &ndrc], vec![panel])
+    let rounding = rounding_of_eq15(rows);
+    let [at_3, at_38] = jumps().map(|jump| signed(100.0 * (jump.above / jump.below - 1.0)));
+    let end = NDRC_FIRST_BRANCH_END;
+    let own = signed(100.0 * (eq15_unrounded(end * (1.0 + 1e-9)) / eq15_unrounded(end * (1.0 - 1e-9)) - 1.0));
+    let right = rounding.as_ref().map_or_else(String::new, |_| {
+        format!(
+            " Second panel: what the printed coefficients alone change. Printed, Eq. 15 jumps by {at_3} % at H/d = 3 and by {at_38} % at \
+             3.8; unrounded, by {own} % just below 3, with the ACE/NDRC relation."
+        )
+    });
+    let panels = [panel].into_iter().chain(rounding).collect();
+    Figure::new("critical-energy", "", judged, &[&full, &ndrc, &right], panels)
+}
+
+/// Printed less unrounded Eq. 15 in percent of it about the places where the branches meet, drawn apart there; `None` where
+/// `rows` do not reach them.
+fn rounding_of_eq15(rows: &[Row]) -> Option<Panel> {
+    /// H/d at which it begins and ends.
+    const SHOWN: [f64; 2] = [2.0, 6.0];
+    /// Points from one jump to the next.
+    const POINTS: u32 = 40;
+    let [first, last] =
+        extremes(rows.iter().filter(|row| row.eq15_unrounded.is_some()).filter_map(|row| row.thickness_ratio))?;
+    let (first, last) = (first.max(SHOWN[0]), last.min(SHOWN[1]));
+    let meet = jumps().map(|jump| jump.thickness_ratio);
+    // Just below 3 the unrounded line has a jump of its own: what lies between is too short to be seen.
+    let branches = [[first, NDRC_FIRST_BRANCH_END], meet, [meet[1], last]];
+    if branches.iter().any(|[from, to]| from >= to) {
+        return None;
+    }
+    let panel = Panel::new("Eq. 15: rounding", Axis::linear("H/d", ""), Axis::linear("printed less unrounded", "%"));
+    let panel = panel.tall(TALL).upright("H/d = 3", meet[0]).upright("H/d = 3.8", meet[1]);
+    Some(branches.into_iter().fold(panel, |panel, [from, to]| {
+        let points = (0..=POINTS).map(|part| {
+            // Within the branch: at its ends another one begins.
+            let share = (f64::from(part) / f64::from(POINTS)).clamp(1e-9, 1.0 - 1e-9);
+            let ratio = from + share * (to - from);
+            (ratio, 100.0 * (eq15_printed(ratio) / eq15_unrounded(ratio) - 1.0))
+        });
+        panel.series("printed less unrounded, of unrounded", Style::line(1).as_line(), points)
+    }))
 }
 
 /// Simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria; the paper's Figure 5 is in percent of
@@ -81,18 +122,17 @@ pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Fi
         rows.iter().find(|row| row.thickness_ratio.is_some()).and_then(|row| row.geometry).unwrap_or(f64::INFINITY);
     let panel = |title| Panel::new(title, Axis::linear("H/d", ""), Axis::linear("difference", "%").including([0.0]));
     let limit: Vec<Point> = full.iter().map(|(ratio, _)| (*ratio, 24.0)).collect();
-    let panels = vec![
-        panel("full depth").series("+24 %: limit for N, H/d infinite", Style::REFERENCE, limit).series(
-            "x = H over Eq. 15, printed",
-            Style::line(0),
-            full,
-        ),
-        panel("criterion ndrc").series("x = x_p(H) over Eq. 15, printed", Style::line(1), printed).series(
-            "the same over Eq. 15, unrounded",
-            Style::line(2),
-            unrounded,
-        ),
-    ];
+    let panels =
+        vec![
+            panel("full depth").series("+24 %: limit for N, H/d infinite", Style::REFERENCE, limit).series(
+                "x = H over Eq. 15, printed",
+                Style::line(0),
+                full,
+            ),
+            panel("criterion ndrc")
+                .series("x = x_p(H) over Eq. 15, unrounded", Style::line(2).wide(), unrounded)
+                .series("the same over Eq. 15, printed", Style::line(1), printed),
+        ];
     let values = [&number(geometry, 3) as &dyn Display, &signed(least), &signed(low), &signed(high)];
     Figure::new("critical-energy-difference", "", judged, &values, panels)
 }
@@ -224,6 +264,16 @@ mod tests {
         assert_eq!(measured_depths(&[], &[]), None);
     }
 
+    /// Lines that coincide in the drawing of energies are told apart beside it, about the jumps of Eq. 15.
+    #[test]
+    fn the_jumps_of_eq15_are_drawn_where_the_sweep_reaches_them() {
+        let panels = |ratios: &[f64]| {
+            let rows: Vec<Row> = ratios.iter().map(|ratio| row(*ratio, 2.0 * ratio)).collect();
+            critical_energy(&rows, &[], &[]).unwrap().panels.len()
+        };
+        assert_eq!([panels(&[1.0, 18.0]), panels(&[1.0, 3.5]), panels(&[4.0, 18.0])], [2, 1, 1]);
+    }
+
     #[test]
     fn a_single_point_has_a_figure() {
         let file = critical_energy(&[row(5.0, 40.0)], &[], &[]).unwrap().file();
@@ -244,7 +294,7 @@ mod tests {
         let scenes = experiments::marked(&experiments::shipped().unwrap());
         let figure = super::applicability(2.0, &applicability::lines(2.0), &scenes, &[]).unwrap();
         let file = figure.file();
-        for words in ["1 %", "5 %", "20 %", "Sliter1980", "Eq. 12 too deep"] {
+        for words in ["1\u{a0}%", "5\u{a0}%", "20\u{a0}%", "Sliter1980", "Eq. 12 too deep"] {
             assert!(file.contains(words), "{words}");
         }
         assert_eq!(scenes.len(), 107);

@@ -8,7 +8,7 @@ use super::figure::Figure;
 use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
 use super::text::{count, number, one_line};
-use super::{Environment, Run};
+use super::{Environment, Run, coverage, nomenclature, typeset};
 use crate::integrators::{Boundaries, MethodName, VelocityAt};
 use crate::physics::groups::Groups;
 use crate::studies::experiments;
@@ -22,6 +22,8 @@ use crate::suite::{
 /// The page of `run` with its figures.
 pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
     let filled = |name: &str, words: &str| match name {
+        "nomenclature" => nomenclature::table().render(),
+        "coverage" => coverage::tables(run),
         "scenes" => scenes(run),
         "formal-orders" => formal_orders(),
         "build" => build(&run.environment),
@@ -29,9 +31,9 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
         "peers" => facts(run.environment.peers.iter().map(|(name, text)| (name.as_str(), cell(text)))),
         "why-above-eq-15" => why_above_eq15(run),
         "sets" => sets(run),
-        "meaning-of-data" => html! { p { (experiments::MEANING) } },
+        "meaning-of-data" => html! { p { (typeset::html(experiments::MEANING)) } },
         "layered-claims" => layered_claims(run),
-        "faults" if run.suite.is_embedded => faults(),
+        "faults" if run.suite.is_embedded => faults(&run.environment),
         "faults" => html! {},
         "headline" => headline(run.judged),
         "why-skipped" => why_skipped(run.judged),
@@ -122,7 +124,7 @@ fn headline(judged: &[Judged]) -> Markup {
     ];
     let shown: Vec<_> = shown.into_iter().flatten().collect();
     html! { @if !shown.is_empty() { ul.counts.headline {
-        @for (label, value, note) in shown { li { span.quiet { (label) } b { (value) } span.quiet { (note) } } }
+        @for (label, value, note) in shown { li { span.quiet { (typeset::html(&label)) } b { (value) } span.quiet { (note) } } }
     } } }
 }
 
@@ -162,7 +164,7 @@ fn why_above_eq15(run: &Run<'_>) -> Markup {
     });
     html! { @if let Some(why) = why {
         h3 { (WHY) }
-        p { (why.strip_prefix(WHY).unwrap_or(&why).trim_start_matches(". ").replace('`', "")) }
+        p { (typeset::html(why.strip_prefix(WHY).unwrap_or(&why).trim_start_matches(". "))) }
     } }
 }
 
@@ -218,7 +220,9 @@ const PATHS: [(&str, bool, Stretch); 4] = [
 
 fn formal_orders() -> Markup {
     let header = ["path", "velocity", "boundaries"].into_iter().chain(Quantity::ALL.map(words_for));
-    let mut table = Table::grid("Formal orders of the central difference (Eq. 6-8) in the step", header).numbers(3..9);
+    let mut table = Table::grid("Formal orders of the central difference (Eq. 6-8) in the step", header)
+        .id("table-formal-orders")
+        .numbers(3..9);
     for (path, leaves_crater, to_end) in PATHS {
         for boundaries in Boundaries::ALL {
             // One row for all velocity rules of the same orders, for a stop and for an exit together.
@@ -294,17 +298,17 @@ fn sets(run: &Run<'_>) -> Markup {
     let sets = experiments::summaries(comparisons);
     html! {
         (Table::cards(caption, cells::SETS).numbers(1..8).rows(cells::sets(&sets), |row| row.map(cell)))
-        (facts(cells::uncertainties(comparisons).map(|(name, known)| (name, cell(known)))))
+        (facts(cells::uncertainties(comparisons).map(|(name, known)| (name, typeset::html(&known)))))
     }
 }
 
 /// The faults that were built into copies of the program, and which claims noticed.
-fn faults() -> Markup {
+fn faults(e: &Environment) -> Markup {
     let seeded = seeded_faults().unwrap_or_default();
     let (thin, others): (Vec<_>, Vec<_>) = seeded.iter().partition(|fault| fault.is_thin());
     let summary = html! { (count(others.len(), "fault")) " with two recorded tables of claims or more" };
     html! { @if !seeded.is_empty() {
-        p { "All " (count(seeded.len(), "fault")) " were noticed; of " (others.len()) " more than one table of claims is recorded." }
+        p { "All " (count(seeded.len(), "fault")) " were noticed; of " (others.len()) " more than one table of claims is recorded. The record is that of commit " code { (e.commit) } "." }
         @if !thin.is_empty() { (faults_table("One table of claims is recorded: without it they may pass", &thin)) }
         (folded(summary, true, faults_table("", &others)))
     } }

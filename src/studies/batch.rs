@@ -4,6 +4,7 @@
 //! Scenes come from a table in chunks ([`Rows`]) or from a seed ([`random_rows`]).
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use thiserror::Error;
 
@@ -12,7 +13,7 @@ use super::random_scenes::Generator;
 use crate::exchange::tables::{Block, Column, Format, Kind, Need, Others, Place, Row, Rows, TableError, Value};
 use crate::integrators::lanes::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, MethodName};
-use crate::physics::parameter::{Absence, Parameter};
+use crate::physics::parameter::{Absence, Parameter, ParameterError};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, ResolveError, Scene};
 
 /// A table of scenes; whether its numbers are admissible is for [`Scene::resolve`] to say.
@@ -47,6 +48,51 @@ const COLUMNS: [Column; NUMBERS.len() + 1] = {
     columns
 };
 
+/// A scene, of which the rows of a table vary numbers.
+#[derive(Debug)]
+pub struct Varied {
+    scene: Scene,
+    parameters: Vec<Parameter>,
+    format: &'static Format,
+}
+
+impl Varied {
+    /// Of `scene`, every number by its path as the name of a column, `parameters.P` or `impact.velocity`; where a cell is
+    /// empty or a column is left out, the scene's own.
+    ///
+    /// Its format is kept as long as the program runs: a program has one.
+    pub fn new(scene: Scene) -> Self {
+        let mut parameters = Parameter::all_of(&scene);
+        for given_by_rows in [Parameter::Velocity, Parameter::Thickness] {
+            if !parameters.contains(&given_by_rows) && scene.concrete().is_none_or(|c| c.layers.is_empty()) {
+                parameters.push(given_by_rows);
+            }
+        }
+        let column = |parameter: &Parameter| {
+            let name: &'static str = Box::leak(parameter.to_string().into_boxed_str());
+            Column::number(name).needed(Need::Optional)
+        };
+        let columns: &'static [Column] = Box::leak(parameters.iter().map(column).collect());
+        let format = Box::leak(Box::new(Format { columns, others: Others::Refused, has_comments: false }));
+        Self { scene, parameters, format }
+    }
+
+    /// What a table of its rows may look like.
+    pub fn format(&self) -> &'static Format {
+        self.format
+    }
+
+    fn scene_of(&self, row: &Row<'_>) -> Result<Scene, RowError> {
+        let mut scene = self.scene.clone();
+        for (index, parameter) in self.parameters.iter().enumerate() {
+            if let Some(value) = row.optional(index)? {
+                parameter.set(&mut scene, value)?;
+            }
+        }
+        Ok(scene)
+    }
+}
+
 /// Columns of the results.
 pub const RESULT_COLUMNS: [(&str, Kind); 10] = [
     ("row", Kind::Count),
@@ -71,6 +117,9 @@ pub enum RowError {
     /// A cell, or the row as a whole.
     #[error(transparent)]
     Table(#[from] Box<TableError>),
+    /// A number that the scene does not have.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
     /// The scene has no equation of motion.
     #[error(transparent)]
     Scene(#[from] ResolveError),
@@ -88,6 +137,8 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
     Ok(Scene {
         title: None,
         mass: row.number(0)?,
+        forces: Vec::new(),
+        parameters: Vec::new(),
         resistance: Resistance::Concrete(Concrete {
             diameter: row.number(1)?,
             nose_factor: row.number(2)?,
@@ -125,6 +176,8 @@ pub fn cells_of(scene: &Scene) -> Vec<Value<'static>> {
 pub enum Scenes {
     /// Rows of a table.
     Table(Rows),
+    /// Rows of a table that vary a scene.
+    Varied(Rows, Arc<Varied>),
     /// Random scenes of a seed, by their numbers from 0; the first is a multiple of [`PART`].
     Random {
         /// Seed.
@@ -138,7 +191,7 @@ impl Scenes {
     /// How many.
     pub fn len(&self) -> usize {
         match self {
-            Self::Table(rows) => rows.len(),
+            Self::Table(rows) | Self::Varied(rows, _) => rows.len(),
             Self::Random { rows, .. } => (rows.end - rows.start) as usize,
         }
     }
@@ -152,6 +205,7 @@ impl Scenes {
     pub fn scenes(&self, part: Range<usize>) -> Vec<Result<Scene, RowError>> {
         match self {
             Self::Table(rows) => part.map(|index| scene_of(&rows.row(index)?)).collect(),
+            Self::Varied(rows, of) => part.map(|index| of.scene_of(&rows.row(index)?)).collect(),
             Self::Random { seed, rows } => {
                 let first = rows.start + part.start as u64;
                 random_rows(*seed, first / PART as u64).take(part.len()).map(Ok).collect()
@@ -168,7 +222,9 @@ impl Scenes {
             Err(error) => error.to_string(),
         };
         match self {
-            Self::Table(rows) => format!("{}: {cause}", Place { at: rows.at(index), ..Place::default() }),
+            Self::Table(rows) | Self::Varied(rows, _) => {
+                format!("{}: {cause}", Place { at: rows.at(index), ..Place::default() })
+            }
             Self::Random { .. } => cause,
         }
     }
@@ -325,6 +381,27 @@ mod tests {
         let text = format!("{}\n{lines}", SCENES.header());
         let mut table = CsvTable::new("t.csv", text.as_bytes(), &SCENES).unwrap();
         Scenes::Table(table.next_rows(100, None).unwrap())
+    }
+
+    #[test]
+    fn rows_vary_the_numbers_of_a_scene_by_their_paths() {
+        let text = "projectile.mass = 2\nparameters.P = '1 kN'\n[[stage]]\nforce = 'P'\nend = 1\n[[stage]]\nstatic_force = 10\n";
+        let varied = Arc::new(Varied::new(Scene::from_toml(text, "law").unwrap()));
+        let rows = "parameters.P,impact.velocity,target.thickness,stage.1.static_force\n2e3,10,,\n,20,0.5,7\n,,,\n";
+        let mut table = CsvTable::new("t.csv", rows.as_bytes(), varied.format()).unwrap();
+        let scenes = Scenes::Varied(table.next_rows(100, None).unwrap(), varied);
+        let answers = answers(scenes.scenes(0..3), &taylor(), false);
+        // X = M V0²/(2 P); W = V0² - 2 P H/M; no speed.
+        let end = |index: usize| answers[index].as_ref().unwrap().solution.end;
+        assert!((end(0).depth - 0.05).abs() < 1e-16, "{}", end(0));
+        assert_eq!((end(1).depth, end(1).velocity), (0.4, 0.0));
+        assert_eq!(answers[2], Err(RowError::Scene(ResolveError::NoImpactSpeed)));
+        let error = CsvTable::new("t.csv", "parameters.Q\n1\n".as_bytes(), scenes_format()).err().unwrap();
+        assert!(error.to_string().contains("parameters.Q"), "{error}");
+    }
+
+    fn scenes_format() -> &'static Format {
+        Varied::new(crate::testing::scene()).format()
     }
 
     #[test]

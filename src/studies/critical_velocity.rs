@@ -20,7 +20,8 @@ use thiserror::Error;
 use super::error::Studied;
 use crate::integrators::{Accuracy, Cost, IntegrationError, Integrator, Margin, MethodName, Taylor};
 use crate::physics::{
-    Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, closed_form, exit_energy,
+    Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, Target, closed_form,
+    exit_energy,
 };
 
 /// Speed (m/s) at which the scene is first resolved, for its exit depth and static work.
@@ -105,6 +106,9 @@ pub enum CriticalError {
     /// The target has no far side: a mistake of the caller, exit code 2.
     #[error("a semi-infinite target has no critical velocity: give it a thickness")]
     NoExit,
+    /// The force is a table that ends in front of the far side: a mistake of the caller, exit code 2.
+    #[error("the table of the force ends at x = {} m, in front of the exit: no critical velocity is known", Shown(*.0))]
+    TableEnds(f64),
     /// The scene has no stages at this impact speed.
     #[error("the scene cannot be resolved at {} m/s: {cause}", Shown(*.velocity))]
     Scene {
@@ -184,7 +188,8 @@ impl Advice for CriticalError {
 
     /// A scene that cannot be resolved counts as such.
     fn is_usage(&self) -> bool {
-        matches!(self, Self::NoExit | Self::Scene { .. }) || self.inner().is_some_and(Advice::is_usage)
+        matches!(self, Self::NoExit | Self::TableEnds(_) | Self::Scene { .. })
+            || self.inner().is_some_and(Advice::is_usage)
     }
 
     fn is_undecided(&self) -> bool {
@@ -199,6 +204,7 @@ impl Advice for CriticalError {
                  central-difference, shorten --dt"
                     .to_owned()
             }
+            Self::TableEnds(_) => "add rows to the table up to the exit".to_owned(),
             _ => self.inner().map_or_else(String::new, Advice::help),
         }
     }
@@ -311,6 +317,13 @@ fn at_any_speed(error_bar: f64, tally: Tally, note: &'static str) -> CriticalVel
 /// # Errors
 /// [`CriticalError`].
 pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Sought {
+    if !scene.forces.is_empty()
+        && scene.thickness.is_some()
+        && let Ok(Problem { target: Target::StagesToEndOfTable, stages, .. }) = scene.resolve(PROBE_SPEED)
+        && let [.., last, _] = &stages[..]
+    {
+        return Err(CriticalError::TableEnds(last.end));
+    }
     let first = OnceCell::new();
     let resolve = |speed| match first.get() {
         Some(problem) => scene.resolve_from(problem, speed),
@@ -626,8 +639,14 @@ fn lower_bound(probe: &Problem) -> f64 {
     let (mut work, mut most, mut least, mut viscous) = (0.0, 0.0_f64, 0.0_f64, 0.0);
     for (index, stage) in probe.stages.iter().enumerate() {
         let (from, to) = (probe.start_of(index), probe.limit_of(index));
-        work += stage.static_work(from, to);
-        viscous += stage.viscosity * (to - from);
+        if let Some(law) = probe.laws.of(index) {
+            let (by_law, most_of_law) = law.static_work(from, to);
+            most = most.max(work + most_of_law);
+            work += by_law;
+        } else {
+            work += stage.static_work(from, to);
+            viscous += stage.viscosity * (to - from);
+        }
         most = most.max(work);
         least = least.min(work);
         if stage.end >= probe.exit_depth {

@@ -21,7 +21,7 @@ pub use self::causes::{Cause, Certainty};
 use self::causes::{Effort, Seen, causes};
 use self::fixed_steps::{FINER, LADDER, Rung, coarsest_step, limit, order, pooled, rung_errors, schemes};
 use self::hypotheses::How;
-pub use self::questions::Content;
+pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, questions};
 use super::order::{OrderFit, StepError, fit};
 use super::verdict::Verdict;
@@ -48,8 +48,15 @@ const ACCURACIES: [f64; 4] = [1e-9, 1e-7, 1e-5, 1e-3];
 const FIXED_QUESTIONS: usize = 120;
 /// Steps of all questions of fixed steps at most.
 const STEPS_TOTAL: f64 = 1e6;
-/// Error over the condition above which one that grows as the step falls is no round-off of 64-bit numbers.
+/// Questions that are asked at a far smaller step, and that step over the coarsest.
+const FLOOR_QUESTIONS: usize = 8;
+const FLOOR_STEP: f64 = 0.002;
+/// Error over the condition above which one that does not fall is no round-off of 64-bit numbers, and how far above what
+/// its order promises.
 const FLOOR_MAX: f64 = 1e-8;
+const FLOOR_EXCESS: f64 = 10.0;
+/// Least order with which errors of a sound scheme fall.
+const FLOOR_ORDER: f64 = 0.8;
 /// An order claimed may exceed the one found by this part of it: the steps are not small for every question.
 const ORDER_MARGIN: f64 = 0.15;
 /// Digits up to which an answer has few.
@@ -676,8 +683,15 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         return vec![cause];
     }
     let mut found = named(&exactly, Effort::Singles);
-    // Small errors alone are those of a solver that does not do what the tolerance asks for.
-    if found.is_none() && 10 * silent <= failed && failing(&at(ACCURACIES[3])) == 0 && failing(&exactly) > 0 {
+    // Small errors alone are those of a solver that does not do what the tolerance asks for, unless they are in few
+    // answers, and those are sure of themselves.
+    let is_of_few = 2 * failed < rows.len() && are_sure(answered);
+    if found.is_none()
+        && !is_of_few
+        && 10 * silent <= failed
+        && failing(&at(ACCURACIES[3])) == 0
+        && failing(&exactly) > 0
+    {
         let (same, compared) = sameness(answered);
         return vec![of_numbers.unwrap_or_else(|| {
             if compared >= 10 && same * 10 >= compared * 9 {
@@ -740,6 +754,21 @@ fn of_events(answered: &[Answered<'_>], failed: usize) -> Option<Cause> {
     let statement = format!("every end is right, and the events listed are not: {}", first.reason);
     let all = failing.len() == failed && failing.iter().all(|judged| judged.is_in_events);
     all.then(|| simple("event-list", statement, Certainty::Certain, failed, failed))
+}
+
+/// Whether most failing answers differ far less between the two tightest tolerances than from the right ones.
+fn are_sure(answered: &[Answered<'_>]) -> bool {
+    let (mut sure, mut all) = (0, 0);
+    for one in answered {
+        let Some((rtol, Ok(answer))) = one.answers.last() else { continue };
+        let judged = judge(one.question, *rtol, answer);
+        if judged.verdict == Verdict::Failed && !judged.is_in_events {
+            let error = (0..3).map(|i| judged.errors[i].abs() / one.question.conditions[i]).fold(0.0, f64::max);
+            all += 1;
+            sure += usize::from(spread(one) < 0.1 * error);
+        }
+    }
+    2 * sure > all
 }
 
 /// Whether the errors of failing answers fall with the tolerance, as those of no wrong equation do.
@@ -899,9 +928,8 @@ fn in_fixed_steps(
     let reproducing = schemes(&right);
     let orders = orders(&right, identity);
     let fails_an_order = orders.iter().any(|order| order.verdict == Verdict::Failed);
-    let grows = (0..3).find_map(|which| growing(&right, which));
-    let floor =
-        grows.or_else(|| of_numbers(&laddered.iter().flat_map(Laddered::numbers).collect::<Vec<_>>(), counts.failed));
+    let floor = floor(asking, &right)
+        .or_else(|| of_numbers(&laddered.iter().flat_map(Laddered::numbers).collect::<Vec<_>>(), counts.failed));
     let verdict = match () {
         () if counts.failed > 0 || fails_an_order || floor.is_some() => Verdict::Failed,
         () if counts.passed == 0 || counts.undecided > counts.passed => Verdict::Undecided,
@@ -916,7 +944,8 @@ fn in_fixed_steps(
         causes.extend(fixed_causes(&laddered, &rows, &reproducing, identity, all));
     }
     let scheme = reproducing.first();
-    if counts.failed == 0 {
+    // What has no order is lowered by nothing else.
+    if counts.failed == 0 && causes.is_empty() {
         causes.extend(what_lowers(scheme.map(|(scheme, _)| *scheme), &right, &orders));
     }
     let scheme = scheme.map(|(scheme, largest)| Reproduced {
@@ -1137,26 +1166,36 @@ fn fixed_causes(
     causes(&seen, identity.reads_scene, &others, Effort::Pairs)
 }
 
-/// The cause of errors that grow as the step falls, far above the round-off of 64-bit numbers.
-fn growing(right: &[(&Question, &[Rung])], which: usize) -> Option<Cause> {
-    let (mut grow, mut compared, mut largest) = (0, 0, 0.0_f64);
-    for (question, rungs) in right {
-        let errors: Vec<f64> = rung_errors(question, rungs).iter().map(|all| all[which].abs()).collect();
-        let (coarse, fine) = errors.split_at(errors.len() / 2);
-        let most = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max) / question.conditions[which];
-        let (coarse, fine) = (most(coarse), most(fine));
-        if coarse.max(fine) > FLOOR_MAX {
-            compared += 1;
-            grow += usize::from(fine > coarse);
-            largest = largest.max(fine);
+/// The cause of errors that no longer fall with the step, far above the round-off of 64-bit numbers: a few questions are
+/// asked again at a far smaller step.
+fn floor(asking: &mut Asking<'_>, right: &[(&Question, &[Rung])]) -> Option<Cause> {
+    let orders = [0, 1, 2].map(|which| order(right, which).map_or(FLOOR_ORDER, |order| (order - 0.2).max(FLOOR_ORDER)));
+    let (mut compared, mut stays, mut largest) = (0, [0; 3], [0.0_f64; 3]);
+    for (question, rungs) in right.iter().take(FLOOR_QUESTIONS) {
+        let Some(coarsest) = rungs.first() else { continue };
+        let asked = PeerRequest { dt_s: Some(FLOOR_STEP * coarsest.step), ..request(question, TOLERANCES[0]) };
+        let Ok(answer) = asking.ask(&asked) else { continue };
+        let found = errors(end_of(&answer).state, question.exact.end, question.problem.impact_speed);
+        compared += 1;
+        // Of several steps, since one may be right by chance.
+        let before = &rung_errors(question, rungs)[LADDER.len() / 2..LADDER.len()];
+        let ratio = LADDER[LADDER.len() / 2] / FLOOR_STEP;
+        for which in 0..3 {
+            let relative = found[which].abs() / question.conditions[which];
+            let expected = before.iter().map(|all| all[which].abs()).fold(0.0, f64::max) / ratio.powf(orders[which]);
+            if relative > FLOOR_MAX && found[which].abs() > FLOOR_EXCESS * expected {
+                stays[which] += 1;
+                largest[which] = largest[which].max(relative);
+            }
         }
     }
+    let which = (0..3).max_by_key(|which| stays[*which]).filter(|which| 2 * stays[*which] > compared)?;
     let statement = format!(
-        "the error of the {} grows as the step falls, to {largest:.0e}: round-off far above that of 64-bit numbers, as of \
-         a sum in single precision",
-        QUANTITIES[which]
+        "the error of the {} does not fall below {:.0e} with the step: round-off far above that of 64-bit numbers, as of a \
+         sum in single precision",
+        QUANTITIES[which], largest[which]
     );
-    (2 * grow > compared).then(|| simple("round-off", statement, Certainty::Likely, grow, right.len()))
+    Some(simple("round-off", statement, Certainty::Likely, stays[which], compared))
 }
 
 /// What lowers the order of a sound scheme.

@@ -6,21 +6,26 @@
 use super::critical_velocity;
 use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Stage};
 
-/// A scene of the paper's size for which other programs found a wrong critical velocity: 0.9 kg, 26.9 mm,
-/// 36 MPa, S 12, k 2, H 0.30 m, 400 m/s; an ogive of N* 0.106 in 2370 kg/m³, or no drag.
-pub fn slab(drag: bool) -> Scene {
-    let concrete = Concrete {
-        diameter: 0.0269,
-        nose_factor: 0.106,
+/// Concrete of 36 MPa with S = 12, continuous c and k = 2: diameter (m), N*, density (kg/m³).
+pub fn concrete(diameter: f64, nose_factor: f64, density: f64) -> Concrete {
+    Concrete {
+        diameter,
+        nose_factor,
         strength: 36e6,
-        density: if drag { 2370.0 } else { 0.0 },
+        density,
         static_factor: 12.0,
         follows_eq14: false,
         inertia_factor: 1.0,
         crater_ratio: 2.0,
         crater_stiffness: CraterStiffness::Continuous,
         layers: Vec::new(),
-    };
+    }
+}
+
+/// A scene of the paper's size for which other programs found a wrong critical velocity: 0.9 kg, 26.9 mm,
+/// 36 MPa, S 12, k 2, H 0.30 m, 400 m/s; an ogive of N* 0.106 in 2370 kg/m³, or no drag.
+pub fn slab(drag: bool) -> Scene {
+    let concrete = concrete(0.0269, 0.106, if drag { 2370.0 } else { 0.0 });
     Scene { thickness: Some(0.30), velocity: Some(400.0), ..Scene::of_concrete(0.9, concrete) }
 }
 

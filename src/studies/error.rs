@@ -247,7 +247,8 @@ pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, Integ
         let number = input(&mut dual);
         // df/dp times p: the derivative by the input starts as its value.
         number.eps = number.re;
-        if number.re == 0.0 || number.re.is_infinite() {
+        // Where a stage has a law of its own, its coefficients are no numbers.
+        if number.re == 0.0 || !number.re.is_finite() {
             return Ok(());
         }
         let flight = Taylor::default().solve_in(&dual, Detail::Events)?;

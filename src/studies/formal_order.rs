@@ -6,7 +6,7 @@
 
 use super::quantity::Quantity;
 use crate::integrators::{Boundaries, Flight, VelocityAt};
-use crate::physics::{EventKind, Outcome, Problem};
+use crate::physics::{EventKind, Law, Outcome, Problem};
 
 /// Largest jump of the force at a stage end, relative to the force, that still counts as continuous.
 ///
@@ -44,13 +44,15 @@ impl Path {
             let mut stretch = Stretch::default();
             for (turn, &index) in crossed.iter().enumerate().take_while(|(_, index)| **index <= last) {
                 let law = &problem.stages[index];
-                stretch.velocity_dependent |= law.viscosity > 0.0 || law.drag > 0.0;
+                let own = problem.laws.of(index);
+                stretch.velocity_dependent |=
+                    own.map_or(law.viscosity > 0.0 || law.drag > 0.0, Law::depends_on_velocity);
                 if turn > 0
                     && let behind = crossed[turn - 1]
                     && let Some(state) = flight.at(EventKind::boundary(problem, behind))
                 {
-                    let left = problem.stages[behind].force(state.depth, state.velocity);
-                    let right = law.force(state.depth, state.velocity);
+                    let left = problem.force(behind, state.depth, state.velocity);
+                    let right = problem.force(index, state.depth, state.velocity);
                     stretch.force_jumps |= (left - right).abs() > CONTINUOUS * left.abs().max(right.abs());
                 }
             }

@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::random::Random;
 use crate::integrators::{Detail, Taylor};
+use crate::physics::force_table::{ForceTable, Row};
 use crate::physics::{Problem, Stage};
 
 /// What stages a random problem has, and where it ends.
@@ -27,6 +28,8 @@ pub enum Kind {
     Several,
     /// Three to five stages, most with viscosity.
     SeveralViscous,
+    /// A table of 2 to 40 rows, whose force rises and falls and often drives, and a force behind it.
+    Table,
 }
 
 /// Numbers from which forces are made.
@@ -102,6 +105,11 @@ impl Kind {
                 stages.push(drive.until(length * share(random)));
                 stages.push(scale.stage([share(random), 0.0, 0.0, some(random, 0.5)]));
             }
+            Self::Table => {
+                let rows = Self::rows(random, &scale);
+                stages.extend(ForceTable::new(&rows).ok()?.stages(0.0));
+                stages.push(scale.stage([share(random), 0.0, 0.0, 0.0]));
+            }
             Self::Several | Self::SeveralViscous => {
                 let count = 3 + random.below(3);
                 let mut end = 0.0;
@@ -142,5 +150,24 @@ impl Kind {
             rest * (1.0 - 0.95 * away)
         };
         Some(problem.with_exit(exit))
+    }
+
+    /// Rows of a table from the face on: steps of all lengths, forces of either sign, some of them zero or as before.
+    fn rows(random: &mut Random, scale: &Scale) -> Vec<Row> {
+        let force = scale.mass * scale.speed * scale.speed / scale.length;
+        let mean = random.uniform(-0.1, 0.5);
+        let mut depth = 0.0;
+        let mut last = 0.0;
+        let mut row = |random: &mut Random| {
+            last = match random.below(8) {
+                0 => 0.0,
+                1 => last,
+                _ => force * (mean + random.uniform(-1.0, 1.0) * random.log_uniform(0.01, 1.0)),
+            };
+            let row = Row { depth, force: last };
+            depth += scale.length * random.log_uniform(1e-3, 0.3);
+            row
+        };
+        (0..2 + random.below(39)).map(|_| row(random)).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! Which problems must have the same solution, whatever it is? The same one in other units, and the return from its end.
 
 use crate::integrators::Flight;
-use crate::physics::{Problem, Stage, Stages, Target};
+use crate::physics::{Laws, Problem, Stage, Stages, Target};
 
 /// Units of length, mass and time, as factors: a metre becomes `length` of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,5 +66,6 @@ pub fn reversed(problem: &Problem, there: &Flight) -> Option<Problem> {
         stages,
         crater: None,
         target: Target::Stages,
+        laws: Laws::none(),
     })
 }

@@ -155,6 +155,11 @@ pub struct Claim {
 }
 
 impl Claim {
+    /// The unit in words that say what the number is of: `0.03 off the formal order`.
+    pub fn unit_in_words(&self) -> &'static str {
+        in_words(self.unit)
+    }
+
     /// First part of the id, by which reports group claims.
     pub fn group(&self) -> &str {
         self.id.split('/').next().unwrap_or(&self.id)
@@ -190,6 +195,53 @@ impl ClaimSpec {
         let claims = varied(&claims, &self.methods, ToString::to_string, |claim, name| claim.method = Some(*name));
         varied(&claims, &self.quantities, ToString::to_string, |claim, name| claim.quantity = Some(*name))
     }
+}
+
+/// Units of numbers of things.
+const THINGS: [&str; 11] = [
+    "families",
+    "claims",
+    "violations",
+    "differences",
+    "defects",
+    "wrong outcomes",
+    "wrong answers",
+    "wrong verdicts",
+    "wrong exit codes",
+    "lines that differ",
+    "contradictions",
+];
+
+/// A unit of a check in words that say what a number is of.
+fn in_words(unit: &'static str) -> &'static str {
+    match unit {
+        "relative x condition" => "relative, over the conditioning",
+        "ulp x condition" => "ulp, over the conditioning",
+        "promises" => "times the promised error",
+        "promises x condition" => "times the promised error, over the conditioning",
+        "order" => "off the formal order",
+        "S" => "S off the jump stated",
+        "tolerance" => "times the tolerance",
+        "uncertainty" => "times the uncertainty stated",
+        "error bars" | "error/bar" => "times the error bar",
+        "error bounds" => "times the error bound",
+        "bound/error" => "times the error",
+        "error/rtol" => "times the tolerance asked for",
+        "compensated/plain" => "of the rounding of plain sums",
+        "quotient" => "times the bound of one scene alone",
+        "digits" => "digits lost",
+        "slope of cost" => "as slope of the cost",
+        "families" => "families of claims that lack some",
+        "claims" => "claims whose computations share more",
+        _ => unit,
+    }
+}
+
+/// How many cases `judged` were measured on, where what they measure is a number of things.
+pub fn of_cases<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Option<usize> {
+    let counted = judged.into_iter().filter(|judged| THINGS.contains(&judged.claim.unit));
+    let cases = counted.map(|judged| judged.cases).sum();
+    (cases > 1).then_some(cases)
 }
 
 /// Each of `claims` once for each of `values`, by `set`; where there are several, the id ends with the name of the value.

@@ -13,7 +13,9 @@ pub mod verdict;
 
 pub use crate::studies::experiments::grouped;
 pub use checks::Check;
-pub use claim::{Claim, Evidence, Judged, LOOSENESS_MAX, Measurement, Section, looseness, skipped, tables, worst};
+pub use claim::{
+    Claim, Evidence, Judged, LOOSENESS_MAX, Measurement, Section, looseness, of_cases, skipped, tables, worst,
+};
 pub use faults::{SeededFault, seeded_faults};
 pub use program::Program;
 pub use suite::{Inputs, Scenes, Suite};

@@ -1,6 +1,7 @@
-//! Scenes with numbers computed elsewhere: `verification/references/exact.json`, made by the recipe beside it.
+//! Scenes with numbers computed elsewhere: `verification/references/exact.json` and, of those with a law of their own,
+//! `laws.json`, each made by the recipe beside it.
 //!
-//! The recipe reads the texts of the scenes, resolves and solves them in 40 digits and shares nothing with this crate.
+//! A recipe reads the texts of the scenes, resolves and solves them in 40 digits and shares nothing with this crate.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -39,11 +40,18 @@ struct Recording {
 /// All recorded scenes.
 ///
 /// # Errors
-/// Only if the shipped file is broken, which a test excludes; in words.
+/// Only if a shipped file is broken, which a test excludes; in words.
 pub fn scenes() -> Result<&'static [RecordedScene], String> {
     static SCENES: LazyLock<Result<Vec<RecordedScene>, String>> = LazyLock::new(|| {
-        let text = include_str!("../../verification/references/exact.json");
-        serde_json::from_str::<Recording>(text).map(|read| read.scenes).map_err(|error| format!("exact.json: {error}"))
+        let mut scenes = Vec::new();
+        for (file, text) in [
+            ("exact.json", include_str!("../../verification/references/exact.json")),
+            ("laws.json", include_str!("../../verification/references/laws.json")),
+        ] {
+            let read: Recording = serde_json::from_str(text).map_err(|error| format!("{file}: {error}"))?;
+            scenes.extend(read.scenes);
+        }
+        Ok(scenes)
     });
     SCENES.as_deref().map_err(Clone::clone)
 }
@@ -64,7 +72,7 @@ impl RecordedScene {
     /// # Errors
     /// Only if the record lacks one of them, which a test excludes; in words.
     pub fn flight(&self) -> Result<Flight, String> {
-        let lacks = |path: &str| format!("exact.json has no {path} of {}", self.name);
+        let lacks = |path: &str| format!("there is no {path} of {}", self.name);
         let number = |path: String| self.number(&path).ok_or_else(|| lacks(&path));
         let state = |prefix: &str| {
             Ok::<_, String>(State {

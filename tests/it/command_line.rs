@@ -179,7 +179,9 @@ fn a_scene_that_ships_goes_by_its_name_wherever_a_scene_is_read_and_a_file_of_th
 
 #[test]
 fn the_scenes_that_ship_are_listed_and_one_is_printed_as_it_stands() {
-    let shipped = names(Path::new(scene("tunnel").trim_end_matches("tunnel.toml")));
+    let mut shipped = names(Path::new(scene("tunnel").trim_end_matches("tunnel.toml")));
+    // Beside them stand the tables that they name.
+    shipped.retain(|name| Path::new(name).extension().is_some_and(|extension| extension == "toml"));
     let answer = json("scenes");
     conforms("scenes", &answer);
     let listed = answer["scenes"].as_array().unwrap();
@@ -193,6 +195,27 @@ fn the_scenes_that_ship_are_listed_and_one_is_printed_as_it_stands() {
         assert_eq!(one["toml"], file);
     }
     assert!(run("scenes tunel").refused().ends_with("help: did you mean `tunnel`?"));
+}
+
+#[test]
+fn the_laws_that_ship_are_listed_with_their_formulas() {
+    let answer = json("scenes --laws");
+    conforms("scenes", &answer);
+    let laws = answer["scenes"].as_array().unwrap();
+    let named = names(Path::new(scene("tunnel").trim_end_matches("tunnel.toml")));
+    assert_eq!(laws.len(), named.iter().filter(|name| name.starts_with("law-")).count());
+    // A long formula goes on in the next line.
+    let shown = run("scenes --laws").out.split_whitespace().collect::<String>();
+    for law in laws {
+        let (name, file) = (law["name"].as_str().unwrap(), law["toml"].as_str().unwrap());
+        assert!(name.starts_with("law-") && shown.contains(&format!("{name}:")), "{name}");
+        for force in law["forces"].as_array().unwrap() {
+            let formula = force["force"].as_str().unwrap();
+            assert!(file.contains(&format!("force = \"{formula}\"")), "{name}: {formula}");
+            assert!(shown.contains(&format!("F={}", formula.replace(' ', ""))), "{name}: {formula}");
+        }
+    }
+    assert!(run("scenes tunnel --laws").refused().contains("cannot be used with"));
 }
 
 #[test]
@@ -450,6 +473,7 @@ fn commands_for_people() -> Vec<String> {
         "experiments",
         "experiments --spread target.strength=10%",
         "verify --only eq15",
+        "scenes --laws",
         "bench @constant-force --repeats 1 --parts step-size",
     ]
     .map(str::to_owned)

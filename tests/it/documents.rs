@@ -158,7 +158,7 @@ fn the_commands_of_the_readme_print_what_stands_there() -> io::Result<()> {
         assert_eq!(said.err + &said.out, shown, "penetrode {line}");
         commands += 1;
     }
-    assert_eq!(commands, 2);
+    assert_eq!(commands, 4);
     let file = run_in(root(), "scenes forrestal-1994-shot-14").out;
     assert!(readme.contains(&format!("```toml\n{}\n```", file.trim_end())), "{file}");
     Ok(())

@@ -91,6 +91,28 @@ fn a_bad_file_is_refused_at_its_place() {
     }
 }
 
+/// The table that gives the force of a stage is refused in itself, at its own place.
+#[test]
+fn a_bad_table_of_a_force_is_refused_at_its_place() {
+    let folder = corpus().join("force_tables");
+    let mut all = String::new();
+    for name in names(&folder) {
+        let place = workplace();
+        let text = "[projectile]\nmass = \"2 kg\"\n[impact]\nvelocity = \"300 m/s\"\n[[stage]]\n\
+                    force = { table = \"r.csv\", x = \"depth_mm\", force = \"force_kN\" }\n";
+        fs::write(place.path().join("scene.toml"), text).unwrap();
+        fs::copy(folder.join(&name), place.path().join("r.csv")).unwrap();
+        let before = names(place.path());
+        let said = run(place.path(), "solve scene.toml --trajectory out.csv");
+        said.refused();
+        assert_eq!(names(place.path()), before, "{name}: something was written");
+        assert!(!said.err.chars().any(|c| c.is_control() && c != '\n'), "{name}: {said:?}");
+        assert!(said.err.len() < 4000, "{name}: {} bytes of message", said.err.len());
+        writeln!(all, "== {name}\n{}", said.err).unwrap();
+    }
+    assert_snapshot("force_tables", all);
+}
+
 /// The results say what is wrong with a row that is no scene, and the others are solved: exit code 3.
 #[test]
 fn a_bad_row_is_reported_in_its_own_line_of_the_results() {

@@ -43,7 +43,9 @@ fn taken(folder: &str) -> Vec<File> {
         let bytes = fs::read(root().join(folder).join(&name)).unwrap();
         (format!("{}-{name}", folder.replace('/', "-")), bytes, true)
     };
-    names(&root().join(folder)).into_iter().map(file).collect()
+    // Tables beside the scenes are none.
+    let is_table = |name: &String| Path::new(name).extension().is_some_and(|extension| extension == "csv");
+    names(&root().join(folder)).into_iter().filter(|name| !is_table(name)).map(file).collect()
 }
 
 /// The hostile files of `kind`, those with the names `of_value` to be taken: only the reader can refuse them.

@@ -89,7 +89,9 @@ impl Report {
             keys.split('}').next().unwrap().split(',').for_each(|key| assert!(listed(key), "{key}"));
         }
         // Sections, tables and figures are numbered in order.
-        for (head, what) in [("<b>Table ", "table"), ("<b>Figure ", "figure"), ("<span class=\"no\">", "section")] {
+        for (head, what) in
+            [("<b>Table ", "table"), ("<b>Figure ", "figure"), ("title=\"to the contents\">", "section")]
+        {
             let numbers =
                 page.split(head).skip(1).map(|rest| rest.chars().take_while(char::is_ascii_digit).collect::<String>());
             let numbers: Vec<usize> = numbers.map(|number| number.parse().unwrap()).collect();
@@ -160,7 +162,7 @@ fn the_report_of_a_table_names_it_and_what_is_wrong_with_it() {
     good.check("audit", 0);
     let page = good.page();
     assert!(good.file("report.html").contains("<title>good.csv: passed</title><style>"));
-    let sum = "All 4 quantities pass: 2 of the order expected, 1 converging, 1 with the exact value in the limit, 1 fixed by the \
+    let sum = "All 4 quantities pass: 2 of the order expected, 1 converging, 1 with the exact value as limit for small steps, 1 fixed by the \
                scene and met.";
     assert!(page.contains(sum), "{page:.900}");
     let bad = Report::of(&[("bad_&_<b>.csv", BAD)], "audit 'bad_&_<b>.csv' --scene @tunnel");

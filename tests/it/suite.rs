@@ -45,6 +45,21 @@ fn every_claim_of_the_shipped_suite_holds_and_no_limit_is_loose() {
     assert_eq!(loose, []);
 }
 
+/// It stands alone in a table, in `junit.xml` and in `summary.md`.
+#[test]
+fn every_statement_is_a_sentence_of_its_own_with_its_subject() {
+    for suite in [Suite::embedded(), Suite::edges()] {
+        let suite = suite.unwrap_or_else(|error| panic!("{error}"));
+        let mut known = BTreeMap::new();
+        for claim in &suite.claims {
+            let statement = claim.statement.as_str();
+            let begins = statement.chars().next().is_some_and(|c| c.is_uppercase() || c.is_ascii_digit() || c == '`');
+            assert!(begins && !statement.ends_with('.'), "{}: {statement}", claim.id);
+            assert_eq!(*known.entry(statement).or_insert(&claim.table), &claim.table, "{statement}");
+        }
+    }
+}
+
 /// That the tables do notice is the test `seeded_faults`.
 #[test]
 fn the_record_of_seeded_faults_names_each_of_them_and_claims_that_exist() {

@@ -108,7 +108,7 @@ fn the_map_has_lines_of_three_errors_and_the_measured_scenes() {
     assert_eq!(value["lines"].as_array().unwrap().len(), 6);
     assert_eq!(value["scenes"].as_array().unwrap().len(), 107);
     let svg = text_of(&folder, "map.svg");
-    for words in ["Eq. 11 too shallow", "Eq. 12 too deep", "20 %", "Sliter1980"] {
+    for words in ["Eq. 11 too shallow", "Eq. 12 too deep", "20\u{a0}%", "Sliter1980"] {
         assert!(svg.contains(words), "{words}");
     }
     assert!(text_of(&folder, "map.csv").starts_with("level,I,N\n0.01,"));

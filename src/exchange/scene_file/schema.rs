@@ -3,10 +3,10 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{LAYERED_TARGET, MATERIAL_OF_PROJECTILE, MATERIAL_OF_TARGET, NOSES, below, numbers};
+use super::{FORCE, LAYERED_TARGET, MATERIAL_OF_PROJECTILE, MATERIAL_OF_TARGET, NOSES, below, numbers};
 use crate::exchange::diagnostic::key_of;
 use crate::physics::Range;
-use crate::physics::parameter::{Absence, Entry, LayerNumber, Parameter};
+use crate::physics::parameter::{Absence, Entry, LayerNumber, Parameter, StageNumber};
 use crate::physics::scene::Criterion;
 use crate::physics::units::Dimension;
 use strum::VariantNames;
@@ -30,7 +30,15 @@ pub fn schema() -> Value {
     });
     let concrete = json!({
         "required": ["target"],
-        "properties": { "projectile": required(&MATERIAL_OF_PROJECTILE), "target": target },
+        "properties": { "projectile": required(&MATERIAL_OF_PROJECTILE), "target": target, "parameters": false },
+    });
+    // Units of parameters are any product of known ones, which the reader alone knows.
+    let parameter =
+        json!({ "type": ["number", "string"], "description": "\"number unit\" of any unit, or a plain number" });
+    schema["properties"]["parameters"] = json!({
+        "type": "object",
+        "description": "quantities that the forces of stages use by name",
+        "additionalProperties": parameter,
     });
     for (key, value) in [
         ("$schema", json!("http://json-schema.org/draft-07/schema#")),
@@ -57,6 +65,7 @@ fn table(home: &str) -> Value {
         let schema = match path.as_str() {
             _ if properties.contains_key(key) => continue,
             "projectile.nose" => nose(),
+            FORCE => force(),
             _ if inner.starts_with(".*") => {
                 json!({ "type": "array", "minItems": 1, "items": table(&format!("{path}.*")) })
             }
@@ -80,7 +89,16 @@ fn table(home: &str) -> Value {
         };
         properties.insert(key.to_owned(), schema);
     }
-    json!({ "type": "object", "additionalProperties": false, "properties": properties, "required": required })
+    let mut schema =
+        json!({ "type": "object", "additionalProperties": false, "properties": properties, "required": required });
+    if home == "stage.*" {
+        let coefficient = |which: &StageNumber| *which != StageNumber::End;
+        let keys = StageNumber::ALL.into_iter().filter(coefficient).map(|which| Parameter::Stage(0, which).key());
+        let absent: Map<String, Value> = keys.map(|key| (key.to_owned(), false.into())).collect();
+        schema["if"] = json!({ "required": ["force"] });
+        schema["then"] = json!({ "properties": absent });
+    }
+    schema
 }
 
 /// The number, with what it is and what its absence means.
@@ -125,6 +143,23 @@ fn in_range(range: Range) -> Value {
         Range::AtLeastHalf => ("minimum", 0.5),
     };
     json!({ "type": "number", key: bound })
+}
+
+/// The force of a stage, in place of its coefficients.
+fn force() -> Value {
+    let text = |what: &str| json!({ "type": "string", "description": what });
+    let expression = text("F(x, V) in N, such as P + Q*V^2, with P and Q in [parameters]");
+    let table = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "properties": {
+            "table": text("CSV file, its path counted from the folder of the scene"),
+            "x": text("column of depths from the impact face, its unit last: depth_mm"),
+            "force": text("column of forces, its unit last: force_kN"),
+        },
+        "required": ["table", "x", "force"],
+    });
+    json!({ "anyOf": [expression, table] })
 }
 
 /// The nose in one of its forms.

@@ -2,7 +2,7 @@ use approx::assert_relative_eq;
 
 use super::super::diagnostic::{Place, printable, text_of};
 use super::*;
-use crate::physics::{Problem, Target};
+use crate::physics::{Problem, ResolveError, Target};
 
 /// A scene with every table and key.
 const FULL: &str = r#"title = "tunnel stop, blunt nose"
@@ -79,6 +79,8 @@ fn every_key_is_read() {
     let scene = Scene {
         title: Some("tunnel stop, blunt nose".to_owned()),
         mass: 2.0,
+        forces: Vec::new(),
+        parameters: Vec::new(),
         resistance: Resistance::Concrete(concrete),
         thickness: Some(0.18),
         criterion: Criterion::Ndrc,
@@ -130,6 +132,92 @@ fn stages_are_read_as_given_and_a_key_left_out_is_0() {
     assert_eq!(read(&closed).problem().unwrap().exit_depth, 0.3);
 }
 
+/// A scene file in `folder` of these stages, between 2 kg at 100 m/s and a target of `thickness`; and what is made of it.
+fn beside(folder: &Path, stages: &str, thickness: &str) -> Result<Scene, Box<SceneError>> {
+    let path = folder.join("scene.toml");
+    let text = format!("[projectile]\nmass = 2\n[target]\n{thickness}\n[impact]\nvelocity = 100\n{stages}");
+    std::fs::write(&path, text).unwrap();
+    Scene::read(&path)
+}
+
+#[test]
+fn a_force_as_a_table_is_read_in_its_units_and_becomes_the_pieces_up_to_where_it_is_needed() {
+    let folder = tempfile::tempdir().unwrap();
+    let csv = "# measured\nno,x (cm),load_kN\n1,0,0\n2,10,2.5\n3,20,-2.5\n4,40,1.5\n";
+    std::fs::write(folder.path().join("r.csv"), csv).unwrap();
+    let table = "[[stage]]\nforce = { table = \"r.csv\", x = \"x (cm)\", force = \"load_kN\" }\n";
+    let stages = |text: &str, thickness: &str| {
+        let problem = beside(folder.path(), text, thickness).unwrap().problem().unwrap();
+        let ends: Vec<_> = problem.stages.iter().map(|stage| stage.end).collect();
+        (ends, problem.target, problem.exit_depth)
+    };
+    let (whole, open) = (Target::Stages, Target::StagesToEndOfTable);
+    // It falls through zero at 15 cm.
+    assert_eq!(stages(table, ""), (vec![0.1, 0.15, 0.2, 0.4, f64::INFINITY], open, f64::INFINITY));
+    assert_eq!(stages(table, "thickness = 0.3"), (vec![0.1, 0.15, 0.2, f64::INFINITY], whole, 0.3));
+    assert_eq!(stages(table, "thickness = 0.4"), (vec![0.1, 0.15, 0.2, f64::INFINITY], whole, 0.4));
+    assert_eq!(stages(table, "thickness = 0.5"), (vec![0.1, 0.15, 0.2, 0.4, f64::INFINITY], open, f64::INFINITY));
+    let cut = format!("{table}end = 0.12\n[[stage]]\nstatic_force = 1\n");
+    assert_eq!(stages(&cut, "thickness = 2"), (vec![0.1, 0.12, f64::INFINITY], whole, 2.0));
+    let short = format!("{table}end = 0.6\n[[stage]]\nstatic_force = 1\n");
+    assert_eq!(stages(&short, "thickness = 2").1, open);
+    let behind = format!("[[stage]]\ndrag = 1\nend = 0.1\n{table}");
+    assert_eq!(stages(&behind, "thickness = 0.3").0, [0.1, 0.15, 0.2, f64::INFINITY]);
+    let late = format!("[[stage]]\ndrag = 1\nend = 0.4\n{table}");
+    let error = beside(folder.path(), &late, "").unwrap_err();
+    assert!(error.message.contains("0 m to 0.4 m") && error.allowed.contains("0.4 m"), "{error:?}");
+
+    let mut scene = beside(folder.path(), &behind, "").unwrap();
+    let first = scene.problem().unwrap().stages[1];
+    assert_eq!((first.static_force, first.stiffness), (7500.0, -50_000.0));
+    // Of a stage with a table only the end is a number of the scene; and it may be moved to where there is no table.
+    let of = |which| Parameter::Stage(1, which);
+    assert!(of(StageNumber::Drag).get(&scene).is_err() && of(StageNumber::Stiffness).set(&mut scene, 1.0).is_err());
+    assert!(of(StageNumber::End).get(&scene).is_ok());
+    Parameter::Stage(0, StageNumber::End).set(&mut scene, 0.5).unwrap();
+    assert!(matches!(scene.problem(), Err(ResolveError::TableElsewhere { stage: 1, start: 0.5, .. })));
+}
+
+#[test]
+fn a_force_that_is_no_table_is_refused_where_it_stands_in_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("r.csv"), "depth_mm,force,force_kN\n0,0,0\n1e-300,1,1e300\n").unwrap();
+    let force = |inner: &str| format!("[[stage]]\nforce = {{ table = \"r.csv\", {inner} }}\n");
+    let right = force("x = \"depth_mm\", force = \"force_kN\"");
+    for (text, message, part) in [
+        ("[[stage]]\nforce = \"2*x\"\n".to_owned(), "`2*x` is m", "2*x"),
+        ("[[stage]]\nforce = 2\n".to_owned(), "`force` is an integer", "2"),
+        (force("V = \"v_m_s\", force = \"force_kN\""), "velocity", "V"),
+        (force("force = \"force_kN\""), "no `x`", "{ table"),
+        (force("x = \"depth_mm\""), "no `force`", "{ table"),
+        (force("x = 1, force = \"force_kN\""), "`x` is an integer", "1"),
+        (force("x = \"depth_mm\", force = \"force_kN\", y = \"a\""), "unknown key `y`", "y"),
+        (force("x = \"depht_mm\", force = \"force_kN\""), "no column `depht_mm`", "\"depht_mm\""),
+        (force("x = \"depth_mm\", force = \"force\""), "no unit of force", "\"force\""),
+        (force("x = \"force_kN\", force = \"force_kN\""), "no unit of length", "\"force_kN\""),
+        (right.replace("r.csv", "no.csv"), "`no.csv` cannot be read", "\"no.csv\""),
+        (right.replace("r.csv", "../"), "is no file", "\"../\""),
+        (right.replace("r.csv", "-"), "`-` cannot be read", "\"-\""),
+        (format!("{right}drag = 1\n"), "`drag` has no place", "drag"),
+        (format!("{right}static_force = 1\n"), "`static_force` has no place", "static_force"),
+    ] {
+        let error = beside(folder.path(), &text, "").unwrap_err();
+        let place = error.place.clone().unwrap();
+        let written = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+        assert!(error.message.contains(message) && written[place.span.clone()].starts_with(part), "{text}{error:?}");
+        assert!(error.file.ends_with("scene.toml"), "{error:?}");
+    }
+    let rows = |count: u32| (0..count).fold(String::new(), |rows, depth| rows + &format!("{depth},1\n"));
+    let many = right.replace("r.csv", "many.csv");
+    for (count, line) in [(20_000, None), (20_001, Some(20_002))] {
+        std::fs::write(folder.path().join("many.csv"), format!("depth_mm,force_kN\n{}", rows(count))).unwrap();
+        let place = beside(folder.path(), &many, "").err().and_then(|error| error.place);
+        assert_eq!(place.map(|place| place.line), line);
+    }
+    let steep = beside(folder.path(), &right, "").unwrap().problem();
+    assert!(matches!(steep, Err(ResolveError::OutOfRange { .. })), "{steep:?}");
+}
+
 #[test]
 fn noses_are_read_by_shape() {
     for (nose, factor) in [
@@ -163,7 +251,11 @@ fn layers_sum_up_and_the_one_beyond_the_crater_stands_for_the_target() {
 #[test]
 fn shipped_scenes_are_the_files_and_each_resolves_with_a_title_and_a_comment() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes");
-    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), SHIPPED.len());
+    let files = std::fs::read_dir(&folder).unwrap().count();
+    assert_eq!(files, SHIPPED.len() + force_table::SHIPPED_TABLES.len());
+    for (name, text) in force_table::SHIPPED_TABLES {
+        assert_eq!(std::fs::read_to_string(folder.join(name)).unwrap(), *text);
+    }
     for (name, text) in SHIPPED {
         let scene = Scene::read(&folder.join(name).with_extension("toml")).unwrap();
         assert_eq!(scene, Scene::from_toml(text, name).unwrap());
@@ -310,6 +402,10 @@ fn without(text: &str, path: &str) -> String {
 fn what_is_set_is_as_if_the_file_gave_it() {
     for (_, text) in SHIPPED {
         for (parameter, quantity) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().given {
+            // Has a unit of the file's own.
+            if matches!(parameter, Parameter::Own(_)) {
+                continue;
+            }
             // Within the range of each number, and within the next boundary of a stage.
             let value = 1.0625 * quantity.value;
             let stated = read(&with_value(text, parameter, &value.into()));
@@ -526,4 +622,61 @@ proptest::proptest! {
             }
         }
     }
+}
+
+/// Mistakes in forces and their parameters, each as a person sees it.
+#[test]
+fn a_force_that_is_no_expression_is_underlined_where_it_is_wrong() {
+    let mut shown = String::new();
+    for (parameters, force) in [
+        ("P = '848 kN'\nQ = '3.25 kg/m'", "P + Q V^2"),
+        ("P = '848 kN'", "P + S*V"),
+        ("P = '848 kN'\nQ = '3.25 kg/m'", "P + Q*V"),
+        ("P = '848 kN'", "P*V^x"),
+        ("P = '848 kN'\nv1 = '50 m/s'", "P*(1 + log(V))"),
+        ("P = '848 kN'", "P*sinh(x)"),
+        ("P = '848 kN'\nb = 2", "P"),
+        ("x = '848 kN'", "x"),
+        ("P = '848 kM'", "P"),
+        ("P = '848'", "P"),
+        ("P = [1]", "P"),
+        ("P = '848 kN'", "P*(1 + 2"),
+        ("P = '848 kN'\nl = '1 m'", "P + sqrt(l)*P"),
+    ] {
+        let text = format!("projectile.mass = 2\n[parameters]\n{parameters}\n[[stage]]\nforce = \"{force}\"\n");
+        let error = Scene::from_toml(&text, "law.toml").unwrap_err();
+        shown += &error.render(false);
+    }
+    snapbox::assert_data_eq!(shown, snapbox::file!["snapshots/laws.txt"].raw());
+}
+
+#[test]
+fn parameters_have_any_unit_and_a_scene_without_a_force_has_none() {
+    let scene = |unit: &str, force: &str| {
+        let text = format!("projectile.mass = 2\nparameters.a = {unit}\n[[stage]]\nforce = \"{force}\"\n");
+        Scene::from_toml(&text, "law.toml")
+    };
+    for (unit, force, value) in [
+        ("'2 kN/mm^2'", "a*x^2", 2e9),
+        ("'3 kPa s'", "a*x*V", 3e3),
+        ("'7 N s^2/m^2'", "a*V^2", 7.0),
+        ("'4 kg/(m s)'", "a*x*V", 4.0),
+    ] {
+        assert_eq!(scene(unit, force).unwrap().parameters[0].value, value, "{unit}");
+    }
+    let concrete = format!("{FULL}\n[parameters]\nP = 1\n");
+    assert!(Scene::from_toml(&concrete, "law.toml").unwrap_err().message.contains("`parameters` has no place"));
+}
+
+#[test]
+fn a_parameter_is_set_with_a_unit_or_else_in_that_of_the_file() {
+    let text = text_of_shipped("law-poncelet");
+    let stated = read(&text.replace("400 MPa", "300 MPa"));
+    for setting in ["parameters.a=300MPa", "parameters.a=3e8", "parameters.a = 3e8 Pa"] {
+        assert_eq!(set(text, &[setting]).as_ref(), Ok(&stated), "{setting}");
+    }
+    assert!(set(text, &["parameters.a=300m"]).is_err());
+    let mut moved = read(text);
+    Parameter::Own(Name::new("a").unwrap()).set(&mut moved, 3e8).unwrap();
+    assert_eq!(moved, stated);
 }

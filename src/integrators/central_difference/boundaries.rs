@@ -1,6 +1,6 @@
 //! Stage ends, exit and rest: where they lie inside a step, and what [`Boundaries`] makes of them.
 
-use super::scheme::{Node, Pause, REMEDY, Stepper, Sum};
+use super::scheme::{Deceleration as _, Node, Pause, REMEDY, Stepper, Sum};
 use super::stability::cannot_end;
 use super::{Boundaries, CentralDifference, Steps};
 use crate::integrators::flight::Course;
@@ -214,7 +214,7 @@ impl<'a, S: Scalar> Run<'a, S> {
             self.stepper.cost.rejected_steps += 1;
             return self.land(end, part);
         }
-        let static_force = self.stepper.law.force(next.x.value, S::zero()).value();
+        let static_force = self.stepper.law.at(next.x.value, S::zero()).value();
         if static_force == 0.0 && next.v.value() == 0.0 {
             return self.never_ends("the force dies out with the velocity");
         }

@@ -3,7 +3,7 @@
 use super::stability::stability_limit;
 use super::{CentralDifference, Steps, Summation, VelocityAt};
 use crate::integrators::outcome::{Cost, IntegrationError, Solved, StepLimit};
-use crate::physics::{Problem, Scalar, Stage, State};
+use crate::physics::{Law, Problem, Scalar, Stage, State};
 
 /// What to do where the steps allowed do not suffice.
 pub(super) const REMEDY: &str = "take a longer --dt, or --method taylor";
@@ -16,19 +16,138 @@ impl VelocityAt {
 
     /// Deceleration F/M at depth `x`, from the velocity `u` half a step `half` before.
     #[inline(always)]
-    pub(super) fn deceleration<S: Scalar>(self, law: &Stage<S>, x: S, u: S, half: S) -> S {
+    pub(super) fn deceleration<S: Scalar>(self, law: &impl Deceleration<S>, x: S, u: S, half: S) -> S {
         match self {
-            Self::LaggedHalfStep => law.force(x, u),
-            Self::Centred => {
-                // half q V² + (1 + half r) V = u - half (p + s x), in the form that does not cancel for small drag.
-                let known = u - half * (law.static_force + law.stiffness * x);
-                let linear = S::one() + half * law.viscosity;
-                let discriminant = linear * linear + S::from_f64(4.0) * half * law.drag * known;
-                // Without a real root the step goes far past rest; the vertex of the parabola is the least V there is.
-                let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
-                law.force(x, (S::from_f64(2.0) * known).over(linear + root))
+            Self::LaggedHalfStep => law.at(x, u),
+            Self::Centred => law.at(x, law.centred(x, u, half)),
+            Self::PredictedHalfStep => law.predicted(x, u, half),
+        }
+    }
+}
+
+/// The deceleration F/M of a stage, as the scheme asks it.
+pub(super) trait Deceleration<S> {
+    /// F/M at depth `x` and velocity `v`, which may lie below zero in the step that comes to rest.
+    fn at(&self, x: S, v: S) -> S;
+
+    /// The solution V of `V = u - half F(x, V)/M`.
+    fn centred(&self, x: S, u: S, half: S) -> S;
+
+    /// F/M at `V = u - half F(x, u)/M`.
+    #[inline(always)]
+    fn predicted(&self, x: S, u: S, half: S) -> S
+    where
+        S: Scalar,
+    {
+        self.at(x, u - half * self.at(x, u))
+    }
+}
+
+/// The stage per unit mass.
+impl<S: Scalar> Deceleration<S> for Stage<S> {
+    #[inline(always)]
+    fn at(&self, x: S, v: S) -> S {
+        self.force(x, v)
+    }
+
+    #[inline(always)]
+    fn centred(&self, x: S, u: S, half: S) -> S {
+        // half q V² + (1 + half r) V = u - half (p + s x), in the form that does not cancel for small drag.
+        let known = u - half * (self.static_force + self.stiffness * x);
+        let linear = S::one() + half * self.viscosity;
+        let discriminant = linear * linear + S::from_f64(4.0) * half * self.drag * known;
+        // Without a real root the step goes far past rest; the vertex of the parabola is the least V there is.
+        let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { S::zero() };
+        (S::from_f64(2.0) * known).over(linear + root)
+    }
+}
+
+/// Corrections of a velocity: by Newton four are usual, and halvings exhaust the digits of a number.
+const CORRECTIONS_MAX: u32 = 80;
+
+/// A law of its own, and the mass.
+impl<S: Scalar> Deceleration<S> for (&Law<S>, S) {
+    fn at(&self, x: S, v: S) -> S {
+        let force = self.0.force(x, v);
+        // Below zero a power of V has no value; the step that comes to rest then ends with the force at rest.
+        let force = if force.value().is_nan() && v.value() < 0.0 { self.0.force(x, S::zero()) } else { force };
+        force.over(self.1)
+    }
+
+    /// As the root between rest and u, if it lies there; the force at rest does what is beyond.
+    fn centred(&self, x: S, u: S, half: S) -> S {
+        let lacking = |v: S| v + half * self.at(x, v) - u;
+        if u.value() <= 0.0 || lacking(S::zero()).value() >= 0.0 {
+            return u - half * self.at(x, S::zero());
+        }
+        let (mut low, mut high, mut v) = (0.0, u.value(), u - half * self.at(x, u));
+        for _ in 0..CORRECTIONS_MAX {
+            if !(v.value() > low && v.value() < high) {
+                v = S::from_f64(0.5 * (low + high));
             }
-            Self::PredictedHalfStep => law.force(x, u - half * law.force(x, u)),
+            let lack = lacking(v);
+            if lack.value() < 0.0 {
+                low = v.value();
+            } else {
+                high = v.value();
+            }
+            let (_, by_velocity) = self.0.slopes(x.value(), v.value());
+            let correction = lack.over(S::one() + half * S::from_f64(by_velocity / self.1.value()));
+            v -= correction;
+            if !(correction.value().abs() > 4.0 * S::EPSILON * v.value().abs()) || high <= low.next_up() {
+                break;
+            }
+        }
+        v
+    }
+
+    fn predicted(&self, x: S, u: S, half: S) -> S {
+        let lagged = self.at(x, u);
+        let v = u - half * lagged;
+        // Where the half step ahead goes past rest and the law has no value there, the lagged force ends the step.
+        if v.value() < 0.0 && self.0.force(x, v).value().is_nan() { lagged } else { self.at(x, v) }
+    }
+}
+
+/// Of a stage or a law.
+#[derive(Clone, Copy)]
+pub(super) enum Rule<'a, S> {
+    Stage(Stage<S>),
+    Law(&'a Law<S>, S),
+}
+
+impl<'a, S: Scalar> Rule<'a, S> {
+    /// That of stage `index`.
+    fn of(problem: &'a Problem<S>, index: usize) -> Self {
+        match problem.laws.of(index) {
+            None => Self::Stage(problem.stages[index].per_mass(problem.mass)),
+            Some(law) => Self::Law(law, problem.mass),
+        }
+    }
+}
+
+impl<S: Scalar> Deceleration<S> for Rule<'_, S> {
+    #[inline(always)]
+    fn at(&self, x: S, v: S) -> S {
+        match self {
+            Self::Stage(stage) => stage.at(x, v),
+            Self::Law(law, mass) => (*law, *mass).at(x, v),
+        }
+    }
+
+    #[inline(always)]
+    fn centred(&self, x: S, u: S, half: S) -> S {
+        match self {
+            Self::Stage(stage) => stage.centred(x, u, half),
+            Self::Law(law, mass) => (*law, *mass).centred(x, u, half),
+        }
+    }
+
+    #[inline(always)]
+    fn predicted(&self, x: S, u: S, half: S) -> S {
+        match self {
+            Self::Stage(stage) => stage.predicted(x, u, half),
+            Self::Law(law, mass) => (*law, *mass).predicted(x, u, half),
         }
     }
 }
@@ -125,15 +244,15 @@ pub(super) struct Node<S> {
 
 impl<S: Scalar> Node<S> {
     /// The node at a state known by its velocity: `V(i-1/2) = V(i) - dt/2 a(i)`, so that Eq. 6 continues from it.
-    fn start(law: &Stage<S>, state: State<S>, h: S) -> Self {
-        let d = law.force(state.depth, state.velocity);
+    fn start(law: &impl Deceleration<S>, state: State<S>, h: S) -> Self {
+        let d = law.at(state.depth, state.velocity);
         let u = Sum::new(state.velocity + S::from_f64(0.5) * h * d);
         Self { x: Sum::new(state.depth), u, v: state.velocity, d, h }
     }
 
     /// The node reached with V(i+1/2) = `u` at depth `x` by a step of size `h`.
     #[inline(always)]
-    fn reached(velocity: VelocityAt, law: &Stage<S>, x: Sum<S>, u: Sum<S>, h: S) -> Self {
+    fn reached(velocity: VelocityAt, law: &impl Deceleration<S>, x: Sum<S>, u: Sum<S>, h: S) -> Self {
         let half = S::from_f64(0.5) * h;
         let d = velocity.deceleration(law, x.value, u.value, half);
         Self { x, u, v: u.value - half * d, d, h }
@@ -165,7 +284,7 @@ pub(super) struct Stepper<'a, S> {
     pub(super) clock: Clock<'a, S>,
     /// Stage that gives the force at the node, and its force rule divided by the mass.
     pub(super) stage: usize,
-    pub(super) law: Stage<S>,
+    pub(super) law: Rule<'a, S>,
     pub(super) node: Node<S>,
     pub(super) cost: Cost,
     /// Largest V(i) and dt in this stage.
@@ -183,7 +302,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             _ => Clock::Equal { size: S::from_f64(options.time_step(problem)), since: S::zero(), count: 0 },
         };
         let stage = stage_at(problem, 0, impact.depth);
-        let law = problem.stages[stage].per_mass(problem.mass);
+        let law = Rule::of(problem, stage);
         Self {
             options,
             problem,
@@ -214,14 +333,15 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if stage != self.stage {
             self.leave_stage();
             self.stage = stage;
-            self.law = self.problem.stages[stage].per_mass(self.problem.mass);
+            self.law = Rule::of(self.problem, stage);
         }
     }
 
     /// Adds the stability limit of the present stage to that of the stages before, if a step was taken in it.
     pub(super) fn leave_stage(&mut self) {
         if self.step_max > 0.0 {
-            let law = &self.problem.stages[self.stage];
+            let at = State { velocity: S::from_f64(self.speed_max), ..self.state() };
+            let law = &self.problem.linear(self.stage, at);
             let limit = stability_limit(law, self.problem.mass.value(), self.speed_max, self.options.velocity);
             self.step_limit.limit = self.step_limit.limit.min(limit);
             self.step_limit.stable &= self.step_max < limit;
@@ -234,28 +354,36 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub(super) fn cruise(&mut self, limit: f64, allowance: u64) -> Pause<S> {
         use VelocityAt::{Centred, LaggedHalfStep, PredictedHalfStep};
         let CentralDifference { velocity, summation, .. } = *self.options;
+        let law = match self.law {
+            Rule::Stage(stage) => stage,
+            Rule::Law(law, mass) => {
+                return self.whole_steps(&(law, mass), velocity, summation, self.clock, limit, allowance);
+            }
+        };
         if let (Summation::Plain, Clock::Equal { size, since, count }) = (summation, self.clock) {
             // Choices written as literals leave no branch in the loop: a third of its time.
             let clock = Clock::Equal { size, since, count };
             return match velocity {
-                LaggedHalfStep => self.whole_steps(LaggedHalfStep, Summation::Plain, clock, limit, allowance),
-                Centred => self.whole_steps(Centred, Summation::Plain, clock, limit, allowance),
-                PredictedHalfStep => self.whole_steps(PredictedHalfStep, Summation::Plain, clock, limit, allowance),
+                LaggedHalfStep => self.whole_steps(&law, LaggedHalfStep, Summation::Plain, clock, limit, allowance),
+                Centred => self.whole_steps(&law, Centred, Summation::Plain, clock, limit, allowance),
+                PredictedHalfStep => {
+                    self.whole_steps(&law, PredictedHalfStep, Summation::Plain, clock, limit, allowance)
+                }
             };
         }
-        self.whole_steps(velocity, summation, self.clock, limit, allowance)
+        self.whole_steps(&law, velocity, summation, self.clock, limit, allowance)
     }
 
     #[inline(always)]
     fn whole_steps(
         &mut self,
+        law: &impl Deceleration<S>,
         velocity: VelocityAt,
         summation: Summation,
         mut clock: Clock<'a, S>,
         limit: f64,
         allowance: u64,
     ) -> Pause<S> {
-        let law = self.law;
         let mut here = self.node;
         let mut taken = 0;
         let mut speed_max = here.v.value();
@@ -272,7 +400,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
                 break Pause::Crossing { x, u };
             }
             step_max = step_max.max(h.value());
-            let next = Node::reached(velocity, &law, x, u, h);
+            let next = Node::reached(velocity, law, x, u, h);
             let moving = next.v.value() > 0.0;
             if !moving {
                 break Pause::Rest(next);
@@ -324,7 +452,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             let law_at =
                 |time| Stage { static_force: law.static_force - source(stage, time).over(problem.mass), ..law };
             let start = self.state();
-            self.law = law_at(start.time);
+            self.law = Rule::Stage(law_at(start.time));
             self.start(start);
             let mut lands = false;
             while !lands {
@@ -336,7 +464,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
                 let left = S::from_f64(end) - now;
                 lands = left.value() <= h.value();
                 let h = if lands { left } else { h };
-                self.law = law_at(now + h);
+                self.law = Rule::Stage(law_at(now + h));
                 self.advance(h);
                 if lands {
                     self.clock.tick_part(h);

@@ -1,7 +1,7 @@
 //! The largest stable step of the scheme, and the step it takes by default.
 
 use super::VelocityAt;
-use crate::physics::{Problem, Scalar, Stage};
+use crate::physics::{Problem, Scalar, Stage, State};
 
 /// Whole steps in the shortest time scale of the stages, for [`super::Steps::Default`].
 const STEPS_PER_SHORTEST_SCALE: f64 = 1e3;
@@ -9,6 +9,9 @@ const STEPS_PER_SHORTEST_SCALE: f64 = 1e3;
 /// Most whole steps in the longest time scale of the stages, for [`super::Steps::Default`]: a crater of 1e-8 diameters
 /// is not resolved by 1e11 steps.
 const STEPS_PER_LONGEST_SCALE: f64 = 1e6;
+
+/// More stages than this are pieces of a table.
+const TABLE_MIN: usize = 64;
 
 /// Largest part of the stability limit that [`super::Steps::Default`] uses.
 pub(super) const PART_OF_LIMIT: f64 = 0.25;
@@ -21,6 +24,10 @@ pub(super) const PART_OF_LIMIT: f64 = 0.25;
 pub(super) fn cannot_end<S: Scalar>(problem: &Problem<S>, time: f64) -> bool {
     let (mass, speed, time) = (problem.mass.value(), problem.impact_speed.value(), 1e3 * time);
     let reach = speed * time;
+    // A law of its own may do anything.
+    if !problem.laws.is_empty() {
+        return false;
+    }
     let mut met =
         (0..problem.stages.len()).filter(|&i| problem.start_of(i).value() <= reach).map(|i| &problem.stages[i]);
     let keeps_moving = |law: &Stage<S>| {
@@ -32,7 +39,7 @@ pub(super) fn cannot_end<S: Scalar>(problem: &Problem<S>, time: f64) -> bool {
 
 /// The default time step (s), from the coefficients of the stages and the impact speed alone.
 ///
-/// A thousandth of the shortest time scale among the stages that start before the exit: `sqrt(M/s)` (half of 2/w),
+/// A thousandth of the shortest time scale among the stages that start before the exit: `sqrt(M/|s|)` (half of 2/w),
 /// `M/(q V0)`, `M/r`, `M V0/|p + s x|` at both ends, and the crossing time of the stage at V0. But not less than a
 /// millionth of the longest time that V0 alone would let a stage last, and at most a quarter of the stability limit
 /// at V0. A heuristic: it resolves the paper's scenes in 10³ to 10⁵ steps, and promises nothing about the error.
@@ -40,17 +47,27 @@ pub fn default_time_step<S: Scalar>(problem: &Problem<S>, velocity: VelocityAt) 
     let (mass, speed) = (problem.mass.value(), problem.impact_speed.value());
     let least = |times: &[f64]| times.iter().copied().filter(|t| *t > 0.0).fold(f64::INFINITY, f64::min);
     let (mut shortest, mut limit, mut longest) = (f64::INFINITY, f64::INFINITY, 0.0_f64);
-    for (index, stage) in problem.stages.iter().enumerate() {
+    // Of a table, whose pieces follow no scale of the motion, none counts as shorter than they are in the mean.
+    let count = problem.stages.len();
+    let finest = if count > TABLE_MIN { problem.start_of(count - 1).value() / count as f64 } else { 0.0 };
+    for index in 0..count {
+        let start = State { depth: problem.start_of(index), ..State::at_impact(problem) };
+        let stage = &problem.linear(index, start);
         let (from, to) = (problem.start_of(index).value(), problem.limit_of(index).value());
         if to <= from {
             continue;
         }
         let Stage { static_force: p, stiffness: s, viscosity: r, drag: q, .. } = stage.values();
-        let crossing = (to - from) / speed;
-        let swing = (mass / s).sqrt();
+        let crossing = (to - from).max(finest) / speed;
+        let swing = (mass / s.abs()).sqrt();
         // A spring cannot be compressed further than V0/w beyond the start of its stage.
         let farthest = to.min(from + speed * swing);
-        let weakening = if s > 0.0 { (p + s * farthest).abs() } else { 0.0 };
+        let weakening = match s {
+            s if s > 0.0 => (p + s * farthest).abs(),
+            // A drive grows up to the end.
+            s if s < 0.0 => (p + s * to).abs(),
+            _ => 0.0,
+        };
         let stopping = mass * speed / (p + s * from).abs().max(weakening);
         shortest = shortest.min(least(&[crossing, swing, stopping, mass / r, mass / (q * speed)]));
         let slowest = least(&[crossing, swing, mass * speed / p.abs(), mass / (p.abs() * q).sqrt()]);
@@ -76,12 +93,17 @@ pub fn default_time_step<S: Scalar>(problem: &Problem<S>, velocity: VelocityAt) 
 /// predicted:  (w dt)² (1 - b) < 4 (1 - b + b²), b < 1   b = g dt/2
 /// ```
 ///
+/// There is none where `s < 0`, without drag: the roots are positive then, and one grows as the motion itself does.
+///
 /// The limit itself is excluded: at `w dt = 2` amplitudes grow linearly. Between half of the limit and the limit the
 /// lagged drag alternates about the solution instead of approaching it from one side.
 ///
 /// # Source
 /// `docs/theory.md`, section 5, for each term alone; the combined forms by the criterion of Schur and Cohn.
 pub fn stability_limit<S: Scalar>(stage: &Stage<S>, mass: f64, speed: f64, velocity: VelocityAt) -> f64 {
+    if stage.stiffness.value() < 0.0 {
+        return f64::INFINITY;
+    }
     let w_squared = stage.stiffness.value() / mass;
     let w = w_squared.sqrt();
     let g = (stage.viscosity.value() + 2.0 * stage.drag.value() * speed) / mass;

@@ -6,6 +6,7 @@ use crate::physics::{Advice, EventKind, Outcome, Scene, Stage, Stages, Target};
 use crate::studies::error::Errors;
 use crate::studies::extreme_scenes;
 use crate::studies::quantity::Quantity;
+use crate::studies::random_problems::Kind;
 use crate::testing::{Random, kinds, of_stages};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -232,6 +233,22 @@ fn flights_through_stages_of_every_family_are_within_8_ulp_times_condition_of_50
     compare_random_stages(CASES);
 }
 
+/// Pieces of tables, whose force falls with depth as often as it rises, and drives.
+fn roll_table(dice: &mut Random) -> Problem {
+    loop {
+        if let Some(problem) = Kind::Table.draw(dice) {
+            return problem;
+        }
+    }
+}
+
+#[test]
+fn flights_through_tables_are_within_8_ulp_times_condition_of_50_digits() {
+    let mut dice = Random::new(9);
+    let [stopped, perforated, _] = compare_stages((0..CASES / 10).map(|_| roll_table(&mut dice)));
+    assert!(stopped > 30 && perforated > 30, "{stopped}, {perforated}");
+}
+
 fn compare_random_stages(cases: u32) {
     let mut dice = Random::new(2);
     let ended = compare_stages((0..cases).map(|_| roll_stages(&mut dice)));
@@ -248,21 +265,22 @@ fn twenty_thousand_cases_of_each_kind_are_within_their_limits() {
         || {
             compare_random_scenes(MANY);
             compare_random_stages(MANY);
-            compare_critical_velocities(MANY);
+            compare_critical_velocities(MANY, roll_stages);
         },
     );
 }
 
 #[test]
 fn critical_velocity_of_stages_is_within_8_ulp_times_condition_of_50_digits() {
-    compare_critical_velocities(CASES);
+    compare_critical_velocities(CASES, roll_stages);
+    compare_critical_velocities(CASES / 10, roll_table);
 }
 
-fn compare_critical_velocities(cases: u32) {
+fn compare_critical_velocities(cases: u32, roll: impl Fn(&mut Random) -> Problem) {
     let mut dice = Random::new(3);
     let (mut worst, mut zero, mut done) = (0.0_f64, 0, 0);
     while done < cases {
-        let mut problem = roll_stages(&mut dice);
+        let mut problem = roll(&mut dice);
         for stage in &mut problem.stages {
             // Stiffness with drag among them, which has V(x) and therefore a critical velocity.
             stage.drag += stage.viscosity * problem.impact_speed.recip();

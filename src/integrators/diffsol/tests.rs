@@ -18,14 +18,14 @@ fn boundary_crossed_twice_within_a_step_is_found_at_its_first_crossing() {
     let at = |t: f64| Ok((2.0 * t - t * t, 2.0 - 2.0 * t));
     let before = Node { time: 0.0, depth: 0.0, velocity: 2.0 };
     let after = Node { time: 1.9, depth: 0.19, velocity: -1.8 };
-    let (end, place) = kind_and_place(locate(&law(0.75), before, after, at).unwrap());
+    let (end, place) = kind_and_place(locate(|x, v| law(0.75).force(x, v), 0.75, before, after, at).unwrap());
     assert_eq!((end, place.depth), ("limit", 0.75));
     assert!((place.time - 0.5).abs() < 1e-15 && (place.velocity - 1.0).abs() < 1e-15, "{place:?}");
-    let (end, place) = kind_and_place(locate(&law(1.25), before, after, at).unwrap());
+    let (end, place) = kind_and_place(locate(|x, v| law(1.25).force(x, v), 1.25, before, after, at).unwrap());
     assert_eq!((end, place.velocity), ("rest", 0.0));
     assert!((place.time - 1.0).abs() < 1e-15 && (place.depth - 1.0).abs() < 1e-15, "{place:?}");
     // Touching counts as reached.
-    let (end, place) = kind_and_place(locate(&law(1.0), before, after, at).unwrap());
+    let (end, place) = kind_and_place(locate(|x, v| law(1.0).force(x, v), 1.0, before, after, at).unwrap());
     assert_eq!(end, "limit");
     assert!(place.velocity.abs() < 1e-7, "{place:?}");
 }
@@ -71,7 +71,8 @@ fn an_event_takes_few_evaluations_of_the_interpolant() {
             evaluations += 1;
             Ok((xi(t), u(t)))
         };
-        let (end, place) = kind_and_place(locate(&law.until(distance), node(0.8), node(after), at).unwrap());
+        let (end, place) =
+            kind_and_place(locate(|x, v| law.force(x, v), distance, node(0.8), node(after), at).unwrap());
         assert_eq!(end, if distance == 1.0 { "rest" } else { "limit" });
         let f = if distance == 1.0 { u(place.time) } else { xi(place.time) - distance };
         assert!(f.abs() < 1e-15, "{place:?}");
@@ -285,7 +286,7 @@ fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
     let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
     assert!((length_of(&light) - 1.0).abs() < 1e-15);
     let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
-    let stage = Reduced { law: still, length: 2.0, unit_speed: 4.0, start, speed: 1.75 };
+    let stage = Reduced { law: still, own: None, length: 2.0, unit_speed: 4.0, start, speed: 1.75 };
     let state = stage.state(Node { time: 3.0, depth: 5.0, velocity: 6.0 });
     assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
 }

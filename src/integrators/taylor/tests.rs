@@ -367,10 +367,3 @@ fn rest_against_stiffness_and_drag_is_found_to_the_digits_of_double_double() {
         }
     }
 }
-
-#[test]
-fn every_entry_of_the_table_is_the_reciprocal_of_its_place() {
-    for (k, entry) in RECIPROCALS.iter().enumerate().skip(1) {
-        assert!((entry * k as f64 - 1.0).abs() <= 0.5 * f64::EPSILON, "{k}: {entry}");
-    }
-}

@@ -9,7 +9,9 @@ use twofloat::TwoFloat;
 use super::*;
 use crate::physics::closed_form::critical_of_stages;
 use crate::physics::exit_energy::propagate;
+use crate::physics::force_table::{ForceTable, Row};
 use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
+use crate::studies::random_problems::Kind;
 use crate::studies::relations::{Units, in_units};
 use crate::testing::{Random, continuous, kinds, of_stages, random_concrete, stage, tunnel};
 
@@ -82,6 +84,20 @@ fn random_stages(random: &mut Random, viscous: bool) -> Problem {
     }
     of_stages(scale, random.log_uniform(0.3, 3.0), end * random.uniform(0.7, 1.0), &stages)
 }
+
+/// Problems of tables whose force rises and falls, drives and resists, with a far side.
+fn random_tables(random: &mut Random, count: usize) -> Vec<Problem> {
+    std::iter::repeat_with(|| Kind::Table.draw(random)).flatten().take(count).collect()
+}
+
+/// The pieces of the table of these rows, and the last stage behind it.
+fn table(rows: &[[f64; 2]], behind: Stage) -> Vec<Stage> {
+    let rows: Vec<_> = rows.iter().map(|&[depth, force]| Row { depth, force }).collect();
+    ForceTable::new(&rows).unwrap().stages(0.0).chain([behind]).collect()
+}
+
+/// A force that falls through zero at 1.5 m, to a drive, and through it again at 2.5 m.
+const BARRIER: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 8.0], [2.0, -8.0], [3.0, 8.0]];
 
 /// References: closed form at 50 digits from these f64 inputs.
 #[test]
@@ -259,6 +275,10 @@ fn the_error_bound_of_the_margin_holds_and_is_not_idle() {
         let margin = exact(&problem);
         scenes.push((problem, margin));
     }
+    for problem in random_tables(&mut random, 40) {
+        let margin = exact(&problem);
+        scenes.push((problem, margin));
+    }
     let dry = scenes.len();
     for _ in 0..60 {
         let problem = random_stages(&mut random, true);
@@ -305,6 +325,11 @@ fn near_the_critical_velocity_the_outcome_is_right_or_undecided() {
         of_stages(1.0, 4.0, 3.0, &[constant(8.0, 1.0), constant(-100.0, INF)]),
         // What is left of a slab behind a jump of the force is a millionth of the depth before it.
         of_stages(2.0, 1.0, 0.1 + 1e-6, &[stage(0.0, 1.0, 0.0, 0.0, 0.1), constant(84_823.0, INF)]),
+        // What just gets over a barrier of a table creeps towards the place where the force falls through zero.
+        of_stages(1.0, 4.0, 2.5, &table(&BARRIER, constant(1.0, INF))),
+        of_stages(1.0, 4.0, 1.5, &table(&BARRIER, constant(1.0, INF))),
+        // Touching: a force that falls to zero and rises again.
+        of_stages(1.0, 4.0, 1.0, &table(&[[0.0, 8.0], [1.0, 0.0], [2.0, 8.0]], constant(1.0, INF))),
     ];
     problems.extend((0..5).map(|_| random_concrete(&mut random)));
     for problem in &problems {
@@ -414,8 +439,9 @@ fn digits_and_derivatives_are_those_of_the_type_of_numbers() {
 fn stages_of_any_kind_give_the_numbers_of_double_double_by_the_other_method() {
     let mut random = Random::new(2);
     let mut compared = [0; 3];
-    for case in 0..900 {
-        let problem = random_stages(&mut random, case % 3 == 0);
+    let mut tables = random_tables(&mut random, 90).into_iter();
+    for case in 0..990 {
+        let problem = if case < 900 { random_stages(&mut random, case % 3 == 0) } else { tables.next().unwrap() };
         let problem = if case % 2 == 0 { problem } else { problem.with_exit(INF) };
         let viscous = problem.stages.iter().any(|law| law.viscosity > 0.0);
         let other = |name| if viscous || name == MethodName::Energy { MethodName::Taylor } else { MethodName::Energy };
@@ -513,6 +539,92 @@ fn a_place_that_is_touched_is_reached() {
         assert_eq!((flight.outcome, flight.stage), (Outcome::StoppedInCrater, 0), "{name}");
         assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Rest], "{name}");
         assert_eq!(flight.end, State { time: 0.5, depth: 1.0, velocity: 0.0 }, "{name}");
+    }
+}
+
+/// Which methods are compared with is the closed form, and that with 50 digits in its own tests.
+#[test]
+fn tables_of_either_slope_are_flown_through_as_the_closed_form_says() {
+    let mut random = Random::new(4);
+    let problems = random_tables(&mut random, 60);
+    for (name, method) in methods(1e-10) {
+        let limit = match name {
+            MethodName::Tsit45 | MethodName::Adaptive => 1e-8,
+            name if is_tolerant(name) => 2e-7,
+            _ => 1e-13,
+        };
+        let mut compared = 0;
+        for problem in &problems[..if is_tolerant(name) { 12 } else { 60 }] {
+            let exact = ClosedForm.solve(problem, Detail::Events).unwrap();
+            let flight = method.integrator().solve(problem, Detail::Events).unwrap();
+            assert_eq!((flight.outcome, flight.stage), (exact.outcome, exact.stage), "{name}: {problem:?}");
+            assert_eq!(kinds(&flight.events), kinds(&exact.events), "{name}: {problem:?}");
+            let fastest = exact.events.iter().map(|e| e.state.velocity).fold(problem.impact_speed, f64::max);
+            let passed = exact.events.iter().filter(|e| e.kind != EventKind::Rest);
+            let condition = passed.map(|e| fastest / e.state.velocity).fold(1.0, f64::max).powi(2);
+            if condition > 1e4 {
+                continue;
+            }
+            compared += 1;
+            for (event, exact) in flight.events.iter().zip(&exact.events) {
+                let (found, exact) = (event.state, exact.state);
+                let off = [
+                    found.depth / exact.depth - 1.0,
+                    found.time / exact.time - 1.0,
+                    (found.velocity - exact.velocity) / fastest,
+                ];
+                let within = off.iter().all(|off| off.abs() < limit * condition);
+                assert!(within, "{name}: {off:?} over {condition}, {found} for {exact}");
+            }
+        }
+        assert!(compared > 8, "{name}: {compared}");
+    }
+}
+
+/// By hand: 4 J up to 1 m and 2 J up to 1.5 m take 12 (m/s)² of 1 kg, and the drive gives 4 of them back up to 2 m.
+#[test]
+fn a_barrier_of_a_table_decides_and_the_drive_behind_it_does_not() {
+    let barrier = |speed: f64, exit: f64| of_stages(1.0, speed, exit, &table(&BARRIER, constant(1.0, INF)));
+    for (name, flight) in flights(&barrier(4.0, 2.0)) {
+        let limit = if is_tolerant(name) { 1e-7 } else { 1e-14 };
+        assert_eq!(flight.outcome, Outcome::Perforated, "{name}");
+        // The least speed, not that at the exit, is what perforating needs.
+        assert!((flight.exit_margin.unwrap() - 4.0 / 16.0).abs() < limit, "{name}: {:?}", flight.exit_margin);
+        assert!((flight.end.velocity - 8.0_f64.sqrt()).abs() < 4.0 * limit, "{name}: {}", flight.end);
+    }
+    // 1 (m/s)² is missing: from 3 of them at 1 m, rest where 16 u - 16 u² = 3 for u = x - 1.
+    for (name, flight) in flights(&barrier(11.0_f64.sqrt(), 2.0)) {
+        let limit = if is_tolerant(name) { 1e-6 } else { 1e-14 };
+        assert_eq!(flight.outcome, Outcome::Stopped, "{name}");
+        assert!((flight.exit_margin.unwrap() + 1.0 / 11.0).abs() < limit, "{name}: {:?}", flight.exit_margin);
+        assert!((flight.end.depth - 1.25).abs() < limit, "{name}: {}", flight.end);
+    }
+    // All that is left is spent at the place where nothing stops it: whether it gets there nobody can say.
+    for (name, flight) in flights(&barrier(12.0_f64.sqrt(), 2.0)) {
+        assert_eq!(flight.outcome, Outcome::Undecided, "{name}: {flight:?}");
+        assert!(flight.end.time.is_finite() && flight.end.time > 1.0 / 3.0_f64.sqrt(), "{name}: {}", flight.end);
+    }
+}
+
+#[test]
+fn a_table_ends_the_flight_at_its_last_row_unless_rest_comes_first() {
+    let (rows, free) = ([[0.0, 4.0], [1.0, 4.0], [2.0, 0.0]], stage(0.0, 0.0, 0.0, 0.0, INF));
+    let open =
+        |speed: f64| Problem { target: Target::StagesToEndOfTable, ..of_stages(1.0, speed, INF, &table(&rows, free)) };
+    let fixed = CentralDifference::uniform(1e-4, VelocityAt::Centred, Boundaries::Landed);
+    let mut answers: Vec<_> = methods(1e-9)
+        .iter()
+        .map(|(name, m)| (*name, [2.0, 4.0].map(|v| answer(m, &open(v), Detail::End).unwrap())))
+        .collect();
+    let by_steps = [2.0, 4.0].map(|speed| fixed.solve(&open(speed), Detail::End));
+    answers.push((MethodName::CentralDifference, by_steps));
+    for (name, [rests, moves]) in answers {
+        let rests = rests.unwrap();
+        assert_eq!((rests.outcome, rests.exit_margin), (Outcome::Stopped, None), "{name}");
+        assert!((rests.end.depth - 0.5).abs() < 1e-7, "{name}: {}", rests.end);
+        let Err(error @ IntegrationError::TableEnds { last }) = moves else { panic!("{name}: {moves:?}") };
+        assert!((last.depth, (last.velocity - 2.0).abs() < 1e-6) == (2.0, true), "{name}: {error}");
+        assert!(!error.is_usage() && error.last() == Some(last) && error.help().contains("rows"), "{name}");
     }
 }
 
@@ -668,6 +780,8 @@ fn the_states_at_given_times_are_as_accurate_as_the_end_and_change_no_number() {
     problems.push(of_stages(1.0, 5.0, 3.0, &[stage(-20.0, 40.0, 0.0, 0.0, 1.0), stage(-1.0, 0.0, 0.0, 0.5, INF)]));
     problems.push(of_stages(1.0, 5.0, 3.0, &[stage(0.0, 0.0, 0.0, 2.0, 1.0), stage(0.0, 0.0, 0.0, 0.0, INF)]));
     problems.push(of_stages(1.0, 0.5, 3.0, &[stage(-200.0, 0.0, 0.0, 1.0, INF)]));
+    problems.push(of_stages(1.0, 4.0, 2.5, &table(&BARRIER, constant(1.0, INF))));
+    problems.push(of_stages(1.0, 3.0, INF, &table(&BARRIER, constant(1.0, INF))));
     for (name, method) in methods(1e-9) {
         let limit = match name {
             MethodName::Tsit45 | MethodName::Adaptive => 1e-7,

@@ -43,7 +43,7 @@ fn profile(e: &Environment) -> Markup {
 
 fn figure_named(figures: &[Figure], kind: &str, of: &str) -> Markup {
     let name = name_of(kind, of);
-    html! { @for shown in figures.iter().filter(|shown| shown.name == name) { (figure(None, shown, "")) } }
+    html! { @for shown in figures.iter().filter(|shown| shown.name == name) { (figure(shown, "")) } }
 }
 
 /// Whole microseconds where they are many, else three digits.

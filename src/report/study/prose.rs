@@ -11,7 +11,7 @@ use std::fmt::Display;
 
 use maud::{Markup, Render, html};
 
-use crate::report::references::{Reference, reference};
+use crate::report::references::{Reference, citation, reference};
 use crate::report::{latex, summary};
 use crate::text::one_line;
 
@@ -124,12 +124,7 @@ impl Prose {
                     @if !below.is_empty() { sub { (below) } }
                     @if !above.is_empty() { sup { (above) } }
                 },
-                Piece::Cite(works) => { "["
-                    @for (index, work) in works.iter().enumerate() {
-                        @if index > 0 { ", " }
-                        a href={ "#ref-" (work.key) } { (number_of(cited, work)) }
-                    }
-                "]" },
+                Piece::Cite(works) => (citation(works, cited)),
             }
         } }
     }
@@ -190,11 +185,6 @@ impl Render for Prose {
     fn render(&self) -> Markup {
         self.html(&[])
     }
-}
-
-/// Number of `work` in a list of references that begins at 1.
-fn number_of(cited: &[&Reference], work: &Reference) -> usize {
-    1 + cited.iter().position(|other| other.key == work.key).unwrap_or(cited.len())
 }
 
 #[cfg(test)]

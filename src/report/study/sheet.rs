@@ -170,12 +170,14 @@ impl Sheet {
         [&self.caption].into_iter().chain(&self.header).chain(cells)
     }
 
-    /// The table on a page, as its `index`-th.
-    pub(super) fn to_html(&self, index: usize, cited: &[&Reference]) -> Table {
-        let caption = html! { b { "Table " (index) ". " } (self.caption.html(cited)) "." };
+    /// The table on a page.
+    pub(in crate::report) fn to_html(&self, cited: &[&Reference]) -> Table {
+        let caption = html! { (self.caption.html(cited)) "." };
         let header = self.header.iter().map(|head| (head.html(cited), head.plain()));
         let is_number = |column: &usize| self.rows.iter().any(|row| row.get(*column).is_some_and(Cell::is_number));
-        let table = Table::cards_of(caption, header).numbers((1..self.header.len()).filter(is_number));
+        let table = Table::cards_of(caption, header)
+            .id(format!("table-{}", self.name))
+            .numbers((1..self.header.len()).filter(is_number));
         let table = if self.is_grid { table.into_grid(self.caption.plain()) } else { table };
         table.rows(&self.rows, |row| row.iter().map(|cell| cell.html(cited)).collect::<Vec<_>>())
     }

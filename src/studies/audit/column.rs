@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::exchange::tables::{Column as Known, Format, Need, Others};
+use crate::exchange::tables::{Column as Known, Format, Need, Others, spellings, unit_of};
 use crate::physics::units::Dimension;
 use crate::studies::quantity::Quantity;
 
@@ -125,23 +125,6 @@ impl Heading {
             Err(None)
         }
     }
-}
-
-/// The unit in the end of a name: `mm` of `_mm`, ` (mm)` and `[mm]`; empty where there is none, `None` where the name
-/// goes on as a word.
-fn unit_of(rest: &str) -> Option<&str> {
-    let bare = rest.trim_start_matches(['_', ' ']);
-    let inside = |open, close| bare.strip_prefix(open).and_then(|rest: &str| rest.strip_suffix(close));
-    match inside('(', ')').or_else(|| inside('[', ']')) {
-        Some(unit) => Some(unit.trim()),
-        None if bare.len() < rest.len() || rest.is_empty() => Some(bare),
-        None => None,
-    }
-}
-
-/// A unit as a name writes it, and as units are written: `m_s` and `m_per_s` for `m/s`.
-fn spellings(unit: &str) -> [String; 2] {
-    [unit.to_owned(), unit.replace("_per_", "/").replace('_', "/")]
 }
 
 /// The column of [`RESULTS`] that a name in lower case differs from by a slip or two, in front of its unit or as a whole.

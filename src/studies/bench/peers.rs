@@ -6,7 +6,7 @@
 
 use super::timing::{Effort, Timing};
 use super::work_precision::{Case, Judgement, Known, Run, Setting, Tally, until_too_long};
-use crate::exchange::peers::{BundledPeer, Peer, PeerAnswer, PeerFailure, PeerRequest};
+use crate::exchange::peers::{BundledPeer, NO_LAWS, Peer, PeerAnswer, PeerFailure, PeerRequest};
 
 /// Tolerances that peers are asked for, by their digits.
 const DIGITS: std::ops::RangeInclusive<i32> = 2..=13;
@@ -51,6 +51,9 @@ pub fn runs(case: &Case, name: &str, peer: &mut Peer, effort: Effort) -> Vec<Run
 
 fn run(case: &Case, peer: &mut Peer, setting: Setting, effort: Effort, mut tally: Tally) -> Run {
     let Setting::Tolerance(rtol) = setting else { return tally.not_run("a peer is asked for a tolerance") };
+    if case.problems.iter().any(|known| !known.problem.laws.is_empty()) {
+        return tally.not_run(NO_LAWS);
+    }
     let mut timings = Vec::new();
     for known in &case.problems {
         let request = PeerRequest::from_problem(&known.problem, rtol);

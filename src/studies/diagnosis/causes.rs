@@ -25,6 +25,8 @@ const COARSE: usize = 4;
 const NEAR_ROOT: f64 = 1e-4;
 /// Rounds of a search between two numbers.
 const ROUNDS_MAX: usize = 80;
+/// Numbers that lie within this factor are one.
+const ONE_NUMBER: f64 = 1.01;
 /// Failing answers that must be explained for certainty.
 const CERTAIN_FROM: usize = 3;
 /// First causes with which a second one is tried.
@@ -271,6 +273,8 @@ struct Explanation {
     /// Passing answers that it would have failed.
     contradicted: usize,
     largest: f64,
+    /// Whether the numbers of all answers, over depth or time, are one number: then it is no matter of steps.
+    is_one_number: bool,
 }
 
 impl Explanation {
@@ -307,9 +311,11 @@ impl Evidence<'_> {
         let mut largest = 0.0_f64;
         let mut told_apart = 0;
         let mut explained = Vec::with_capacity(self.failing.len());
+        let mut shares: Vec<f64> = Vec::new();
         for seen in &self.failing {
             let fitted = || seen.fit(hypothesis, others, mask)?.first().copied();
             let number = if is_per_answer { fitted() } else { Some(number) };
+            shares.extend(number.and_then(|number| hypothesis.parameter.share(number, seen.question)));
             let faults: Option<Vec<_>> =
                 number.map(|number| others.iter().copied().chain([(hypothesis, number)]).collect());
             let found = faults.as_ref().and_then(|faults| Some((seen.explained_by(faults, mask)?, faults)));
@@ -334,7 +340,11 @@ impl Evidence<'_> {
         } else {
             self.passing.iter().filter(|seen| seen.contradicts(&faults, mask)).count()
         };
-        Explanation { faults, explained, told_apart, contradicted, largest }
+        shares.sort_by(f64::total_cmp);
+        // The middle half alone: an answer may have two fitting numbers.
+        let of_part = |part: usize| shares.get(part * shares.len() / 4).copied().unwrap_or(0.0);
+        let is_one_number = shares.len() >= CERTAIN_FROM && of_part(3) <= ONE_NUMBER * of_part(1);
+        Explanation { faults, explained, told_apart, contradicted, largest, is_one_number }
     }
 
     /// The best explanation by `hypothesis`, if it explains anything.
@@ -490,7 +500,7 @@ fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], o
     let is_of_one = first.faults.iter().any(|(fault, _)| is_of_one_number(fault));
     let is_enough = first.told_apart >= if evidence.passing.is_empty() { 2 * CERTAIN_FROM } else { CERTAIN_FROM };
     let is_rounding = first.faults.iter().any(|(fault, _)| matches!(fault.parameter, Parameter::Nearness));
-    let is_certain = is_alone && !is_of_one && !is_rounding && is_enough;
+    let is_certain = is_alone && !first.is_one_number && !is_of_one && !is_rounding && is_enough;
     let certainty = if is_certain { Certainty::Certain } else { Certainty::Likely };
     let mut causes: Vec<Cause> = Vec::new();
     // Those that cannot be told apart are one cause.

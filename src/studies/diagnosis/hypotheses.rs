@@ -80,6 +80,15 @@ impl Parameter {
         matches!(self, Self::Delay | Self::Lateness | Self::Nearness | Self::Choice(_))
     }
 
+    /// A number of its own over the depth or the time of the flight; `None` for one of all answers.
+    pub(super) fn share(self, number: f64, question: &Question) -> Option<f64> {
+        match self {
+            Self::Delay => Some(number / question.exact.end.depth),
+            Self::Lateness => Some(number / question.exact.end.time),
+            _ => None,
+        }
+    }
+
     /// Freedom that an explanation has, for the choice of the simplest.
     pub(super) fn freedom(self) -> u8 {
         match self {

@@ -125,8 +125,44 @@ impl Question {
     }
 }
 
-/// What the flight `exact` through `problem` meets.
-fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec<Content> {
+impl Content {
+    /// What a force is made of.
+    pub const TERMS: [Self; 11] = [
+        Self::StaticForce,
+        Self::Drive,
+        Self::Stiffness,
+        Self::LaterStiffness,
+        Self::Viscosity,
+        Self::Drag,
+        Self::AirGap,
+        Self::Stiff,
+        Self::Scene,
+        Self::CraterStiffness,
+        Self::Eq14,
+    ];
+
+    /// What a flight meets on its way.
+    pub const EVENTS: [Self; 10] = [
+        Self::StageEnd,
+        Self::SeveralStageEnds,
+        Self::ForceJump,
+        Self::ShortStage,
+        Self::Exit,
+        Self::ExitBeforeLastStage,
+        Self::ExitAtStageEnd,
+        Self::Rest,
+        Self::Grazing,
+        Self::NoSpeed,
+    ];
+
+    /// `static force`.
+    pub fn words(self) -> String {
+        if self == Self::Eq14 { "S of Eq. 14".to_owned() } else { self.to_string().replace('-', " ") }
+    }
+}
+
+/// What the flight `exact` through `problem`, the one of `scene` if it has one, meets.
+pub fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec<Content> {
     let met = &problem.stages[..=exact.stage];
     let ends: Vec<f64> = met[..exact.stage].iter().map(|law| law.end).collect();
     let in_any = |of: fn(&Stage) -> bool| met.iter().any(of);
@@ -231,7 +267,7 @@ fn stiff(random: &mut Random) -> Problem {
 }
 
 /// The families in the order in which they are asked: what tells causes apart first.
-const FAMILIES: [Family; 25] = [
+const FAMILIES: [Family; 26] = [
     Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
     Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
     Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
@@ -352,6 +388,16 @@ const FAMILIES: [Family; 25] = [
             let scale = Scale::draw(random);
             let law = mixed(random, &scale);
             Some(Problem::of_stages(scale.mass, 0.0, [law]).with_exit(scale.length))
+        },
+    },
+    Family {
+        name: "small-term",
+        // Terms that are next to nothing beside another still count.
+        draw: |random| {
+            let great = if random.chance(0.5) { 0 } else { 1 + random.below(3) };
+            let share = |term| if term == great { 1.0 } else { random.log_uniform(1e-5, 1e-3) };
+            let terms = [0, 1, 2, 3].map(share);
+            single(random, terms)
         },
     },
 ];

@@ -270,3 +270,68 @@ fn every_cause_has_its_row_in_the_reference() {
         assert!(is_there, "{}", hypothesis.id);
     }
 }
+
+/// Exact, but for terms that are small beside the others: they are left out.
+#[test]
+fn a_term_that_is_dropped_where_it_is_small_is_found() {
+    let drop: fn(&mut Problem) = |problem| {
+        let speed = problem.impact_speed;
+        for law in &mut problem.stages {
+            if law.viscosity * speed < 1e-2 * law.static_force {
+                law.viscosity = 0.0;
+            }
+        }
+    };
+    let found = diagnose(&mut Strange(drop), Plan { asks_edges: false, ..Plan::default() }, &|_, _| {});
+    assert_eq!(found.verdict, Verdict::Failed);
+}
+
+/// Exact, but for a spring that is a little too stiff in one stage: no matter of the tolerance.
+#[test]
+fn a_small_fault_in_few_answers_is_not_taken_for_inaccuracy() {
+    let stiffer: fn(&mut Problem) = |problem| {
+        if let Some(law) = problem.stages.get_mut(1) {
+            law.stiffness *= 1.001;
+        }
+    };
+    let found = diagnose(&mut Strange(stiffer), Plan { asks_edges: false, ..Plan::default() }, &|_, _| {});
+    assert_eq!(found.verdict, Verdict::Failed);
+    assert!(!found.causes[0].id.starts_with("tolerance"), "{:?}", found.causes);
+}
+
+/// Central difference whose time is a sum in single precision.
+struct Forgetful(CentralDifference);
+
+impl Solver for Forgetful {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity { name: "forgetful".to_owned(), fixed_step: true, ..PeerIdentity::default() }
+    }
+
+    fn command(&self) -> String {
+        "forgetful".to_owned()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let step = request.dt_s.unwrap();
+        let scheme = CentralDifference::uniform(step, self.0.velocity, self.0.boundaries);
+        let solved = scheme.solve(&request.problem(None), Detail::End);
+        let mut flight = solved.map_err(|error| failure(&error.to_string()))?;
+        let steps = (flight.end.time / step) as usize;
+        let sum = (0..steps).fold(0.0_f32, |sum, _| sum + step as f32);
+        flight.end.time += f64::from(sum) - steps as f64 * step;
+        Ok(answer(flight.outcome, flight.end))
+    }
+
+    fn restart(&mut self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn a_sum_in_single_precision_is_found_though_every_limit_looks_right() {
+    let scheme = CentralDifference::uniform(1.0, VelocityAt::PredictedHalfStep, Boundaries::Landed);
+    for seed in 1..=4 {
+        let found = diagnose(&mut Forgetful(scheme.clone()), Plan { seed, ..Plan::default() }, &|_, _| {});
+        assert_eq!(found.verdict, Verdict::Failed, "seed {seed}: {:?} {:?}", found.counts, found.causes);
+    }
+}

@@ -10,8 +10,9 @@ use crate::physics::nose::NoseShape;
 use crate::physics::semi_empirical::{
     NDRC_END, NDRC_FIRST_BRANCH_END, depth_ratio, eq15_printed, eq15_unrounded, jumps, model_difference,
 };
-use crate::physics::{Concrete, CraterStiffness, Criterion, Scene, groups};
+use crate::physics::{Concrete, Criterion, Scene, groups};
 use crate::studies::critical_velocity;
+use crate::studies::edge_problems::concrete;
 use crate::studies::order::{StepError, fit};
 use crate::studies::random::Random;
 
@@ -86,22 +87,6 @@ impl Eq15Form {
 
 /// Diameter, mass, strength and S of the formulas' scenes: any will do, the groups alone matter.
 const MASS: f64 = 2.0;
-
-/// Concrete of 36 MPa with S = 12, continuous c and k = 2.
-pub(super) fn concrete(diameter: f64, nose_factor: f64, density: f64) -> Concrete {
-    Concrete {
-        diameter,
-        nose_factor,
-        strength: 36e6,
-        density,
-        static_factor: 12.0,
-        follows_eq14: false,
-        inertia_factor: 1.0,
-        crater_ratio: 2.0,
-        crater_stiffness: CraterStiffness::Continuous,
-        layers: Vec::new(),
-    }
-}
 
 /// A scene of given N (`None`: Q = 0).
 fn scene(geometry: Option<f64>) -> (Scene, Concrete) {

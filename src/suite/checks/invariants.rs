@@ -99,6 +99,9 @@ fn time_reversal(subject: &Subject<'_>) -> Found {
 
 fn similarity(&Similarity { length, mass, time }: &Similarity, subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
+    if !problem.laws.is_empty() {
+        return Err(NotMeasured::skip("the parameters of an expression would have to be scaled, too"));
+    }
     let plain = subject.solution(Detail::Events)?;
     let scaled = in_units(problem, Units { length, mass, time });
     let scaled = solve(&subject.method(None)?, &scaled, Detail::Events)?;

@@ -150,6 +150,11 @@ fn known_bad(KnownBad { is, flaw, limit, check }: &KnownBad, subject: &Subject<'
         Bad::Undecided => Verdict::Undecided,
     };
     let measured = judged.measured.map_or("nothing measured".to_owned(), |measured| format!("{measured:.2e}"));
-    let remark = format!("{}: {measured}, limit {limit:.1e} {}; {}", judged.verdict.name(), claim.unit, judged.remark);
+    let remark = format!(
+        "{}: {measured}, limit {limit:.1e} {}; {}",
+        judged.verdict.name(),
+        claim.unit_in_words(),
+        judged.remark
+    );
     Ok(Measurement::count(usize::from(judged.verdict != must)).remark(remark))
 }

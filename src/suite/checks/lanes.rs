@@ -149,6 +149,8 @@ impl Row {
         Scene {
             title: None,
             mass,
+            forces: Vec::new(),
+            parameters: Vec::new(),
             resistance: Resistance::Concrete(concrete),
             thickness: self.cells[5],
             criterion: if self.criterion == "ndrc" { Criterion::Ndrc } else { Criterion::FullDepth },

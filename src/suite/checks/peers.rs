@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::super::claim::{Found, Measurement, NotMeasured};
 use super::{Subject, Worst};
-use crate::exchange::peers::{self, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
+use crate::exchange::peers::{self, NO_LAWS, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
 use crate::integrators::Detail;
 use crate::physics::Problem;
 
@@ -131,6 +131,9 @@ impl PeerAnswers {
                 format!("no answers of {name}")
             }));
         };
+        if !problem.laws.is_empty() {
+            return Err(NotMeasured::skip(NO_LAWS));
+        }
         match source {
             Source::Recorded(recording) => {
                 let flight = recording

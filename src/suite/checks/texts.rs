@@ -180,6 +180,12 @@ fn stages(text: &RecordedScene, scene: &Scene, speed: f64) -> Found<BTreeMap<Str
     let mut said = BTreeMap::from([("scene.exit_depth_m".to_owned(), problem.exit_depth)]);
     for (index, stage) in problem.stages.iter().enumerate() {
         let Stage { static_force, stiffness, viscosity, drag, end } = *stage;
+        if end.is_finite() {
+            said.insert(format!("scene.stages.{index}.end_m"), end);
+        }
+        if problem.laws.of(index).is_some() {
+            continue;
+        }
         for (name, value) in [
             ("static_force_n", static_force),
             ("stiffness_n_m", stiffness),
@@ -187,9 +193,6 @@ fn stages(text: &RecordedScene, scene: &Scene, speed: f64) -> Found<BTreeMap<Str
             ("drag_kg_m", drag),
         ] {
             said.insert(format!("scene.stages.{index}.{name}"), value);
-        }
-        if end.is_finite() {
-            said.insert(format!("scene.stages.{index}.end_m"), end);
         }
     }
     let given = || Parameter::CraterStiffness.get(scene).ok();
@@ -394,6 +397,10 @@ struct Key {
 /// The rule for `key` of the table `header`.
 fn rule_of(header: &str, key: &str) -> Option<Key> {
     let is_layer = header == "[[target.layer]]";
+    // Names of the file's own, which may be those of keys.
+    if header == "[parameters]" {
+        return None;
+    }
     let (is_required, negative, zero) = match key {
         "mass" | "diameter" => (true, false, false),
         "strength" => (true, false, is_layer),

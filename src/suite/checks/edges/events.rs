@@ -383,7 +383,8 @@ fn laws_outside_their_range(_: &Subject<'_>) -> Found {
     let mut worst = 0.0;
     for (name, text) in SHIPPED {
         let scene = Scene::from_toml(text, name)?;
-        for stage in scene.problem()?.stages {
+        // The coefficients of a law of its own are NaN.
+        for stage in scene.problem()?.stages.iter().filter(|stage| !stage.static_force.is_nan()) {
             for x in [-1e3, -1e-3, 0.0, 0.1, 1e3] {
                 for v in [-1e3, -1e-9, 0.0, 1e-9, 1e3] {
                     let terms = [stage.static_force, stage.stiffness * x, stage.viscosity * v, stage.drag * v * v];

@@ -1,0 +1,660 @@
+//! One stage whose force is an expression of its own: the series of V and x from the series of the expression.
+//!
+//! ```text
+//! over time      x' = V,  V' = -F(x, V)/M                            s = t
+//! over velocity  t' = m M V0 (1-s)^(m-1)/F(x, V),  x' = V t'         V = V0 (1-s)^m, for F > 0
+//! ```
+//!
+//! **Velocity as variable.** A fractional power of V, as in `(V/v1)^1.5`, has a branch point at V = 0: the series in time
+//! ends there, and steps shrink on the way to rest. With `V = u^m`, m the common denominator of the powers, F is smooth
+//! in u, and rest is the fixed end u = 0 (docs/theory.md, section 10). Where V falls fast enough, steps go by u, else by
+//! time.
+//!
+//! **Length of a step.** The last two coefficients give it, as in [`super`]. They may vanish by chance, and a force may
+//! change where they do not see it. So three places of the step are asked whether the series satisfies the equation there,
+//! and a step on which it does not is shortened. What lies between them is bounded by intervals ([`Law::shown_in`]).
+//!
+//! **Kinks.** min, max and abs have one smooth branch on each side of a switch. A step takes one branch, and ends at the
+//! first root of the switch.
+//!
+//! **Events.** The first root of V on the step is isolated ([`locate::first_root`]). x grows until then, so that a boundary
+//! is passed before it exactly when x reaches it there.
+
+use super::{STEPS_MAX, Steps, power_of_two_below, rough_exp2, rough_log2};
+use crate::integrators::flight::{Course, SLOW, StageEnd, VANISHES};
+use crate::integrators::locate;
+use crate::integrators::outcome::{IntegrationError, Solved};
+use crate::physics::expression::Jets;
+use crate::physics::{Law, Scalar, State};
+
+/// Places of a step, over its length, at which the equation is asked.
+const ASKED: [f64; 3] = [1.0, 0.62, 0.29];
+
+/// What the equation may lack over the step, in tolerances: truncation after order K has the factor K there.
+const DEFECT_MAX: f64 = 100.0;
+
+/// Times that a step may be shortened, each by [`SHORTENING`].
+const SHORTENED_MAX: u32 = 100;
+const SHORTENING: f64 = 0.7;
+
+/// Velocity over the impact speed below which what is left of a flight goes by the power of V with which the force vanishes.
+const VANISHING: f64 = 1e-12;
+
+/// Distance to rest over the depth below which a force is about to end the flight, and no barrier holds it up.
+const NEAR_REST: f64 = 1e-11;
+
+/// Longest step by velocity where the force vanishes at rest: its quotients cancel towards the end.
+const VANISHING_SPAN: f64 = 0.5;
+
+/// Longest step in its unit of time, and times that the unit may be changed where coefficients overflow.
+const SPAN_MAX: f64 = 64.0;
+const RESCALED_MAX: u32 = 60;
+
+/// Share of the velocity's root that a step by velocity must take to be taken without asking for one by time; and behind
+/// another such step.
+const ENOUGH: f64 = 0.3;
+const STILL_ENOUGH: f64 = 0.05;
+
+/// Halvings of a bracket: more than a number has digits.
+const HALVINGS: u32 = 80;
+
+/// Corrections of a root in the number type.
+const CORRECTIONS: usize = 4;
+
+/// Series of one step over its variable s: depth (m), velocity (m/s), time since its start (s).
+#[derive(Clone)]
+struct Path<S, const K: usize> {
+    depth: [S; K],
+    velocity: [S; K],
+    time: [S; K],
+    form: Form,
+    /// Length of the step in s.
+    span: f64,
+}
+
+/// Which variable a step goes by.
+#[derive(Clone, Copy, PartialEq)]
+enum Form {
+    /// Time, in a unit of so many seconds.
+    Time(f64),
+    /// `V = V0 (1-s)^m`.
+    Velocity(u32),
+}
+
+/// What ends a step.
+#[derive(Clone, Copy, PartialEq)]
+enum Event {
+    None,
+    Limit,
+    Rest,
+}
+
+/// `c[0] + c[1] s + ...`, by four chains at once: each waits for its last product, none for another.
+fn value<S: Scalar>(coefficients: &[S], s: S) -> S {
+    let s2 = s * s;
+    let s4 = s2 * s2;
+    let mut sums = [S::zero(); 4];
+    for four in coefficients.chunks(4).rev() {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum = *sum * s4 + four.get(lane).copied().unwrap_or(S::zero());
+        }
+    }
+    (sums[0] + s2 * sums[2]) + s * (sums[1] + s2 * sums[3])
+}
+
+/// Its derivative.
+fn slope<S: Scalar>(coefficients: &[S], s: S) -> S {
+    let terms = coefficients.iter().enumerate().skip(1).rev();
+    terms.fold(S::zero(), |sum, (k, c)| sum * s + *c * S::from_f64(k as f64))
+}
+
+/// First root of the series on `(0, span]`.
+fn first_root<S: Scalar, const K: usize>(series: &[S; K], span: f64) -> Option<f64> {
+    let values = series.map(Scalar::value);
+    let rest = values[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * span);
+    // A switch may have no series where the force has one.
+    if values[0].abs() > rest || !rest.is_finite() { None } else { locate::first_root(&values, span) }
+}
+
+/// The place before `end` where a function, which rises there from below zero to above it, vanishes: by Newton's method, by
+/// halving where that leaves the bracket. `function` gives value and slope.
+fn root_before(function: impl Fn(f64) -> (f64, f64), end: f64) -> f64 {
+    let (mut low, mut high, mut at) = (0.0, end, end);
+    for _ in 0..HALVINGS {
+        let (value, slope) = function(at);
+        if value < 0.0 {
+            low = at;
+        } else {
+            high = at;
+        }
+        let newton = at - value / slope;
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - at).abs() <= f64::EPSILON * at || next <= low || next >= high {
+            break;
+        }
+        at = next;
+    }
+    at
+}
+
+/// Value and slope of a series, as numbers; four chains each, as [`value`].
+fn both<S: Scalar>(series: &[S], s: f64) -> (f64, f64) {
+    let s2 = s * s;
+    let s4 = s2 * s2;
+    // Of `a_j(s^4)` and its derivative by `s^4`, where the series is the sum of `s^j a_j(s^4)`.
+    let (mut sums, mut slopes) = ([0.0; 4], [0.0; 4]);
+    for four in series.chunks(4).rev() {
+        for lane in 0..4 {
+            slopes[lane] = slopes[lane] * s4 + sums[lane];
+            sums[lane] = sums[lane] * s4 + four.get(lane).map_or(0.0, |c| c.value());
+        }
+    }
+    let value = (sums[0] + s2 * sums[2]) + s * (sums[1] + s2 * sums[3]);
+    let inner = (slopes[0] + s2 * slopes[2]) + s * (slopes[1] + s2 * slopes[3]);
+    (value, sums[1] + s * (2.0 * sums[2] + 3.0 * s * sums[3]) + 4.0 * s2 * s * inner)
+}
+
+/// First root of the velocity on `(0, span]`.
+///
+/// Where V only falls, the sign at the end decides.
+fn first_rest<S: Scalar, const K: usize>(velocity: &[S; K], span: f64) -> Option<f64> {
+    let (at_end, _) = both(velocity, span);
+    let rest = velocity[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * span);
+    if velocity[0].value() > rest {
+        return None;
+    }
+    let mut slope = [0.0; K];
+    for k in 1..K {
+        slope[k - 1] = k as f64 * velocity[k].value();
+    }
+    if locate::is_negative(&slope[..K - 1], span) {
+        let risen = |s| {
+            let (value, slope) = both(velocity, s);
+            (-value, -slope)
+        };
+        return (at_end <= 0.0).then(|| root_before(risen, span));
+    }
+    first_root(velocity, span)
+}
+
+impl<S: Scalar, const K: usize> Path<S, K> {
+    fn start(form: Form, at: State<S>) -> Self {
+        let zero = [S::zero(); K];
+        let mut path = Self { depth: zero, velocity: zero, time: zero, form, span: 0.0 };
+        (path.depth[0], path.velocity[0]) = (at.depth, at.velocity);
+        path
+    }
+
+    /// The state at `s`, its time since the start of the step.
+    fn at(&self, s: S) -> State<S> {
+        let velocity = match self.form {
+            Form::Time(_) => value(&self.velocity, s),
+            // By its formula: the series cancels towards rest.
+            Form::Velocity(m) => (1..=m).fold(self.velocity[0], |v, _| v * (S::one() - s)),
+        };
+        let time = match self.form {
+            Form::Time(unit) => s * S::from_f64(unit),
+            Form::Velocity(_) => value(&self.time, s),
+        };
+        State { time, depth: value(&self.depth, s), velocity }
+    }
+
+    /// What is left of the velocity at its end.
+    fn speed_left(&self) -> f64 {
+        self.at(S::from_f64(self.span)).velocity.value()
+    }
+
+    /// The longest span whose last two terms are within `tolerance` of the second of the series.
+    fn spanned(mut self, tolerance: f64) -> Self {
+        let of = |series: &[S; K], scale: S| {
+            let goal = rough_log2(tolerance * scale.value());
+            let by = |k: usize| (goal - rough_log2(series[k].value())) * (1.0 / k as f64);
+            rough_exp2(by(K - 1).min(by(K - 2)))
+        };
+        self.span = match self.form {
+            Form::Time(_) => of(&self.velocity, self.velocity[0]).min(SPAN_MAX),
+            Form::Velocity(_) => of(&self.depth, self.depth[1]).min(of(&self.time, self.time[1])).min(1.0),
+        };
+        self
+    }
+
+    fn is_finite(&self) -> bool {
+        let all = self.depth.iter().chain(&self.velocity).chain(&self.time);
+        all.copied().all(|c| c.value().is_finite())
+    }
+
+    /// What the equation lacks at `s`, over the span and over the quantity that it changes.
+    fn defect(&self, s: f64, law: &Law<S>, mass: f64) -> f64 {
+        let (velocity, rate) = both(&self.velocity, s);
+        let velocity = match self.form {
+            Form::Time(_) => velocity,
+            Form::Velocity(m) => self.velocity[0].value() * (1.0 - s).powi(m.cast_signed()),
+        };
+        let force = law.force_value(both(&self.depth, s).0, velocity);
+        match self.form {
+            Form::Time(unit) => (rate + force / mass * unit).abs() * self.span / self.velocity[0].value(),
+            Form::Velocity(m) => {
+                let falling = (1.0 - s).powi(m.cast_signed() - 1);
+                let rate = f64::from(m) * mass * self.velocity[0].value() * falling / force;
+                let first = self.time[1].value();
+                // At rest both vanish, and their quotient is the force's.
+                if falling == 0.0 && m > 1 {
+                    return 0.0;
+                }
+                (both(&self.time, s).1 - rate).abs() * self.span / first
+            }
+        }
+    }
+
+    /// Rounding that the defect has by itself: of the force, and of the sum.
+    fn noise(&self, force: f64, mass: f64) -> f64 {
+        match self.form {
+            Form::Time(unit) => {
+                let largest = self.velocity.iter().enumerate().rev();
+                let sum = largest.fold(0.0, |sum, (k, c)| sum * self.span + k as f64 * c.value().abs());
+                (sum + force.abs() / mass * unit * self.span) / self.velocity[0].value()
+            }
+            Form::Velocity(_) => {
+                let largest = self.time.iter().enumerate().skip(1).rev();
+                largest.fold(0.0, |sum, (k, c)| sum * self.span + k as f64 * c.value().abs()) / self.time[1].value()
+            }
+        }
+    }
+}
+
+/// A stage in progress.
+struct Walk<'l, S, const K: usize> {
+    law: &'l Law<S>,
+    mass: S,
+    jets: Jets<S>,
+    /// The side of each switch on this step.
+    sides: Vec<bool>,
+    /// The switch at whose root this step starts.
+    kink: Option<usize>,
+    /// Whether the step before went by velocity.
+    goes_by_velocity: bool,
+    tolerance: f64,
+}
+
+impl Steps {
+    /// Solves the present stage, of `law`, up to `limit`.
+    pub(super) fn through_law<S: Scalar, const K: usize>(
+        &self,
+        course: &mut Course<'_, S>,
+        law: &Law<S>,
+        limit: S,
+    ) -> Solved<StageEnd<S>> {
+        let bound = law.bound();
+        let mut walk = Walk::<S, K> {
+            law,
+            mass: course.problem.mass,
+            jets: Jets::default(),
+            sides: vec![false; bound.switches().len()],
+            kink: None,
+            goes_by_velocity: false,
+            tolerance: self.tolerance,
+        };
+        while course.cost.steps < STEPS_MAX {
+            if let Some(end) = walk.step(course, limit)? {
+                return Ok(end);
+            }
+        }
+        let remedy = "end the target or the stage before V vanishes, or take --method adaptive";
+        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: course.state.values() })
+    }
+}
+
+impl<S: Scalar, const K: usize> Walk<'_, S, K> {
+    /// One step from the state of `course`; how the stage ends, if it does.
+    fn step(&mut self, course: &mut Course<'_, S>, limit: S) -> Solved<Option<StageEnd<S>>> {
+        let start = course.state;
+        let force = self.law.force(start.depth, start.velocity);
+        course.cost.force_evaluations += K as u64;
+        if !force.value().is_finite() {
+            return Err(self.no_force(course, start));
+        }
+        if let Some(end) = self.end_of_slow(course, force, limit) {
+            return Ok(Some(end));
+        }
+        self.choose_sides(start, force, limit);
+        let (path, kink) = self.path(course, force, limit)?;
+        let (s, event) = first_event(&path, limit);
+        let local = path.at(s);
+        let next = State {
+            time: start.time + local.time,
+            depth: if event == Event::Limit { limit } else { local.depth },
+            velocity: if event == Event::Rest || local.velocity.value() < 0.0 { S::zero() } else { local.velocity },
+        };
+        if !next.is_finite() {
+            return Err(IntegrationError::NotFinite { what: "the state", last: start.values() });
+        }
+        course.cost.steps += 1;
+        if let Some(least) = least_inside(&path, s.value()) {
+            course.pass_least(least);
+        }
+        self.widen_bound(course, force.value(), start, next);
+        course.sample_until(next, |time| {
+            let since = time - start.time.value();
+            let s = match path.form {
+                Form::Time(unit) => since / unit,
+                Form::Velocity(_) => {
+                    let passed = |s| {
+                        let (time, pace) = both(&path.time, s);
+                        (time - since, pace)
+                    };
+                    root_before(passed, s.value())
+                }
+            };
+            let local = path.at(S::from_f64(s));
+            State { time: S::from_f64(time), ..local }
+        });
+        Ok(match event {
+            Event::None => {
+                self.kink = kink;
+                course.state = next;
+                course.sample(next);
+                None
+            }
+            Event::Limit => Some(StageEnd::Limit(next)),
+            Event::Rest => Some(StageEnd::Rest(next)),
+        })
+    }
+
+    /// The error where the force has no value.
+    fn no_force(&self, course: &Course<'_, S>, at: State<S>) -> IntegrationError {
+        let last = at.values();
+        let why = self.law.explain(last.depth, last.velocity);
+        IntegrationError::NoForce { stage: course.stage, why, last }
+    }
+
+    /// The end of a flight that is as good as over: rest within the digits of the present state, or an approach.
+    fn end_of_slow(&self, course: &Course<'_, S>, force: S, limit: S) -> Option<StageEnd<S>> {
+        let State { time, depth, velocity } = course.state;
+        let (v, x) = (velocity.value(), depth.value());
+        let relative = v / course.problem.impact_speed.value();
+        let to_rest = 0.5 * self.mass.value() * v * v / force.value().abs();
+        let is_lost = relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
+        if is_lost && self.law.force_value(x, 0.0) != 0.0 {
+            // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
+            return Some(StageEnd::Rest(State { velocity: S::zero(), ..course.state }));
+        }
+        if v > SLOW * course.problem.impact_speed.value() {
+            return None;
+        }
+        let at_rest = self.law.force(depth, S::zero()).value();
+        let deceleration = force.over(self.mass);
+        if at_rest > 0.0 && force.value() > 0.0 {
+            let to_rest = State {
+                time: time + velocity.over(deceleration),
+                depth: depth + velocity * velocity.over(deceleration) * S::from_f64(0.5),
+                velocity: S::zero(),
+            };
+            let change = (at_rest / force.value() - 1.0).abs().max(0.01);
+            let is_over = (to_rest.depth.value() - x) * change <= 0.25 * f64::EPSILON * x
+                && (to_rest.time - time).value() * change <= f64::EPSILON * time.value();
+            let is_before = to_rest.depth.value() < limit.value();
+            return (is_over && is_before).then_some(StageEnd::Rest(to_rest));
+        }
+        if at_rest == 0.0 && v <= VANISHING * course.problem.impact_speed.value() && self.law.stops(x, v) {
+            // F = a V^n, n < 1.
+            let rest = |power: f64| S::one().over(S::from_f64(power - self.law.power(x, v)));
+            let time = time + velocity.over(deceleration) * rest(1.0);
+            let depth = depth + velocity * velocity.over(deceleration) * rest(2.0);
+            let is_before = depth.value() < limit.value();
+            return is_before.then_some(StageEnd::Rest(State { time, depth, velocity: S::zero() }));
+        }
+        let is_approach = self.law.is_approach(self.mass.value(), course.state.values(), limit.value() - x);
+        is_approach.then_some(StageEnd::Approach(course.state, VANISHES))
+    }
+
+    /// Chooses the side of each switch ahead.
+    fn choose_sides(&mut self, start: State<S>, force: S, limit: S) {
+        if self.sides.is_empty() {
+            return;
+        }
+        let unit = time_unit(start, force, self.mass, limit);
+        // Two rounds: the slope of a switch that stands at zero may depend on the side of another.
+        for _ in 0..2 {
+            self.over_time(start, unit, 4);
+            for (side, register) in self.law.bound().switches().iter().enumerate() {
+                let series = self.jets.register(*register);
+                let known = if self.kink == Some(side) { &series[1..4] } else { &series[..4] };
+                let first = known.iter().map(|c| c.value()).find(|c| *c != 0.0);
+                self.sides[side] = first.unwrap_or(0.0) > 0.0;
+            }
+        }
+    }
+
+    /// A step on which the equation holds, and the switch at whose root it ends.
+    fn path(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<(Path<S, K>, Option<usize>)> {
+        let start = course.state;
+        let by_velocity = self.over_velocity(start, force);
+        let mut path = match by_velocity {
+            Some(path) if path.span >= if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH } => path,
+            other => {
+                let by_time = self.by_time(course, force, limit)?;
+                match other {
+                    Some(path) if path.speed_left() < by_time.speed_left() => {
+                        self.over_velocity(start, force).unwrap_or(path)
+                    }
+                    _ => by_time,
+                }
+            }
+        };
+        self.goes_by_velocity = matches!(path.form, Form::Velocity(_));
+        // What the force is rounded to: its terms may cancel.
+        let (by_depth, by_velocity) = self.law.slopes(start.depth.value(), start.velocity.value());
+        let terms = (by_depth * start.depth.value()).abs() + (by_velocity * start.velocity.value()).abs();
+        let size = force.value().abs() + if terms.is_finite() { terms } else { 0.0 };
+        let mut kink = None;
+        for _ in 0..SHORTENED_MAX {
+            if let Some((switch, root)) = self.first_kink(path.span) {
+                (path.span, kink) = (root, Some(switch));
+            }
+            let allowed =
+                DEFECT_MAX * self.tolerance + 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(size, self.mass.value());
+            let holds = |share: &f64| path.defect(share * path.span, self.law, self.mass.value()) <= allowed;
+            let energy = self.mass.value() * start.velocity.value() * start.velocity.value();
+            let place = |share: f64| {
+                let at = path.at(S::from_f64(share * path.span)).values();
+                (at.depth, at.velocity.max(0.0))
+            };
+            let shows = || {
+                let parts = self.law.shown_in(place, energy)?;
+                (1..parts).all(|part| holds(&(part as f64 / parts as f64))).then_some(())
+            };
+            if ASKED.iter().all(holds) && shows().is_some() {
+                return Ok((path, kink));
+            }
+            path.span *= SHORTENING;
+            kink = None;
+        }
+        let end = path.at(S::from_f64(path.span));
+        let last = State { time: start.time + end.time, ..end };
+        if self.law.force(end.depth, end.velocity).value().is_finite() {
+            return Err(IntegrationError::NotFinite { what: "the step", last: start.values() });
+        }
+        Err(self.no_force(course, last))
+    }
+
+    /// The first root of a switch on a step of `span`.
+    fn first_kink(&self, span: f64) -> Option<(usize, f64)> {
+        let roots = self.law.bound().switches().iter().enumerate().filter_map(|(side, register)| {
+            let mut series = [S::zero(); K];
+            series.copy_from_slice(&self.jets.register(*register)[..K]);
+            if self.kink == Some(side) {
+                series[0] = S::zero();
+            }
+            // A root at the end of the step is passed by the next.
+            first_root(&series, span).filter(|root| *root < span).map(|root| (side, root))
+        });
+        roots.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The series over time, in a unit in which it has finite coefficients.
+    fn by_time(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Path<S, K>> {
+        let mut unit = time_unit(course.state, force, self.mass, limit);
+        for _ in 0..RESCALED_MAX {
+            let path = self.over_time(course.state, unit, K);
+            if path.is_finite() {
+                return Ok(path.spanned(self.tolerance));
+            }
+            unit *= 1.0 / 1_048_576.0;
+        }
+        Err(self.no_force(course, course.state))
+    }
+
+    /// The first `count` coefficients over time in units of `unit` (s).
+    fn over_time(&mut self, start: State<S>, unit: f64, count: usize) -> Path<S, K> {
+        let mut path = Path::start(Form::Time(unit), start);
+        path.time[1] = S::from_f64(unit);
+        self.jets.start(self.law.bound(), &self.sides);
+        let rate = S::from_f64(unit).over(self.mass);
+        for k in 0..count {
+            let force = self.jets.push(self.law.bound(), path.depth[k], path.velocity[k]);
+            if k + 1 < K {
+                let share = S::one().over(S::from_f64((k + 1) as f64));
+                path.depth[k + 1] = S::from_f64(unit) * path.velocity[k] * share;
+                path.velocity[k + 1] = -(rate * force * share);
+            }
+        }
+        path
+    }
+
+    /// The series over velocity, for a law with a branch point at rest and a force that resists.
+    fn over_velocity(&mut self, start: State<S>, force: S) -> Option<Path<S, K>> {
+        let m = self.law.branch_at_rest().filter(|m| *m > 1)?;
+        if force.value() <= 0.0 {
+            return None;
+        }
+        let mut path = Path::start(Form::Velocity(m), start);
+        // V0 (1-s)^m, and m M V0 (1-s)^(m-1).
+        let mut rate = [S::zero(); K];
+        for (series, scale, power) in [
+            (&mut path.velocity, start.velocity, m),
+            (&mut rate, start.velocity * self.mass * S::from_f64(f64::from(m)), m - 1),
+        ] {
+            let mut binomial = 1.0;
+            for (k, term) in series.iter_mut().enumerate().take(power as usize + 1) {
+                *term = scale * S::from_f64(binomial);
+                binomial *= -(f64::from(power) - k as f64) / (k as f64 + 1.0);
+            }
+        }
+        let inverse = S::one().over(force);
+        let mut forces = [S::zero(); K];
+        // dt/ds.
+        let mut pace = [S::zero(); K];
+        self.jets.start_falling(self.law.bound(), &self.sides, m);
+        for k in 0..K {
+            forces[k] = self.jets.push(self.law.bound(), path.depth[k], path.velocity[k]);
+            let known = (1..=k).fold(rate[k], |sum, i| sum - forces[i] * pace[k - i]);
+            pace[k] = known * inverse;
+            if k + 1 < K {
+                let share = S::one().over(S::from_f64((k + 1) as f64));
+                let advance = (0..=k.min(m as usize)).fold(S::zero(), |sum, i| sum + path.velocity[i] * pace[k - i]);
+                path.time[k + 1] = pace[k] * share;
+                path.depth[k + 1] = advance * share;
+            }
+        }
+        if !path.is_finite() {
+            return None;
+        }
+        let mut path = path.spanned(self.tolerance);
+        if self.law.force(start.depth, S::zero()).value() == 0.0 {
+            path.span = path.span.min(VANISHING_SPAN);
+        }
+        Some(path)
+    }
+
+    /// Adds the error of one step to the error bound of `W/V0²`, and the growth of what is there (docs/theory.md, section 10):
+    ///
+    /// ```text
+    /// d(dW)/dt = -(F_V/M) dW      at one depth
+    /// ```
+    ///
+    /// so that only a force that falls with V lets an error grow. What a step adds is that of [`super`].
+    fn widen_bound(&self, course: &mut Course<'_, S>, force: f64, start: State<S>, next: State<S>) {
+        let (a, b) = (start.values(), next.values());
+        let (time, distance) = (b.time - a.time, b.depth - a.depth);
+        let falls = [a, b].map(|at| self.law.slopes(at.depth, at.velocity).1).into_iter().fold(0.0, f64::min).abs();
+        let mass = self.mass.value();
+        let growth = time * falls / mass;
+        let fastest = a.velocity.max(b.velocity);
+        let end_force = self.law.force(next.depth, next.velocity).value().abs();
+        let largest = force.abs().max(if end_force.is_finite() { end_force } else { 0.0 }) / mass;
+        let relative = 1.0 / course.problem.impact_speed.value();
+        let rounding = 6.0 * fastest * fastest + 3.0 * largest * (b.depth + 2.0 * distance);
+        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * fastest * fastest;
+        let grown = if growth.is_finite() { growth.exp() } else { 1.0 };
+        course.error_bound = course.error_bound * grown + relative * relative * added;
+    }
+}
+
+/// A unit of time (s), a power of two: the shortest of that in which the force stops the projectile and that to the limit.
+fn time_unit<S: Scalar>(start: State<S>, force: S, mass: S, limit: S) -> f64 {
+    let speed = start.velocity.value();
+    let stopping = speed * mass.value() / force.value().abs();
+    let crossing = (limit.value() - start.depth.value()) / speed;
+    let shortest = stopping.min(crossing);
+    power_of_two_below(if shortest.is_finite() && shortest > 0.0 { shortest } else { 1.0 })
+}
+
+/// Where the step ends, and how: at the first rest, at the limit if that comes before, else at its span.
+fn first_event<S: Scalar, const K: usize>(path: &Path<S, K>, limit: S) -> (S, Event) {
+    let span = path.span;
+    let rest = match path.form {
+        Form::Time(_) => first_rest(&path.velocity, span),
+        Form::Velocity(_) => (span >= 1.0).then_some(1.0),
+    };
+    let end = rest.unwrap_or(span);
+    let beyond = |s: S| value(&path.depth, s) - limit;
+    if limit.value() < f64::INFINITY && beyond(S::from_f64(end)).value() >= 0.0 {
+        let limit = limit.value();
+        let passed = |s| {
+            let (depth, speed) = both(&path.depth, s);
+            (depth - limit, speed)
+        };
+        let root = S::from_f64(root_before(passed, end));
+        return (corrected(root, end, beyond, |s| slope(&path.depth, s)), Event::Limit);
+    }
+    match (rest, path.form) {
+        (Some(rest), Form::Time(_)) => {
+            let at = |s| value(&path.velocity, s);
+            (corrected(S::from_f64(rest), span, at, |s| slope(&path.velocity, s)), Event::Rest)
+        }
+        (Some(rest), Form::Velocity(_)) => (S::from_f64(rest), Event::Rest),
+        (None, _) if path.speed_left() <= 0.0 => (S::from_f64(span), Event::Rest),
+        (None, _) => (S::from_f64(span), Event::None),
+    }
+}
+
+/// `root`, which is that of the values, corrected in the number type; as it is where two roots meet.
+fn corrected<S: Scalar>(root: S, end: f64, function: impl Fn(S) -> S, slope: impl Fn(S) -> S) -> S {
+    let mut s = root;
+    for _ in 0..CORRECTIONS {
+        let next = s - function(s).over(slope(s));
+        if !((next.value() - root.value()).abs() <= 1e-6 * end) {
+            break;
+        }
+        let is_last = S::EPSILON >= f64::EPSILON || next.value() == s.value();
+        s = next;
+        if is_last {
+            break;
+        }
+    }
+    s
+}
+
+/// The least velocity inside the step, where V falls before it and rises behind it.
+fn least_inside<S: Scalar, const K: usize>(path: &Path<S, K>, end: f64) -> Option<f64> {
+    let rate = |s: f64| slope(&path.velocity, S::from_f64(s)).value();
+    if matches!(path.form, Form::Velocity(_)) || !(rate(0.0) < 0.0 && rate(end) > 0.0) {
+        return None;
+    }
+    let mut slopes = [0.0; K];
+    for k in 1..K {
+        slopes[k - 1] = k as f64 * path.velocity[k].value();
+    }
+    let place = root_before(|s| both(&slopes, s), end);
+    Some(path.at(S::from_f64(place)).velocity.value())
+}

@@ -1,0 +1,343 @@
+//! Contracts of a solution whose force is an expression of its own, for every method that takes one.
+
+use super::*;
+use crate::physics::reference::{self, Source};
+use crate::physics::{Advice, EventKind, Outcome, Problem, Scene, Stage};
+use crate::studies::error::Errors;
+use crate::studies::formal_order::{Path, formal_order};
+use crate::studies::quantity::Quantity;
+use crate::testing::{Random, kinds, random_concrete};
+
+/// 2 kg, a force of the parameters below, no far side.
+fn scene(force: &str, speed: f64) -> Scene {
+    let known = [
+        ("P", "'848 kN'"),
+        ("Q", "'3.25 kg/m'"),
+        ("R", "'50 kN'"),
+        ("b", "0.2"),
+        ("v1", "'100 m/s'"),
+        ("l", "'20 mm'"),
+    ];
+    let is_used = |name: &str| force.split(|c: char| !c.is_alphanumeric()).any(|word| word == name);
+    let used = known.iter().filter(|(name, _)| is_used(name)).map(|(name, value)| format!("{name} = {value}\n"));
+    let text = format!(
+        "projectile.mass = 2\nimpact.velocity = {speed:?}\n[parameters]\n{}[[stage]]\nforce = \"{force}\"\n",
+        used.collect::<String>()
+    );
+    Scene::from_toml(&text, "law").unwrap()
+}
+
+fn problem(force: &str, speed: f64) -> Problem {
+    scene(force, speed).problem().unwrap()
+}
+
+/// Force, impact speed (m/s), depth (m) and time (s) of rest; and the speed (m/s) at a depth (m) before it.
+///
+/// Of a force of V alone by quadrature over V, of the others by that over x of the linear equation of W; mpmath with 40
+/// digits, 20 for those times.
+const KNOWN: [(&str, f64, f64, f64, f64, f64); 14] = [
+    (
+        "P + Q*V^2 + R*(V/v1)^1.5",
+        202.0,
+        0.041_204_557_230_173_07,
+        0.000_428_546_364_637_818_07,
+        0.0247,
+        122.553_119_945_732_2,
+    ),
+    (
+        "(P + Q*V^2)*(1 + b*exp(-V/v1))",
+        202.0,
+        0.042_215_047_140_045_196,
+        0.000_417_898_950_212_396_17,
+        0.0253,
+        126.915_553_950_958_28,
+    ),
+    (
+        "P*(1 + b*log(1 + V/v1)) + Q*V^2",
+        202.0,
+        0.038_884_348_984_737_79,
+        0.000_406_144_033_262_498_3,
+        0.0233,
+        122.936_787_372_337_65,
+    ),
+    (
+        "P*(1 + b*log10(1 + V/v1))",
+        202.0,
+        0.044_899_526_408_868_136,
+        0.000_451_160_766_195_477_44,
+        0.0269,
+        126.699_943_769_336_16,
+    ),
+    ("R*(V/v1)^0.2", 202.0, 0.787_807_210_146_129_1, 0.008_775_080_311_033_617, 0.473, 121.347_761_439_303_35),
+    (
+        "P + R*sqrt(1 + (V/v1)^2)",
+        202.0,
+        0.043_732_270_048_354_51,
+        0.000_438_214_981_961_115_86,
+        0.0262,
+        126.619_197_093_779_93,
+    ),
+    (
+        "P*(1 + b*atan(V/v1)) + R*tanh(V/v1)",
+        202.0,
+        0.039_326_581_287_758_03,
+        0.000_405_373_466_922_416_63,
+        0.0236,
+        124.917_544_266_803_74,
+    ),
+    (
+        "P*(1 + b*sin(V/v1)) + R*cos(V/v1)",
+        202.0,
+        0.040_607_926_093_901_986,
+        0.000_408_310_674_349_731_76,
+        0.0244,
+        127.355_626_091_266_06,
+    ),
+    (
+        "P + Q*max(V^2 - v1^2, 0)",
+        202.0,
+        0.046_128_778_267_665_815,
+        0.000_464_680_914_642_254_54,
+        0.0277,
+        125.254_664_130_440_3,
+    ),
+    (
+        "P*tanh(x/l) + Q*V^2 + R",
+        202.0,
+        0.053_932_395_527_220_63,
+        0.000_494_143_976_752_465_9,
+        0.0324,
+        139.428_766_779_235_53,
+    ),
+    (
+        "P + R*abs(x/l - 1) + Q*V^2",
+        202.0,
+        0.043_399_285_497_563_48,
+        0.000_436_294_037_314_787_1,
+        0.026,
+        125.861_988_905_239_61,
+    ),
+    (
+        "P*(1 - exp(-x/l)) + Q*V^2 + R",
+        202.0,
+        0.058_409_514_287_266_776,
+        0.000_530_410_558_634_416_4,
+        0.035,
+        140.517_395_133_519_27,
+    ),
+    ("P - R*x/l", 202.0, 0.052_122_588_837_087_355, 0.000_531_142_289_585_633_8, 0.0313, 124.443_611_728_364_74),
+    ("P*cos(x/l) + R", 150.0, 0.147_668_165_465_075_55, 0.001_476_123_497_302_210_9, 0.0886, 185.359_803_087_063_1),
+];
+
+/// Methods that take a law, to round-off or to `rtol`.
+fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
+    let names = MethodName::built().filter(|name| {
+        !matches!(name, MethodName::Energy | MethodName::ClosedForm) && name.accuracy() != Accuracy::Step
+    });
+    names
+        .map(|name| {
+            let is_tolerant = name.accuracy() == Accuracy::Tolerance;
+            let options = MethodOptions { rtol: is_tolerant.then_some(rtol), ..MethodOptions::default() };
+            (name, Method::new(name, &options).unwrap())
+        })
+        .collect()
+}
+
+#[test]
+fn every_method_solves_every_law_as_accurately_as_it_promises() {
+    for (name, method) in methods(1e-10) {
+        // Steps that pass a kink, or a power at rest, lose accuracy that the library does not see.
+        for (force, speed, depth, time, exit, velocity) in KNOWN {
+            let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
+            let flight = method.integrator().solve(&problem(force, speed), Detail::Events).unwrap();
+            assert_eq!((flight.outcome, kinds(&flight.events)), (Outcome::Stopped, vec![EventKind::Rest]), "{force}");
+            let through = problem(force, speed).with_exit(exit);
+            let through = method.integrator().solve(&through, Detail::Events).unwrap();
+            assert_eq!((through.outcome, through.end.depth), (Outcome::Perforated, exit), "{force}");
+            let errors = [flight.end.depth / depth, flight.end.time / time, through.end.velocity / velocity];
+            let error = errors.into_iter().map(|ratio| (ratio - 1.0).abs()).fold(0.0, f64::max);
+            assert!(error <= allowed, "{name}, {force}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn methods_that_are_formulas_refuse_a_law() {
+    for name in [MethodName::Energy, MethodName::ClosedForm] {
+        let method = Method::new(name, &MethodOptions::default()).unwrap();
+        let error = method.integrator().solve(&problem("P + Q*V^2", 300.0), Detail::End).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
+    }
+    assert!(reference::flight(Source::Problem(&problem("P + Q*V^2", 300.0))).is_err());
+}
+
+/// The same problem with every stage written as an expression.
+fn written(problem: &Problem) -> Problem {
+    let mut text = format!("projectile.mass = {:e}\nimpact.velocity = {:e}\n", problem.mass, problem.impact_speed);
+    if problem.has_exit() {
+        text += &format!("target.thickness = {:e}\n", problem.exit_depth);
+    }
+    let mut stages = String::new();
+    text += "[parameters]\n";
+    for (index, stage) in problem.stages.iter().enumerate() {
+        let Stage { static_force: p, stiffness: s, viscosity: r, drag: q, end } = *stage;
+        let units = [("p", p, "N"), ("s", s, "N/m"), ("r", r, "kg/s"), ("q", q, "kg/m")];
+        for (name, value, unit) in units {
+            text += &format!("{name}{index} = '{value:e} {unit}'\n");
+        }
+        stages += &format!("[[stage]]\nforce = 'p{index} + s{index}*x + r{index}*V + q{index}*V^2'\n");
+        if end.is_finite() {
+            stages += &format!("end = {end:e}\n");
+        }
+    }
+    Scene::from_toml(&(text + &stages), "written").unwrap().problem().unwrap()
+}
+
+#[test]
+fn coefficients_written_as_an_expression_give_the_same_digits() {
+    let mut random = Random::new(5);
+    for _ in 0..200 {
+        let problem = random_concrete(&mut random);
+        let (exact, conditions) = (
+            reference::flight(Source::Problem(&problem)).unwrap(),
+            reference::conditions(Source::Problem(&problem)).unwrap(),
+        );
+        let flight = Taylor::default().solve(&written(&problem), Detail::Events).unwrap();
+        if flight.outcome == Outcome::Undecided {
+            continue;
+        }
+        assert!(flight.outcome.is_stop() == exact.outcome.is_stop(), "{problem:?}");
+        // The crater's end is a stage's end here.
+        let end = flight.end;
+        let renamed =
+            Flight { events: Taylor::default().solve(&problem, Detail::Events).unwrap().events, end, ..flight };
+        let (units, quantity) = Errors::in_50_digits(&renamed, &exact, &conditions).worst().unwrap();
+        assert!(units < 16.0, "{units} of {quantity}: {problem:?}");
+    }
+}
+
+/// Errors at two steps, one eighth of each other, over many steps: the slope is the order.
+#[test]
+fn central_difference_has_its_formal_orders_for_a_law() {
+    for velocity in VelocityAt::ALL {
+        for boundaries in Boundaries::ALL {
+            for (force, speed, depth, time, exit, end_speed) in [KNOWN[1], KNOWN[2], KNOWN[11], KNOWN[12]] {
+                let solve = |problem: &Problem, step| {
+                    CentralDifference::uniform(step, velocity, boundaries).solve(problem, Detail::Events).unwrap()
+                };
+                let (stop, through) = (problem(force, speed), problem(force, speed).with_exit(exit));
+                for (quantity, problem, exact) in [
+                    (Quantity::Depth, &stop, depth),
+                    (Quantity::Time, &stop, time),
+                    (Quantity::Velocity, &through, end_speed),
+                ] {
+                    let path = Path::of(problem, &Taylor::default().solve(problem, Detail::Events).unwrap());
+                    let formal = formal_order(velocity, boundaries, &path, quantity).unwrap();
+                    let error = |scale: f64| {
+                        let steps = (0..12).map(|i| time / (scale * (200.0 + 7.3 * f64::from(i))));
+                        let errors = steps.map(|step| {
+                            let end = solve(problem, step).end;
+                            let value = match quantity {
+                                Quantity::Depth => end.depth,
+                                Quantity::Time => end.time,
+                                _ => end.velocity,
+                            };
+                            (value / exact - 1.0).abs()
+                        });
+                        errors.fold(0.0, f64::max)
+                    };
+                    let order = (error(1.0) / error(8.0)).log(8.0);
+                    let said = format!("{quantity} of {force}, {velocity}, {boundaries}: {order} of {formal}");
+                    assert!(order > formal - 0.25 && (formal > 1.5 || order < formal + 0.6), "{said}");
+                }
+            }
+        }
+    }
+}
+
+/// A wall of 1 cm, 29 cm behind the face, takes all of the energy: its series at the face is that of nothing.
+#[test]
+fn a_wall_far_ahead_is_not_stepped_over() {
+    for (force, inner) in [
+        ("R*0.02 + P*6*exp(-((x/l - 14.5)/0.5)^2)", 0.27..0.325),
+        ("R*0.02 + P*24*exp(-((x/l - 14.5)/0.15)^4)", 0.27..0.325),
+        ("R*0.02 + P*3*(tanh((x/l - 13)/0.05) - tanh((x/l - 14.5)/0.05))", 0.25..0.325),
+    ] {
+        let problem = problem(force, 300.0).with_exit(0.33);
+        for (name, method) in methods(1e-8) {
+            let flight = method.integrator().solve(&problem, Detail::Events).unwrap();
+            assert!(flight.outcome.is_stop() && inner.contains(&flight.end.depth), "{name}, {force}: {}", flight.end);
+        }
+        let resolve = |speed| Ok(Problem { impact_speed: speed, ..problem.clone() });
+        let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
+        // The work of the wall and of the slab.
+        let law = problem.laws.of(0).unwrap();
+        let exact = (2.0 * law.static_work(0.0, 0.33).1 / 2.0).sqrt();
+        assert!((critical.velocity / exact - 1.0).abs() < 1e-9, "{force}: {} and {exact}", critical.velocity);
+    }
+}
+
+/// `P (1 - x/l)` drives beyond l: `V_c² = P l/M` stands on the barrier.
+#[test]
+fn a_critical_speed_on_a_barrier_is_found() {
+    let problem = problem("P*(1 - x/l)", 100.0).with_exit(0.1);
+    let resolve = |speed| Ok(Problem { impact_speed: speed, ..problem.clone() });
+    let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
+    let exact = (848e3_f64 * 0.02 / 2.0).sqrt();
+    assert!((critical.velocity / exact - 1.0).abs() < 1e-12, "{} and {exact}", critical.velocity);
+    let on_it = Taylor::default().solve(&resolve(exact).unwrap(), Detail::End).unwrap();
+    assert_eq!(on_it.outcome, Outcome::Undecided);
+}
+
+#[test]
+fn a_force_without_a_value_ends_the_flight_with_its_place_and_the_reason() {
+    // The root is of a negative number beyond 20 mm.
+    let error = Taylor::default().solve(&problem("P*sqrt(1 - x/l)", 302.0), Detail::End).unwrap_err();
+    let IntegrationError::NoForce { stage: 0, last, .. } = &error else { panic!("{error}") };
+    assert!((last.depth / 0.02 - 1.0).abs() < 1e-3, "{error}");
+    assert!(error.to_string().contains("sqrt(1 - x/l)"), "{error}");
+}
+
+#[test]
+fn a_law_that_never_rests_says_so_and_still_leaves_a_target() {
+    for force in ["R*V/v1", "R*(V/v1)^1.5", "R*(V/v1)^2"] {
+        for (name, method) in methods(1e-8) {
+            let error = method.integrator().solve(&problem(force, 100.0), Detail::End).unwrap_err();
+            assert!(matches!(error, IntegrationError::NeverEnds { .. }), "{name}, {force}: {error}");
+        }
+        let flight = Taylor::default().solve(&problem(force, 100.0).with_exit(0.1), Detail::End).unwrap();
+        assert_eq!(flight.outcome, Outcome::Perforated);
+    }
+}
+
+#[test]
+fn the_exit_margin_is_continuous_and_its_bound_holds_next_to_the_critical_speed() {
+    for (force, speed, depth, ..) in [KNOWN[0], KNOWN[4], KNOWN[8], KNOWN[10], KNOWN[13]] {
+        // The impact speed is critical for a target as thick as the depth of rest.
+        for nearness in [1e-3, 1e-9, 1e-12] {
+            for side in [-1.0, 1.0] {
+                let exit = depth * (1.0 + side * nearness);
+                for (name, method) in methods(1e-10) {
+                    let flight =
+                        method.integrator().solve(&problem(force, speed).with_exit(exit), Detail::End).unwrap();
+                    let is_right = flight.outcome == Outcome::Undecided || flight.outcome.is_stop() == (side > 0.0);
+                    assert!(is_right, "{name}, {force}: {} at {exit}", flight.outcome);
+                    let is_past = flight.exit_margin.is_some_and(|margin| margin > 0.0);
+                    let agrees = is_past == (flight.outcome == Outcome::Perforated);
+                    assert!(flight.outcome == Outcome::Undecided || agrees, "{name}, {force}: {flight:?}");
+                    let resolves = name == MethodName::Taylor && nearness > 1e-11;
+                    assert!(!resolves || flight.outcome != Outcome::Undecided, "{name}, {force}, {nearness}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_exit_margin_of_taylor_is_that_of_the_least_velocity_inside_a_stage() {
+    // R (1 - x/l) slows the projectile down to x = l and drives it beyond: W(l) = V0² - R l/M.
+    let problem = problem("R*(1 - x/l)", 100.0).with_exit(0.035);
+    let flight = Taylor::default().solve(&problem, Detail::End).unwrap();
+    let margin = flight.exit_margin.unwrap();
+    assert!((margin - 0.95).abs() <= 1e-14, "{margin}");
+}

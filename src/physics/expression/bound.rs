@@ -1,0 +1,654 @@
+//! An expression with values of its parameters, as steps on registers: for values, and for power series ([`super::Jets`]).
+//!
+//! What is made of parameters and numbers alone is computed once, and stands in the steps as a constant. A function whose
+//! series needs that of another (sine and cosine; tanh and its slope) computes both in one step.
+
+use num_dual::Dual64;
+use smallvec::SmallVec;
+
+use super::parse::{Binary, Function, Term};
+use super::tape::{self, DomainError, Tape};
+use crate::physics::scalar::Scalar;
+
+/// Largest whole exponent that is computed by products, which hold at zero too.
+pub(super) const POWER_MAX: f64 = 64.0;
+
+/// Largest exponent `n + 1/2` that is computed by products and a square root.
+const HALF_POWER_MAX: f64 = 8.0;
+
+/// Registers that a law of the field needs: to set more to zero takes longer than to compute it.
+const FEW: usize = 16;
+
+/// Registers that need no allocation.
+const MANY: usize = 96;
+
+/// An expression with values of its parameters.
+#[derive(Clone, Debug)]
+pub struct Bound<S = f64> {
+    tape: Tape,
+    parameters: SmallVec<[S; 8]>,
+    steps: Vec<Step<S>>,
+    registers: usize,
+    switches: SmallVec<[usize; 4]>,
+    result: Value<S>,
+    /// e of each register that is a constant times `V^e`; NaN for others.
+    powers: Vec<f64>,
+}
+
+/// What a term became.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Value<S> {
+    Constant(S),
+    Register(usize),
+}
+
+/// What is computed next, of registers by index. The results follow in the next one or two registers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Step<S> {
+    /// A number, where a register is needed.
+    Constant {
+        value: S,
+    },
+    /// `factor a + shift`.
+    Affine {
+        a: usize,
+        factor: S,
+        shift: S,
+    },
+    /// `a + factor b`.
+    Sum {
+        a: usize,
+        b: usize,
+        factor: S,
+    },
+    /// `a/divisor`; a series is multiplied by the `inverse`, which is faster and an ulp apart.
+    Share {
+        a: usize,
+        divisor: S,
+        inverse: S,
+    },
+    Multiply {
+        a: usize,
+        b: usize,
+    },
+    Square {
+        a: usize,
+    },
+    /// `a/b`, and `1/b`.
+    Divide {
+        a: usize,
+        b: usize,
+    },
+    /// `dividend/b`, and `1/b`.
+    Ratio {
+        dividend: S,
+        b: usize,
+    },
+    /// The series whose coefficient k is k times that of `a`.
+    Slope {
+        a: usize,
+    },
+    /// `sqrt a`, and `1/(2 sqrt a)`.
+    Sqrt {
+        a: usize,
+    },
+    /// `a^exponent`, the product of `whole`, which is `a^n`, and `root`, which is `sqrt a`.
+    HalfPower {
+        a: usize,
+        whole: usize,
+        root: usize,
+        exponent: f64,
+    },
+    /// `a^exponent`, and the slope of it, whose coefficient 0, no other than zero, is `1/a` in its place.
+    Power {
+        a: usize,
+        slope: usize,
+        exponent: S,
+    },
+    Exp {
+        a: usize,
+        slope: usize,
+    },
+    /// `sin a` and `cos a`.
+    SinCos {
+        a: usize,
+        slope: usize,
+    },
+    /// `tanh a` and `1 - tanh² a`.
+    Tanh {
+        a: usize,
+        slope: usize,
+    },
+    /// A function f with `divisor f' = factor a'`, and the slope of it, with `1/divisor` as coefficient 0.
+    Integral {
+        function: Function,
+        a: usize,
+        slope: usize,
+        divisor: usize,
+        factor: S,
+    },
+    /// `above` where the register of the switch of this index is not negative, else `below`.
+    Select {
+        index: usize,
+        switch: usize,
+        above: usize,
+        below: usize,
+    },
+}
+
+impl<S> Step<S> {
+    /// How many registers it fills.
+    pub(super) fn width(&self) -> usize {
+        match self {
+            Self::Divide { .. }
+            | Self::Ratio { .. }
+            | Self::Sqrt { .. }
+            | Self::Power { .. }
+            | Self::SinCos { .. }
+            | Self::Tanh { .. }
+            | Self::Integral { .. } => 2,
+            _ => 1,
+        }
+    }
+}
+
+impl<S: Scalar> Step<S> {
+    /// Values of its registers, the second one only where it has two; a constant enters by `lift`.
+    #[inline(always)]
+    pub(super) fn values<T: Scalar>(&self, at: impl Fn(usize) -> T, lift: impl Fn(S) -> T) -> (T, T) {
+        let zero = T::zero();
+        match *self {
+            Self::Constant { value } => (lift(value), zero),
+            Self::Affine { a, factor, shift } => (at(a) * lift(factor) + lift(shift), zero),
+            Self::Sum { a, b, factor } => (at(a) + at(b) * lift(factor), zero),
+            Self::Share { a, divisor, .. } => (at(a).over(lift(divisor)), zero),
+            Self::Multiply { a, b } => (at(a) * at(b), zero),
+            Self::Square { a } => (at(a) * at(a), zero),
+            Self::Divide { a, b } => (at(a).over(at(b)), T::one().over(at(b))),
+            Self::Ratio { dividend, b } => (lift(dividend).over(at(b)), T::one().over(at(b))),
+            Self::Slope { .. } => (zero, zero),
+            Self::Select { switch, above, below, .. } => (tape::side(at(switch), at(above), at(below)), zero),
+            Self::Sqrt { a } => {
+                let root = at(a).sqrt();
+                (root, T::from_f64(0.5).over(root))
+            }
+            Self::HalfPower { a, whole, root, exponent } => {
+                // Not by the rule of products, which gives no slope at zero.
+                let slope = || exponent * at(a).value().powf(exponent - 1.0);
+                (at(a).with_slope(at(whole) * at(root), slope), zero)
+            }
+            Self::Power { a, exponent, .. } => (at(a).powf(lift(exponent)), T::one().over(at(a))),
+            Self::Exp { a, .. } => (at(a).exp(), zero),
+            Self::SinCos { a, .. } => (at(a).sin(), at(a).cos()),
+            Self::Tanh { a, .. } => {
+                let value = at(a).tanh();
+                (value, T::one() - value * value)
+            }
+            Self::Integral { function, a, divisor, .. } => (tape::call(function, at(a)), T::one().over(at(divisor))),
+        }
+    }
+}
+
+/// e of each register that is a constant times `V^e`; NaN for others.
+fn powers<S: Scalar>(steps: &[Step<S>], registers: usize) -> Vec<f64> {
+    let mut powers = Vec::with_capacity(registers);
+    powers.extend([f64::NAN, 1.0]);
+    for step in steps {
+        let of = |register: usize| powers[register];
+        let power = match *step {
+            Step::Constant { .. } => 0.0,
+            Step::Affine { a, shift, .. } if shift.value() == 0.0 && shift.is_constant() => of(a),
+            Step::Share { a, .. } => of(a),
+            Step::Multiply { a, b } => of(a) + of(b),
+            Step::Square { a } => 2.0 * of(a),
+            Step::Divide { a, b } => of(a) - of(b),
+            Step::Ratio { b, .. } => -of(b),
+            Step::Sqrt { a } => 0.5 * of(a),
+            Step::HalfPower { a, exponent, .. } => exponent * of(a),
+            Step::Power { a, exponent, .. } if exponent.is_constant() => exponent.value() * of(a),
+            _ => f64::NAN,
+        };
+        powers.push(power);
+        if step.width() == 2 {
+            powers.push(f64::NAN);
+        }
+    }
+    powers
+}
+
+impl<S: Scalar> Bound<S> {
+    pub(super) fn new(tape: Tape, parameters: &[S]) -> Self {
+        let mut making = Making { steps: Vec::with_capacity(tape.terms().len()), ..Making::default() };
+        let mut values: Vec<Value<S>> = Vec::with_capacity(tape.terms().len());
+        let mut uses = vec![0; tape.terms().len()];
+        for term in tape.terms() {
+            term.operands().for_each(|operand| uses[operand] += 1);
+        }
+        for term in tape.terms() {
+            let value = making.term(term, parameters, &values, &uses);
+            values.push(value);
+        }
+        let result = values.last().copied().unwrap_or(Value::Constant(S::zero()));
+        let Making { steps, registers, switches, .. } = making;
+        let powers = powers(&steps, registers);
+        Self { tape, parameters: parameters.iter().copied().collect(), steps, registers, switches, result, powers }
+    }
+
+    /// e of `register` where it is a constant times `V^e`.
+    pub(super) fn power(&self, register: usize) -> Option<f64> {
+        self.powers.get(register).copied().filter(|power| power.is_finite())
+    }
+
+    /// Value at depth `x` (m) and velocity `v` (m/s); not finite where [`Bound::explain`] says why.
+    ///
+    /// At a kink the side on which the switch is not negative.
+    #[inline]
+    pub fn eval(&self, x: S, v: S) -> S {
+        self.eval_in(x, v, |constant| constant)
+    }
+
+    #[inline]
+    fn eval_in<T: Scalar>(&self, x: T, v: T, lift: impl Fn(S) -> T + Copy) -> T {
+        match self.result {
+            Value::Constant(constant) => lift(constant),
+            Value::Register(result) => self.run(x, v, lift, |registers| registers[result]),
+        }
+    }
+
+    /// What `then` takes from the values of all registers.
+    #[inline]
+    fn run<T: Scalar, A>(&self, x: T, v: T, lift: impl Fn(S) -> T + Copy, then: impl FnOnce(&[T]) -> A) -> A {
+        if self.registers <= FEW {
+            let mut registers = [T::zero(); FEW];
+            self.fill(&mut registers, x, v, lift);
+            then(&registers)
+        } else if self.registers <= MANY {
+            let mut registers = [T::zero(); MANY];
+            self.fill(&mut registers, x, v, lift);
+            then(&registers)
+        } else {
+            let mut registers = vec![T::zero(); self.registers];
+            self.fill(&mut registers, x, v, lift);
+            then(&registers)
+        }
+    }
+
+    #[inline]
+    fn fill<T: Scalar>(&self, registers: &mut [T], x: T, v: T, lift: impl Fn(S) -> T + Copy) {
+        registers[..2].copy_from_slice(&[x, v]);
+        let mut place = 2;
+        for step in &self.steps {
+            let (first, second) = step.values(|register| registers[register], lift);
+            registers[place] = first;
+            place += 1;
+            if step.width() == 2 {
+                registers[place] = second;
+                place += 1;
+            }
+        }
+    }
+
+    /// The expression that was bound.
+    pub fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
+    /// Registers whose sign decides between the branches of `abs`, `min` and `max`: of `a` in `abs(a)`, of `a - b` in the
+    /// others. Not those that x and V do not change.
+    ///
+    /// The series of a switch may end early where that of the expression does not: in `max(P, Q*sqrt(x))` at x = 0 the term that
+    /// is not chosen has none.
+    pub fn switches(&self) -> &[usize] {
+        &self.switches
+    }
+
+    /// The side of each of [`Bound::switches`] at (`x`, `v`): whether its register is not negative.
+    pub fn sides(&self, x: S, v: S) -> SmallVec<[bool; 4]> {
+        if self.switches.is_empty() {
+            return SmallVec::new();
+        }
+        let sides = |registers: &[S]| self.switches.iter().map(|switch| registers[*switch].value() >= 0.0).collect();
+        self.run(x, v, |constant| constant, sides)
+    }
+
+    /// The first term that has no value at depth `x` (m) and velocity `v` (m/s), and why; `None` if each has one.
+    pub fn explain(&self, x: f64, v: f64) -> Option<DomainError> {
+        self.tape.fault(&self.parameters, x, v, false)
+    }
+
+    /// As [`Bound::explain`], also of a term that has a value and no power series there: a root of zero.
+    pub fn explain_series(&self, x: f64, v: f64) -> Option<DomainError> {
+        self.tape.fault(&self.parameters, x, v, true)
+    }
+
+    /// Exponents e that are no whole numbers, of powers `V^e` that begin a term: a branch point at rest.
+    ///
+    /// Of `(V/v1)^1.5` it is 1.5, of `V*sqrt(V)` 0.5, of `sqrt(x*V^3)` 1.5; `(V - v1)^1.5` has none. Sorted, each once.
+    pub fn powers_of_v(&self) -> Vec<f64> {
+        // An exponent has neither x nor V in it, and the same value everywhere.
+        let numbers = self.tape.values(&self.parameters, S::zero(), S::zero());
+        let mut powers: Vec<Option<f64>> = Vec::with_capacity(numbers.len());
+        let mut found = Vec::new();
+        for term in self.tape.terms() {
+            let power = match term {
+                Term::V => Some(1.0),
+                Term::Number(_) | Term::Parameter(_) | Term::X => Some(0.0),
+                Term::Negative(of) | Term::Call(Function::Abs, of) => powers[of],
+                Term::Call(Function::Sqrt, of) => powers[of].map(|power| 0.5 * power),
+                Term::Binary(Binary::Multiply, a, b) => powers[a].zip(powers[b]).map(|(a, b)| a + b),
+                Term::Binary(Binary::Divide, a, b) => powers[a].zip(powers[b]).map(|(a, b)| a - b),
+                Term::Binary(Binary::Power, base, exponent) => {
+                    powers[base].map(|power| power * numbers[exponent].value())
+                }
+                // Of a sum or a function, only what V does not touch is no power of it.
+                _ => term.operands().all(|operand| powers[operand] == Some(0.0)).then_some(0.0),
+            };
+            let is_root = matches!(term, Term::Call(Function::Sqrt, _) | Term::Binary(Binary::Power, ..));
+            found.extend(power.filter(|power| is_root && power.fract() != 0.0));
+            powers.push(power);
+        }
+        found.sort_by(f64::total_cmp);
+        found.dedup();
+        found
+    }
+
+    pub(super) fn steps(&self) -> &[Step<S>] {
+        &self.steps
+    }
+
+    pub(super) fn registers(&self) -> usize {
+        self.registers
+    }
+
+    pub(super) fn result(&self) -> Value<S> {
+        self.result
+    }
+}
+
+impl Bound {
+    /// F, dF/dx and dF/dV at depth `x` (m) and velocity `v` (m/s), the derivatives exact as far as f64 rounds.
+    pub fn gradient(&self, x: f64, v: f64) -> (f64, f64, f64) {
+        let along = |dx, dv| self.eval_in(Dual64::new(x, dx), Dual64::new(v, dv), Dual64::from_f64);
+        let (by_x, by_v) = (along(1.0, 0.0), along(0.0, 1.0));
+        // Dual numbers divide with another rounding.
+        (self.eval(x, v), by_x.eps, by_v.eps)
+    }
+}
+
+/// What several terms share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shared {
+    Sqrt(usize),
+    Slope(usize),
+    SinCos(usize),
+    Product(usize, usize),
+    Difference(usize, usize),
+}
+
+/// Steps in the making.
+#[derive(Debug)]
+struct Making<S> {
+    steps: Vec<Step<S>>,
+    registers: usize,
+    switches: SmallVec<[usize; 4]>,
+    shared: Vec<(Shared, usize)>,
+}
+
+impl<S> Default for Making<S> {
+    fn default() -> Self {
+        // The first two registers are x and V.
+        Self { steps: Vec::new(), registers: 2, switches: SmallVec::new(), shared: Vec::new() }
+    }
+}
+
+impl<S: Scalar> Making<S> {
+    fn push(&mut self, step: Step<S>) -> usize {
+        let register = self.registers;
+        self.registers += step.width();
+        self.steps.push(step);
+        register
+    }
+
+    fn share(&mut self, what: Shared, step: Step<S>) -> usize {
+        if let Some((_, register)) = self.shared.iter().find(|(known, _)| *known == what) {
+            return *register;
+        }
+        let register = self.push(step);
+        self.shared.push((what, register));
+        register
+    }
+
+    fn product(&mut self, a: usize, b: usize) -> usize {
+        let step = if a == b { Step::Square { a } } else { Step::Multiply { a, b } };
+        self.share(Shared::Product(a.min(b), a.max(b)), step)
+    }
+
+    fn slope(&mut self, a: usize) -> usize {
+        self.share(Shared::Slope(a), Step::Slope { a })
+    }
+
+    /// `factor a + shift`.
+    fn affine(&mut self, a: usize, factor: S, shift: S) -> usize {
+        self.push(Step::Affine { a, factor, shift })
+    }
+
+    /// The register of `value`.
+    fn register(&mut self, value: Value<S>) -> usize {
+        match value {
+            Value::Constant(value) => self.push(Step::Constant { value }),
+            Value::Register(register) => register,
+        }
+    }
+
+    fn term(&mut self, term: Term, parameters: &[S], values: &[Value<S>], uses: &[usize]) -> Value<S> {
+        use Value::{Constant, Register};
+        let minus = S::from_f64(-1.0);
+        match term {
+            Term::Number(bits) => Constant(S::from_f64(f64::from_bits(bits))),
+            Term::Parameter(index) => Constant(parameters[index]),
+            Term::X => Register(0),
+            Term::V => Register(1),
+            Term::Negative(of) => match values[of] {
+                Constant(of) => Constant(-of),
+                Register(a) => Register(self.affine(a, minus, S::zero())),
+            },
+            Term::Call(function, of) => match values[of] {
+                Constant(of) => Constant(tape::call(function, of)),
+                Register(a) => Register(self.call(function, a)),
+            },
+            Term::Binary(operation, a, b) => match (values[a], values[b]) {
+                (Constant(a), Constant(b)) => Constant(tape::binary(operation, a, b)),
+                (first, second) => {
+                    let joined = match operation {
+                        Binary::Add => self.joined(first, second, S::one(), uses[a], uses[b]),
+                        Binary::Subtract => self.joined(first, second, minus, uses[a], uses[b]),
+                        _ => None,
+                    };
+                    joined.unwrap_or_else(|| self.binary(operation, first, second))
+                }
+            },
+        }
+    }
+
+    fn call(&mut self, function: Function, a: usize) -> usize {
+        match function {
+            Function::Sqrt => self.share(Shared::Sqrt(a), Step::Sqrt { a }),
+            Function::Abs => {
+                let below = self.affine(a, S::from_f64(-1.0), S::zero());
+                self.select(a, a, below)
+            }
+            Function::Exp => {
+                let slope = self.slope(a);
+                self.push(Step::Exp { a, slope })
+            }
+            Function::Tanh => {
+                let slope = self.slope(a);
+                self.push(Step::Tanh { a, slope })
+            }
+            Function::Sin | Function::Cos => {
+                let slope = self.slope(a);
+                let sine = self.share(Shared::SinCos(a), Step::SinCos { a, slope });
+                if function == Function::Sin { sine } else { sine + 1 }
+            }
+            Function::Log | Function::Log10 | Function::Atan => {
+                let slope = self.slope(a);
+                let divisor = if function == Function::Atan {
+                    let square = self.product(a, a);
+                    self.affine(square, S::one(), S::one())
+                } else {
+                    a
+                };
+                let one = S::one();
+                let factor = if function == Function::Log10 { one.over(S::from_f64(10.0).ln()) } else { one };
+                self.push(Step::Integral { function, a, slope, divisor, factor })
+            }
+        }
+    }
+
+    fn binary(&mut self, operation: Binary, first: Value<S>, second: Value<S>) -> Value<S> {
+        use Value::{Constant, Register};
+        Register(match (operation, first, second) {
+            (_, Constant(a), Constant(b)) => return Constant(tape::binary(operation, a, b)),
+            (Binary::Add, Register(a), Constant(shift)) | (Binary::Add, Constant(shift), Register(a)) => {
+                self.affine(a, S::one(), shift)
+            }
+            (Binary::Add, Register(a), Register(b)) => self.push(Step::Sum { a, b, factor: S::one() }),
+            (Binary::Subtract, ..) => return self.difference(first, second),
+            (Binary::Multiply, Register(a), Constant(factor)) | (Binary::Multiply, Constant(factor), Register(a)) => {
+                self.affine(a, factor, S::zero())
+            }
+            (Binary::Multiply, Register(a), Register(b)) => self.product(a, b),
+            (Binary::Divide, Register(a), Constant(divisor)) => {
+                self.push(Step::Share { a, divisor, inverse: S::one().over(divisor) })
+            }
+            (Binary::Divide, Constant(dividend), Register(b)) => self.push(Step::Ratio { dividend, b }),
+            (Binary::Divide, Register(a), Register(b)) => self.push(Step::Divide { a, b }),
+            (Binary::Power, Register(a), Constant(exponent)) => return self.power(a, exponent),
+            (Binary::Power, base, Register(exponent)) => {
+                // The units were checked, and with them that no exponent varies; a^b is exp(b log a) all the same.
+                let logarithm = match base {
+                    Constant(base) => Constant(base.ln()),
+                    Register(base) => Register(self.call(Function::Log, base)),
+                };
+                match self.binary(Binary::Multiply, logarithm, Register(exponent)) {
+                    Register(product) => self.call(Function::Exp, product),
+                    Constant(product) => return Constant(product.exp()),
+                }
+            }
+            (Binary::Min, ..) => return self.extreme(first, second, false),
+            (Binary::Max, ..) => return self.extreme(first, second, true),
+        })
+    }
+
+    /// `first + sign second` in one step with the product by a constant that one of them is, if it is the last step and
+    /// nothing else uses it.
+    fn joined(
+        &mut self,
+        first: Value<S>,
+        second: Value<S>,
+        sign: S,
+        uses_first: usize,
+        uses_second: usize,
+    ) -> Option<Value<S>> {
+        use Value::{Constant, Register};
+        let Some(&Step::Affine { a, factor, shift }) = self.steps.last() else { return None };
+        let last = self.registers - 1;
+        let is_last = |value, uses| matches!(value, Register(register) if register == last && uses == 1);
+        if shift.value() != 0.0 || !shift.is_constant() {
+            return None;
+        }
+        let step = match (first, second) {
+            (_, Constant(shift)) if is_last(first, uses_first) => Step::Affine { a, factor, shift: sign * shift },
+            (Constant(shift), _) if is_last(second, uses_second) => Step::Affine { a, factor: sign * factor, shift },
+            (Register(first), _) if is_last(second, uses_second) => Step::Sum { a: first, b: a, factor: sign * factor },
+            _ => return None,
+        };
+        self.steps.pop();
+        self.registers -= 1;
+        Some(Register(self.push(step)))
+    }
+
+    fn difference(&mut self, first: Value<S>, second: Value<S>) -> Value<S> {
+        use Value::{Constant, Register};
+        let minus = S::from_f64(-1.0);
+        match (first, second) {
+            (Constant(a), Constant(b)) => Constant(a - b),
+            (Register(a), Constant(b)) => Register(self.affine(a, S::one(), -b)),
+            (Constant(shift), Register(a)) => Register(self.affine(a, minus, shift)),
+            (Register(a), Register(b)) => {
+                Register(self.share(Shared::Difference(a, b), Step::Sum { a, b, factor: minus }))
+            }
+        }
+    }
+
+    /// The greater or the lesser of two, of which one is no constant.
+    fn extreme(&mut self, first: Value<S>, second: Value<S>, greater: bool) -> Value<S> {
+        let (above, below) = if greater { (first, second) } else { (second, first) };
+        match self.difference(first, second) {
+            Value::Register(switch) => {
+                let (above, below) = (self.register(above), self.register(below));
+                Value::Register(self.select(switch, above, below))
+            }
+            Value::Constant(switch) => {
+                if switch.value() >= 0.0 {
+                    above
+                } else {
+                    below
+                }
+            }
+        }
+    }
+
+    fn select(&mut self, switch: usize, above: usize, below: usize) -> usize {
+        let known = self.switches.iter().position(|known| *known == switch);
+        let index = known.unwrap_or_else(|| {
+            self.switches.push(switch);
+            self.switches.len() - 1
+        });
+        self.push(Step::Select { index, switch, above, below })
+    }
+
+    fn power(&mut self, a: usize, exponent: S) -> Value<S> {
+        let size = exponent.value().abs();
+        let power = if !exponent.is_constant() {
+            None
+        } else if size == 0.0 {
+            return Value::Constant(S::one());
+        } else if size.fract() == 0.0 && size <= POWER_MAX {
+            Some(self.whole_power(a, size as u32))
+        } else if size.fract() == 0.5 && size <= HALF_POWER_MAX {
+            Some(self.half_power(a, size))
+        } else {
+            None
+        };
+        Value::Register(match power {
+            Some(power) if exponent.value() < 0.0 => self.push(Step::Ratio { dividend: S::one(), b: power }),
+            Some(power) => power,
+            None => {
+                let slope = self.slope(a);
+                self.push(Step::Power { a, slope, exponent })
+            }
+        })
+    }
+
+    fn whole_power(&mut self, a: usize, exponent: u32) -> usize {
+        if exponent == 1 {
+            a
+        } else if exponent % 2 == 1 {
+            let rest = self.whole_power(a, exponent - 1);
+            self.product(a, rest)
+        } else {
+            let half = self.whole_power(a, exponent / 2);
+            self.product(half, half)
+        }
+    }
+
+    fn half_power(&mut self, a: usize, exponent: f64) -> usize {
+        let root = self.share(Shared::Sqrt(a), Step::Sqrt { a });
+        if exponent == 0.5 {
+            return root;
+        }
+        let whole = self.whole_power(a, exponent as u32);
+        self.push(Step::HalfPower { a, whole, root, exponent })
+    }
+}

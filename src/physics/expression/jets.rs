@@ -1,0 +1,240 @@
+//! Which power series in time does an expression have, order by order?
+//!
+//! Coefficient k of each register follows from lower ones of its own and from coefficients up to k of its operands:
+//!
+//! ```text
+//! c = a b        c[k] = sum over i of a[i] b[k-i]
+//! q = a/b        q[k] = (a[k] - sum over i < k of q[i] b[k-i])/b[0]
+//! s = sqrt u     s[k] = (u[k] - sum over 0 < i < k of s[i] s[k-i])/(2 s[0])
+//! w = exp u      k w[k] = sum over i > 0 of (i u[i]) w[k-i];  sine and cosine, tanh and its slope alike
+//! g f' = u'      k f[k] g[0] = k u[k] - sum over 0 < i < k of (i f[i]) g[k-i]:  log (g = u), atan (g = 1 + u²)
+//! p = u^e        k p[k] u[0] = e sum over i > 0 of (i u[i]) p[k-i] - sum over 0 < i < k of (i p[i]) u[k-i]
+//! ```
+//!
+//! Source: Griewank, Walther (2008), Evaluating Derivatives, 2nd ed., section 13.2.
+
+use smallvec::SmallVec;
+
+use super::bound::{Bound, Step, Value};
+use crate::physics::scalar::Scalar;
+use crate::physics::scalar::reciprocal;
+
+/// Power series in time of the registers of a [`Bound`] expression, one order more with each [`Jets::push`].
+///
+/// # Example
+/// ```
+/// use penetrode::physics::expression::{Jets, Known, Tape};
+/// use penetrode::physics::units::Dimension;
+///
+/// // x = 2 t + t², V = x' = 2 + 2 t: V² = 4 + 8 t + 4 t².
+/// let known = [Known { name: "Q", value: 1.0, unit: Dimension::Drag.into() }];
+/// let force = Tape::read("Q*V^2", &known, Dimension::Force.into())?.bind(&[1.0]);
+/// let mut jets = Jets::default();
+/// jets.start(&force, &[]);
+/// let coefficients = [(0.0, 2.0), (2.0, 2.0), (1.0, 0.0), (0.0, 0.0)].map(|(x, v)| jets.push(&force, x, v));
+/// assert_eq!(coefficients, [4.0, 8.0, 4.0, 0.0]);
+/// # Ok::<(), penetrode::physics::expression::ExpressionError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Jets<S = f64> {
+    /// Coefficients that are there.
+    filled: usize,
+    /// Of each register.
+    coefficients: Vec<[S; ORDERS_MAX]>,
+    sides: SmallVec<[bool; 4]>,
+    /// m of a velocity `V0 (1-t)^m`; 0 for any other.
+    falling: u32,
+}
+
+/// Most coefficients of a series.
+const ORDERS_MAX: usize = 48;
+
+impl<S: Scalar> Default for Jets<S> {
+    fn default() -> Self {
+        Self { filled: 0, coefficients: Vec::new(), sides: SmallVec::new(), falling: 0 }
+    }
+}
+
+impl<S: Scalar> Jets<S> {
+    /// Most coefficients of a series.
+    pub const ORDERS_MAX: usize = ORDERS_MAX;
+
+    /// Begins new series, on these `sides` of [`Bound::switches`] all along. Allocates for more registers than ever before.
+    pub fn start(&mut self, bound: &Bound<S>, sides: &[bool]) {
+        debug_assert_eq!(sides.len(), bound.switches().len());
+        self.filled = 0;
+        self.coefficients.resize(bound.registers(), [S::zero(); ORDERS_MAX]);
+        self.sides.clear();
+        self.sides.extend_from_slice(sides);
+        self.falling = 0;
+    }
+
+    /// As [`Jets::start`], for a velocity `V0 (1-t)^m`, whose coefficients [`Jets::push`] must be given.
+    ///
+    /// Powers of V are then powers of `1-t`, each coefficient a multiple of the one before. The recurrence for a power of
+    /// any series would lose digits here: it cancels where the power is a polynomial.
+    pub fn start_falling(&mut self, bound: &Bound<S>, sides: &[bool], m: u32) {
+        self.start(bound, sides);
+        self.falling = m;
+    }
+
+    /// Coefficients of `register` so far, from order 0. Registers 0 and 1 are x and V.
+    pub fn register(&self, register: usize) -> &[S] {
+        &self.coefficients[register][..self.filled]
+    }
+
+    /// Takes the next coefficients of x and V and gives that of the expression.
+    ///
+    /// Not finite where there is no series, as [`Bound::explain_series`] says, or where coefficients overflow: in a unit of
+    /// time near the distance of the nearest pole they do not.
+    ///
+    /// # Panics
+    /// If there are [`Jets::ORDERS_MAX`] coefficients already, or `bound` is not the expression of [`Jets::start`].
+    pub fn push(&mut self, bound: &Bound<S>, x: S, v: S) -> S {
+        let k = self.filled;
+        assert!(k < ORDERS_MAX, "the series has its {ORDERS_MAX} coefficients");
+        self.filled += 1;
+        self.coefficients[0][k] = x;
+        self.coefficients[1][k] = v;
+        let mut place = 2;
+        for step in bound.steps() {
+            let (done, rest) = self.coefficients.split_at_mut(place);
+            let (first, second) = match *step {
+                Step::Select { index, switch, above, below } => {
+                    let chosen = done[if self.sides[index] { above } else { below }][k];
+                    // A switch without a value has no sides.
+                    let is_lost = k == 0 && done[switch][0].value().is_nan();
+                    (if is_lost { done[switch][0] } else { chosen }, S::zero())
+                }
+                _ if k == 0 => step.values(|register| done[register][0], |constant| constant),
+                Step::Power { .. } | Step::Sqrt { .. }
+                    if self.falling > 0
+                        && let Some(power) = bound.power(place) =>
+                {
+                    let exponent = power * f64::from(self.falling);
+                    let first = rest[0][k - 1] * S::from_f64(k as f64 - 1.0 - exponent) * reciprocal(k);
+                    (first, first * S::from_f64(k as f64))
+                }
+                _ => step.coefficients(k, done, rest),
+            };
+            rest[0][k] = first;
+            place += 1;
+            if step.width() == 2 {
+                rest[1][k] = second;
+                place += 1;
+            }
+        }
+        match bound.result() {
+            Value::Register(register) => self.coefficients[register][k],
+            Value::Constant(constant) if k == 0 => constant,
+            Value::Constant(_) => S::zero(),
+        }
+    }
+}
+
+impl<S: Scalar> Step<S> {
+    /// Coefficients of order `k`, above 0, of its registers, from those of registers before them and lower ones of their `own`.
+    ///
+    /// The second of two registers begins with what the first one's recurrence is multiplied by.
+    #[inline(always)]
+    fn coefficients(&self, k: usize, before: &[[S; ORDERS_MAX]], own: &[[S; ORDERS_MAX]]) -> (S, S) {
+        let (zero, order, inverse) = (S::zero(), S::from_f64(k as f64), reciprocal::<S>(k));
+        let series = |register: usize| &before[register];
+        match *self {
+            // A branch is chosen by whoever knows the sides.
+            Self::Constant { .. } | Self::Select { .. } => (zero, zero),
+            Self::Affine { a, factor, .. } => (series(a)[k] * factor, zero),
+            Self::Sum { a, b, factor } => (series(a)[k] + series(b)[k] * factor, zero),
+            Self::Share { a, inverse, .. } => (series(a)[k] * inverse, zero),
+            Self::Multiply { a, b } | Self::HalfPower { whole: a, root: b, .. } => {
+                let (a, b) = (series(a), series(b));
+                (a[0] * b[k] + a[k] * b[0] + inner(a, b, k), zero)
+            }
+            Self::Square { a } => {
+                let a = series(a);
+                let ends = a[0] * a[k];
+                (ends + ends + inner_square(a, k), zero)
+            }
+            Self::Divide { a, b } => {
+                let (a, b) = (series(a), series(b));
+                ((a[k] - own[0][0] * b[k] - inner(&own[0], b, k)) * own[1][0], zero)
+            }
+            Self::Ratio { b, .. } => {
+                let b = series(b);
+                (-(own[0][0] * b[k] + inner(&own[0], b, k)) * own[1][0], zero)
+            }
+            Self::Slope { a } => (order * series(a)[k], zero),
+            Self::Sqrt { a } => ((series(a)[k] - inner_square(&own[0], k)) * own[1][0], zero),
+            Self::Power { a, slope, exponent } => {
+                let (a, slope, slopes) = (series(a), series(slope), &own[1]);
+                // A whole power of a series that begins with t begins with that power of t.
+                let is_late = exponent.value() > k as f64 && exponent.value().fract() == 0.0;
+                if a[0].value() == 0.0 && is_late && exponent.is_constant() {
+                    return (zero, zero);
+                }
+                let sum = exponent * (slope[k] * own[0][0] + inner(slope, &own[0], k)) - inner(slopes, a, k);
+                let scaled = sum * slopes[0];
+                (scaled * inverse, scaled)
+            }
+            Self::Exp { slope, .. } => (inverse * integrand(series(slope), &own[0], k), zero),
+            Self::SinCos { slope, .. } => {
+                let slope = series(slope);
+                (inverse * integrand(slope, &own[1], k), -(inverse * integrand(slope, &own[0], k)))
+            }
+            Self::Tanh { slope, .. } => {
+                let next = inverse * integrand(series(slope), &own[1], k);
+                let ends = own[0][0] * next;
+                (next, -(ends + ends + inner_square(&own[0], k)))
+            }
+            Self::Integral { slope, divisor, factor, .. } => {
+                let (slope, divisor) = (series(slope), series(divisor));
+                let sum = factor * slope[k] - inner(&own[1], divisor, k);
+                let scaled = sum * own[1][0];
+                (scaled * inverse, scaled)
+            }
+        }
+    }
+}
+
+/// The sum over 0 < i <= k of `slope[i] factor[k-i]`.
+#[inline(always)]
+fn integrand<S: Scalar>(slope: &[S; ORDERS_MAX], factor: &[S; ORDERS_MAX], k: usize) -> S {
+    slope[k] * factor[0] + inner(slope, factor, k)
+}
+
+/// The sum over 0 < i < k of `a[i] b[k-i]`.
+///
+/// Without the ends, so that it reads no coefficient of this order: two numbers read at once, one of which was just
+/// written, wait for the writing.
+#[inline(always)]
+fn inner<S: Scalar>(a: &[S; ORDERS_MAX], b: &[S; ORDERS_MAX], k: usize) -> S {
+    product(&a[1..k], &b[1..k])
+}
+
+/// As [`inner`], of a series with itself: each pair once.
+#[inline(always)]
+fn inner_square<S: Scalar>(a: &[S; ORDERS_MAX], k: usize) -> S {
+    let half = (k - 1) / 2;
+    let pairs = product(&a[1..=half], &a[k - half..k]);
+    let middle = if k.is_multiple_of(2) { a[k / 2] * a[k / 2] } else { S::zero() };
+    pairs + pairs + middle
+}
+
+/// The sum over i of `a[i] b[n-1-i]`, of two slices of the length n.
+#[inline(always)]
+fn product<S: Scalar>(a: &[S], b: &[S]) -> S {
+    let (a_fours, a_rest) = a.as_chunks::<4>();
+    let (b_rest, b_fours) = b.as_rchunks::<4>();
+    // Four sums at once: each waits for its last product, none for another.
+    let mut sums = [S::zero(); 4];
+    for (a, b) in a_fours.iter().zip(b_fours.iter().rev()) {
+        for (index, sum) in sums.iter_mut().enumerate() {
+            *sum += a[index] * b[3 - index];
+        }
+    }
+    let mut rest = S::zero();
+    for (a, b) in a_rest.iter().zip(b_rest.iter().rev()) {
+        rest += *a * *b;
+    }
+    rest + ((sums[0] + sums[1]) + (sums[2] + sums[3]))
+}

@@ -1,0 +1,328 @@
+//! Laws of one's own: a force F(x, V) that is an expression, in place of the four coefficients of a stage.
+//!
+//! A [`Problem`](super::Problem) holds them beside its stages. A stage with a law has NaN for coefficients, and a method
+//! that knows no laws refuses the problem.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::expression::{Bound, Tape, Unit, is_name};
+use super::problem::State;
+use super::scalar::Scalar;
+
+/// The force F(x, V) (N) of one stage, its parameters given.
+#[derive(Clone, Debug)]
+pub struct Law<S = f64> {
+    parameters: Vec<S>,
+    bound: Bound<S>,
+    /// The same in values, for slopes.
+    values: Bound,
+    /// m with which the force is smooth in u at rest, `V = u^m`.
+    branch: Option<u32>,
+}
+
+impl<S: PartialEq> PartialEq for Law<S> {
+    fn eq(&self, other: &Self) -> bool {
+        self.parameters == other.parameters && self.values.tape() == other.values.tape()
+    }
+}
+
+impl<S: Scalar> Law<S> {
+    /// The law of `tape` at `parameters` (SI units), in the order of [`Tape::parameters`].
+    pub fn new(tape: &Tape, parameters: Vec<S>) -> Self {
+        let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
+        let values = tape.bind(&values);
+        let powers = values.powers_of_v();
+        let is_whole = |m: u32| powers.iter().all(|power| (power * f64::from(m)).fract() == 0.0);
+        let branch = (1..=BRANCH_MAX).find(|m| is_whole(*m));
+        Self { bound: tape.bind(&parameters), values, parameters, branch }
+    }
+
+    /// Force (N) at depth `x` (m) and velocity `v` (m/s); NaN or infinite where the expression has no value.
+    pub fn force(&self, x: S, v: S) -> S {
+        self.bound.eval(x, v)
+    }
+
+    /// The same in values.
+    #[inline]
+    pub(crate) fn force_value(&self, x: f64, v: f64) -> f64 {
+        self.values.eval(x, v)
+    }
+
+    /// The expression with its parameters, for series.
+    pub(crate) fn bound(&self) -> &Bound<S> {
+        &self.bound
+    }
+
+    /// Why the force has no value at depth `x` (m) and velocity `v` (m/s).
+    pub fn explain(&self, x: f64, v: f64) -> String {
+        let unknown = "the number is beyond the range of 64 bits".to_owned();
+        let reason = self.values.explain(x, v).or_else(|| self.values.explain_series(x, v));
+        reason.map_or(unknown, |error| format!("in {}, {}", error.term, error.reason))
+    }
+
+    /// Derivatives `F_x` (N/m) and `F_V` (N s/m).
+    pub fn slopes(&self, x: f64, v: f64) -> (f64, f64) {
+        let (_, by_depth, by_velocity) = self.values.gradient(x, v);
+        (by_depth, by_velocity)
+    }
+
+    /// The side of each switch of min, max and abs at depth `x` (m) and velocity `v` (m/s).
+    #[cfg(feature = "diffsol")]
+    pub(crate) fn sides(&self, x: f64, v: f64) -> smallvec::SmallVec<[bool; 4]> {
+        self.values.sides(x, v)
+    }
+
+    /// Whether the force does not drive at rest, at 33 depths between two (m).
+    pub(crate) fn resists_between(&self, from: f64, to: f64) -> bool {
+        (0..=PANELS)
+            .all(|panel| self.values.eval(from + (to - from) * f64::from(panel) / f64::from(PANELS), 0.0) >= 0.0)
+    }
+
+    /// In how many parts of a way the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
+    /// greatest force seen, and enough to count beside the `energy` (J). `place` gives depth (m) and velocity (m/s) at a share
+    /// of the way from 0 to 1.
+    ///
+    /// By bounds of the expression over each part. A series sees nothing of what lies far ahead.
+    pub(crate) fn shown_in(&self, place: impl Fn(f64) -> (f64, f64), energy: f64) -> Option<usize> {
+        let within = |(from, to): ((f64, f64), (f64, f64)), largest: f64| {
+            let (low, high) = (from.1.min(to.1), from.1.max(to.1));
+            // What a slower projectile meets is for the steps to come.
+            let (least, most) =
+                self.values.range((from.0.min(to.0), from.0.max(to.0)), (low.max(SLOWEST * high), high));
+            let shown = (self.values.eval(to.0, to.1) - self.values.eval(from.0, from.1)).abs();
+            let hidden = most - least;
+            hidden <= SURPRISE * largest + 2.0 * shown || hidden * (to.0 - from.0).abs() <= NOTHING * energy
+        };
+        let size = |(x, v): (f64, f64)| self.values.eval(x, v).abs();
+        let (start, end) = (place(0.0), place(1.0));
+        if within((start, end), size(start).max(size(end))) {
+            return Some(1);
+        }
+        let places: [(f64, f64); PARTS + 1] = std::array::from_fn(|part| place(part as f64 / PARTS as f64));
+        let largest = places.iter().map(|place| size(*place)).filter(|size| size.is_finite()).fold(0.0, f64::max);
+        places.windows(2).all(|pair| within((pair[0], pair[1]), largest)).then_some(PARTS)
+    }
+
+    /// Whether the force depends on the velocity.
+    pub fn depends_on_velocity(&self) -> bool {
+        self.values.tape().depends_on_v()
+    }
+
+    /// m with which the force is smooth in u at rest, `V = u^m`: the common denominator of the powers of V that have a
+    /// branch point there.
+    pub fn branch_at_rest(&self) -> Option<u32> {
+        self.branch
+    }
+
+    /// Whether the force brings a projectile to rest at depth `x` (m) that comes there slower than `v` (m/s): it resists at
+    /// rest, or vanishes as a power of V below the first (docs/theory.md, section 10).
+    pub fn stops(&self, x: f64, v: f64) -> bool {
+        let slow = 1e-8 * v;
+        self.values.eval(x, 0.0) > 0.0 || self.power(x, slow) < 1.0 - 1e-6
+    }
+
+    /// n of `F = a V^n` about velocity `v` (m/s).
+    pub(crate) fn power(&self, x: f64, v: f64) -> f64 {
+        (self.values.eval(x, v) / self.values.eval(x, 0.5 * v)).log2()
+    }
+
+    /// Whether a projectile of `mass` (kg), which is `at` a state with little of its speed left, will never come to rest
+    /// before the limit, `distance` (m) ahead: its resistance vanishes with the velocity.
+    pub(crate) fn is_approach(&self, mass: f64, at: State, distance: f64) -> bool {
+        if self.stops(at.depth, at.velocity) || self.values.eval(at.depth, at.velocity) <= 0.0 {
+            return false;
+        }
+        let reach = self.reach(mass, at);
+        reach < 0.5 * distance || (reach == f64::INFINITY && distance == f64::INFINITY)
+    }
+
+    /// How far (m) the projectile still gets from `at` where its resistance vanishes as a power of V: `F = a V^n` gives
+    /// `M V²/((2 - n) F)` for 1 <= n < 2, and no bound for n >= 2 (docs/theory.md, section 10).
+    pub(crate) fn reach(&self, mass: f64, at: State) -> f64 {
+        if at.velocity <= 0.0 {
+            return 0.0;
+        }
+        let (force, power) = (self.values.eval(at.depth, at.velocity), self.power(at.depth, at.velocity));
+        if power < 2.0 - 1e-9 { mass * at.velocity * at.velocity / ((2.0 - power) * force) } else { f64::INFINITY }
+    }
+
+    /// Exit margin of a rest before `exit` (m) where the force at rest is zero: `(X - H)/H`, its error that of the depth.
+    ///
+    /// `F = a V^n` leaves a distance that goes as `W^(1 - n/2)`, and so does the error of the depth.
+    pub(crate) fn margin_of_depth(&self, rest: State, exit: f64, speed: f64, error_bound: f64) -> (f64, f64) {
+        let power = self.power(rest.depth, 1e-8 * speed).clamp(0.0, 1.0);
+        (rest.depth / exit - 1.0, 8.0 * (error_bound + f64::EPSILON).powf(1.0 - 0.5 * power))
+    }
+
+    /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it on the way.
+    pub fn static_work(&self, from: f64, to: f64) -> (f64, f64) {
+        let force = |x: f64| self.values.eval(x, 0.0);
+        if !self.values.tape().depends_on_x() {
+            let work = force(from) * (to - from);
+            return (work, work.max(0.0));
+        }
+        let place = |panel: u32| from + (to - from) * f64::from(panel) / f64::from(PANELS);
+        let scale = (to - from) / f64::from(PANELS) * (0..PANELS).map(|panel| force(place(panel)).abs()).sum::<f64>();
+        let bounds = |from: f64, to: f64| self.values.range((from, to), (0.0, 0.0));
+        // Twice: what the points above miss may be all of it.
+        let rough = |panel| integral(&force, &bounds, (place(panel), place(panel + 1)), (scale, 1e-6), HALVINGS).abs();
+        let scale = scale + (0..PANELS).map(rough).sum::<f64>();
+        let (mut work, mut most) = (0.0, 0.0_f64);
+        for panel in 0..PANELS {
+            let (from, to) = (place(panel), place(panel + 1));
+            // Where the force begins to drive.
+            let ends = if force(from) > 0.0 && force(to) < 0.0 { [sign_change(&force, from, to), to] } else { [to; 2] };
+            for (from, to) in [(from, ends[0]), (ends[0], ends[1])] {
+                work += integral(&force, &bounds, (from, to), (scale, 0.0), HALVINGS);
+                most = most.max(work);
+            }
+        }
+        (work, most)
+    }
+
+    /// The same law in another number type, parameters taken over by value.
+    pub fn cast<T: Scalar>(&self) -> Law<T> {
+        Law::new(self.bound.tape(), self.parameters.iter().map(|p| T::from_f64(p.value())).collect())
+    }
+}
+
+/// Name of a parameter. Names are few, and are kept as long as the program runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Name(&'static str);
+
+impl Name {
+    /// The name `text`; `None` for a text that no expression could hold as a name.
+    pub fn new(text: &str) -> Option<Self> {
+        static KNOWN: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+        if !is_name(text) {
+            return None;
+        }
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(name) = known.get(text) {
+            return Some(Self(name));
+        }
+        let name = Box::leak(text.to_owned().into_boxed_str());
+        known.insert(name);
+        Some(Self(name))
+    }
+
+    /// The name as text.
+    pub fn text(self) -> &'static str {
+        self.0
+    }
+}
+
+/// A parameter of the forces of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OwnParameter {
+    /// Its name.
+    pub name: Name,
+    /// Its value in SI units.
+    pub value: f64,
+    /// Its unit.
+    pub unit: Unit,
+}
+
+/// Largest common denominator of powers of V for which u is taken as variable.
+const BRANCH_MAX: u32 = 12;
+
+/// Parts of a way whose force is bounded.
+const PARTS: usize = 8;
+
+/// Share of the greatest force of a way that may lie hidden in a part of it; share of the energy that is nothing; and share of
+/// the greatest velocity of a part below which its force is not asked.
+const SURPRISE: f64 = 0.5;
+const NOTHING: f64 = 1e-18;
+const SLOWEST: f64 = 0.05;
+
+/// Parts in which a stretch is searched for places where its force begins to drive.
+const PANELS: u32 = 32;
+
+/// Halvings of a part of which the work is sought.
+const HALVINGS: u32 = 30;
+
+/// Nodes in (0, 1) and weights of Gauss and Legendre with ten points, the half below zero.
+const GAUSS: [(f64, f64); 5] = [
+    (0.973_906_528_517_171_7, 0.066_671_344_308_688_14),
+    (0.865_063_366_688_984_5, 0.149_451_349_150_580_6),
+    (0.679_409_568_299_024_4, 0.219_086_362_515_982_04),
+    (0.433_395_394_129_247_2, 0.269_266_719_309_996_35),
+    (0.148_874_338_981_631_22, 0.295_524_224_714_752_87),
+];
+
+/// Integral of `force`: ten points, halved until both halves give the whole, and until its `bounds` leave room for little
+/// else, beside the `scale` of the whole work; `roughly` is the share that may be wrong.
+fn integral(
+    force: &impl Fn(f64) -> f64,
+    bounds: &impl Fn(f64, f64) -> (f64, f64),
+    (from, to): (f64, f64),
+    (scale, roughly): (f64, f64),
+    halvings: u32,
+) -> f64 {
+    let rule = |from: f64, to: f64| {
+        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+        half * GAUSS.iter().map(|(x, w)| w * (force(middle - half * x) + force(middle + half * x))).sum::<f64>()
+    };
+    let middle = 0.5 * (from + to);
+    let (left, right) = (rule(from, middle), rule(middle, to));
+    let (least, most) = bounds(from, to);
+    let hides_little = (most - least) * (to - from) <= (left + right).abs() + 0.02 * scale;
+    let is_exact = !((left + right - rule(from, to)).abs() > 1e-15 * scale + roughly * (left.abs() + right.abs()));
+    let is_enough = is_exact && hides_little;
+    if is_enough || halvings == 0 {
+        return left + right;
+    }
+    let part = |from, to| integral(force, bounds, (from, to), (scale, roughly), halvings - 1);
+    part(from, middle) + part(middle, to)
+}
+
+/// Where `force`, positive at `low` and negative at `high`, changes its sign.
+fn sign_change(force: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    for _ in 0..64 {
+        let middle = 0.5 * (low + high);
+        if force(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// The laws of the stages of a problem; nothing where all have coefficients.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Laws<S = f64>(Option<Arc<[Option<Law<S>>]>>);
+
+impl<S> Laws<S> {
+    /// No law: every stage has coefficients.
+    pub const fn none() -> Self {
+        Self(None)
+    }
+
+    /// Whether every stage has coefficients.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_none()
+    }
+
+    /// The law of stage `index`; `None` for one of coefficients.
+    #[inline(always)]
+    pub fn of(&self, index: usize) -> Option<&Law<S>> {
+        match &self.0 {
+            None => None,
+            Some(laws) => laws.get(index)?.as_ref(),
+        }
+    }
+}
+
+impl<S: Scalar> Laws<S> {
+    /// The same laws in another number type.
+    pub fn cast<T: Scalar>(&self) -> Laws<T> {
+        let cast = |laws: &Arc<[Option<Law<S>>]>| laws.iter().map(|law| law.as_ref().map(Law::cast)).collect();
+        Laws(self.0.as_ref().map(cast))
+    }
+}
+
+impl<S> FromIterator<Option<Law<S>>> for Laws<S> {
+    fn from_iter<I: IntoIterator<Item = Option<Law<S>>>>(laws: I) -> Self {
+        let laws: Arc<[_]> = laws.into_iter().collect();
+        Self(laws.iter().any(Option::is_some).then_some(laws))
+    }
+}
