@@ -13,6 +13,9 @@ use crate::physics::{Criterion, Scene, Shown, groups};
 use crate::studies::sensitivity::{self, Share, Spread, Uncertainty};
 use crate::studies::{applicability, critical_velocity};
 
+/// What is said where no velocity is critical.
+const SEVERAL: &str = "paths cross here: no velocity is critical, and the intervals were found by a scan";
+
 /// Arguments of `critical`.
 #[derive(Args, Debug)]
 #[command(after_help = "Example: penetrode critical paper-slab --spread target.strength=5%")]
@@ -42,11 +45,14 @@ pub struct CriticalJson {
     schema: &'static str,
     scene: SceneJson,
     method: MethodJson,
-    critical_velocity_m_s: f64,
+    /// Intervals of impact velocities that perforate; `null` for no upper end.
+    perforating_velocities_m_s: Vec<(f64, Option<f64>)>,
+    /// `null` where more than one interval perforates.
+    critical_velocity_m_s: Option<f64>,
     error_bar_m_s: Option<f64>,
-    critical_energy_j: f64,
+    critical_energy_j: Option<f64>,
     dimensionless_energy: Option<f64>,
-    evaluations: u32,
+    evaluations: Option<u32>,
     note: &'static str,
     closed_form: Option<ClosedCriticalJson>,
     relative_error: Option<f64>,
@@ -109,17 +115,20 @@ impl Ask for CriticalArgs {
         }
         let method = self.method.build()?;
         let spreads = sensitivity::spreads(&self.spread)?;
-        let found = critical_velocity::of_scene(&scene, method.integrator())?;
+        let (intervals, found) = critical_velocity::speeds(&scene, method.integrator())?;
+        let shown = found.as_ref().map_or(intervals[0].low.velocity, |found| found.velocity);
         let exact = critical_velocity::exact(&scene).ok();
-        let problem = scene.resolve(found.velocity)?;
-        let warnings = applicability::warnings(&scene, found.velocity).into_iter();
+        let problem = scene.resolve(shown)?;
+        let warnings = applicability::warnings(&scene, shown).into_iter();
         let warnings = warnings.chain(applicability::drag_in_crater(&scene, &problem));
         for warning in scene.exit_depth_warning().into_iter().chain(warnings) {
             say("warning: ", &warning);
         }
-        let is_zero = exact == Some(0.0) || found.velocity == 0.0;
+        let is_zero = exact == Some(0.0) || shown == 0.0;
         let uncertainty = match spreads.as_slice() {
-            [_, ..] if !is_zero => Some(sensitivity::uncertainty(&scene, &spreads, self.samples as usize, self.seed)?),
+            [_, ..] if !is_zero && found.is_some() => {
+                Some(sensitivity::uncertainty(&scene, &spreads, self.samples as usize, self.seed)?)
+            }
             _ => None,
         };
         let no_spread = (is_zero && !spreads.is_empty())
@@ -130,12 +139,16 @@ impl Ask for CriticalArgs {
             schema: "penetrode/critical/1",
             scene: SceneJson::new(&scene, &problem),
             method: MethodJson::new(self.method.method, &self.method.options()?, Some(&problem), None),
-            critical_velocity_m_s: found.velocity,
-            error_bar_m_s: found.error_bar,
-            critical_energy_j: found.energy,
-            dimensionless_energy: dimensionless(found.energy),
-            evaluations: found.evaluations,
-            note: found.note,
+            perforating_velocities_m_s: intervals
+                .iter()
+                .map(|interval| (interval.low.velocity, interval.high.map(|high| high.velocity)))
+                .collect(),
+            critical_velocity_m_s: found.as_ref().map(|found| found.velocity),
+            error_bar_m_s: found.as_ref().and_then(|found| found.error_bar),
+            critical_energy_j: found.as_ref().map(|found| found.energy),
+            dimensionless_energy: found.as_ref().and_then(|found| dimensionless(found.energy)),
+            evaluations: found.as_ref().map(|found| found.evaluations),
+            note: found.as_ref().map_or(SEVERAL, |found| found.note),
             closed_form: exact.map(|velocity| {
                 let energy = 0.5 * scene.mass * velocity * velocity;
                 ClosedCriticalJson {
@@ -144,8 +157,7 @@ impl Ask for CriticalArgs {
                     dimensionless_energy: dimensionless(energy),
                 }
             }),
-            relative_error: exact
-                .map(|exact| if found.velocity == exact { 0.0 } else { ((found.velocity - exact) / exact).abs() }),
+            relative_error: exact.map(|exact| if shown == exact { 0.0 } else { ((shown - exact) / exact).abs() }),
             eq15: Eq15Json::new(&scene),
             uncertainty,
             skipped: no_spread.into_iter().collect(),
@@ -163,9 +175,21 @@ impl CriticalJson {
         let mut text = Text::titled(self.scene.title.as_deref());
         text.line(format!("  method     {}, perforation at {criterion}", self.method.name));
         let bar = self.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {}", error_text(Some(bar))));
-        let velocity = Shown(self.critical_velocity_m_s);
-        text.line(format!("  V_c        {velocity}{bar} m/s, {} flights", self.evaluations));
-        text.line(format!("  E_c        {}", engineering(self.critical_energy_j, "J")));
+        if let (Some(velocity), Some(energy), Some(flights)) =
+            (self.critical_velocity_m_s, self.critical_energy_j, self.evaluations)
+        {
+            text.line(format!("  V_c        {}{bar} m/s, {flights} flights", Shown(velocity)));
+            text.line(format!("  E_c        {}", engineering(energy, "J")));
+        }
+        if self.critical_velocity_m_s.is_none()
+            || self.perforating_velocities_m_s.iter().any(|(_, high)| high.is_some())
+        {
+            for (index, (low, high)) in self.perforating_velocities_m_s.iter().enumerate() {
+                let head = if index == 0 { "  perforate  " } else { "             " };
+                let high = high.map_or("and above".to_owned(), |high| format!("to {} m/s", Shown(high)));
+                text.line(format!("{head}{} m/s {high}", Shown(*low)));
+            }
+        }
         if !self.note.is_empty() {
             text.wrapped("  note       ", self.note);
         }

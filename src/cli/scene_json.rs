@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::physics::scene::Force;
-use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Stage};
+use crate::physics::scene::{Ending, Force, Resistance};
+use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Shown, Stage};
 
 /// The scene in SI units; what a scene of stages does not have is `null`.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -33,6 +33,8 @@ pub struct SceneJson {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<ForceJson>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ends: Vec<EndJson>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<OwnParameterJson>,
 }
 
@@ -42,6 +44,54 @@ pub struct SceneJson {
 pub struct ForceJson {
     pub stage: usize,
     pub force: String,
+}
+
+/// The end of a stage that is no depth, and the mass that joins the projectile there.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
+pub struct EndJson {
+    pub stage: usize,
+    pub end_velocity_m_s: Option<f64>,
+    pub until: Option<String>,
+    pub add_mass_kg: Option<f64>,
+}
+
+impl EndJson {
+    /// For people, the stage in front.
+    pub fn text(&self) -> String {
+        let condition = match (self.end_velocity_m_s, &self.until) {
+            (Some(velocity), _) => format!("V = {} m/s", Shown(velocity)),
+            (None, Some(until)) => until.clone(),
+            (None, None) => "its end".to_owned(),
+        };
+        let mass = self.add_mass_kg.map_or(String::new(), |mass| format!(", {} kg join", Shown(mass)));
+        format!("stage {}: {condition}{mass}", self.stage)
+    }
+}
+
+/// The ends of `scene` that are no depths.
+pub fn ends(scene: &Scene) -> impl Iterator<Item = EndJson> {
+    scene.ends.iter().map(|(stage, end)| {
+        let (end_velocity_m_s, until) = match &end.condition {
+            Some(Ending::Velocity(velocity)) => (Some(*velocity), None),
+            Some(Ending::Until(tape)) => (None, Some(tape.to_text())),
+            None => (None, None),
+        };
+        EndJson { stage: *stage, end_velocity_m_s, until, add_mass_kg: end.add_mass }
+    })
+}
+
+/// The stages of `problem`, those of `scene` where it gives coefficients.
+fn stages(scene: &Scene, problem: &Problem) -> Vec<Stage> {
+    let mut stages = problem.stages.to_vec();
+    if let (false, Resistance::Stages(given)) = (scene.ends.is_empty(), &scene.resistance)
+        && given.len() == stages.len()
+    {
+        for (index, stage) in stages.iter_mut().enumerate().filter(|(index, _)| scene.force_of(*index).is_none()) {
+            *stage = given[index];
+        }
+    }
+    stages
 }
 
 /// A parameter of the forces, in SI units.
@@ -90,8 +140,9 @@ impl SceneJson {
             drag_kg_m: homogeneous.and(scene.tunnel()).map(|law| law.drag),
             exit_depth_m: problem.has_exit().then_some(problem.exit_depth),
             follows: scene.follows(),
-            stages: problem.stages.to_vec(),
+            stages: stages(scene, problem),
             forces: forces(scene).collect(),
+            ends: ends(scene).collect(),
             parameters: scene
                 .parameters
                 .iter()

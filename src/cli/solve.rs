@@ -252,6 +252,9 @@ impl SolveArgs {
             let whose = if data.scene.stages.len() > 1 { format!("stage {stage}: ") } else { String::new() };
             text.wrapped("  force    ", &format!("{whose}{force}"));
         }
+        for end in &data.scene.ends {
+            text.wrapped("  end      ", &end.text());
+        }
         text.gap();
         let row = |event: &Event| {
             let name = match event.kind {

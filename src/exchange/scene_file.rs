@@ -15,12 +15,12 @@ use toml::de::{DeTable, DeValue};
 use super::diagnostic::{
     Dialect, Fault, SceneError, Span, did_you_mean, key_of, nearest, parse, quoted, read_text, type_of,
 };
-use crate::physics::expression::{Known, RESERVED, Tape, Unit, is_name};
+use crate::physics::expression::{ExpressionError, Known, RESERVED, Tape, Unit, is_name};
 use crate::physics::law::{Name, OwnParameter};
 use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, LayerNumber, Parameter, StageNumber};
 use crate::physics::scene::{
-    Concrete, CraterStiffness, Criterion, Force, Layer, Range, Resistance, Scene, layer_beyond,
+    Concrete, CraterStiffness, Criterion, Ending, Force, Layer, OwnEnd, Range, Resistance, Scene, layer_beyond,
 };
 use crate::physics::units::{self, Dimension, Quantity, QuantityError};
 use crate::physics::{Stage, semi_empirical};
@@ -75,6 +75,8 @@ pub const SHIPPED: &[(&str, &str)] = shipped![
     "law-johnson-cook-rate",
     "law-free-surface",
     "law-two-layers",
+    "law-allen",
+    "law-plug",
 ];
 
 /// The text of the shipped scene `name`.
@@ -196,7 +198,7 @@ impl SceneFile {
 }
 
 /// Paths of texts.
-const WORDS: [&str; 7] = [
+const WORDS: [&str; 8] = [
     "projectile.nose.shape",
     "perforation.criterion",
     "title",
@@ -204,7 +206,11 @@ const WORDS: [&str; 7] = [
     "stage.*.force.x",
     "stage.*.force.V",
     "stage.*.force.force",
+    UNTIL,
 ];
+
+/// Path of the condition on which a stage ends.
+const UNTIL: &str = "stage.*.until";
 
 /// Path of the force of a stage in place of its coefficients.
 const FORCE: &str = "stage.*.force";
@@ -272,6 +278,7 @@ const DIALECT: Dialect = Dialect {
         "projectile.nose" => "write nose = { factor = 0.72 }".to_owned(),
         "projectile.nose.shape" => "write shape = \"flat\"".to_owned(),
         "perforation.criterion" => "write criterion = \"full-depth\"".to_owned(),
+        "stage.until" => "write for instance until = \"V = v1\"".to_owned(),
         path if path.starts_with("stage.force") => format!("write {}", force_table::EXAMPLE),
         "stage" | "target.layer" => format!("write each as [[{path}]]"),
         _ => format!("write [{path}]"),
@@ -402,6 +409,7 @@ fn home_of<'a, 't>(
 struct Staged {
     stages: Vec<Stage>,
     forces: Vec<(usize, Force)>,
+    ends: Vec<(usize, OwnEnd)>,
     parameters: Vec<OwnParameter>,
     thickness: Option<f64>,
 }
@@ -591,20 +599,20 @@ impl<'t> Reader<'t> {
             return missing("[projectile]", "[projectile] with mass, diameter and nose");
         }
         let mass = self.value(Parameter::Mass)?;
-        let (resistance, thickness, forces, parameters) = if self.at("stage").is_some() {
+        let (resistance, thickness, forces, ends, parameters) = if self.at("stage").is_some() {
             self.without("[projectile]", &MATERIAL_OF_PROJECTILE, "with [[stage]], [projectile] has only `mass`")?;
             self.without("the scene", &["resistance"], "with [[stage]] there is no [resistance]")?;
-            let Staged { stages, forces, parameters, thickness } = self.stages()?;
-            (Resistance::Stages(stages), thickness, forces, parameters)
+            let Staged { stages, forces, ends, parameters, thickness } = self.stages()?;
+            (Resistance::Stages(stages), thickness, forces, ends, parameters)
         } else if self.at("target").is_some() {
             self.without("the scene", &[PARAMETERS], "[parameters] are those of a `force` in a [[stage]]")?;
             let (resistance, thickness) = self.concrete()?;
-            (resistance, thickness, Vec::new(), Vec::new())
+            (resistance, thickness, Vec::new(), Vec::new(), Vec::new())
         } else {
             return missing("[target]", "[target] with strength and density, or stages");
         };
         let title = self.word("title").map(|(title, _)| title);
-        Ok(Scene { title, mass, resistance, forces, thickness, criterion, velocity, parameters })
+        Ok(Scene { title, mass, resistance, forces, ends, thickness, criterion, velocity, parameters })
     }
 
     fn criterion(&self) -> Result<Criterion, Fault> {
@@ -629,9 +637,10 @@ impl<'t> Reader<'t> {
         let thickness = self.number(Parameter::Thickness)?;
         let mut stages: Vec<Stage> = Vec::with_capacity(count);
         let parameters = self.parameters()?;
-        let mut forces = Vec::new();
+        let (mut forces, mut ends) = (Vec::new(), Vec::new());
         for index in 0..count {
-            let previous = stages.last().map_or(0.0, |previous| previous.end);
+            let places = stages.iter().rev().map(|before| before.end);
+            let previous = places.into_iter().find(|end| *end < f64::INFINITY).unwrap_or(0.0);
             let force = self.force(index, previous, &parameters)?;
             let is_law = matches!(force, Some(Force::Expression(_)));
             forces.extend(force.map(|force| (index, force)));
@@ -647,11 +656,14 @@ impl<'t> Reader<'t> {
                     end: value(StageNumber::End)?,
                 }
             };
-            if stage.end.is_infinite() && index + 1 < count {
+            let own_end = self.own_end(index, index + 1 == count, &parameters)?;
+            let has_condition = own_end.as_ref().is_some_and(|end| end.condition.is_some());
+            ends.extend(own_end.map(|end| (index, end)));
+            if stage.end.is_infinite() && index + 1 < count && !has_condition {
                 return Err(Fault::new(
                     self.place(&format!("stage.{index}")),
                     "this stage has no `end`, and another follows",
-                    "only the last stage goes without an `end`",
+                    "only the last stage goes without an `end`, an `end_velocity` or an `until`",
                     "give it an `end`, or remove the stages behind it",
                 ));
             }
@@ -674,8 +686,8 @@ impl<'t> Reader<'t> {
             }
             stages.push(stage);
         }
-        self.used(&parameters, &forces)?;
-        Ok(Staged { stages, forces, parameters, thickness })
+        self.used(&parameters, &forces, &ends)?;
+        Ok(Staged { stages, forces, ends, parameters, thickness })
     }
 
     /// The parameters, in the order of the file.
@@ -732,9 +744,31 @@ impl<'t> Reader<'t> {
 
     /// The force `text` at `whole` in the file, an expression of `parameters`.
     fn expression(&self, text: &str, whole: Span, parameters: &[OwnParameter]) -> Result<Tape, Fault> {
+        self.of_parameters(text, whole, parameters, |known| Tape::read(text, known, Dimension::Force.into()))
+    }
+
+    /// The equation `text` at `whole` in the file, of x or V and of `parameters`.
+    fn equation(&self, text: &str, whole: Span, parameters: &[OwnParameter]) -> Result<Tape, Fault> {
+        let read = |known: &[Known<'_>]| Tape::read_equation(text, known);
+        let tape = self.of_parameters(text, whole.clone(), parameters, read)?;
+        if !(tape.depends_on_x() || tape.depends_on_v()) {
+            let message = "neither x nor V is in this equation, so that it never becomes true";
+            return Err(Fault::new(whole, message, "an equation of x, V or both", "write for instance \"V = v1\""));
+        }
+        Ok(tape)
+    }
+
+    /// What `read` makes of `text` at `whole` in the file, where `parameters` are known.
+    fn of_parameters(
+        &self,
+        text: &str,
+        whole: Span,
+        parameters: &[OwnParameter],
+        read: impl Fn(&[Known<'_>]) -> Result<Tape, ExpressionError>,
+    ) -> Result<Tape, Fault> {
         let known = |one: &OwnParameter| Known { name: one.name.text(), value: one.value, unit: one.unit };
         let known: Vec<_> = parameters.iter().map(known).collect();
-        Tape::read(text, &known, Dimension::Force.into()).map_err(|error| {
+        read(&known).map_err(|error| {
             // Where escapes moved the text, the whole is underlined.
             let raw = self.text.get(whole.clone()).unwrap_or_default();
             let span = raw.find(text).map_or(whole.clone(), |start| {
@@ -745,10 +779,56 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// Refuses a parameter that no force uses.
-    fn used(&self, parameters: &[OwnParameter], forces: &[(usize, Force)]) -> Result<(), Fault> {
+    /// How the stage `index` ends besides at a depth, and what joins the projectile there.
+    fn own_end(&mut self, index: usize, is_last: bool, parameters: &[OwnParameter]) -> Result<Option<OwnEnd>, Fault> {
+        let velocity = Parameter::Stage(index, StageNumber::EndVelocity);
+        let mass = Parameter::Stage(index, StageNumber::AddMass);
+        let until = format!("stage.{index}.until");
+        let given = [&velocity.to_string(), &until, &mass.to_string()].map(|path| self.at(path).map(|(key, _)| key));
+        if let Some(key) = given.iter().flatten().next()
+            && is_last
+        {
+            return Err(Fault::new(
+                key.clone(),
+                "the last stage ends here, and nothing follows",
+                "a stage that another follows",
+                "add the stage that follows, or remove this",
+            ));
+        }
+        if let (Some(_), Some(key)) = (&given[0], &given[1]) {
+            let (message, allowed) = ("this stage ends on two conditions", "one of `end_velocity` and `until`");
+            return Err(Fault::new(key.clone(), message, allowed, "remove one of the two"));
+        }
+        let is_table = self.at(&format!("stage.{index}.force.table")).is_some();
+        if let (Some(key), true) = (given[0].as_ref().or(given[1].as_ref()), is_table) {
+            let message = "this stage has a table for its force, and ends on a condition";
+            let help = "write the force as an expression, or end the stage at a depth";
+            return Err(Fault::new(key.clone(), message, "an `end` beside a table", help));
+        }
+        let condition = match self.number(velocity)? {
+            Some(velocity) => Some(Ending::Velocity(velocity)),
+            None => match self.word(&until) {
+                Some((text, whole)) => Some(Ending::Until(self.equation(&text, whole, parameters)?)),
+                None => None,
+            },
+        };
+        let add_mass = self.number(mass)?;
+        Ok((condition.is_some() || add_mass.is_some()).then_some(OwnEnd { condition, add_mass }))
+    }
+
+    /// Refuses a parameter that no force and no end uses.
+    fn used(
+        &self,
+        parameters: &[OwnParameter],
+        forces: &[(usize, Force)],
+        ends: &[(usize, OwnEnd)],
+    ) -> Result<(), Fault> {
         let uses = |force: &Force, index: usize| matches!(force, Force::Expression(tape) if tape.uses(index));
-        let is_used = |index: usize| forces.iter().any(|(_, force)| uses(force, index));
+        let ends_by =
+            |end: &OwnEnd, index: usize| matches!(&end.condition, Some(Ending::Until(tape)) if tape.uses(index));
+        let is_used = |index: usize| {
+            forces.iter().any(|(_, force)| uses(force, index)) || ends.iter().any(|(_, end)| ends_by(end, index))
+        };
         match parameters.iter().enumerate().find(|(index, _)| !is_used(*index)) {
             None => Ok(()),
             Some((_, one)) => {
@@ -766,7 +846,7 @@ impl<'t> Reader<'t> {
         if self.at(&home).is_none() {
             return Ok(None);
         }
-        let coefficients = StageNumber::ALL.into_iter().filter(|which| *which != StageNumber::End);
+        let coefficients = StageNumber::ALL.into_iter().filter(|which| which.is_coefficient());
         let coefficients: Vec<_> = coefficients.map(|which| Parameter::Stage(index, which).to_string()).collect();
         let coefficients: Vec<_> = coefficients.iter().map(String::as_str).collect();
         self.without("a stage with `force`", &coefficients, "`force` and `end`, or coefficients")?;

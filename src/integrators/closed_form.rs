@@ -118,7 +118,7 @@ impl StageSolver<f64> for Exact {
         if let StageEnd::Approach(..) = end {
             course.error_bound = margin_error(problem, stage, entry.depth, 0.0);
         }
-        let (StageEnd::Limit(state) | StageEnd::Rest(state) | StageEnd::Approach(state, _)) = end;
+        let state = end.state();
         if state.is_finite() {
             if !self.continuous {
                 course.sample_until(state, |time| state_in(&problem.stages[stage], problem.mass, entry, state, time));

@@ -224,7 +224,7 @@ impl StageSolver<f64> for &Reusing {
 
     fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
         // A depth has 53 bits, and what is left of the target behind a stop may be no longer than its rounding.
-        let Problem { mass, impact_speed, .. } = *course.problem;
+        let (mass, impact_speed) = (course.mass, course.problem.impact_speed);
         let force = course.problem.force(course.stage, course.state.depth, 0.0).abs();
         let rounding = f64::EPSILON * (2.0 * force / mass) * course.state.depth / impact_speed / impact_speed;
         let bound = course.error_bound + if course.state.velocity > 0.0 { 0.0 } else { rounding };
@@ -335,11 +335,11 @@ struct Reduced {
 
 impl Reduced {
     fn of(course: &Course<'_>) -> Solved<Self> {
-        let (problem, start) = (course.problem, course.state);
+        let (problem, start, mass) = (course.problem, course.state, course.mass);
         let limit = problem.limit_of(course.stage);
         // What the tolerance leaves open in x must be little beside the stage: a thin rest of a slab is its own unit.
         let (length, speed) = (length_of(problem).min(limit - start.depth), problem.impact_speed);
-        let (stage, mass) = (&problem.linear(course.stage, start), problem.mass);
+        let stage = &problem.linear(course.stage, start);
         let law = Stage {
             static_force: (stage.static_force + stage.stiffness * start.depth) / mass * length / speed / speed,
             stiffness: stage.stiffness / mass * (length / speed) * (length / speed),
@@ -358,6 +358,7 @@ impl Reduced {
             length,
             speed,
             acceleration: length / mass / speed / speed,
+            side: law.end().map_or(1.0, |end| end.side(start)),
         });
         Ok(Self { law, own, length, unit_speed: speed, start, speed: start.velocity / speed })
     }
@@ -381,6 +382,10 @@ impl Reduced {
         let state = |at: Node| self.state(Node { time: epoch + at.time, ..at });
         Ok(match end {
             StageEnd::Limit(at) => StageEnd::Limit(State { depth: course.limit()?, ..state(at) }),
+            StageEnd::Condition(at) => {
+                let at = state(at);
+                StageEnd::Condition(course.condition().map_or(at, |end| end.settled(at)))
+            }
             StageEnd::Rest(at) => StageEnd::Rest(state(at)),
             StageEnd::Approach(at, why) => StageEnd::Approach(state(at), why),
         })
@@ -399,6 +404,8 @@ struct OwnLaw {
     speed: f64,
     /// `L/(M V0²)`, which makes a force a deceleration in these units.
     acceleration: f64,
+    /// The sign of the condition of the stage on the way to its zero.
+    side: f64,
 }
 
 impl OwnLaw {
@@ -472,8 +479,93 @@ impl OwnLaw {
     fn is_approach(&self, at: Node, end: f64) -> bool {
         let (depth, velocity) = self.place(&[at.depth, at.velocity]);
         let mass = self.length / self.acceleration / self.speed / self.speed;
-        let place = State { time: at.time, depth, velocity };
-        self.law.is_approach(mass, place, (end - at.depth) * self.length)
+        let (place, distance) = (State { time: at.time, depth, velocity }, (end - at.depth) * self.length);
+        let ways = (depth, depth + self.law.reach(mass, place).min(distance));
+        let may_end = self.law.end().is_some_and(|end| end.may_vanish(ways, (0.0, velocity)));
+        !may_end && self.law.is_approach(mass, place, distance)
+    }
+
+    /// The condition at a node, above zero on the way to its end, and its slope over time.
+    fn condition(&self, at: Node) -> (f64, f64) {
+        let Some(end) = self.law.end() else { return (f64::INFINITY, 0.0) };
+        let (depth, velocity) = self.place(&[at.depth, at.velocity]);
+        let (_, by_depth, by_velocity) = end.gradient(depth, velocity);
+        let slope =
+            by_depth * self.length * at.velocity - by_velocity * self.speed * self.force(&[at.depth, at.velocity]);
+        (self.side * end.value(depth, velocity), self.side * slope)
+    }
+
+    /// `end` of a step between two nodes, or the condition that is met in front of it, for an error of `lost` in u².
+    fn or_condition(
+        &self,
+        course: &mut Course<'_>,
+        lost: f64,
+        [before, after]: [Node; 2],
+        end: Option<StageEnd>,
+        mut interpolant: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
+    ) -> Result<Option<StageEnd>, DiffsolError> {
+        let last = end.map_or(after, StageEnd::state);
+        let node = |time| interpolant(time).map(|(xi, u)| Node { time, depth: xi, velocity: u });
+        let (zero, is_open) = self.first_zero(before, last, lost, node)?;
+        course.is_in_doubt |= is_open;
+        Ok(zero.map(StageEnd::Condition).or(end))
+    }
+
+    /// Where the condition is met first between two nodes, on the library's interpolant `at`; and whether an error of
+    /// `lost` in u² leaves that open.
+    fn first_zero(
+        &self,
+        before: Node,
+        after: Node,
+        lost: f64,
+        mut at: impl FnMut(f64) -> Result<Node, DiffsolError>,
+    ) -> Result<(Option<Node>, bool), DiffsolError> {
+        let Some(end) = self.law.end() else { return Ok((None, false)) };
+        let ends = [before, after].map(|node| self.place(&[node.depth, node.velocity]));
+        let (slow, fast) = (ends[0].1.min(ends[1].1), ends[0].1.max(ends[1].1));
+        let spread = 0.5 * (fast - slow) + lost.sqrt() * self.speed;
+        if !end.may_vanish((ends[0].0, ends[1].0), ((slow - spread).max(0.0), fast + spread)) {
+            return Ok((None, false));
+        }
+        let value = |node: Node| self.condition(node).0;
+        let place = |part: usize| before.time + (after.time - before.time) * part as f64 / LOOKS as f64;
+        let mut seen = [before; LOOKS + 1];
+        for (part, node) in seen.iter_mut().enumerate().skip(1) {
+            *node = if part == LOOKS { after } else { at(place(part))? };
+        }
+        let mut crossing = (1..=LOOKS).find(|part| value(seen[*part]) <= 0.0).map(|part| (seen[part - 1], seen[part]));
+        let mut nearest = after;
+        if crossing.is_none() {
+            // Where it is nearest to zero, it may touch it.
+            let least = (0..=LOOKS).min_by(|a, b| value(seen[*a]).total_cmp(&value(seen[*b]))).unwrap_or(LOOKS);
+            let (mut low, mut high) = (seen[least.saturating_sub(1)].time, seen[(least + 1).min(LOOKS)].time);
+            for _ in 0..KINK_HALVINGS {
+                let [one, other] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+                let [left, right] = [at(one)?, at(other)?];
+                if value(left) <= value(right) { high = other } else { low = one }
+            }
+            nearest = at(0.5 * (low + high))?;
+            if value(after) < value(nearest) {
+                nearest = after;
+            }
+            if value(nearest) <= 0.0 {
+                crossing = Some((before, nearest));
+            }
+        }
+        let error = |node: Node| {
+            let (depth, velocity) = self.place(&[node.depth, node.velocity]);
+            let error = if node.velocity > lost.sqrt() { 0.5 * lost / node.velocity } else { lost.sqrt() };
+            let (_, by_depth, by_velocity) = end.gradient(depth, velocity);
+            error * (by_velocity.abs() * self.speed + by_depth.abs() * self.length) + end.noise(depth, velocity)
+        };
+        let Some((from, to)) = crossing else { return Ok((None, value(nearest) <= error(nearest))) };
+        let size = value(from);
+        let found = bracketed_root(from, to, 1e-3 * size, |node| self.condition(node), at)?;
+        // The parabola through the zero goes so far beyond it.
+        let rate = self.condition(found).1;
+        let curvature = (self.condition(to).1 - self.condition(from).1) / (to.time - from.time);
+        let beyond = if curvature > 0.0 { 0.5 * rate * rate / curvature } else { f64::INFINITY };
+        Ok((Some(found), beyond <= error(found)))
     }
 
     fn force(&self, y: &[f64]) -> f64 {
@@ -634,6 +726,9 @@ const STEP_MIN: f64 = 1e-30;
 /// Halvings of a step with a kink inside.
 const KINK_HALVINGS: u32 = 40;
 
+/// Parts of a step at whose ends a condition is asked.
+const LOOKS: usize = 8;
+
 /// By what a step is shortened that may hide a part of its force, and how short beside the time since the start of the stage
 /// it is not.
 const SHORTENING: f64 = 0.3;
@@ -682,6 +777,7 @@ where
         force.own.replace(stage.own.clone());
         force.evaluations.set(0);
         let longest_step = law.longest_step();
+        let noise = scheme.margin_error(rtol);
         let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed);
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
@@ -746,15 +842,10 @@ where
             cost.steps += 1;
             let scratch = &mut self.scratch;
             let mut interpolant = |t| solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]));
-            let is_last = after.velocity <= 0.0 || after.depth >= law.end;
-            let end = is_last
-                .then(|| locate(|x, v| force.force(&[x, v]), law.end, before, after, &mut interpolant))
-                .transpose();
+            let lost = course.error_bound + noise * energy_max;
+            let end = end_of_step(stage, force, course, lost, [before, after], &mut interpolant);
             let end = end.map_err(|e| failure(e, epoch, before))?;
-            let place = match end {
-                Some(StageEnd::Limit(place) | StageEnd::Rest(place) | StageEnd::Approach(place, _)) => place,
-                None => after,
-            };
+            let place = end.map_or(after, StageEnd::state);
             let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
             sampled.map_err(|e| failure(e, epoch, before))?;
             energy_max = energy_max.max(place.velocity * place.velocity);
@@ -777,11 +868,29 @@ where
         if !scheme.is_implicit() {
             self.reused = Some(solver);
         }
-        let noise = scheme.margin_error(rtol);
         let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
         course.cost = course.cost + cost;
         course.error_bound += (noise + round_off) * energy_max;
         stage.end_of(course, end, epoch, noise)
+    }
+}
+
+/// How the stage ends in the step between two nodes, if it does, for an error of `lost` in u².
+fn end_of_step(
+    stage: &Reduced,
+    force: &Force,
+    course: &mut Course<'_>,
+    lost: f64,
+    [before, after]: [Node; 2],
+    mut interpolant: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
+) -> Result<Option<StageEnd>, DiffsolError> {
+    let is_last = after.velocity <= 0.0 || after.depth >= stage.law.end;
+    let end = is_last
+        .then(|| locate(|x, v| force.force(&[x, v]), stage.law.end, before, after, &mut interpolant))
+        .transpose()?;
+    match &stage.own {
+        Some(own) if own.law.end().is_some() => own.or_condition(course, lost, [before, after], end, interpolant),
+        _ => Ok(end),
     }
 }
 

@@ -11,9 +11,9 @@
 use std::cmp::Ordering;
 
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample, Solved};
-use crate::physics::exit_energy::{energy_beyond_stop, speed_missing};
+use crate::physics::exit_energy::{energy_beyond_stop_of, speed_missing};
 pub(crate) use crate::physics::problem::StageEnd;
-use crate::physics::{Event, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
+use crate::physics::{Condition, Event, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
 
 /// What is said of a place that is reached without speed, if it is reached.
 const LEAST_TIME: &str = "the speed vanishes towards the end: the time is the least possible, until 2e-16 of the speed is \
@@ -75,6 +75,8 @@ pub(crate) struct Course<'a, S = f64> {
     pub(crate) detail: Detail<'a>,
     /// State at the start of the present stage; at the end of the flight, its end.
     pub(crate) state: State<S>,
+    /// The mass (kg) that moves.
+    pub(crate) mass: S,
     /// Index of the present stage.
     pub(crate) stage: usize,
     /// Whether the exit depth is reached.
@@ -82,6 +84,8 @@ pub(crate) struct Course<'a, S = f64> {
     pub(crate) cost: Cost,
     /// Error bound of `W/V0²` at `state`.
     pub(crate) error_bound: f64,
+    /// Whether the error bound leaves open if a stage ends on its condition.
+    pub(crate) is_in_doubt: bool,
     /// What the method reports about its choices.
     pub(crate) notes: Vec<String>,
     events: Events<S>,
@@ -90,6 +94,8 @@ pub(crate) struct Course<'a, S = f64> {
     passed: usize,
     /// Least `W/V0²` passed so far: at stage ends, or where a law of its own lets V rise again.
     least_at_ends: Bounded,
+    /// The stage that ended on its condition in the present state.
+    just_met: Option<usize>,
 }
 
 impl<'a, S: Scalar> Course<'a, S> {
@@ -100,15 +106,18 @@ impl<'a, S: Scalar> Course<'a, S> {
             problem,
             detail,
             state: State::at_impact(problem),
+            mass: problem.mass,
             stage: 0,
             is_through: false,
             cost: Cost::default(),
             error_bound: 0.0,
+            is_in_doubt: false,
             notes: Vec::new(),
             events: Events::new(),
             trajectory: Vec::new(),
             passed: 0,
             least_at_ends: Bounded::NONE,
+            just_met: None,
         }
     }
 
@@ -219,13 +228,15 @@ impl<'a, S: Scalar> Course<'a, S> {
         Bounded { value: relative * relative, bound: self.error_bound }
     }
 
-    /// Lists every stage end at the present depth and enters the stage beyond them.
+    /// Lists every stage end at the present state and enters the stage beyond them.
     #[inline(always)]
-    fn pass_ends(&mut self) {
-        while let Some(law) = self.problem.stages.get(self.stage)
-            && law.end.value() <= self.state.depth.value()
-        {
-            self.pass_end();
+    pub(crate) fn pass_ends(&mut self) {
+        while let Some(law) = self.problem.stages.get(self.stage) {
+            if law.end.value() <= self.state.depth.value() {
+                self.pass_end();
+            } else if self.problem.laws.is_empty() || !self.pass_if_met() {
+                break;
+            }
         }
     }
 
@@ -235,6 +246,83 @@ impl<'a, S: Scalar> Course<'a, S> {
         self.event(EventKind::boundary(self.problem, self.stage));
         self.least_at_ends = self.least_at_ends.min(self.energy());
         self.stage += 1;
+        if !self.problem.laws.is_empty() {
+            self.join_mass();
+        }
+    }
+
+    /// Where the present stage ends besides a depth.
+    #[inline(always)]
+    pub(crate) fn condition(&self) -> Option<&'a Condition<S>> {
+        self.problem.laws.of(self.stage)?.end()
+    }
+
+    /// Passes the end of the present stage if its condition is met in the present state, and says whether it is.
+    #[cold]
+    fn pass_if_met(&mut self) -> bool {
+        let Some(condition) = self.condition() else { return false };
+        // A zero that a method has located is one, whatever rounding leaves of it.
+        let met_before = self.just_met.and_then(|stage| self.problem.laws.of(stage)?.end());
+        let is_met = met_before.is_some_and(|before| before.is_same(condition)) || condition.is_met(self.state);
+        if is_met {
+            self.pass_condition();
+        }
+        is_met
+    }
+
+    /// Lists the end of the present stage on its condition, at the present state, and enters the stage behind it.
+    ///
+    /// The error bound, which is of W at one depth, takes the error of the place with it (docs/theory.md, section 10).
+    #[cold]
+    pub(crate) fn pass_condition(&mut self) {
+        let Some(condition) = self.condition() else { return };
+        self.just_met = Some(self.stage);
+        self.event(EventKind::boundary(self.problem, self.stage));
+        self.least_at_ends = self.least_at_ends.min(self.energy());
+        let (at, mass, before) = (self.state.values(), self.mass.value(), self.stage);
+        self.stage = condition.next();
+        let error = self.error_bound;
+        self.join_mass();
+        let (x, v) = (at.depth, at.velocity);
+        let share = mass / self.mass.value();
+        let slope =
+            |stage: usize, mass: f64| -2.0 * self.problem.force(stage, S::from_f64(x), S::from_f64(v)).value() / mass;
+        let (_, by_depth, by_velocity) = condition.gradient(x, v);
+        let behind = State { velocity: v * share, ..at };
+        let slope_behind = -2.0
+            * self
+                .problem
+                .force(self.stage.min(self.problem.stages.len() - 1), S::from_f64(x), S::from_f64(behind.velocity))
+                .value()
+            / self.mass.value();
+        let slope_before = slope(before, mass);
+        let mass_slope = self
+            .problem
+            .laws
+            .of(self.stage)
+            .and_then(|law| law.joining(self.state.depth))
+            .map_or(0.0, |(_, slope)| slope);
+        let jump = share * share * (slope_before - 2.0 * v * v * mass_slope / self.mass.value()) - slope_behind;
+        let passing = 2.0 * v * by_depth + by_velocity * slope_before;
+        let speed = self.problem.impact_speed.value();
+        let place = 2.0 * v * condition.noise(x, v) / speed / speed;
+        let grown = error * (share * share - jump * by_velocity / passing).abs() + (place * jump / passing).abs();
+        // Where forces have no value, the flight ends with that.
+        self.error_bound = if grown.is_nan() { error } else { grown };
+    }
+
+    /// Adds the mass that joins at the start of the present stage; momentum is kept.
+    #[cold]
+    fn join_mass(&mut self) {
+        let Some((added, _)) = self.problem.laws.of(self.stage).and_then(|law| law.joining(self.state.depth)) else {
+            return;
+        };
+        let mass = self.mass + added;
+        let share = self.mass.over(mass);
+        self.state.velocity = self.state.velocity * share;
+        self.error_bound *= share.value() * share.value();
+        self.mass = mass;
+        self.sample(self.state);
     }
 
     /// Lists the exit, if it is reached, and the rest, if there is no velocity left.
@@ -259,7 +347,7 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
         let scale = self.problem.impact_speed.value();
         let depth = self.state.depth.value();
-        let value = energy_beyond_stop(self.problem, self.stage, depth) / scale / scale;
+        let value = energy_beyond_stop_of(self.problem, self.stage, depth, self.mass.value()) / scale / scale;
         if value == 0.0
             && let Some(law) = self.problem.laws.of(self.stage)
         {
@@ -332,9 +420,17 @@ impl<'a, S: Scalar> Course<'a, S> {
         Ok(arrival)
     }
 
+    /// The margin of a flight that may have taken another way: not decided.
+    #[cold]
+    fn doubted(&mut self, margin: Option<Bounded>) -> Option<Bounded> {
+        self.notes.push(TOUCHES.to_owned());
+        margin.map(|margin| Bounded { bound: margin.bound.max(margin.value.abs()), ..margin })
+    }
+
     /// The flight that ends at the present state, with its exit margin.
     #[inline(always)]
-    pub(crate) fn finish(self, margin: Option<Bounded>) -> Flight<S> {
+    pub(crate) fn finish(mut self, margin: Option<Bounded>) -> Flight<S> {
+        let margin = if self.is_in_doubt { self.doubted(margin) } else { margin };
         let outcome = if margin.is_some_and(|margin| !margin.is_decided()) {
             Outcome::Undecided
         } else if self.is_through {
@@ -356,6 +452,10 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
     }
 }
+
+/// What is said of a flight on which a condition may or may not be met.
+const TOUCHES: &str =
+    "the condition of a stage is touched within the error bound: whether the stage ends there is open";
 
 /// A flight that never starts: at rest on the face (`V0 = 0`), or no target at all (exit depth 0).
 ///
@@ -406,9 +506,15 @@ pub(crate) fn solve<S: Scalar>(
         if entered >= problem.stages.len() {
             break;
         }
+        course.just_met = None;
         let rests = match method.solve_stage(&mut course)? {
             StageEnd::Limit(state) => {
                 course.state = state;
+                false
+            }
+            StageEnd::Condition(state) => {
+                course.state = state;
+                course.just_met = Some(entered);
                 false
             }
             StageEnd::Rest(state) => {
@@ -428,6 +534,8 @@ pub(crate) fn solve<S: Scalar>(
         if !rests {
             course.pass_ends();
             course.is_through = course.state.depth.value() >= problem.exit_depth.value();
+        } else if !problem.laws.is_empty() {
+            course.pass_if_met();
         }
         if course.is_through || course.state.velocity.value() <= 0.0 {
             course.stage = entered;

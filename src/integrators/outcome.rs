@@ -199,6 +199,16 @@ pub enum IntegrationError {
         /// Where it has none.
         last: State,
     },
+    /// The condition on which a stage ends has no value where the flight goes.
+    #[error("the end of stage {stage} has no value at x = {} m, V = {} m/s: {why}", Shown(last.depth), Shown(last.velocity))]
+    NoEnd {
+        /// Index of the stage.
+        stage: usize,
+        /// Which part of the expression, and why.
+        why: String,
+        /// Where it has none.
+        last: State,
+    },
     /// The library behind the method gave up.
     #[error("{method} gave up after {last}: {cause}")]
     SolverFailed {
@@ -233,7 +243,7 @@ impl Advice for IntegrationError {
             Self::TableEnds { .. } => {
                 "add rows to the table, or end its stage (`end`) or the target (`thickness`) before its last row"
             }
-            Self::NoForce { .. } => {
+            Self::NoForce { .. } | Self::NoEnd { .. } => {
                 "bound the argument with max or min, end the stage before that place, or try --method tsit45"
             }
             Self::SolverFailed { .. } => "loosen --rtol, or take --method taylor",
@@ -249,6 +259,7 @@ impl Advice for IntegrationError {
             | Self::NeverEnds { last, .. }
             | Self::TableEnds { last }
             | Self::NoForce { last, .. }
+            | Self::NoEnd { last, .. }
             | Self::SolverFailed { last, .. } => Some(*last),
             _ => None,
         }
@@ -259,11 +270,16 @@ impl Advice for IntegrationError {
 ///
 /// # Errors
 /// [`IntegrationError::Refused`].
-pub(crate) fn refuse_laws<S>(problem: &Problem<S>, method: &'static str) -> Solved<()> {
+pub(crate) fn refuse_laws<S: Scalar>(problem: &Problem<S>, method: &'static str) -> Solved<()> {
     if problem.laws.is_empty() {
         return Ok(());
     }
-    let why = "its formulas are those of p + s x + r V + q V², and a stage has a law of its own; take --method taylor";
+    let why = if problem.laws.have_conditions() {
+        "its formulas end stages at depths, and one ends at a speed or on a condition, or a mass joins there; \
+         take --method taylor"
+    } else {
+        "its formulas are those of p + s x + r V + q V², and a stage has a law of its own; take --method taylor"
+    };
     Err(IntegrationError::Refused { method, why: why.to_owned() })
 }
 

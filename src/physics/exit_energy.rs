@@ -63,7 +63,13 @@ pub fn propagate<S: Differentiable>(stage: &Stage<S>, mass: S, w: S, from: S, to
 ///
 /// Ahead of a stop W is negative, save where the force vanishes with the speed and round-off decides that it drives.
 pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64) -> f64 {
-    let least = continued(problem, stage, depth, 0.0, f64::INFINITY);
+    energy_beyond_stop_of(problem, stage, depth, problem.mass.value())
+}
+
+/// As [`energy_beyond_stop`], where `mass` (kg) moves.
+#[inline]
+pub(crate) fn energy_beyond_stop_of<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, mass: f64) -> f64 {
+    let least = continued(problem, stage, depth, mass, 0.0, f64::INFINITY);
     // A NaN stays what it is.
     if least > 0.0 { 0.0 } else { least }
 }
@@ -79,6 +85,10 @@ pub fn energy_beyond_stop<S: Scalar>(problem: &Problem<S>, stage: usize, depth: 
 ///
 /// `None` without an exit, or in a stage of another kind.
 pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
+    // The depth does not tell the stage.
+    if problem.laws.have_conditions() {
+        return None;
+    }
     let index = (0..problem.stages.len()).find(|&index| problem.limit_of(index) > at.depth)?;
     if let Some(law) = problem.laws.of(index) {
         let (speed, exit) = (problem.impact_speed, problem.exit_depth);
@@ -94,7 +104,8 @@ pub fn energy_beyond_approach(problem: &Problem, at: State) -> Option<f64> {
     } else {
         return None;
     };
-    let beyond = if law.end < problem.exit_depth { continued(problem, index + 1, limit, w, w) } else { w };
+    let beyond =
+        if law.end < problem.exit_depth { continued(problem, index + 1, limit, problem.mass, w, w) } else { w };
     (problem.has_exit() && beyond.is_finite()).then_some(beyond)
 }
 
@@ -112,14 +123,33 @@ pub(crate) fn speed_missing(law: &Stage, mass: f64, at: State, limit: f64) -> Op
     (missing >= 0.0).then_some(missing)
 }
 
-/// Least of `least` and of W (m²/s²) at the stage ends from stage `stage` on and at the exit, from `w` at `depth`.
-fn continued<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, least: f64) -> f64 {
-    let (mut w, mut from, mut least) = (w, depth, least);
+/// Least of `least` and of W (m²/s²) at the stage ends from stage `stage` on and at the exit, from `w` at `depth` with `mass` (kg).
+///
+/// An end on a condition is that at rest, and a mass that joins there shares the momentum: `W -> W (m/(m + added))²`.
+fn continued<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, mass: f64, w: f64, least: f64) -> f64 {
+    let (mut w, mut from, mut least, mut mass) = (w, depth, least, mass);
+    let mut next = stage;
     for index in stage..problem.stages.len() {
+        if index < next {
+            continue;
+        }
+        next = index + 1;
         let law = &problem.stages[index].values();
-        let mass = problem.mass.value();
-        let to = problem.limit_of(index).value().max(from);
+        let mut to = problem.limit_of(index).value().max(from);
+        let mut leaves = law.end >= problem.exit_depth.value();
         w = if let Some(law) = problem.laws.of(index) {
+            if index > stage
+                && let Some((added, _)) = law.joining(S::from_f64(from))
+            {
+                let share = mass / (mass + added.value());
+                w *= share * share;
+                mass += added.value();
+            }
+            if let Some(end) = law.end()
+                && let Some(place) = end.met_at_rest(from, to)
+            {
+                (to, next, leaves) = (place, end.next(), place >= problem.exit_depth.value());
+            }
             let (work, most) = law.static_work(from, to);
             least = least.min(w - 2.0 * most / mass);
             w - 2.0 * work / mass
@@ -130,7 +160,7 @@ fn continued<S: Scalar>(problem: &Problem<S>, stage: usize, depth: f64, w: f64, 
         };
         least = least.min(w);
         from = to;
-        if law.end >= problem.exit_depth.value() {
+        if leaves {
             break;
         }
     }

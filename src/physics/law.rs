@@ -4,11 +4,13 @@
 //! that knows no laws refuses the problem.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::expression::{Bound, Tape, Unit, is_name};
-use super::problem::State;
+use super::condition::Condition;
+use super::expression::{Bound, Known, Tape, Unit, is_name};
+use super::problem::{Stage, State};
 use super::scalar::Scalar;
+use super::units::Dimension;
 
 /// The force F(x, V) (N) of one stage, its parameters given.
 #[derive(Clone, Debug)]
@@ -19,11 +21,18 @@ pub struct Law<S = f64> {
     values: Bound,
     /// m with which the force is smooth in u at rest, `V = u^m`.
     branch: Option<u32>,
+    /// Where the stage ends besides a depth.
+    end: Option<Condition<S>>,
+    /// The mass (kg) that joins the projectile where the stage begins, a function of x.
+    joining: Option<(Tape, Vec<S>)>,
 }
 
 impl<S: PartialEq> PartialEq for Law<S> {
     fn eq(&self, other: &Self) -> bool {
-        self.parameters == other.parameters && self.values.tape() == other.values.tape()
+        self.parameters == other.parameters
+            && self.values.tape() == other.values.tape()
+            && self.end == other.end
+            && self.joining == other.joining
     }
 }
 
@@ -32,10 +41,59 @@ impl<S: Scalar> Law<S> {
     pub fn new(tape: &Tape, parameters: Vec<S>) -> Self {
         let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
         let values = tape.bind(&values);
-        let powers = values.powers_of_v();
-        let is_whole = |m: u32| powers.iter().all(|power| (power * f64::from(m)).fract() == 0.0);
-        let branch = (1..=BRANCH_MAX).find(|m| is_whole(*m));
-        Self { bound: tape.bind(&parameters), values, parameters, branch }
+        let branch = branch(&values.powers_of_v());
+        Self { bound: tape.bind(&parameters), values, parameters, branch, end: None, joining: None }
+    }
+
+    /// The law of the coefficients of `stage`.
+    pub(crate) fn of_coefficients(stage: &Stage<S>) -> Self {
+        static TAPE: LazyLock<Option<Tape>> = LazyLock::new(|| {
+            let known = [
+                ("p", Dimension::Force),
+                ("s", Dimension::Stiffness),
+                ("r", Dimension::Viscosity),
+                ("q", Dimension::Drag),
+            ];
+            let known = known.map(|(name, unit)| Known { name, value: 0.0, unit: unit.into() });
+            Tape::read("p + s*x + r*V + q*V^2", &known, Dimension::Force.into()).ok()
+        });
+        let Stage { static_force, stiffness, viscosity, drag, .. } = *stage;
+        match &*TAPE {
+            Some(tape) => Self::new(tape, vec![static_force, stiffness, viscosity, drag]),
+            None => unreachable!("the text of a force of coefficients is one"),
+        }
+    }
+
+    /// The same law, of a stage that ends at `end` too.
+    #[must_use]
+    pub(crate) fn ending(mut self, end: Condition<S>) -> Self {
+        self.bound = self.bound.with(end.tape(), end.parameters());
+        let mut powers = self.values.powers_of_v();
+        powers.extend(end.powers_of_v());
+        self.branch = branch(&powers);
+        self.end = Some(end);
+        self
+    }
+
+    /// The same law, of a stage at whose start a mass joins: the value of `tape` (kg) at `parameters`.
+    #[must_use]
+    pub(crate) fn joined_by(mut self, tape: &Tape, parameters: Vec<S>) -> Self {
+        self.joining = Some((tape.clone(), parameters));
+        self
+    }
+
+    /// Where the stage ends besides a depth.
+    #[inline(always)]
+    pub fn end(&self) -> Option<&Condition<S>> {
+        self.end.as_ref()
+    }
+
+    /// The mass (kg) that joins the projectile where the stage begins, at depth `x` (m), and its derivative (kg/m).
+    pub fn joining(&self, x: S) -> Option<(S, f64)> {
+        let (tape, parameters) = self.joining.as_ref()?;
+        let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
+        let (_, slope, _) = tape.bind(&values).gradient(x.value(), 0.0);
+        Some((tape.bind(parameters).eval(x, S::zero()), slope))
     }
 
     /// Force (N) at depth `x` (m) and velocity `v` (m/s); NaN or infinite where the expression has no value.
@@ -77,6 +135,11 @@ impl<S: Scalar> Law<S> {
     pub(crate) fn resists_between(&self, from: f64, to: f64) -> bool {
         (0..=PANELS)
             .all(|panel| self.values.eval(from + (to - from) * f64::from(panel) / f64::from(PANELS), 0.0) >= 0.0)
+    }
+
+    /// Whether bounds show that the force drives nowhere from the face to depth `to` (m), at any speed.
+    pub(crate) fn never_drives(&self, to: f64) -> bool {
+        self.values.range((0.0, to), (0.0, f64::INFINITY)).0 >= 0.0
     }
 
     /// In how many parts of a way the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
@@ -183,8 +246,20 @@ impl<S: Scalar> Law<S> {
 
     /// The same law in another number type, parameters taken over by value.
     pub fn cast<T: Scalar>(&self) -> Law<T> {
-        Law::new(self.bound.tape(), self.parameters.iter().map(|p| T::from_f64(p.value())).collect())
+        let to = |parameters: &[S]| parameters.iter().map(|p| T::from_f64(p.value())).collect::<Vec<_>>();
+        let mut law = Law::new(self.bound.tape(), to(&self.parameters));
+        if let Some(end) = &self.end {
+            law = law.ending(end.cast());
+        }
+        law.joining = self.joining.as_ref().map(|(tape, parameters)| (tape.clone(), to(parameters)));
+        law
     }
+}
+
+/// The least m with which powers of V are whole powers of u, `V = u^m`.
+fn branch(powers: &[f64]) -> Option<u32> {
+    let is_whole = |m: u32| powers.iter().all(|power| (power * f64::from(m)).fract() == 0.0);
+    (1..=BRANCH_MAX).find(|m| is_whole(*m))
 }
 
 /// Name of a parameter. Names are few, and are kept as long as the program runs.
@@ -300,6 +375,12 @@ impl<S> Laws<S> {
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.0.is_none()
+    }
+
+    /// Whether a stage ends at a speed or on a condition, or a mass joins at the start of one.
+    pub fn have_conditions(&self) -> bool {
+        let is_plain = |law: &Law<S>| law.end.is_none() && law.joining.is_none();
+        self.0.as_ref().is_some_and(|laws| !laws.iter().flatten().all(is_plain))
     }
 
     /// The law of stage `index`; `None` for one of coefficients.

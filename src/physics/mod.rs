@@ -2,6 +2,7 @@
 
 pub mod advice;
 pub mod closed_form;
+pub mod condition;
 pub mod elementary;
 pub mod exit_energy;
 pub mod expression;
@@ -19,6 +20,7 @@ pub mod units;
 
 pub use crate::text::Shown;
 pub use advice::Advice;
+pub use condition::Condition;
 pub use force_table::ForceTable;
 pub use law::{Law, Laws};
 pub use parameter::Parameter;

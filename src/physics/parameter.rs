@@ -83,6 +83,8 @@ pub enum StageNumber {
     Viscosity,
     Drag,
     End,
+    EndVelocity,
+    AddMass,
 }
 
 /// What the table holds on one number.
@@ -177,6 +179,12 @@ impl Parameter {
             Self::Stage(_, S::Viscosity) => ("stage.*.viscosity", "viscosity r", Some(Viscosity), NotNegative, Is(0.0)),
             Self::Stage(_, S::Drag) => ("stage.*.drag", "drag q", Some(Drag), NotNegative, Is(0.0)),
             Self::Stage(_, S::End) => ("stage.*.end", "end x", Some(Length), NotNegative, Is(f64::INFINITY)),
+            Self::Stage(_, S::EndVelocity) => {
+                ("stage.*.end_velocity", "end velocity", Some(Velocity), Positive, Means("no end at a velocity"))
+            }
+            Self::Stage(_, S::AddMass) => {
+                ("stage.*.add_mass", "added mass", Some(Mass), NotNegative, Means("no mass joins"))
+            }
             Self::Own(_) => ("parameters.*", "parameter", None, Finite, Refused("\"1 N\"")),
             Self::ThicknessRatio => ("H/d", "thickness ratio H/d", None, NotNegative, GROUP),
             Self::Geometry => ("N", "geometry function N", None, Positive, GROUP),
@@ -276,8 +284,13 @@ impl Parameter {
             }
             (Self::Mass | Self::Velocity, _) | (Self::Thickness, Stages(_)) => None,
             (Self::Stage(index, which), Stages(stages)) => {
-                let is_table = which != StageNumber::End && scene.force_of(index).is_some();
-                let why = is_table.then_some("that stage gives its force as a table");
+                let is_table = which.is_coefficient() && scene.force_of(index).is_some();
+                let is_given = scene.end_of(index).is_some_and(|end| end.number(which).is_some());
+                let why = match which {
+                    StageNumber::EndVelocity if !is_given => Some("that stage ends at no velocity"),
+                    StageNumber::AddMass if !is_given => Some("no mass joins at the end of that stage"),
+                    _ => is_table.then_some("that stage gives its force as a table"),
+                };
                 if index >= stages.len() { Some("it has fewer stages, counted from 0") } else { why }
             }
             (Self::Stage(..), _) => Some("it gives no stages"),
@@ -312,7 +325,10 @@ impl Parameter {
             }
             (Self::Mass, _) => scene.mass,
             (Self::Velocity, _) => velocity()?,
-            (Self::Stage(index, which), Stages(stages)) => which.of(stages[index]),
+            (Self::Stage(index, which), Stages(stages)) => {
+                let number = scene.end_of(index).and_then(|end| end.number(which));
+                number.unwrap_or_else(|| which.of(stages[index]))
+            }
             // No other number gets past its obstacle.
             (Self::Thickness | Self::Stage(..), _) | (_, Stages(_)) => thickness()?,
             (Self::Diameter, Concrete(concrete)) => concrete.diameter,
@@ -353,7 +369,14 @@ impl Parameter {
             }
             (Self::Mass, _) => scene.mass = value,
             (Self::Velocity, _) => scene.velocity = Some(value),
-            (Self::Stage(index, which), Stages(stages)) => *which.field(&mut stages[index]) = value,
+            (Self::Stage(index, which), Stages(stages)) => {
+                let end = scene.ends.iter_mut().find(|(stage, _)| *stage == index);
+                if let Some(number) = end.and_then(|(_, end)| end.number_mut(which)) {
+                    *number = value;
+                } else if let Some(number) = which.field(&mut stages[index]) {
+                    *number = value;
+                }
+            }
             // No other number gets past its obstacle.
             (Self::Thickness | Self::Stage(..), _) | (_, Stages(_)) => scene.thickness = Some(value),
             (Self::Diameter, Concrete(concrete)) => concrete.diameter = value,
@@ -450,21 +473,29 @@ impl LayerNumber {
 
 impl StageNumber {
     /// Every number of a stage.
-    pub const ALL: [Self; 5] = [Self::StaticForce, Self::Stiffness, Self::Viscosity, Self::Drag, Self::End];
+    pub const ALL: [Self; 7] =
+        [Self::StaticForce, Self::Stiffness, Self::Viscosity, Self::Drag, Self::End, Self::EndVelocity, Self::AddMass];
+
+    /// Whether it is one of the four of `p + s x + r V + q V²`.
+    pub fn is_coefficient(self) -> bool {
+        !matches!(self, Self::End | Self::EndVelocity | Self::AddMass)
+    }
 
     /// Its value in `stage`.
     pub(super) fn of(self, mut stage: Stage) -> f64 {
-        *self.field(&mut stage)
+        self.field(&mut stage).map_or(f64::NAN, |number| *number)
     }
 
-    fn field(self, stage: &mut Stage) -> &mut f64 {
-        match self {
+    /// Its place in `stage`, where the stage itself has it.
+    fn field(self, stage: &mut Stage) -> Option<&mut f64> {
+        Some(match self {
             Self::StaticForce => &mut stage.static_force,
             Self::Stiffness => &mut stage.stiffness,
             Self::Viscosity => &mut stage.viscosity,
             Self::Drag => &mut stage.drag,
             Self::End => &mut stage.end,
-        }
+            Self::EndVelocity | Self::AddMass => return None,
+        })
     }
 }
 

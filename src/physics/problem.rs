@@ -270,9 +270,10 @@ impl<S: Scalar> Problem<S> {
         self.crater.map_or((S::zero(), self.stages[0]), |crater| (self.stages[crater].end, self.stages[crater + 1]))
     }
 
-    /// Depth where stage `index` begins (m).
+    /// Depth where stage `index` begins (m): the end in front of it that is a place.
     pub fn start_of(&self, index: usize) -> S {
-        if index == 0 { S::zero() } else { self.stages[index - 1].end }
+        let places = self.stages[..index].iter().rev().map(|stage| stage.end);
+        places.into_iter().find(|end| end.value() < f64::INFINITY).unwrap_or(S::zero())
     }
 
     /// Depth (m) at which integration through stage `index` ends: its end or the exit depth, whichever comes first.
@@ -364,10 +365,20 @@ impl std::fmt::Display for State {
 pub(crate) enum StageEnd<S = f64> {
     /// At the limit of the stage; the velocity there may be zero.
     Limit(State<S>),
+    /// Before the limit, where the condition of the stage is met.
+    Condition(State<S>),
     /// At rest before the limit.
     Rest(State<S>),
     /// Neither: from the state given, a place before the limit is only approached.
     Approach(State<S>, &'static str),
+}
+
+impl<S> StageEnd<S> {
+    /// The state there.
+    pub(crate) fn state(self) -> State<S> {
+        let (Self::Limit(state) | Self::Condition(state) | Self::Rest(state) | Self::Approach(state, _)) = self;
+        state
+    }
 }
 
 /// What happened at a place. The order of the variants is the order of events at one place.

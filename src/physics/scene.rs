@@ -4,17 +4,20 @@
 //! every number before it returns a [`Problem`].
 
 use std::f64::consts::FRAC_PI_4;
+use std::sync::LazyLock;
 
 use thiserror::Error;
 
 use super::advice::Advice;
-use super::expression::Tape;
+use super::condition::Condition;
+use super::expression::{Known, Tape};
 use super::force_table::ForceTable;
 use super::law::{Law, Laws, OwnParameter};
 use super::parameter::{LayerNumber, Parameter, StageNumber};
 use super::problem::{Problem, Stage, Stages, Target};
 use super::scalar::Scalar;
 use super::semi_empirical;
+use super::units::Dimension;
 use crate::text::Shown;
 
 /// What the projectile meets.
@@ -33,6 +36,55 @@ pub enum Force {
     Table(ForceTable),
     /// An expression of x, V and [`Scene::parameters`].
     Expression(Tape),
+}
+
+/// How a stage ends besides at a depth, and what joins the projectile at its end.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OwnEnd {
+    /// The condition that ends it, if there is one.
+    pub condition: Option<Ending>,
+    /// The mass (kg) that joins there, its momentum zero before.
+    pub add_mass: Option<f64>,
+}
+
+/// A condition that ends a stage.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ending {
+    /// The velocity (m/s) is no longer above this.
+    Velocity(f64),
+    /// The two sides of an equation of x, V and [`Scene::parameters`] are equal.
+    Until(Tape),
+}
+
+impl OwnEnd {
+    /// Its number `which`.
+    pub(super) fn number(&self, which: StageNumber) -> Option<f64> {
+        match (which, &self.condition) {
+            (StageNumber::EndVelocity, Some(Ending::Velocity(velocity))) => Some(*velocity),
+            (StageNumber::AddMass, _) => self.add_mass,
+            _ => None,
+        }
+    }
+
+    pub(super) fn number_mut(&mut self, which: StageNumber) -> Option<&mut f64> {
+        match (which, &mut self.condition) {
+            (StageNumber::EndVelocity, Some(Ending::Velocity(velocity))) => Some(velocity),
+            (StageNumber::AddMass, _) => self.add_mass.as_mut(),
+            _ => None,
+        }
+    }
+}
+
+/// A mass as an expression.
+fn mass_itself() -> &'static Tape {
+    static TAPE: LazyLock<Option<Tape>> = LazyLock::new(|| {
+        let unit = Dimension::Mass.into();
+        Tape::read("m", &[Known { name: "m", value: 0.0, unit }], unit).ok()
+    });
+    match &*TAPE {
+        Some(tape) => tape,
+        None => unreachable!("the text of a mass is an expression"),
+    }
 }
 
 /// The numbers of Eq. 4-5, 13 and 14.
@@ -110,6 +162,8 @@ pub struct Scene {
     pub resistance: Resistance,
     /// The forces of stages that have no coefficients, each with the index of its stage, from 0.
     pub forces: Vec<(usize, Force)>,
+    /// The ends of stages that are no depths, each with the index of its stage, from 0.
+    pub ends: Vec<(usize, OwnEnd)>,
     /// Target thickness H (m), with layers their sum; `None` for a semi-infinite target.
     pub thickness: Option<f64>,
     /// When it counts as perforated.
@@ -214,6 +268,12 @@ pub enum ResolveError {
         /// Where the stage begins (m).
         start: f64,
     },
+    /// A stage has a table for its force, and a condition for its end.
+    #[error("stage {0} has a table for its force, and ends on a condition")]
+    TableOnCondition(usize),
+    /// The last stage ends on a condition.
+    #[error("stage {0} ends on a condition, or a mass joins there, and no stage follows")]
+    NothingFollows(usize),
     /// The last stage ends inside the target.
     #[error("the last stage ends at {} m, inside the target", Shown(*.0))]
     TargetGoesOn(f64),
@@ -248,6 +308,8 @@ impl Advice for ResolveError {
             Self::NoStage => "give at least one stage",
             Self::StageEndsFall { .. } => "order the stages by their ends, and leave out only the last end",
             Self::TableElsewhere { .. } => "add a row at or before the start of the stage, and one behind it",
+            Self::TableOnCondition(_) => "write the force as an expression, or end the stage at a depth",
+            Self::NothingFollows(_) => "add the stage that follows",
             Self::TargetGoesOn(_) => "leave out the end of the last stage, or end the target there",
             Self::LayersDoNotSumUp { .. } => "leave out the thickness; it follows from the layers",
             Self::OutOfRange { .. } => "check the units of the scene; its numbers lie too far apart",
@@ -446,6 +508,20 @@ fn given<S: Scalar>(
             // A subnormal number has lost digits already, and any product with it loses more.
             representable(parameter.entry().name, value, true)?;
         }
+        if let Some(end) = scene.end_of(index) {
+            for which in [StageNumber::EndVelocity, StageNumber::AddMass] {
+                end.number(which).map_or(Ok(()), |value| Parameter::Stage(index, which).admit(value))?;
+            }
+            if index + 1 == stages.len() {
+                return Err(ResolveError::NothingFollows(index));
+            }
+            if end.condition.is_some() && matches!(scene.force_of(index), Some(Force::Table(_))) {
+                return Err(ResolveError::TableOnCondition(index));
+            }
+            if stage.end == f64::INFINITY && end.condition.is_some() {
+                continue;
+            }
+        }
         // In this form it also refuses NaN, and a stage behind one without an end.
         if !(stage.end >= previous && previous.is_finite()) {
             return Err(ResolveError::StageEndsFall { stage: index, end: stage.end, previous });
@@ -481,6 +557,7 @@ impl Scene {
             mass,
             resistance: Resistance::Concrete(concrete),
             forces: Vec::new(),
+            ends: Vec::new(),
             thickness: None,
             criterion: Criterion::FullDepth,
             velocity: None,
@@ -548,6 +625,54 @@ impl Scene {
         self.forces.iter().find(|(stage, _)| *stage == index).map(|(_, force)| force)
     }
 
+    /// How stage `index` ends besides at a depth.
+    pub fn end_of(&self, index: usize) -> Option<&OwnEnd> {
+        self.ends.iter().find(|(stage, _)| *stage == index).map(|(_, end)| end)
+    }
+
+    /// `stages` and `laws`, the conditions of [`Scene::ends`] at the stages that `pieces` tells of each given stage: every
+    /// stage has a law then, so that what knows coefficients alone refuses it.
+    fn with_ends<S: Scalar>(
+        &self,
+        mut stages: Stages<S>,
+        mut laws: Vec<Option<Law<S>>>,
+        pieces: &[std::ops::Range<usize>],
+        parameters: &[S],
+        number: &impl Fn(Parameter, f64) -> S,
+    ) -> (Stages<S>, Laws<S>) {
+        if self.ends.is_empty() {
+            return (stages, laws.into_iter().collect());
+        }
+        laws.resize_with(stages.len(), || None);
+        for (stage, law) in stages.iter_mut().zip(&mut laws) {
+            if law.is_none() {
+                *law = Some(Law::of_coefficients(stage));
+                *stage = Stage::of_law(stage.end);
+            }
+        }
+        for (index, end) in &self.ends {
+            let Some(range) = pieces.get(*index) else { continue };
+            let next = range.end;
+            let condition = end.condition.as_ref().map(|condition| match condition {
+                Ending::Velocity(velocity) => {
+                    let which = Parameter::Stage(*index, StageNumber::EndVelocity);
+                    Condition::of_speed(number(which, *velocity), next)
+                }
+                Ending::Until(tape) => Condition::of_zero(tape, parameters.to_vec(), next),
+            });
+            if let Some(condition) = condition {
+                for law in &mut laws[range.clone()] {
+                    *law = law.take().map(|law| law.ending(condition.clone()));
+                }
+            }
+            if let (Some(mass), Some(law)) = (end.add_mass, laws.get_mut(next)) {
+                let mass = number(Parameter::Stage(*index, StageNumber::AddMass), mass);
+                *law = law.take().map(|law| law.joined_by(mass_itself(), vec![mass]));
+            }
+        }
+        (stages, laws.into_iter().collect())
+    }
+
     /// `given` with the pieces of tables in place of their stages, and the laws of stages whose force is an expression; and
     /// whether a table ends before its stage and the exit, so that the last stage stands for what lies behind it.
     fn with_forces<S: Scalar>(
@@ -556,14 +681,17 @@ impl Scene {
         exit_depth: f64,
         number: &impl Fn(Parameter, f64) -> S,
     ) -> Resolved<(Stages<S>, Laws<S>, bool)> {
-        if self.forces.is_empty() {
+        if self.forces.is_empty() && self.ends.is_empty() {
             return Ok((given.into(), Laws::none(), false));
         }
         let parameters: Vec<S> =
             self.parameters.iter().map(|one| number(Parameter::Own(one.name), one.value)).collect();
         let (mut stages, mut laws) = (Stages::new(), Vec::new());
+        let mut pieces = Vec::with_capacity(given.len());
+        let mut ends_early = false;
         for (index, stage) in given.iter().enumerate() {
             laws.resize_with(stages.len(), || None);
+            let first = stages.len();
             let table = match self.force_of(index) {
                 Some(Force::Table(table)) => table,
                 other => {
@@ -571,17 +699,20 @@ impl Scene {
                         laws.push(Some(Law::new(tape, parameters.clone())));
                     }
                     stages.push(*stage);
+                    pieces.push(first..first + 1);
                     continue;
                 }
             };
-            let (start, end) =
-                (index.checked_sub(1).map_or(0.0, |before| given[before].end.value()), stage.end.value());
+            let places = given[..index].iter().rev().map(|before| before.end.value());
+            let start = places.into_iter().find(|end| *end < f64::INFINITY).unwrap_or(0.0);
+            let end = stage.end.value();
             if !(table.first() <= start && start < table.last()) {
                 let (first, last) = (table.first(), table.last());
                 return Err(ResolveError::TableElsewhere { stage: index, first, last, start });
             }
             if end <= start {
                 stages.push(*stage);
+                pieces.push(first..first + 1);
                 continue;
             }
             let mut reached = start;
@@ -596,19 +727,22 @@ impl Scene {
                     break;
                 }
             }
+            pieces.push(first..stages.len());
             if reached >= exit_depth && reached < end {
                 // Nothing behind the exit is met.
                 if let Some(last) = stages.last_mut() {
                     last.end = S::from_f64(f64::INFINITY);
                 }
-                return Ok((stages, laws.into_iter().collect(), false));
+                break;
             }
             if reached < end {
                 stages.push(Stage::free());
-                return Ok((stages, laws.into_iter().collect(), true));
+                ends_early = true;
+                break;
             }
         }
-        Ok((stages, laws.into_iter().collect(), false))
+        let (stages, laws) = self.with_ends(stages, laws, &pieces, &parameters, number);
+        Ok((stages, laws, ends_early))
     }
 
     /// As [`Scene::resolve`], from the `problem` of this scene at another speed: only a continuous crater constant depends

@@ -138,6 +138,7 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
         title: None,
         mass: row.number(0)?,
         forces: Vec::new(),
+        ends: Vec::new(),
         parameters: Vec::new(),
         resistance: Resistance::Concrete(Concrete {
             diameter: row.number(1)?,

@@ -13,6 +13,7 @@ use super::error::{Studied, StudyError, Truth, error_scale, flight_error, free_q
 use super::formal_order::{Path, formal_order};
 use super::grid_convergence::{GridValue, ThreeGrids, three_grids};
 use super::order::{Class, Exclusion, FitError, FittedPoint, OrderFit, StepError, fit};
+use super::perforating_velocities;
 use super::quantity::Quantity;
 use super::random::Random;
 use super::verdict::Verdict;
@@ -279,6 +280,11 @@ fn of_critical_velocity(
         return Ok(Err(why.to_owned()));
     }
     let critical = scene.resolve(velocity)?;
+    if perforating_velocities::may_cross(&critical) {
+        let why =
+            "paths may cross here, so that the outcome may change where no energy vanishes: no order is expected of it";
+        return Ok(Err(why.to_owned()));
+    }
     let exact = match Truth::of(&critical) {
         Ok(truth) => truth.flight,
         Err(error) => return Ok(Err(error.to_string())),

@@ -18,10 +18,11 @@ use smallvec::SmallVec;
 use thiserror::Error;
 
 use super::error::Studied;
+use super::perforating_velocities::{self, Edge, Interval, Perforating};
 use crate::integrators::{Accuracy, Cost, IntegrationError, Integrator, Margin, MethodName, Taylor};
 use crate::physics::{
     Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, Target, closed_form,
-    exit_energy,
+    exit_energy, scene::Ending,
 };
 
 /// Speed (m/s) at which the scene is first resolved, for its exit depth and static work.
@@ -167,6 +168,12 @@ pub enum CriticalError {
         /// What resolves more, by the method that was asked.
         remedy: &'static str,
     },
+    /// Several intervals of impact speeds perforate, so that no one is critical.
+    #[error("no velocity is critical: {}", intervals_text(.0))]
+    Several(Vec<Interval>),
+    /// No impact speed that was tried perforates.
+    #[error("no impact velocity from {} to {} m/s perforates", Shown(.0.0), Shown(.0.1))]
+    Never((f64, f64)),
     /// The tolerance was not reached.
     #[error("tolerance not reached after {flights} flights ({reason}), between {low} and {high}")]
     NotConverged {
@@ -204,6 +211,7 @@ impl Advice for CriticalError {
                  central-difference, shorten --dt"
                     .to_owned()
             }
+            Self::Several(_) => "`penetrode critical` lists them as perforating_velocities_m_s".to_owned(),
             Self::TableEnds(_) => "add rows to the table up to the exit".to_owned(),
             _ => self.inner().map_or_else(String::new, Advice::help),
         }
@@ -324,6 +332,17 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Sought {
     {
         return Err(CriticalError::TableEnds(last.end));
     }
+    if let Some(found) = perforating(scene, integrator)? {
+        return of_intervals(scene, &found);
+    }
+    of_unique(scene, integrator)
+}
+
+/// As [`of_scene`], for a scene whose paths cannot cross.
+///
+/// # Errors
+/// [`CriticalError`].
+fn of_unique(scene: &Scene, integrator: &dyn Integrator) -> Sought {
     let first = OnceCell::new();
     let resolve = |speed| match first.get() {
         Some(problem) => scene.resolve_from(problem, speed),
@@ -332,6 +351,91 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Sought {
     let reused = integrator.reusing();
     critical_velocity(resolve, reused.as_deref().unwrap_or(integrator))
 }
+
+/// The impact speeds that perforate `scene` through `integrator`, where they need not be all above one critical velocity;
+/// `None` where they are.
+///
+/// # Errors
+/// [`CriticalError`]: a scene or a flight failed, or the target has no far side.
+pub fn perforating(scene: &Scene, integrator: &dyn Integrator) -> Sought<Option<Perforating>> {
+    let probe = scene.resolve(PROBE_SPEED);
+    let probe = probe.map_err(|cause| CriticalError::Scene { velocity: PROBE_SPEED, cause })?;
+    if !perforating_velocities::may_cross(&probe) {
+        return Ok(None);
+    }
+    if !probe.has_exit() {
+        return Err(CriticalError::NoExit);
+    }
+    let named = scene.ends.iter().filter_map(|(_, end)| match end.condition {
+        Some(Ending::Velocity(velocity)) => Some(velocity),
+        _ => None,
+    });
+    let named = named.chain(scene.velocity.filter(|speed| *speed > 0.0));
+    let work = lower_bound(&probe).sqrt();
+    let (least, most) = named.fold((work, work), |(least, most), speed| (least.min(speed), most.max(speed)));
+    let reused = integrator.reusing();
+    let integrator = reused.as_deref().unwrap_or(integrator);
+    perforating_velocities::perforating(|speed| scene.resolve(speed), integrator, (least, most)).map(Some)
+}
+
+/// The impact speeds that perforate `scene`, and its critical velocity if there is one.
+///
+/// # Errors
+/// [`CriticalError`], several intervals excepted.
+pub fn speeds(scene: &Scene, integrator: &dyn Integrator) -> Sought<(Vec<Interval>, Option<CriticalVelocity>)> {
+    if scene.ends.is_empty() {
+        let found = of_scene(scene, integrator)?;
+        return Ok((vec![of_one(&found)], Some(found)));
+    }
+    match perforating(scene, integrator)? {
+        None => {
+            let found = of_unique(scene, integrator)?;
+            Ok((vec![of_one(&found)], Some(found)))
+        }
+        Some(found) => {
+            let one = if found.intervals.len() > 1 { None } else { Some(of_intervals(scene, &found)?) };
+            Ok((found.intervals, one))
+        }
+    }
+}
+
+/// All speeds above one.
+fn of_one(found: &CriticalVelocity) -> Interval {
+    let low = Edge { velocity: found.velocity, error_bar: found.error_bar.unwrap_or(f64::NAN) };
+    Interval { low, high: None }
+}
+
+/// V_c where one interval alone perforates.
+fn of_intervals(scene: &Scene, found: &Perforating) -> Sought {
+    let Perforating { ref intervals, tried, evaluations, cost } = *found;
+    match intervals[..] {
+        [] => Err(CriticalError::Never(tried)),
+        [Interval { low, .. }] => Ok(CriticalVelocity {
+            velocity: low.velocity,
+            error_bar: Some(low.error_bar),
+            energy: 0.5 * scene.mass * low.velocity * low.velocity,
+            evaluations,
+            cost,
+            bracket: (low.velocity - low.error_bar, low.velocity + low.error_bar),
+            note: "paths may cross here: the velocities that perforate were found by a scan",
+        }),
+        _ => Err(CriticalError::Several(intervals.clone())),
+    }
+}
+
+/// Intervals for people.
+fn intervals_text(intervals: &[Interval]) -> String {
+    let text = |interval: &Interval| match interval.high {
+        Some(high) => format!("{} to {} m/s", Shown(interval.low.velocity), Shown(high.velocity)),
+        None => format!("{} m/s and above", Shown(interval.low.velocity)),
+    };
+    let all: Vec<_> = intervals.iter().take(SHOWN_MAX).map(text).collect();
+    let more = if intervals.len() > SHOWN_MAX { ", and others" } else { "" };
+    format!("velocities that perforate are {}{more}", all.join(", "))
+}
+
+/// Most intervals in a message.
+const SHOWN_MAX: usize = 6;
 
 /// Exact critical velocity of `scene` (m/s), where it has a closed form.
 ///

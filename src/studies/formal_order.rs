@@ -38,8 +38,18 @@ impl Path {
     /// The facts about `flight`, an accurate flight (closed form, Taylor) through `problem` with its events.
     pub fn of(problem: &Problem, flight: &Flight) -> Self {
         // Stages of no length leave no trace.
-        let crossed: Vec<usize> =
-            (0..=flight.stage).filter(|&index| problem.stages[index].end > problem.start_of(index)).collect();
+        let crossed: Vec<usize> = if problem.laws.have_conditions() {
+            // Where they end, the flight tells.
+            let ends = flight.events.iter().filter_map(|event| match event.kind {
+                EventKind::StageEnd(index) => Some((index, event.state.depth)),
+                _ => None,
+            });
+            let mut start = 0.0;
+            let passed = ends.filter(|(_, depth)| std::mem::replace(&mut start, *depth) < *depth);
+            passed.map(|(index, _)| index).chain([flight.stage]).collect()
+        } else {
+            (0..=flight.stage).filter(|&index| problem.stages[index].end > problem.start_of(index)).collect()
+        };
         let stretch = |last: usize| {
             let mut stretch = Stretch::default();
             for (turn, &index) in crossed.iter().enumerate().take_while(|(_, index)| **index <= last) {
@@ -53,7 +63,9 @@ impl Path {
                 {
                     let left = problem.force(behind, state.depth, state.velocity);
                     let right = problem.force(index, state.depth, state.velocity);
-                    stretch.force_jumps |= (left - right).abs() > CONTINUOUS * left.abs().max(right.abs());
+                    // A mass that joins lets the velocity jump.
+                    let joins = problem.laws.of(index).is_some_and(|law| law.joining(state.depth).is_some());
+                    stretch.force_jumps |= joins || (left - right).abs() > CONTINUOUS * left.abs().max(right.abs());
                 }
             }
             stretch

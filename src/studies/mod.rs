@@ -17,6 +17,7 @@ pub mod formal_order;
 pub mod grid_convergence;
 pub mod limit;
 pub mod order;
+pub mod perforating_velocities;
 mod power_law;
 pub mod quantity;
 pub mod random;

@@ -23,6 +23,7 @@ use serde::Serialize;
 
 use super::critical_velocity;
 use super::error::{Studied, StudyError, Truth};
+use super::perforating_velocities;
 use super::random::Random;
 use super::sweep::as_text;
 #[cfg(feature = "diffsol")]
@@ -138,15 +139,18 @@ fn quantities(scene: &Scene, notes: &mut Vec<String>) -> Studied<Quantities> {
                 let problem = scene.resolve(velocity)?;
                 let (start, limit) = (|index| problem.start_of(index), |index| problem.limit_of(index));
                 let stages = problem.stages.iter().enumerate();
+                let may_cross = perforating_velocities::may_cross(&problem);
                 let resists = |(index, stage): (usize, &crate::physics::Stage)| match problem.laws.of(index) {
                     Some(law) => law.resists_between(start(index), limit(index)),
                     None => stage.resists_between(start(index), limit(index)),
                 };
-                if stages.into_iter().all(resists) {
+                if !may_cross && stages.into_iter().all(resists) {
                     quantities.critical_velocity = Some(velocity);
                     return Ok(quantities);
                 }
-                "a stage drives, and V_c may stand on a barrier".to_owned()
+                let why =
+                    if may_cross { "paths may cross here" } else { "a stage drives, and V_c may stand on a barrier" };
+                why.to_owned()
             }
             Ok(_) => "it is zero".to_owned(),
             Err(error) => error.to_string(),

@@ -5,6 +5,7 @@ the file holds. A force is evaluated as it stands in the scene. No equation of m
 
 - F of V alone: `x = M ∫ V dV/F` and `t = M ∫ dV/F`, from the speed of the end to that of the impact.
 - `F = A(x) + Q V²`: `W(x) = e^(-2 Q x/M) (W0 - (2/M) ∫ A e^(2 Q x/M) dx)`, and `t = ∫ dx/sqrt(W)`.
+- Stages of F of V alone that end at a speed or on a condition g(x, V) = 0: as the first, with x over V; the first zero of g over V.
 - `F = C(x) V^n`, n < 1: `V^(2-n) = V0^(2-n) - ((2-n)/M) ∫ C dx`, and `t = ∫ dx/V`.
 
 Each is done with 40 digits and again with 55 and other nodes; both must agree to 30 digits. Depths of Robins and Euler, Poncelet,
@@ -37,6 +38,8 @@ LAWS = {
     "ceb-rate": ("speed", ["1.5e-6", "1e-4", "1e-2", "1.5"]),
     "johnson-cook-rate": ("speed", ["0.05", "1", "10"]),
     "free-surface": ("depth", ["0.05", "0.1"]),
+    "allen": ("ends", []),
+    "plug": ("ends", []),
     "two-layers": ("depth", ["0.06", "0.09", "0.11", "0.14"]),
 }
 
@@ -64,13 +67,19 @@ class Scene:
         self.known = {key: number(value) for key, value in root["parameters"].items()}
         known = {name: getattr(mp, name) for name in ("sqrt", "exp", "log", "tanh", "pi")} | {"max": max} | self.known
         self.forces, self.ends = [], []
+        self.stages = root["stage"]
         for stage in root["stage"]:
-            code = compile(stage["force"].replace("^", "**"), name, "eval")
-            self.forces.append(lambda x, V, code=code: eval(code, known, {"x": mpf(x), "V": mpf(V)}))
+            self.forces.append(self.function(stage.get("force", "0"), known))
             self.ends.append(number(stage["end"]) if "end" in stage else mp.inf)
+        left, right = zip(*(stage.get("until", "1 = 0").split("=") for stage in root["stage"]))
+        self.until = [self.function(f"({a}) - ({b})", known) for a, b in zip(left, right)]
         self.kind, marks = LAWS[name]
         self.marks = [mpf(mark) for mark in marks]
         self.far = self.thickness if self.thickness is not None else mp.inf
+
+    def function(self, text, known):
+        code = compile(text.replace("^", "**").strip(), self.name, "eval")
+        return lambda x, V: eval(code, known, {"x": mpf(x), "V": mpf(V)})
 
     # ---- F of V alone
 
@@ -125,8 +134,42 @@ class Scene:
             break
         return events
 
+    # ---- stages of F of V alone that end at speeds or on conditions
+
+    def slowed(self, stage, mass, power, low, high):
+        return mass * mp.quad(lambda v: v**power / self.forces[stage](0, v), [low, high])
+
+    def by_ends(self, speed, far):
+        events, time, depth, mass = [], mpf(0), mpf(0), self.mass
+        for index, stage in enumerate(self.stages):
+            if self.forces[index](0, 1) == 0:
+                time += (far - depth) / speed
+                return events + [("exit", index, time, far, speed)]
+            start, fast, moving = depth, speed, mass
+            at = lambda v: start + self.slowed(index, moving, 1, v, fast)
+            root = lambda g, low, high: mp.findroot(g, (low, high), solver="anderson", tol=mpf(10) ** (-2 * mp.dps + 15))
+            slow = mpf(0)
+            if "end_velocity" in stage:
+                slow = min(fast, number(stage["end_velocity"]))
+            elif "until" in stage:
+                g = lambda v: self.until[index](at(v), v)
+                places = [fast * (1 - mpf(i) / 64) for i in range(65)]
+                pair = next((pair for pair in zip(places, places[1:]) if g(pair[0]) * g(pair[1]) <= 0), None)
+                slow = root(g, pair[1], pair[0]) if pair else slow
+            if at(slow) > far:
+                slow = root(lambda v: at(v) - far, slow, fast)
+                return events + [("exit", index, time + self.slowed(index, moving, 0, slow, fast), far, slow)]
+            time, depth, speed = time + self.slowed(index, moving, 0, slow, fast), at(slow), slow
+            if slow == 0:
+                return events + [("rest", index, time, depth, speed)]
+            events.append(("stage-end", index, time, depth, speed))
+            mass += number(stage.get("add_mass", 0))
+            speed *= moving / mass
+
     def fly(self):
         """Events: kind, stage, time, depth, velocity."""
+        if self.kind == "ends":
+            return self.by_ends(self.speed, self.far)
         if self.kind != "speed":
             return self.by_depth()
         if self.thickness is None:
@@ -137,6 +180,17 @@ class Scene:
         return [("exit", 0, self.by_speed(0, v, self.speed), self.thickness, v)]
 
     def critical(self):
+        tol = mpf(10) ** (-2 * mp.dps + 15)
+        if self.name == "plug":
+            # The slowest that leaves comes to rest where its condition is met.
+            rests = lambda v: self.until[0](self.slowed(0, self.mass, 1, 0, v), 0)
+            speed = mp.findroot(rests, (1, self.speed), solver="anderson", tol=tol)
+            for share, kind in ((1 - mpf(10) ** -6, "rest"), (1 + mpf(10) ** -6, "exit")):
+                assert self.by_ends(share * speed, self.far)[-1][0] == kind
+            return speed
+        if self.kind == "ends":
+            last = lambda v: self.by_ends(v, mp.inf)[-1][3] - self.thickness
+            return mp.findroot(last, (1, self.speed), solver="anderson", tol=tol)
         if self.kind == "speed":
             way = lambda v: self.by_speed(1, 0, v) - self.thickness
             return mp.findroot(way, (1, self.speed), solver="anderson", tol=mpf(10) ** (-2 * mp.dps + 15))

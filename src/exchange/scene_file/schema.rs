@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{FORCE, LAYERED_TARGET, MATERIAL_OF_PROJECTILE, MATERIAL_OF_TARGET, NOSES, below, numbers};
+use super::{FORCE, LAYERED_TARGET, MATERIAL_OF_PROJECTILE, MATERIAL_OF_TARGET, NOSES, UNTIL, below, numbers};
 use crate::exchange::diagnostic::key_of;
 use crate::physics::Range;
 use crate::physics::parameter::{Absence, Entry, LayerNumber, Parameter, StageNumber};
@@ -92,9 +92,14 @@ fn table(home: &str) -> Value {
     let mut schema =
         json!({ "type": "object", "additionalProperties": false, "properties": properties, "required": required });
     if home == "stage.*" {
-        let coefficient = |which: &StageNumber| *which != StageNumber::End;
-        let keys = StageNumber::ALL.into_iter().filter(coefficient).map(|which| Parameter::Stage(0, which).key());
+        let keys = StageNumber::ALL
+            .into_iter()
+            .filter(|which| which.is_coefficient())
+            .map(|which| Parameter::Stage(0, which).key());
         let absent: Map<String, Value> = keys.map(|key| (key.to_owned(), false.into())).collect();
+        schema["not"] = json!({ "required": [Parameter::Stage(0, StageNumber::EndVelocity).key(), key_of(UNTIL)] });
+        schema["properties"][key_of(UNTIL)]["description"] =
+            "the stage ends where two expressions of x and V are equal, such as V = v1 with v1 in [parameters]".into();
         schema["if"] = json!({ "required": ["force"] });
         schema["then"] = json!({ "properties": absent });
     }

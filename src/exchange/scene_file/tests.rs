@@ -80,6 +80,7 @@ fn every_key_is_read() {
         title: Some("tunnel stop, blunt nose".to_owned()),
         mass: 2.0,
         forces: Vec::new(),
+        ends: Vec::new(),
         parameters: Vec::new(),
         resistance: Resistance::Concrete(concrete),
         thickness: Some(0.18),

@@ -1,14 +1,17 @@
 //! Stage ends, exit and rest: where they lie inside a step, and what [`Boundaries`] makes of them.
 
-use super::scheme::{Deceleration as _, Node, Pause, REMEDY, Stepper, Sum};
+use super::scheme::{Deceleration as _, Node, Pause, REMEDY, Rule, Stepper, Sum};
 use super::stability::cannot_end;
 use super::{Boundaries, CentralDifference, Steps};
 use crate::integrators::flight::Course;
 use crate::integrators::outcome::{Detail, Flight, IntegrationError, Solved};
-use crate::physics::{Problem, Scalar, State};
+use crate::physics::{Condition, Problem, Scalar, State};
 
 /// Steps without any change of x and V after which the scheme counts as stuck for ever.
 const STUCK_STEPS: u64 = 1 << 20;
+
+/// Halvings of a step in which a condition is met: more than a number has digits.
+const HALVINGS: u32 = 80;
 
 /// A step in which something happens, from one state to the next; the velocity at its end may be negative.
 pub(crate) struct Step<S> {
@@ -123,10 +126,13 @@ impl<'a, S: Scalar> Run<'a, S> {
         // Steps up to the last change of x or V.
         let mut moved = 0;
         loop {
+            if !problem.laws.is_empty() {
+                run.pass_what_is_met();
+            }
             (run.course.stage, run.course.state) = (run.stepper.stage, run.stepper.state());
             let limit = run.course.limit()?.value();
             if matches!(run.course.detail, Detail::Trajectory) {
-                run.course.push_sample(run.course.state, run.stepper.node.d * problem.mass);
+                run.course.push_sample(run.course.state, run.stepper.node.d * run.stepper.mass);
             }
             let (before, steps) = (run.course.state, run.stepper.cost.steps);
             let left = max_steps - steps;
@@ -145,6 +151,10 @@ impl<'a, S: Scalar> Run<'a, S> {
                 }
                 Pause::Crossing { x, u } => run.cross(x, u)?,
                 Pause::Rest(next) => run.come_to_rest(next)?,
+                Pause::Condition(next) => {
+                    run.stepper.cost.force_evaluations += options.velocity.evaluations();
+                    run.meet(next)?
+                }
             };
             if has_ended {
                 return Ok(run.finish());
@@ -177,6 +187,115 @@ impl<'a, S: Scalar> Run<'a, S> {
         (lands && end.value() < self.stepper.problem.exit_depth.value()).then_some(end)
     }
 
+    /// Enters the stage behind every end whose condition is met at the present node, and lets the mass join that joined
+    /// the flight.
+    fn pass_what_is_met(&mut self) {
+        let state = self.stepper.state();
+        let velocity = state.velocity * self.stepper.mass.over(self.course.mass);
+        (self.course.stage, self.course.state) = (self.stepper.stage, State { velocity, ..state });
+        self.course.pass_ends();
+        let has_joined = self.course.mass.value() != self.stepper.mass.value();
+        if has_joined || self.course.stage != self.stepper.stage {
+            self.stepper.enter(self.course.stage, self.course.mass, self.course.state);
+        }
+    }
+
+    /// How far into `step` the condition of the present stage is met, if it is met before the limit and before rest.
+    fn condition_in(&self, step: &Step<S>) -> Option<S> {
+        let condition = self.condition()?;
+        let Rule::Law(_, _, side) = self.stepper.law else { return None };
+        let limit = self.stepper.problem.limit_of(self.stepper.stage);
+        let last = step.reach(limit).or(step.rest()).unwrap_or(step.size);
+        let is_met = |tau: f64| {
+            let tau = S::from_f64(tau);
+            side * condition.value(step.depth(tau).value(), step.velocity(tau).value()) <= 0.0
+        };
+        if !is_met(last.value()) {
+            return None;
+        }
+        let (mut low, mut high) = (0.0, last.value());
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if is_met(middle) { high = middle } else { low = middle }
+        }
+        Some(S::from_f64(high))
+    }
+
+    /// The node at the end of a next step to `x` with V(i+1/2) = `u`, if the condition of the present stage is met in it
+    /// before the limit.
+    fn condition_before(&mut self, x: Sum<S>, u: Sum<S>, h: S) -> Solved<Option<Node<S>>> {
+        if self.condition().is_none() {
+            return Ok(None);
+        }
+        let next = self.stepper.arrive(x, u, h);
+        self.finite("velocity", next.v)?;
+        let is_met = self.condition_in(&self.step_to(x.value, next.v, h)).is_some();
+        Ok(is_met.then_some(next))
+    }
+
+    fn condition(&self) -> Option<&'a Condition<S>> {
+        self.stepper.problem.laws.of(self.stepper.stage)?.end()
+    }
+
+    /// Takes the step to the node `next`, in which the condition of the present stage is met. True if the run ends in it.
+    fn meet(&mut self, next: Node<S>) -> Solved<bool> {
+        self.finite("velocity", next.v)?;
+        let step = self.step_to(next.x.value, next.v, next.h);
+        let part = self.condition_in(&step).unwrap_or(next.h);
+        let boundaries = self.stepper.options.boundaries;
+        if boundaries == Boundaries::Landed && part.value() < next.h.value() {
+            self.stepper.step_max = self.stepper.step_max.max(part.value());
+            let (x, u) = self.stepper.node.ahead(part, self.stepper.options.summation);
+            let landed = self.stepper.arrive(x, u, part);
+            self.finite("velocity", landed.v)?;
+            return Ok(self.meet_at(landed, part, part));
+        }
+        Ok(self.meet_at(next, next.h, part))
+    }
+
+    /// Completes the step of `size` to the node `next`, the condition met after `part` of it, and starts afresh.
+    fn meet_at(&mut self, next: Node<S>, size: S, part: S) -> bool {
+        self.stepper.cost.steps += 1;
+        let mut step = self.step_to(next.x.value, next.v, size);
+        let before = step.from.time;
+        if size.value() < self.stepper.clock.step().value() {
+            self.stepper.clock.tick_part(size);
+        } else {
+            self.stepper.clock.tick();
+        }
+        step.to.time = self.stepper.clock.now();
+        let is_located = self.stepper.options.boundaries == Boundaries::Interpolated;
+        let met = if is_located {
+            State { time: before + part, depth: step.depth(part), velocity: step.velocity(part) }
+        } else {
+            step.arrival()
+        };
+        let is_at_end = self.stepper.options.boundaries != Boundaries::StepEnd;
+        let settled = self.condition().filter(|_| is_at_end).map_or(met, |condition| condition.settled(met));
+        (self.course.stage, self.course.state) = (self.stepper.stage, settled);
+        self.course.sample_until(settled, |time| step.inside(time));
+        self.course.pass_condition();
+        self.course.pass_ends();
+        let stage = self.course.stage;
+        let share = self.stepper.mass.over(self.course.mass);
+        self.stepper.stage = stage;
+        // What lies between the condition and the end of the step.
+        let has_ended = (settled.velocity.value() <= 0.0
+            || is_located
+            || step.to.depth.value() >= self.course.problem.exit_depth.value())
+            && self.push_events(&step, stage);
+        if has_ended {
+            return true;
+        }
+        let state = if is_located {
+            State { velocity: step.to.velocity * share, ..step.to }
+        } else {
+            State { velocity: self.course.state.velocity, ..step.to }
+        };
+        self.stepper.enter(self.course.stage, self.course.mass, state);
+        false
+    }
+
     /// The step from the present node to depth `x` and velocity `v`. Its end has the time of its start until the clock
     /// has ticked.
     fn step_to(&self, x: S, v: S, size: S) -> Step<S> {
@@ -188,6 +307,9 @@ impl<'a, S: Scalar> Run<'a, S> {
     fn cross(&mut self, x: Sum<S>, u: Sum<S>) -> Solved<bool> {
         self.finite("depth", x.value)?;
         let h = self.stepper.clock.step();
+        if let Some(met) = self.condition_before(x, u, h)? {
+            return self.meet(met);
+        }
         if let Some(end) = self.landing() {
             // The velocity at its end does not matter for the place.
             let step = self.step_to(x.value, self.stepper.node.v, h);
@@ -207,6 +329,9 @@ impl<'a, S: Scalar> Run<'a, S> {
     fn come_to_rest(&mut self, next: Node<S>) -> Solved<bool> {
         self.finite("velocity", next.v)?;
         self.stepper.cost.force_evaluations += self.stepper.options.velocity.evaluations();
+        if self.condition().is_some() && self.condition_in(&self.step_to(next.x.value, next.v, next.h)).is_some() {
+            return self.meet(next);
+        }
         if let Some(end) = self.landing()
             && let Some(part) = self.step_to(next.x.value, next.v, next.h).reach(end)
         {
@@ -271,6 +396,13 @@ impl<'a, S: Scalar> Run<'a, S> {
             self.pass_ends(index..index + 1, state);
         }
         let exit = if problem.has_exit() { step.passed(problem.exit_depth, is_located) } else { None };
+        // A mass that joined inside the step shares the momentum.
+        let exit = match exit {
+            Some(exit) if !problem.laws.is_empty() => {
+                Some(State { velocity: exit.velocity * self.stepper.mass.over(self.course.mass), ..exit })
+            }
+            other => other,
+        };
         self.course.is_through = exit.is_some();
         let Some(end) = exit.or_else(|| step.at_rest(deepest, is_located)) else { return false };
         self.course.state = end;
@@ -293,7 +425,9 @@ impl<'a, S: Scalar> Run<'a, S> {
         self.stepper.leave_stage();
         // A place at a stage end belongs to the stage that ends there.
         let place = if self.course.is_through { problem.exit_depth } else { self.course.state.depth };
-        self.course.stage = problem.stages.iter().take_while(|stage| stage.end.value() < place.value()).count();
+        if !problem.laws.have_conditions() {
+            self.course.stage = problem.stages.iter().take_while(|stage| stage.end.value() < place.value()).count();
+        }
         let exit_margin = problem.has_exit().then(|| self.course.margin().value);
         if self.course.detail >= Detail::Events {
             let note = "error bar of the exit margin not given: a fixed step has no error estimate";

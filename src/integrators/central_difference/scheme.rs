@@ -30,6 +30,12 @@ pub(super) trait Deceleration<S> {
     /// F/M at depth `x` and velocity `v`, which may lie below zero in the step that comes to rest.
     fn at(&self, x: S, v: S) -> S;
 
+    /// Whether a condition ends the stage at depth `x` and velocity `v`.
+    #[inline(always)]
+    fn ends(&self, _x: S, _v: S) -> bool {
+        false
+    }
+
     /// The solution V of `V = u - half F(x, V)/M`.
     fn centred(&self, x: S, u: S, half: S) -> S;
 
@@ -65,8 +71,12 @@ impl<S: Scalar> Deceleration<S> for Stage<S> {
 /// Corrections of a velocity: by Newton four are usual, and halvings exhaust the digits of a number.
 const CORRECTIONS_MAX: u32 = 80;
 
-/// A law of its own, and the mass.
-impl<S: Scalar> Deceleration<S> for (&Law<S>, S) {
+/// A law of its own, the mass, and the sign of the condition of its stage on the way to the end.
+impl<S: Scalar> Deceleration<S> for (&Law<S>, S, f64) {
+    fn ends(&self, x: S, v: S) -> bool {
+        self.0.end().is_some_and(|end| self.2 * end.value(x.value(), v.value()) <= 0.0)
+    }
+
     fn at(&self, x: S, v: S) -> S {
         let force = self.0.force(x, v);
         // Below zero a power of V has no value; the step that comes to rest then ends with the force at rest.
@@ -113,15 +123,15 @@ impl<S: Scalar> Deceleration<S> for (&Law<S>, S) {
 #[derive(Clone, Copy)]
 pub(super) enum Rule<'a, S> {
     Stage(Stage<S>),
-    Law(&'a Law<S>, S),
+    Law(&'a Law<S>, S, f64),
 }
 
 impl<'a, S: Scalar> Rule<'a, S> {
-    /// That of stage `index`.
-    fn of(problem: &'a Problem<S>, index: usize) -> Self {
+    /// That of stage `index`, entered at a state, where `mass` moves.
+    fn of(problem: &'a Problem<S>, index: usize, mass: S, at: State<S>) -> Self {
         match problem.laws.of(index) {
-            None => Self::Stage(problem.stages[index].per_mass(problem.mass)),
-            Some(law) => Self::Law(law, problem.mass),
+            None => Self::Stage(problem.stages[index].per_mass(mass)),
+            Some(law) => Self::Law(law, mass, law.end().map_or(1.0, |end| end.side(at))),
         }
     }
 }
@@ -131,7 +141,7 @@ impl<S: Scalar> Deceleration<S> for Rule<'_, S> {
     fn at(&self, x: S, v: S) -> S {
         match self {
             Self::Stage(stage) => stage.at(x, v),
-            Self::Law(law, mass) => (*law, *mass).at(x, v),
+            Self::Law(law, mass, side) => (*law, *mass, *side).at(x, v),
         }
     }
 
@@ -139,7 +149,7 @@ impl<S: Scalar> Deceleration<S> for Rule<'_, S> {
     fn centred(&self, x: S, u: S, half: S) -> S {
         match self {
             Self::Stage(stage) => stage.centred(x, u, half),
-            Self::Law(law, mass) => (*law, *mass).centred(x, u, half),
+            Self::Law(law, mass, side) => (*law, *mass, *side).centred(x, u, half),
         }
     }
 
@@ -147,7 +157,7 @@ impl<S: Scalar> Deceleration<S> for Rule<'_, S> {
     fn predicted(&self, x: S, u: S, half: S) -> S {
         match self {
             Self::Stage(stage) => stage.predicted(x, u, half),
-            Self::Law(law, mass) => (*law, *mass).predicted(x, u, half),
+            Self::Law(law, mass, side) => (*law, *mass, *side).predicted(x, u, half),
         }
     }
 }
@@ -275,6 +285,8 @@ pub(super) enum Pause<S> {
     Crossing { x: Sum<S>, u: Sum<S> },
     /// The next step comes to rest (or V is NaN) before the limit.
     Rest(Node<S>),
+    /// The next step ends where the condition of the stage is met, moving and before the limit.
+    Condition(Node<S>),
 }
 
 /// The scheme at one node of a problem.
@@ -284,6 +296,8 @@ pub(super) struct Stepper<'a, S> {
     pub(super) clock: Clock<'a, S>,
     /// Stage that gives the force at the node, and its force rule divided by the mass.
     pub(super) stage: usize,
+    /// The mass (kg) that moves.
+    pub(super) mass: S,
     pub(super) law: Rule<'a, S>,
     pub(super) node: Node<S>,
     pub(super) cost: Cost,
@@ -302,12 +316,13 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             _ => Clock::Equal { size: S::from_f64(options.time_step(problem)), since: S::zero(), count: 0 },
         };
         let stage = stage_at(problem, 0, impact.depth);
-        let law = Rule::of(problem, stage);
+        let law = Rule::of(problem, stage, problem.mass, impact);
         Self {
             options,
             problem,
             clock,
             stage,
+            mass: problem.mass,
             law,
             node: Node::start(&law, impact, clock.step()),
             cost: Cost { force_evaluations: 1, ..Cost::default() },
@@ -333,8 +348,16 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if stage != self.stage {
             self.leave_stage();
             self.stage = stage;
-            self.law = Rule::of(self.problem, stage);
+            self.law = Rule::of(self.problem, stage, self.mass, State { depth: x, ..self.state() });
         }
+    }
+
+    /// Enters `stage` at a state with `mass` moving, and starts afresh.
+    pub(super) fn enter(&mut self, stage: usize, mass: S, state: State<S>) {
+        self.leave_stage();
+        (self.stage, self.mass) = (stage, mass);
+        self.law = Rule::of(self.problem, stage, mass, state);
+        self.start(state);
     }
 
     /// Adds the stability limit of the present stage to that of the stages before, if a step was taken in it.
@@ -342,7 +365,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if self.step_max > 0.0 {
             let at = State { velocity: S::from_f64(self.speed_max), ..self.state() };
             let law = &self.problem.linear(self.stage, at);
-            let limit = stability_limit(law, self.problem.mass.value(), self.speed_max, self.options.velocity);
+            let limit = stability_limit(law, self.mass.value(), self.speed_max, self.options.velocity);
             self.step_limit.limit = self.step_limit.limit.min(limit);
             self.step_limit.stable &= self.step_max < limit;
         }
@@ -356,8 +379,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let CentralDifference { velocity, summation, .. } = *self.options;
         let law = match self.law {
             Rule::Stage(stage) => stage,
-            Rule::Law(law, mass) => {
-                return self.whole_steps(&(law, mass), velocity, summation, self.clock, limit, allowance);
+            Rule::Law(law, mass, side) => {
+                return self.whole_steps(&(law, mass, side), velocity, summation, self.clock, limit, allowance);
             }
         };
         if let (Summation::Plain, Clock::Equal { size, since, count }) = (summation, self.clock) {
@@ -404,6 +427,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             let moving = next.v.value() > 0.0;
             if !moving {
                 break Pause::Rest(next);
+            }
+            if law.ends(next.x.value, next.v) {
+                break Pause::Condition(next);
             }
             here = next;
             clock.tick();

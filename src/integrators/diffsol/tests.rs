@@ -6,6 +6,7 @@ use crate::testing::{Random, of_stages, random_concrete, stage, tunnel};
 fn kind_and_place(end: StageEnd) -> (&'static str, Node) {
     match end {
         StageEnd::Limit(at) => ("limit", at),
+        StageEnd::Condition(at) => ("condition", at),
         StageEnd::Rest(at) => ("rest", at),
         StageEnd::Approach(at, _) => ("approach", at),
     }

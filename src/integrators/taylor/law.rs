@@ -17,6 +17,10 @@
 //! **Kinks.** min, max and abs have one smooth branch on each side of a switch. A step takes one branch, and ends at the
 //! first root of the switch.
 //!
+//! **Ends on a condition** g(x, V) = 0: the series of g comes with that of the force, and its first root on the step is
+//! isolated like that of V, touching included. Where g comes so near to zero that the error bound leaves open whether it
+//! vanishes, the flight is in doubt.
+//!
 //! **Events.** The first root of V on the step is isolated ([`locate::first_root`]). x grows until then, so that a boundary
 //! is passed before it exactly when x reaches it there.
 
@@ -25,7 +29,7 @@ use crate::integrators::flight::{Course, SLOW, StageEnd, VANISHES};
 use crate::integrators::locate;
 use crate::integrators::outcome::{IntegrationError, Solved};
 use crate::physics::expression::Jets;
-use crate::physics::{Law, Scalar, State};
+use crate::physics::{Condition, Law, Scalar, State};
 
 /// Places of a step, over its length, at which the equation is asked.
 const ASKED: [f64; 3] = [1.0, 0.62, 0.29];
@@ -87,6 +91,7 @@ enum Event {
     None,
     Limit,
     Rest,
+    Condition,
 }
 
 /// `c[0] + c[1] s + ...`, by four chains at once: each waits for its last product, none for another.
@@ -274,6 +279,8 @@ struct Walk<'l, S, const K: usize> {
     /// Whether the step before went by velocity.
     goes_by_velocity: bool,
     tolerance: f64,
+    /// The condition that ends the stage, and the sign of g on the way to it.
+    end: Option<(&'l Condition<S>, f64)>,
 }
 
 impl Steps {
@@ -287,7 +294,8 @@ impl Steps {
         let bound = law.bound();
         let mut walk = Walk::<S, K> {
             law,
-            mass: course.problem.mass,
+            mass: course.mass,
+            end: law.end().map(|end| (end, end.side(course.state))),
             jets: Jets::default(),
             sides: vec![false; bound.switches().len()],
             kink: None,
@@ -319,11 +327,19 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         self.choose_sides(start, force, limit);
         let (path, kink) = self.path(course, force, limit)?;
         let (s, event) = first_event(&path, limit);
+        let (s, event, closeness) = self.first_zero(s, event);
         let local = path.at(s);
         let next = State {
             time: start.time + local.time,
             depth: if event == Event::Limit { limit } else { local.depth },
             velocity: if event == Event::Rest || local.velocity.value() < 0.0 { S::zero() } else { local.velocity },
+        };
+        let next = match self.end {
+            Some((end, _)) if event == Event::Condition => {
+                let depth = if next.depth.value() > limit.value() { limit } else { next.depth };
+                end.settled(State { depth, ..next })
+            }
+            _ => next,
         };
         if !next.is_finite() {
             return Err(IntegrationError::NotFinite { what: "the state", last: start.values() });
@@ -333,6 +349,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             course.pass_least(least);
         }
         self.widen_bound(course, force.value(), start, next);
+        if let Some((place, closeness)) = closeness {
+            self.doubt(course, path.at(S::from_f64(place)), closeness);
+        }
         course.sample_until(next, |time| {
             let since = time - start.time.value();
             let s = match path.form {
@@ -356,6 +375,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 None
             }
             Event::Limit => Some(StageEnd::Limit(next)),
+            Event::Condition => Some(StageEnd::Condition(next)),
             Event::Rest => Some(StageEnd::Rest(next)),
         })
     }
@@ -403,7 +423,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             let is_before = depth.value() < limit.value();
             return is_before.then_some(StageEnd::Rest(State { time, depth, velocity: S::zero() }));
         }
-        let is_approach = self.law.is_approach(self.mass.value(), course.state.values(), limit.value() - x);
+        let reach = |law: &Law<S>| x + law.reach(self.mass.value(), course.state.values()).min(limit.value() - x);
+        let may_end = self.end.is_some_and(|(end, _)| end.may_vanish((x, reach(self.law)), (0.0, v)));
+        let is_approach = !may_end && self.law.is_approach(self.mass.value(), course.state.values(), limit.value() - x);
         is_approach.then_some(StageEnd::Approach(course.state, VANISHES))
     }
 
@@ -463,7 +485,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 let parts = self.law.shown_in(place, energy)?;
                 (1..parts).all(|part| holds(&(part as f64 / parts as f64))).then_some(())
             };
-            if ASKED.iter().all(holds) && shows().is_some() {
+            if ASKED.iter().all(holds) && shows().is_some() && self.shows_end(&path) {
                 return Ok((path, kink));
             }
             path.span *= SHORTENING;
@@ -471,10 +493,78 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
         let end = path.at(S::from_f64(path.span));
         let last = State { time: start.time + end.time, ..end };
+        if let Some((condition, _)) = self.end
+            && let Some(why) = condition.explain(start.depth.value(), start.velocity.value())
+        {
+            return Err(IntegrationError::NoEnd { stage: course.stage, why, last: start.values() });
+        }
         if self.law.force(end.depth, end.velocity).value().is_finite() {
             return Err(IntegrationError::NotFinite { what: "the step", last: start.values() });
         }
         Err(self.no_force(course, last))
+    }
+
+    /// The series of g over the path that was made last.
+    fn condition_series(&self) -> Option<[S; K]> {
+        let mut series = [S::zero(); K];
+        match self.law.bound().beside()? {
+            Ok(register) => series.copy_from_slice(&self.jets.register(register)[..K]),
+            Err(constant) => series[0] = constant,
+        }
+        Some(series)
+    }
+
+    /// Whether the series of g gives g along the path.
+    fn shows_end(&self, path: &Path<S, K>) -> bool {
+        let (Some((end, _)), Some(series)) = (self.end, self.condition_series()) else { return true };
+        ASKED.iter().all(|share| {
+            let s = share * path.span;
+            let at = path.at(S::from_f64(s)).values();
+            // Behind rest nothing is asked.
+            if at.velocity < 0.0 {
+                return true;
+            }
+            let size = series.iter().rev().fold(0.0, |sum, c| sum * s + c.value().abs());
+            let allowed = (DEFECT_MAX * self.tolerance + 64.0 * f64::EPSILON) * size;
+            (both(&series, s).0 - end.value(at.depth, at.velocity)).abs() <= allowed + end.noise(at.depth, at.velocity)
+        })
+    }
+
+    /// `event` at `s`, or the zero of g in front of it. Also where g is nearest to zero, if it is near: a place of the step
+    /// and how far g goes beyond zero there, below zero where it does not get there.
+    fn first_zero(&self, s: S, event: Event) -> (S, Event, Option<(f64, f64)>) {
+        let (Some((_, side)), Some(series)) = (self.end, self.condition_series()) else { return (s, event, None) };
+        let span = s.value();
+        let rest = series[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * span);
+        if side * series[0].value() > rest {
+            return (s, event, None);
+        }
+        // Where g turns: the first root of its slope.
+        let mut slopes = [0.0; K];
+        for k in 1..K {
+            slopes[k - 1] = k as f64 * series[k].value();
+        }
+        let turn = if slopes.iter().all(|c| *c == 0.0) { None } else { locate::first_root(&slopes, span) };
+        if let Some(root) = first_root(&series, span) {
+            let corrected = corrected(S::from_f64(root), span, |s| value(&series, s), |s| slope(&series, s));
+            let (rate, curvature) = both(&slopes, corrected.value());
+            // The parabola through the root goes so far beyond it.
+            let beyond = if side * curvature > 0.0 { 0.5 * rate * rate / curvature.abs() } else { f64::INFINITY };
+            return (corrected, Event::Condition, Some((corrected.value(), beyond)));
+        }
+        let nearest = turn.into_iter().chain([span]).map(|s| (s, -side * both(&series, s).0));
+        (s, event, nearest.max_by(|a, b| a.1.total_cmp(&b.1)))
+    }
+
+    /// Notes whether the error bound leaves open if g vanishes, where it goes `beyond` zero or stays so far from it.
+    fn doubt(&self, course: &mut Course<'_, S>, at: State<S>, beyond: f64) {
+        let Some((end, _)) = self.end else { return };
+        let State { depth, velocity, .. } = at.values();
+        let lost = course.error_bound.sqrt() * course.problem.impact_speed.value();
+        let error = if velocity > lost { 0.5 * lost * lost / velocity } else { lost };
+        let (_, _, by_velocity) = end.gradient(depth, velocity.max(0.0));
+        let allowed = by_velocity.abs() * error + end.noise(depth, velocity.max(0.0));
+        course.is_in_doubt |= beyond.abs() <= allowed;
     }
 
     /// The first root of a switch on a step of `span`.

@@ -130,7 +130,7 @@ const KNOWN: [(&str, f64, f64, f64, f64, f64); 14] = [
 ];
 
 /// Methods that take a law, to round-off or to `rtol`.
-fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
+pub(super) fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
     let names = MethodName::built().filter(|name| {
         !matches!(name, MethodName::Energy | MethodName::ClosedForm) && name.accuracy() != Accuracy::Step
     });

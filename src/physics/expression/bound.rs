@@ -31,6 +31,8 @@ pub struct Bound<S = f64> {
     registers: usize,
     switches: SmallVec<[usize; 4]>,
     result: Value<S>,
+    /// The value of the second expression, if there is one.
+    beside: Option<Value<S>>,
     /// e of each register that is a constant times `V^e`; NaN for others.
     powers: Vec<f64>,
 }
@@ -218,20 +220,32 @@ fn powers<S: Scalar>(steps: &[Step<S>], registers: usize) -> Vec<f64> {
 
 impl<S: Scalar> Bound<S> {
     pub(super) fn new(tape: Tape, parameters: &[S]) -> Self {
+        Self::of(tape, parameters, None)
+    }
+
+    fn of(tape: Tape, parameters: &[S], beside: Option<(&Tape, &[S])>) -> Self {
         let mut making = Making { steps: Vec::with_capacity(tape.terms().len()), ..Making::default() };
-        let mut values: Vec<Value<S>> = Vec::with_capacity(tape.terms().len());
-        let mut uses = vec![0; tape.terms().len()];
-        for term in tape.terms() {
-            term.operands().for_each(|operand| uses[operand] += 1);
-        }
-        for term in tape.terms() {
-            let value = making.term(term, parameters, &values, &uses);
-            values.push(value);
-        }
-        let result = values.last().copied().unwrap_or(Value::Constant(S::zero()));
+        let result = making.value(&tape, parameters);
+        let beside = beside.map(|(tape, parameters)| making.value(tape, parameters));
         let Making { steps, registers, switches, .. } = making;
         let powers = powers(&steps, registers);
-        Self { tape, parameters: parameters.iter().copied().collect(), steps, registers, switches, result, powers }
+        let parameters = parameters.iter().copied().collect();
+        Self { tape, parameters, steps, registers, switches, result, beside, powers }
+    }
+
+    /// The same expression with a second one `beside` it, at `parameters` of its own: a series of the one comes with that
+    /// of the other, and both have their sides among [`Bound::switches`].
+    #[must_use]
+    pub(crate) fn with(&self, beside: &Tape, parameters: &[S]) -> Self {
+        Self::of(self.tape.clone(), &self.parameters, Some((beside, parameters)))
+    }
+
+    /// The register of the second expression; its value where it has none.
+    pub(crate) fn beside(&self) -> Option<Result<usize, S>> {
+        self.beside.map(|value| match value {
+            Value::Register(register) => Ok(register),
+            Value::Constant(constant) => Err(constant),
+        })
     }
 
     /// e of `register` where it is a constant times `V^e`.
@@ -366,6 +380,15 @@ impl<S: Scalar> Bound<S> {
 }
 
 impl Bound {
+    /// The values of the two sides of an equation; of any other expression, its value and zero.
+    pub(crate) fn sides_of_equation(&self, x: f64, v: f64) -> (f64, f64) {
+        let values = self.tape.values(&self.parameters, x, v);
+        match self.tape.terms().last() {
+            Some(Term::Binary(Binary::Subtract, a, b)) => (values[a], values[b]),
+            _ => (values.last().copied().unwrap_or(0.0), 0.0),
+        }
+    }
+
     /// F, dF/dx and dF/dV at depth `x` (m) and velocity `v` (m/s), the derivatives exact as far as f64 rounds.
     pub fn gradient(&self, x: f64, v: f64) -> (f64, f64, f64) {
         let along = |dx, dv| self.eval_in(Dual64::new(x, dx), Dual64::new(v, dv), Dual64::from_f64);
@@ -402,6 +425,20 @@ impl<S> Default for Making<S> {
 }
 
 impl<S: Scalar> Making<S> {
+    /// The value of `tape` at `parameters`.
+    fn value(&mut self, tape: &Tape, parameters: &[S]) -> Value<S> {
+        let mut values: Vec<Value<S>> = Vec::with_capacity(tape.terms().len());
+        let mut uses = vec![0; tape.terms().len()];
+        for term in tape.terms() {
+            term.operands().for_each(|operand| uses[operand] += 1);
+        }
+        for term in tape.terms() {
+            let value = self.term(term, parameters, &values, &uses);
+            values.push(value);
+        }
+        values.last().copied().unwrap_or(Value::Constant(S::zero()))
+    }
+
     fn push(&mut self, step: Step<S>) -> usize {
         let register = self.registers;
         self.registers += step.width();

@@ -62,9 +62,57 @@ impl Tape {
     /// ```
     pub fn read(text: &str, known: &[Known<'_>], wanted: Unit) -> Result<Self, ExpressionError> {
         let nodes = parse::parse(text, known)?;
-        unit::check(text, &nodes, known, wanted)?;
+        unit::check(text, &nodes, known, Some(wanted))?;
+        Ok(Self::of(text, nodes, known))
+    }
+
+    /// Reads the equation `text`, two expressions of one unit with `=` between them, as its left side less its right.
+    ///
+    /// # Errors
+    /// As [`Tape::read`]; also a text without `=`, or with more than one.
+    ///
+    /// # Example
+    /// ```
+    /// use penetrode::physics::expression::{Known, Tape};
+    /// use penetrode::physics::units::Dimension;
+    ///
+    /// let known = [Known { name: "v1", value: 61.0, unit: Dimension::Velocity.into() }];
+    /// let end = Tape::read_equation("V = v1", &known)?;
+    /// assert_eq!(end.bind(end.parameters()).eval(0.1, 200.0), 139.0);
+    ///
+    /// let error = Tape::read_equation("x = v1", &known).unwrap_err();
+    /// assert_eq!(error.message, "`v1` is m/s, here a length (m) is compared");
+    /// # Ok::<(), penetrode::physics::expression::ExpressionError>(())
+    /// ```
+    pub fn read_equation(text: &str, known: &[Known<'_>]) -> Result<Self, ExpressionError> {
+        let sides: Vec<&str> = text.split('=').collect();
+        let [left, right] = sides[..] else {
+            let message =
+                if sides.len() < 2 { "the equation has no `=`" } else { "the equation has more than one `=`" };
+            let span = text.match_indices('=').nth(1).map_or(0..text.len(), |(start, _)| start..start + 1);
+            let help = "write for instance \"V = v1\", with v1 in [parameters]";
+            return Err(ExpressionError::new(span, message, "one expression, `=`, and another", help));
+        };
+        let mut nodes = parse::parse(left, known)?;
+        let (count, start) = (nodes.len(), left.len() + 1);
+        let behind = |mut error: ExpressionError| {
+            error.span = error.span.start + start..error.span.end + start;
+            error
+        };
+        let others = parse::parse(right, known).map_err(behind)?;
+        nodes.extend(others.into_iter().map(|Node { term, span }| Node {
+            term: term.moved(|operand| operand + count),
+            span: span.start + start..span.end + start,
+        }));
+        let term = Term::Binary(Binary::Subtract, count - 1, nodes.len() - 1);
+        nodes.push(Node { term, span: 0..text.len() });
+        unit::check(text, &nodes, known, None)?;
+        Ok(Self::of(text, nodes, known))
+    }
+
+    fn of(text: &str, nodes: Vec<Node>, known: &[Known<'_>]) -> Self {
         let parameters = known.iter().map(|known| known.value).collect();
-        Ok(Self(Arc::new(Program::new(text.to_owned(), nodes, parameters))))
+        Self(Arc::new(Program::new(text.to_owned(), nodes, parameters)))
     }
 
     /// The text as it was read.

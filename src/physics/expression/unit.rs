@@ -140,11 +140,17 @@ struct Found {
     varies: bool,
 }
 
-/// Refuses the terms `nodes` of `text` unless units fit all through, and the whole has the unit `wanted`.
-pub(super) fn check(text: &str, nodes: &[Node], known: &[Known<'_>], wanted: Unit) -> Result<(), ExpressionError> {
+/// Refuses the terms `nodes` of `text` unless units fit all through, and the whole has the unit `wanted`; without one it is
+/// the difference of the sides of an equation.
+pub(super) fn check(
+    text: &str,
+    nodes: &[Node],
+    known: &[Known<'_>],
+    wanted: Option<Unit>,
+) -> Result<(), ExpressionError> {
     let asked = asked(nodes, wanted);
     let mut found: Vec<Found> = Vec::with_capacity(nodes.len());
-    let check = Check { text, nodes };
+    let check = Check { text, nodes, equates: wanted.is_none() };
     for (index, node) in nodes.iter().enumerate() {
         let next = match node.term {
             Term::Number(bits) => {
@@ -160,8 +166,8 @@ pub(super) fn check(text: &str, nodes: &[Node], known: &[Known<'_>], wanted: Uni
         };
         found.push(next);
     }
-    match found.last().and_then(|whole| whole.unit) {
-        Some(unit) if unit != wanted => {
+    match found.last().and_then(|whole| whole.unit).zip(wanted) {
+        Some((unit, wanted)) if unit != wanted => {
             let span = nodes.last().map_or(0..text.len(), |node| node.span.clone());
             let message = format!("{} is {unit}, {} is wanted", quoted(&text[span.clone()]), wanted.described());
             Err(ExpressionError::new(span, message, wanted.described(), REMEDY))
@@ -173,10 +179,10 @@ pub(super) fn check(text: &str, nodes: &[Node], known: &[Known<'_>], wanted: Uni
 const REMEDY: &str = "multiply or divide by parameters with units; x is in m, V in m/s";
 
 /// The unit that each term must have for what it is part of, where that says one.
-fn asked(nodes: &[Node], wanted: Unit) -> Vec<Option<Unit>> {
+fn asked(nodes: &[Node], wanted: Option<Unit>) -> Vec<Option<Unit>> {
     let mut asked = vec![None; nodes.len()];
     if let Some(last) = asked.last_mut() {
-        *last = Some(wanted);
+        *last = wanted;
     }
     for (index, node) in nodes.iter().enumerate().rev() {
         let unit = match node.term {
@@ -196,6 +202,8 @@ fn asked(nodes: &[Node], wanted: Unit) -> Vec<Option<Unit>> {
 struct Check<'a> {
     text: &'a str,
     nodes: &'a [Node],
+    /// Whether the last term is the difference of the sides of an equation.
+    equates: bool,
 }
 
 impl Check<'_> {
@@ -297,7 +305,7 @@ impl Check<'_> {
         };
         let deed = match binary {
             Binary::Add => "added",
-            Binary::Subtract => "subtracted",
+            Binary::Subtract if !(self.equates && b + 2 == self.nodes.len()) => "subtracted",
             _ => "compared",
         };
         let message = format!("{} is {unit}, here {} is {deed}", self.quoted(term), wanted.described());

@@ -150,6 +150,7 @@ impl Row {
             title: None,
             mass,
             forces: Vec::new(),
+            ends: Vec::new(),
             parameters: Vec::new(),
             resistance: Resistance::Concrete(concrete),
             thickness: self.cells[5],

@@ -1,0 +1,194 @@
+//! Contracts of a flight whose stages end at a speed or on a condition, for every method that takes laws.
+
+use super::laws::methods;
+use super::*;
+use crate::physics::{Advice, EventKind, Outcome, Problem, Scene};
+use crate::studies::critical_velocity;
+use crate::testing::kinds;
+
+fn scene(text: &str) -> Scene {
+    Scene::from_toml(&format!("projectile.mass = 2\n{text}"), "ends").unwrap()
+}
+
+fn problem(text: &str, speed: f64) -> Problem {
+    scene(text).resolve(speed).unwrap()
+}
+
+/// 3 V² down to 250 m/s, 20 kN + V² below.
+const SAND: &str = "[[stage]]\ndrag = 3\nend_velocity = 250\n[[stage]]\nstatic_force = 20000\ndrag = 1\n";
+
+/// The tunnel's force until it is the shear strength left, and a plug of 0.5 kg behind that.
+const PLUG: &str = "[parameters]\nP = '800 kN'\nQ = '3 kg/m'\nR = '20 MN/m'\nH = '0.1 m'\n\
+     [[stage]]\nforce = 'P + Q*V^2'\nuntil = 'P + Q*V^2 = R*(H - x)'\nadd_mass = 0.5\n[[stage]]\nstatic_force = 0\n";
+
+fn with_thickness(text: &str, thickness: f64) -> String {
+    format!("target.thickness = {thickness:?}\n{text}")
+}
+
+/// Relative to `exact`, within `allowed`.
+fn is_near(value: f64, exact: f64, allowed: f64) -> bool {
+    ((value - exact) / exact).abs() <= allowed
+}
+
+/// Closed forms of either stage, mpmath with 40 digits.
+#[test]
+fn an_end_at_a_speed_is_met_at_its_place_and_time_by_every_method() {
+    for (name, method) in methods(1e-10) {
+        let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
+        let flight = method.integrator().solve(&problem(SAND, 400.0), Detail::Events).unwrap();
+        assert_eq!(
+            (flight.outcome, kinds(&flight.events)),
+            (Outcome::Stopped, vec![EventKind::StageEnd(0), EventKind::Rest])
+        );
+        let met = flight.events[0].state;
+        assert_eq!(met.velocity, 250.0, "{name}");
+        let ends = [
+            (met.depth, 0.313_335_752_830_490_37),
+            (met.time, 0.001),
+            (flight.end.depth, 1.730_401_772_617_134_7),
+            (flight.end.time, 0.015_933_959_053_583_118),
+        ];
+        for (value, exact) in ends {
+            assert!(is_near(value, exact, allowed), "{name}: {value} and {exact}");
+        }
+        let through = method.integrator().solve(&problem(&with_thickness(SAND, 0.9), 400.0), Detail::Events).unwrap();
+        assert_eq!(through.outcome, Outcome::Perforated, "{name}");
+        assert!(is_near(through.end.velocity, 160.887_558_130_288_42, allowed), "{name}: {}", through.end);
+    }
+}
+
+/// A projectile that is as slow as the speed, or slower, is in the stage behind it from the start.
+#[test]
+fn a_stage_that_is_entered_at_its_end_ends_there() {
+    for speed in [250.0, 249.0, 10.0] {
+        for (name, method) in methods(1e-10) {
+            let flight = method.integrator().solve(&problem(SAND, speed), Detail::Events).unwrap();
+            let alone =
+                method.integrator().solve(&problem(&SAND[SAND.rfind("[[").unwrap()..], speed), Detail::End).unwrap();
+            assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest], "{name}");
+            assert_eq!((flight.events[0].state.time, flight.events[0].state.depth), (0.0, 0.0), "{name}");
+            assert!(is_near(flight.end.depth, alone.end.depth, 1e-8), "{name}: {} and {}", flight.end, alone.end);
+        }
+    }
+}
+
+/// `P + Q V² = R (H - x)` on the path `W(x)` of `P + Q V²`; mpmath with 40 digits.
+#[test]
+fn a_condition_is_met_where_its_sides_are_equal_and_the_mass_that_joins_keeps_the_momentum() {
+    for (name, method) in methods(1e-10) {
+        let allowed = if name == MethodName::Taylor { 16.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let flight = method.integrator().solve(&problem(&with_thickness(PLUG, 0.1), 260.0), Detail::Events).unwrap();
+        let events = [EventKind::StageEnd(0), EventKind::Exit];
+        assert_eq!((flight.outcome, kinds(&flight.events)), (Outcome::Perforated, events.to_vec()), "{name}");
+        let met = flight.events[0].state;
+        for (value, exact) in [
+            (met.depth, 0.057_848_339_715_189_06),
+            (met.velocity, 119.768_117_204_620_17),
+            (met.time, 0.000_307_945_260_059_030_9),
+            (flight.end.velocity, 95.814_493_763_696_13),
+            (flight.end.time, 0.000_747_875_156_143_104_4),
+        ] {
+            assert!(is_near(value, exact, allowed), "{name}: {value} and {exact}");
+        }
+        assert_eq!(flight.end.depth, 0.1);
+        // Rest at H - P/R at the latest.
+        let stop = method.integrator().solve(&problem(&with_thickness(PLUG, 0.1), 220.0), Detail::Events).unwrap();
+        assert_eq!((stop.outcome, kinds(&stop.events)), (Outcome::Stopped, vec![EventKind::Rest]), "{name}");
+    }
+}
+
+/// Errors at two steps, one eighth of each other, over many steps: landing alone keeps the second order.
+#[test]
+fn central_difference_keeps_its_order_where_it_lands_on_a_condition() {
+    let exact = [1.730_401_772_617_134_7, 0.015_933_959_053_583_118];
+    for velocity in VelocityAt::ALL {
+        for boundaries in Boundaries::ALL {
+            let error = |scale: f64, quantity: usize| {
+                let steps = (0..12).map(|i| exact[1] / (scale * (400.0 + 7.3 * f64::from(i))));
+                let errors = steps.map(|step| {
+                    let scheme = CentralDifference::uniform(step, velocity, boundaries);
+                    let end = scheme.solve(&problem(SAND, 400.0), Detail::End).unwrap().end;
+                    ([end.depth, end.time][quantity] / exact[quantity] - 1.0).abs()
+                });
+                errors.fold(0.0, f64::max)
+            };
+            for quantity in [0, 1] {
+                let order = (error(1.0, quantity) / error(8.0, quantity)).log(8.0);
+                let is_second = boundaries == Boundaries::Landed && velocity != VelocityAt::LaggedHalfStep;
+                let formal = if is_second { 2.0 } else { 1.0 };
+                assert!((order - formal).abs() < 0.35, "{quantity}, {velocity}, {boundaries}: {order} of {formal}");
+            }
+        }
+    }
+}
+
+/// A slab as thick as the depth of rest: the impact speed is critical.
+#[test]
+fn the_outcome_next_to_the_critical_speed_is_right_or_undecided_where_a_stage_ends_at_a_speed() {
+    for nearness in [1e-3, 1e-9, 1e-12] {
+        for side in [-1.0, 1.0] {
+            let exit = 1.730_401_772_617_134_7 * (1.0 + side * nearness);
+            for (name, method) in methods(1e-10) {
+                let flight =
+                    method.integrator().solve(&problem(&with_thickness(SAND, exit), 400.0), Detail::End).unwrap();
+                let is_right = flight.outcome == Outcome::Undecided || flight.outcome.is_stop() == (side > 0.0);
+                assert!(is_right, "{name}: {} at {exit}", flight.outcome);
+                let resolves = name == MethodName::Taylor && nearness > 1e-11;
+                assert!(!resolves || flight.outcome != Outcome::Undecided, "{name}, {nearness}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_critical_speed_is_found_where_stages_end_at_speeds() {
+    // mpmath with 40 digits, from the closed forms backwards.
+    for (thickness, exact) in [(0.9, 170.856_847_164_926_33), (1.6, 328.935_567_520_323_7)] {
+        let found = critical_velocity::of_scene(&scene(&with_thickness(SAND, thickness)), &Taylor::default()).unwrap();
+        assert!(is_near(found.velocity, exact, 1e-13), "{} and {exact}", found.velocity);
+        assert_eq!(found.note, "");
+    }
+}
+
+/// The slowest that gets through rests where the static force is the shear strength left.
+#[test]
+fn a_critical_speed_is_found_where_a_stage_ends_on_a_condition() {
+    let found = critical_velocity::of_scene(&scene(&with_thickness(PLUG, 0.1)), &Taylor::default()).unwrap();
+    assert!(is_near(found.velocity, 229.327_924_231_836, 1e-12), "{}", found.velocity);
+    assert!(found.error_bar.unwrap() < 1e-9 && !found.note.is_empty(), "{found:?}");
+}
+
+#[test]
+fn formulas_refuse_ends_that_are_no_depths() {
+    for name in [MethodName::Energy, MethodName::ClosedForm] {
+        let method = Method::new(name, &MethodOptions::default()).unwrap();
+        let error = method.integrator().solve(&problem(SAND, 300.0), Detail::End).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("end"), "{error}");
+    }
+}
+
+/// `W = V0² - 2 (F/M) x` is a line, and the condition a parabola that touches it.
+#[test]
+fn a_condition_that_is_touched_is_met_and_one_that_is_missed_by_little_is_not() {
+    let text = |a: f64| {
+        format!(
+            "target.thickness = 0.5\n[parameters]\nm = '1 kg'\na = '{a:?} J'\nb = '1e7 N/m'\nl = '0.1 m'\n[[stage]]\n\
+             static_force = 20000\nuntil = 'm*V^2 = a - b*(x - l)^2'\n[[stage]]\nstatic_force = 200000\n"
+        )
+    };
+    // W = V0² - 2e4 x; a - 1e7 (x - 0.1)² reaches it where a >= V0² - 2000 - 10: V0 = 100.
+    let touched = 10_000.0 - 2000.0 - 10.0;
+    for (a, meets) in [(touched + 1e-6, true), (touched - 1e-6, false)] {
+        for (name, method) in methods(1e-12) {
+            let flight = method.integrator().solve(&problem(&text(a), 100.0), Detail::Events).unwrap();
+            let is_met = flight.events.iter().any(|event| event.kind == EventKind::StageEnd(0));
+            assert!(is_met == meets || flight.outcome == Outcome::Undecided, "{name}, {a}: {flight:?}");
+            assert!(
+                name != MethodName::Taylor || is_met == meets && flight.outcome != Outcome::Undecided,
+                "{flight:?}"
+            );
+        }
+    }
+    let flight = Taylor::default().solve(&problem(&text(touched), 100.0), Detail::Events).unwrap();
+    assert_eq!(flight.outcome, Outcome::Undecided, "{flight:?}");
+}

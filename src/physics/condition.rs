@@ -1,0 +1,170 @@
+//! Ends of stages that are no places: a speed, or any zero of a function g(x, V).
+//!
+//! ```text
+//! end_velocity = v   g = V - v,            met where g <= 0
+//! until = "a = b"    g = a(x, V) - b(x, V)  met where g = 0 or changes its sign, in either direction
+//! ```
+//!
+//! A stage that is entered where its condition is met ends there. Touching counts. An end at a depth may stand beside a
+//! condition: the stage ends at whichever comes first.
+
+use super::expression::{Bound, Known, Tape};
+use super::problem::State;
+use super::scalar::Scalar;
+use super::units::Dimension;
+use std::sync::LazyLock;
+
+/// Where a stage ends besides a depth.
+#[derive(Clone, Debug)]
+pub struct Condition<S = f64> {
+    /// g in values.
+    values: Bound,
+    parameters: Vec<S>,
+    kind: Kind,
+    /// Index of the stage behind it.
+    next: usize,
+}
+
+/// What kind of an end it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A speed, from above.
+    Speed,
+    /// A zero of g, from either side.
+    Zero,
+}
+
+impl<S: PartialEq> PartialEq for Condition<S> {
+    fn eq(&self, other: &Self) -> bool {
+        let is_same = self.kind == other.kind && self.next == other.next;
+        is_same && self.parameters == other.parameters && self.values.tape() == other.values.tape()
+    }
+}
+
+impl<S: Scalar> Condition<S> {
+    fn new(tape: &Tape, parameters: Vec<S>, kind: Kind, next: usize) -> Self {
+        let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
+        Self { values: tape.bind(&values), parameters, kind, next }
+    }
+
+    /// V = `speed` (m/s), with stage `next` behind it.
+    pub(crate) fn of_speed(speed: S, next: usize) -> Self {
+        static TAPE: LazyLock<Option<Tape>> = LazyLock::new(|| {
+            Tape::read_equation("V = v", &[Known { name: "v", value: 0.0, unit: Dimension::Velocity.into() }]).ok()
+        });
+        match &*TAPE {
+            Some(tape) => Self::new(tape, vec![speed], Kind::Speed, next),
+            None => unreachable!("the text of an end at a speed is an equation"),
+        }
+    }
+
+    /// The zero of the equation `tape` at `parameters` (SI units), with stage `next` behind it.
+    pub(crate) fn of_zero(tape: &Tape, parameters: Vec<S>, next: usize) -> Self {
+        Self::new(tape, parameters, Kind::Zero, next)
+    }
+
+    /// Whether both have the same function.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let values = |condition: &Self| condition.parameters.iter().map(|p| p.value()).collect::<Vec<_>>();
+        self.kind == other.kind && self.values.tape() == other.values.tape() && values(self) == values(other)
+    }
+
+    /// Index of the stage behind it.
+    pub fn next(&self) -> usize {
+        self.next
+    }
+
+    /// Whether it is a speed.
+    pub fn is_speed(&self) -> bool {
+        self.kind == Kind::Speed
+    }
+
+    pub(crate) fn tape(&self) -> &Tape {
+        self.values.tape()
+    }
+
+    pub(crate) fn parameters(&self) -> &[S] {
+        &self.parameters
+    }
+
+    pub(crate) fn powers_of_v(&self) -> Vec<f64> {
+        self.values.powers_of_v()
+    }
+
+    /// g at depth `x` (m) and velocity `v` (m/s).
+    pub fn value(&self, x: f64, v: f64) -> f64 {
+        self.values.eval(x, v)
+    }
+
+    /// g, dg/dx and dg/dV.
+    pub(crate) fn gradient(&self, x: f64, v: f64) -> (f64, f64, f64) {
+        self.values.gradient(x, v)
+    }
+
+    /// Rounding of g there: of its two sides, and of x and V.
+    pub(crate) fn noise(&self, x: f64, v: f64) -> f64 {
+        let (_, by_depth, by_velocity) = self.values.gradient(x, v);
+        let place = (by_depth * x).abs() + (by_velocity * v).abs();
+        let (left, right) = self.values.sides_of_equation(x, v);
+        8.0 * f64::EPSILON * (left.abs() + right.abs() + if place.is_finite() { place } else { 0.0 })
+    }
+
+    /// Whether g is zero at a state, up to rounding; of a speed, whether it is no longer above it.
+    pub(crate) fn is_met(&self, at: State<S>) -> bool {
+        let State { depth, velocity, .. } = at.values();
+        let (g, noise) = (self.value(depth, velocity), self.noise(depth, velocity));
+        if self.kind == Kind::Speed { g <= noise } else { g.abs() <= noise }
+    }
+
+    /// The sign of g on the way to its zero, for a stage that is entered at a state.
+    pub(crate) fn side(&self, at: State<S>) -> f64 {
+        let State { depth, velocity, .. } = at.values();
+        if self.kind == Kind::Speed { 1.0 } else { self.value(depth, velocity).signum() }
+    }
+
+    /// `state` with what the end fixes exactly.
+    pub(crate) fn settled(&self, state: State<S>) -> State<S> {
+        match (self.kind, self.parameters.first()) {
+            (Kind::Speed, Some(speed)) => State { velocity: *speed, ..state },
+            _ => state,
+        }
+    }
+
+    /// Whether g may be zero for x and V between these.
+    pub(crate) fn may_vanish(&self, x: (f64, f64), v: (f64, f64)) -> bool {
+        let (least, most) = self.values.range(x, v);
+        !(least > 0.0 || most < 0.0)
+    }
+
+    /// The first depth between two (m) at which it is met at rest, by a search at 33 places.
+    pub(crate) fn met_at_rest(&self, from: f64, to: f64) -> Option<f64> {
+        let g = |x: f64| self.value(x, 0.0);
+        let side = if self.kind == Kind::Speed { 1.0 } else { g(from).signum() };
+        if side * g(from) <= 0.0 {
+            return Some(from);
+        }
+        let place = |panel: u32| from + (to - from) * f64::from(panel) / f64::from(PANELS);
+        let panel = (1..=PANELS).find(|panel| side * g(place(*panel)) <= 0.0)?;
+        let (mut low, mut high) = (place(panel - 1), place(panel));
+        for _ in 0..64 {
+            let middle = 0.5 * (low + high);
+            if side * g(middle) > 0.0 { low = middle } else { high = middle }
+        }
+        Some(high)
+    }
+
+    /// The same condition in another number type, parameters taken over by value.
+    pub fn cast<T: Scalar>(&self) -> Condition<T> {
+        let parameters = self.parameters.iter().map(|p| T::from_f64(p.value())).collect();
+        Condition { values: self.values.clone(), parameters, kind: self.kind, next: self.next }
+    }
+
+    /// Why g has no value at depth `x` (m) and velocity `v` (m/s).
+    pub(crate) fn explain(&self, x: f64, v: f64) -> Option<String> {
+        let reason = self.values.explain(x, v).or_else(|| self.values.explain_series(x, v))?;
+        Some(format!("in {}, {}", reason.term, reason.reason))
+    }
+}
+
+/// Parts in which a stretch is searched.
+const PANELS: u32 = 32;
