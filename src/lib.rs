@@ -69,7 +69,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/` has more: `solve`, `order_study` of a scheme of your own, and `own_integrator`.
+//! `examples/` has more: `solve`, `order_study` of a scheme of your own, `own_integrator`, and `own_law`.
 //!
 //! # Which part answers what
 //!
@@ -79,6 +79,7 @@
 //! | Is there an exact answer? | [`ClosedForm`]; in 50 digits [`physics::reference`] |
 //! | What does the paper's scheme give? | [`CentralDifference`] |
 //! | Another general solver? | [`Diffsol`] (feature `diffsol`), [`Energy`] over depth; by name [`integrators::Method`] |
+//! | My force F(x, V)? | as text in a scene ([`physics::expression`]), in code by [`physics::ForceFunction`] |
 //! | Which velocity perforates? | [`critical_velocity`](fn@critical_velocity); exactly [`studies::critical_velocity::exact`] |
 //! | Which order does my scheme have? | [`fit_order`]; from a table of results [`studies::audit`](mod@studies::audit) |
 //! | How does one of ours converge? | [`studies::convergence`] |
@@ -95,8 +96,8 @@
 //!
 //! # Limits
 //!
-//! One rigid projectile, normal impact, motion along a line, resistance without memory. No law beyond `p + s x + r V + q V²`
-//! in a stage. Units are SI inside; 64-bit numbers, with dual numbers and double-double where [`physics::Scalar`] stands.
+//! One rigid projectile, normal impact, motion along a line, resistance without memory. Closed forms
+//! are those of `p + s x + r V + q V²` in a stage. Units are SI inside; 64-bit numbers, with dual numbers and double-double where [`physics::Scalar`] stands.
 //!
 //! # Features
 //!

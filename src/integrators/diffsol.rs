@@ -372,6 +372,12 @@ impl Reduced {
         }
     }
 
+    /// Whether a law of its own holds a projectile at `at` that is as good as at rest: no step may pass where a force has no bound
+    /// at rest.
+    fn is_held(&self, at: Node) -> bool {
+        self.own.as_ref().is_some_and(|own| own.force(&[at.depth, at.velocity]) > 0.0)
+    }
+
     /// What `end`, found in these units with times that count from `epoch` and `noise` in its speed, means.
     fn end_of(&self, course: &Course<'_>, end: StageEnd, epoch: f64, noise: f64) -> Solved<StageEnd> {
         let end = match (end, &self.own) {
@@ -420,6 +426,30 @@ impl OwnLaw {
         self.law.stops(depth, self.speed)
     }
 
+    /// Adds to `seen` what the step from `before` to `after` shows, on the library's interpolant `at`.
+    fn note(
+        &self,
+        seen: &mut Seen,
+        [before, after]: [Node; 2],
+        mut at: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
+    ) -> Result<(), DiffsolError> {
+        let force = |node: Node| self.force(&[node.depth, node.velocity]);
+        let falls = [before, after].map(|node| -self.slopes(&[node.depth, node.velocity]).1);
+        seen.growth += (after.time - before.time) * falls[0].max(falls[1]).max(0.0);
+        if !(force(before) > 0.0 && force(after) < 0.0) {
+            return Ok(());
+        }
+        let (mut low, mut high) = (before, after);
+        for _ in 0..HALVINGS {
+            let time = 0.5 * (low.time + high.time);
+            let (depth, velocity) = at(time)?;
+            let middle = Node { time, depth, velocity };
+            if force(middle) > 0.0 { low = middle } else { high = middle }
+        }
+        seen.least = seen.least.min(high.velocity.max(0.0));
+        Ok(())
+    }
+
     /// Length of a step that ends at the kink which the step from `before` to `after` has passed; `None` where it has
     /// passed none, or one that lies at an end of it.
     fn to_kink(
@@ -437,7 +467,7 @@ impl OwnLaw {
             return Ok(None);
         }
         let (mut low, mut high) = (before.time, after.time);
-        for _ in 0..KINK_HALVINGS {
+        for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
             if sides(at(middle)?) == first { low = middle } else { high = middle }
         }
@@ -539,7 +569,7 @@ impl OwnLaw {
             // Where it is nearest to zero, it may touch it.
             let least = (0..=LOOKS).min_by(|a, b| value(seen[*a]).total_cmp(&value(seen[*b]))).unwrap_or(LOOKS);
             let (mut low, mut high) = (seen[least.saturating_sub(1)].time, seen[(least + 1).min(LOOKS)].time);
-            for _ in 0..KINK_HALVINGS {
+            for _ in 0..HALVINGS {
                 let [one, other] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
                 let [left, right] = [at(one)?, at(other)?];
                 if value(left) <= value(right) { high = other } else { low = one }
@@ -579,6 +609,35 @@ impl OwnLaw {
         let (by_depth, by_velocity) = self.law.slopes(depth, velocity);
         let scaled = |slope: f64, unit: f64| if slope.is_finite() { slope * self.acceleration * unit } else { 0.0 };
         (scaled(by_depth, self.length), scaled(by_velocity, self.speed))
+    }
+}
+
+/// What the steps of a stage have shown.
+struct Seen {
+    /// Largest u².
+    energy_max: f64,
+    /// Time of the kink that a step was shortened to.
+    kink: Option<f64>,
+    /// Of a law of its own: least velocity where the force changes from slowing to driving [V0].
+    least: f64,
+    /// Integral of `-F_V` over the time where it is positive: the logarithm by which an error of `W/V0²` may have grown.
+    growth: f64,
+}
+
+impl Seen {
+    fn from(stage: &Reduced) -> Self {
+        Self { energy_max: stage.speed * stage.speed, kink: None, least: f64::INFINITY, growth: 0.0 }
+    }
+
+    /// Widens the error bound of `W/V0²` by what `steps` of the scheme at a tolerance leave; by a law of its own also by what
+    /// the library allows each step, and by the growth of both.
+    fn widen_bound(&self, course: &mut Course<'_>, stage: &Reduced, (scheme, rtol): (Scheme, f64), steps: f64) {
+        course.error_bound += (scheme.margin_error(rtol) + 4.0 * f64::EPSILON * steps) * self.energy_max;
+        if stage.own.is_some() {
+            let of_steps = ERROR_OF_STEP * scheme.library_rtol(rtol) * steps * self.energy_max;
+            course.error_bound = (course.error_bound + of_steps) * self.growth.exp();
+            course.pass_least(self.least * stage.unit_speed);
+        }
     }
 }
 
@@ -723,8 +782,12 @@ impl<Eqn: OdeEquations<V = Pair, T = f64>> OfScheme<Eqn> {
 /// Shortest step [L/V0]. Each stage starts at time zero, so no time swallows it.
 const STEP_MIN: f64 = 1e-30;
 
-/// Halvings of a step with a kink inside.
-const KINK_HALVINGS: u32 = 40;
+/// Halvings of a step with a kink or a least velocity inside.
+const HALVINGS: u32 = 40;
+
+/// Error of a step by a law of its own, in the library's tolerance: what it tests leaves out kinks, and derivatives that are
+/// large at rest.
+const ERROR_OF_STEP: f64 = 4.0;
 
 /// Parts of a step at whose ends a condition is asked.
 const LOOKS: usize = 8;
@@ -777,7 +840,6 @@ where
         force.own.replace(stage.own.clone());
         force.evaluations.set(0);
         let longest_step = law.longest_step();
-        let noise = scheme.margin_error(rtol);
         let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed);
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
@@ -785,9 +847,7 @@ where
         let mut epoch = 0.0;
         let mut h = first_step;
         let mut retries = 0;
-        // Time of the kink that a step was shortened to.
-        let mut kink = None;
-        let mut energy_max = stage.speed * stage.speed;
+        let mut seen = Seen::from(stage);
         let mut cost = Cost::default();
         let state_at = |epoch: f64, at: Node| stage.state(Node { time: epoch + at.time, ..at });
         let failure = |cause: DiffsolError, epoch: f64, at: Node| IntegrationError::SolverFailed {
@@ -803,14 +863,19 @@ where
                 return Err(method.budget_spent(state_at(epoch, before)));
             }
             // The stop reason says nothing here: there is neither a root function nor a stop time.
-            let _ = solver.step().map_err(|e| failure(e, epoch, before))?;
+            if let Err(cause) = solver.step() {
+                if is_lost(before.velocity, rtol, seen.energy_max) && stage.is_held(before) {
+                    break StageEnd::Rest(Node { velocity: 0.0, ..before });
+                }
+                return Err(failure(cause, epoch, before));
+            }
             let state = solver.state();
             let after = Node { time: state.t, depth: state.y[0], velocity: state.y[1] };
             let next_step = state.h;
             // Backwards with u > 0 at both ends: u was negative in between. Where it was lost in the tolerance already
             // (an explicit method at its stability limit), that is the rest; elsewhere the step was too long.
             let backwards = after.depth < before.depth && after.velocity > 0.0;
-            if backwards && is_lost(before.velocity, rtol, energy_max) {
+            if backwards && is_lost(before.velocity, rtol, seen.energy_max) {
                 cost.steps += 1;
                 break StageEnd::Rest(before);
             }
@@ -824,7 +889,7 @@ where
             } else if let Some(own) = &stage.own {
                 let scratch = &mut self.scratch;
                 let at = |t| solver.interpolate_inplace(t, scratch).map(|()| [scratch[0], scratch[1]]);
-                own.to_new_kink(&mut kink, epoch, before, after, at).map_err(|e| failure(e, epoch, before))?
+                own.to_new_kink(&mut seen.kink, epoch, before, after, at).map_err(|e| failure(e, epoch, before))?
             } else {
                 None
             };
@@ -842,13 +907,16 @@ where
             cost.steps += 1;
             let scratch = &mut self.scratch;
             let mut interpolant = |t| solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]));
-            let lost = course.error_bound + noise * energy_max;
+            let lost = course.error_bound + scheme.margin_error(rtol) * seen.energy_max;
             let end = end_of_step(stage, force, course, lost, [before, after], &mut interpolant);
             let end = end.map_err(|e| failure(e, epoch, before))?;
             let place = end.map_or(after, StageEnd::state);
+            if let Some(own) = &stage.own {
+                own.note(&mut seen, [before, place], &mut interpolant).map_err(|e| failure(e, epoch, before))?;
+            }
             let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
             sampled.map_err(|e| failure(e, epoch, before))?;
-            energy_max = energy_max.max(place.velocity * place.velocity);
+            seen.energy_max = seen.energy_max.max(place.velocity * place.velocity);
             if let Some(end) = end {
                 break end;
             }
@@ -868,10 +936,9 @@ where
         if !scheme.is_implicit() {
             self.reused = Some(solver);
         }
-        let round_off = 4.0 * f64::EPSILON * cost.steps as f64;
         course.cost = course.cost + cost;
-        course.error_bound += (noise + round_off) * energy_max;
-        stage.end_of(course, end, epoch, noise)
+        seen.widen_bound(course, stage, (scheme, rtol), cost.steps as f64);
+        stage.end_of(course, end, epoch, scheme.margin_error(rtol))
     }
 }
 

@@ -1,9 +1,10 @@
-//! Laws of one's own: a force F(x, V) that is an expression, in place of the four coefficients of a stage.
+//! Laws of one's own: a force F(x, V) as an expression or in code, in place of the four coefficients of a stage.
 //!
 //! A [`Problem`](super::Problem) holds them beside its stages. A stage with a law has NaN for coefficients, and a method
 //! that knows no laws refuses the problem.
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use super::condition::Condition;
@@ -12,27 +13,90 @@ use super::problem::{Stage, State};
 use super::scalar::Scalar;
 use super::units::Dimension;
 
+/// A force F(x, V) in code, for what an expression does not hold: a table of two variables, a model fitted to data.
+///
+/// Every method takes it but `taylor`, which needs the series of an expression, and the methods that are formulas. What a
+/// step hides between the places at which a method asks for the force is not seen.
+///
+/// # Example
+/// ```
+/// use std::sync::Arc;
+///
+/// use penetrode::integrators::Diffsol;
+/// use penetrode::physics::law::{ForceFunction, Law};
+/// use penetrode::{Detail, Integrator, Problem, Stage};
+///
+/// /// A strength that grows by a tenth for each factor e of the velocity.
+/// #[derive(Debug)]
+/// struct Rate {
+///     strength: f64,
+/// }
+///
+/// impl ForceFunction for Rate {
+///     fn force(&self, _x: f64, v: f64) -> f64 {
+///         self.strength * (1.0 + 0.1 * (1.0 + v).ln())
+///     }
+/// }
+///
+/// let law = Law::of_code(Arc::new(Rate { strength: 848e3 }));
+/// let problem = Problem::of_stages(2.0, 300.0, [Stage::free()]).with_law(0, &law);
+/// let depth = Diffsol::adaptive(1e-10).solve(&problem, Detail::End)?.end.depth;
+/// assert!((depth / 0.069_855_012_005_727_02 - 1.0).abs() < 1e-8, "{depth}");
+/// # Ok::<(), penetrode::IntegrationError>(())
+/// ```
+pub trait ForceFunction: fmt::Debug + Send + Sync {
+    /// Force (N) at depth `x` (m) and velocity `v` (m/s), `v >= 0`. Not finite: it has none there, and the flight ends
+    /// with an error.
+    fn force(&self, x: f64, v: f64) -> f64;
+
+    /// Derivatives `F_x` (N/m) and `F_V` (N s/m), for implicit methods and error bounds: by differences, unless it says
+    /// better.
+    fn slopes(&self, x: f64, v: f64) -> (f64, f64) {
+        let step = |at: f64| DIFFERENCE * at.abs().max(1e-3);
+        let (dx, dv, low) = (step(x), step(v), (v - step(v)).max(0.0));
+        let by_depth = (self.force(x + dx, v) - self.force(x - dx, v)) / (2.0 * dx);
+        (by_depth, (self.force(x, v + dv) - self.force(x, low)) / (v + dv - low))
+    }
+}
+
+/// Step of a difference over the place: the cube root of an epsilon.
+const DIFFERENCE: f64 = 6e-6;
+
 /// The force F(x, V) (N) of one stage, its parameters given.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Law<S = f64> {
-    parameters: Vec<S>,
-    bound: Bound<S>,
-    /// The same in values, for slopes.
-    values: Bound,
-    /// m with which the force is smooth in u at rest, `V = u^m`.
-    branch: Option<u32>,
+    force: Form<S>,
     /// Where the stage ends besides a depth.
     end: Option<Condition<S>>,
     /// The mass (kg) that joins the projectile where the stage begins, a function of x.
     joining: Option<(Tape, Vec<S>)>,
 }
 
-impl<S: PartialEq> PartialEq for Law<S> {
+#[derive(Clone, Debug)]
+enum Form<S> {
+    Expression(Box<Expression<S>>),
+    Code(Arc<dyn ForceFunction>),
+}
+
+#[derive(Clone, Debug)]
+struct Expression<S> {
+    parameters: Vec<S>,
+    bound: Bound<S>,
+    /// The same in values, for slopes.
+    values: Bound,
+    /// m with which the force is smooth in u at rest, `V = u^m`.
+    branch: Option<u32>,
+}
+
+impl<S: PartialEq> PartialEq for Form<S> {
     fn eq(&self, other: &Self) -> bool {
-        self.parameters == other.parameters
-            && self.values.tape() == other.values.tape()
-            && self.end == other.end
-            && self.joining == other.joining
+        match (self, other) {
+            (Self::Expression(one), Self::Expression(other)) => {
+                one.parameters == other.parameters && one.values.tape() == other.values.tape()
+            }
+            (Self::Code(one), Self::Code(other)) => Arc::ptr_eq(one, other),
+            _ => false,
+        }
     }
 }
 
@@ -42,7 +106,17 @@ impl<S: Scalar> Law<S> {
         let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
         let values = tape.bind(&values);
         let branch = branch(&values.powers_of_v());
-        Self { bound: tape.bind(&parameters), values, parameters, branch, end: None, joining: None }
+        let bound = tape.bind(&parameters);
+        Self::of(Form::Expression(Box::new(Expression { parameters, bound, values, branch })))
+    }
+
+    /// The law of a force in code.
+    pub fn of_code(force: Arc<dyn ForceFunction>) -> Self {
+        Self::of(Form::Code(force))
+    }
+
+    fn of(force: Form<S>) -> Self {
+        Self { force, end: None, joining: None }
     }
 
     /// The law of the coefficients of `stage`.
@@ -67,10 +141,12 @@ impl<S: Scalar> Law<S> {
     /// The same law, of a stage that ends at `end` too.
     #[must_use]
     pub(crate) fn ending(mut self, end: Condition<S>) -> Self {
-        self.bound = self.bound.with(end.tape(), end.parameters());
-        let mut powers = self.values.powers_of_v();
-        powers.extend(end.powers_of_v());
-        self.branch = branch(&powers);
+        if let Form::Expression(expression) = &mut self.force {
+            expression.bound = expression.bound.with(end.tape(), end.parameters());
+            let mut powers = expression.values.powers_of_v();
+            powers.extend(end.powers_of_v());
+            expression.branch = branch(&powers);
+        }
         self.end = Some(end);
         self
     }
@@ -98,48 +174,82 @@ impl<S: Scalar> Law<S> {
 
     /// Force (N) at depth `x` (m) and velocity `v` (m/s); NaN or infinite where the expression has no value.
     pub fn force(&self, x: S, v: S) -> S {
-        self.bound.eval(x, v)
+        let code = match &self.force {
+            Form::Expression(expression) => return expression.bound.eval(x, v),
+            Form::Code(code) => code,
+        };
+        let (depth, velocity) = (x.value(), v.value());
+        let force = S::from_f64(code.force(depth, velocity));
+        if x.is_constant() && v.is_constant() {
+            return force;
+        }
+        let (by_depth, by_velocity) = code.slopes(depth, velocity);
+        let change = |at: S, slope: f64| (at - S::from_f64(at.value())) * S::from_f64(slope);
+        force + change(x, by_depth) + change(v, by_velocity)
     }
 
     /// The same in values.
     #[inline]
     pub(crate) fn force_value(&self, x: f64, v: f64) -> f64 {
-        self.values.eval(x, v)
+        match &self.force {
+            Form::Expression(expression) => expression.values.eval(x, v),
+            Form::Code(code) => code.force(x, v),
+        }
     }
 
-    /// The expression with its parameters, for series.
-    pub(crate) fn bound(&self) -> &Bound<S> {
-        &self.bound
+    /// The expression with its parameters, for series; `None` for code.
+    pub(crate) fn bound(&self) -> Option<&Bound<S>> {
+        self.expression().map(|expression| &expression.bound)
+    }
+
+    fn expression(&self) -> Option<&Expression<S>> {
+        match &self.force {
+            Form::Expression(expression) => Some(expression),
+            Form::Code(_) => None,
+        }
+    }
+
+    /// Bounds of the force between depths and velocities; those of code are not known.
+    fn range(&self, x: (f64, f64), v: (f64, f64)) -> Option<(f64, f64)> {
+        self.expression().map(|expression| expression.values.range(x, v))
     }
 
     /// Why the force has no value at depth `x` (m) and velocity `v` (m/s).
     pub fn explain(&self, x: f64, v: f64) -> String {
         let unknown = "the number is beyond the range of 64 bits".to_owned();
-        let reason = self.values.explain(x, v).or_else(|| self.values.explain_series(x, v));
+        let Some(Expression { values, .. }) = self.expression() else {
+            return format!("its code gives {}", self.force_value(x, v));
+        };
+        let reason = values.explain(x, v).or_else(|| values.explain_series(x, v));
         reason.map_or(unknown, |error| format!("in {}, {}", error.term, error.reason))
     }
 
     /// Derivatives `F_x` (N/m) and `F_V` (N s/m).
     pub fn slopes(&self, x: f64, v: f64) -> (f64, f64) {
-        let (_, by_depth, by_velocity) = self.values.gradient(x, v);
-        (by_depth, by_velocity)
+        match &self.force {
+            Form::Expression(expression) => {
+                let (_, by_depth, by_velocity) = expression.values.gradient(x, v);
+                (by_depth, by_velocity)
+            }
+            Form::Code(code) => code.slopes(x, v),
+        }
     }
 
     /// The side of each switch of min, max and abs at depth `x` (m) and velocity `v` (m/s).
     #[cfg(feature = "diffsol")]
     pub(crate) fn sides(&self, x: f64, v: f64) -> smallvec::SmallVec<[bool; 4]> {
-        self.values.sides(x, v)
+        self.expression().map_or_else(smallvec::SmallVec::new, |expression| expression.values.sides(x, v))
     }
 
     /// Whether the force does not drive at rest, at 33 depths between two (m).
     pub(crate) fn resists_between(&self, from: f64, to: f64) -> bool {
         (0..=PANELS)
-            .all(|panel| self.values.eval(from + (to - from) * f64::from(panel) / f64::from(PANELS), 0.0) >= 0.0)
+            .all(|panel| self.force_value(from + (to - from) * f64::from(panel) / f64::from(PANELS), 0.0) >= 0.0)
     }
 
     /// Whether bounds show that the force drives nowhere from the face to depth `to` (m), at any speed.
     pub(crate) fn never_drives(&self, to: f64) -> bool {
-        self.values.range((0.0, to), (0.0, f64::INFINITY)).0 >= 0.0
+        self.range((0.0, to), (0.0, f64::INFINITY)).is_some_and(|(least, _)| least >= 0.0)
     }
 
     /// In how many parts of a way the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
@@ -151,13 +261,13 @@ impl<S: Scalar> Law<S> {
         let within = |(from, to): ((f64, f64), (f64, f64)), largest: f64| {
             let (low, high) = (from.1.min(to.1), from.1.max(to.1));
             // What a slower projectile meets is for the steps to come.
-            let (least, most) =
-                self.values.range((from.0.min(to.0), from.0.max(to.0)), (low.max(SLOWEST * high), high));
-            let shown = (self.values.eval(to.0, to.1) - self.values.eval(from.0, from.1)).abs();
+            let depths = (from.0.min(to.0), from.0.max(to.0));
+            let Some((least, most)) = self.range(depths, (low.max(SLOWEST * high), high)) else { return true };
+            let shown = (self.force_value(to.0, to.1) - self.force_value(from.0, from.1)).abs();
             let hidden = most - least;
             hidden <= SURPRISE * largest + 2.0 * shown || hidden * (to.0 - from.0).abs() <= NOTHING * energy
         };
-        let size = |(x, v): (f64, f64)| self.values.eval(x, v).abs();
+        let size = |(x, v): (f64, f64)| self.force_value(x, v).abs();
         let (start, end) = (place(0.0), place(1.0));
         if within((start, end), size(start).max(size(end))) {
             return Some(1);
@@ -169,31 +279,31 @@ impl<S: Scalar> Law<S> {
 
     /// Whether the force depends on the velocity.
     pub fn depends_on_velocity(&self) -> bool {
-        self.values.tape().depends_on_v()
+        self.expression().is_none_or(|expression| expression.values.tape().depends_on_v())
     }
 
     /// m with which the force is smooth in u at rest, `V = u^m`: the common denominator of the powers of V that have a
     /// branch point there.
     pub fn branch_at_rest(&self) -> Option<u32> {
-        self.branch
+        self.expression()?.branch
     }
 
     /// Whether the force brings a projectile to rest at depth `x` (m) that comes there slower than `v` (m/s): it resists at
     /// rest, or vanishes as a power of V below the first (docs/theory.md, section 10).
     pub fn stops(&self, x: f64, v: f64) -> bool {
         let slow = 1e-8 * v;
-        self.values.eval(x, 0.0) > 0.0 || self.power(x, slow) < 1.0 - 1e-6
+        self.force_value(x, 0.0) > 0.0 || self.power(x, slow) < 1.0 - 1e-6
     }
 
     /// n of `F = a V^n` about velocity `v` (m/s).
     pub(crate) fn power(&self, x: f64, v: f64) -> f64 {
-        (self.values.eval(x, v) / self.values.eval(x, 0.5 * v)).log2()
+        (self.force_value(x, v) / self.force_value(x, 0.5 * v)).log2()
     }
 
     /// Whether a projectile of `mass` (kg), which is `at` a state with little of its speed left, will never come to rest
     /// before the limit, `distance` (m) ahead: its resistance vanishes with the velocity.
     pub(crate) fn is_approach(&self, mass: f64, at: State, distance: f64) -> bool {
-        if self.stops(at.depth, at.velocity) || self.values.eval(at.depth, at.velocity) <= 0.0 {
+        if self.stops(at.depth, at.velocity) || self.force_value(at.depth, at.velocity) <= 0.0 {
             return false;
         }
         let reach = self.reach(mass, at);
@@ -206,7 +316,7 @@ impl<S: Scalar> Law<S> {
         if at.velocity <= 0.0 {
             return 0.0;
         }
-        let (force, power) = (self.values.eval(at.depth, at.velocity), self.power(at.depth, at.velocity));
+        let (force, power) = (self.force_value(at.depth, at.velocity), self.power(at.depth, at.velocity));
         if power < 2.0 - 1e-9 { mass * at.velocity * at.velocity / ((2.0 - power) * force) } else { f64::INFINITY }
     }
 
@@ -220,14 +330,14 @@ impl<S: Scalar> Law<S> {
 
     /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it on the way.
     pub fn static_work(&self, from: f64, to: f64) -> (f64, f64) {
-        let force = |x: f64| self.values.eval(x, 0.0);
-        if !self.values.tape().depends_on_x() {
+        let force = |x: f64| self.force_value(x, 0.0);
+        if self.expression().is_some_and(|expression| !expression.values.tape().depends_on_x()) {
             let work = force(from) * (to - from);
             return (work, work.max(0.0));
         }
         let place = |panel: u32| from + (to - from) * f64::from(panel) / f64::from(PANELS);
         let scale = (to - from) / f64::from(PANELS) * (0..PANELS).map(|panel| force(place(panel)).abs()).sum::<f64>();
-        let bounds = |from: f64, to: f64| self.values.range((from, to), (0.0, 0.0));
+        let bounds = |from: f64, to: f64| self.range((from, to), (0.0, 0.0)).unwrap_or((0.0, 0.0));
         // Twice: what the points above miss may be all of it.
         let rough = |panel| integral(&force, &bounds, (place(panel), place(panel + 1)), (scale, 1e-6), HALVINGS).abs();
         let scale = scale + (0..PANELS).map(rough).sum::<f64>();
@@ -247,7 +357,10 @@ impl<S: Scalar> Law<S> {
     /// The same law in another number type, parameters taken over by value.
     pub fn cast<T: Scalar>(&self) -> Law<T> {
         let to = |parameters: &[S]| parameters.iter().map(|p| T::from_f64(p.value())).collect::<Vec<_>>();
-        let mut law = Law::new(self.bound.tape(), to(&self.parameters));
+        let mut law = match &self.force {
+            Form::Expression(expression) => Law::new(expression.bound.tape(), to(&expression.parameters)),
+            Form::Code(code) => Law::of_code(Arc::clone(code)),
+        };
         if let Some(end) = &self.end {
             law = law.ending(end.cast());
         }
@@ -394,6 +507,14 @@ impl<S> Laws<S> {
 }
 
 impl<S: Scalar> Laws<S> {
+    /// These laws, and `law` for stage `index`.
+    #[must_use]
+    pub fn with(&self, index: usize, law: &Law<S>) -> Self {
+        let known = self.0.as_ref().map_or(0, |laws| laws.len());
+        let laws = (0..known.max(index + 1)).map(|i| if i == index { Some(law.clone()) } else { self.of(i).cloned() });
+        laws.collect()
+    }
+
     /// The same laws in another number type.
     pub fn cast<T: Scalar>(&self) -> Laws<T> {
         let cast = |laws: &Arc<[Option<Law<S>>]>| laws.iter().map(|law| law.as_ref().map(Law::cast)).collect();

@@ -22,7 +22,7 @@ pub use crate::text::Shown;
 pub use advice::Advice;
 pub use condition::Condition;
 pub use force_table::ForceTable;
-pub use law::{Law, Laws};
+pub use law::{ForceFunction, Law, Laws};
 pub use parameter::Parameter;
 pub use problem::{Event, EventKind, Outcome, Problem, Stage, Stages, State, Target};
 pub use scalar::Scalar;

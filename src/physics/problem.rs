@@ -13,7 +13,7 @@
 use serde::{Deserialize, Deserializer, Serialize};
 use smallvec::SmallVec;
 
-use super::law::Laws;
+use super::law::{Law, Laws};
 use super::scalar::Scalar;
 use crate::text::Shown;
 
@@ -257,6 +257,19 @@ impl<S: Scalar> Problem<S> {
     #[must_use]
     pub fn with_exit(mut self, exit_depth: S) -> Self {
         self.exit_depth = exit_depth;
+        self
+    }
+
+    /// The same problem with the force of stage `index` by a law of its own. Of the stage, its end alone counts then.
+    ///
+    /// # Panics
+    /// If there is no such stage.
+    #[must_use]
+    pub fn with_law(mut self, index: usize, law: &Law<S>) -> Self {
+        let lost = S::from_f64(f64::NAN);
+        let end = self.stages[index].end;
+        self.stages[index] = Stage { static_force: lost, stiffness: lost, viscosity: lost, drag: lost, end };
+        self.laws = self.laws.with(index, law);
         self
     }
 

@@ -38,6 +38,9 @@ const AT_ONCE_MAX: u32 = 4;
 /// Expansions of the bracket, the factor squared each time: from 4 to beyond the range of the numbers.
 const EXPANSIONS_MAX: u32 = 12;
 
+/// By what the step beyond a predicted root grows from one to the next.
+const OVERSHOOT: f64 = 4.0;
+
 /// Smallest impact speed tried, relative to the first: a target perforated at that has no critical velocity but 0.
 const SLOWEST: f64 = 1e-14;
 
@@ -274,15 +277,17 @@ fn within(flights_max: u32, resolve: impl Fn(f64) -> Resolved, integrator: &dyn 
     let velocity = root.velocity();
     // dV = du / 2V.
     let error_bar = root.bar.map(|bar| ((bar + root.w.abs()) / slope + resolution) / (2.0 * velocity));
+    let is_wide = |bar: f64| !(bar < UNDECIDED * velocity);
     let error_bar = match error_bar {
-        // The slope may be that of the other side of a kink, such as drag behind a barrier leaves: ask flights.
-        Some(bar) if !(bar < UNDECIDED * velocity) => {
-            let half_width = search.half_width(root, resolution).unwrap_or(f64::INFINITY);
-            Some(bar.min(half_width / (2.0 * velocity)))
+        // The slope may be that of the other side of a kink, such as drag behind a barrier leaves, and W of a law of its
+        // own may touch zero as a square: ask flights.
+        Some(bar) if is_wide(bar) || !probe.laws.is_empty() => {
+            let seen = search.half_width(root, resolution).unwrap_or(f64::INFINITY) / (2.0 * velocity);
+            Some(if is_wide(bar) { bar.min(seen) } else { bar.max(seen) })
         }
         ordinary => ordinary,
     };
-    if let Some(error_bar) = error_bar.filter(|bar| !(*bar < UNDECIDED * velocity)) {
+    if let Some(error_bar) = error_bar.filter(|bar| is_wide(*bar)) {
         return Err(CriticalError::Undecided { velocity, error_bar, remedy: remedy(integrator.name()) });
     }
     let tally = search.tally.take();
@@ -576,7 +581,7 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
     fn bracket(&self, probe: &Problem) -> Sought<Option<Bracket>> {
         let first = self.at(lower_bound(probe))?;
         let (mut low, mut high) = (first, first);
-        let mut factor = 4.0_f64;
+        let (mut factor, mut beyond) = (4.0_f64, 2.0);
         if first.w > 0.0 {
             // Drive, or a crater constant that grew with the speed: V_c is below the bound, or nothing.
             let slowest = first.u * SLOWEST * SLOWEST;
@@ -593,9 +598,10 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
         } else {
             for expansion in 0.. {
                 let before = high;
-                // Where two stops show how W rises, the line through them is zero at a predicted root: go twice as far above it.
+                // Where two stops show how W rises, the line through them is zero at a predicted root: go beyond it.
                 let line = if expansion == 0 { f64::NAN } else { Bracket { low, high }.secant_root() };
-                let next = if line > high.u && line < 1e12 * high.u { 2.0 * line - high.u } else { high.u * factor };
+                let is_prediction = line > high.u && line < 1e12 * high.u;
+                let next = if is_prediction { beyond * line - (beyond - 1.0) * high.u } else { high.u * factor };
                 if expansion == EXPANSIONS_MAX || !next.is_finite() {
                     return Err(CriticalError::NoBracket { low: first, high });
                 }
@@ -606,6 +612,9 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
                 }
                 low = before;
                 factor *= factor;
+                if is_prediction {
+                    beyond *= OVERSHOOT;
+                }
             }
         }
         if low.w < 0.0 && high.w > 0.0 {

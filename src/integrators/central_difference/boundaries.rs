@@ -425,6 +425,9 @@ impl<'a, S: Scalar> Run<'a, S> {
         self.stepper.leave_stage();
         // A place at a stage end belongs to the stage that ends there.
         let place = if self.course.is_through { problem.exit_depth } else { self.course.state.depth };
+        if self.course.is_through {
+            self.course.pass_least(self.stepper.speed_min);
+        }
         if !problem.laws.have_conditions() {
             self.course.stage = problem.stages.iter().take_while(|stage| stage.end.value() < place.value()).count();
         }

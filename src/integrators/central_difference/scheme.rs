@@ -27,6 +27,9 @@ impl VelocityAt {
 
 /// The deceleration F/M of a stage, as the scheme asks it.
 pub(super) trait Deceleration<S> {
+    /// Whether V may fall and rise again inside a stage.
+    const MAY_RISE: bool;
+
     /// F/M at depth `x` and velocity `v`, which may lie below zero in the step that comes to rest.
     fn at(&self, x: S, v: S) -> S;
 
@@ -51,6 +54,8 @@ pub(super) trait Deceleration<S> {
 
 /// The stage per unit mass.
 impl<S: Scalar> Deceleration<S> for Stage<S> {
+    const MAY_RISE: bool = false;
+
     #[inline(always)]
     fn at(&self, x: S, v: S) -> S {
         self.force(x, v)
@@ -73,6 +78,8 @@ const CORRECTIONS_MAX: u32 = 80;
 
 /// A law of its own, the mass, and the sign of the condition of its stage on the way to the end.
 impl<S: Scalar> Deceleration<S> for (&Law<S>, S, f64) {
+    const MAY_RISE: bool = true;
+
     fn ends(&self, x: S, v: S) -> bool {
         self.0.end().is_some_and(|end| self.2 * end.value(x.value(), v.value()) <= 0.0)
     }
@@ -137,6 +144,8 @@ impl<'a, S: Scalar> Rule<'a, S> {
 }
 
 impl<S: Scalar> Deceleration<S> for Rule<'_, S> {
+    const MAY_RISE: bool = true;
+
     #[inline(always)]
     fn at(&self, x: S, v: S) -> S {
         match self {
@@ -304,6 +313,8 @@ pub(super) struct Stepper<'a, S> {
     /// Largest V(i) and dt in this stage.
     speed_max: f64,
     pub(super) step_max: f64,
+    /// Least V(i) in stages in which V may rise again.
+    pub(super) speed_min: f64,
     pub(super) step_limit: StepLimit,
 }
 
@@ -328,6 +339,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             cost: Cost { force_evaluations: 1, ..Cost::default() },
             speed_max: 0.0,
             step_max: 0.0,
+            speed_min: f64::INFINITY,
             step_limit: StepLimit { limit: f64::INFINITY, stable: true },
         }
     }
@@ -398,9 +410,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     }
 
     #[inline(always)]
-    fn whole_steps(
+    fn whole_steps<D: Deceleration<S>>(
         &mut self,
-        law: &impl Deceleration<S>,
+        law: &D,
         velocity: VelocityAt,
         summation: Summation,
         mut clock: Clock<'a, S>,
@@ -435,6 +447,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             clock.tick();
             taken += 1;
             speed_max = speed_max.max(here.v.value());
+            if D::MAY_RISE {
+                self.speed_min = self.speed_min.min(here.v.value());
+            }
         };
         self.node = here;
         self.clock = clock;

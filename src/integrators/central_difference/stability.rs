@@ -1,5 +1,7 @@
 //! The largest stable step of the scheme, and the step it takes by default.
 
+use smallvec::SmallVec;
+
 use super::VelocityAt;
 use crate::physics::{Problem, Scalar, Stage, State};
 
@@ -9,6 +11,9 @@ const STEPS_PER_SHORTEST_SCALE: f64 = 1e3;
 /// Most whole steps in the longest time scale of the stages, for [`super::Steps::Default`]: a crater of 1e-8 diameters
 /// is not resolved by 1e11 steps.
 const STEPS_PER_LONGEST_SCALE: f64 = 1e6;
+
+/// Doublings of a way from an epsilon of that of a second.
+const DOUBLINGS: u32 = 200;
 
 /// More stages than this are pieces of a table.
 const TABLE_MIN: usize = 64;
@@ -51,35 +56,62 @@ pub fn default_time_step<S: Scalar>(problem: &Problem<S>, velocity: VelocityAt) 
     let count = problem.stages.len();
     let finest = if count > TABLE_MIN { problem.start_of(count - 1).value() / count as f64 } else { 0.0 };
     for index in 0..count {
-        let start = State { depth: problem.start_of(index), ..State::at_impact(problem) };
-        let stage = &problem.linear(index, start);
-        let (from, to) = (problem.start_of(index).value(), problem.limit_of(index).value());
-        if to <= from {
+        let (start, to) = (problem.start_of(index).value(), problem.limit_of(index).value());
+        if to <= start {
             continue;
         }
-        let Stage { static_force: p, stiffness: s, viscosity: r, drag: q, .. } = stage.values();
-        let crossing = (to - from).max(finest) / speed;
-        let swing = (mass / s.abs()).sqrt();
-        // A spring cannot be compressed further than V0/w beyond the start of its stage.
-        let farthest = to.min(from + speed * swing);
-        let weakening = match s {
-            s if s > 0.0 => (p + s * farthest).abs(),
-            // A drive grows up to the end.
-            s if s < 0.0 => (p + s * to).abs(),
-            _ => 0.0,
-        };
-        let stopping = mass * speed / (p + s * from).abs().max(weakening);
-        shortest = shortest.min(least(&[crossing, swing, stopping, mass / r, mass / (q * speed)]));
-        let slowest = least(&[crossing, swing, mass * speed / p.abs(), mass / (p.abs() * q).sqrt()]);
-        if slowest.is_finite() {
-            longest = longest.max(slowest);
+        let crossing = (to - start).max(finest) / speed;
+        for place in places(problem, index) {
+            let at = State { time: S::zero(), depth: S::from_f64(place.depth), velocity: S::from_f64(place.velocity) };
+            let stage = &problem.linear(index, at);
+            let Stage { static_force: p, stiffness: s, viscosity: r, drag: q, .. } = stage.values();
+            let from = place.depth;
+            let swing = (mass / s.abs()).sqrt();
+            // A spring cannot be compressed further than V0/w beyond the start of its stage.
+            let farthest = to.min(from + speed * swing);
+            let weakening = match s {
+                s if s > 0.0 => (p + s * farthest).abs(),
+                // A drive grows up to the end.
+                s if s < 0.0 => (p + s * to).abs(),
+                _ => 0.0,
+            };
+            let stopping = mass * speed / (p + s * from).abs().max(weakening);
+            shortest = shortest.min(least(&[crossing, swing, stopping, mass / r, mass / (q * speed)]));
+            let slowest = least(&[crossing, swing, mass * speed / p.abs(), mass / (p.abs() * q).sqrt()]);
+            if slowest.is_finite() {
+                longest = longest.max(slowest);
+            }
+            limit = limit.min(stability_limit(stage, mass, speed, velocity));
         }
-        limit = limit.min(stability_limit(stage, mass, speed, velocity));
     }
     let step = (shortest / STEPS_PER_SHORTEST_SCALE).max(longest / STEPS_PER_LONGEST_SCALE).min(PART_OF_LIMIT * limit);
     // A target that does nothing has no scale at all; any step then gives the same flight. Nor may the choice
     // underflow or overflow, whatever the scene.
     if step.is_finite() { step.max(f64::MIN_POSITIVE) } else { 1.0 }
+}
+
+/// Where the time scales of a stage are asked: at its start; of a law of its own also at eight more places on the way to rest,
+/// as far as the force at V0 lets it come.
+fn places<S: Scalar>(problem: &Problem<S>, index: usize) -> SmallVec<[State; 9]> {
+    let speed = problem.impact_speed.value();
+    let (start, to) = (problem.start_of(index).value(), problem.limit_of(index).value());
+    let at = |distance: f64, velocity: f64| State { time: 0.0, depth: start + distance, velocity };
+    let mut places = SmallVec::from_elem(at(0.0, speed), 1);
+    let Some(law) = problem.laws.of(index) else { return places };
+    let energy = 0.5 * problem.mass.value() * speed * speed;
+    let (mut distance, mut work) = (speed * f64::EPSILON, 0.0);
+    for _ in 0..DOUBLINGS {
+        let force = law.force_value(start + distance, speed);
+        work += force.max(0.0) * 0.5 * distance;
+        if work >= energy || start + distance >= to {
+            let way = distance.min(to - start);
+            let share = |i: u32| f64::from(i) / 8.0;
+            places.extend((1..=8).map(|i| at(share(i) * way, speed * (1.0 - share(i)).sqrt())));
+            break;
+        }
+        distance *= 2.0;
+    }
+    places
 }
 
 /// The largest stable step (s) in `stage` at speed `speed` (m/s); infinite where there is none.

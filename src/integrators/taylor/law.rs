@@ -14,6 +14,9 @@
 //! change where they do not see it. So three places of the step are asked whether the series satisfies the equation there,
 //! and a step on which it does not is shortened. What lies between them is bounded by intervals ([`Law::shown_in`]).
 //!
+//! **Branch points over depth.** `(x/l)^1.5` has no series at x = 0, nor has a root where its argument begins. A step so short
+//! that F is `F0 + a (x - x0)^p` on it, to a rounding of what it takes of the energy, leaves such a place.
+//!
 //! **Kinks.** min, max and abs have one smooth branch on each side of a switch. A step takes one branch, and ends at the
 //! first root of the switch.
 //!
@@ -28,7 +31,8 @@ use super::{STEPS_MAX, Steps, power_of_two_below, rough_exp2, rough_log2};
 use crate::integrators::flight::{Course, SLOW, StageEnd, VANISHES};
 use crate::integrators::locate;
 use crate::integrators::outcome::{IntegrationError, Solved};
-use crate::physics::expression::Jets;
+use crate::physics::expression::{Bound, Jets};
+use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
 
 /// Places of a step, over its length, at which the equation is asked.
@@ -47,12 +51,21 @@ const VANISHING: f64 = 1e-12;
 /// Distance to rest over the depth below which a force is about to end the flight, and no barrier holds it up.
 const NEAR_REST: f64 = 1e-11;
 
+/// Times that a step from a branch point is shortened, eightfold, and what it may take of the energy: the force changes by as
+/// much with the velocity.
+const BRANCH_TRIALS: i32 = 40;
+const BRANCH_SHARE: f64 = 1e-9;
+
+/// Share of a root behind which a turn counts as beyond it: a double root is known to half of its digits.
+const NEAR_TURN: f64 = 0.99999;
+
 /// Longest step by velocity where the force vanishes at rest: its quotients cancel towards the end.
 const VANISHING_SPAN: f64 = 0.5;
 
-/// Longest step in its unit of time, and times that the unit may be changed where coefficients overflow.
+/// Longest step in its unit of time, and times that the unit may be changed, by `2^-20`, where coefficients overflow: a unit of
+/// nothing would have the series of a standstill.
 const SPAN_MAX: f64 = 64.0;
-const RESCALED_MAX: u32 = 60;
+const RESCALED_MAX: u32 = 40;
 
 /// Share of the velocity's root that a step by velocity must take to be taken without asking for one by time; and behind
 /// another such step.
@@ -209,6 +222,11 @@ impl<S: Scalar, const K: usize> Path<S, K> {
         self.at(S::from_f64(self.span)).velocity.value()
     }
 
+    /// Whether the velocity falls at its end.
+    fn slows_at_its_end(&self) -> bool {
+        both(&self.velocity, self.span).1 < 0.0
+    }
+
     /// The longest span whose last two terms are within `tolerance` of the second of the series.
     fn spanned(mut self, tolerance: f64) -> Self {
         let of = |series: &[S; K], scale: S| {
@@ -270,6 +288,8 @@ impl<S: Scalar, const K: usize> Path<S, K> {
 /// A stage in progress.
 struct Walk<'l, S, const K: usize> {
     law: &'l Law<S>,
+    /// Its expression.
+    bound: &'l Bound<S>,
     mass: S,
     jets: Jets<S>,
     /// The side of each switch on this step.
@@ -291,9 +311,13 @@ impl Steps {
         law: &Law<S>,
         limit: S,
     ) -> Solved<StageEnd<S>> {
-        let bound = law.bound();
+        let Some(bound) = law.bound() else {
+            let why = "a law in code has no series; take --method adaptive".to_owned();
+            return Err(IntegrationError::Refused { method: "taylor", why });
+        };
         let mut walk = Walk::<S, K> {
             law,
+            bound,
             mass: course.mass,
             end: law.end().map(|end| (end, end.side(course.state))),
             jets: Jets::default(),
@@ -325,7 +349,17 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Ok(Some(end));
         }
         self.choose_sides(start, force, limit);
-        let (path, kink) = self.path(course, force, limit)?;
+        let (path, kink) = match self.path(course, force, limit) {
+            Err(IntegrationError::NoForce { last, .. }) if last == start.values() => {
+                let next = self.leave_branch_point(start, force, limit).ok_or_else(|| self.no_force(course, start))?;
+                course.cost.steps += 1;
+                self.widen_bound(course, force.value(), start, next);
+                course.sample_until(next, |time| State { time: S::from_f64(time), ..start });
+                (self.kink, course.state) = (None, next);
+                return Ok(None);
+            }
+            other => other?,
+        };
         let (s, event) = first_event(&path, limit);
         let (s, event, closeness) = self.first_zero(s, event);
         let local = path.at(s);
@@ -345,10 +379,14 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NotFinite { what: "the state", last: start.values() });
         }
         course.cost.steps += 1;
-        if let Some(least) = least_inside(&path, s.value()) {
+        self.widen_bound(course, force.value(), start, next);
+        // A step by velocity can only end at the least one.
+        let drives = || self.law.force_value(next.depth.value(), next.velocity.value()) < 0.0;
+        let is_at_least = matches!(path.form, Form::Velocity(_)) && drives();
+        let least = if is_at_least { Some(next.velocity.value()) } else { least_inside(&path, s.value()) };
+        if let Some(least) = least {
             course.pass_least(least);
         }
-        self.widen_bound(course, force.value(), start, next);
         if let Some((place, closeness)) = closeness {
             self.doubt(course, path.at(S::from_f64(place)), closeness);
         }
@@ -385,6 +423,40 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let last = at.values();
         let why = self.law.explain(last.depth, last.velocity);
         IntegrationError::NoForce { stage: course.stage, why, last }
+    }
+
+    /// The state behind a place at which the force has a value and no series over depth: `F = F0 + a d^p` at the distance d.
+    ///
+    /// `W = W0 - 2 (F0 d + a d^(p+1)/(p+1))/M`, and the time is the integral of `1/V` to the first order of what W loses.
+    /// `None` where the force is of another kind.
+    fn leave_branch_point(&self, start: State<S>, force: S, limit: S) -> Option<State<S>> {
+        let (x, v, mass) = (start.depth.value(), start.velocity.value(), self.mass.value());
+        let excess = |distance: f64| self.law.force_value(x + distance, v) - force.value();
+        let power = |distance: f64| (excess(distance) / excess(0.5 * distance)).log2();
+        self.bound.explain_series(x, v)?;
+        let longest = (limit.value() - x).min(v * time_unit(start, force, self.mass, limit));
+        for trial in 0..BRANCH_TRIALS {
+            let distance = longest * 0.125_f64.powi(trial);
+            let share = |force: f64| force.abs() * distance / (mass * v * v);
+            let p = power(distance);
+            let lost = share(excess(distance)) * (p - power(0.5 * distance)).abs();
+            let is_little = share(force.value().abs() + excess(distance).abs()) <= BRANCH_SHARE;
+            if !(p > 0.0 && is_little && lost <= f64::EPSILON / 16.0) {
+                continue;
+            }
+            let d = S::from_f64(distance);
+            let more = self.law.force(start.depth + d, start.velocity) - force;
+            let part = |order: f64| S::one().over(S::from_f64(order));
+            let work = (force + more * part(p + 1.0)) * d;
+            let work_twice = (force * part(2.0) + more * part((p + 1.0) * (p + 2.0))) * d * d;
+            let energy = self.mass * start.velocity * start.velocity;
+            return Some(State {
+                time: start.time + (d + work_twice.over(energy)).over(start.velocity),
+                depth: start.depth + d,
+                velocity: (start.velocity * start.velocity - S::from_f64(2.0) * work.over(self.mass)).sqrt(),
+            });
+        }
+        None
     }
 
     /// The end of a flight that is as good as over: rest within the digits of the present state, or an approach.
@@ -438,7 +510,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         // Two rounds: the slope of a switch that stands at zero may depend on the side of another.
         for _ in 0..2 {
             self.over_time(start, unit, 4);
-            for (side, register) in self.law.bound().switches().iter().enumerate() {
+            for (side, register) in self.bound.switches().iter().enumerate() {
                 let series = self.jets.register(*register);
                 let known = if self.kink == Some(side) { &series[1..4] } else { &series[..4] };
                 let first = known.iter().map(|c| c.value()).find(|c| *c != 0.0);
@@ -456,7 +528,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             other => {
                 let by_time = self.by_time(course, force, limit)?;
                 match other {
-                    Some(path) if path.speed_left() < by_time.speed_left() => {
+                    // Behind a least velocity, steps by velocity would only approach it.
+                    Some(path) if path.speed_left() < by_time.speed_left() && by_time.slows_at_its_end() => {
                         self.over_velocity(start, force).unwrap_or(path)
                     }
                     _ => by_time,
@@ -507,7 +580,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// The series of g over the path that was made last.
     fn condition_series(&self) -> Option<[S; K]> {
         let mut series = [S::zero(); K];
-        match self.law.bound().beside()? {
+        match self.bound.beside()? {
             Ok(register) => series.copy_from_slice(&self.jets.register(register)[..K]),
             Err(constant) => series[0] = constant,
         }
@@ -548,9 +621,14 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         if let Some(root) = first_root(&series, span) {
             let corrected = corrected(S::from_f64(root), span, |s| value(&series, s), |s| slope(&series, s));
             let (rate, curvature) = both(&slopes, corrected.value());
-            // The parabola through the root goes so far beyond it.
-            let beyond = if side * curvature > 0.0 { 0.5 * rate * rate / curvature.abs() } else { f64::INFINITY };
-            return (corrected, Event::Condition, Some((corrected.value(), beyond)));
+            let (place, beyond) = match turn {
+                // A double root is known to half of its digits, the value where g turns to all.
+                Some(turn) if turn >= NEAR_TURN * root => (turn, -side * both(&series, turn).0),
+                // The parabola through the root goes so far beyond it.
+                _ if side * curvature > 0.0 => (corrected.value(), 0.5 * rate * rate / curvature.abs()),
+                _ => (corrected.value(), f64::INFINITY),
+            };
+            return (corrected, Event::Condition, Some((place, beyond)));
         }
         let nearest = turn.into_iter().chain([span]).map(|s| (s, -side * both(&series, s).0));
         (s, event, nearest.max_by(|a, b| a.1.total_cmp(&b.1)))
@@ -569,7 +647,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
 
     /// The first root of a switch on a step of `span`.
     fn first_kink(&self, span: f64) -> Option<(usize, f64)> {
-        let roots = self.law.bound().switches().iter().enumerate().filter_map(|(side, register)| {
+        let roots = self.bound.switches().iter().enumerate().filter_map(|(side, register)| {
             let mut series = [S::zero(); K];
             series.copy_from_slice(&self.jets.register(*register)[..K]);
             if self.kink == Some(side) {
@@ -598,12 +676,12 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     fn over_time(&mut self, start: State<S>, unit: f64, count: usize) -> Path<S, K> {
         let mut path = Path::start(Form::Time(unit), start);
         path.time[1] = S::from_f64(unit);
-        self.jets.start(self.law.bound(), &self.sides);
+        self.jets.start(self.bound, &self.sides);
         let rate = S::from_f64(unit).over(self.mass);
         for k in 0..count {
-            let force = self.jets.push(self.law.bound(), path.depth[k], path.velocity[k]);
+            let force = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
             if k + 1 < K {
-                let share = S::one().over(S::from_f64((k + 1) as f64));
+                let share = reciprocal(k + 1);
                 path.depth[k + 1] = S::from_f64(unit) * path.velocity[k] * share;
                 path.velocity[k + 1] = -(rate * force * share);
             }
@@ -634,13 +712,13 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let mut forces = [S::zero(); K];
         // dt/ds.
         let mut pace = [S::zero(); K];
-        self.jets.start_falling(self.law.bound(), &self.sides, m);
+        self.jets.start_falling(self.bound, &self.sides, m);
         for k in 0..K {
-            forces[k] = self.jets.push(self.law.bound(), path.depth[k], path.velocity[k]);
+            forces[k] = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
             let known = (1..=k).fold(rate[k], |sum, i| sum - forces[i] * pace[k - i]);
             pace[k] = known * inverse;
             if k + 1 < K {
-                let share = S::one().over(S::from_f64((k + 1) as f64));
+                let share = reciprocal(k + 1);
                 let advance = (0..=k.min(m as usize)).fold(S::zero(), |sum, i| sum + path.velocity[i] * pace[k - i]);
                 path.time[k + 1] = pace[k] * share;
                 path.depth[k + 1] = advance * share;

@@ -1,8 +1,10 @@
 //! Contracts of a solution whose force is an expression of its own, for every method that takes one.
 
+use std::sync::Arc;
+
 use super::*;
 use crate::physics::reference::{self, Source};
-use crate::physics::{Advice, EventKind, Outcome, Problem, Scene, Stage};
+use crate::physics::{Advice, EventKind, ForceFunction, Law, Outcome, Problem, Scene, Stage};
 use crate::studies::error::Errors;
 use crate::studies::formal_order::{Path, formal_order};
 use crate::studies::quantity::Quantity;
@@ -161,6 +163,57 @@ fn every_method_solves_every_law_as_accurately_as_it_promises() {
     }
 }
 
+/// `P (1 + b ln(1 + V/v1)) + Q V²` in code.
+#[derive(Debug)]
+struct Rate;
+
+impl ForceFunction for Rate {
+    fn force(&self, _x: f64, v: f64) -> f64 {
+        848e3 * (1.0 + 0.2 * (1.0 + v / 100.0).ln()) + 3.25 * v * v
+    }
+}
+
+#[test]
+fn a_law_in_code_is_solved_as_the_same_law_in_text() {
+    let coded = |speed| Problem::of_stages(2.0, speed, [Stage::free()]).with_law(0, &Law::of_code(Arc::new(Rate)));
+    let (_, speed, depth, time, exit, velocity) = KNOWN[2];
+    for (name, method) in methods(1e-10) {
+        if name == MethodName::Taylor {
+            let error = method.integrator().solve(&coded(speed), Detail::End).unwrap_err();
+            assert!(error.is_usage() && error.to_string().contains("a law in code"), "{error}");
+            continue;
+        }
+        let end = method.integrator().solve(&coded(speed), Detail::End).unwrap().end;
+        let through = method.integrator().solve(&coded(speed).with_exit(exit), Detail::End).unwrap().end;
+        for (value, exact) in [(end.depth, depth), (end.time, time), (through.velocity, velocity)] {
+            assert!((value / exact - 1.0).abs() < 300.0 * name.promise_at(1e-10), "{name}: {value} and {exact}");
+        }
+        // W at a slab as thick as the depth of rest is zero.
+        let resolve = |speed| Ok(coded(speed).with_exit(depth));
+        let critical = crate::studies::critical_velocity::critical_velocity(resolve, method.integrator()).unwrap();
+        assert!((critical.velocity - speed).abs() <= critical.error_bar.unwrap(), "{name}: {critical:?}");
+    }
+    let scheme = CentralDifference::uniform(1e-7, VelocityAt::Centred, Boundaries::Interpolated);
+    assert!((scheme.solve(&coded(speed), Detail::End).unwrap().end.depth / depth - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_law_in_code_without_a_value_ends_the_flight_with_an_error() {
+    #[derive(Debug)]
+    struct Lost;
+    impl ForceFunction for Lost {
+        fn force(&self, x: f64, _v: f64) -> f64 {
+            if x < 0.01 { 1e5 } else { f64::NAN }
+        }
+    }
+    let problem = Problem::of_stages(2.0, 300.0, [Stage::free()]).with_law(0, &Law::of_code(Arc::new(Lost)));
+    for (name, method) in methods(1e-8) {
+        assert!(method.integrator().solve(&problem, Detail::End).is_err(), "{name}");
+    }
+    let scheme = CentralDifference::uniform(1e-6, VelocityAt::Centred, Boundaries::Interpolated);
+    assert!(scheme.solve(&problem, Detail::End).is_err());
+}
+
 #[test]
 fn methods_that_are_formulas_refuse_a_law() {
     for name in [MethodName::Energy, MethodName::ClosedForm] {
@@ -255,6 +308,34 @@ fn central_difference_has_its_formal_orders_for_a_law() {
     }
 }
 
+/// Force, depth (m) and time (s) of rest from 300 m/s; mpmath, 40 digits: over x `X = l (V0² M (n+1)/(2 P l))^(1/(n+1))` for `P (x/l)^n`
+/// and `t = X/V0 B(1/(n+1), 1/2)/(n+1)`; over V `M V0^1.5/(1.5 P √v1)` and the like for `P (V/v1)^-0.5`.
+const BRANCHED: [(&str, f64, f64); 4] = [
+    ("P*(x/l)^1.5", 0.056_251_312_958_145_08, 0.000_275_938_489_192_318_5),
+    ("P*sqrt(x/l)", 0.079_732_480_632_051_06, 0.000_458_392_584_053_963_2),
+    ("P + P*sqrt(max(x/l - 0.5, 0))", 0.057_433_268_553_268_87, 0.000_340_397_182_033_063_1),
+    ("P*(V/v1)^-0.5", 0.147_060_917_623_772_6, 0.000_817_005_097_909_847_8),
+];
+
+#[test]
+fn laws_without_a_series_at_their_start_or_without_bound_at_rest_are_solved() {
+    for (force, depth, time) in BRANCHED {
+        let problem = problem(force, 300.0);
+        for (name, method) in methods(1e-10) {
+            let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 1e4 * name.promise_at(1e-10) };
+            let end = method.integrator().solve(&problem, Detail::End).unwrap().end;
+            let error = (end.depth / depth - 1.0).abs().max((end.time / time - 1.0).abs());
+            assert!(error <= allowed, "{name}, {force}: {error:e}");
+        }
+        // The default step resolves a force that is nothing at impact.
+        if !force.contains('V') {
+            let scheme = CentralDifference { velocity: VelocityAt::Centred, ..CentralDifference::default() };
+            let end = scheme.solve(&problem, Detail::End).unwrap().end;
+            assert!((end.depth / depth - 1.0).abs() < 1e-3, "{force}: {end}");
+        }
+    }
+}
+
 /// A wall of 1 cm, 29 cm behind the face, takes all of the energy: its series at the face is that of nothing.
 #[test]
 fn a_wall_far_ahead_is_not_stepped_over() {
@@ -333,11 +414,54 @@ fn the_exit_margin_is_continuous_and_its_bound_holds_next_to_the_critical_speed(
     }
 }
 
+/// R (1 - x/l) slows the projectile down to x = l and drives it beyond: W(l) = V0² - R l/M.
 #[test]
-fn the_exit_margin_of_taylor_is_that_of_the_least_velocity_inside_a_stage() {
-    // R (1 - x/l) slows the projectile down to x = l and drives it beyond: W(l) = V0² - R l/M.
+fn the_exit_margin_is_that_of_the_least_velocity_inside_a_stage() {
     let problem = problem("R*(1 - x/l)", 100.0).with_exit(0.035);
-    let flight = Taylor::default().solve(&problem, Detail::End).unwrap();
-    let margin = flight.exit_margin.unwrap();
-    assert!((margin - 0.95).abs() <= 1e-14, "{margin}");
+    for (name, method) in methods(1e-10) {
+        let margin = method.integrator().exit_margin(&problem).unwrap().unwrap();
+        let error = margin.error.unwrap();
+        assert!((margin.value - 0.95).abs() <= error && error < 1e-5, "{name}: {} +- {error}", margin.value);
+    }
+    for velocity in VelocityAt::ALL {
+        let scheme = CentralDifference::uniform(1e-7, velocity, Boundaries::Interpolated);
+        let margin = scheme.exit_margin(&problem).unwrap().unwrap().value;
+        assert!((margin - 0.95).abs() <= 1e-4, "{velocity}: {margin}");
+    }
+}
+
+#[test]
+fn error_bounds_of_margins_hold_for_laws_with_kinks_and_falling_slopes() {
+    for force in [
+        "R*max(0, 1 - ((x/l - 1)/0.3)^2)",
+        "R*0.1 + P*max(0, 1 - abs(x/l - 1)/0.2)",
+        "P*exp(-V/v1)",
+        "P*(1 + b*cos(V/v1*3)) + R*min(1, V/v1)",
+        "R*abs(sin(3*x/l))*(1 + b*V/v1)",
+        "R*(1 - x/l) + R*b*(V/v1)^1.5",
+    ] {
+        for (speed, exit) in [(60.0, 0.03), (102.0, 0.05), (202.0, 0.025)] {
+            let problem = problem(force, speed).with_exit(exit);
+            let known = Taylor::default().exit_margin(&problem).unwrap().unwrap();
+            for (name, method) in methods(1e-7) {
+                let margin = method.integrator().exit_margin(&problem).unwrap().unwrap();
+                let off = (margin.value - known.value).abs();
+                let bound = margin.error.unwrap() + known.error.unwrap();
+                assert!(off <= bound, "{name}, {force}, {speed}: {off:e} of {bound:e}");
+            }
+        }
+    }
+}
+
+/// `M x'' = -R (1 - x/l) - r x'` has a saddle at x = l, and the only path that ends there has the speed `V = k (l - x)`
+/// with `M k² - r k - R/l = 0`.
+#[test]
+fn the_critical_speed_of_a_viscous_barrier_is_found() {
+    let problem = problem("R*(1 - x/l) + R*b*V/v1", 100.0).with_exit(0.035);
+    let resolve = |speed| Ok(Problem { impact_speed: speed, ..problem.clone() });
+    let (barrier, viscosity) = (50e3_f64, 50e3 * 0.2 / 100.0);
+    let exact = 0.02 * (viscosity + (viscosity * viscosity + 8.0 * barrier / 0.02).sqrt()) / 4.0;
+    let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
+    let off = (critical.velocity - exact).abs();
+    assert!(off <= critical.error_bar.unwrap() && off < 1e-6 * exact, "{critical:?} and {exact}");
 }

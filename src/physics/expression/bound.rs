@@ -135,6 +135,8 @@ pub(super) enum Step<S> {
         switch: usize,
         above: usize,
         below: usize,
+        /// Whether it is the greater of the two, else the lesser.
+        greater: bool,
     },
 }
 
@@ -512,7 +514,7 @@ impl<S: Scalar> Making<S> {
             Function::Sqrt => self.share(Shared::Sqrt(a), Step::Sqrt { a }),
             Function::Abs => {
                 let below = self.affine(a, S::from_f64(-1.0), S::zero());
-                self.select(a, a, below)
+                self.select(a, (a, below), true)
             }
             Function::Exp => {
                 let slope = self.slope(a);
@@ -624,7 +626,7 @@ impl<S: Scalar> Making<S> {
         match self.difference(first, second) {
             Value::Register(switch) => {
                 let (above, below) = (self.register(above), self.register(below));
-                Value::Register(self.select(switch, above, below))
+                Value::Register(self.select(switch, (above, below), greater))
             }
             Value::Constant(switch) => {
                 if switch.value() >= 0.0 {
@@ -636,13 +638,13 @@ impl<S: Scalar> Making<S> {
         }
     }
 
-    fn select(&mut self, switch: usize, above: usize, below: usize) -> usize {
+    fn select(&mut self, switch: usize, (above, below): (usize, usize), greater: bool) -> usize {
         let known = self.switches.iter().position(|known| *known == switch);
         let index = known.unwrap_or_else(|| {
             self.switches.push(switch);
             self.switches.len() - 1
         });
-        self.push(Step::Select { index, switch, above, below })
+        self.push(Step::Select { index, switch, above, below, greater })
     }
 
     fn power(&mut self, a: usize, exponent: S) -> Value<S> {

@@ -100,7 +100,7 @@ impl<S: Scalar> Jets<S> {
         for step in bound.steps() {
             let (done, rest) = self.coefficients.split_at_mut(place);
             let (first, second) = match *step {
-                Step::Select { index, switch, above, below } => {
+                Step::Select { index, switch, above, below, .. } => {
                     let chosen = done[if self.sides[index] { above } else { below }][k];
                     // A switch without a value has no sides.
                     let is_lost = k == 0 && done[switch][0].value().is_nan();
@@ -164,6 +164,12 @@ impl<S: Scalar> Step<S> {
                 (-(own[0][0] * b[k] + inner(&own[0], b, k)) * own[1][0], zero)
             }
             Self::Slope { a } => (order * series(a)[k], zero),
+            // A root or power of nothing is nothing, where it has a value.
+            Self::Sqrt { a } | Self::Power { a, .. }
+                if own[0][0].value() == 0.0 && series(a)[..=k].iter().all(|c| c.value() == 0.0) =>
+            {
+                (zero, zero)
+            }
             Self::Sqrt { a } => ((series(a)[k] - inner_square(&own[0], k)) * own[1][0], zero),
             Self::Power { a, slope, exponent } => {
                 let (a, slope, slopes) = (series(a), series(slope), &own[1]);

@@ -37,6 +37,15 @@ fn rising((a, b): Range, function: impl Fn(f64) -> f64) -> Range {
     hull([function(a), function(b)])
 }
 
+/// Of the greater or the lesser of two.
+fn extreme(one: Range, other: Range, greater: bool) -> Range {
+    if [one.0, one.1, other.0, other.1].into_iter().any(f64::is_nan) {
+        return ALL;
+    }
+    let of = if greater { f64::max } else { f64::min };
+    (of(one.0, other.0), of(one.1, other.1))
+}
+
 /// Of sine, or of cosine as `sin(z + pi/2)`.
 fn sine((a, b): Range, shift: f64) -> Range {
     use std::f64::consts::{FRAC_PI_2, TAU};
@@ -86,10 +95,10 @@ impl<S: Scalar> Bound<S> {
                 Step::Divide { a, b } => (product(of(a), inverse(of(b))), inverse(of(b))),
                 Step::Ratio { dividend, b } => (scaled(inverse(of(b)), dividend), inverse(of(b))),
                 Step::Slope { .. } => (ALL, ALL),
-                Step::Select { switch, above, below, .. } => match of(switch) {
+                Step::Select { switch, above, below, greater, .. } => match of(switch) {
                     (low, _) if low >= 0.0 => (of(above), ALL),
                     (_, high) if high < 0.0 => (of(below), ALL),
-                    _ => (hull([of(above).0, of(above).1, of(below).0, of(below).1]), ALL),
+                    _ => (extreme(of(above), of(below), greater), ALL),
                 },
                 Step::Sqrt { a } => {
                     let root = rising((of(a).0.max(0.0), of(a).1), f64::sqrt);
@@ -138,6 +147,7 @@ mod tests {
             "sin(3*x/l)*cos(V/u) + max(x/l, 1 - V/u)",
             "log(1 + V/u)/(2 + x/l) + log10(2 + x/l) + atan(x/l - 1)",
             "(1 + V/u)^1.5 + (V/u)^0.2 + sqrt(1 + x/l)/(1 + x/l)^-2 + 1/(3 - sin(V/u))",
+            "max(0, 1 - ((x/l - 1)/0.3)^2) + min(1, V/u - x/l)",
         ] {
             let tape = Tape::read(text, &known, Unit::NONE).unwrap();
             let bound = tape.bind(tape.parameters());
