@@ -168,12 +168,8 @@ impl Ask for CriticalArgs {
 
 impl CriticalJson {
     fn text(&self, criterion: Criterion) -> String {
-        let criterion = match criterion {
-            Criterion::FullDepth => "x = H",
-            Criterion::Ndrc => "x = x_p(H), the NDRC relation",
-        };
         let mut text = Text::titled(self.scene.title.as_deref());
-        text.line(format!("  method     {}, perforation at {criterion}", self.method.name));
+        text.line(format!("  method     {}, perforation at {}", self.method.name, criterion.place()));
         let bar = self.error_bar_m_s.map_or(String::new(), |bar| format!(" +- {}", error_text(Some(bar))));
         if let (Some(velocity), Some(energy), Some(flights)) =
             (self.critical_velocity_m_s, self.critical_energy_j, self.evaluations)

@@ -8,7 +8,9 @@ pub mod converge;
 pub mod critical;
 pub mod diagnose;
 pub mod experiments;
+pub mod export;
 pub mod init;
+pub mod limit;
 pub mod map;
 pub mod method_args;
 pub mod output;
@@ -304,6 +306,8 @@ commands! {
     Solve = "solve": Printing<solve::SolveArgs>,
     /// Critical velocity and energy, beside the closed form and Eq. 15.
     Critical = "critical": Printing<critical::CriticalArgs>,
+    /// The thickness that just stops the projectile, beside Eq. 11-12.
+    Limit = "limit": Printing<limit::LimitArgs>,
     /// Many scenes from a table, one line of results each.
     Batch = "batch": batch::BatchArgs,
     /// Order of convergence of every quantity, fitted and classified.
@@ -316,6 +320,8 @@ commands! {
     Bench = "bench": Printing<bench::BenchArgs>,
     /// Measured depths beside predicted ones: shipped data or your own.
     Experiments = "experiments": Printing<experiments::ExperimentsArgs>,
+    /// A scene as what a finite element code runs: VDLOAD, decks, driver.
+    Export = "export": Printing<export::ExportArgs>,
     /// Order, error bar and verdict for results of another code.
     Audit = "audit": Printing<audit::AuditArgs>,
     /// Is a solver right, and if not, what is wrong with it?

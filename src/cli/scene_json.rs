@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::physics::scene::{Ending, Force, Resistance};
-use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Shown, Stage};
+use crate::physics::{Concrete, CraterStiffness, Criterion, Problem, Scene, Shown, Stage};
 
 /// The scene in SI units; what a scene of stages does not have is `null`.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -17,6 +17,7 @@ pub struct SceneJson {
     pub strength_pa: Option<f64>,
     pub density_kg_m3: Option<f64>,
     pub thickness_m: Option<f64>,
+    pub criterion: Criterion,
     #[serde(rename = "S")]
     pub static_factor: Option<f64>,
     #[serde(rename = "B")]
@@ -131,6 +132,7 @@ impl SceneJson {
             strength_pa: of_one(|c| c.strength),
             density_kg_m3: of_one(|c| c.density),
             thickness_m: scene.thickness,
+            criterion: scene.criterion,
             static_factor: of_one(|c| c.static_factor),
             inertia_factor: of(|c| c.inertia_factor),
             crater_ratio: of(|c| c.crater_ratio),

@@ -16,7 +16,7 @@ use crate::exchange::input::name_of;
 use crate::exchange::tables::{self, Column, Format, Kind, Others, Value, table_of};
 use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Method, Sample};
 use crate::physics::groups::Groups;
-use crate::physics::{Event, EventKind, Outcome, Problem, Range, Scene, State};
+use crate::physics::{Criterion, Event, EventKind, Outcome, Problem, Range, Scene, State};
 use crate::studies::applicability;
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
@@ -70,6 +70,8 @@ pub struct SolveJson {
     stage: usize,
     #[serde(flatten)]
     end: State,
+    /// Speed at x = H (m/s) where the criterion has the exit elsewhere and the projectile gets there; else `null`.
+    velocity_at_far_side_m_s: Option<f64>,
     /// Least W = V² over V0² at the stage ends and the exit, below zero for a stop: the exit energy unless a stage drives.
     exit_margin: Option<f64>,
     /// Half-width of its error bound.
@@ -94,6 +96,12 @@ pub struct GroupsJson {
     N: Option<f64>,
     H_over_d: Option<f64>,
     X_over_d: Option<f64>,
+    /// Of Eq. 11-12, the limit N -> infinity, without a far side.
+    X_over_d_eq11_12: Option<f64>,
+    /// M/(rho d³), N as Eq. 13 prints it: without N* and B.
+    N_without_nose: Option<f64>,
+    /// Johnson number rho V0²/fc.
+    johnson: Option<f64>,
 }
 
 /// Work done.
@@ -139,13 +147,17 @@ impl RelativeErrorJson {
 }
 
 impl GroupsJson {
-    fn new(scene: &Scene, impact_speed: f64, depth: f64) -> Self {
+    /// The groups of `scene` at `impact_speed` (m/s), which ended at `depth` (m).
+    pub fn new(scene: &Scene, impact_speed: f64, depth: f64) -> Self {
         let groups = Groups::of(scene, impact_speed);
         Self {
             I: groups.map(|g| g.impact),
             N: groups.and_then(|g| g.geometry),
             H_over_d: groups.and_then(|g| g.thickness_ratio),
             X_over_d: scene.concrete().map(|concrete| depth / concrete.diameter),
+            X_over_d_eq11_12: groups.map(|g| g.depth_ratio_eq11_12),
+            N_without_nose: groups.and_then(|g| g.mass_ratio),
+            johnson: groups.map(|g| g.johnson),
         }
     }
 }
@@ -191,6 +203,7 @@ impl Ask for SolveArgs {
         let mut skipped = method.explain(&problem, &flight, detail);
         skipped.retain(|note| sensitivities.is_none() || !note.starts_with("sensitivities"));
         let exact = ClosedForm.solve(&problem, Detail::Events).ok();
+        let far_side = velocity_at_far_side(&scene, flight.outcome, &method);
         let data = SolveJson {
             schema: "penetrode/solve/1",
             scene: SceneJson::new(&scene, &problem),
@@ -199,6 +212,7 @@ impl Ask for SolveArgs {
             outcome: flight.outcome,
             stage: flight.stage,
             end: flight.end,
+            velocity_at_far_side_m_s: far_side,
             exit_margin: flight.exit_margin,
             exit_margin_error: flight.exit_margin_error,
             events: flight.events.to_vec(),
@@ -239,6 +253,17 @@ impl SolveArgs {
     fn text(&self, data: &SolveJson, flight: &Flight) -> String {
         let mut text = Text::titled(data.scene.title.as_deref());
         text.line(format!("  method   {}", data.method.text()));
+        let place = match (data.outcome, data.scene.criterion, data.velocity_at_far_side_m_s) {
+            (Outcome::Perforated, Criterion::FullDepth, _) => " at x = H".to_owned(),
+            (Outcome::Perforated, criterion, far_side) => {
+                let beyond = far_side.map_or_else(
+                    || "it stops before x = H".to_owned(),
+                    |speed| format!("{} at x = H", engineering(speed, "m/s")),
+                );
+                format!(" at {}; {beyond}", criterion.place())
+            }
+            _ => String::new(),
+        };
         let margin = match data.exit_margin.zip(data.exit_margin_error) {
             Some((margin, bar)) if margin.is_finite() && bar.is_finite() => {
                 format!(" (exit margin {} +- {bar:.0e} of V0²)", significant(margin))
@@ -246,7 +271,7 @@ impl SolveArgs {
             Some(_) => " (the exit margin leaves the range of 64-bit numbers)".to_owned(),
             None => String::new(),
         };
-        text.line(format!("  outcome  {}{margin}", data.outcome));
+        text.line(format!("  outcome  {}{place}{margin}", data.outcome));
         text.lines(data.groups.text(data.scene.velocity_m_s));
         for ForceJson { stage, force } in &data.scene.forces {
             let whose = if data.scene.stages.len() > 1 { format!("stage {stage}: ") } else { String::new() };
@@ -308,17 +333,24 @@ impl SolveArgs {
 }
 
 impl GroupsJson {
-    /// One line, where the scene has the groups.
-    fn text(&self, impact_speed: f64) -> Option<String> {
+    /// Two lines, where the scene has the groups.
+    pub fn text(&self, impact_speed: f64) -> Vec<String> {
         // Where the speed is above zero, I is neither zero nor infinite, only out of range.
-        let impact = match self.I? {
+        let Some(impact) = self.I else { return Vec::new() };
+        let impact = match impact {
             0.0 if impact_speed > 0.0 => "below 1e-323".to_owned(),
             f64::INFINITY => "above 1e308".to_owned(),
             impact => significant(impact),
         };
-        let rest = [("N", self.N), ("H/d", self.H_over_d), ("X/d", self.X_over_d)];
-        let shown = rest.into_iter().filter_map(|(name, value)| Some(format!("   {name} {}", significant(value?))));
-        Some(format!("  groups   I {impact}{}", shown.collect::<String>()))
+        let shown = |list: &[(&str, Option<f64>)]| {
+            let known = list.iter().filter_map(|(name, value)| Some(format!("{name} {}", significant((*value)?))));
+            known.collect::<Vec<_>>().join("   ")
+        };
+        let flown = shown(&[("N", self.N), ("H/d", self.H_over_d), ("X/d", self.X_over_d)]);
+        let beside =
+            [("X/d", self.X_over_d_eq11_12), ("N without N*", self.N_without_nose), ("Johnson number", self.johnson)];
+        let gap = if flown.is_empty() { "" } else { "   " };
+        vec![format!("  groups   I {impact}{gap}{flown}"), format!("  Eq. 11-13  {}", shown(&beside))]
     }
 }
 
@@ -348,6 +380,17 @@ const EVENTS_MAX: usize = 60;
 
 /// How many of more are shown from each end.
 const EVENTS_SHOWN: usize = 8;
+
+/// Speed (m/s) at x = H of a projectile that perforated by a criterion with another exit; `None` where it stops before, and
+/// with the criterion x = H.
+fn velocity_at_far_side(scene: &Scene, outcome: Outcome, method: &Method) -> Option<f64> {
+    if scene.criterion == Criterion::FullDepth || outcome != Outcome::Perforated {
+        return None;
+    }
+    let whole = Scene { criterion: Criterion::FullDepth, ..scene.clone() };
+    let flight = method.integrator().solve(&whole.problem().ok()?, Detail::End).ok()?;
+    (flight.outcome == Outcome::Perforated).then_some(flight.end.velocity)
+}
 
 /// What would decide an outcome that is undecided.
 const UNDECIDED: &str = "the exit margin lies within its error bound: this speed is V_c to the accuracy of the method. A \

@@ -1,5 +1,6 @@
 //! What crosses the border of the program: scene files, tables, and other people's solvers.
 
+pub mod abaqus;
 #[cfg(feature = "report")]
 pub(crate) mod decode;
 pub mod diagnostic;

@@ -1,12 +1,13 @@
 //! Which dimensionless groups a scene has, and which numbers give a scene a wanted group.
 //!
 //! ```text
-//! I = M V0²/(S fc d³),   N = M/(N* B rho d³),   H/d,   X/d,   E_c/(d³ fc)
+//! I = M V0²/(S fc d³),   N = M/(N* B rho d³),   H/d,   X/d,   E_c/(d³ fc),   rho V0²/fc
 //! ```
 //!
 //! Source: Li & Chen (2003), Eq. 5-7, 13, 14. Eq. 13 of the paper prints N without N*, its nose being flat (N* = 1).
 
 use super::scene::{Concrete, Resistance, Scene};
+use super::semi_empirical;
 
 /// The groups of a scene of one concrete.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,10 +16,14 @@ pub struct Groups {
     pub impact: f64,
     /// Geometry function N; `None` without drag (Q = 0), where it is infinite.
     pub geometry: Option<f64>,
+    /// M/(rho d³), which Eq. 13 prints as N: without N* and B; `None` for a density of 0.
+    pub mass_ratio: Option<f64>,
     /// Relative target thickness H/d; `None` for a semi-infinite target.
     pub thickness_ratio: Option<f64>,
     /// Johnson number rho V0²/fc.
     pub johnson: f64,
+    /// Depth X/d of Eq. 11-12, the limit of N -> infinity.
+    pub depth_ratio_eq11_12: f64,
 }
 
 impl Groups {
@@ -33,13 +38,17 @@ impl Groups {
         let d = concrete.diameter;
         let speed_per_diameter = impact_speed / d;
         let scaled_density = concrete.nose_factor * concrete.inertia_factor * concrete.density;
+        // Squares of speed and cubes of length are shared out, so that neither overflows before the quotient.
+        let impact =
+            (scene.mass / d) * speed_per_diameter / (concrete.static_factor * concrete.strength) * speed_per_diameter;
+        let mass_over = |density: f64| (density > 0.0).then(|| (scene.mass / d) / (density * d * d));
         Some(Self {
-            // Squares of speed and cubes of length are shared out, so that neither overflows before the quotient.
-            impact: (scene.mass / d) * speed_per_diameter / (concrete.static_factor * concrete.strength)
-                * speed_per_diameter,
-            geometry: (scaled_density > 0.0).then(|| (scene.mass / d) / (scaled_density * d * d)),
+            impact,
+            geometry: mass_over(scaled_density),
+            mass_ratio: mass_over(concrete.density),
             thickness_ratio: scene.thickness.map(|thickness| thickness / d),
             johnson: (concrete.density * impact_speed) * (impact_speed / concrete.strength),
+            depth_ratio_eq11_12: semi_empirical::depth_ratio(impact, concrete.crater_ratio),
         })
     }
 }
@@ -80,6 +89,13 @@ mod tests {
         assert_relative_eq!(groups.impact, 8.455, epsilon = 5e-4);
         assert_relative_eq!(groups.geometry.unwrap(), 125.7, epsilon = 0.3);
         assert_eq!(groups.thickness_ratio, None);
+        // N without N* = 0.15625, the ogive's; k/2 + 2 I/pi.
+        assert_relative_eq!(groups.mass_ratio.unwrap(), 0.156_25 * groups.geometry.unwrap(), max_relative = 1e-15);
+        assert_relative_eq!(
+            groups.depth_ratio_eq11_12,
+            1.0 + 2.0 * groups.impact / std::f64::consts::PI,
+            max_relative = 1e-15
+        );
     }
 
     #[test]

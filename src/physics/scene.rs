@@ -140,15 +140,37 @@ pub struct Layer {
 
 /// When the target counts as perforated.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, strum::EnumString, strum::IntoStaticStr, strum::VariantNames,
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantNames,
+    serde::Serialize,
 )]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[strum(serialize_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
 pub enum Criterion {
     /// x = H, the paper's.
     #[default]
     FullDepth,
     /// x = `x_p(H)`, the penetration that perforates by the ACE/NDRC relation (docs/theory.md, section 4).
     Ndrc,
+}
+
+impl Criterion {
+    /// Where the projectile is when the target counts as perforated, for people.
+    pub fn place(self) -> &'static str {
+        match self {
+            Self::FullDepth => "x = H",
+            Self::Ndrc => "x = x_p(H), the NDRC relation",
+        }
+    }
 }
 
 /// A scene in SI units, admissible throughout.

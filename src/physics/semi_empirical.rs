@@ -41,6 +41,9 @@ const NDRC_PARABOLA: [f64; 2] = [3.19, 0.718];
 /// Second branch, `H/d = a + b y`: a and b.
 const NDRC_LINE: [f64; 2] = [1.32, 1.24];
 
+/// y = `x_p/d` where the first branch ends.
+const NDRC_JOINT: f64 = 1.35;
+
 /// H/d where the relation ends, `1.32 + 1.24 · 13.5`.
 pub const NDRC_END: f64 = 18.06;
 
@@ -114,6 +117,26 @@ pub fn perforating_depth_ratio<S: Scalar>(thickness_ratio: S) -> S {
     } else {
         (h - S::from_f64(c)) / S::from_f64(d)
     }
+}
+
+/// Thickness H/d that a penetration y = `x_p/d` just perforates: the ACE/NDRC relation.
+///
+/// ```text
+/// H/d = 3.19 y - 0.718 y²   y <= 1.35;     1.32 + 1.24 y  beyond
+/// ```
+///
+/// The inverse of [`perforating_depth_ratio`]: just beyond y = 1.35 the second branch begins below the end of the first,
+/// which is as thick as the smaller of the two depths perforates, and holds until the second branch is above it.
+/// Beyond y = 13.5 the second branch continues.
+pub fn perforated_thickness_ratio(depth_ratio: f64) -> f64 {
+    let (y, [a, b], [c, d]) = (depth_ratio, NDRC_PARABOLA, NDRC_LINE);
+    if y <= NDRC_JOINT { y * (a - b * y) } else { (c + d * y).max(NDRC_FIRST_BRANCH_END) }
+}
+
+/// d(H/d)/dy of [`perforated_thickness_ratio`].
+pub fn perforation_slope(depth_ratio: f64) -> f64 {
+    let ([a, b], [_, d]) = (NDRC_PARABOLA, NDRC_LINE);
+    if depth_ratio <= NDRC_JOINT { a - 2.0 * b * depth_ratio } else { d }
 }
 
 /// Range of the ACE/NDRC relation and of unrounded Eq. 15: 0 < H/d <= 18.06.
@@ -234,7 +257,7 @@ mod tests {
     }
 
     /// The relation as it is printed: H/d that the penetration y perforates.
-    fn perforated_thickness_ratio(y: f64) -> f64 {
+    fn printed_relation(y: f64) -> f64 {
         if y <= 1.35 { y * (3.19 - 0.718 * y) } else { 1.32 + 1.24 * y }
     }
 
@@ -243,10 +266,15 @@ mod tests {
         for step in 1..=1000 {
             let y = f64::from(step) * 1.35e-3;
             // Near the top of the parabola the inverse loses digits by itself: dln y/dln H is at most 1.6 here.
-            assert_relative_eq!(perforating_depth_ratio(perforated_thickness_ratio(y)), y, max_relative = 2e-15);
+            assert_relative_eq!(perforating_depth_ratio(printed_relation(y)), y, max_relative = 2e-15);
         }
+        for y in [1e-300, 0.5, 1.35, 1.3532, 13.5] {
+            assert_relative_eq!(perforated_thickness_ratio(y), printed_relation(y), max_relative = 2e-16);
+        }
+        // 1.32 + 1.24 · 1.351 = 2.99524 lies below the end of the first branch.
+        assert_eq!(perforated_thickness_ratio(1.351), NDRC_FIRST_BRANCH_END);
         for y in [1.3532, 1.4, 2.0, 5.0, 13.5] {
-            assert_relative_eq!(perforating_depth_ratio(perforated_thickness_ratio(y)), y, max_relative = 1e-15);
+            assert_relative_eq!(perforating_depth_ratio(printed_relation(y)), y, max_relative = 1e-15);
         }
     }
 

@@ -13,6 +13,7 @@ use super::random_scenes::Generator;
 use crate::exchange::tables::{Block, Column, Format, Kind, Need, Others, Place, Row, Rows, TableError, Value};
 use crate::integrators::lanes::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, MethodName};
+use crate::physics::groups::Groups;
 use crate::physics::parameter::{Absence, Parameter, ParameterError};
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, ResolveError, Scene};
 
@@ -94,7 +95,7 @@ impl Varied {
 }
 
 /// Columns of the results.
-pub const RESULT_COLUMNS: [(&str, Kind); 10] = [
+pub const RESULT_COLUMNS: [(&str, Kind); 11] = [
     ("row", Kind::Count),
     ("outcome", Kind::Text),
     ("depth_m", Kind::Number),
@@ -104,6 +105,7 @@ pub const RESULT_COLUMNS: [(&str, Kind); 10] = [
     ("crater_end_velocity_m_s", Kind::Number),
     ("exit_margin", Kind::Number),
     ("critical_velocity_m_s", Kind::Number),
+    ("X_over_d_eq11_12", Kind::Number),
     ("error", Kind::Text),
 ];
 
@@ -240,10 +242,10 @@ impl Scenes {
             let message = self.message(index, answer);
             let (outcome, numbers) = match answer {
                 Ok(answer) => (answer.solution.outcome.name(), answer.numbers()),
-                Err(_) => ("", [None; 7]),
+                Err(_) => ("", [None; 8]),
             };
-            let [a, b, c, d, e, f, g] = numbers.map(Value::Number);
-            block.push(&[Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, Value::Text(&message)]);
+            let [a, b, c, d, e, f, g, h] = numbers.map(Value::Number);
+            block.push(&[Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, h, Value::Text(&message)]);
         }
         block
     }
@@ -262,13 +264,15 @@ pub struct Answer {
     pub solution: Summary,
     /// Critical velocity (m/s), where it was asked for and the target has a thickness, or why there is none.
     pub critical: Option<Result<f64, Box<CriticalError>>>,
+    /// Depth X/d of Eq. 11-12 without a far side; `None` for stages and layers.
+    pub depth_ratio_eq11_12: Option<f64>,
     /// True if a fixed step stayed within its stability limit, and for every other method.
     pub stable: bool,
 }
 
 impl Answer {
     /// Its numbers, in the order of [`RESULT_COLUMNS`].
-    fn numbers(&self) -> [Option<f64>; 7] {
+    fn numbers(&self) -> [Option<f64>; 8] {
         let Summary { end, crater_end, exit_margin, .. } = self.solution;
         [
             Some(end.depth),
@@ -278,6 +282,7 @@ impl Answer {
             crater_end.map(|s| s.velocity),
             exit_margin,
             self.critical.as_ref().and_then(|critical| critical.as_ref().ok()).copied(),
+            self.depth_ratio_eq11_12,
         ]
     }
 }
@@ -295,7 +300,7 @@ pub fn answers(
     // Why a scene has no problem; scenes are large and stay where they are.
     let causes: Vec<Option<ResolveError>> =
         scenes.iter().map(|scene| scene.as_ref().ok()?.problem().map(|problem| problems.push(problem)).err()).collect();
-    let answer = |solution, stable| Answer { solution, critical: None, stable };
+    let answer = |solution, stable| Answer { solution, critical: None, depth_ratio_eq11_12: None, stable };
     let solved: Vec<Result<Answer, IntegrationError>> = if method.is_plain(MethodName::Taylor) {
         Batch::new().solve(&problems).into_iter().map(|solution| Ok(answer(solution?, true))).collect()
     } else {
@@ -313,6 +318,8 @@ pub fn answers(
         cause.map_or(Ok(()), Err)?;
         let Some(answer) = solved.next() else { unreachable!("one solution a problem, and one problem a scene") };
         let mut answer = answer?;
+        let groups = scene.velocity.and_then(|speed| Groups::of(&scene, speed));
+        answer.depth_ratio_eq11_12 = groups.map(|groups| groups.depth_ratio_eq11_12);
         if with_critical && scene.thickness.is_some() {
             let critical = critical_velocity::of_scene(&scene, method.integrator());
             answer.critical = Some(critical.map(|critical| critical.velocity).map_err(Box::new));
@@ -432,8 +439,8 @@ mod tests {
             table("2,0.05,0.72,-36e6,2300,,,,,,300,\n2,0.05,0.72,36e6,2300,,,,,,300,\"a \"\"b\"\"\u{202e}\"\n");
         let found = answers(scenes.scenes(0..2), &taylor(), false);
         let lines = [
-            "7,,,,,,,,,\"line 2: the strength fc [Pa] = -36000000 is not admissible: it must be a number > 0\"\n",
-            "8,,,,,,,,,\"line 3, column 12: `a \"\"b\"\"\u{fffd}` in `criterion` is not full-depth or ndrc\"\n",
+            "7,,,,,,,,,,\"line 2: the strength fc [Pa] = -36000000 is not admissible: it must be a number > 0\"\n",
+            "8,,,,,,,,,,\"line 3, column 12: `a \"\"b\"\"\u{fffd}` in `criterion` is not full-depth or ndrc\"\n",
         ];
         let Block::Lines(text) = scenes.results(0, 7, &found, false) else { unreachable!("not CSV") };
         assert_eq!(text, lines.concat());

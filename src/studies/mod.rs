@@ -18,6 +18,7 @@ pub mod grid_convergence;
 pub mod limit;
 pub mod order;
 pub mod perforating_velocities;
+pub mod perforation_limit;
 mod power_law;
 pub mod quantity;
 pub mod random;

@@ -740,6 +740,8 @@ def answers(numbers, words, order):
             scene("drag_kg_m", problem.Q)
             if problem.thickness is not None:
                 out["groups.H_over_d"] = problem.thickness / problem.d
+            if n["density"]:
+                out["groups.N_without_nose"] = problem.mass / (n["density"] * problem.d**3)
             if problem.Q:
                 out["groups.N"] = problem.mass / (problem.nose * problem.B * n["density"] * problem.d**3)
     flight = None
@@ -764,7 +766,14 @@ def answers(numbers, words, order):
                 scene(f"stages.{i}.end_m", law.end)
         if not words["stages"]:
             if problem.plain:
-                out["groups.I"] = problem.mass * speed**2 / (problem.S * n["strength"] * problem.d**3)
+                impact = problem.mass * speed**2 / (problem.S * n["strength"] * problem.d**3)
+                out["groups.I"] = impact
+                # Eq. 11-12, with I of Eq. 11 under the root; N as Eq. 13 prints it; the Johnson number.
+                deep = impact > problem.k * mp.pi / 4
+                out["groups.X_over_d_eq11_12"] = (
+                    problem.k / 2 + 2 * impact / mp.pi if deep else mp.sqrt(4 * problem.k * impact / mp.pi)
+                )
+                out["groups.johnson"] = n["density"] * speed**2 / n["strength"]
             out["groups.X_over_d"] = flight["x"] / problem.d
         word["outcome"] = flight["outcome"]
         out["stage"] = mpf(flight["stage"])
@@ -837,6 +846,7 @@ def record(name, text, digits=25):
         for key, x in list(second.items()):
             # The last event is the end; a coefficient that is absent is zero; others follow.
             said = key in ("scene.static_force_n", "scene.drag_kg_m", "groups.X_over_d", "critical_energy_j")
+            said |= key in ("groups.X_over_d_eq11_12", "groups.N_without_nose", "groups.johnson")
             said |= key == "scene.exit_depth_m" and x == second["scene.thickness_m"]
             if said or key.startswith(last) or (key.startswith("scene.stages.") and not x):
                 del second[key]

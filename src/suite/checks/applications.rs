@@ -5,10 +5,11 @@ use super::{Subject, Worst, formulas, off};
 use crate::integrators::MethodName;
 use crate::physics::Parameter;
 use crate::physics::groups::dimensionless_energy;
+use crate::physics::semi_empirical::CRATER_RATIO_OF_EQ15;
 use crate::physics::{Criterion, Scene, semi_empirical};
 use crate::studies::sensitivity;
 use crate::studies::sweep::{Axis, Plan};
-use crate::studies::{applicability, critical_velocity, experiments};
+use crate::studies::{applicability, critical_velocity, experiments, perforation_limit};
 
 check! {
     /// Critical velocity and energies of every point of a sweep of H/d against the closed form of a scene built for that
@@ -21,6 +22,9 @@ check! {
         /// How many, evenly.
         points: usize,
     } in Slab, "relative", by sweep;
+    /// Perforation limit of the scene by both criteria: critical velocity of that thickness against the impact speed, and
+    /// Eq. 15 at the limit of Eq. 11-12 against the energy of the shot; worst relative difference.
+    ThicknessLimit {} in Slab, "relative", by thickness_limit;
     /// Depth computed at places of each line of equal error of Eq. 11-12, k = 2: worst relative distance of its error
     /// from that of the line.
     Map {
@@ -64,6 +68,32 @@ fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
         }
     }
     Ok(worst.measurement().evidence(Evidence::Sweep { plan: Box::new(plan), rows }))
+}
+
+fn thickness_limit(subject: &Subject<'_>) -> Found {
+    let scene = subject.scene()?;
+    let speed = scene.velocity.ok_or_else(|| NotMeasured::skip("the scene gives no impact speed"))?;
+    let method = subject.method(None)?;
+    let mut worst = Worst::default();
+    for criterion in [Criterion::FullDepth, Criterion::Ndrc] {
+        let scene = Scene { criterion, ..scene.clone() };
+        if criterion == Criterion::Ndrc && scene.concrete().is_none_or(|concrete| !concrete.layers.is_empty()) {
+            continue;
+        }
+        let limit = perforation_limit::of_scene(&scene, method.integrator())?;
+        let bound = limit.error.unwrap_or(f64::NAN);
+        holds!(bound <= 1e-9 * limit.thickness, "a bound of {bound:e} m for {} m", limit.thickness);
+        let wall = Scene { thickness: Some(limit.thickness), ..scene };
+        worst.take(off(critical_velocity::exact(&wall)?, speed), || format!("by {criterion:?}"));
+    }
+    if let (Some([full, ndrc]), Some(c)) = (perforation_limit::of_eq11_12(scene)?, scene.concrete()) {
+        let impact = scene.mass * speed.powi(2) / (c.static_factor * c.strength * c.diameter.powi(3));
+        worst.take(off(semi_empirical::impact_function(full, c.crater_ratio), impact), || "by Eq. 11-12".to_owned());
+        if c.crater_ratio == CRATER_RATIO_OF_EQ15 {
+            worst.take(off(semi_empirical::eq15_unrounded(ndrc), 0.5 * impact), || "by Eq. 15".to_owned());
+        }
+    }
+    Ok(worst.measurement())
 }
 
 fn map(&Map { points }: &Map, subject: &Subject<'_>) -> Found {

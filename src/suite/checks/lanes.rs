@@ -295,9 +295,9 @@ fn written(scenes: &Scenes, first: u64, found: &[Result<Answer, RowError>]) -> F
     let text = String::from_utf8(table.finish()?)?;
     let mut lines = text.lines();
     let names = "row,outcome,depth_m,time_s,velocity_m_s,crater_end_time_s,crater_end_velocity_m_s,exit_margin,\
-                 critical_velocity_m_s,error";
+                 critical_velocity_m_s,X_over_d_eq11_12,error";
     holds!(lines.next() == Some(names), "the results have other columns: {text:.120}");
-    Ok(lines.map(|line| line.splitn(10, ',').map(str::to_owned).collect()).collect())
+    Ok(lines.map(|line| line.splitn(11, ',').map(str::to_owned).collect()).collect())
 }
 
 /// The cell of a number: empty where there is none.
@@ -325,7 +325,7 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
     let cells = written(&scenes, 7, &found)?;
     holds!(cells.len() == lines.len(), "{} results of {} rows", cells.len(), lines.len());
     let said = &cells[bad];
-    let tells = said[9].contains(&format!("line {}", bad + 2)) && said[1..9].iter().all(String::is_empty);
+    let tells = said[10].contains(&format!("line {}", bad + 2)) && said[1..10].iter().all(String::is_empty);
     holds!(tells && all()[bad].is_err() | found[bad].is_err(), "of the bad row is said {said:?}");
 
     let mut worst = Worst::default();
@@ -347,7 +347,7 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
         let answer = found[index].as_ref().map_err(|error| NotMeasured::broken(format!("row {index}: {error}")))?;
         let row_cells = &cells[index];
         holds!(row_cells[0] == (index + 7).to_string(), "row {index} has the number {}", row_cells[0]);
-        let values = row_cells[2..9].iter().map(|cell| parsed(cell)).collect::<Found<Vec<_>>>()?;
+        let values = row_cells[2..10].iter().map(|cell| parsed(cell)).collect::<Found<Vec<_>>>()?;
         let solution = of_cells(&row_cells[1], &values, &answer.solution)
             .ok_or_else(|| NotMeasured::broken(format!("row {index}: the cells {row_cells:?} of {answer:?}")))?;
         worst.take(error_of(subject, &problem, &solution)?, name);
@@ -362,6 +362,12 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
                 return Err(NotMeasured::broken(format!("row {index}: V_c is {printed:?}, from {other:?}")));
             }
         }
+        let by_eq11_12 = depth_of_eq11_12(&scene).unwrap_or(f64::NAN);
+        holds!(
+            off(values[7].unwrap_or(f64::NAN), by_eq11_12) < 1e-14,
+            "row {index}: X/d {:?} of {by_eq11_12}",
+            values[7]
+        );
         undecided += u64::from(solution.outcome == Outcome::Undecided);
         *reached.entry(solution.outcome.name()).or_default() += 1;
     }
@@ -377,9 +383,17 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
     Ok(found.resolving(1.0).remark(remark))
 }
 
+/// X/d of Eq. 11-12 for `scene`, as it is printed.
+fn depth_of_eq11_12(scene: &Scene) -> Option<f64> {
+    let (c, speed) = (scene.concrete()?, scene.velocity?);
+    let impact = scene.mass * speed.powi(2) / (c.static_factor * c.strength * c.diameter.powi(3));
+    let (k, pi) = (c.crater_ratio, std::f64::consts::PI);
+    Some(if impact <= k * pi / 4.0 { (4.0 * k * impact / pi).sqrt() } else { k / 2.0 + 2.0 * impact / pi })
+}
+
 /// The solution that the cells of a row state, if they are those of `solution`.
 fn of_cells(outcome: &str, values: &[Option<f64>], solution: &Summary) -> Option<Summary> {
-    let [Some(depth), Some(time), Some(velocity), crater_time, crater_velocity, exit_margin, _] = *values else {
+    let [Some(depth), Some(time), Some(velocity), crater_time, crater_velocity, exit_margin, ..] = *values else {
         return None;
     };
     let crater_end = crater_time.zip(crater_velocity).zip(solution.crater_end);

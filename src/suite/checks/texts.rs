@@ -76,7 +76,7 @@ impl Numbers {
         match name.strip_prefix("scene.") {
             Some(rest) if rest.starts_with("stages.") || STAGES.contains(&rest) => Self::Stages,
             Some(_) => Self::Scene,
-            None if ["groups.I", "groups.N", "groups.H_over_d"].contains(&name) => Self::Scene,
+            None if name.starts_with("groups.") && name != "groups.X_over_d" => Self::Scene,
             None if name.starts_with("critical_") || name.starts_with("eq15.") || name == "dimensionless_energy" => {
                 Self::Critical
             }
@@ -169,6 +169,9 @@ fn stated(scene: &Scene) -> BTreeMap<String, f64> {
     if let Some(groups) = Groups::of(scene, scene.velocity.unwrap_or(0.0)) {
         said.insert("groups.I".to_owned(), groups.impact);
         said.extend(groups.geometry.map(|geometry| ("groups.N".to_owned(), geometry)));
+        said.extend(groups.mass_ratio.map(|ratio| ("groups.N_without_nose".to_owned(), ratio)));
+        said.insert("groups.X_over_d_eq11_12".to_owned(), groups.depth_ratio_eq11_12);
+        said.insert("groups.johnson".to_owned(), groups.johnson);
         said.extend(groups.thickness_ratio.map(|ratio| ("groups.H_over_d".to_owned(), ratio)));
     }
     said

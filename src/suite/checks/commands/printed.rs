@@ -137,7 +137,9 @@ impl Reading<'_> {
                 ["method", name, ..] => self.word(name.trim_end_matches(','), "method.name"),
                 ["outcome", outcome, rest @ ..] => {
                     self.word(outcome, "outcome");
-                    if let ["(exit", "margin", margin, "+-", bound, ..] = rest {
+                    // In front of it stands the place of the exit.
+                    let margin = rest.iter().position(|word| *word == "(exit").unwrap_or(rest.len());
+                    if let ["(exit", "margin", margin, "+-", bound, ..] = &rest[margin..] {
                         self.plain(margin, "exit_margin", 6);
                         self.plain(bound, "exit_margin_error", 1);
                     }
@@ -147,6 +149,10 @@ impl Reading<'_> {
                         let name = format!("groups.{}", pair[0].replace('/', "_over_"));
                         self.plain(pair[1], &name, 6);
                     }
+                }
+                ["Eq.", "11-13", "X/d", ratio, .., johnson] => {
+                    self.plain(ratio, "groups.X_over_d_eq11_12", 6);
+                    self.plain(johnson, "groups.johnson", 6);
                 }
                 ["cost", steps, "steps,", rejected, "rejected,", evaluations, ..] => {
                     self.plain(steps, "cost.steps", 17);
