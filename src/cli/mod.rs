@@ -9,6 +9,7 @@ pub mod critical;
 pub mod diagnose;
 pub mod experiments;
 pub mod export;
+pub mod formulas;
 pub mod init;
 pub mod limit;
 pub mod map;
@@ -308,6 +309,8 @@ commands! {
     Critical = "critical": Printing<critical::CriticalArgs>,
     /// The thickness that just stops the projectile, beside Eq. 11-12.
     Limit = "limit": Printing<limit::LimitArgs>,
+    /// Depth, perforation and scabbing limits by published formulas.
+    Formulas = "formulas": Printing<formulas::FormulasArgs>,
     /// Many scenes from a table, one line of results each.
     Batch = "batch": batch::BatchArgs,
     /// Order of convergence of every quantity, fitted and classified.

@@ -18,7 +18,9 @@ use crate::integrators::Method;
 use crate::physics::semi_empirical::NDRC_END;
 use crate::physics::{Criterion, Outcome, Parameter};
 use crate::report::sweep_figures;
-use crate::studies::sweep::{Axis, COLUMNS, POINTS, Plan, Row, explanation, read_points};
+use crate::studies::sweep::{
+    Axis, COLUMNS, Conclusion, MeasuredPoint, POINTS, Plan, Row, conclusions, explanation, read_points,
+};
 use crate::text::or_dash;
 
 /// Rows of the table for people; all rows are in the CSV and the JSON.
@@ -74,19 +76,10 @@ pub struct SweepJson {
     pub data: Vec<MeasuredPoint>,
     /// Why the curves along H/d differ; empty along anything else.
     pub explanation: String,
+    /// The paper's conclusions on its Figures 4 and 5, and whether they hold here; empty along anything but H/d.
+    pub conclusions: Vec<Conclusion>,
     /// Rows without an answer.
     pub bad_rows: usize,
-}
-
-/// A measured point and the curves there, all as `E_c/(d³ fc)`.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct MeasuredPoint {
-    #[serde(rename = "H_over_d")]
-    thickness_ratio: f64,
-    measured: f64,
-    energy_full_depth: Option<f64>,
-    energy_ndrc: Option<f64>,
-    eq15_printed: Option<f64>,
 }
 
 impl Ask for SweepArgs {
@@ -111,6 +104,7 @@ impl Ask for SweepArgs {
         let method = self.method.build()?;
         let points = self.points(&plan)?;
         let rows = plan.run(method.integrator());
+        let beside = beside(&plan, &points, &method)?;
         let data = SweepJson {
             schema: "penetrode/sweep/1",
             title: plan.scene().title.clone(),
@@ -119,13 +113,14 @@ impl Ask for SweepArgs {
             axes,
             static_factor_follows_strength: plan.moves_static_factor(),
             follows: plan.follows(),
-            data: beside(&plan, &points, &method)?,
+            conclusions: if draws_eq15(&plan) { conclusions(&rows, &beside) } else { Vec::new() },
+            data: beside,
             explanation: explanation(&plan, &rows),
             bad_rows: rows.iter().filter(|row| !row.error.is_empty()).count(),
             rows,
         };
         if let Some(path) = &self.out {
-            write_files(path, &plan, &data.rows, &points)?;
+            write_files(path, &plan, &data.rows, &data.data)?;
         }
         say_notes(&plan, &data);
         let exit = if data.bad_rows > 0 { Exit::Criterion } else { Exit::Success };
@@ -179,6 +174,9 @@ impl SweepArgs {
         if !data.explanation.is_empty() {
             text.gap();
             text.wrapped("  ", &data.explanation);
+        }
+        for Conclusion { statement, standing, reason } in &data.conclusions {
+            text.wrapped("  - ", &format!("{statement}: {standing}; {reason}"));
         }
         if let Some(path) = &self.out {
             text.gap();
@@ -266,9 +264,11 @@ fn draws_eq15(plan: &Plan) -> bool {
 }
 
 /// Writes table and figures; every one is drawn before the first is written.
-fn write_files(path: &Path, plan: &Plan, rows: &[Row], points: &[(f64, f64)]) -> Result<(), CliError> {
+fn write_files(path: &Path, plan: &Plan, rows: &[Row], measured: &[MeasuredPoint]) -> Result<(), CliError> {
     let figures = if draws_eq15(plan) {
-        vec![sweep_figures::critical_energy(rows, points, &[]), sweep_figures::critical_energy_difference(rows, &[])]
+        let points: Vec<_> = measured.iter().map(|point| (point.thickness_ratio, point.measured)).collect();
+        let difference = sweep_figures::critical_energy_difference(rows, measured, &[]);
+        vec![sweep_figures::critical_energy(rows, &points, &[]), difference]
     } else {
         vec![sweep_figures::critical_velocity(plan, rows)]
     };

@@ -20,7 +20,9 @@ use crate::physics::{Advice, Problem, Stage};
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ExportError {
     /// A law of its own, or an end that is no depth.
-    #[error("stage {0} has an expression for its force or its end, and the subroutine is written of coefficients and depths")]
+    #[error(
+        "stage {0} has an expression for its force or its end, and the subroutine is written of coefficients and depths"
+    )]
     Law(usize),
     /// Nothing to run.
     #[error("the impact velocity is 0: there is nothing to run")]

@@ -58,7 +58,7 @@ fn of_evidence(run: &Run<'_>, judged: &Judged) -> Vec<Figure> {
         Some(Evidence::Rounding(rows)) => vec![stability_figures::rounding(rows, &[judged])],
         Some(Evidence::Sweep { rows, .. }) => vec![
             sweep_figures::critical_energy(rows, run.points, &[judged]),
-            sweep_figures::critical_energy_difference(rows, &[judged]),
+            sweep_figures::critical_energy_difference(rows, &[], &[judged]),
         ],
         Some(Evidence::Map { crater_ratio, lines, scenes }) => {
             vec![sweep_figures::applicability(*crater_ratio, lines, scenes, &[judged])]

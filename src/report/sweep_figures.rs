@@ -11,7 +11,8 @@ use crate::exchange::tables::{Value, push_line};
 use crate::physics::semi_empirical::{NDRC_FIRST_BRANCH_END, eq15_printed, eq15_unrounded, jumps};
 use crate::studies::applicability::{ERROR_ALLOWED, Line};
 use crate::studies::experiments::{BAND, Comparison, MarkedScene, summaries};
-use crate::studies::sweep::{self, Plan, Row};
+use crate::studies::formulas::Said;
+use crate::studies::sweep::{self, MeasuredPoint, Plan, Row};
 use crate::suite::{Judged, grouped};
 
 /// Least H/d at which differences are drawn: for thinner slabs they run to thousands of percent and hide the rest.
@@ -108,11 +109,11 @@ fn rounding_of_eq15(rows: &[Row]) -> Option<Panel> {
     }))
 }
 
-/// Simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria; the paper's Figure 5 is in percent of
-/// measured energies.
+/// Simulation less Eq. 15 in percent of Eq. 15, over H/d, by both criteria; and where energies are `measured`, the paper's
+/// Figure 5: each curve in percent of them.
 ///
 /// `None` where no row has H/d of at least one.
-pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Figure> {
+pub fn critical_energy_difference(rows: &[Row], measured: &[MeasuredPoint], judged: &[&Judged]) -> Option<Figure> {
     let full = difference(rows, |row| row.energy_full_depth, |row| row.eq15_printed);
     let printed = difference(rows, |row| row.energy_ndrc, |row| row.eq15_printed);
     let unrounded = difference(rows, |row| row.energy_ndrc, |row| row.eq15_unrounded);
@@ -134,6 +135,18 @@ pub fn critical_energy_difference(rows: &[Row], judged: &[&Judged]) -> Option<Fi
                 .series("the same over Eq. 15, printed", Style::line(1), printed),
         ];
     let values = [&number(geometry, 3) as &dyn Display, &signed(least), &signed(low), &signed(high)];
+    let over_measured = |curve: fn(&MeasuredPoint) -> Option<f64>| {
+        let point =
+            |point: &MeasuredPoint| Some((point.thickness_ratio, 100.0 * (curve(point)? / point.measured - 1.0)));
+        measured.iter().filter_map(point).filter(|(_, y)| y.is_finite()).collect::<Vec<Point>>()
+    };
+    let figure_5 = (!measured.is_empty()).then(|| {
+        panel("over measured energies: the paper's Figure 5")
+            .series("simulation, x = H", Style::marks(0), over_measured(|point| point.energy_full_depth))
+            .series("simulation, x = x_p(H)", Style::marks(2), over_measured(|point| point.energy_ndrc))
+            .series("Eq. 15, printed", Style::marks(1), over_measured(|point| point.eq15_printed))
+    });
+    let panels = panels.into_iter().chain(figure_5).collect();
     Figure::new("critical-energy-difference", "", judged, &values, panels)
 }
 
@@ -187,6 +200,33 @@ pub fn applicability(crater_ratio: f64, lines: &[Line], scenes: &[MarkedScene], 
     let (allowed, tests) = (number(100.0 * ERROR_ALLOWED, 2), count(scenes.len(), "measured test"));
     let values = [&allowed as &dyn Display, &within, &tests, &number(crater_ratio, 3)];
     Figure::new("applicability-map", "", judged, &values, vec![panel])
+}
+
+/// Perforation limits (m) over the impact velocity (m/s) by the equation of motion and the formulas that are confirmed.
+///
+/// `None` where none has a number.
+pub fn perforation_limits(rows: &[(f64, Vec<Said>)]) -> Option<Figure> {
+    let (_, first) = rows.first()?;
+    let names = first.iter().filter(|said| said.confirmed).map(|said| said.name.clone());
+    let panel = Panel::new(
+        "perforation limit",
+        Axis::linear("impact velocity", "m/s"),
+        Axis::linear("thickness that just stops", "m").including([0.0]),
+    );
+    let (mut panel, mut drawn, mut left_out) = (panel.tall(TALL), 0, 0);
+    left_out += first.iter().filter(|said| !said.confirmed).count();
+    for name in names {
+        let at = |(speed, said): &(f64, Vec<Said>)| {
+            Some((*speed, said.iter().find(|said| said.name == name)?.perforation_m?))
+        };
+        let points: Vec<Point> = rows.iter().filter_map(at).collect();
+        if !points.is_empty() {
+            panel = panel.series(name, Style::line(drawn), points);
+            drawn += 1;
+        }
+    }
+    let values = [&left_out as &dyn Display];
+    if drawn == 0 { None } else { Figure::new("perforation-limits", "", &[], &values, vec![panel]) }
 }
 
 /// Predicted over measured depth (m) with the band of ±20 %; one kind of mark for each set.
@@ -260,7 +300,7 @@ mod tests {
     fn nothing_finite_is_no_figure() {
         assert_eq!(critical_energy(&[], &[], &[]), None);
         assert_eq!(critical_energy(&[row(1.0, f64::NAN)], &[], &[]), None);
-        assert_eq!(critical_energy_difference(&[row(0.5, 1.0)], &[]), None);
+        assert_eq!(critical_energy_difference(&[row(0.5, 1.0)], &[], &[]), None);
         assert_eq!(measured_depths(&[], &[]), None);
     }
 
@@ -285,7 +325,7 @@ mod tests {
     fn the_message_gives_the_gap_and_what_is_left_of_it() {
         let figure = critical_energy(&[row(1.0, 2.0), row(2.0, 9.0)], &[], &[]).unwrap();
         assert!(figure.message.contains("+100 to +100 % off Eq. 15"), "{}", figure.message);
-        let figure = critical_energy_difference(&[row(1.0, 2.0), row(2.0, 9.0)], &[]).unwrap();
+        let figure = critical_energy_difference(&[row(1.0, 2.0), row(2.0, 9.0)], &[], &[]).unwrap();
         assert!(figure.message.contains("+100 % at the least"), "{}", figure.message);
     }
 

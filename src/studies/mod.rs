@@ -14,6 +14,7 @@ pub mod error;
 pub mod experiments;
 pub mod extreme_scenes;
 pub mod formal_order;
+pub mod formulas;
 pub mod grid_convergence;
 pub mod limit;
 pub mod order;

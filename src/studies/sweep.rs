@@ -5,11 +5,14 @@
 //! simulation asks for a path through the whole thickness, Eq. 15 for the depth from which the rest of the slab fails
 //! (docs/theory.md, section 4). With Q = 0 and the criterion `ndrc` the equation of motion *is* unrounded Eq. 15.
 
+mod conclusions;
+
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use smallvec::SmallVec;
 use thiserror::Error;
 
+pub use self::conclusions::{Conclusion, MeasuredPoint, Standing, conclusions};
 use super::critical_velocity;
 use super::error::{Studied, StudyError};
 use crate::exchange::tables::{self, Column, Format, Kind, Others, TableError, Value};
@@ -635,6 +638,38 @@ mod tests {
         let text = said(bare);
         assert!(text.contains("alone makes +36.5 %, k and c +3.8 %.") && !text.contains("drag ("), "{text}");
         assert!(!text.contains("Where drag lowers it"), "{text}");
+    }
+
+    /// mpmath, of the parts above: +80.7 % at H/d = 10.26 is the least, +96.5 % at 18; without drag it falls, to +36.5 %.
+    #[test]
+    fn the_third_conclusion_is_refuted_by_drag_and_borne_out_without_it() {
+        let third = |scene: Scene, points: &[MeasuredPoint]| {
+            let plan = Plan::new(scene, &["H/d=0.5:18:200".parse().unwrap()]).unwrap();
+            conclusions(&plan.run(&Taylor::default()), points)
+        };
+        let found = third(slab(), &[]);
+        let standing = found.iter().map(|conclusion| conclusion.standing).collect::<Vec<_>>();
+        assert_eq!(standing, [Standing::NotTestable, Standing::NotTestable, Standing::Refuted]);
+        let reason = &found[2].reason;
+        assert!(reason.contains("+80.7 % at H/d = 10.2") && reason.contains("+96.5 % at H/d = 18"), "{reason}");
+        let mut bare = slab();
+        Parameter::Density.set(&mut bare, 0.0).unwrap();
+        let point = |measured| MeasuredPoint {
+            thickness_ratio: 5.0,
+            measured,
+            energy_full_depth: Some(40.0),
+            energy_ndrc: Some(19.0),
+            eq15_printed: Some(18.5),
+        };
+        for (points, expected) in [
+            (&[point(20.0), point(39.0)][..], [Standing::BorneOut, Standing::BorneOut]),
+            (&[point(18.0), point(39.0)], [Standing::Refuted, Standing::BorneOut]),
+            (&[point(20.0), point(41.0)], [Standing::BorneOut, Standing::Refuted]),
+        ] {
+            let found = third(bare.clone(), points);
+            assert_eq!(found.iter().map(|c| c.standing).collect::<Vec<_>>()[..2], expected);
+            assert_eq!(found[2].standing, Standing::BorneOut, "{}", found[2].reason);
+        }
     }
 
     #[test]
