@@ -8,8 +8,10 @@ use super::method_args::{MethodArgs, MethodJson};
 use super::output::{Text, engineering, error_text, say, significant};
 use super::scene_json::SceneJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
+use crate::integrators::{Detail, Integrator};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
 use crate::physics::{Criterion, Scene, Shown, groups};
+use crate::studies::critical_velocity::CriticalVelocity;
 use crate::studies::sensitivity::{self, Share, Spread, Uncertainty};
 use crate::studies::{applicability, critical_velocity};
 
@@ -57,10 +59,23 @@ pub struct CriticalJson {
     closed_form: Option<ClosedCriticalJson>,
     relative_error: Option<f64>,
     eq15: Option<Eq15Json>,
+    /// V_c of the same slab by other criteria, with the criterion `plug`.
+    #[serde(skip)]
+    criteria: Vec<CriterionJson>,
+    /// V_r just above V_c, with the criterion `plug`: it jumps there from nothing.
+    #[serde(skip)]
+    residual_velocity_at_limit_m_s: Option<f64>,
     /// Uncertainty of V_c from the spreads asked for; `null` without any.
     uncertainty: Option<Uncertainty>,
     /// What was asked for and not computed, and why.
     skipped: Vec<String>,
+}
+
+/// V_c by another criterion; `null` where there is none.
+#[derive(Debug)]
+pub struct CriterionJson {
+    criterion: &'static str,
+    critical_velocity_m_s: Option<f64>,
 }
 
 /// The exact critical velocity.
@@ -159,11 +174,29 @@ impl Ask for CriticalArgs {
             }),
             relative_error: exact.map(|exact| if shown == exact { 0.0 } else { ((shown - exact) / exact).abs() }),
             eq15: Eq15Json::new(&scene),
+            criteria: criteria(&scene, method.integrator()),
+            residual_velocity_at_limit_m_s: at_limit(&scene, found.as_ref(), method.integrator()),
             uncertainty,
             skipped: no_spread.into_iter().collect(),
         };
         Ok(Answer { text: data.text(scene.criterion), data: Some(data), exit: Exit::Success })
     }
+}
+
+/// V_c of `scene` by other criteria, if its own is `plug`.
+fn criteria(scene: &Scene, integrator: &dyn Integrator) -> Vec<CriterionJson> {
+    let found = |(criterion, other): (&'static str, Scene)| {
+        let found = critical_velocity::of_scene(&other, integrator).ok();
+        CriterionJson { criterion, critical_velocity_m_s: found.map(|found| found.velocity) }
+    };
+    scene.other_criteria().into_iter().map(found).collect()
+}
+
+/// The residual velocity (m/s) just above V_c, if the criterion is `plug`.
+fn at_limit(scene: &Scene, found: Option<&CriticalVelocity>, integrator: &dyn Integrator) -> Option<f64> {
+    let found = found.filter(|_| scene.plug.is_some())?;
+    let above = found.velocity + 2.0 * found.error_bar.unwrap_or(0.0);
+    Some(integrator.solve(&scene.resolve(above).ok()?, Detail::End).ok()?.end.velocity)
 }
 
 impl CriticalJson {
@@ -197,6 +230,14 @@ impl CriticalJson {
         if let Some(uncertainty) = &self.uncertainty {
             add_uncertainty(&mut text, uncertainty);
             self.scene.follows.iter().for_each(|sentence| text.wrapped("             ", sentence));
+        }
+        if let Some(residual) = self.residual_velocity_at_limit_m_s {
+            text.line(format!("  V_r        {} m/s just above V_c", significant(residual)));
+        }
+        for (index, CriterionJson { criterion, critical_velocity_m_s }) in self.criteria.iter().enumerate() {
+            let head = if index == 0 { "  V_c by" } else { "" };
+            let velocity = critical_velocity_m_s.map_or("-".to_owned(), |velocity| format!("{} m/s", Shown(velocity)));
+            text.line(format!("{head:13}{criterion:12} {velocity}"));
         }
         if let Some((ours, eq15)) = self.dimensionless_energy.zip(self.eq15.as_ref()) {
             eq15.add_to(&mut text, ours);

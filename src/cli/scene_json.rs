@@ -35,8 +35,19 @@ pub struct SceneJson {
     pub forces: Vec<ForceJson>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ends: Vec<EndJson>,
+    #[serde(skip)]
+    pub plug: Option<PlugJson>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<OwnParameterJson>,
+}
+
+/// The criterion `plug`, and the static thickness H* of the plug.
+#[derive(Clone, Debug)]
+#[expect(missing_docs, reason = "named with their units")]
+pub struct PlugJson {
+    pub half_angle_deg: f64,
+    pub shear_strength_pa: f64,
+    pub static_thickness_m: f64,
 }
 
 /// The force of a stage that is an expression.
@@ -115,6 +126,10 @@ pub fn forces(scene: &Scene) -> impl Iterator<Item = ForceJson> {
 impl SceneJson {
     /// `scene` as it resolved into `problem`.
     pub fn new(scene: &Scene, problem: &Problem) -> Self {
+        // A plug makes laws of the stages; they are shown by their coefficients.
+        let plain = Scene { criterion: Criterion::FullDepth, plug: None, ..scene.clone() };
+        let plain = scene.plug.and_then(|_| plain.resolve(problem.impact_speed).ok());
+        let problem = plain.as_ref().unwrap_or(problem);
         let concrete = scene.concrete();
         let of = |get: fn(&Concrete) -> f64| concrete.map(get);
         // A layered target has no strength of its own: its layers are in the stages.
@@ -145,6 +160,11 @@ impl SceneJson {
             stages: stages(scene, problem),
             forces: forces(scene).collect(),
             ends: ends(scene).collect(),
+            plug: scene.plug.zip(scene.tunnel()).zip(concrete).map(|((plug, tunnel), concrete)| PlugJson {
+                half_angle_deg: plug.half_angle,
+                shear_strength_pa: plug.shear_strength,
+                static_thickness_m: plug.static_thickness(tunnel.static_force, concrete.diameter),
+            }),
             parameters: scene
                 .parameters
                 .iter()

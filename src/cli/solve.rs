@@ -84,8 +84,19 @@ pub struct SolveJson {
     #[serde(skip_serializing_if = "Option::is_none")]
     trajectory: Option<Vec<Sample>>,
     skipped: Vec<String>,
+    /// The same slab by other criteria, with the criterion `plug`.
+    #[serde(skip)]
+    criteria: Vec<ByCriterionJson>,
     /// Asked for with `--sensitivities`; `null` otherwise.
     sensitivities: Option<SensitivitiesJson>,
+}
+
+/// The outcome by another criterion, and the velocity at its end.
+#[derive(Debug)]
+pub struct ByCriterionJson {
+    criterion: &'static str,
+    outcome: Outcome,
+    velocity_m_s: f64,
 }
 
 /// The groups of Eq. 13; `null` where the scene has none.
@@ -226,6 +237,7 @@ impl Ask for SolveArgs {
             relative_error: exact.and_then(|exact| RelativeErrorJson::new(&flight, &exact, problem.impact_speed)),
             trajectory: times.is_some().then(|| flight.trajectory.clone()),
             skipped,
+            criteria: criteria(&scene, problem.impact_speed, &method),
             sensitivities,
         };
         let is_unstable = flight.step_limit.is_some_and(|limit| !limit.stable);
@@ -236,6 +248,15 @@ impl Ask for SolveArgs {
         };
         Ok(Answer { text: self.text(&data, &flight), data: Some(data), exit })
     }
+}
+
+/// What `scene` comes to by other criteria, if its own is `plug`.
+fn criteria(scene: &Scene, speed: f64, method: &Method) -> Vec<ByCriterionJson> {
+    let by = |(criterion, other): (&'static str, Scene)| {
+        let flight = method.integrator().solve(&other.resolve(speed).ok()?, Detail::End).ok()?;
+        Some(ByCriterionJson { criterion, outcome: flight.outcome, velocity_m_s: flight.end.velocity })
+    };
+    scene.other_criteria().into_iter().filter_map(by).collect()
 }
 
 impl SolveArgs {
@@ -276,6 +297,16 @@ impl SolveArgs {
         for ForceJson { stage, force } in &data.scene.forces {
             let whose = if data.scene.stages.len() > 1 { format!("stage {stage}: ") } else { String::new() };
             text.wrapped("  force    ", &format!("{whose}{force}"));
+        }
+        if let Some(plug) = &data.scene.plug {
+            let angle = significant(plug.half_angle_deg);
+            let strength = engineering(plug.shear_strength_pa, "Pa");
+            let left = engineering(plug.static_thickness_m, "m");
+            text.line(format!("  plug     half angle {angle} deg, shear strength {strength}, static thickness {left}"));
+        }
+        for ByCriterionJson { criterion, outcome, velocity_m_s } in &data.criteria {
+            let velocity = engineering(*velocity_m_s, "m/s");
+            text.line(format!("  by       {criterion}: {outcome}, {velocity}"));
         }
         for end in &data.scene.ends {
             text.wrapped("  end      ", &end.text());

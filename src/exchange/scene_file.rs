@@ -23,7 +23,7 @@ use crate::physics::scene::{
     Concrete, CraterStiffness, Criterion, Ending, Force, Layer, OwnEnd, Range, Resistance, Scene, layer_beyond,
 };
 use crate::physics::units::{self, Dimension, Quantity, QuantityError};
-use crate::physics::{Stage, semi_empirical};
+use crate::physics::{Plug, Stage, semi_empirical};
 use crate::text::Shown;
 
 mod force_table;
@@ -227,6 +227,9 @@ const MATERIAL_OF_PROJECTILE: [&str; 2] = ["projectile.diameter", "projectile.no
 
 /// What [target] has besides its thickness, unless the force is given by stages; layers stand for the first two.
 const MATERIAL_OF_TARGET: [&str; 3] = ["target.strength", "target.density", "target.layer"];
+
+/// What [perforation] has with the criterion `plug` alone.
+const PLUG: [&str; 2] = ["perforation.half_angle", "perforation.shear_strength"];
 
 /// What [target] leaves to its layers, where it has any.
 const LAYERED_TARGET: [&str; 3] = ["target.strength", "target.density", "target.thickness"];
@@ -590,7 +593,7 @@ impl<'t> Reader<'t> {
 
     fn scene(&mut self) -> Result<Scene, Fault> {
         let velocity = self.at("impact").is_some().then(|| self.value(Parameter::Velocity)).transpose()?;
-        let criterion = self.criterion()?;
+        let (criterion, plug) = self.criterion()?;
         let missing = |header: &str, help: &str| {
             let message = format!("the scene has no {header}");
             Err(Fault::new(0..0, message, format!("{header} is required"), format!("add {help}")))
@@ -612,22 +615,67 @@ impl<'t> Reader<'t> {
             return missing("[target]", "[target] with strength and density, or stages");
         };
         let title = self.word("title").map(|(title, _)| title);
-        Ok(Scene { title, mass, resistance, forces, ends, thickness, criterion, velocity, parameters })
+        Ok(Scene { title, mass, resistance, forces, ends, thickness, criterion, plug, velocity, parameters })
     }
 
-    fn criterion(&self) -> Result<Criterion, Fault> {
+    fn criterion(&mut self) -> Result<(Criterion, Option<Plug>), Fault> {
         const PATH: &str = "perforation.criterion";
-        let Some((name, span)) = self.word(PATH) else { return Ok(Criterion::default()) };
-        match name.parse() {
-            Ok(Criterion::Ndrc) if self.at("stage").is_some() => Err(Fault::new(
+        let (name, span) = self.word(PATH).unwrap_or((<&str>::from(Criterion::default()).to_owned(), 0..0));
+        let Ok(criterion) = name.parse::<Criterion>() else {
+            return Err(DIALECT.unknown_word(PATH, span, &name, Criterion::VARIANTS));
+        };
+        if criterion != Criterion::FullDepth && self.at("stage").is_some() {
+            return Err(Fault::new(
                 span,
-                "`ndrc` needs a projectile diameter, and a scene of stages has none",
+                format!("`{name}` needs a projectile diameter, and a scene of stages has none"),
                 "`full-depth` in a scene of stages",
                 (DIALECT.remedy)(PATH),
-            )),
-            Ok(criterion) => Ok(criterion),
-            Err(_) => Err(DIALECT.unknown_word(PATH, span, &name, Criterion::VARIANTS)),
+            ));
         }
+        if criterion != Criterion::Plug {
+            self.without("[perforation]", &PLUG, "with criterion = \"plug\" alone")?;
+            return Ok((criterion, None));
+        }
+        let needs = |what: &str, help: &str| {
+            Err(Fault::new(span.clone(), format!("`plug` needs {what}"), "a slab of one concrete", help))
+        };
+        if self.at("target.layer").is_some() {
+            return needs("one concrete, and this target has layers", "take `full-depth`");
+        }
+        if self.at("target.thickness").is_none() {
+            return needs("a rear face, and this target has none", "give [target] a thickness, such as \"200 mm\"");
+        }
+        let half_angle = self.half_angle()?;
+        let shear_strength = self.value(Parameter::ShearStrength)?;
+        Ok((criterion, Some(Plug { half_angle, shear_strength })))
+    }
+
+    /// The half angle of the plug (degrees).
+    fn half_angle(&mut self) -> Result<f64, Fault> {
+        const ALLOWED: &str = "degrees from 0 to below 90, such as \"60 deg\", or a bare number";
+        let parameter = Parameter::HalfAngle;
+        let path = parameter.to_string();
+        let Some((_, value)) = self.at(&path) else { return Err(self.missing(&path, "\"60 deg\"")) };
+        let (span, help) = (value.span(), "write for instance half_angle = \"60 deg\"");
+        let refused = |message: String| Fault::new(span.clone(), message, ALLOWED, help);
+        let read = match (value.get_ref().as_str(), bare(value.get_ref())) {
+            (_, Some(bare)) => bare,
+            (Some(text), None) => {
+                let (number, unit) = units::split(text.trim());
+                if !["deg", "°"].contains(&unit.trim()) {
+                    return Err(refused(format!("`half_angle` takes degrees, not {}", quoted(unit.trim()))));
+                }
+                Quantity::bare(number.trim())
+            }
+            (None, None) => return Err(refused(format!("`half_angle` is {}", type_of(value.get_ref())))),
+        };
+        let quantity = read.map_err(|error| refused(format!("`half_angle`: {error}")))?;
+        let angle = quantity.value;
+        if !parameter.entry().range.contains(angle) {
+            return Err(refused(format!("`half_angle` = {} is out of range", Shown(angle))));
+        }
+        self.given.push((parameter, quantity));
+        Ok(angle)
     }
 
     /// The resistance of stages given outright, and the thickness of the target.

@@ -277,7 +277,8 @@ impl<'a, S: Scalar> Course<'a, S> {
     pub(crate) fn pass_condition(&mut self) {
         let Some(condition) = self.condition() else { return };
         self.just_met = Some(self.stage);
-        self.event(EventKind::boundary(self.problem, self.stage));
+        let is_plug = condition.is_plug();
+        self.event(if is_plug { EventKind::Plug } else { EventKind::boundary(self.problem, self.stage) });
         self.least_at_ends = self.least_at_ends.min(self.energy());
         let (at, mass, before) = (self.state.values(), self.mass.value(), self.stage);
         self.stage = condition.next();

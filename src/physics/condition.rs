@@ -3,6 +3,7 @@
 //! ```text
 //! end_velocity = v   g = V - v,            met where g <= 0
 //! until = "a = b"    g = a(x, V) - b(x, V)  met where g = 0 or changes its sign, in either direction
+//! a plug             g = R(x) - F(x, V),   met where g <= 0 (super::plug)
 //! ```
 //!
 //! A stage that is entered where its condition is met ends there. Touching counts. An end at a depth may stand beside a
@@ -32,6 +33,8 @@ pub(crate) enum Kind {
     Speed,
     /// A zero of g, from either side.
     Zero,
+    /// A zero of g from above, where a plug breaks off.
+    Plug,
 }
 
 impl<S: PartialEq> PartialEq for Condition<S> {
@@ -69,9 +72,19 @@ impl<S: Scalar> Condition<S> {
         self.kind == other.kind && self.values.tape() == other.values.tape() && values(self) == values(other)
     }
 
+    /// As [`Condition::of_zero`] from above, where a plug breaks off.
+    pub(super) fn of_plug(tape: &Tape, parameters: Vec<S>, next: usize) -> Self {
+        Self::new(tape, parameters, Kind::Plug, next)
+    }
+
     /// Index of the stage behind it.
     pub fn next(&self) -> usize {
         self.next
+    }
+
+    /// Whether a plug breaks off there.
+    pub fn is_plug(&self) -> bool {
+        self.kind == Kind::Plug
     }
 
     /// Whether it is a speed.
@@ -109,17 +122,17 @@ impl<S: Scalar> Condition<S> {
         8.0 * f64::EPSILON * (left.abs() + right.abs() + if place.is_finite() { place } else { 0.0 })
     }
 
-    /// Whether g is zero at a state, up to rounding; of a speed, whether it is no longer above it.
+    /// Whether g is zero at a state, up to rounding; of a speed or a plug, whether it is no longer above zero.
     pub(crate) fn is_met(&self, at: State<S>) -> bool {
         let State { depth, velocity, .. } = at.values();
         let (g, noise) = (self.value(depth, velocity), self.noise(depth, velocity));
-        if self.kind == Kind::Speed { g <= noise } else { g.abs() <= noise }
+        if self.kind == Kind::Zero { g.abs() <= noise } else { g <= noise }
     }
 
     /// The sign of g on the way to its zero, for a stage that is entered at a state.
     pub(crate) fn side(&self, at: State<S>) -> f64 {
         let State { depth, velocity, .. } = at.values();
-        if self.kind == Kind::Speed { 1.0 } else { self.value(depth, velocity).signum() }
+        if self.kind == Kind::Zero { self.value(depth, velocity).signum() } else { 1.0 }
     }
 
     /// `state` with what the end fixes exactly.
@@ -139,7 +152,7 @@ impl<S: Scalar> Condition<S> {
     /// The first depth between two (m) at which it is met at rest, by a search at 33 places.
     pub(crate) fn met_at_rest(&self, from: f64, to: f64) -> Option<f64> {
         let g = |x: f64| self.value(x, 0.0);
-        let side = if self.kind == Kind::Speed { 1.0 } else { g(from).signum() };
+        let side = if self.kind == Kind::Zero { g(from).signum() } else { 1.0 };
         if side * g(from) <= 0.0 {
             return Some(from);
         }

@@ -49,6 +49,10 @@ pub enum Parameter {
     CraterStiffness,
     /// Impact velocity V0 (m/s).
     Velocity,
+    /// Half angle of the plug (degrees).
+    HalfAngle,
+    /// Shear strength around the plug (Pa).
+    ShearStrength,
     /// A number of the layer `.0`, counted from 0.
     Layer(usize, LayerNumber),
     /// A number of the stage `.0`, counted from 0.
@@ -115,7 +119,7 @@ pub enum Absence {
 
 impl Parameter {
     /// Every number with a path of its own, groups last.
-    pub const PLAIN: [Self; 14] = [
+    pub const PLAIN: [Self; 16] = [
         Self::Mass,
         Self::Diameter,
         Self::NoseFactor,
@@ -127,6 +131,8 @@ impl Parameter {
         Self::CraterRatio,
         Self::CraterStiffness,
         Self::Velocity,
+        Self::HalfAngle,
+        Self::ShearStrength,
         Self::ThicknessRatio,
         Self::Geometry,
         Self::Impact,
@@ -138,7 +144,7 @@ impl Parameter {
         use Absence::{Is, Means, Refused};
         use Dimension::{Density, Drag, Force, Length, Mass, Pressure, Stiffness, Velocity, Viscosity};
         use LayerNumber as L;
-        use Range::{Finite, NotNegative, Positive, UnitInterval};
+        use Range::{BelowRightAngle, Finite, NotNegative, Positive, UnitInterval};
         use StageNumber as S;
         const GROUP: Absence = Means("what its numbers give");
         const CONTINUOUS: Absence = Means("a force continuous at x = k d");
@@ -159,6 +165,12 @@ impl Parameter {
             Self::Velocity => {
                 let example = Refused("\"300 m/s\", or drop [impact]");
                 ("impact.velocity", "impact speed V0", Some(Velocity), NotNegative, example)
+            }
+            Self::HalfAngle => {
+                ("perforation.half_angle", "half angle of the plug [deg]", None, BelowRightAngle, Refused("\"60 deg\""))
+            }
+            Self::ShearStrength => {
+                ("perforation.shear_strength", "shear strength tau", Some(Pressure), Positive, Refused("\"20 MPa\""))
             }
             Self::Layer(_, L::Thickness) => {
                 ("target.layer.*.thickness", "thickness h", Some(Length), NotNegative, THICK)
@@ -252,6 +264,9 @@ impl Parameter {
     /// [`ParameterError::Value`].
     pub fn parse_value(self, text: &str) -> Result<f64, ParameterError> {
         let text = text.trim();
+        // The one number with a unit that is no dimension.
+        let text =
+            if self == Self::HalfAngle { text.trim_end_matches("deg").trim_end_matches('°').trim() } else { text };
         let read = match (number(text), self.entry().dimension) {
             // A bare number is SI; anything else must have a unit of the dimension.
             (Err(QuantityError::NoNumber), Some(dimension)) => quantity(text, dimension),
@@ -282,6 +297,7 @@ impl Parameter {
                 let is_there = scene.parameters.iter().any(|one| one.name == name);
                 (!is_there).then_some("its forces have no such parameter")
             }
+            (Self::HalfAngle | Self::ShearStrength, _) => scene.plug.is_none().then_some("its criterion is not `plug`"),
             (Self::Mass | Self::Velocity, _) | (Self::Thickness, Stages(_)) => None,
             (Self::Stage(index, which), Stages(stages)) => {
                 let is_table = which.is_coefficient() && scene.force_of(index).is_some();
@@ -325,6 +341,8 @@ impl Parameter {
             }
             (Self::Mass, _) => scene.mass,
             (Self::Velocity, _) => velocity()?,
+            (Self::HalfAngle, _) => scene.plug.map_or(f64::NAN, |plug| plug.half_angle),
+            (Self::ShearStrength, _) => scene.plug.map_or(f64::NAN, |plug| plug.shear_strength),
             (Self::Stage(index, which), Stages(stages)) => {
                 let number = scene.end_of(index).and_then(|end| end.number(which));
                 number.unwrap_or_else(|| which.of(stages[index]))
@@ -369,6 +387,8 @@ impl Parameter {
             }
             (Self::Mass, _) => scene.mass = value,
             (Self::Velocity, _) => scene.velocity = Some(value),
+            (Self::HalfAngle, _) => scene.plug.iter_mut().for_each(|plug| plug.half_angle = value),
+            (Self::ShearStrength, _) => scene.plug.iter_mut().for_each(|plug| plug.shear_strength = value),
             (Self::Stage(index, which), Stages(stages)) => {
                 let end = scene.ends.iter_mut().find(|(stage, _)| *stage == index);
                 if let Some(number) = end.and_then(|(_, end)| end.number_mut(which)) {
@@ -636,10 +656,13 @@ mod tests {
         let of =
             |range| numbers.iter().filter(|p| p.entry().range == range).map(ToString::to_string).collect::<Vec<_>>();
         let positive = ["projectile.mass", "projectile.diameter", "target.strength", "resistance.S"];
-        assert_eq!(of(Range::Positive), [&positive[..], &["resistance.crater_stiffness", "N"]].concat());
+        assert_eq!(
+            of(Range::Positive),
+            [&positive[..], &["resistance.crater_stiffness", "perforation.shear_strength", "N"]].concat()
+        );
         assert_eq!(of(Range::UnitInterval), ["projectile.nose.factor"]);
         assert_eq!(of(Range::Finite), ["stage.0.static_force"]);
-        assert_eq!(of(Range::NotNegative).len(), numbers.len() - 8);
+        assert_eq!(of(Range::NotNegative).len(), numbers.len() - 10);
     }
 
     #[test]

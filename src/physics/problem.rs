@@ -404,6 +404,8 @@ pub enum EventKind {
     StageEnd(usize),
     /// Depth k d reached, touching included.
     CraterEnd,
+    /// A plug breaks off ([`super::plug`]).
+    Plug,
     /// Exit depth reached, touching included.
     Exit,
     /// Velocity zero.
@@ -416,7 +418,7 @@ impl EventKind {
         if problem.crater == Some(index) { Self::CraterEnd } else { Self::StageEnd(index) }
     }
 
-    /// Name in every output (docs/reference.md, "JSON"): `crater-end`, `stage-end`, `exit`, `rest`.
+    /// Name in every output (docs/reference.md, "JSON"): `crater-end`, `stage-end`, `plug`, `exit`, `rest`.
     pub fn name(self) -> &'static str {
         self.into()
     }

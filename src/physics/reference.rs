@@ -408,7 +408,8 @@ impl Source<'_> {
             Self::Problem(problem) => (0..problem.stages.len()).find(|&index| problem.laws.of(index).is_some()),
             Self::Scene(scene, _) => {
                 let is_law = |(_, force): &&(usize, Force)| matches!(force, Force::Expression(_));
-                let end = scene.ends.first().map(|(stage, _)| *stage);
+                let plug = (scene.criterion == Criterion::Plug).then_some(0);
+                let end = scene.ends.first().map(|(stage, _)| *stage).or(plug);
                 scene.forces.iter().find(is_law).map(|(stage, _)| *stage).or(end)
             }
         };

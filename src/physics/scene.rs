@@ -14,6 +14,7 @@ use super::expression::{Known, Tape};
 use super::force_table::ForceTable;
 use super::law::{Law, Laws, OwnParameter};
 use super::parameter::{LayerNumber, Parameter, StageNumber};
+use super::plug::{Plug, Slab};
 use super::problem::{Problem, Stage, Stages, Target};
 use super::scalar::Scalar;
 use super::semi_empirical;
@@ -161,6 +162,8 @@ pub enum Criterion {
     FullDepth,
     /// x = `x_p(H)`, the penetration that perforates by the ACE/NDRC relation (docs/theory.md, section 4).
     Ndrc,
+    /// The rest of the slab breaks off as a plug ([`super::plug`]), or x = H before that.
+    Plug,
 }
 
 impl Criterion {
@@ -169,6 +172,7 @@ impl Criterion {
         match self {
             Self::FullDepth => "x = H",
             Self::Ndrc => "x = x_p(H), the NDRC relation",
+            Self::Plug => "the plug",
         }
     }
 }
@@ -190,6 +194,8 @@ pub struct Scene {
     pub thickness: Option<f64>,
     /// When it counts as perforated.
     pub criterion: Criterion,
+    /// The plug of the criterion [`Criterion::Plug`].
+    pub plug: Option<Plug>,
     /// Impact velocity V0 (m/s), where the scene gives one.
     pub velocity: Option<f64>,
     /// The quantities that expressions use by name.
@@ -209,6 +215,8 @@ pub enum Range {
     UnitInterval,
     /// Finite and >= 0.5.
     AtLeastHalf,
+    /// 0 to below 90.
+    BelowRightAngle,
 }
 
 impl Range {
@@ -221,6 +229,7 @@ impl Range {
                 Self::Positive => value > 0.0,
                 Self::UnitInterval => (0.0..=1.0).contains(&value),
                 Self::AtLeastHalf => value >= 0.5,
+                Self::BelowRightAngle => (0.0..90.0).contains(&value),
             }
     }
 
@@ -232,6 +241,7 @@ impl Range {
             Self::Positive => "a number > 0",
             Self::UnitInterval => "a number from 0 to 1",
             Self::AtLeastHalf => "a number >= 0.5",
+            Self::BelowRightAngle => "degrees from 0 to below 90",
         }
     }
 
@@ -265,6 +275,9 @@ pub enum ResolveError {
     /// The criterion `ndrc` on a scene without a diameter.
     #[error("the criterion `ndrc` needs a projectile diameter, and a scene of stages has none")]
     NoDiameter,
+    /// The criterion `plug` on a scene that lacks what it needs.
+    #[error("the criterion `plug` needs a slab of one concrete with a thickness, a half angle and a shear strength")]
+    NoPlug,
     /// No stage at all.
     #[error("the scene has no stage")]
     NoStage,
@@ -326,6 +339,9 @@ impl Advice for ResolveError {
         match self {
             Self::Inadmissible { .. } => "give a value in the range",
             Self::NoImpactSpeed => "add [impact] with velocity = \"300 m/s\"",
+            Self::NoPlug => {
+                "give [target] a thickness and [perforation] half_angle and shear_strength, or take `full-depth`"
+            }
             Self::NoDiameter => "take the criterion `full-depth`",
             Self::NoStage => "give at least one stage",
             Self::StageEndsFall { .. } => "order the stages by their ends, and leave out only the last end",
@@ -582,6 +598,7 @@ impl Scene {
             ends: Vec::new(),
             thickness: None,
             criterion: Criterion::FullDepth,
+            plug: None,
             velocity: None,
             parameters: Vec::new(),
         }
@@ -639,12 +656,61 @@ impl Scene {
                 (stages, crater, target)
             }
         };
-        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target, laws: Laws::none() })
+        let (stages, laws) = match self.criterion {
+            Criterion::Plug => self.with_plug(&stages, exit_depth, &number)?,
+            _ => (stages, Laws::none()),
+        };
+        Ok(Problem { mass, impact_speed, exit_depth, stages, crater, target, laws })
+    }
+
+    /// `stages`, each of which ends where the plug breaks off too, and that of the plug behind them.
+    #[cold]
+    fn with_plug<S: Scalar>(
+        &self,
+        stages: &[Stage<S>],
+        thickness: S,
+        number: &impl Fn(Parameter, f64) -> S,
+    ) -> Resolved<(Stages<S>, Laws<S>)> {
+        let (Some(plug), Some(concrete), true) = (self.plug, self.concrete(), thickness.value() < f64::INFINITY) else {
+            return Err(ResolveError::NoPlug);
+        };
+        if !concrete.layers.is_empty() {
+            return Err(ResolveError::NoPlug);
+        }
+        Parameter::HalfAngle.admit(plug.half_angle)?;
+        Parameter::ShearStrength.admit(plug.shear_strength)?;
+        let angle = number(Parameter::HalfAngle, plug.half_angle) * S::from_f64(1_f64.to_radians());
+        let slab = Slab {
+            thickness,
+            diameter: number(Parameter::Diameter, concrete.diameter),
+            density: number(Parameter::Density, concrete.density),
+            shear_strength: number(Parameter::ShearStrength, plug.shear_strength),
+            tangent: angle.sin().over(angle.cos()),
+        };
+        let laws = stages.iter().map(|stage| Some(slab.breaking(stage, stages.len())));
+        let laws: Laws<S> = laws.chain([Some(slab.moving())]).collect();
+        let places = stages.iter().map(|stage| Stage::of_law(stage.end));
+        Ok((places.chain([Stage::of_law(S::from_f64(f64::INFINITY))]).collect(), laws))
     }
 
     /// The force of stage `index` that is no coefficients.
     pub fn force_of(&self, index: usize) -> Option<&Force> {
         self.forces.iter().find(|(stage, _)| *stage == index).map(|(_, force)| force)
+    }
+
+    /// The same target judged by other criteria, with their names, for a scene with the criterion `plug`: x = H, `x_p(H)`, and
+    /// `H - H*`, where the static resistance breaks the plug off; none for any other scene.
+    pub fn other_criteria(&self) -> Vec<(&'static str, Self)> {
+        let (Some(plug), Some(concrete), Some(thickness), Some(tunnel)) =
+            (self.plug, self.concrete(), self.thickness, self.tunnel())
+        else {
+            return Vec::new();
+        };
+        let of = |criterion| Self { criterion, plug: None, ..self.clone() };
+        let left = plug.static_thickness(tunnel.static_force, concrete.diameter);
+        let full = of(Criterion::FullDepth);
+        let fixed = Self { thickness: Some((thickness - left).max(0.0)), ..full.clone() };
+        vec![("full-depth", full), ("ndrc", of(Criterion::Ndrc)), ("static plug", fixed)]
     }
 
     /// How stage `index` ends besides at a depth.
@@ -773,6 +839,9 @@ impl Scene {
     /// # Errors
     /// As [`Scene::resolve`].
     pub(crate) fn resolve_from(&self, problem: &Problem, impact_speed: f64) -> Resolved {
+        if self.criterion == Criterion::Plug {
+            return self.resolve(impact_speed);
+        }
         Parameter::Velocity.admit(impact_speed)?;
         let mut stages = Stages::from_slice(&problem.stages);
         let continuous = self.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous);
@@ -810,7 +879,7 @@ impl Scene {
     /// by, or the depth leaves the range of `f64`.
     fn exit_depth_in<S: Scalar>(&self, number: &impl Fn(Parameter, f64) -> S) -> Resolved<S> {
         let diameter = match self.criterion {
-            Criterion::FullDepth => None,
+            Criterion::FullDepth | Criterion::Plug => None,
             Criterion::Ndrc => Some(self.concrete().ok_or(ResolveError::NoDiameter)?.diameter),
         };
         let Some(given) = self.thickness else { return Ok(S::from_f64(f64::INFINITY)) };

@@ -521,6 +521,6 @@ fn words_for_event(kind: EventKind, problem: &Problem) -> String {
         EventKind::CraterEnd => "x = k d".to_owned(),
         EventKind::StageEnd(index) if problem.stages[index].end == f64::INFINITY => format!("the end of stage {index}"),
         EventKind::StageEnd(index) => format!("x = {} mm", number(problem.stages[index].end * 1e3, 3)),
-        EventKind::Exit | EventKind::Rest => kind.name().to_owned(),
+        EventKind::Plug | EventKind::Exit | EventKind::Rest => kind.name().to_owned(),
     }
 }

@@ -141,6 +141,7 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
         mass: row.number(0)?,
         forces: Vec::new(),
         ends: Vec::new(),
+        plug: None,
         parameters: Vec::new(),
         resistance: Resistance::Concrete(Concrete {
             diameter: row.number(1)?,
@@ -157,7 +158,10 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
         thickness: row.optional(5)?,
         criterion: match row.text(11)? {
             "" => Criterion::default(),
-            name => name.parse().map_err(|_| row.refuse_cell(11, name, "not full-depth or ndrc"))?,
+            name => match name.parse() {
+                Ok(criterion) if criterion != Criterion::Plug => criterion,
+                _ => return Err(row.refuse_cell(11, name, "not full-depth or ndrc").into()),
+            },
         },
         velocity: Some(row.number(10)?),
     })

@@ -21,8 +21,8 @@ use super::error::Studied;
 use super::perforating_velocities::{self, Edge, Interval, Perforating};
 use crate::integrators::{Accuracy, Cost, IntegrationError, Integrator, Margin, MethodName, Taylor};
 use crate::physics::{
-    Advice, Concrete, CraterStiffness, Problem, ResolveError, Resolved, Scene, Shown, Stage, Target, closed_form,
-    exit_energy, scene::Ending,
+    Advice, Concrete, CraterStiffness, Criterion, Problem, ResolveError, Resolved, Scene, Shown, Stage, Target,
+    closed_form, exit_energy, scene::Ending,
 };
 
 /// Speed (m/s) at which the scene is first resolved, for its exit depth and static work.
@@ -388,7 +388,7 @@ pub fn perforating(scene: &Scene, integrator: &dyn Integrator) -> Sought<Option<
 /// # Errors
 /// [`CriticalError`], several intervals excepted.
 pub fn speeds(scene: &Scene, integrator: &dyn Integrator) -> Sought<(Vec<Interval>, Option<CriticalVelocity>)> {
-    if scene.ends.is_empty() {
+    if scene.ends.is_empty() && scene.criterion != Criterion::Plug {
         let found = of_scene(scene, integrator)?;
         return Ok((vec![of_one(&found)], Some(found)));
     }
@@ -449,9 +449,13 @@ const SHOWN_MAX: usize = 6;
 pub fn exact(scene: &Scene) -> Studied<f64> {
     let problem = scene.resolve(PROBE_SPEED)?;
     let critical = match scene.concrete() {
-        Some(concrete) if concrete.layers.is_empty() => closed_form::critical(&problem, concrete.crater_stiffness)?,
+        Some(concrete) if concrete.layers.is_empty() && problem.laws.is_empty() => {
+            closed_form::critical(&problem, concrete.crater_stiffness)?
+        }
         // Layers with a continuous crater constant depend on V0 through it.
-        Some(Concrete { crater_stiffness: CraterStiffness::Continuous, .. }) => return of_layers(problem),
+        Some(Concrete { crater_stiffness: CraterStiffness::Continuous, .. }) if problem.laws.is_empty() => {
+            return of_layers(problem);
+        }
         _ => closed_form::critical_of_stages(&problem)?,
     };
     Ok(critical.velocity)

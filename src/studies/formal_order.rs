@@ -6,7 +6,7 @@
 
 use super::quantity::Quantity;
 use crate::integrators::{Boundaries, Flight, VelocityAt};
-use crate::physics::{EventKind, Law, Outcome, Problem};
+use crate::physics::{EventKind, Law, Outcome, Problem, State};
 
 /// Largest jump of the force at a stage end, relative to the force, that still counts as continuous.
 ///
@@ -38,15 +38,26 @@ impl Path {
     /// The facts about `flight`, an accurate flight (closed form, Taylor) through `problem` with its events.
     pub fn of(problem: &Problem, flight: &Flight) -> Self {
         // Stages of no length leave no trace.
+        let mut behind = None;
+        let ends: Vec<(usize, State)> = flight
+            .events
+            .iter()
+            .filter_map(|event| {
+                let index = match event.kind {
+                    EventKind::StageEnd(index) => index,
+                    EventKind::CraterEnd => problem.crater?,
+                    EventKind::Plug => behind.map_or(0, |index| index + 1),
+                    EventKind::Exit | EventKind::Rest => return None,
+                };
+                behind = Some(index);
+                Some((index, event.state))
+            })
+            .collect();
         let crossed: Vec<usize> = if problem.laws.have_conditions() {
             // Where they end, the flight tells.
-            let ends = flight.events.iter().filter_map(|event| match event.kind {
-                EventKind::StageEnd(index) => Some((index, event.state.depth)),
-                _ => None,
-            });
             let mut start = 0.0;
-            let passed = ends.filter(|(_, depth)| std::mem::replace(&mut start, *depth) < *depth);
-            passed.map(|(index, _)| index).chain([flight.stage]).collect()
+            let passed = ends.iter().filter(|(_, at)| std::mem::replace(&mut start, at.depth) < at.depth);
+            passed.map(|(index, _)| *index).chain([flight.stage]).collect()
         } else {
             (0..=flight.stage).filter(|&index| problem.stages[index].end > problem.start_of(index)).collect()
         };
@@ -59,7 +70,7 @@ impl Path {
                     own.map_or(law.viscosity > 0.0 || law.drag > 0.0, Law::depends_on_velocity);
                 if turn > 0
                     && let behind = crossed[turn - 1]
-                    && let Some(state) = flight.at(EventKind::boundary(problem, behind))
+                    && let Some((_, state)) = ends.iter().find(|(index, _)| *index == behind)
                 {
                     let left = problem.force(behind, state.depth, state.velocity);
                     let right = problem.force(index, state.depth, state.velocity);

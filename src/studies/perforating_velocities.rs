@@ -5,7 +5,7 @@
 //! the plane (x, W) cross: a faster projectile may meet its condition elsewhere, or not at all. The speeds that
 //! perforate are then intervals.
 //!
-//! Flights at [`PLACES`] speeds, in equal ratios, show where the outcome changes; between two stops or two
+//! Flights at a thousand speeds, in equal ratios, show where the outcome changes; between two stops or two
 //! perforations whose exit margins come near to zero the extremum is sought. Each change is then halved to round-off. An
 //! interval narrower than a step of the scan is found only so.
 

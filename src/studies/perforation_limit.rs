@@ -103,6 +103,7 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<Perforatio
     }
     let (thickness, slope) = match scene.criterion {
         Criterion::FullDepth => (depth, 1.0),
+        Criterion::Plug => return Err(ResolveError::NoPlug.into()),
         Criterion::Ndrc => {
             let d = scene.concrete().ok_or(ResolveError::NoDiameter)?.diameter;
             let y = depth / d;

@@ -295,7 +295,7 @@ fn solve_by_diffsol(problem: &Problem<Dual64>, rtol: f64) -> Solved<State<Dual64
         }
         let stage = match event.kind {
             EventKind::StageEnd(index) => index,
-            EventKind::CraterEnd => problem.crater.unwrap_or(0),
+            EventKind::CraterEnd | EventKind::Plug => problem.crater.unwrap_or(0),
             EventKind::Exit | EventKind::Rest => flight.stage,
         };
         let law = &problem.stages[stage];

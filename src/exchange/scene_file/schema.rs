@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{FORCE, LAYERED_TARGET, MATERIAL_OF_PROJECTILE, MATERIAL_OF_TARGET, NOSES, UNTIL, below, numbers};
+use super::{FORCE, LAYERED_TARGET, MATERIAL_OF_PROJECTILE, MATERIAL_OF_TARGET, NOSES, PLUG, UNTIL, below, numbers};
 use crate::exchange::diagnostic::key_of;
 use crate::physics::Range;
 use crate::physics::parameter::{Absence, Entry, LayerNumber, Parameter, StageNumber};
@@ -21,16 +21,25 @@ pub fn schema() -> Value {
         "projectile": absent(&MATERIAL_OF_PROJECTILE),
         "target": absent(&MATERIAL_OF_TARGET),
         "resistance": false,
-        "perforation": { "properties": { "criterion": { "const": <&str>::from(Criterion::FullDepth) } } },
+        "perforation": { "properties": {
+            "criterion": { "const": <&str>::from(Criterion::FullDepth) },
+            "half_angle": false,
+            "shear_strength": false,
+        } },
     } });
     let target = json!({
         "if": { "required": ["layer"] },
         "then": absent(&LAYERED_TARGET),
         "else": required(&MATERIAL_OF_TARGET[..2]),
     });
+    let plug = json!({
+        "if": { "properties": { "criterion": { "const": <&str>::from(Criterion::Plug) } }, "required": ["criterion"] },
+        "then": { "required": PLUG.map(key_of) },
+        "else": absent(&PLUG),
+    });
     let concrete = json!({
         "required": ["target"],
-        "properties": { "projectile": required(&MATERIAL_OF_PROJECTILE), "target": target, "parameters": false },
+        "properties": { "projectile": required(&MATERIAL_OF_PROJECTILE), "target": target, "perforation": plug, "parameters": false },
     });
     // Units of parameters are any product of known ones, which the reader alone knows.
     let parameter =
@@ -79,7 +88,9 @@ fn table(home: &str) -> Value {
                         MATERIAL_OF_PROJECTILE.iter().chain(&MATERIAL_OF_TARGET).any(|known| *known == path);
                     // The last layer goes without a thickness.
                     let is_last = matches!(number, Parameter::Layer(_, LayerNumber::Thickness));
-                    if matches!(number.entry().absence, Absence::Refused(_)) && !is_material && !is_last {
+                    let is_of_plug = matches!(number, Parameter::HalfAngle | Parameter::ShearStrength);
+                    let is_required = !is_material && !is_last && !is_of_plug;
+                    if matches!(number.entry().absence, Absence::Refused(_)) && is_required {
                         required.push(key);
                     }
                     described(number)
@@ -129,6 +140,10 @@ fn value_of(number: Parameter) -> Value {
     // S of a layer that a file gives is that of any concrete.
     let is_given = matches!(number, Parameter::Layer(_, LayerNumber::StaticFactor));
     let range = if is_given { Parameter::StaticFactor.entry().range } else { range };
+    if number == Parameter::HalfAngle {
+        let pattern = format!("^\\s*{}\\s*(?:deg|°)\\s*$", decimal(range));
+        return json!({ "anyOf": [{ "type": "string", "pattern": pattern }, in_range(range)] });
+    }
     let Some(dimension) = dimension else { return in_range(range) };
     let quantity = json!({ "$ref": format!("#/definitions/{}", name_of(dimension, range)) });
     let mut ways = vec![quantity];
@@ -146,6 +161,7 @@ fn in_range(range: Range) -> Value {
         Range::Positive => ("exclusiveMinimum", 0.0),
         Range::UnitInterval => return json!({ "type": "number", "minimum": 0, "maximum": 1 }),
         Range::AtLeastHalf => ("minimum", 0.5),
+        Range::BelowRightAngle => return json!({ "type": "number", "minimum": 0, "exclusiveMaximum": 90 }),
     };
     json!({ "type": "number", key: bound })
 }

@@ -81,6 +81,7 @@ fn every_key_is_read() {
         mass: 2.0,
         forces: Vec::new(),
         ends: Vec::new(),
+        plug: None,
         parameters: Vec::new(),
         resistance: Resistance::Concrete(concrete),
         thickness: Some(0.18),

@@ -163,6 +163,72 @@ fn a_critical_speed_is_found_where_a_stage_ends_on_a_condition() {
     assert!(found.error_bar.unwrap() < 1e-9 && !found.note.is_empty(), "{found:?}");
 }
 
+/// The slab of the paper, S = 12: crater and tunnel by their closed forms, the plug at the zero of R - F, the critical speed
+/// from rest at H - H*; mpmath with 40 digits.
+#[test]
+fn a_slab_plugs_where_the_force_is_the_strength_left_and_its_limit_is_the_static_plug() {
+    let text = "projectile = { mass = 20, diameter = 0.06, nose = { shape = 'flat' } }\nimpact.velocity = 160\n\
+                [target]\nstrength = 36e6\ndensity = 2400\nthickness = 0.3\n\
+                [perforation]\ncriterion = 'plug'\nhalf_angle = '60 deg'\nshear_strength = 7.2e6\n";
+    let scene = Scene::from_toml(text, "plug").unwrap();
+    for (name, method) in methods(1e-10) {
+        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let flight = method.integrator().solve(&scene.problem().unwrap(), Detail::Events).unwrap();
+        assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Plug, EventKind::Exit], "{name}");
+        let [crater, plug, exit] = [0, 1, 2].map(|index| flight.events[index].state);
+        for (value, exact) in [
+            (crater.time, 7.961_569_211_410_025e-4),
+            (crater.velocity, 132.500_867_408_136_9),
+            (plug.time, 8.912_502_758_069_82e-4),
+            (plug.depth, 0.132_297_738_937_724_3),
+            (plug.velocity, 126.153_561_809_053_66),
+            (exit.time, 0.005_392_282_364_538_44),
+            (exit.velocity, 37.258_623_745_901_76),
+        ] {
+            assert!(is_near(value, exact, allowed), "{name}: {value} and {exact}");
+        }
+    }
+    let found = critical_velocity::of_scene(&scene, &Taylor::default()).unwrap();
+    assert!(is_near(found.velocity, 99.377_690_863_332_65, 1e-13), "{found:?}");
+}
+
+/// R - F grows from the face on, where the slowest that plugs breaks it at once: `P + Q V_c² = R(H)`.
+#[test]
+fn the_residual_velocity_jumps_at_the_ballistic_limit_where_the_force_falls_faster_than_the_strength() {
+    let text = "projectile = { mass = 0.2, diameter = 0.05, nose = { shape = 'flat' } }\nresistance = { S = 1, k = 0 }\n\
+                impact.velocity = 300\n[target]\nstrength = 30e6\ndensity = 2400\nthickness = 0.4\n\
+                [perforation]\ncriterion = 'plug'\nhalf_angle = '10 deg'\nshear_strength = 5e5\n";
+    let scene = Scene::from_toml(text, "plug").unwrap();
+    let (intervals, found) = critical_velocity::speeds(&scene, &Taylor::default()).unwrap();
+    let found = found.unwrap();
+    assert_eq!(intervals.len(), 1, "{intervals:?}");
+    let at = |speed: f64| Taylor::default().solve(&scene.resolve(speed).unwrap(), Detail::Events).unwrap();
+    let [below, above] = [1.0 - 1e-9, 1.0 + 1e-9].map(|share| at(share * found.velocity));
+    assert_eq!((below.outcome, above.outcome), (Outcome::StoppedInTunnel, Outcome::Perforated));
+    assert!(above.end.velocity > 0.9 && above.at(EventKind::Plug).is_some(), "{above:?}");
+    let (plug, tunnel) = (scene.plug.unwrap(), scene.tunnel().unwrap());
+    let exact = ((plug.strength_left(0.4, 0.05) - tunnel.static_force) / tunnel.drag).sqrt();
+    assert!(is_near(found.velocity, exact, 1e-12), "{} and {exact}", found.velocity);
+    let fixed = scene.other_criteria().pop().unwrap().1;
+    let fixed = critical_velocity::of_scene(&fixed, &Taylor::default()).unwrap();
+    assert!(found.velocity < fixed.velocity, "{} and {}", found.velocity, fixed.velocity);
+}
+
+/// 25 kN over 0.1 m takes 50 m/s. A projectile that falls to 100 m/s meets 1 MN, and gets on for 10 mm: 12,250 m²/s² of
+/// V0² leave 100 m/s that deep.
+#[test]
+fn speeds_that_perforate_are_intervals_where_a_slower_projectile_misses_a_condition() {
+    let text = "target.thickness = 0.1\nparameters.v1 = '100 m/s'\n[[stage]]\nstatic_force = 25000\n\
+                until = 'V = v1'\n[[stage]]\nstatic_force = 1e6\n";
+    let (intervals, found) = critical_velocity::speeds(&scene(text), &Taylor::default()).unwrap();
+    let ends: Vec<_> = intervals.iter().map(|one| (one.low.velocity, one.high.map(|high| high.velocity))).collect();
+    let [(first, Some(last)), (second, None)] = ends[..] else { unreachable!("{ends:?}") };
+    assert!(found.is_none() && is_near(first, 50.0, 1e-13) && is_near(last, 100.0, 1e-13), "{ends:?}");
+    assert!(is_near(second, 12_250_f64.sqrt(), 1e-13), "{ends:?}");
+    let error = critical_velocity::of_scene(&scene(text), &Taylor::default()).unwrap_err().to_string();
+    assert!(error.contains("50 to 99.99") && error.contains("and above"), "{error}");
+}
+
 #[test]
 fn formulas_refuse_ends_that_are_no_depths() {
     for name in [MethodName::Energy, MethodName::ClosedForm] {

@@ -151,6 +151,7 @@ impl Row {
             mass,
             forces: Vec::new(),
             ends: Vec::new(),
+            plug: None,
             parameters: Vec::new(),
             resistance: Resistance::Concrete(concrete),
             thickness: self.cells[5],

@@ -682,6 +682,7 @@ fn wire_answer(&WireAnswer { problems }: &WireAnswer, subject: &Subject<'_>, see
         let kinds = flight.events.iter().enumerate().all(|(at, event)| match event.kind {
             EventKind::CraterEnd => problem.crater == Some(at) && at + 1 < states.len(),
             EventKind::StageEnd(stage) => problem.crater != Some(at) && stage == at && at + 1 < states.len(),
+            EventKind::Plug => false,
             EventKind::Rest => rests && at + 1 == states.len(),
             EventKind::Exit => !rests && at + 1 == states.len(),
         });
