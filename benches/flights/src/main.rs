@@ -118,6 +118,43 @@ fn varied(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Impact speeds about `speed`, by the golden section.
+fn speeds(speed: f64) -> impl Iterator<Item = f64> {
+    (0..200).map(move |i| speed * (0.8 + 0.4 * (f64::from(i) * 0.618_033_988_749_894_8).fract()))
+}
+
+/// The laws that ship; `laws.py` times other programs at the same speeds.
+fn laws(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("laws");
+    group.throughput(Throughput::Elements(200));
+    for (name, _) in SHIPPED.iter().filter(|(name, _)| name.starts_with("law-")) {
+        let scene = scene(name);
+        let resolve = |speed| scene.resolve(speed).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let problems: Vec<Problem> = scene.velocity.into_iter().flat_map(speeds).map(resolve).collect();
+        // A law that only approaches a depth has no time to compare.
+        if Taylor::default().solve(&problems[0], Detail::End).is_err() {
+            continue;
+        }
+        for problem in &problems {
+            let strict =
+                Method::new(MethodName::Tsit45, &MethodOptions { rtol: Some(1e-11), ..MethodOptions::default() });
+            let strict = strict.unwrap_or_else(|e| panic!("{e}"));
+            let [ours, theirs] = [&Taylor::default() as &dyn Integrator, strict.integrator()]
+                .map(|method| method.solve(problem, Detail::End).unwrap_or_else(|e| panic!("{name}: {e}")));
+            let off = [
+                ours.end.depth / theirs.end.depth - 1.0,
+                (ours.end.velocity - theirs.end.velocity) / problem.impact_speed,
+            ];
+            assert!(ours.outcome == theirs.outcome && off.iter().all(|off| off.abs() < 1e-7), "{name}: {off:?}");
+        }
+        let solve = |problem| Taylor::default().solve(problem, Detail::Events);
+        group.bench_function(*name, |bencher| {
+            bencher.iter(|| problems.iter().filter(|problem| black_box(solve(problem)).is_ok()).count());
+        });
+    }
+    group.finish();
+}
+
 fn batch(criterion: &mut Criterion) {
     let scenes = varied_scenes();
     let varied: Vec<Problem> = scenes.iter().filter_map(|scene| scene.problem().ok()).collect();
@@ -169,6 +206,6 @@ criterion_group! {
     name = benches;
     // Fifty benches of eight seconds each would be more than anybody waits for.
     config = Criterion::default().warm_up_time(Duration::from_secs(1)).measurement_time(Duration::from_secs(3));
-    targets = flights, varied, batch, critical
+    targets = flights, varied, laws, batch, critical
 }
 criterion_main!(benches);
