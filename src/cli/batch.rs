@@ -2,12 +2,12 @@
 
 use std::io::ErrorKind::BrokenPipe;
 use std::io::{self, BufWriter, Read};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use rayon::prelude::*;
 
 use super::method_args::MethodArgs;
 use super::output::{Destination, check_format, check_outputs, is_parquet, new_progress, say, show_progress};
@@ -16,10 +16,10 @@ use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::interruption::whole;
 #[cfg(feature = "parquet")]
 use crate::exchange::tables::parquet::ParquetReader;
-use crate::exchange::tables::{self, Block, CsvTable, Rows, TableWriter};
+use crate::exchange::tables::{self, CsvTable, Rows, TableWriter};
 use crate::integrators::Method;
 use crate::physics::Scene;
-use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, Varied, answers};
+use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, Varied, solve};
 use crate::text::count;
 
 /// Progress over a known number of rows.
@@ -50,6 +50,11 @@ pub struct BatchArgs {
     /// Also the critical velocity of every scene with a thickness.
     #[arg(long)]
     pub critical: bool,
+    /// Only this part of the scenes, such as 7/1000, for an array of jobs.
+    ///
+    /// Rows keep their numbers: the parts one behind the other are the whole. A CSV table is read twice to be counted.
+    #[arg(long, value_name = "I/N", value_parser = part)]
+    pub part: Option<Part>,
     /// Threads [default: one a processor].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -69,12 +74,19 @@ impl Run for BatchArgs {
             .map_err(|error| CliError::failed(error.to_string(), ""))?;
         let progress = new_progress();
         let varied = self.scene.as_deref().map(|path| Scene::read(path).map(Varied::new)).transpose()?.map(Arc::new);
-        let mut source = Source::open(&self.scenes, varied, &progress)?;
+        let mut source = Source::open(&self.scenes, varied.clone(), &progress)?;
+        let mut rows = 0..u64::MAX;
+        if let Some(part) = self.part {
+            rows = part.rows(source.count(&self.scenes)?, source.multiple());
+            source = Source::open(&self.scenes, varied, &progress)?;
+            source.skip(rows.start)?;
+        }
+        let mut source = Cut { source, left: rows.end - rows.start };
         // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
         let first = source.next_scenes(None)?;
         let unwritable = |cause| CliError::write(&self.out, cause);
         let mut sink = self.sink().map_err(unwritable)?;
-        let tally = match pool.install(|| self.solve_all(first, &mut source, &mut sink, &method)) {
+        let tally = match pool.install(|| self.solve_all(first, rows.start, &mut source, &mut sink, &method)) {
             // Whoever reads the results (`| head`) has enough.
             Err(CliError::Write { cause, .. }) if is_standard(&self.out) && cause.kind() == BrokenPipe => {
                 return Ok(Exit::Success);
@@ -84,7 +96,7 @@ impl Run for BatchArgs {
         let written = sink.finish().and_then(|output| Ok(output.into_inner()?));
         written.and_then(|output| whole(|| output.finish(&self.out))).map_err(unwritable)?;
         progress.finish_and_clear();
-        say("", &summary(&tally));
+        say("", &summary(&tally, self.part));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
 }
@@ -98,11 +110,12 @@ impl BatchArgs {
         TableWriter::new(output, &RESULT_COLUMNS, is_parquet(&self.out))
     }
 
-    /// Solves one chunk, `scenes` to begin with, while the one before is written and the next is read.
+    /// Solves one chunk, `scenes` to begin with, which come behind `before` others, while the one before is written and the next is read.
     fn solve_all(
         &self,
         mut scenes: Option<Scenes>,
-        source: &mut Source,
+        before: u64,
+        source: &mut Cut,
         sink: &mut Sink,
         method: &Method,
     ) -> Result<Tally, CliError> {
@@ -113,7 +126,11 @@ impl BatchArgs {
         // Ends with the table: each turn but the last has scenes.
         while scenes.is_some() || !results.is_empty() {
             let (solved, moved) = rayon::join(
-                || scenes.as_ref().map(|scenes| solve(scenes, tally.rows + 1, method, self.critical, is_parquet)),
+                || {
+                    scenes
+                        .as_ref()
+                        .map(|scenes| solve(scenes, before + tally.rows + 1, method, self.critical, is_parquet))
+                },
                 || -> Result<_, CliError> {
                     let written = results.into_iter().try_for_each(|block| sink.push(block));
                     written.map_err(|cause| CliError::write(&self.out, cause))?;
@@ -136,7 +153,37 @@ fn keep_freed_memory() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(16 << 20)));
 }
 
-fn summary(tally: &Tally) -> String {
+/// A part of the scenes: which, from 1, and of how many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    index: u64,
+    of: u64,
+}
+
+impl Part {
+    /// Its rows of `count`, from 0; bounds within are multiples of `multiple`.
+    fn rows(self, count: u64, multiple: u64) -> Range<u64> {
+        let bound = |index: u64| {
+            let exact = (u128::from(count) * u128::from(index) / u128::from(self.of)) as u64;
+            if index == self.of { count } else { exact / multiple * multiple }
+        };
+        bound(self.index - 1)..bound(self.index)
+    }
+}
+
+/// `I/N`.
+fn part(text: &str) -> Result<Part, String> {
+    let numbers = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+    match numbers {
+        Some((index, of)) if 1 <= index && index <= of => Ok(Part { index, of }),
+        _ => Err("write which part and of how many, from 1: 7/1000".to_owned()),
+    }
+}
+
+fn summary(tally: &Tally, part: Option<Part>) -> String {
+    if let (0, Some(Part { index, of })) = (tally.rows, part) {
+        return format!("0 rows: part {index} of {of} is empty, for there are fewer scenes than parts");
+    }
     if tally.rows == 0 {
         return "0 rows: the table has a first line with names and no scene below it".to_owned();
     }
@@ -145,26 +192,6 @@ fn summary(tally: &Tally) -> String {
         text.push_str(&format!(", {} with a step beyond the stability limit", tally.unstable));
     }
     text
-}
-
-/// Results of a chunk, part by part; `first` is the number of its first row.
-fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parquet: bool) -> (Tally, Vec<Block>) {
-    let total = scenes.len();
-    let (tallies, blocks): (Vec<Tally>, Vec<Block>) = (0..total.div_ceil(PART))
-        .into_par_iter()
-        // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
-        .with_max_len(1)
-        .map(|index| {
-            let from = index * PART;
-            let answers = answers(scenes.scenes(from..total.min(from + PART)), method, critical);
-            (Tally::of(&answers), scenes.results(from, first + from as u64, &answers, is_parquet))
-        })
-        .unzip();
-    let mut tally = Tally::default();
-    for counted in tallies {
-        tally += counted;
-    }
-    (tally, blocks)
 }
 
 /// Where the scenes come from.
@@ -211,30 +238,94 @@ impl Source {
         Ok(Self::Csv(CsvTable::new(&name, input, format)?, varied))
     }
 
-    /// The next chunk, `None` at the end; the memory of `used` is reused.
-    fn next_scenes(&mut self, used: Option<Scenes>) -> Result<Option<Scenes>, CliError> {
+    /// How many scenes there are, from the beginning; `path` is theirs. A table without a number of rows is read through.
+    fn count(&mut self, path: &Path) -> Result<u64, CliError> {
+        match self {
+            _ if is_standard(path) => {
+                let help = "write the scenes into a file first";
+                Err(CliError::usage("standard input cannot be cut into parts: it is read once", help))
+            }
+            Self::Csv(table, _) => {
+                let (mut count, mut used) = (0, None);
+                // Ends with the table.
+                loop {
+                    let rows = table.next_rows(CHUNK, used)?;
+                    if rows.is_empty() {
+                        return Ok(count);
+                    }
+                    count += rows.len() as u64;
+                    used = Some(rows);
+                }
+            }
+            #[cfg(feature = "parquet")]
+            Self::Parquet(table, ..) => Ok(table.rows()),
+            Self::Random { end, .. } => Ok(*end),
+        }
+    }
+
+    /// What bounds of parts are multiples of.
+    fn multiple(&self) -> u64 {
+        if matches!(self, Self::Random { .. }) { PART as u64 } else { 1 }
+    }
+
+    /// Leaves out the next `count` scenes.
+    fn skip(&mut self, mut count: u64) -> Result<(), CliError> {
+        match self {
+            Self::Csv(table, _) => {
+                let mut used = None;
+                while count > 0 {
+                    let rows = table.next_rows(count.min(CHUNK as u64) as usize, used)?;
+                    // A table that was cut since it was counted.
+                    count = if rows.is_empty() { 0 } else { count - rows.len() as u64 };
+                    used = Some(rows);
+                }
+            }
+            #[cfg(feature = "parquet")]
+            Self::Parquet(table, ..) => table.skip(count)?,
+            Self::Random { next, .. } => *next = count,
+        }
+        Ok(())
+    }
+
+    /// The next chunk of at most `most` scenes, `None` at the end; the memory of `used` is reused.
+    fn next_scenes(&mut self, most: usize, used: Option<Scenes>) -> Result<Option<Scenes>, CliError> {
         let scenes = match self {
             Self::Csv(table, varied) => {
                 let used = match used {
                     Some(Scenes::Table(rows) | Scenes::Varied(rows, _)) => Some(rows),
                     _ => None,
                 };
-                of_rows(table.next_rows(CHUNK, used)?, varied.as_ref())
+                of_rows(table.next_rows(most, used)?, varied.as_ref())
             }
             #[cfg(feature = "parquet")]
             Self::Parquet(table, progress, varied) => {
-                let rows = table.next_rows(CHUNK)?;
+                let rows = table.next_rows(most)?;
                 progress.inc(rows.len() as u64);
                 of_rows(rows, varied.as_ref())
             }
             Self::Random { seed, next, end, progress } => {
                 let from = *next;
-                *next = (*end).min(from.saturating_add(CHUNK as u64));
+                *next = (*end).min(from.saturating_add(most as u64));
                 progress.set_position(from);
                 Scenes::Random { seed: *seed, rows: from..*next }
             }
         };
         Ok(Some(scenes).filter(|scenes| !scenes.is_empty()))
+    }
+}
+
+/// The scenes of a part.
+struct Cut {
+    source: Source,
+    left: u64,
+}
+
+impl Cut {
+    /// The next chunk, as of the whole.
+    fn next_scenes(&mut self, used: Option<Scenes>) -> Result<Option<Scenes>, CliError> {
+        let scenes = self.source.next_scenes(self.left.min(CHUNK as u64) as usize, used)?;
+        self.left -= scenes.as_ref().map_or(0, |scenes| scenes.len() as u64);
+        Ok(scenes)
     }
 }
 
@@ -263,6 +354,20 @@ fn random_table(path: &Path) -> Result<Option<(u64, u64)>, CliError> {
 #[expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_one_behind_the_other_are_the_whole() {
+        for (count, of) in [(10, 3), (1, 4), (0, 2), (u64::MAX, 1000), (1_000_001, 7)] {
+            let parts: Vec<_> = (1..=of).map(|index| Part { index, of }.rows(count, 1)).collect();
+            assert_eq!((parts[0].start, parts[of as usize - 1].end), (0, count));
+            assert!(parts.windows(2).all(|pair| pair[0].end == pair[1].start));
+        }
+        assert_eq!(Part { index: 2, of: 3 }.rows(10_000, 256), 3328..6656);
+        assert_eq!(part("7/1000"), Ok(Part { index: 7, of: 1000 }));
+        for text in ["0/3", "4/3", "1", "a/b", "1/0", "-1/3"] {
+            assert!(part(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn a_random_table_has_a_length_and_a_seed() {

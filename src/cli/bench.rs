@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, error_text, escape_terminal, new_progress, say_line, show_progress, wrapped};
 use super::verify::report_line;
-use super::{Answer, Ask, CliError, Exit, Settings, command_typed, end_peers_with_program};
+use super::{Answer, Ask, CliError, Exit, Settings, command_typed, end_peers_with_program, program};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
 use crate::exchange::scene_file::shipped;
 use crate::physics::Scene;
@@ -208,7 +208,7 @@ impl BenchArgs {
     fn growth(&self, progress: &ProgressBar) -> Result<Vec<Growth>, CliError> {
         const THREADS: [u16; 2] = [1, 2];
         let failed = |message: String| CliError::failed(message, "");
-        let program = std::env::current_exe().map_err(|error| failed(format!("where is this program? {error}")))?;
+        let program = program().map_err(|error| failed(format!("where is this program? {error}")))?;
         let counts = growth::counts(self.most);
         progress.inc_length((counts.len() * THREADS.len()) as u64);
         progress.set_message("batches");

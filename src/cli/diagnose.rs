@@ -11,7 +11,7 @@ use super::{Answer, Ask, CliError, end_peers_with_program};
 use crate::exchange::peers::Peer;
 use crate::report::diagnosis::report;
 use crate::studies::Verdict;
-use crate::studies::diagnosis::{Asked, Cause, Diagnosis, Plan, diagnose};
+use crate::studies::diagnosis::{Asked, Cause, Diagnosis, Plan, Solver, diagnose};
 use crate::text::{count, digits_text, or_dash};
 
 /// Failing questions shown.
@@ -49,10 +49,19 @@ impl Ask for DiagnoseArgs {
     fn ask(&self) -> Result<Answer<DiagnoseJson>, CliError> {
         self.report.check("diagnose", &[])?;
         end_peers_with_program()?;
-        let mut peer = Peer::start(&self.command)?;
+        self.of(&mut Peer::start(&self.command)?)
+    }
+}
+
+impl DiagnoseArgs {
+    /// The diagnosis of `solver`, a program or a solver within this one; the report is written.
+    ///
+    /// # Errors
+    /// A report that cannot be written (exit 1).
+    pub fn of(&self, solver: &mut dyn Solver) -> Result<Answer<DiagnoseJson>, CliError> {
         let bar = progress_bar(u64::from(self.questions), "questions");
         let plan = Plan { seed: self.seed, questions: self.questions as usize, asks_edges: true };
-        let diagnosis = diagnose(&mut peer, plan, &|asked, all| {
+        let diagnosis = diagnose(solver, plan, &|asked, all| {
             bar.set_length(all as u64);
             bar.set_position(asked as u64);
             if asked == all {

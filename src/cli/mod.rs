@@ -26,8 +26,10 @@ pub mod stress;
 pub mod sweep;
 pub mod verify;
 
+use std::ffi::OsString;
 use std::io::{self, IsTerminal};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use schemars::{JsonSchema, Schema, schema_for};
@@ -35,7 +37,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::exchange::SceneError;
-use crate::exchange::input::{is_standard, name_of};
+use crate::exchange::input::{holding, is_standard, name_of};
 use crate::exchange::interruption::clean_up_when_interrupted;
 use crate::physics::{Advice, Problem, Scene, State};
 use crate::report::folder::{FolderError, without_temporary_name};
@@ -198,6 +200,14 @@ pub trait Run {
     /// [`CliError`], with the exit code.
     fn run(&self) -> Result<Exit, CliError>;
 
+    /// Its answer to a program that calls it: nothing is printed, files are written.
+    ///
+    /// # Errors
+    /// As [`Run::run`]; a command without an answer (exit 2).
+    fn call(&self) -> Result<Called, CliError> {
+        Err(CliError::usage("the command has no answer in JSON", "run it in a shell"))
+    }
+
     /// Whether JSON is asked for.
     fn wants_json(&self) -> bool {
         false
@@ -240,6 +250,61 @@ pub struct Answer<T> {
     pub exit: Exit,
 }
 
+/// What a command answers a program that calls it.
+#[derive(Clone, Debug)]
+pub struct Called {
+    /// What `--json` prints; `None` where the answer is a text whoever asks.
+    pub json: Option<String>,
+    /// What is printed for people.
+    pub text: String,
+    /// How the program would have ended.
+    pub exit: Exit,
+}
+
+impl Called {
+    /// Of `answer`.
+    ///
+    /// # Errors
+    /// When there is no memory for the JSON.
+    pub fn new<T: Serialize>(answer: Answer<T>) -> Result<Self, CliError> {
+        let Answer { data, text, exit } = answer;
+        let json = data.map(|data| serde_json::to_string(&data)).transpose();
+        Ok(Self { json: json.map_err(|error| CliError::stdout(error.into()))?, text, exit })
+    }
+}
+
+/// The answer to the `words` of a command line, the first of which is the command. Each of `files` stands in memory under its
+/// name, wherever the command reads a small file whole (a scene, a table of steps).
+///
+/// The same function as the program's, for programs that link it: signals, standard output and standard error are left alone.
+/// The texts beside the answer are the warnings and notes.
+///
+/// # Example
+/// ```
+/// use penetrode::cli::call;
+///
+/// let (answer, said) = call(&["critical", "tunnel", "--set", "target.thickness=0.3 m"].map(Into::into), Vec::new());
+/// assert!(answer?.json.is_some_and(|json| json.contains("critical_velocity_m_s")));
+/// assert!(said.is_empty());
+/// # Ok::<(), penetrode::cli::CliError>(())
+/// ```
+///
+/// # Errors
+/// [`CliError`], with the exit code.
+pub fn call(words: &[String], files: Vec<(String, Vec<u8>)>) -> (Result<Called, CliError>, Vec<String>) {
+    output::hearing(|| {
+        let words = ["penetrode"].into_iter().chain(words.iter().map(String::as_str));
+        let cli = Cli::try_parse_from(words).map_err(|error| {
+            let text = error.render().to_string();
+            // What follows tells how to ask for help in a shell.
+            let text = text.split("\n\nUsage:").next().unwrap_or_default().split("\n\nFor more").next();
+            let text = text.unwrap_or_default().trim().trim_start_matches("error: ");
+            CliError::usage(text, "")
+        })?;
+        holding(files, || cli.command.entry().1.call())
+    })
+}
+
 /// A command that prints its answer, as JSON if asked.
 #[derive(Args, Debug)]
 pub struct Printing<A: Args> {
@@ -266,6 +331,10 @@ impl<A: Ask> Run for Printing<A> {
         }
         .map_err(CliError::stdout)?;
         Ok(answer.exit)
+    }
+
+    fn call(&self) -> Result<Called, CliError> {
+        Called::new(self.args.ask()?)
     }
 
     fn wants_json(&self) -> bool {
@@ -361,10 +430,20 @@ pub struct Cli {
 impl Cli {
     /// The arguments of this process; a mistake in them, and a wish for help, end it.
     pub fn of_process() -> Self {
+        Self::of_words(std::env::args_os()).unwrap_or_else(|error| error.exit())
+    }
+
+    /// The `words` of a command line, the first of which names the program: those of this process, or of one that is run
+    /// by another program, such as a script.
+    ///
+    /// # Errors
+    /// A mistake in them, or a wish for help.
+    pub fn of_words(words: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
+        let words = WORDS.get_or_init(|| words.into_iter().collect());
         // What is cut off for `-h` alone would be missing nowhere else.
-        let is_brief = std::env::args_os().any(|word| word == "-h");
+        let is_brief = words.iter().any(|word| word == "-h");
         let commands = if is_brief { Self::command().mut_subcommands(brief) } else { Self::command() };
-        Self::from_arg_matches(&commands.get_matches()).unwrap_or_else(|error| error.exit())
+        Self::from_arg_matches(&commands.try_get_matches_from(words)?)
     }
 
     /// Runs the command, reports an error on standard error, and says how it ended.
@@ -435,15 +514,37 @@ impl Settings {
     }
 }
 
-/// Lets the peers of this run end with it, however it ends.
+/// The command line of this run; empty where a program calls a command.
+static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// The program, where it is not the one that this process runs.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// From now on the program is at `path`: for a process that is another program, such as an interpreter of scripts. What runs
+/// the program anew, as claims about its commands do, runs that.
+pub fn let_program_be(path: PathBuf) {
+    // Said once: a second word changes nothing.
+    let _ = PROGRAM.set(path);
+}
+
+/// The program that claims about commands run.
+fn program() -> io::Result<PathBuf> {
+    PROGRAM.get().cloned().map_or_else(std::env::current_exe, Ok)
+}
+
+/// Lets the peers of this run end with it, however it ends. A program that calls a command keeps its signals.
 fn end_peers_with_program() -> Result<(), CliError> {
+    if WORDS.get().is_none() {
+        return Ok(());
+    }
     let failed = |cause| CliError::failed(format!("signals cannot be received: {cause}"), "run without a peer");
     clean_up_when_interrupted().map_err(failed)
 }
 
 /// The command of this run as it was typed, its words quoted as for a shell.
 fn command_typed() -> String {
-    let words: Vec<_> = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+    let Some(words) = WORDS.get() else { return "called by another program".to_owned() };
+    let words: Vec<_> = words.iter().skip(1).map(|word| word.to_string_lossy()).collect();
     // A NUL cannot be quoted, and cannot be in an argument either.
-    format!("penetrode {}", shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default())
+    format!("penetrode {}", shlex::try_join(words.iter().map(AsRef::as_ref)).unwrap_or_default())
 }

@@ -1,5 +1,6 @@
 //! How results leave the program: JSON, numbers for people, tables, and files written whole or not at all.
 
+use std::cell::RefCell;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
 use std::fs;
@@ -66,9 +67,26 @@ pub fn be_quiet() {
     IS_QUIET.store(true, Ordering::Relaxed);
 }
 
+thread_local! {
+    /// What was said to a program that listens, in place of standard error.
+    static HEARD: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
+}
+
+/// What `work` gives, and what it said on the way (warnings, notes), none of it on standard error.
+///
+/// Of this thread alone.
+pub fn hearing<R>(work: impl FnOnce() -> R) -> (R, Vec<String>) {
+    HEARD.set(Some(Vec::new()));
+    let made = work();
+    (made, HEARD.take().unwrap_or_default())
+}
+
 /// Prints for a person on standard error, `head` (`warning: `) in front, unless all is to be quiet.
 pub fn say(head: &str, text: &str) {
-    say_line(&wrapped(head, text));
+    let is_heard = HEARD.with_borrow_mut(|heard| heard.as_mut().map(|heard| heard.push(format!("{head}{text}"))));
+    if is_heard.is_none() {
+        say_line(&wrapped(head, text));
+    }
 }
 
 /// A line as it is on standard error, unless all is to be quiet.

@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, escape_terminal, new_progress, say, say_line, show_progress};
 use super::sweep::read_data;
-use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program};
+use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program, program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
@@ -85,7 +85,7 @@ impl Ask for VerifyArgs {
         }
         let peers = self.peers()?;
         // Without it the claims about commands would be skipped, and the suite pass.
-        let program = std::env::current_exe().and_then(|path| Program::new(&path)).map_err(|cause| {
+        let program = program().and_then(|path| Program::new(&path)).map_err(|cause| {
             let help = "its claims run it in a temporary folder: let TMPDIR name one that can be written";
             CliError::failed(format!("the program cannot be run again: {cause}"), help)
         })?;

@@ -15,6 +15,7 @@ use toml::de::{DeTable, DeValue};
 use super::diagnostic::{
     Dialect, Fault, SceneError, Span, did_you_mean, key_of, nearest, parse, quoted, read_text, type_of,
 };
+use super::input;
 use crate::physics::expression::{ExpressionError, Known, RESERVED, Tape, Unit, is_name};
 use crate::physics::law::{Name, OwnParameter};
 use crate::physics::nose::NoseShape;
@@ -91,8 +92,11 @@ pub(crate) fn shipped_like(name: &str, otherwise: &str) -> String {
 }
 
 /// Name and text of the scene file at `path`; where there is no file, of the shipped scene of that name.
-fn text_at(path: &Path) -> Result<(String, String), Box<SceneError>> {
-    let is_file = path.exists() && !path.is_dir();
+///
+/// # Errors
+/// [`SceneError`]: as [`Scene::read`], before the text is understood.
+pub fn text_at(path: &Path) -> Result<(String, String), Box<SceneError>> {
+    let is_file = input::is_file(path);
     if let Some((name, text)) = path.to_str().filter(|_| !is_file).and_then(|name| Some((name, shipped(name)?))) {
         return Ok((name.to_owned(), text.to_owned()));
     }

@@ -28,7 +28,7 @@ pub use error::{At, Fault, Place, TableError};
 
 use super::input::{self, Unread, name_of};
 use crate::physics::Range;
-use crate::physics::units::{Dimension, QuantityError, number};
+use crate::physics::units::{Dimension, QuantityError, number, scaled};
 use crate::text::{Shown, shortened, steers};
 
 /// Largest table that is read whole (bytes): a study of step sizes or a series of tests is some kilobytes.
@@ -67,12 +67,36 @@ pub struct Column {
     pub need: Need,
     /// Range of its numbers.
     pub range: Range,
+    /// Its name without the unit, and what it measures: a table may then give it in another unit (`mass_g` for `mass_kg`).
+    pub measure: Option<(&'static str, Dimension)>,
 }
 
 impl Column {
     /// A required column of finite numbers.
     pub const fn number(name: &'static str) -> Self {
-        Self { name, kind: Kind::Number, need: Need::Required, range: Range::Finite }
+        Self { name, kind: Kind::Number, need: Need::Required, range: Range::Finite, measure: None }
+    }
+
+    /// The same in any unit of `dimension`, which stands behind `stem` in the name.
+    #[must_use]
+    pub const fn measured(self, stem: &'static str, dimension: Dimension) -> Self {
+        Self { measure: Some((stem, dimension)), ..self }
+    }
+
+    /// What a number of the column `name` of a table at hand is in the unit of this one, as a factor; `None` where it is
+    /// another column.
+    fn factor(&self, name: &str) -> Option<f64> {
+        if name == self.name {
+            return Some(1.0);
+        }
+        let (stem, dimension) = self.measure?;
+        let unit = unit_of(name.strip_prefix(stem)?).filter(|unit| !unit.is_empty())?;
+        let is_alike = |known: &str| spellings(unit).iter().any(|unit| unit.to_lowercase() == known.to_lowercase());
+        let exactly = spellings(unit).iter().find_map(|unit| dimension.coefficient(unit));
+        // Names of columns are in small letters: `strength_mpa`.
+        exactly.or_else(|| {
+            dimension.units().iter().find(|known| is_alike(known)).and_then(|unit| dimension.coefficient(unit))
+        })
     }
 
     /// A required column of text.
@@ -180,6 +204,8 @@ pub struct Layout {
     columns: &'static [Column],
     /// Index of each column, from 0.
     places: Vec<Option<usize>>,
+    /// Its numbers in the unit of the format, over those in the table.
+    factors: Vec<f64>,
     /// Names as they stand, without blanks at their ends, unknown ones among them.
     names: Vec<String>,
     /// Line of the names.
@@ -197,11 +223,15 @@ impl Layout {
             return refuse(1, Fault::NoHeader);
         }
         let mut places = vec![None; format.columns.len()];
+        let mut factors = vec![1.0; format.columns.len()];
         for (index, name) in names.iter().map(|name| name.trim()).enumerate() {
-            match format.columns.iter().position(|known| known.name == name) {
-                Some(known) if places[known].replace(index).is_some() => {
+            let known =
+                format.columns.iter().enumerate().find_map(|(known, column)| Some((known, column.factor(name)?)));
+            match known {
+                Some((known, _)) if places[known].is_some() => {
                     return refuse(index + 1, Fault::ColumnTwice(name.to_owned()));
                 }
+                Some((known, factor)) => (places[known], factors[known]) = (Some(index), factor),
                 // A line with another separator is one name.
                 None if format.others == Others::Refused
                     || format.others == Others::Read && name.contains([';', '\t']) =>
@@ -216,8 +246,13 @@ impl Layout {
         let mut missing = format.columns.iter().zip(&places).filter(|(_, place)| place.is_none());
         match missing.find(|(column, _)| column.need == Need::Required) {
             Some((column, _)) if format.others != Others::Read => refuse(0, Fault::MissingColumn(column.name)),
-            _ => Ok(Self { columns: format.columns, places, names, header: at }),
+            _ => Ok(Self { columns: format.columns, places, factors, names, header: at }),
         }
+    }
+
+    /// Place in the table, from 0, of each column of the format.
+    pub fn places(&self) -> &[Option<usize>] {
+        &self.places
     }
 }
 
@@ -234,13 +269,24 @@ pub struct Rows {
 enum Data {
     /// Records of a CSV table, and the line of each.
     Csv(Vec<ByteRecord>, Vec<u64>),
-    /// Columns of a Parquet table in the order of the format, an empty one where the table has none, and the number of
-    /// the first row, from 1.
-    #[cfg(feature = "parquet")]
-    Parquet(Vec<Cells>, u64),
+    /// Columns of a table without lines in the order of the format, an empty one where the table has none, and the number
+    /// of the first row, from 1.
+    Columns(Vec<Cells>, u64),
 }
 
 impl Rows {
+    /// Rows of a table in memory: `columns` in the order of the format of `layout`, without a cell where the table has no
+    /// such column; the first is row `first`, from 1.
+    ///
+    /// # Panics
+    /// If the columns are not those of the format, or differ in length: a mistake of the caller.
+    pub fn of_columns(layout: &Arc<Layout>, columns: Vec<Cells>, first: u64) -> Self {
+        assert_eq!(columns.len(), layout.columns.len(), "one entry a column of the format");
+        let count = columns.iter().map(Cells::len).max().unwrap_or(0);
+        assert!(columns.iter().all(|cells| [0, count].contains(&cells.len())), "columns of one length");
+        Self { layout: Arc::clone(layout), count, data: Data::Columns(columns, first) }
+    }
+
     /// How many.
     pub fn len(&self) -> usize {
         self.count
@@ -255,8 +301,7 @@ impl Rows {
     pub fn at(&self, index: usize) -> At {
         match &self.data {
             Data::Csv(_, lines) => At::Line(lines[index]),
-            #[cfg(feature = "parquet")]
-            Data::Parquet(_, first) => At::Row(first + index as u64),
+            Data::Columns(_, first) => At::Row(first + index as u64),
         }
     }
 
@@ -271,9 +316,7 @@ impl Rows {
                 let fault = Fault::Ragged { found: records[index].len(), expected: self.layout.names.len() };
                 Err(TableError::of_row(row.at(), 0, fault))
             }
-            Data::Csv(..) => Ok(row),
-            #[cfg(feature = "parquet")]
-            Data::Parquet(..) => Ok(row),
+            Data::Csv(..) | Data::Columns(..) => Ok(row),
         }
     }
 }
@@ -311,8 +354,7 @@ impl<'a> Row<'a> {
             Data::Csv(records, _) => std::str::from_utf8(records[self.index].get(place).unwrap_or_default())
                 .map(str::trim)
                 .map_err(|_| TableError::of_row(self.at(), place + 1, Fault::NotText)),
-            #[cfg(feature = "parquet")]
-            Data::Parquet(..) => Ok(""),
+            Data::Columns(..) => Ok(""),
         }
     }
 
@@ -325,8 +367,7 @@ impl<'a> Row<'a> {
     fn check_text(&self) -> Result<(), Box<TableError>> {
         let bad = match &self.rows.data {
             Data::Csv(records, _) => records[self.index].iter().position(|cell| std::str::from_utf8(cell).is_err()),
-            #[cfg(feature = "parquet")]
-            Data::Parquet(..) => None,
+            Data::Columns(..) => None,
         };
         bad.map_or(Ok(()), |column| Err(TableError::of_row(self.at(), column + 1, Fault::NotText)))
     }
@@ -351,8 +392,7 @@ impl<'a> Row<'a> {
         let Some(place) = self.rows.layout.places[column] else { return Ok("") };
         match &self.rows.data {
             Data::Csv(..) => self.cell(place),
-            #[cfg(feature = "parquet")]
-            Data::Parquet(columns, _) => Ok(match &columns[column] {
+            Data::Columns(columns, _) => Ok(match &columns[column] {
                 Cells::Texts(cells) => cells[self.index].as_deref().map_or("", str::trim),
                 _ => "",
             }),
@@ -365,7 +405,7 @@ impl<'a> Row<'a> {
     /// [`Fault::Cell`] and [`Fault::EmptyCell`].
     #[inline]
     pub fn optional(&self, column: usize) -> Result<Option<f64>, Box<TableError>> {
-        let Column { need, range, .. } = self.rows.layout.columns[column];
+        let (Column { need, range, .. }, factor) = (self.rows.layout.columns[column], self.rows.layout.factors[column]);
         let refuse = |text: &str, error: Option<QuantityError>| {
             let reason: Cow<'static, str> = match (range, error) {
                 (Range::Finite, Some(QuantityError::TooSmall)) => "too small for 64 bits".into(),
@@ -378,14 +418,13 @@ impl<'a> Row<'a> {
         let value = match &self.rows.data {
             Data::Csv(..) => match self.text(column)? {
                 "" => None,
-                text => match number(text) {
+                text => match if factor == 1.0 { number(text) } else { scaled(text, factor) } {
                     Ok(value) if range.contains(value) => return Ok(Some(value)),
                     other => return refuse(text, other.err()),
                 },
             },
-            #[cfg(feature = "parquet")]
-            Data::Parquet(columns, _) => match &columns[column] {
-                Cells::Numbers(cells) => cells.get(self.index).copied().flatten(),
+            Data::Columns(columns, _) => match &columns[column] {
+                Cells::Numbers(cells) => cells.get(self.index).copied().flatten().map(|value| factor * value),
                 _ => None,
             },
         };
@@ -550,13 +589,17 @@ impl Cells {
     }
 
     /// How many.
-    #[cfg(feature = "parquet")]
-    pub(super) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         match self {
             Self::Counts(cells) => cells.len(),
             Self::Numbers(cells) => cells.len(),
             Self::Texts(cells) => cells.len(),
         }
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
     }
 
     /// Appends `cells`.

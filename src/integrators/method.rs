@@ -156,7 +156,7 @@ const RTOL_ALLOWED: std::ops::RangeInclusive<f64> = 1e-15..=0.1;
 pub struct Method {
     name: MethodName,
     options: MethodOptions,
-    integrator: Box<dyn Integrator + Sync>,
+    integrator: Box<dyn Integrator + Send + Sync>,
 }
 
 /// Most stages behind the end of a flight that are named one by one.
@@ -226,7 +226,10 @@ impl Method {
 
     /// The same method with another integrator, which `wrap` makes of its own.
     #[must_use]
-    pub fn within(self, wrap: impl FnOnce(Box<dyn Integrator + Sync>) -> Box<dyn Integrator + Sync>) -> Self {
+    pub fn within(
+        self,
+        wrap: impl FnOnce(Box<dyn Integrator + Send + Sync>) -> Box<dyn Integrator + Send + Sync>,
+    ) -> Self {
         Self { integrator: wrap(self.integrator), ..self }
     }
 
@@ -237,7 +240,10 @@ impl Method {
 }
 
 /// The table of methods: the integrator of each name.
-fn integrator(name: MethodName, options: &MethodOptions) -> Result<Box<dyn Integrator + Sync>, IntegrationError> {
+fn integrator(
+    name: MethodName,
+    options: &MethodOptions,
+) -> Result<Box<dyn Integrator + Send + Sync>, IntegrationError> {
     Ok(match name {
         MethodName::Taylor => Box::new(options.rtol.map_or_else(|| Ok(Taylor::default()), Taylor::with_rtol)?),
         MethodName::Energy => Box::new(options.rtol.map_or_else(|| Ok(Energy::default()), Energy::with_rtol)?),

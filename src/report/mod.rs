@@ -8,6 +8,7 @@ pub mod diagnosis;
 pub mod environment;
 pub mod figure;
 pub mod figures;
+pub mod flight_figure;
 pub mod folder;
 pub mod json;
 pub mod junit;

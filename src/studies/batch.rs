@@ -3,9 +3,11 @@
 //! A row is one crater and one tunnel. Its answer depends on no other row, so threads and neighbours change nothing.
 //! Scenes come from a table in chunks ([`Rows`]) or from a seed ([`random_rows`]).
 
+use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::prelude::*;
 use thiserror::Error;
 
 use super::critical_velocity::{self, CriticalError};
@@ -35,15 +37,35 @@ const NUMBERS: [&str; 11] = [
     "velocity_m_s",
 ];
 
+/// Names of the numbers without their units; those of plain numbers are not asked for.
+const STEMS: [&str; NUMBERS.len()] = [
+    "mass",
+    "diameter",
+    "nose_factor",
+    "strength",
+    "density",
+    "thickness",
+    "S",
+    "B",
+    "k",
+    "crater_stiffness",
+    "velocity",
+];
+
 const COLUMNS: [Column; NUMBERS.len() + 1] = {
     let mut columns = [Column::text("criterion").needed(Need::Optional); NUMBERS.len() + 1];
     let mut index = 0;
     while index < NUMBERS.len() {
-        columns[index] = Column::number(NUMBERS[index]).needed(match Parameter::PLAIN[index].entry().absence {
+        let entry = Parameter::PLAIN[index].entry();
+        let column = Column::number(NUMBERS[index]).needed(match entry.absence {
             Absence::Refused(_) => Need::Required,
             Absence::Is(value) => Need::Default(value),
             Absence::Means(_) => Need::Optional,
         });
+        columns[index] = match entry.dimension {
+            Some(dimension) => column.measured(STEMS[index], dimension),
+            None => column,
+        };
         index += 1;
     }
     columns
@@ -61,8 +83,9 @@ impl Varied {
     /// Of `scene`, every number by its path as the name of a column, `parameters.P` or `impact.velocity`; where a cell is
     /// empty or a column is left out, the scene's own.
     ///
-    /// Its format is kept as long as the program runs: a program has one.
+    /// Its format is kept as long as the program runs, once for all scenes with the same numbers.
     pub fn new(scene: Scene) -> Self {
+        static KNOWN: Mutex<BTreeMap<Vec<Parameter>, &'static Format>> = Mutex::new(BTreeMap::new());
         let mut parameters = Parameter::all_of(&scene);
         for given_by_rows in [Parameter::Velocity, Parameter::Thickness] {
             if !parameters.contains(&given_by_rows) && scene.concrete().is_none_or(|c| c.layers.is_empty()) {
@@ -73,8 +96,11 @@ impl Varied {
             let name: &'static str = Box::leak(parameter.to_string().into_boxed_str());
             Column::number(name).needed(Need::Optional)
         };
-        let columns: &'static [Column] = Box::leak(parameters.iter().map(column).collect());
-        let format = Box::leak(Box::new(Format { columns, others: Others::Refused, has_comments: false }));
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        let format = *known.entry(parameters.clone()).or_insert_with(|| {
+            let columns: &'static [Column] = Box::leak(parameters.iter().map(column).collect());
+            Box::leak(Box::new(Format { columns, others: Others::Refused, has_comments: false }))
+        });
         Self { scene, parameters, format }
     }
 
@@ -331,6 +357,27 @@ pub fn answers(
         Ok(answer)
     });
     answers.collect()
+}
+
+/// Results of `scenes`, part by part on all threads of the pool at hand, and how many came to what; `first` is the number of
+/// the first row, from 1.
+pub fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parquet: bool) -> (Tally, Vec<Block>) {
+    let total = scenes.len();
+    let (tallies, blocks): (Vec<Tally>, Vec<Block>) = (0..total.div_ceil(PART))
+        .into_par_iter()
+        // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
+        .with_max_len(1)
+        .map(|index| {
+            let from = index * PART;
+            let answers = answers(scenes.scenes(from..total.min(from + PART)), method, critical);
+            (Tally::of(&answers), scenes.results(from, first + from as u64, &answers, is_parquet))
+        })
+        .unzip();
+    let mut tally = Tally::default();
+    for counted in tallies {
+        tally += counted;
+    }
+    (tally, blocks)
 }
 
 /// How many rows came to what.

@@ -158,3 +158,38 @@ fn random_tables_are_fixed_by_their_seed() {
     assert!(long.starts_with(&short));
     assert_ne!(short, make("random:1500:8"));
 }
+
+#[test]
+fn parts_of_a_table_one_behind_the_other_are_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: Vec<String> =
+        (1..=10).map(|i| format!("2,0.05,0.72,36e6,2300,,,,,,{}", 50 * i)).chain(["bad".to_owned()]).collect();
+    fs::write(folder.path().join("scenes.csv"), table(&rows)).unwrap();
+    // The numbers of rows, the lines in messages and every digit are those of the whole.
+    for (scenes, codes) in [("scenes.csv", [3, 0]), ("random:3000:5", [0, 0])] {
+        let run = |options: &str| run_in(folder.path(), &format!("batch {scenes} --out - {options}"));
+        let whole = run("").expect(codes[0]).out;
+        let header = whole.lines().next().unwrap();
+        let mut together = format!("{header}\n");
+        for part in 1..=4 {
+            let said = run(&format!("--part {part}/4")).expect(if part == 4 { codes[0] } else { codes[1] });
+            together += said.out.strip_prefix(&format!("{header}\n")).unwrap();
+        }
+        assert_eq!(together, whole);
+    }
+    let said = run_in(folder.path(), "batch scenes.csv --out - --part 1/100").expect(0);
+    assert!(said.err.contains("part 1 of 100 is empty"), "{}", said.err);
+    for (part, why) in [("0/4", "7/1000"), ("5/4", "7/1000"), ("x", "7/1000")] {
+        assert!(run_in(folder.path(), &format!("batch scenes.csv --out - --part {part}")).refused().contains(why));
+    }
+    let said = run_with(&table(&[]), "batch - --out - --part 1/2").refused();
+    assert!(said.contains("standard input cannot be cut"), "{said}");
+}
+
+#[test]
+fn columns_may_be_in_other_units() {
+    let si = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,velocity_m_s\n2,0.05,0.72,36e6,2300,300\n";
+    let other = "mass_g,diameter_mm,nose_factor,strength_mpa,density_g_cm3,velocity_km_s\n2000,50,0.72,36,2.3,0.3\n";
+    let [si, other] = [si, other].map(|table| run_with(table, "batch - --out -").expect(0).out);
+    assert_eq!(si, other);
+}

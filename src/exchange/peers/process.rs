@@ -18,7 +18,7 @@ use thiserror::Error;
 use self::group::Group;
 use super::wire::{PeerAnswer, PeerRequest};
 use crate::exchange::diagnostic::printable;
-use crate::physics::{Advice, Outcome};
+use crate::physics::Advice;
 use crate::text::clipped;
 
 mod group;
@@ -477,10 +477,7 @@ fn answer(line: &[u8], id: u64, request: &PeerRequest, events: bool) -> Result<P
     }
     let mut answer: PeerAnswer = serde_json::from_slice(line).map_err(nonsense)?;
     if head.outcome.is_none() {
-        // A peer that names none perforates where it reaches the exit depth within the tolerance asked for.
-        let is_reached = |exit: f64| exit - answer.depth_m <= (request.rtol * exit).max(request.atol[0]);
-        let perforates = request.exit_depth_m.is_some_and(is_reached);
-        answer.outcome = if perforates { Outcome::Perforated } else { Outcome::Stopped };
+        answer.outcome = request.outcome_at(answer.depth_m);
     }
     if events && !answer.has_events_in_order(request) {
         return Err(PeerFault::nonsense("its events are not of the stages, each once, in the order of time", line));

@@ -107,6 +107,13 @@ impl PeerRequest {
         }
     }
 
+    /// The outcome of an answer that names none and ends at `depth` (m): it perforates where it reaches the exit depth within
+    /// the tolerance asked for.
+    pub fn outcome_at(&self, depth: f64) -> Outcome {
+        let is_reached = |exit: f64| exit - depth <= (self.rtol * exit).max(self.atol[0]);
+        if self.exit_depth_m.is_some_and(is_reached) { Outcome::Perforated } else { Outcome::Stopped }
+    }
+
     /// The problem that this asks for; `crater` is the stage that ends at k d, if there is one.
     ///
     /// Takes the numbers as they are: meant for requests of ours, not for input from outside.

@@ -20,7 +20,7 @@ use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnDescriptor, ColumnPath, Type};
 
 use super::error::{At, Fault, Place, TableError};
-use super::{Cells, Column, Data, Format, Kind, Layout, Rows};
+use super::{Cells, Column, Format, Kind, Layout, Rows};
 use crate::text::shortened;
 
 /// Rows of a row group that is written: some megabytes.
@@ -106,6 +106,26 @@ impl ParquetReader {
         })
     }
 
+    /// Leaves out the next `count` rows, whole row groups unread.
+    ///
+    /// # Errors
+    /// As [`ParquetReader::next_rows`].
+    pub fn skip(&mut self, mut count: u64) -> Result<(), Box<TableError>> {
+        // Ends with the list of row groups, or with the count.
+        while let Some(group) = self.reader.metadata().row_groups().get(self.group).filter(|_| self.left == 0) {
+            let rows = u64::try_from(group.num_rows()).unwrap_or(0);
+            if rows > count {
+                break;
+            }
+            (self.group, self.rows, count) = (self.group + 1, self.rows + rows, count - rows);
+        }
+        while count > 0 {
+            let some = self.next_rows(count.min(1 << 16) as usize)?.len() as u64;
+            count = if some == 0 { 0 } else { count - some };
+        }
+        Ok(())
+    }
+
     fn read(&mut self, count: usize) -> Result<Rows, ParquetError> {
         let mut cells: Vec<_> = self.format.columns.iter().map(|column| Cells::empty(column.kind)).collect();
         let mut read = 0;
@@ -126,7 +146,7 @@ impl ParquetReader {
         }
         let first = self.rows + 1;
         self.rows += read as u64;
-        Ok(Rows { layout: Arc::clone(&self.layout), count: read, data: Data::Parquet(cells, first) })
+        Ok(Rows::of_columns(&self.layout, cells, first))
     }
 
     /// Opens the next row group; false at the end.

@@ -120,7 +120,7 @@ impl Flaw {
 /// A method with a flaw.
 pub(super) struct Flawed {
     /// The method.
-    pub(super) inner: Box<dyn Integrator + Sync>,
+    pub(super) inner: Box<dyn Integrator + Send + Sync>,
     /// What is wrong with its solutions.
     pub(super) flaw: Flaw,
 }

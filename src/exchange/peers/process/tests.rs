@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use super::*;
-use crate::physics::Stage;
+use crate::physics::{Outcome, Stage};
 
 const GREETING: &str = r#"read q; echo '{"name": "fake", "version": "1", "method": "none"}'"#;
 const ANSWER: &str = r#"{"id": 1, "outcome": "stopped", "depth_m": 0.5, "time_s": 2e-3, "velocity_m_s": 0}"#;
