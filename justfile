@@ -69,6 +69,10 @@ parquet:
 bench:
     cargo bench --manifest-path benches/flights/Cargo.toml
 
+# The wheel in a fresh environment, and its tests
+python:
+    .ci/python
+
 # Instruction counts, by valgrind
 instructions:
     cargo bench --bench instructions
