@@ -512,6 +512,35 @@ def sweep(scene: Scene | PathLike, vary: Mapping[str, Any] | None = None, **keyw
     return Answer(_ask([*words, *_words({"out": out})], **of), _of_table(words, **of))
 
 
+def limit(scene: Scene | PathLike, **options: Any) -> Answer:
+    """The perforation limit: the thickness that just stops the projectile.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        With an impact velocity.
+    **options
+        Those of the command.
+
+    Returns
+    -------
+    Answer
+        The fields of ``penetrode limit --json``.
+
+    Raises
+    ------
+    OptionError, SceneError, RunError
+        As the command.
+
+    Examples
+    --------
+    >>> import penetrode as pn
+    >>> pn.limit("tunnel").schema
+    'penetrode/limit/1'
+    """
+    return Answer(_ask(["limit", *_words(options)], _scene(scene)))
+
+
 def map(k: float = 2.0, out: PathLike | None = None) -> Answer:
     """How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
 
