@@ -302,7 +302,8 @@ impl SolveArgs {
             let angle = significant(plug.half_angle_deg);
             let strength = engineering(plug.shear_strength_pa, "Pa");
             let left = engineering(plug.static_thickness_m, "m");
-            text.line(format!("  plug     half angle {angle} deg, shear strength {strength}, static thickness {left}"));
+            let words = format!("half angle {angle} deg, shear strength {strength}, static thickness {left}");
+            text.wrapped("  plug     ", &words);
         }
         for ByCriterionJson { criterion, outcome, velocity_m_s } in &data.criteria {
             let velocity = engineering(*velocity_m_s, "m/s");
