@@ -92,7 +92,7 @@ impl<S: Scalar> Stage<S> {
         Self { static_force: zero, stiffness: zero, viscosity: zero, drag: zero, end: S::from_f64(f64::INFINITY) }
     }
 
-    /// A stage until x = `end` (m) whose force is a [`Law`](super::law::Law) of its own.
+    /// A stage until x = `end` (m) whose force is a [`Law`] of its own.
     ///
     /// Its coefficients are NaN: what reads them in place of the law gets no number, and no wrong one.
     pub fn of_law(end: S) -> Self {
