@@ -32,12 +32,15 @@ pub struct SceneJson {
     pub follows: Vec<String>,
     pub stages: Vec<Stage>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     pub forces: Vec<ForceJson>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     pub ends: Vec<EndJson>,
     #[serde(skip)]
     pub plug: Option<PlugJson>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     pub parameters: Vec<OwnParameterJson>,
 }
 

@@ -37,6 +37,7 @@ pub struct ShippedJson {
     title: String,
     /// Its forces that are expressions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     forces: Vec<ForceJson>,
     /// Its file.
     toml: &'static str,

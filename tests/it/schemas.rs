@@ -88,6 +88,22 @@ fn the_schema_of_scenes_takes_each_that_ships_and_refuses_each_that_is_refused_f
             "stages-end-inside-target",
             "stages-fall",
             "stages-without-end",
+            // Texts of conditions, and ends beside other stages.
+            "ends-mass-in-last-stage",
+            "ends-mass-without-end",
+            "ends-parameter-unused",
+            "ends-until-beside-table",
+            "ends-until-constant",
+            "ends-until-empty-side",
+            "ends-until-of-two-dimensions",
+            "ends-until-two-equals",
+            "ends-until-unknown-name",
+            "ends-until-without-equals",
+            "ends-velocity-in-last-stage",
+            // A plug beside the target.
+            "plug-angle-of-90",
+            "plug-of-layers",
+            "plug-without-thickness",
             // `critical` needs none.
             "velocity-missing",
         ],
