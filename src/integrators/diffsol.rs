@@ -38,6 +38,7 @@ use self_cell::self_cell;
 use super::adaptive::{Choice, EXPLICIT, IMPLICIT};
 use super::flight::{self, Bounded, Course, SLOW, StageEnd, StageSolver, VANISHES};
 use super::outcome::{Cost, Detail, IntegrationError, Integrator, Solved};
+use crate::physics::condition::Sight;
 use crate::physics::{Law, Problem, Stage, State};
 
 type Matrix = NalgebraMat<f64>;
@@ -485,15 +486,24 @@ impl OwnLaw {
         epoch: f64,
         before: Node,
         after: Node,
-        at: impl FnMut(f64) -> Result<[f64; 2], DiffsolError>,
+        mut at: impl FnMut(f64) -> Result<[f64; 2], DiffsolError>,
     ) -> Result<Option<f64>, DiffsolError> {
         let start = epoch + before.time;
         let is_at_kink = kink.is_some_and(|kink| (start - kink).abs() <= 1e-3 * (after.time - before.time));
-        let length = self.to_kink(before, after, at)?.filter(|_| !is_at_kink);
+        let length = self.to_kink(before, after, &mut at)?.filter(|_| !is_at_kink);
         *kink = length.map_or(kink.filter(|_| !is_at_kink), |length| Some(start + length));
         let step = after.time - before.time;
-        let may_hide = length.is_none() && step > NARROWEST * start && !self.hides_nothing(before, after);
-        Ok(if may_hide { Some(SHORTENING * step) } else { length })
+        if length.is_some() || step <= NARROWEST * start {
+            return Ok(length);
+        }
+        if !self.hides_nothing(before, after) {
+            return Ok(Some(SHORTENING * step));
+        }
+        let Some(end) = self.law.end() else { return Ok(None) };
+        Ok(match end.look(self.side, |share| at(before.time + share * step).map(|y| self.place(&y)))? {
+            Sight::Hidden(from, to) => Some(if from > 0.0 { from } else { to } * step),
+            _ => None,
+        })
     }
 
     /// Whether the step from `before` to `after` shows its force ([`Law::shown_in`]).
@@ -563,7 +573,15 @@ impl OwnLaw {
         for (part, node) in seen.iter_mut().enumerate().skip(1) {
             *node = if part == LOOKS { after } else { at(place(part))? };
         }
-        let mut crossing = (1..=LOOKS).find(|part| value(seen[*part]) <= 0.0).map(|part| (seen[part - 1], seen[part]));
+        let mut at_share = |share: f64| at(before.time + (after.time - before.time) * share);
+        let sight = end.look(self.side, |share| {
+            let node = if share < 1.0 { at_share(share)? } else { after };
+            Ok::<_, DiffsolError>(self.place(&[node.depth, node.velocity]))
+        })?;
+        let mut crossing = match sight {
+            Sight::Crossed(from, to) => Some((at_share(from)?, if to < 1.0 { at_share(to)? } else { after })),
+            _ => (1..=LOOKS).find(|part| value(seen[*part]) <= 0.0).map(|part| (seen[part - 1], seen[part])),
+        };
         let mut nearest = after;
         if crossing.is_none() {
             // Where it is nearest to zero, it may touch it.

@@ -9,6 +9,8 @@
 //! A stage that is entered where its condition is met ends there. Touching counts. An end at a depth may stand beside a
 //! condition: the stage ends at whichever comes first.
 
+use smallvec::SmallVec;
+
 use super::expression::{Bound, Known, Tape};
 use super::problem::State;
 use super::scalar::Scalar;
@@ -149,6 +151,63 @@ impl<S: Scalar> Condition<S> {
         !(least > 0.0 || most < 0.0)
     }
 
+    /// What a way shows of g, which is above zero on `side` where it begins. `place` gives depth (m) and velocity (m/s) at a share
+    /// of the way from 0 to 1.
+    ///
+    /// A part is looked at in halves until bounds exclude a zero, or until g is shown by its values.
+    ///
+    /// # Errors
+    /// What `place` says.
+    pub(crate) fn look<E>(&self, side: f64, mut place: impl FnMut(f64) -> Result<(f64, f64), E>) -> Result<Sight, E> {
+        let mut parts: SmallVec<[_; LEVELS as usize + 2]> = SmallVec::new();
+        let mut looked = 0;
+        parts.push(((0.0, place(0.0)?), (1.0, place(1.0)?), 0));
+        while let Some((from, to, level)) = parts.pop() {
+            let share = 0.5 * (from.0 + to.0);
+            let middle = (share, place(share)?);
+            let (x, v) = (span([from.1.0, middle.1.0, to.1.0]), span([from.1.1, middle.1.1, to.1.1]));
+            if !self.may_vanish(x, v) {
+                continue;
+            }
+            let width = self.width(x, v);
+            if self.is_shown(x, v) || (level >= LEVELS && !width.is_finite()) {
+                if side * self.value(to.1.0, to.1.1) <= 0.0 {
+                    return Ok(Sight::Crossed(from.0, to.0));
+                }
+                looked += 1;
+                // Two zeros may lie in it, as close as bounds can tell.
+                if looked > LOOKED_MAX || !(width > self.noise(x.1, v.1)) || level >= DEEPEST {
+                    continue;
+                }
+            } else if level >= LEVELS {
+                return Ok(Sight::Hidden(from.0, to.0));
+            }
+            parts.extend([(middle, to, level + 1), (from, middle, level + 1)]);
+        }
+        Ok(Sight::Clear)
+    }
+
+    /// Whether the values at its corners show g in a box: no more lies between its bounds, and the bounds of quarters add up to
+    /// those of the whole, so that g does not turn in it.
+    fn is_shown(&self, x: (f64, f64), v: (f64, f64)) -> bool {
+        let width = self.width(x, v);
+        let corners = [(x.0, v.0), (x.0, v.1), (x.1, v.0), (x.1, v.1)];
+        let (least, most) = span(corners.map(|(x, v)| self.value(x, v)));
+        let noise = self.noise(x.1, v.1);
+        let part = |(from, to): (f64, f64), i: u32| {
+            let at = |i: u32| from + (to - from) * 0.25 * f64::from(i);
+            (at(i), at(i + 1))
+        };
+        let quarters = (0..4).map(|i| self.width(part(x, i), part(v, i))).sum::<f64>();
+        width <= VISIBLE * (most - least) + noise && quarters <= ADDITIVE * width + noise
+    }
+
+    /// How far the bounds of g lie apart.
+    fn width(&self, x: (f64, f64), v: (f64, f64)) -> f64 {
+        let (least, most) = self.values.range(x, v);
+        most - least
+    }
+
     /// The first depth between two (m) at which it is met at rest, by a search at 33 places.
     pub(crate) fn met_at_rest(&self, from: f64, to: f64) -> Option<f64> {
         let g = |x: f64| self.value(x, 0.0);
@@ -178,6 +237,34 @@ impl<S: Scalar> Condition<S> {
         Some(format!("in {}, {}", reason.term, reason.reason))
     }
 }
+
+/// What a way shows of a condition.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Sight {
+    /// Its sign does not change.
+    Clear,
+    /// Its sign changes first between these shares of the way.
+    Crossed(f64, f64),
+    /// Between these shares of the way bounds leave room for zeros that the values do not show.
+    Hidden(f64, f64),
+}
+
+/// The least and the greatest.
+fn span<const N: usize>(numbers: [f64; N]) -> (f64, f64) {
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    numbers.into_iter().fold(ends, |(least, most), number| (least.min(number), most.max(number)))
+}
+
+/// Halvings of a way that is looked at, where the values do not show g; where they do and its zeros may be close; and how many
+/// such parts of a way are halved.
+const LEVELS: u32 = 10;
+const DEEPEST: u32 = 50;
+const LOOKED_MAX: u32 = 1000;
+
+/// How much wider than the values at its corners the bounds of a box may be, and those of its quarters together than its own: a
+/// term that comes twice widens both alike, and a function that turns many times fills each quarter.
+const VISIBLE: f64 = 4.0;
+const ADDITIVE: f64 = 1.5;
 
 /// Parts in which a stretch is searched.
 const PANELS: u32 = 32;

@@ -27,10 +27,13 @@
 //! **Events.** The first root of V on the step is isolated ([`locate::first_root`]). x grows until then, so that a boundary
 //! is passed before it exactly when x reaches it there.
 
+use std::convert::Infallible;
+
 use super::{STEPS_MAX, Steps, power_of_two_below, rough_exp2, rough_log2};
 use crate::integrators::flight::{Course, SLOW, StageEnd, VANISHES};
 use crate::integrators::locate;
 use crate::integrators::outcome::{IntegrationError, Solved};
+use crate::physics::condition::Sight;
 use crate::physics::expression::{Bound, Jets};
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
@@ -55,6 +58,9 @@ const NEAR_REST: f64 = 1e-11;
 /// much with the velocity.
 const BRANCH_TRIALS: i32 = 40;
 const BRANCH_SHARE: f64 = 1e-9;
+
+/// What the terms of a series may leave of g by cancelling, over g.
+const CANCELLED: f64 = 1e-3;
 
 /// Share of a root behind which a turn counts as beyond it: a double root is known to half of its digits.
 const NEAR_TURN: f64 = 0.99999;
@@ -558,10 +564,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 let parts = self.law.shown_in(place, energy)?;
                 (1..parts).all(|part| holds(&(part as f64 / parts as f64))).then_some(())
             };
-            if ASKED.iter().all(holds) && shows().is_some() && self.shows_end(&path) {
+            let shown = if ASKED.iter().all(holds) && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
+            if shown >= 1.0 {
                 return Ok((path, kink));
             }
-            path.span *= SHORTENING;
+            path.span *= shown;
             kink = None;
         }
         let end = path.at(S::from_f64(path.span));
@@ -587,9 +594,40 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         Some(series)
     }
 
-    /// Whether the series of g gives g along the path.
-    fn shows_end(&self, path: &Path<S, K>) -> bool {
-        let (Some((end, _)), Some(series)) = (self.end, self.condition_series()) else { return true };
+    /// The share of the path on which its series shows where g vanishes: 1 where all of it does.
+    fn shown_end(&self, path: &Path<S, K>) -> f64 {
+        let (Some((end, side)), Some(series)) = (self.end, self.condition_series()) else { return 1.0 };
+        if !self.shows_end(path, end, &series) {
+            return SHORTENING;
+        }
+        let place = |share: f64| {
+            let at = path.at(S::from_f64(share * path.span)).values();
+            Ok::<_, Infallible>((at.depth, at.velocity.max(0.0)))
+        };
+        let Ok(sight) = end.look(side, place);
+        match sight {
+            Sight::Clear => 1.0,
+            Sight::Hidden(from, to) => {
+                if from > 0.0 {
+                    from
+                } else {
+                    to
+                }
+            }
+            Sight::Crossed(_, to) => {
+                let is_found = first_root(&series, path.span).is_some_and(|root| root <= to * path.span * (1.0 + 1e-9));
+                if is_found { 1.0 } else { to.min(SHORTENING) }
+            }
+        }
+    }
+
+    /// Whether the series of g gives g along the path, and is no sum of numbers far beyond it.
+    fn shows_end(&self, path: &Path<S, K>, end: &Condition<S>, series: &[S; K]) -> bool {
+        let largest = [0.0].iter().chain(&ASKED).map(|share| {
+            let at = path.at(S::from_f64(share * path.span)).values();
+            end.value(at.depth, at.velocity.max(0.0)).abs()
+        });
+        let largest = largest.fold(0.0, f64::max);
         ASKED.iter().all(|share| {
             let s = share * path.span;
             let at = path.at(S::from_f64(s)).values();
@@ -599,7 +637,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             }
             let size = series.iter().rev().fold(0.0, |sum, c| sum * s + c.value().abs());
             let allowed = (DEFECT_MAX * self.tolerance + 64.0 * f64::EPSILON) * size;
-            (both(&series, s).0 - end.value(at.depth, at.velocity)).abs() <= allowed + end.noise(at.depth, at.velocity)
+            let noise = end.noise(at.depth, at.velocity);
+            allowed <= CANCELLED * largest + noise
+                && (both(series, s).0 - end.value(at.depth, at.velocity)).abs() <= allowed + noise
         })
     }
 

@@ -263,3 +263,31 @@ fn a_condition_that_is_touched_is_met_and_one_that_is_missed_by_little_is_not() 
     let flight = Taylor::default().solve(&problem(&text(touched), 100.0), Detail::Events).unwrap();
     assert_eq!(flight.outcome, Outcome::Undecided, "{flight:?}");
 }
+
+/// Thousands of zeros lie in a step of the flight, or two between places that tell nothing of them: x where the first lies.
+#[test]
+fn the_first_of_many_zeros_and_a_narrow_one_far_ahead_are_not_stepped_over() {
+    let text = |condition: &str| {
+        format!(
+            "target.thickness = 0.5\n[parameters]\nl = '20 mm'\n[[stage]]\nstatic_force = 20000\nuntil = '{condition}'\n\
+             [[stage]]\nstatic_force = 50000\n"
+        )
+    };
+    let fast = |turns: f64| 0.02 / turns * 0.9999_f64.asin();
+    for (condition, first) in [
+        ("sin(2000*x/l) = 0.9999", fast(2000.0)),
+        ("sin(200*x/l) = 0.9999", fast(200.0)),
+        ("sin(20*x/l) = 0.9999", fast(20.0)),
+        ("exp(-((x/l - 14.5)/0.1)^2) = 0.5", 0.02 * (14.5 - 0.1 * 2.0_f64.ln().sqrt())),
+        ("exp(-((x/l - 14.5)/0.003)^2) = 0.5", 0.02 * (14.5 - 0.003 * 2.0_f64.ln().sqrt())),
+        ("max(1 - abs(x/l - 9)/0.01, 0) = 0.25", 0.02 * (9.0 - 0.0075)),
+    ] {
+        for (name, method) in methods(1e-10) {
+            let flight = method.integrator().solve(&problem(&text(condition), 300.0), Detail::Events).unwrap();
+            let met = flight.events.first().map(|event| (event.kind, event.state.depth));
+            let is_first = met.is_some_and(|(kind, x)| kind == EventKind::StageEnd(0) && is_near(x, first, 1e-8));
+            assert!(is_first || flight.outcome == Outcome::Undecided, "{name}, {condition}: {met:?} and {first}");
+            assert!(name != MethodName::Taylor || is_first && flight.outcome != Outcome::Undecided, "{condition}");
+        }
+    }
+}
