@@ -572,7 +572,7 @@ impl Table {
     }
 
     fn __repr__(&self) -> String {
-        let Tally { rows, bad, undecided, unstable } = self.tally;
+        let Tally { rows, bad, undecided, unstable, .. } = self.tally;
         let unstable = if unstable > 0 { format!(", {unstable} unstable") } else { String::new() };
         format!("<penetrode.Table of {rows} rows: {bad} bad, {undecided} undecided{unstable}>")
     }

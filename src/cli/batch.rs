@@ -191,6 +191,12 @@ fn summary(tally: &Tally, part: Option<Part>) -> String {
     if tally.unstable > 0 {
         text.push_str(&format!(", {} with a step beyond the stability limit", tally.unstable));
     }
+    if tally.outside_eq14 > 0 {
+        text.push_str(&format!(
+            ", {} with an S of Eq. 14 outside its range (13.5 to 96.7 MPa, d < 76 mm, V0 < 1200 m/s)",
+            tally.outside_eq14
+        ));
+    }
     text
 }
 

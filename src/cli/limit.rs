@@ -9,9 +9,9 @@ use super::output::{Text, engineering, error_text, say, significant};
 use super::scene_json::SceneJson;
 use super::solve::GroupsJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
-use crate::physics::Shown;
 use crate::physics::groups::Groups;
 use crate::physics::semi_empirical::{perforated_thickness_ratio, perforation_validity};
+use crate::physics::{Criterion, Scene, Shown};
 use crate::studies::{applicability, perforation_limit};
 use crate::text::or_dash;
 
@@ -31,7 +31,7 @@ pub struct LimitArgs {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct LimitJson {
     schema: &'static str,
-    /// The scene against an unlimited target.
+    /// The scene against an unlimited target; with the criterion `plug`, against a slab of the limit.
     scene: SceneJson,
     groups: GroupsJson,
     method: MethodJson,
@@ -80,7 +80,11 @@ impl Ask for LimitArgs {
         let method = self.method.build()?;
         let named = |error: perforation_limit::LimitError| CliError::from(error).in_file(&self.scene.path);
         let found = perforation_limit::of_scene(&scene, method.integrator()).map_err(named)?;
-        let unlimited = perforation_limit::unlimited(&scene);
+        // A plug needs a far side to break out of: that of the limit.
+        let unlimited = match scene.criterion {
+            Criterion::Plug => Scene { thickness: Some(found.thickness), ..scene.clone() },
+            _ => perforation_limit::unlimited(&scene),
+        };
         let problem = unlimited.problem()?;
         for warning in applicability::warnings(&scene, problem.impact_speed) {
             say("warning: ", &warning);

@@ -17,7 +17,7 @@ use super::parameter::{LayerNumber, Parameter, StageNumber};
 use super::plug::{Plug, Slab};
 use super::problem::{Problem, Stage, Stages, Target};
 use super::scalar::Scalar;
-use super::semi_empirical;
+use super::semi_empirical::{self, UseOfEq14};
 use super::units::Dimension;
 use crate::text::Shown;
 
@@ -408,6 +408,11 @@ impl Concrete {
     pub fn usual_static_factor(strength: f64) -> Resolved<f64> {
         Parameter::Strength.admit(strength)?;
         Ok(semi_empirical::static_factor(strength))
+    }
+
+    /// Its S by Eq. 14 for a shot of `speed` (m/s).
+    pub fn use_of_eq14(&self, speed: f64) -> UseOfEq14 {
+        UseOfEq14 { strength: self.strength, diameter: self.diameter, speed }
     }
 
     /// Crater depth k d (m).

@@ -17,6 +17,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use super::scalar::Scalar;
+use crate::text::significant;
 
 /// Whether a formula is used inside the range it was made for, and what there is to say about it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,7 +69,58 @@ pub(crate) fn static_factor_or_none(strength: f64) -> f64 {
 /// Range of the experiments to which Eq. 14 was fitted: fc from 13.5e6 to 96.7e6 Pa.
 pub fn static_factor_validity(strength: f64) -> Validity {
     let note = format!("Eq. 14 was fitted to strengths from 13.5 to 96.7 MPa; this one is {} MPa", strength / 1e6);
-    Validity { valid: (13.5e6..=96.7e6).contains(&strength), note }
+    Validity { valid: is_strength_of_eq14(strength), note }
+}
+
+/// A shot whose S is left to Eq. 14.
+///
+/// The fit is that of small projectiles: of shots of 13 kg and 76 mm it predicts 0.57 to 0.69 of the measured depth
+/// (Forrestal et al. 2003), and beyond 1200 m/s noses erode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UseOfEq14 {
+    /// Compressive strength fc (Pa).
+    pub strength: f64,
+    /// Diameter d (m).
+    pub diameter: f64,
+    /// Impact velocity V0 (m/s).
+    pub speed: f64,
+}
+
+impl UseOfEq14 {
+    /// Whether it lies among the experiments of the fit: fc 13.5 to 96.7 MPa, d < 76 mm, V0 < 1200 m/s.
+    pub fn is_in_range(self) -> bool {
+        is_strength_of_eq14(self.strength) && self.diameter < EQ14_DIAMETER && self.speed < EQ14_SPEED
+    }
+
+    /// What lies outside, one sentence each.
+    pub fn departures(self) -> Vec<String> {
+        let strength = static_factor_validity(self.strength);
+        let strength = (!strength.valid).then_some(strength.note);
+        let diameter = (self.diameter >= EQ14_DIAMETER).then(|| {
+            format!(
+                "Eq. 14 was fitted to projectiles below 76 mm; this one has {} mm, and of shots of 13 kg and 76 mm it predicts 0.57 \
+                 to 0.69 of the depth",
+                significant(1e3 * self.diameter)
+            )
+        });
+        let speed = (self.speed >= EQ14_SPEED).then(|| {
+            format!(
+                "Eq. 14 was fitted to impact velocities below 1200 m/s; this one is {} m/s",
+                significant(self.speed)
+            )
+        });
+        strength.into_iter().chain(diameter).chain(speed).collect()
+    }
+}
+
+/// Diameter (m) below which those of the fit of Eq. 14 lie.
+const EQ14_DIAMETER: f64 = 0.076;
+
+/// Impact velocity (m/s) below which those of the fit of Eq. 14 lie.
+const EQ14_SPEED: f64 = 1200.0;
+
+fn is_strength_of_eq14(strength: f64) -> bool {
+    (13.5e6..=96.7e6).contains(&strength)
 }
 
 /// Depth X/d of Eq. 11-12 at impact function `impact`, for crater depth `crater_ratio` = k > 0.
@@ -254,6 +306,21 @@ mod tests {
         assert_relative_eq!(static_factor(35.2e6), 12.135_597_524_338_4, max_relative = 1e-14);
         assert!(static_factor_validity(36e6).valid);
         assert!(!static_factor_validity(150e6).valid && !static_factor_validity(10e6).valid);
+    }
+
+    #[test]
+    fn each_departure_from_the_experiments_of_eq_14_is_said_at_its_edge() {
+        let within = UseOfEq14 { strength: 36e6, diameter: 0.0759, speed: 1199.0 };
+        assert!(within.is_in_range() && within.departures().is_empty());
+        for (outside, said) in [
+            (UseOfEq14 { strength: 96.8e6, ..within }, "96.8 MPa"),
+            (UseOfEq14 { diameter: 0.0762, ..within }, "76.2000 mm"),
+            (UseOfEq14 { speed: 1200.0, ..within }, "1200.00 m/s"),
+        ] {
+            let text = outside.departures();
+            assert!(!outside.is_in_range() && text.len() == 1 && text[0].contains(said), "{text:?}");
+        }
+        assert_eq!(UseOfEq14 { strength: 1e6, diameter: 0.3, speed: 2e3 }.departures().len(), 3);
     }
 
     /// The relation as it is printed: H/d that the penetration y perforates.

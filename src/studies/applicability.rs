@@ -16,7 +16,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use super::order::bisect;
 use crate::physics::groups::Groups;
-use crate::physics::semi_empirical::{self, static_factor_validity};
+use crate::physics::semi_empirical;
 use crate::physics::{CraterStiffness, Problem, Scene, Stage};
 use crate::text::significant;
 
@@ -117,10 +117,7 @@ pub fn warnings(scene: &Scene, impact_speed: f64) -> Vec<String> {
         }
     }
     if concrete.follows_eq14 {
-        let range = static_factor_validity(concrete.strength);
-        if !range.valid {
-            warnings.push(range.note);
-        }
+        warnings.extend(concrete.use_of_eq14(impact_speed).departures());
     }
     warnings
 }

@@ -298,6 +298,8 @@ pub struct Answer {
     pub depth_ratio_eq11_12: Option<f64>,
     /// True if a fixed step stayed within its stability limit, and for every other method.
     pub stable: bool,
+    /// True if S is left to Eq. 14 outside the experiments to which it was fitted.
+    pub outside_eq14: bool,
 }
 
 impl Answer {
@@ -330,7 +332,8 @@ pub fn answers(
     // Why a scene has no problem; scenes are large and stay where they are.
     let causes: Vec<Option<ResolveError>> =
         scenes.iter().map(|scene| scene.as_ref().ok()?.problem().map(|problem| problems.push(problem)).err()).collect();
-    let answer = |solution, stable| Answer { solution, critical: None, depth_ratio_eq11_12: None, stable };
+    let answer =
+        |solution, stable| Answer { solution, critical: None, depth_ratio_eq11_12: None, stable, outside_eq14: false };
     let solved: Vec<Result<Answer, IntegrationError>> = if method.is_plain(MethodName::Taylor) {
         Batch::new().solve(&problems).into_iter().map(|solution| Ok(answer(solution?, true))).collect()
     } else {
@@ -350,6 +353,9 @@ pub fn answers(
         let mut answer = answer?;
         let groups = scene.velocity.and_then(|speed| Groups::of(&scene, speed));
         answer.depth_ratio_eq11_12 = groups.map(|groups| groups.depth_ratio_eq11_12);
+        answer.outside_eq14 = scene.concrete().zip(scene.velocity).is_some_and(|(concrete, speed)| {
+            concrete.follows_eq14 && concrete.layers.is_empty() && !concrete.use_of_eq14(speed).is_in_range()
+        });
         if with_critical && scene.thickness.is_some() {
             let critical = critical_velocity::of_scene(&scene, method.integrator());
             answer.critical = Some(critical.map(|critical| critical.velocity).map_err(Box::new));
@@ -391,6 +397,8 @@ pub struct Tally {
     pub undecided: u64,
     /// Solved with a step beyond the stability limit of the scheme.
     pub unstable: u64,
+    /// Solved with an S of Eq. 14 outside the experiments to which it was fitted.
+    pub outside_eq14: u64,
 }
 
 impl Tally {
@@ -403,6 +411,7 @@ impl Tally {
                 continue;
             };
             tally.unstable += u64::from(!answer.stable);
+            tally.outside_eq14 += u64::from(answer.outside_eq14);
             match &answer.critical {
                 Some(Err(error)) if !matches!(**error, CriticalError::Undecided { .. }) => tally.bad += 1,
                 critical => {
@@ -421,6 +430,7 @@ impl std::ops::AddAssign for Tally {
         self.bad += other.bad;
         self.undecided += other.undecided;
         self.unstable += other.unstable;
+        self.outside_eq14 += other.outside_eq14;
     }
 }
 

@@ -147,8 +147,7 @@ impl Experiment {
 
     /// True if it lies in the range to which S was fitted.
     pub fn is_in_range_of_fit(&self) -> bool {
-        let Concrete { strength, diameter, .. } = self.concrete;
-        semi_empirical::static_factor_validity(strength).valid && diameter < 0.0762 && self.velocity_m_s < 1200.0
+        self.concrete.use_of_eq14(self.velocity_m_s).is_in_range()
     }
 }
 

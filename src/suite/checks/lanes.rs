@@ -330,7 +330,7 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
     holds!(tells && all()[bad].is_err() | found[bad].is_err(), "of the bad row is said {said:?}");
 
     let mut worst = Worst::default();
-    let mut undecided = 0;
+    let (mut undecided, mut outside_eq14) = (0, 0);
     let mut reached = std::collections::BTreeMap::<&str, usize>::new();
     for (index, scene) in all().into_iter().enumerate().filter(|(index, _)| *index != bad) {
         let row = &made[index - usize::from(index > bad)];
@@ -370,9 +370,12 @@ fn table_of_scenes(&TableOfScenes { rows: count }: &TableOfScenes, subject: &Sub
             values[7]
         );
         undecided += u64::from(solution.outcome == Outcome::Undecided);
+        let [strength, d, speed] = [3, 1, 10].map(|cell| row.cells[cell].unwrap_or(f64::NAN));
+        let is_outside = !(13.5e6..=96.7e6).contains(&strength) || d >= 0.076 || speed >= 1200.0;
+        outside_eq14 += u64::from(row.cells[6].is_none() && is_outside);
         *reached.entry(solution.outcome.name()).or_default() += 1;
     }
-    let tally = Tally { rows: lines.len() as u64, bad: 1, undecided, unstable: 0 };
+    let tally = Tally { rows: lines.len() as u64, bad: 1, undecided, unstable: 0, outside_eq14 };
     holds!(Tally::of(&found) == tally, "{:?} in place of {tally:?}", Tally::of(&found));
     for outcome in ["stopped-in-crater", "stopped-in-tunnel", "perforated"] {
         let count = reached.get(outcome).copied().unwrap_or_default();

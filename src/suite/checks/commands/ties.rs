@@ -564,7 +564,7 @@ const TESTS: [MeasuredTest; 9] = [
     ("a", 1.6, 30.5, Some(3.0), 38.0, 2310.0, 800.0, 1540.0, 20.0),
     ("a", 1.6, 30.5, Some(4.25), 23.0, 2040.0, 800.0, 1190.0, 20.0),
     ("b", 8.0, 76.0, None, 40.0, 2300.0, 120.0, 55.0, 5.0),
-    ("b", 8.0, 76.0, None, 40.0, 2300.0, 240.0, 130.0, 5.0),
+    ("b", 8.0, 75.0, None, 40.0, 2300.0, 240.0, 130.0, 5.0),
     ("b", 8.0, 76.0, None, 140.0, 2300.0, 60.0, 12.0, 5.0),
     ("b", 6.0, 76.0, None, 36.0, 2300.0, 180.0, 90.0, 4.0),
     ("b", 8.0, 76.0, None, 36.0, 2300.0, 80.0, 30.0, 4.0),
@@ -637,8 +637,9 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
         let is_of = |test: &MeasuredTest| test.0 == of_name && (test.7 < 0.5 * test.2) == is_shallow;
         let members: Vec<&Value> =
             shots.iter().zip(&TESTS).filter(|(_, test)| is_of(test)).map(|(shot, _)| shot).collect();
-        // S was fitted to 13.5 to 96.7 MPa.
-        let in_range = TESTS.iter().filter(|test| is_of(test) && (13.5..=96.7).contains(&test.4)).count();
+        // S was fitted to 13.5 to 96.7 MPa and less than 76 mm.
+        let in_range = |test: &MeasuredTest| (13.5..=96.7).contains(&test.4) && test.2 < 76.0;
+        let in_range = TESTS.iter().filter(|test| is_of(test) && in_range(test)).count();
         let mut ratios: Vec<f64> = members.iter().map(|shot| of(shot, "ratio")).collect();
         ratios.sort_by(f64::total_cmp);
         let count = ratios.len();
