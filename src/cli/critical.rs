@@ -60,10 +60,12 @@ pub struct CriticalJson {
     relative_error: Option<f64>,
     eq15: Option<Eq15Json>,
     /// V_c of the same slab by other criteria, with the criterion `plug`.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     criteria: Vec<CriterionJson>,
     /// V_r just above V_c, with the criterion `plug`: it jumps there from nothing.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(default)]
     residual_velocity_at_limit_m_s: Option<f64>,
     /// Uncertainty of V_c from the spreads asked for; `null` without any.
     uncertainty: Option<Uncertainty>,
@@ -72,7 +74,7 @@ pub struct CriticalJson {
 }
 
 /// V_c by another criterion; `null` where there is none.
-#[derive(Debug)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct CriterionJson {
     criterion: &'static str,
     critical_velocity_m_s: Option<f64>,

@@ -37,7 +37,8 @@ pub struct SceneJson {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(default)]
     pub ends: Vec<EndJson>,
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(default)]
     pub plug: Option<PlugJson>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(default)]
@@ -45,8 +46,8 @@ pub struct SceneJson {
 }
 
 /// The criterion `plug`, and the static thickness H* of the plug.
-#[derive(Clone, Debug)]
-#[expect(missing_docs, reason = "named with their units")]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[expect(missing_docs, reason = "`docs/reference.md` names every field with its unit")]
 pub struct PlugJson {
     pub half_angle_deg: f64,
     pub shear_strength_pa: f64,
@@ -130,8 +131,7 @@ impl SceneJson {
     /// `scene` as it resolved into `problem`.
     pub fn new(scene: &Scene, problem: &Problem) -> Self {
         // A plug makes laws of the stages; they are shown by their coefficients.
-        let plain = Scene { criterion: Criterion::FullDepth, plug: None, ..scene.clone() };
-        let plain = scene.plug.and_then(|_| plain.resolve(problem.impact_speed).ok());
+        let plain = scene.plug.and_then(|_| scene.judged_by(Criterion::FullDepth).resolve(problem.impact_speed).ok());
         let problem = plain.as_ref().unwrap_or(problem);
         let concrete = scene.concrete();
         let of = |get: fn(&Concrete) -> f64| concrete.map(get);

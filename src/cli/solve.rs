@@ -85,14 +85,15 @@ pub struct SolveJson {
     trajectory: Option<Vec<Sample>>,
     skipped: Vec<String>,
     /// The same slab by other criteria, with the criterion `plug`.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     criteria: Vec<ByCriterionJson>,
     /// Asked for with `--sensitivities`; `null` otherwise.
     sensitivities: Option<SensitivitiesJson>,
 }
 
 /// The outcome by another criterion, and the velocity at its end.
-#[derive(Debug)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct ByCriterionJson {
     criterion: &'static str,
     outcome: Outcome,
@@ -275,7 +276,7 @@ impl SolveArgs {
         let mut text = Text::titled(data.scene.title.as_deref());
         text.line(format!("  method   {}", data.method.text()));
         let place = match (data.outcome, data.scene.criterion, data.velocity_at_far_side_m_s) {
-            (Outcome::Perforated, Criterion::FullDepth, _) => " at x = H".to_owned(),
+            (Outcome::Perforated, Criterion::FullDepth | Criterion::Plug, _) => " at x = H".to_owned(),
             (Outcome::Perforated, criterion, far_side) => {
                 let beyond = far_side.map_or_else(
                     || "it stops before x = H".to_owned(),

@@ -55,6 +55,7 @@ pub const SHIPPED: &[(&str, &str)] = shipped![
     "jump",
     "jump-perforate",
     "thin-slab",
+    "plug",
     "layer-at-crater-end",
     "loaded-spring",
     "spring-and-drag",

@@ -703,6 +703,12 @@ impl Scene {
         self.forces.iter().find(|(stage, _)| *stage == index).map(|(_, force)| force)
     }
 
+    /// The same scene with another criterion, and no plug.
+    #[must_use]
+    pub fn judged_by(&self, criterion: Criterion) -> Self {
+        Self { criterion, plug: None, ..self.clone() }
+    }
+
     /// The same target judged by other criteria, with their names, for a scene with the criterion `plug`: x = H, `x_p(H)`, and
     /// `H - H*`, where the static resistance breaks the plug off; none for any other scene.
     pub fn other_criteria(&self) -> Vec<(&'static str, Self)> {
@@ -711,11 +717,10 @@ impl Scene {
         else {
             return Vec::new();
         };
-        let of = |criterion| Self { criterion, plug: None, ..self.clone() };
         let left = plug.static_thickness(tunnel.static_force, concrete.diameter);
-        let full = of(Criterion::FullDepth);
+        let full = self.judged_by(Criterion::FullDepth);
         let fixed = Self { thickness: Some((thickness - left).max(0.0)), ..full.clone() };
-        vec![("full-depth", full), ("ndrc", of(Criterion::Ndrc)), ("static plug", fixed)]
+        vec![("full-depth", full), ("ndrc", self.judged_by(Criterion::Ndrc)), ("static plug", fixed)]
     }
 
     /// How stage `index` ends besides at a depth.

@@ -369,7 +369,7 @@ impl Plan {
                 if scene.criterion == criterion {
                     return row.dimensionless_energy;
                 }
-                let other = Scene { criterion, plug: None, ..scene.clone() };
+                let other = scene.judged_by(criterion);
                 let found = critical_velocity::of_scene(&other, integrator).ok()?;
                 Some(dimensionless_energy(found.energy, concrete))
             };
@@ -446,8 +446,7 @@ pub fn explanation(plan: &Plan, rows: &[Row]) -> String {
 /// drag does.
 fn parts_of_gap(scene: &Scene, row: &Row) -> Option<(String, f64)> {
     let energy = |scene: &Scene| {
-        let velocity =
-            critical_velocity::exact(&Scene { criterion: Criterion::FullDepth, plug: None, ..scene.clone() }).ok()?;
+        let velocity = critical_velocity::exact(&scene.judged_by(Criterion::FullDepth)).ok()?;
         Some(dimensionless_energy(0.5 * scene.mass * velocity * velocity, scene.concrete()?))
     };
     let mut bare = scene.clone();

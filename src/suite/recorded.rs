@@ -1,5 +1,5 @@
-//! Scenes with numbers computed elsewhere: `verification/references/exact.json` and, of those with a law of their own,
-//! `laws.json`, each made by the recipe beside it.
+//! Scenes with numbers computed elsewhere: `verification/references/exact.json`, of those with a law of their own `laws.json`, and
+//! of the one that plugs `plug.json`, each made by the recipe beside it.
 //!
 //! A recipe reads the texts of the scenes, resolves and solves them in 40 digits and shares nothing with this crate.
 
@@ -47,6 +47,7 @@ pub fn scenes() -> Result<&'static [RecordedScene], String> {
         for (file, text) in [
             ("exact.json", include_str!("../../verification/references/exact.json")),
             ("laws.json", include_str!("../../verification/references/laws.json")),
+            ("plug.json", include_str!("../../verification/references/plug.json")),
         ] {
             let read: Recording = serde_json::from_str(text).map_err(|error| format!("{file}: {error}"))?;
             scenes.extend(read.scenes);
@@ -88,6 +89,7 @@ impl RecordedScene {
             let prefix = format!("events.{}.", events.len());
             let kind = match name.as_str() {
                 "crater-end" => EventKind::CraterEnd,
+                "plug" => EventKind::Plug,
                 "rest" => EventKind::Rest,
                 "exit" => EventKind::Exit,
                 _ => EventKind::StageEnd(number(format!("{prefix}stage"))? as usize),

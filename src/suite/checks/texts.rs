@@ -23,7 +23,7 @@ use crate::physics::groups::{self, Groups};
 use crate::physics::parameter::{LayerNumber, Parameter, StageNumber};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::{self, Dimension};
-use crate::physics::{Advice, EventKind, Outcome, Problem, Resistance, Scene, Stage, State};
+use crate::physics::{Advice, Criterion, EventKind, Outcome, Problem, Resistance, Scene, Stage, State};
 use crate::studies::critical_velocity;
 use crate::studies::random::Random;
 
@@ -179,7 +179,9 @@ fn stated(scene: &Scene) -> BTreeMap<String, f64> {
 
 /// What the scene resolves into.
 fn stages(text: &RecordedScene, scene: &Scene, speed: f64) -> Found<BTreeMap<String, f64>> {
-    let problem = scene.resolve(speed).map_err(|error| broken(text, &error.to_string()))?;
+    // A plug makes laws of the stages, whose coefficients are those without it.
+    let plain = scene.plug.map(|_| scene.judged_by(Criterion::FullDepth));
+    let problem = plain.as_ref().unwrap_or(scene).resolve(speed).map_err(|error| broken(text, &error.to_string()))?;
     let mut said = BTreeMap::from([("scene.exit_depth_m".to_owned(), problem.exit_depth)]);
     for (index, stage) in problem.stages.iter().enumerate() {
         let Stage { static_force, stiffness, viscosity, drag, end } = *stage;
