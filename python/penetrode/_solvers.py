@@ -52,21 +52,20 @@ def by_stages(
     """
 
     def solve(problem: Problem) -> dict[str, Any]:
-        state = (0.0, 0.0, problem.velocity)
+        time, depth, velocity = 0.0, 0.0, problem.velocity
         events: list[tuple[str, int | None, float, float, float]] = []
-        exit_depth = problem.exit_depth
+        outcome = "perforated"
         for index, stage in enumerate(problem.stages):
-            limit = min(stage.end, exit_depth)
-            if state[1] < limit:
-                state = fly(problem, stage, limit, state)
-            time, depth, velocity = state
-            if limit == exit_depth and depth >= limit:
+            limit = min(stage.end, problem.exit_depth)
+            if depth < limit:
+                time, depth, velocity = fly(problem, stage, limit, (time, depth, velocity))
+            if limit == problem.exit_depth and depth >= limit:
                 break
             if velocity <= 0.0 or depth < limit:
-                return {"outcome": "stopped", "depth_m": depth, "time_s": time, "velocity_m_s": 0.0, "events": events}
+                outcome, velocity = "stopped", 0.0
+                break
             events.append(("stage-end", index, time, depth, velocity))
-        time, depth, velocity = state
-        return {"outcome": "perforated", "depth_m": depth, "time_s": time, "velocity_m_s": velocity, "events": events}
+        return {"outcome": outcome, "depth_m": depth, "time_s": time, "velocity_m_s": velocity, "events": events}
 
     solve.__name__ = getattr(fly, "__name__", "by_stages")
     return solve

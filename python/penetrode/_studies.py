@@ -541,6 +541,81 @@ def limit(scene: Scene | PathLike, **options: Any) -> Answer:
     return Answer(_ask(["limit", *_words(options)], _scene(scene)))
 
 
+def formulas(scene: Scene | PathLike, out: PathLike | None = None, **options: Any) -> Answer:
+    """Depth, perforation limit and scabbing limit by the published formulas, beside the equation of motion.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        With an impact velocity; its thickness does not count.
+    out : path, optional
+        CSV file for the formulas over the impact velocity; the figure goes beside it.
+    **options
+        Those of the command: `nose`, and the method and its options.
+
+    Returns
+    -------
+    Answer
+        With ``formulas``: ``name``, ``year``, ``sources``, ``depth_m``, ``perforation_m``, ``scabbing_m`` [m], and ``not_valid``, why
+        there is none.
+
+    Raises
+    ------
+    OptionError, SceneError, RunError
+        As the command: a scene of stages or layers has no formulas.
+
+    Notes
+    -----
+    Each formula names its sources, and whether it was read in two places: ``confirmed``.
+
+    Examples
+    --------
+    >>> import penetrode as pn
+    >>> found = pn.formulas("paper-slab")
+    >>> found.formulas[0]["name"], round(found.formulas[0]["depth_m"], 6)
+    ('equation of motion, x = H', 0.356909)
+    """
+    words = ["formulas", *_words(options)]
+    of: dict[str, Any] = {"scene": _scene(scene)}
+    return Answer(_ask([*words, *_words({"out": out})], **of), _of_table(words, **of))
+
+
+def export(scene: Scene | PathLike, out: PathLike, code: str = "abaqus", *, dt: float | str | None = None) -> Answer:
+    """A scene as what a finite element code runs, and what to expect of it.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        With an impact velocity; a stage whose force is an expression is refused.
+    out : path
+        Folder to write; one that holds anything else is left alone.
+    code : {"abaqus"}
+        The code.
+    dt : float or str, optional
+        Fixed time increment [s], or a text such as "1 us"; by default from the stages.
+
+    Returns
+    -------
+    Answer
+        With ``files``, ``exact``, and ``expected``: depth, time and velocity at that increment and its halves.
+
+    Raises
+    ------
+    OptionError, SceneError, RunError
+        As the command.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import penetrode as pn
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     found = pn.export("paper-slab", folder + "/slab", dt="2 us")
+    >>> "vdload.f" in found.files, found.dt_s
+    (True, 2e-06)
+    """
+    return Answer(_ask(["export", code, *_words({"out": os.fspath(out), "dt": dt})], _scene(scene)))
+
+
 def map(k: float = 2.0, out: PathLike | None = None) -> Answer:
     """How far Eq. 11-12 may be trusted: lines of equal error over (I, N).
 

@@ -20,11 +20,13 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import importlib
 import itertools
+import math
 import json
 import os
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -183,10 +185,19 @@ def _of_chance(
     return _solve(name, folder, make, options)
 
 
-def _run(tasks: Iterable[Any], out: str | os.PathLike[str], client: Any, progress: bool) -> Done:
-    """Does delayed `tasks`, and writes the index of what they made."""
-
+def _run(
+    work: Callable[..., dict[str, Any]],
+    each: Iterable[tuple[Any, ...]],
+    out: str | os.PathLike[str],
+    options: dict[str, Any],
+    client: Any,
+    progress: bool,
+) -> Done:
+    """Does `work`, a task for each of `each`, into the folder `out`, and writes the index of what they made."""
     folder = Path(out)
+    if folder.exists() and not folder.is_dir():
+        raise OptionError(f"{folder} is a file", "name a folder for the results")
+    folder.mkdir(parents=True, exist_ok=True)
     if client is None:
         try:
             from distributed import get_client
@@ -194,8 +205,12 @@ def _run(tasks: Iterable[Any], out: str | os.PathLike[str], client: Any, progres
             client = get_client()
         except (ImportError, ValueError):
             client = None
+    # A worker does several tasks at once. Here one uses all cores; more of them would only fill the memory.
+    options = {"threads": None if client is None else 1, **options}
+    delayed: Any = importlib.import_module("dask").delayed
+    tasks = [delayed(work, pure=False)(*given, os.fspath(folder.resolve()), options) for given in each]
     if client is not None:
-        futures = client.compute(list(tasks))
+        futures = client.compute(tasks)
         if progress:
             import distributed
 
@@ -203,7 +218,6 @@ def _run(tasks: Iterable[Any], out: str | os.PathLike[str], client: Any, progres
             bar(futures, notebook=False)
         said = client.gather(futures)
     else:
-        # Each task uses all cores; more of them at once would only fill the memory.
         said = [task.compute(scheduler="synchronous") for task in tasks]
     names = [one["name"] for one in said]
     # What a killed task left of these files; the files themselves are whole.
@@ -217,24 +231,21 @@ def _run(tasks: Iterable[Any], out: str | os.PathLike[str], client: Any, progres
     return Done(folder=folder, files=[folder / f"{name}.parquet" for name in names], **total)
 
 
-def _delayed() -> Any:
-    """The decorator of tasks of dask."""
-    import importlib
-
-    return importlib.import_module("dask").delayed
-
-
-def _folder(out: str | os.PathLike[str]) -> str:
-    folder = Path(out)
-    if folder.exists() and not folder.is_dir():
-        raise OptionError(f"{folder} is a file", "name a folder for the results")
-    folder.mkdir(parents=True, exist_ok=True)
-    return os.fspath(folder.resolve())
-
-
-def _threads(options: dict[str, Any]) -> dict[str, Any]:
-    """Options of a task: as many threads as the worker gives it."""
-    return {"threads": 1, **options}
+def _files(source: Any) -> Iterator[str]:
+    """The files that `source` names."""
+    paths: list[str] = []
+    for one in [source] if isinstance(source, (str, os.PathLike)) else list(source):
+        path = os.fspath(one)
+        if os.path.isdir(path):
+            paths += sorted(glob.glob(os.path.join(glob.escape(path), "*.parquet")))
+        else:
+            paths += sorted(glob.glob(path)) or [path]
+    if not paths:
+        raise TableError(f"there is no table in {source!r}", "name Parquet or CSV files")
+    for path in paths:
+        if not os.path.isfile(path):
+            raise TableError(f"{path}: there is no such file", "check the path; it must be there for all workers")
+    yield from map(os.path.abspath, paths)
 
 
 def batch(
@@ -258,7 +269,7 @@ def batch(
     progress : bool, default False
         Show a bar.
     **options
-        As in `penetrode.batch`; `threads` is 1 a task, since a worker does several.
+        As in `penetrode.batch`; `threads` is 1 a task on a cluster, since a worker does several.
 
     Returns
     -------
@@ -277,25 +288,9 @@ def batch(
     ...     penetrode.dask.batch("scenes.csv", folder).rows
     3
     """
-
-    folder, options = _folder(out), _threads(options)
     if hasattr(source, "to_delayed"):
-        delayed = _delayed()(_of_partition, pure=False)
-        return _run([delayed(part, folder, options) for part in source.to_delayed()], out, client, progress)
-    paths: list[str] = []
-    for one in [source] if isinstance(source, (str, os.PathLike)) else list(source):
-        path = os.fspath(one)
-        if os.path.isdir(path):
-            paths += sorted(glob.glob(os.path.join(glob.escape(path), "*.parquet")))
-        else:
-            paths += sorted(glob.glob(path)) or [path]
-    if not paths:
-        raise TableError(f"there is no table in {source!r}", "name Parquet or CSV files")
-    for path in paths:
-        if not os.path.isfile(path):
-            raise TableError(f"{path}: there is no such file", "check the path; it must be there for all workers")
-    delayed = _delayed()(_of_file, pure=False)
-    return _run([delayed(os.path.abspath(path), folder, options) for path in paths], out, client, progress)
+        return _run(_of_partition, ((part,) for part in source.to_delayed()), out, options, client, progress)
+    return _run(_of_file, ((path,) for path in _files(source)), out, options, client, progress)
 
 
 def _pieces(count: int, piece: int) -> list[range]:
@@ -337,17 +332,12 @@ def sweep(
     OptionError
         An axis without a value.
     """
-
     grid = {path: [float(value) for value in values] for path, values in axes.items()}
     if not grid or not all(grid.values()):
         raise OptionError("an axis has no value", "give each path a list of numbers")
-    count = 1
-    for values in grid.values():
-        count *= len(values)
-    folder, options = _folder(out), _threads({"scene": scene, **options})
-    delayed = _delayed()(_of_grid, pure=False)
-    tasks = [delayed(grid, rows, folder, options) for rows in _pieces(count, piece)]
-    return _run(tasks, out, client, progress)
+    count = math.prod(map(len, grid.values()))
+    each = ((grid, rows) for rows in _pieces(count, piece))
+    return _run(_of_grid, each, out, {"scene": scene, **options}, client, progress)
 
 
 def monte_carlo(
@@ -387,17 +377,14 @@ def monte_carlo(
     OptionError
         A path that the scene does not have as a number of its own.
     """
-
     known = _numbers(scene)
     for path in spread:
         if path not in known:
             raise OptionError(f"the scene has no number `{path}`", f"choose among {', '.join(known)}")
     means = {path: known[path] for path in spread}
-    folder, options = _folder(out), _threads({"scene": scene, **options})
-    delayed = _delayed()(_of_chance, pure=False)
     spreads = {path: float(value) for path, value in spread.items()}
-    tasks = [delayed(means, spreads, seed, rows, folder, options) for rows in _pieces(samples, piece)]
-    return _run(tasks, out, client, progress)
+    each = ((means, spreads, seed, rows) for rows in _pieces(samples, piece))
+    return _run(_of_chance, each, out, {"scene": scene, **options}, client, progress)
 
 
 def _numbers(scene: Scene) -> dict[str, float]:

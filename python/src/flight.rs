@@ -105,7 +105,7 @@ fn step(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<f64> {
 /// Attributes
 /// ----------
 /// event : str
-///     ``crater-end``, ``stage-end``, ``exit`` or ``rest``.
+///     ``crater-end``, ``stage-end``, ``plug``, ``exit`` or ``rest``.
 /// stage : int or None
 ///     Which stage ends.
 /// time, depth, velocity : float

@@ -19,7 +19,7 @@ const TABLES: [&str; 8] =
     ["title", "projectile", "target", "resistance", "impact", "perforation", "stage", "parameters"];
 
 /// Keywords of a scene, by the tables where they stand in a file.
-const KEYWORDS: [(&str, &str); 14] = [
+const KEYWORDS: [(&str, &str); 16] = [
     ("mass", "projectile.mass"),
     ("diameter", "projectile.diameter"),
     ("nose", "projectile.nose"),
@@ -34,6 +34,8 @@ const KEYWORDS: [(&str, &str); 14] = [
     ("crater_stiffness", "resistance.crater_stiffness"),
     ("velocity", "impact.velocity"),
     ("criterion", "perforation.criterion"),
+    ("half_angle", "perforation.half_angle"),
+    ("shear_strength", "perforation.shear_strength"),
 ];
 
 /// What a scene is made from, and what it means.
@@ -93,8 +95,10 @@ impl Inner {
 ///     Crater constant c [N/m]; by default the one that makes the force continuous.
 /// velocity : str or float, optional
 ///     Impact velocity V0 [m/s].
-/// criterion : {"full-depth", "ndrc"}, optional
+/// criterion : {"full-depth", "ndrc", "plug"}, optional
 ///     When the target counts as perforated.
+/// half_angle, shear_strength : str or float, optional
+///     Of the plug [degrees], below 90; around it [Pa], above zero: required with ``plug``, refused without.
 /// title, projectile, target, resistance, impact, perforation, stage, parameters : optional
 ///     The tables of a scene file; ``stage=[{"force": "P + b*V", ...}]`` and ``parameters`` are a law of your own.
 ///

@@ -37,7 +37,7 @@ impl Answer {
 /// Data, text, exit code, what was said.
 type Parts<'py> = (Bound<'py, PyAny>, String, u8, Vec<String>);
 
-/// The answer to `words`, the command first and then its options; `scene` stands behind the command. `files` are in memory.
+/// The answer to `words`, the command first and then its options; `scene` stands in front of the options. `files` are in memory.
 pub fn answer(
     py: Python<'_>,
     mut words: Vec<String>,
@@ -47,7 +47,8 @@ pub fn answer(
 ) -> PyResult<Answer> {
     if let Some(scene) = scene {
         let (named, file) = scene.inner.words();
-        words.splice(1..1, named);
+        let place = words.iter().position(|word| word.starts_with("--")).unwrap_or(words.len());
+        words.splice(place..place, named);
         files.push(file);
     }
     let threads = pool(py)?;
@@ -63,7 +64,7 @@ pub fn answer(
 /// words : list of str
 ///     The command, and its options as in a shell.
 /// scene : Scene, optional
-///     Stands behind the command.
+///     Stands in front of the options.
 /// files : list of (str, bytes)
 ///     Files that stand in memory, by the names in `words`.
 /// fault : str

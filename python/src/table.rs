@@ -46,7 +46,7 @@ const PIECES: usize = 4;
 /// ----------
 /// columns : list of str
 ///     ``row, outcome, depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s, exit_margin,
-///     critical_velocity_m_s, error``, in SI units.
+///     critical_velocity_m_s, X_over_d_eq11_12, error``, in SI units.
 /// bad, undecided, unstable : int
 ///     Rows without an answer; with an undecided outcome; solved with a step beyond the stability limit.
 #[pyclass(frozen, module = "penetrode")]

@@ -1,6 +1,7 @@
 """What the tests share."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -10,7 +11,8 @@ import pytest
 
 import penetrode as pn
 
-PROGRAM = shutil.which("penetrode", path=str(Path(sys.executable).parent))
+# The command that the tests are told of, built apart from the package; else the one that came with it.
+PROGRAM = os.environ.get("PENETRODE_COMMAND") or shutil.which("penetrode", path=str(Path(sys.executable).parent))
 
 # Laws of their own are not told to peers, and some methods do not take them; every scene is solved by the default one.
 SCENES = pn.scene_names()

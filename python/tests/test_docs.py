@@ -48,10 +48,11 @@ def test_the_package_has_an_example():
     assert doctest.testmod(pn).failed == 0 and doctest.testmod(pn).attempted > 0
 
 
-@pytest.mark.parametrize("place", ["README.md", "../README.md"])
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_the_lines_of_the_readme_run(place, capsys):
-    block = (HERE / place).read_text("utf-8").split("```python\n", 1)[1].split("```", 1)[0]
+def test_the_lines_of_the_readme_run(capsys):
+    texts = [(HERE / place).read_text("utf-8") for place in ("README.md", "../README.md")]
+    block, same = (text.split("```python\n", 1)[1].split("```", 1)[0] for text in texts)
+    assert block == same
     pytest.importorskip("scipy")
     exec(block, {})
     said = capsys.readouterr().out

@@ -14,13 +14,15 @@ def test_every_answer_has_a_text_and_its_figures():
         "converge": (pn.converge("tunnel", points=8), 1),
         "sweep": (pn.sweep("paper-slab", {"H/d": (1, 9, 9)}), 2),
         "map": (pn.map(), 1),
+        "limit": (pn.limit("tunnel"), 0),
+        "formulas": (pn.formulas("paper-slab"), 1),
         "audit": (pn.audit({"dt_s": [1e-6, 2e-6, 3e-6, 5e-6], "depth_m": [0.1, 0.11, 0.12, 0.14]}), 1),
         "diagnose": (pn.diagnose(lambda problem: (1.0, 1.0, 0.0), questions=24), 0),
     }
     for name, (answer, figures) in answers.items():
         assert len(repr(answer)) > 50 and "\x1b" not in repr(answer), name
         html = answer._repr_html_()
-        assert html.startswith("<pre>") and html.count("<img") >= figures, name
+        assert html.startswith('<pre style="font-family:monospace">') and html.count("<img") >= figures, name
         assert answer.to_dict()["schema"].startswith(f"penetrode/{name}/"), name
 
 
