@@ -234,9 +234,9 @@ def test_ctrl_c_ends_a_long_call():
 
     scene = pn.scene("tunnel")
     started = time.monotonic()
-    threading.Timer(0.3, _thread.interrupt_main).start()
+    threading.Timer(0.05, _thread.interrupt_main).start()
     with pytest.raises(KeyboardInterrupt):
-        # Half a minute of steps.
+        # As many steps as are allowed: half a second at least.
         pn.solve(scene, "central-difference", dt=1e-12)
     assert time.monotonic() - started < 5
 
