@@ -52,6 +52,8 @@ pub enum Need {
     Required,
     /// An absent cell is no number, or an empty text.
     Optional,
+    /// As optional, and the table has this column or the one of the name here.
+    Unless(&'static str),
     /// An absent cell is this number.
     Default(f64),
 }
@@ -69,12 +71,14 @@ pub struct Column {
     pub range: Range,
     /// Its name without the unit, and what it measures: a table may then give it in another unit (`mass_g` for `mass_kg`).
     pub measure: Option<(&'static str, Dimension)>,
+    /// Other names, without the unit where it has one: the symbols of a paper.
+    pub aliases: &'static [&'static str],
 }
 
 impl Column {
     /// A required column of finite numbers.
     pub const fn number(name: &'static str) -> Self {
-        Self { name, kind: Kind::Number, need: Need::Required, range: Range::Finite, measure: None }
+        Self { name, kind: Kind::Number, need: Need::Required, range: Range::Finite, measure: None, aliases: &[] }
     }
 
     /// The same in any unit of `dimension`, which stands behind `stem` in the name.
@@ -83,14 +87,21 @@ impl Column {
         Self { measure: Some((stem, dimension)), ..self }
     }
 
+    /// The same, called by `aliases` too.
+    #[must_use]
+    pub const fn called(self, aliases: &'static [&'static str]) -> Self {
+        Self { aliases, ..self }
+    }
+
     /// What a number of the column `name` of a table at hand is in the unit of this one, as a factor; `None` where it is
     /// another column.
     fn factor(&self, name: &str) -> Option<f64> {
         if name == self.name {
             return Some(1.0);
         }
-        let (stem, dimension) = self.measure?;
-        let unit = unit_of(name.strip_prefix(stem)?).filter(|unit| !unit.is_empty())?;
+        let Some((stem, dimension)) = self.measure else { return self.aliases.contains(&name).then_some(1.0) };
+        let mut stems = [stem].into_iter().chain(self.aliases.iter().copied());
+        let unit = stems.find_map(|stem| unit_of(name.strip_prefix(stem)?).filter(|unit| !unit.is_empty()))?;
         let is_alike = |known: &str| spellings(unit).iter().any(|unit| unit.to_lowercase() == known.to_lowercase());
         let exactly = spellings(unit).iter().find_map(|unit| dimension.coefficient(unit));
         // Names of columns are in small letters: `strength_mpa`.
@@ -171,11 +182,29 @@ impl Format {
         self.columns.iter().map(|column| column.name).collect::<Vec<_>>().join(",")
     }
 
+    /// Whether a table whose columns have the `places` lacks `column`.
+    fn lacks(&self, column: &Column, place: Option<usize>, places: &[Option<usize>]) -> bool {
+        let has =
+            |name: &str| self.columns.iter().zip(places).any(|(other, place)| other.name == name && place.is_some());
+        match column.need {
+            Need::Required => place.is_none(),
+            Need::Unless(other) => place.is_none() && !has(other),
+            Need::Optional | Need::Default(_) => false,
+        }
+    }
+
     /// Its columns in words.
     pub fn allowed(&self) -> String {
         let names = |is_needed: bool| {
-            let of_kind = self.columns.iter().filter(|column| (column.need == Need::Required) == is_needed);
-            of_kind.map(|column| column.name).collect::<Vec<_>>().join(", ")
+            let of_kind = self
+                .columns
+                .iter()
+                .filter(|column| matches!(column.need, Need::Required | Need::Unless(_)) == is_needed);
+            let name = |column: &Column| match column.need {
+                Need::Unless(other) => format!("{} (or {other})", column.name),
+                _ => column.name.to_owned(),
+            };
+            of_kind.map(name).collect::<Vec<_>>().join(", ")
         };
         let (needed, optional) = (names(true), names(false));
         let mut text = match (needed.is_empty(), optional.is_empty()) {
@@ -243,8 +272,8 @@ impl Layout {
             }
         }
         let names = names.iter().map(|name| name.trim().to_owned()).collect();
-        let mut missing = format.columns.iter().zip(&places).filter(|(_, place)| place.is_none());
-        match missing.find(|(column, _)| column.need == Need::Required) {
+        let mut missing = format.columns.iter().zip(&places);
+        match missing.find(|(column, place)| format.lacks(column, **place, &places)) {
             Some((column, _)) if format.others != Others::Read => refuse(0, Fault::MissingColumn(column.name)),
             _ => Ok(Self { columns: format.columns, places, factors, names, header: at }),
         }
@@ -379,8 +408,28 @@ impl<'a> Row<'a> {
 
     /// The cell of `text` in `column` is `reason`.
     pub fn refuse_cell(&self, column: usize, text: &str, reason: impl Into<Cow<'static, str>>) -> Box<TableError> {
-        let (name, text) = (self.rows.layout.columns[column].name, shortened(text));
-        self.refuse(column, Fault::Cell { name: name.into(), text, reason: reason.into() })
+        let (name, text) = (self.name(column), shortened(text));
+        self.refuse(column, Fault::Cell { name, text, reason: reason.into() })
+    }
+
+    /// The row as a whole is refused for `reason`.
+    pub fn refuse_row(&self, reason: String) -> Box<TableError> {
+        TableError::of_row(self.at(), 0, Fault::Row(reason))
+    }
+
+    /// The name that the table gives `column`.
+    fn name(&self, column: usize) -> Cow<'static, str> {
+        match self.rows.layout.places[column] {
+            Some(place) => self.rows.layout.names[place].clone().into(),
+            None => self.rows.layout.columns[column].name.into(),
+        }
+    }
+
+    /// Places, from 0, and names of the columns that the format does not have.
+    pub fn others(&self) -> impl Iterator<Item = (usize, &'a str)> {
+        let layout = &self.rows.layout;
+        let names = layout.names.iter().map(String::as_str).enumerate();
+        names.filter(|(place, _)| !layout.places.contains(&Some(*place)))
     }
 
     /// The text in `column` without blanks at its ends; empty where it is absent.
@@ -432,7 +481,7 @@ impl<'a> Row<'a> {
             (Some(value), _) if range.contains(value) => Ok(Some(value)),
             (Some(value), _) => refuse(&Shown(value).to_string(), None),
             (None, Need::Required) => Err(self.refuse_empty(column)),
-            (None, Need::Optional) => Ok(None),
+            (None, Need::Optional | Need::Unless(_)) => Ok(None),
             (None, Need::Default(value)) => Ok(Some(value)),
         }
     }
@@ -448,7 +497,7 @@ impl<'a> Row<'a> {
 
     /// The cell in `column` is empty and must not be.
     pub fn refuse_empty(&self, column: usize) -> Box<TableError> {
-        self.refuse(column, Fault::EmptyCell(self.rows.layout.columns[column].name.into()))
+        self.refuse(column, Fault::EmptyCell(self.name(column)))
     }
 }
 
@@ -484,8 +533,21 @@ pub fn read<T>(
     file: &str,
     bytes: &[u8],
     format: &'static Format,
-    mut each: impl FnMut(&Row<'_>) -> Result<T, Box<TableError>>,
+    each: impl FnMut(&Row<'_>) -> Result<T, Box<TableError>>,
 ) -> Result<Vec<T>, Box<TableError>> {
+    read_rows(file, bytes, format, each)?.into_iter().collect()
+}
+
+/// As [`read`], with the fault of a row in its place.
+///
+/// # Errors
+/// [`TableError`] of the table.
+pub fn read_rows<T>(
+    file: &str,
+    bytes: &[u8],
+    format: &'static Format,
+    mut each: impl FnMut(&Row<'_>) -> Result<T, Box<TableError>>,
+) -> Result<Vec<Result<T, Box<TableError>>>, Box<TableError>> {
     let mut table = CsvTable::new(file, bytes, format)?;
     let (mut all, mut used) = (Vec::new(), None);
     loop {
@@ -496,7 +558,7 @@ pub fn read<T>(
         }
         for index in 0..records.len() {
             let made = records.row(index).and_then(|row| row.check_text().and_then(|()| each(&row)));
-            all.push(made.map_err(|error| error.in_file(file))?);
+            all.push(made.map_err(|error| error.in_file(file)));
         }
         used = Some(records);
     }

@@ -22,6 +22,20 @@ pub enum NoseShape {
         /// Nose height over the diameter, psi > 0.
         length_ratio: f64,
     },
+    /// A tangent ogive, cut off flat.
+    TruncatedOgive {
+        /// Radius of the ogive over the diameter, psi >= 1/2.
+        caliber_radius_head: f64,
+        /// Diameter of the flat over the diameter, t = 0 to 1.
+        tip_ratio: f64,
+    },
+    /// A cone, cut off flat.
+    TruncatedCone {
+        /// Height of what is left over the diameter, psi > 0.
+        length_ratio: f64,
+        /// Diameter of the flat over the diameter, t = 0 to 1.
+        tip_ratio: f64,
+    },
     /// A spherical cap.
     Spherical {
         /// Radius of the sphere over the diameter, psi >= 1/2; 1/2 is the hemisphere.
@@ -36,12 +50,28 @@ impl NoseShape {
     /// flat 1    ogive 1/(3 psi) - 1/(24 psi²)    cone 1/(1 + 4 psi²)    cap 1 - 1/(8 psi²)
     /// ```
     ///
+    /// A flat of t d in front adds t², and the face behind it ends at the angle a to the axis, cos a = 1 - (1 - t)/(2 psi):
+    ///
+    /// ```text
+    /// truncated ogive   t² + 8 psi ((1/2 - psi) (2/3 - cos a + cos³a/3) + psi sin⁴a/4)
+    /// truncated cone    t² + (1 - t²)/(1 + (2 psi/(1 - t))²)
+    /// ```
+    ///
     /// The ogive is evaluated as `(8 - 1/psi)/(24 psi)`, so that no square overflows.
     pub fn factor(self) -> f64 {
         match self {
             Self::Flat => 1.0,
             Self::Ogive { caliber_radius_head: psi } => (8.0 - 1.0 / psi) / (24.0 * psi),
             Self::Cone { length_ratio: psi } => 1.0 / (1.0 + 4.0 * psi * psi),
+            Self::TruncatedOgive { caliber_radius_head: psi, tip_ratio: t } => {
+                // With u = 1 - cos a: 2/3 - cos a + cos³a/3 = u² (1 - u/3), sin²a = u (2 - u); nothing cancels.
+                let u = 0.5 * (1.0 - t) / psi;
+                t * t + 8.0 * psi * u * u * ((0.5 - psi) * (1.0 - u / 3.0) + 0.25 * psi * (2.0 - u) * (2.0 - u))
+            }
+            Self::TruncatedCone { length_ratio: psi, tip_ratio: t } => {
+                let (flat, slope) = (t * t, 2.0 * psi / (1.0 - t));
+                flat + (1.0 - flat) / (1.0 + slope * slope)
+            }
             Self::Spherical { radius_ratio: psi } => 1.0 - 0.125 / psi / psi,
         }
     }
@@ -57,7 +87,11 @@ impl NoseShape {
         match self {
             Self::Flat => 0.0,
             Self::Ogive { caliber_radius_head: psi } => (psi - 0.25).sqrt(),
-            Self::Cone { length_ratio: psi } => psi,
+            Self::Cone { length_ratio: psi } | Self::TruncatedCone { length_ratio: psi, .. } => psi,
+            Self::TruncatedOgive { caliber_radius_head: psi, tip_ratio: t } => {
+                let u = 0.5 * (1.0 - t) / psi;
+                psi * (u * (2.0 - u)).sqrt()
+            }
             Self::Spherical { radius_ratio: psi } => 0.25 / (psi + (psi - 0.5).sqrt() * (psi + 0.5).sqrt()),
         }
     }
@@ -95,6 +129,32 @@ mod tests {
         for hemisphere in HEMISPHERES {
             assert_relative_eq!(hemisphere.factor(), 0.5);
         }
+    }
+
+    const TRUNCATED: [(NoseShape, f64, f64); 5] = [
+        (NoseShape::TruncatedOgive { caliber_radius_head: 3.0, tip_ratio: 0.4 }, 0.2298, 1.3076696830622021),
+        (NoseShape::TruncatedOgive { caliber_radius_head: 1.5, tip_ratio: 0.7 }, 0.53645, 0.65383484153110103),
+        (NoseShape::TruncatedOgive { caliber_radius_head: 0.5, tip_ratio: 0.25 }, 0.501953125, 0.48412291827592711),
+        (NoseShape::TruncatedCone { length_ratio: 1.5, tip_ratio: 0.4 }, 0.19230769230769231, 1.5),
+        (NoseShape::TruncatedCone { length_ratio: 0.3, tip_ratio: 0.8 }, 0.676, 0.3),
+    ];
+
+    /// mpmath, 40 digits: `t² + 8 quad(y y'^3/(1 + y'^2))` over the face behind the flat, and its height by geometry.
+    #[test]
+    fn factors_and_heights_of_truncated_noses_are_those_of_the_integral() {
+        for (nose, factor, height) in TRUNCATED {
+            assert_relative_eq!(nose.factor(), factor, max_relative = 1e-15);
+            assert_relative_eq!(nose.height_ratio(), height, max_relative = 1e-15);
+        }
+        // Without a flat they are the whole noses.
+        for psi in [0.5, 2.0, 6.0] {
+            let cut = NoseShape::TruncatedOgive { caliber_radius_head: psi, tip_ratio: 0.0 };
+            assert_relative_eq!(cut.factor(), ogive(psi).factor(), max_relative = 1e-14);
+            assert_relative_eq!(cut.height_ratio(), ogive(psi).height_ratio(), max_relative = 1e-15);
+        }
+        let [whole, cut] =
+            [NoseShape::Cone { length_ratio: 1.5 }, NoseShape::TruncatedCone { length_ratio: 1.5, tip_ratio: 0.0 }];
+        assert_eq!(whole.factor(), cut.factor());
     }
 
     #[test]

@@ -632,7 +632,7 @@ mod tests {
     #[test]
     fn columns_of_a_table_are_the_paths_of_a_plain_target_with_their_units() {
         let columns: Vec<_> = Parameter::PLAIN[..11].iter().map(|parameter| parameter.column()).collect();
-        assert_eq!(columns.join(",") + ",criterion", crate::studies::batch::SCENES.header());
+        assert_eq!(columns.join(",") + ",criterion,nose,CRH,tip_ratio,R_pa", crate::studies::batch::SCENES.header());
     }
 
     #[test]

@@ -6,22 +6,42 @@ use crate::studies::experiments::{Comparison, SetSummary};
 use crate::studies::extreme_scenes::Summary;
 
 /// Columns of [`sets`].
-pub const SETS: [&str; 9] =
-    ["set", "tests", "median", "spread", "range", "within ±20 %", "in range of S", "mean E/D", "u_val/D"];
+pub const SETS: [&str; 12] = [
+    "set",
+    "tests",
+    "median",
+    "spread",
+    "range",
+    "within ±20 %",
+    "outliers",
+    "in range of S",
+    "mean E/D",
+    "95 % of it",
+    "u_val/D",
+    "|E| <= u_val",
+];
 
 /// Predicted over measured depth and the comparison error E/D, set by set.
-pub fn sets(sets: &[SetSummary]) -> impl Iterator<Item = [String; 9]> {
+pub fn sets(sets: &[SetSummary]) -> impl Iterator<Item = [String; 12]> {
     sets.iter().map(|set| {
+        let percent = |value: f64| format!("{:+.1}", 100.0 * value);
         [
             one_line(&set.set),
             set.experiments.to_string(),
             format!("{:.2}", set.median),
-            format!("{:.2}", set.spread),
+            or_dash(set.spread, |spread| format!("{spread:.2}")),
             format!("{:.2} to {:.2}", set.least, set.greatest),
             set.within_20_percent.to_string(),
+            set.outliers.to_string(),
             set.in_range_of_fit.to_string(),
-            format!("{:+.1} %", 100.0 * set.mean_comparison_error),
+            format!("{} %", percent(set.mean_comparison_error)),
+            set.mean_comparison_error95
+                .map_or("-".to_owned(), |[low, high]| format!("{} to {} %", percent(low), percent(high))),
             set.validation_uncertainty.map_or("not given".to_owned(), |u| format!("{:.1} %", 100.0 * u)),
+            match set.with_validation_uncertainty {
+                0 => "-".to_owned(),
+                given => format!("{} of {given}", set.within_validation_uncertainty),
+            },
         ]
     })
 }

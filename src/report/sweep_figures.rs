@@ -6,11 +6,12 @@ use std::fmt::Display;
 
 use super::chart::{Anchor, Axis, Ink, Panel, Point, Style, extremes};
 use super::figure::Figure;
-use super::text::{count, number};
+use super::text::{count, number, one_line};
 use crate::exchange::tables::{Value, push_line};
 use crate::physics::semi_empirical::{NDRC_FIRST_BRANCH_END, eq15_printed, eq15_unrounded, jumps};
 use crate::studies::applicability::{ERROR_ALLOWED, Line};
-use crate::studies::experiments::{BAND, Comparison, MarkedScene, summaries};
+use crate::studies::experiments::perforation::{PerforationTest, Perforations};
+use crate::studies::experiments::{BAND, Comparison, MarkedScene, Shots, summaries};
 use crate::studies::formulas::Said;
 use crate::studies::sweep::{self, MeasuredPoint, Plan, Row};
 use crate::suite::{Judged, grouped};
@@ -251,23 +252,176 @@ pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option
     }
     let within: usize = summaries(comparisons).iter().map(|set| set.within_20_percent).sum();
     let values = [&number(100.0 * BAND, 2) as &dyn Display, &within, &count(comparisons.len(), "test")];
-    Figure::new("measured-depths", "", judged, &values, vec![panel])
+    let panels = [panel].into_iter().chain(ratios(comparisons)).collect();
+    Figure::new("measured-depths", "", judged, &values, panels)
 }
 
-/// The comparison of measured depths as CSV, one row a test.
-pub fn measured_table(comparisons: &[Comparison]) -> String {
-    let mut csv = "test_set,line,velocity_m_s,measured_depth_m,predicted_depth_m,ratio,I,N,k,comparison_error_m,numerical_uncertainty_m,input_uncertainty_m,data_uncertainty_m,validation_uncertainty_m\n".to_owned();
-    for c in comparisons {
-        let measured =
-            [c.experiment.velocity_m_s, c.experiment.measured_depth_m, c.predicted_depth_m, c.ratio, c.impact]
-                .map(Some);
-        let computed = [c.geometry, Some(c.crater_ratio), Some(c.comparison_error_m), Some(c.numerical_uncertainty_m)];
-        let uncertain = [c.input_uncertainty_m, c.experiment.data_uncertainty_m, c.validation_uncertainty_m];
-        let mut row = vec![Value::Text(&c.experiment.set), Value::Count(c.experiment.line)];
-        row.extend(measured.into_iter().chain(computed).chain(uncertain).map(Value::Number));
+/// Predicted over measured depth over X/d, the strength and the diameter; outliers by set and line.
+fn ratios(comparisons: &[Comparison]) -> impl Iterator<Item = Panel> {
+    type Over = (&'static str, &'static str, fn(&Comparison) -> f64);
+    const OVER: [Over; 3] = [
+        ("measured X/d", "", |c| c.experiment.measured_depth_m / c.experiment.concrete.diameter),
+        ("strength", "MPa", |c| 1e-6 * c.experiment.concrete.strength),
+        ("diameter", "mm", |c| 1e3 * c.experiment.concrete.diameter),
+    ];
+    OVER.into_iter().map(move |(title, unit, over)| {
+        let [least, most] = extremes(comparisons.iter().map(over)).unwrap_or([1.0, 1.0]);
+        let ends = [least / 1.5, most * 1.5];
+        let band = [(ends[0], 1.0 - BAND), (ends[0], 1.0 + BAND), (ends[1], 1.0 + BAND), (ends[1], 1.0 - BAND)];
+        let mut panel = Panel::new(
+            format!("ratio over {title}"),
+            Axis::log(title, unit).over(ends),
+            Axis::log("predicted over measured", ""),
+        )
+        .series("±20 %", Style::area(Ink::Shade), band)
+        .series("equal", Style::REFERENCE, ends.map(|x| (x, 1.0)))
+        .tall(290.0);
+        for (index, (set, members)) in grouped(comparisons, |c| c.group()).into_iter().enumerate() {
+            panel = panel.series(set, Style::marks(index).radius(2.5), members.iter().map(|c| (over(c), c.ratio)));
+        }
+        for c in comparisons.iter().filter(|c| c.is_outlier) {
+            let right = over(c) > (ends[0] * ends[1]).sqrt();
+            let (shift, anchor) = if right { (0.95, Anchor::End) } else { (1.05, Anchor::Start) };
+            panel = panel.label((over(c) * shift, c.ratio), format!("line {}", c.experiment.line), anchor);
+        }
+        panel
+    })
+}
+
+/// Shots as CSV: each in the order of `shots`, measured beside predicted, and the columns of its table that are not read.
+pub fn measured_table(shots: &Shots, comparisons: &[Comparison], perforations: &Perforations) -> String {
+    const NAMES: [&str; 22] = [
+        "test_set",
+        "line",
+        "velocity_m_s",
+        "measured_depth_m",
+        "predicted_depth_m",
+        "ratio",
+        "I",
+        "N",
+        "k",
+        "comparison_error_m",
+        "numerical_uncertainty_m",
+        "input_uncertainty_m",
+        "data_uncertainty_m",
+        "validation_uncertainty_m",
+        "is_outlier",
+        "measured_outcome",
+        "predicted_outcome",
+        "measured_residual_m_s",
+        "predicted_residual_m_s",
+        "measured_limit_m_s",
+        "predicted_limit_m_s",
+        "excluded",
+    ];
+    let others: Vec<String> = shots
+        .others
+        .iter()
+        .map(|name| if NAMES.contains(&name.as_str()) { format!("given_{name}") } else { name.clone() })
+        .collect();
+    let mut csv = String::new();
+    let names = NAMES.iter().copied().chain(others.iter().map(String::as_str));
+    push_line(&mut csv, &names.map(Value::Text).collect::<Vec<_>>());
+    let (mut depths, mut fired, mut limits) =
+        (comparisons.iter(), perforations.shots.iter(), perforations.limits.iter());
+    let word = |perforated: Option<bool>| match perforated {
+        Some(true) => "perforated",
+        Some(false) => "stopped",
+        None => "",
+    };
+    for shot in &shots.shots {
+        let is_used = shot.excluded.is_none();
+        let has_far_side = is_used && shot.scene.thickness.is_some();
+        let c = if is_used && shot.depth.is_some() { depths.next() } else { None };
+        let test = if has_far_side && shot.perforated.is_some() { fired.next() } else { None };
+        let limit = if has_far_side && shot.limit.is_some() { limits.next() } else { None };
+        let numbers = [
+            shot.scene.velocity,
+            shot.depth.map(|depth| depth.value),
+            c.map(|c| c.predicted_depth_m),
+            c.map(|c| c.ratio),
+            c.map(|c| c.impact),
+            c.and_then(|c| c.geometry),
+            c.map(|c| c.crater_ratio),
+            c.map(|c| c.comparison_error_m),
+            c.map(|c| c.numerical_uncertainty_m),
+            c.and_then(|c| c.input_uncertainty_m),
+            c.and_then(|c| c.experiment.data_uncertainty_m),
+            c.and_then(|c| c.validation_uncertainty_m),
+        ];
+        let velocities = [
+            shot.residual.map(|residual| residual.value),
+            test.map(|test| test.predicted_velocity_m_s),
+            shot.limit.map(|limit| limit.value),
+            limit.map(|limit| limit.predicted_limit_m_s),
+        ];
+        let mut row = vec![Value::Text(&shot.set), Value::Count(shot.line)];
+        row.extend(numbers.map(Value::Number));
+        row.push(Value::Text(match c {
+            Some(c) if c.is_outlier => "yes",
+            Some(_) => "no",
+            None => "",
+        }));
+        let predicted = match test {
+            Some(PerforationTest { predicted_perforation: None, .. }) => "undecided",
+            Some(test) => word(test.predicted_perforation),
+            None => "",
+        };
+        row.extend([Value::Text(word(shot.perforated)), Value::Text(predicted)]);
+        row.extend(velocities.map(Value::Number));
+        row.push(Value::Text(shot.excluded.as_deref().unwrap_or("")));
+        row.extend(shot.others.iter().map(|cell| Value::Text(cell)));
         push_line(&mut csv, &row);
     }
     csv
+}
+
+/// Residual over impact velocity, measured and predicted, a panel for each group with a curve through its shots.
+///
+/// `None` without such a group.
+pub fn residual_velocities(perforations: &Perforations) -> Option<Figure> {
+    /// Points of a curve.
+    const POINTS: u32 = 200;
+    let fitted =
+        perforations.groups.iter().filter_map(|group| Some((group, group.lambert_jonas.or(group.recht_ipson)?)));
+    let panels: Vec<Panel> = fitted
+        .map(|(group, fit)| {
+            let of_group = || {
+                let in_group = |test: &&PerforationTest| test.set == group.set && test.thickness_m == group.thickness_m;
+                perforations.shots.iter().filter(in_group)
+            };
+            let measured = of_group().filter_map(|test| Some((test.velocity_m_s, test.measured_velocity_m_s?)));
+            let stopped = of_group().filter(|test| !test.measured_perforation).map(|test| (test.velocity_m_s, 0.0));
+            let predicted = of_group().map(|test| (test.velocity_m_s, test.predicted_velocity_m_s));
+            let fastest = of_group().map(|test| test.velocity_m_s).fold(0.0, f64::max);
+            let least = fit.limit_m_s.value;
+            let curve = (0..=POINTS).map(|part| {
+                // Denser where the curve rises from the axis.
+                let speed = least + (fastest - least) * (f64::from(part) / f64::from(POINTS)).powi(2);
+                (speed, fit.at(speed))
+            });
+            let title = format!("{}, H {} mm", one_line(&group.set), number(1e3 * group.thickness_m, 4));
+            Panel::new(
+                title,
+                Axis::linear("impact velocity", "m/s"),
+                Axis::linear("residual velocity", "m/s").including([0.0]),
+            )
+            .tall(TALL)
+            .series("curve through the shots", Style::line(0), curve)
+            .series("measured", Style::marks(0), measured)
+            .series("stopped", Style::marks(0).hollow(), stopped)
+            .series("predicted", Style::marks(1), predicted)
+        })
+        .collect();
+    let errors: Vec<String> = perforations
+        .groups
+        .iter()
+        .filter_map(|group| {
+            let fit = group.lambert_jonas.or(group.recht_ipson)?;
+            Some(format!("{} against {} m/s", number(group.predicted_limit_m_s, 4), number(fit.limit_m_s.value, 4)))
+        })
+        .collect();
+    if panels.is_empty() { None } else { Figure::new("residual-velocities", "", &[], &[&errors.join(", ")], panels) }
 }
 
 #[cfg(test)]

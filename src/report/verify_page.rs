@@ -297,7 +297,7 @@ fn sets(run: &Run<'_>) -> Markup {
     let caption = "Predicted over measured depth, set by set; E = S − D is the comparison error after ASME V&V 20";
     let sets = experiments::summaries(comparisons);
     html! {
-        (Table::cards(caption, cells::SETS).numbers(1..8).rows(cells::sets(&sets), |row| row.map(cell)))
+        (Table::cards(caption, cells::SETS).numbers(1..10).rows(cells::sets(&sets), |row| row.map(cell)))
         (facts(cells::uncertainties(comparisons).map(|(name, known)| (name, typeset::html(&known)))))
     }
 }

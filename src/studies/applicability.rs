@@ -39,6 +39,22 @@ pub fn depth_ratio(impact: f64, geometry: f64, crater_ratio: f64) -> f64 {
     }
 }
 
+/// The impact function I at which [`depth_ratio`] is `depth_ratio`; without drag for `geometry` = `None`.
+///
+/// ```text
+/// X/d <= k: I = (X/d)² N/((4 k/pi)(N + k pi/4) - (X/d)²)      beyond: I = k pi/4 + (N + k pi/4) expm1(pi (X/d - k)/(2 N))
+/// ```
+pub fn impact_at(depth_ratio: f64, geometry: Option<f64>, crater_ratio: f64) -> f64 {
+    let (y, k) = (depth_ratio, crater_ratio);
+    let Some(n) = geometry else { return semi_empirical::impact_function(y, k) };
+    let edge = k * FRAC_PI_4;
+    if y <= k {
+        y * y * n / (k / FRAC_PI_4 * (n + edge) - y * y)
+    } else {
+        edge + (n + edge) * ((y - k) * FRAC_PI_2 / n).exp_m1()
+    }
+}
+
 /// Error of Eq. 11-12, relative to the depth of the equation of motion; zero without drag (`geometry` = `None`).
 pub fn model_error(impact: f64, geometry: Option<f64>, crater_ratio: f64) -> f64 {
     let (Some(n), k) = (geometry, crater_ratio) else { return 0.0 };
@@ -175,6 +191,16 @@ mod tests {
             (8.455, 125.9, 2.0, 6.215_773_173_665_595),
         ] {
             assert!((depth_ratio(impact, geometry, k) / expected - 1.0).abs() < 4e-16, "{impact} {geometry}");
+        }
+    }
+
+    #[test]
+    fn the_impact_function_of_a_depth_is_the_one_that_gives_it() {
+        for (impact, geometry, k) in [(0.5, 10.0, 2.0), (2.0, 10.0, 2.0), (100.0, 10.0, 2.0), (0.2, 20.0, 0.707)] {
+            let y = depth_ratio(impact, geometry, k);
+            assert!((impact_at(y, Some(geometry), k) / impact - 1.0).abs() < 4e-15, "{impact}");
+            let y = semi_empirical::depth_ratio(impact, k);
+            assert!((impact_at(y, None, k) / impact - 1.0).abs() < 4e-15, "{impact}");
         }
     }
 

@@ -16,8 +16,11 @@ use crate::exchange::tables::{Block, Column, Format, Kind, Need, Others, Place, 
 use crate::integrators::lanes::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, MethodName};
 use crate::physics::groups::Groups;
+use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, Parameter, ParameterError};
+use crate::physics::units::Dimension;
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, ResolveError, Scene};
+use crate::text::Shown;
 
 /// A table of scenes; whether its numbers are admissible is for [`Scene::resolve`] to say.
 pub static SCENES: Format = Format { columns: &COLUMNS, others: Others::Refused, has_comments: false };
@@ -52,8 +55,34 @@ const STEMS: [&str; NUMBERS.len()] = [
     "velocity",
 ];
 
-const COLUMNS: [Column; NUMBERS.len() + 1] = {
-    let mut columns = [Column::text("criterion").needed(Need::Optional); NUMBERS.len() + 1];
+/// Symbols of papers for the numbers, without their units.
+const SYMBOLS: [&[&str]; NUMBERS.len()] =
+    [&["M"], &["d"], &["N*"], &["fc"], &["rho"], &["H", "H_target"], &[], &[], &[], &[], &["V0", "impact_velocity"]];
+
+/// Index in [`COLUMNS`] of the thickness.
+pub(super) const THICKNESS: usize = 5;
+/// Index of k.
+pub(super) const CRATER_RATIO: usize = 8;
+/// Index of the impact velocity.
+pub(super) const VELOCITY: usize = 10;
+/// Index of the criterion, behind all numbers.
+pub(super) const CRITERION: usize = NUMBERS.len();
+/// Index of the shape of the nose; the number that goes with it, and the flat of a truncated one, follow.
+pub(super) const NOSE: usize = CRITERION + 1;
+const NOSE_NUMBER: usize = NOSE + 1;
+const TIP: usize = NOSE + 2;
+const RESISTANCE: usize = NOSE + 3;
+
+/// The columns of a scene in a table.
+pub const COLUMNS: [Column; RESISTANCE + 1] = {
+    let mut columns = [Column::text("criterion").needed(Need::Optional); RESISTANCE + 1];
+    columns[NOSE] = Column::text("nose").needed(Need::Optional);
+    columns[NOSE_NUMBER] = Column::number("CRH").called(&["nose_ratio", "psi"]).needed(Need::Optional);
+    columns[TIP] = Column::number("tip_ratio").within(crate::physics::Range::UnitInterval).needed(Need::Optional);
+    columns[RESISTANCE] = Column::number("R_pa")
+        .measured("R", Dimension::Pressure)
+        .within(crate::physics::Range::Positive)
+        .needed(Need::Optional);
     let mut index = 0;
     while index < NUMBERS.len() {
         let entry = Parameter::PLAIN[index].entry();
@@ -65,11 +94,16 @@ const COLUMNS: [Column; NUMBERS.len() + 1] = {
         columns[index] = match entry.dimension {
             Some(dimension) => column.measured(STEMS[index], dimension),
             None => column,
-        };
+        }
+        .called(SYMBOLS[index]);
         index += 1;
     }
+    columns[NOSE_FACTOR].need = Need::Unless("nose");
     columns
 };
+
+/// Index of N*.
+const NOSE_FACTOR: usize = 2;
 
 /// A scene, of which the rows of a table vary numbers.
 #[derive(Debug)]
@@ -156,12 +190,79 @@ pub enum RowError {
     Integration(#[from] IntegrationError),
 }
 
-/// The scene of `row`; S follows the strength where the row gives none.
+/// The words of the column `nose`, each with the number that `CRH` is there.
+const NOSES: &str = "not flat, ogive (CRH), cone (CRH is length/diameter), spherical (CRH is radius/diameter), hemispherical, \
+                     truncated-ogive or truncated-cone (tip_ratio)";
+
+/// The shape of the nose that `row` names, `None` where it names none. Its number may stand behind the word: `ogive (CRH 3)`.
+///
+/// # Errors
+/// [`TableError`]: an unknown word, a number that is missing, out of its range or there twice.
+pub fn nose_of(row: &Row<'_>) -> Result<Option<NoseShape>, Box<TableError>> {
+    let text = row.text(NOSE)?;
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let (word, behind) = text.split_once('(').map_or((text, None), |(word, rest)| (word, Some(rest)));
+    let word: String = word.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();
+    let behind = match behind.map(|rest| rest.trim_end_matches(')').trim_start_matches(|c: char| !c.is_ascii_digit())) {
+        None => None,
+        Some(number) => match number.trim().parse::<f64>() {
+            Ok(number) if row.optional(NOSE_NUMBER)?.is_none_or(|other| other == number) => Some(number),
+            _ => return Err(row.refuse_cell(NOSE, text, "not a nose with one number")),
+        },
+    };
+    let given = || behind.map_or_else(|| row.number(NOSE_NUMBER), Ok);
+    let at_least = |least: f64, includes: bool| {
+        let number = given()?;
+        match number >= least && (includes || number > least) && number.is_finite() {
+            true => Ok(number),
+            false => {
+                let reason = format!("not a number {} {least}", if includes { ">=" } else { ">" });
+                Err(row.refuse_cell(NOSE_NUMBER, &Shown(number).to_string(), reason))
+            }
+        }
+    };
+    let half = || at_least(0.5, true);
+    Ok(Some(match word.as_str() {
+        "flat" | "flatassumed" => NoseShape::Flat,
+        "ogive" | "ogival" => NoseShape::Ogive { caliber_radius_head: half()? },
+        "cone" | "conical" => NoseShape::Cone { length_ratio: at_least(0.0, false)? },
+        "spherical" => NoseShape::Spherical { radius_ratio: half()? },
+        "hemispherical" | "hemisphere" => match behind.is_none_or(|number| number == 0.5) {
+            true => NoseShape::Spherical { radius_ratio: 0.5 },
+            false => return Err(row.refuse_cell(NOSE, text, "not a hemisphere, whose number is 0.5")),
+        },
+        "truncatedogive" => NoseShape::TruncatedOgive { caliber_radius_head: half()?, tip_ratio: row.number(TIP)? },
+        "truncatedcone" => {
+            NoseShape::TruncatedCone { length_ratio: at_least(0.0, false)?, tip_ratio: row.number(TIP)? }
+        }
+        _ => return Err(row.refuse_cell(NOSE, text, NOSES)),
+    }))
+}
+
+/// The scene of `row`; S follows the strength where the row gives neither S nor R = S fc.
 ///
 /// # Errors
 /// [`RowError`]: a cell that cannot be read or is missing, or a strength that gives no S.
 pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
-    let (strength, static_factor) = (row.number(3)?, row.optional(6)?);
+    let shape = nose_of(row)?;
+    Ok(Scene { velocity: Some(row.number(VELOCITY)?), ..scene_with(row, shape, row.number(CRATER_RATIO)?)? })
+}
+
+/// As [`scene_of`] with a nose of `shape`, unless the row gives N*, and k = `crater_ratio`; without a velocity where it has none.
+///
+/// # Errors
+/// [`RowError`].
+pub fn scene_with(row: &Row<'_>, shape: Option<NoseShape>, crater_ratio: f64) -> Result<Scene, RowError> {
+    let strength = row.number(3)?;
+    let static_factor = match (row.optional(6)?, row.optional(RESISTANCE)?) {
+        (Some(_), Some(_)) => {
+            return Err(row.refuse_cell(RESISTANCE, row.text(RESISTANCE)?, "there beside S, and R = S fc").into());
+        }
+        (factor, resistance) => factor.or(resistance.map(|resistance| resistance / strength)),
+    };
+    let nose_factor = row.optional(NOSE_FACTOR)?.or(shape.map(NoseShape::factor));
     Ok(Scene {
         title: None,
         mass: row.number(0)?,
@@ -171,25 +272,25 @@ pub fn scene_of(row: &Row<'_>) -> Result<Scene, RowError> {
         parameters: Vec::new(),
         resistance: Resistance::Concrete(Concrete {
             diameter: row.number(1)?,
-            nose_factor: row.number(2)?,
+            nose_factor: nose_factor.ok_or_else(|| row.refuse_empty(NOSE_FACTOR))?,
             strength,
             density: row.number(4)?,
             static_factor: static_factor.map_or_else(|| Concrete::usual_static_factor(strength), Ok)?,
             follows_eq14: static_factor.is_none(),
             inertia_factor: row.number(7)?,
-            crater_ratio: row.number(8)?,
+            crater_ratio,
             crater_stiffness: row.optional(9)?.map_or(CraterStiffness::Continuous, CraterStiffness::Given),
             layers: Vec::new(),
         }),
-        thickness: row.optional(5)?,
-        criterion: match row.text(11)? {
+        thickness: row.optional(THICKNESS)?,
+        criterion: match row.text(CRITERION)? {
             "" => Criterion::default(),
             name => match name.parse() {
                 Ok(criterion) if criterion != Criterion::Plug => criterion,
-                _ => return Err(row.refuse_cell(11, name, "not full-depth or ndrc").into()),
+                _ => return Err(row.refuse_cell(CRITERION, name, "not full-depth or ndrc").into()),
             },
         },
-        velocity: Some(row.number(10)?),
+        velocity: row.optional(VELOCITY)?,
     })
 }
 
@@ -201,7 +302,9 @@ pub fn cells_of(scene: &Scene) -> Vec<Value<'static>> {
     let is_stated = |parameter: &Parameter| !(follows && *parameter == Parameter::StaticFactor);
     let value = |parameter: &Parameter| parameter.get(scene).ok().filter(|_| is_stated(parameter));
     let numbers = Parameter::PLAIN.iter().take(NUMBERS.len()).map(|parameter| Value::Number(value(parameter)));
-    numbers.chain([criterion]).collect()
+    // The nose has its N*, and R its S.
+    let rest = [Value::Text(""), Value::Number(None), Value::Number(None), Value::Number(None)];
+    numbers.chain([criterion]).chain(rest).collect()
 }
 
 /// Scenes, some thousands of them.

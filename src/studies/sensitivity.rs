@@ -413,6 +413,26 @@ impl std::str::FromStr for Spread {
     }
 }
 
+/// Standard uncertainty to first order of the quantity of `scene` whose derivative `derivative` picks; `None` without spreads.
+///
+/// # Errors
+/// As [`by_closed_form`].
+pub fn input_uncertainty(
+    scene: &Scene,
+    spreads: &[Spread],
+    derivative: impl Fn(&Sensitivity) -> Option<f64>,
+) -> Studied<Option<f64>> {
+    if spreads.is_empty() {
+        return Ok(None);
+    }
+    let derivatives = by_closed_form(scene)?;
+    let part = |spread: &Spread| {
+        let entry = derivatives.entries.iter().find(|entry| entry.parameter == spread.parameter);
+        entry.and_then(|entry| Some(derivative(entry)? * entry.value * spread.relative)).unwrap_or(0.0)
+    };
+    Ok(Some(spreads.iter().map(|spread| part(spread).powi(2)).sum::<f64>().sqrt()))
+}
+
 /// Uncertainty of V_c from the spreads of its inputs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]

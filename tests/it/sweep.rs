@@ -106,7 +106,7 @@ fn the_map_has_lines_of_three_errors_and_the_measured_scenes() {
     let value = run_in(folder.path(), "map --out map.csv --json").expect(0).json();
     conforms("map", &value);
     assert_eq!(value["lines"].as_array().unwrap().len(), 6);
-    assert_eq!(value["scenes"].as_array().unwrap().len(), 107);
+    assert_eq!(value["scenes"].as_array().unwrap().len(), 105);
     let svg = text_of(&folder, "map.svg");
     for words in ["Eq. 11 too shallow", "Eq. 12 too deep", "20\u{a0}%", "Sliter1980"] {
         assert!(svg.contains(words), "{words}");

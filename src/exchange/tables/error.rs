@@ -97,6 +97,8 @@ pub enum Fault {
     TwoValues { step: f64, name: Cow<'static, str>, first: f64, second: f64, other: u64 },
     #[error("{found} different steps, and an order needs {needed}")]
     TooFewSteps { found: usize, needed: usize },
+    #[error("{0}")]
+    Row(String),
     #[error("the cell in `{0}` is empty")]
     EmptyCell(Cow<'static, str>),
     #[error("`{}` in `{name}` is {reason}", shortened(.text))]
@@ -159,6 +161,7 @@ impl Advice for TableError {
             Fault::Cell { reason, .. } if reason.contains("a number") => {
                 "write numbers with a decimal point and without units: 1.25e-6"
             }
+            Fault::Row(_) => "correct the row, or remove it",
             Fault::Cell { .. } => "correct the cell, or remove the row",
             Fault::ColumnTwice(_) => "remove one of the two",
             Fault::TwoValues { .. } => "keep one of them: a result that a step does not determine has no order",

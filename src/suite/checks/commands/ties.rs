@@ -582,6 +582,11 @@ fn scene_of((_, mass, d, head, fc, density, speed, ..): &MeasuredTest) -> String
     )
 }
 
+/// Number `index` of the list `value`.
+fn of_end(value: &Value, index: usize) -> f64 {
+    value[index].as_f64().unwrap_or(f64::NAN)
+}
+
 fn sets_of_tests(subject: &Subject<'_>) -> Found {
     const SPREADS: [(&str, f64); 2] = [("target.strength", 0.1), ("impact.velocity", 0.01)];
     let program = subject.program()?;
@@ -611,8 +616,8 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
         let (numerical, data) = (of(shot, "numerical_uncertainty_m"), of(shot, "data_uncertainty_m"));
         for (name, exact) in [
             ("velocity_m_s", test.6),
-            ("measured_depth_m", 1e-3 * test.7),
-            ("data_uncertainty_m", 1e-3 * test.8),
+            ("measured_depth_m", test.7 / 1e3),
+            ("data_uncertainty_m", test.8 / 1e3),
             ("predicted_depth_m", depth),
             ("I", solved.number("groups.I")?),
             ("N", solved.number("groups.N")?),
@@ -646,7 +651,11 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
         counted += count;
         holds!(count > 0, "the set {name} has no test");
         let mean = ratios.iter().sum::<f64>() / count as f64;
-        let square = ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / count as f64;
+        let square = ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / (count - 1).max(1) as f64;
+        // Student's t at 95 % (tables): the half width of the mean is t s/√n.
+        let t =
+            [f64::NAN, 12.706_204_736_432_095, 4.302_652_729_911_275, 3.182_446_305_284_263_3, 2.776_445_105_197_801_4];
+        let half = t[count - 1] * square.sqrt() / (count as f64).sqrt();
         let uncertainty =
             members.iter().map(|s| (of(s, "validation_uncertainty_m") / of(s, "measured_depth_m")).powi(2));
         let uncertainty = (uncertainty.sum::<f64>() / count as f64).sqrt();
@@ -656,7 +665,7 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
         let numbers = [
             ("shots", count as f64),
             ("median", median),
-            ("spread", square.sqrt()),
+            ("spread", if count > 1 { square.sqrt() } else { f64::NAN }),
             ("least", least),
             ("greatest", greatest),
             ("within_20_percent", within as f64),
@@ -664,15 +673,32 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
             ("mean_comparison_error", mean - 1.0),
             ("validation_uncertainty", uncertainty),
         ];
-        for (field, exact) in numbers {
+        let within_u_val =
+            members.iter().filter(|s| of(s, "comparison_error_m").abs() <= of(s, "validation_uncertainty_m")).count();
+        worst.take(must(set["within_validation_uncertainty"] == within_u_val), || format!("|E| <= u_val of {name}"));
+        for (index, side) in [-1.0, 1.0].into_iter().enumerate().filter(|_| count > 1) {
+            let (found, exact) = (of_end(&set["mean_comparison_error95"], index), mean - 1.0 + side * half);
+            worst.take((found - exact).abs(), || format!("interval of {name}: {found} and not {exact}"));
+        }
+        for (field, exact) in numbers.into_iter().filter(|(_, exact)| !exact.is_nan()) {
             let error = if field == "spread" { (of(set, field) - exact).abs() } else { apart(of(set, field), exact) };
             worst.take(error, || format!("{field} of {name}: {} and not {exact}", set[field]));
         }
-        // The rows of the text, one in each of two tables.
-        let first = format!("{count} {median:.2} {:.2} {least:.2} to {greatest:.2} {within}", square.sqrt());
+        // The rows of the text, one in each of three tables.
+        let spread = if count > 1 { format!("{:.2}", square.sqrt()) } else { "-".to_owned() };
+        let outliers =
+            shots.iter().zip(&TESTS).filter(|(shot, test)| is_of(test) && shot["is_outlier"] == true).count();
+        let first = format!("{count} {median:.2} {spread} {least:.2} to {greatest:.2} {within} {outliers}");
         let last = if uncertainty.is_nan() { "not given".to_owned() } else { format!("{:.1} %", 100.0 * uncertainty) };
-        let second = format!("{} {:+.1} % {last}", set["in_range_of_fit"], 100.0 * (mean - 1.0));
-        for row in [first, second] {
+        let interval = if count > 1 {
+            format!("{:+.1} to {:+.1} %", 100.0 * (mean - 1.0 - half), 100.0 * (mean - 1.0 + half))
+        } else {
+            "-".to_owned()
+        };
+        let error = format!("{:+.1} % {interval}", 100.0 * (mean - 1.0));
+        let second = format!("{} {error}", set["in_range_of_fit"]);
+        let third = format!("{last} {within_u_val} of {count}");
+        for row in [first, second, third] {
             let row = format!("{name} {row}");
             let stands = said.out.lines().any(|line| line.split_whitespace().collect::<Vec<_>>().join(" ") == row);
             worst.take(must(stands), || format!("the text has no row `{row}`"));

@@ -1,0 +1,390 @@
+//! Which ballistic limit do residual velocities and outcomes of tests show?
+//!
+//! ```text
+//! V_r = a (V^p - V_bl^p)^(1/p)          Lambert and Jonas (1976); p = 2 is Recht and Ipson (1963)
+//! P(perforated at V) = Φ((V - V50)/σ)   probit; V50 and σ of greatest likelihood
+//! ```
+//!
+//! For given p and V_bl the best a follows linearly, so least squares is one root for V_bl within one for p (argmin). Intervals are
+//! `± t s √(JᵀJ)⁻¹` of the linearised model. The interval of V50 holds every V50 that the likelihood ratio does not reject at 95 %.
+//! Where no stop is faster than a perforation, σ has no estimate, and all that is known of V50 lies between the fastest stop and the
+//! slowest perforation.
+//!
+//! Sources: R. F. Recht, T. W. Ipson, J. Appl. Mech. 30 (1963) 384; J. P. Lambert, G. H. Jonas, BRL-R-1852 (1976).
+
+use argmin::core::{CostFunction, Executor};
+use argmin::solver::brent::BrentRoot;
+use nalgebra::{DMatrix, Matrix3};
+use serde::Serialize;
+
+use super::statistics::{CHI_SQUARED_95, LEVEL, ln_normal};
+use crate::studies::order::student_t;
+
+/// Places at which a range is looked through before a root is bracketed.
+const SCAN: usize = 200;
+
+/// Powers p that are searched.
+const POWERS: [f64; 2] = [1.0, 10.0];
+
+/// A number with its interval of 95 %.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// 95 % interval.
+    pub interval95: [f64; 2],
+}
+
+/// A curve through residual velocities.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct ResidualFit {
+    /// Residual velocities above zero.
+    pub shots: usize,
+    /// Factor a.
+    pub a: Estimate,
+    /// Power p; without an interval where it is 2 by assumption.
+    pub p: f64,
+    /// 95 % interval of p.
+    pub p95: Option<[f64; 2]>,
+    /// Ballistic limit `V_bl` (m/s).
+    pub limit_m_s: Estimate,
+    /// Standard deviation of the residual velocities about the curve (m/s).
+    pub deviation_m_s: f64,
+}
+
+impl ResidualFit {
+    /// Residual velocity (m/s) at the impact velocity `speed` (m/s).
+    pub fn at(&self, speed: f64) -> f64 {
+        if speed <= self.limit_m_s.value { 0.0 } else { self.a.value * curve(speed, self.limit_m_s.value, self.p) }
+    }
+}
+
+/// Ballistic limit by outcomes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct OutcomeFit {
+    /// Perforations.
+    pub perforated: usize,
+    /// Stops.
+    pub stopped: usize,
+    /// Fastest stop (m/s).
+    pub fastest_stop_m_s: f64,
+    /// Slowest perforation (m/s).
+    pub slowest_perforation_m_s: f64,
+    /// Velocity (m/s) at which half the shots perforate; without mixed results, the middle between fastest stop and slowest
+    /// perforation.
+    pub v50_m_s: f64,
+    /// 95 % interval, `null` where the shots set no bound; without mixed results, the two velocities themselves.
+    pub v50_95_m_s: [Option<f64>; 2],
+    /// σ (m/s); `null` without mixed results.
+    pub deviation_m_s: Option<f64>,
+}
+
+/// `(v^p - b^p)^(1/p)` for `0 <= b < v`, without powers that overflow.
+fn curve(v: f64, b: f64, p: f64) -> f64 {
+    v * ((-(p * (b / v).ln()).exp()).ln_1p() / p).exp()
+}
+
+/// The root of `f` between `from` and `to`, where its signs differ.
+fn root(from: f64, to: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
+    struct Root<F>(F);
+    impl<F: Fn(f64) -> f64> CostFunction for Root<F> {
+        type Param = f64;
+        type Output = f64;
+        fn cost(&self, param: &f64) -> Result<f64, argmin::core::Error> {
+            Ok(self.0(*param))
+        }
+    }
+    let solver = BrentRoot::new(from, to, 1e-16 * (from.abs() + to.abs()));
+    let run = Executor::new(Root(f), solver).configure(|state| state.param(0.5 * (from + to)).max_iters(200)).run();
+    run.ok()?.state.best_param.filter(|root| root.is_finite())
+}
+
+/// The least minimum of a function whose derivative is `slope`, between `from` and `to` and not at an end.
+fn minimum(from: f64, to: f64, value: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> Option<f64> {
+    let place = |index: usize| from + (to - from) * index as f64 / SCAN as f64;
+    let slopes: Vec<f64> = (0..=SCAN).map(|index| slope(place(index))).collect();
+    let brackets = (0..SCAN).filter(|&index| slopes[index] < 0.0 && slopes[index + 1] >= 0.0);
+    let minima = brackets.filter_map(|index| root(place(index), place(index + 1), &slope));
+    minima.min_by(|a, b| value(*a).total_cmp(&value(*b)))
+}
+
+/// Residual velocities over impact velocities, both over the greatest impact velocity.
+struct Residuals(Vec<(f64, f64)>);
+
+/// The curve of given p and limit that fits best.
+struct Best {
+    a: f64,
+    squares: f64,
+}
+
+impl Residuals {
+    fn best(&self, b: f64, p: f64) -> Best {
+        let of = |&(v, r): &(f64, f64)| (curve(v, b, p), r);
+        let a = self.0.iter().map(of).map(|(g, r)| g * r).sum::<f64>()
+            / self.0.iter().map(of).map(|(g, _)| g * g).sum::<f64>();
+        Best { a, squares: self.0.iter().map(of).map(|(g, r)| (r - a * g).powi(2)).sum() }
+    }
+
+    /// dg/db and dg/dp of `curve`.
+    fn slopes(v: f64, b: f64, p: f64) -> [f64; 2] {
+        let g = curve(v, b, p);
+        let [vp, bp] = [v, b].map(|x| x.powf(p));
+        let by_limit = -(b / g).powf(p - 1.0);
+        let b_ln_b = if b > 0.0 { bp * b.ln() } else { 0.0 };
+        [by_limit, g * ((vp * v.ln() - b_ln_b) / (p * (vp - bp)) - g.ln() / p)]
+    }
+
+    /// Half the derivative of the sum of squares over a: that by the limit, and by p.
+    fn gradient(&self, b: f64, p: f64) -> [f64; 2] {
+        let Best { a, .. } = self.best(b, p);
+        self.0.iter().fold([0.0; 2], |sum, &(v, r)| {
+            let residual = r - a * curve(v, b, p);
+            let slopes = Self::slopes(v, b, p);
+            [sum[0] - residual * slopes[0], sum[1] - residual * slopes[1]]
+        })
+    }
+
+    /// The best limit of given p; `None` where it is zero.
+    fn limit(&self, p: f64) -> Option<f64> {
+        let slowest = self.0.iter().map(|(v, _)| *v).fold(f64::INFINITY, f64::min);
+        // At the slowest shot itself the slope is infinite.
+        minimum(0.0, slowest * (1.0 - 1e-9), |b| self.best(b, p).squares, |b| self.gradient(b, p)[0])
+    }
+
+    /// The curve of `b` and `p` with its intervals; velocities times `unit`.
+    fn fit(&self, b: f64, p: f64, is_free: bool, unit: f64) -> Option<ResidualFit> {
+        let Best { a, squares } = self.best(b, p);
+        let parameters = if is_free { 3 } else { 2 };
+        let dof = self.0.len().checked_sub(parameters).filter(|dof| *dof > 0)?;
+        let rows = DMatrix::from_fn(self.0.len(), 3, |row, column| {
+            let v = self.0[row].0;
+            let [by_limit, by_power] = Self::slopes(v, b, p);
+            [curve(v, b, p), a * by_limit, if is_free { a * by_power } else { 0.0 }][column]
+        });
+        let mut normal = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
+        if !is_free {
+            normal[(2, 2)] = 1.0;
+        }
+        let inverse = normal.try_inverse()?;
+        let deviation = (squares / dof as f64).sqrt();
+        let half = |index: usize| student_t(LEVEL, dof) * deviation * inverse[(index, index)].sqrt();
+        let around = |value: f64, half: f64| [value - half, value + half];
+        Some(ResidualFit {
+            shots: self.0.len(),
+            a: Estimate { value: a, interval95: around(a, half(0)) },
+            p,
+            p95: is_free.then(|| around(p, half(2))),
+            limit_m_s: Estimate { value: b * unit, interval95: around(b, half(1)).map(|end| end * unit) },
+            deviation_m_s: deviation * unit,
+        })
+    }
+}
+
+/// The curve through `residuals`, impact and residual velocities (m/s) of which those above zero count, with p = 2 (Recht and
+/// Ipson) and with p free (Lambert and Jonas).
+///
+/// `None` for fewer than three, or four with p free, for those whose best limit is zero, and for a p at an end of 1 to 10.
+pub fn of_residuals(residuals: &[(f64, f64)]) -> [Option<ResidualFit>; 2] {
+    let perforated = residuals.iter().filter(|(_, residual)| *residual > 0.0);
+    let unit = perforated.clone().map(|(speed, _)| *speed).fold(0.0, f64::max);
+    let scaled = Residuals(perforated.map(|(speed, residual)| (speed / unit, residual / unit)).collect());
+    if scaled.0.len() < 3 {
+        return [None; 2];
+    }
+    let plain = scaled.limit(2.0).and_then(|b| scaled.fit(b, 2.0, false, unit));
+    let free = (scaled.0.len() > 3)
+        .then(|| {
+            let squares = |p| scaled.limit(p).map_or(f64::INFINITY, |b| scaled.best(b, p).squares);
+            // Where no limit fits there is no minimum either.
+            let slope = |p| scaled.limit(p).map_or(-1.0, |b| scaled.gradient(b, p)[1]);
+            let p = minimum(POWERS[0], POWERS[1], squares, slope)?;
+            scaled.fit(scaled.limit(p)?, p, true, unit)
+        })
+        .flatten();
+    [plain, free]
+}
+
+/// Outcomes over impact velocities, these from their mean in units of their greatest distance from it.
+struct Outcomes(Vec<(f64, bool)>);
+
+impl Outcomes {
+    /// Logarithm of the likelihood of V50 = `middle` and 1/σ = `steepness`, and its derivatives by both.
+    fn likelihood(&self, middle: f64, steepness: f64) -> [f64; 3] {
+        self.0.iter().fold([0.0; 3], |sum, &(v, perforated)| {
+            let sign = if perforated { 1.0 } else { -1.0 };
+            let (ln, slope) = ln_normal(sign * steepness * (v - middle));
+            [sum[0] + ln, sum[1] - sign * steepness * slope, sum[2] + sign * (v - middle) * slope]
+        })
+    }
+
+    /// The best 1/σ for given V50: the likelihood is concave in it. `None` where none is best, for a `middle` that parts the outcomes.
+    fn steepness(&self, middle: f64) -> Option<f64> {
+        let slope = |steepness: f64| self.likelihood(middle, steepness)[2];
+        if slope(0.0) <= 0.0 {
+            return Some(0.0);
+        }
+        let mut steep = 1.0;
+        // To 1e9 times the width of the velocities.
+        for _ in 0..30 {
+            if slope(steep) < 0.0 {
+                return root(0.0, steep, slope);
+            }
+            steep *= 2.0;
+        }
+        None
+    }
+
+    /// The likelihood of `middle` with the best 1/σ; nothing is more likely than what parts the outcomes.
+    fn profile(&self, middle: f64) -> f64 {
+        self.steepness(middle).map_or(0.0, |steepness| self.likelihood(middle, steepness)[0])
+    }
+}
+
+/// The ballistic limit of `outcomes`, impact velocities (m/s) with whether they perforated; `None` without both outcomes, and where
+/// perforations are no faster than stops on the whole.
+pub fn of_outcomes(outcomes: &[(f64, bool)]) -> Option<OutcomeFit> {
+    /// Widths of the velocities within which an interval ends, or it has no end.
+    const FAR: f64 = 20.0;
+    let speeds = |wanted: bool| outcomes.iter().filter(move |shot| shot.1 == wanted).map(|shot| shot.0);
+    let (perforated, stopped) = (speeds(true).count(), speeds(false).count());
+    if perforated == 0 || stopped == 0 {
+        return None;
+    }
+    let (fastest_stop_m_s, slowest_perforation_m_s) =
+        (speeds(false).fold(0.0, f64::max), speeds(true).fold(f64::INFINITY, f64::min));
+    let found = |v50_m_s, v50_95_m_s, deviation_m_s| OutcomeFit {
+        perforated,
+        stopped,
+        fastest_stop_m_s,
+        slowest_perforation_m_s,
+        v50_m_s,
+        v50_95_m_s,
+        deviation_m_s,
+    };
+    if fastest_stop_m_s <= slowest_perforation_m_s {
+        let ends = [fastest_stop_m_s, slowest_perforation_m_s];
+        return Some(found(0.5 * (ends[0] + ends[1]), ends.map(Some), None));
+    }
+    let center = outcomes.iter().map(|shot| shot.0).sum::<f64>() / outcomes.len() as f64;
+    let unit = outcomes.iter().map(|shot| (shot.0 - center).abs()).fold(0.0, f64::max);
+    let scaled = Outcomes(outcomes.iter().map(|&(v, outcome)| ((v - center) / unit, outcome)).collect());
+    let slope = |middle: f64| -scaled.steepness(middle).map_or(0.0, |s| scaled.likelihood(middle, s)[1]);
+    let middle = minimum(-1.0, 1.0, |middle| -scaled.profile(middle), slope)?;
+    let steepness = scaled.steepness(middle).filter(|steepness| *steepness > 0.0)?;
+    let most = scaled.profile(middle);
+    let beyond = |at: f64| most - scaled.profile(at) - 0.5 * CHI_SQUARED_95;
+    let end = |side: f64| {
+        let step = |index: usize| middle + side * FAR * (index as f64 / SCAN as f64).powi(2);
+        let outside = (1..=SCAN).find(|&index| beyond(step(index)) > 0.0)?;
+        Some(center + unit * root(step(outside - 1), step(outside), beyond)?)
+    };
+    Some(found(center + unit * middle, [end(-1.0), end(1.0)], Some(unit / steepness)))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    const RESIDUALS: [(f64, f64); 7] =
+        [(420.0, 110.0), (450.0, 190.0), (500.0, 275.0), (560.0, 362.0), (640.0, 461.0), (720.0, 555.0), (390.0, 0.0)];
+
+    const OUTCOMES: [(f64, bool); 10] = [
+        (300.0, false),
+        (320.0, false),
+        (335.0, true),
+        (340.0, false),
+        (350.0, false),
+        (355.0, true),
+        (360.0, false),
+        (370.0, true),
+        (385.0, true),
+        (400.0, true),
+    ];
+
+    /// mpmath, 40 digits: `findroot` of the gradient of the sum of squares, J by `diff`, Student's t by `betainc`. The order is a, `V_bl`,
+    /// p, the half widths of their intervals, and the deviation.
+    #[test]
+    fn curves_through_residual_velocities_are_those_of_least_squares_in_forty_digits() {
+        let [plain, free] = of_residuals(&RESIDUALS);
+        for (fit, expected) in [
+            (
+                plain.unwrap(),
+                [
+                    0.928_991_779_359_873_5,
+                    402.498_771_093_406_33,
+                    2.0,
+                    0.006_638_447_927_460_631,
+                    1.542_846_959_298_499,
+                    0.0,
+                    1.845_668_141_872_349,
+                ],
+            ),
+            (
+                free.unwrap(),
+                [
+                    0.922_059_161_186_619_2,
+                    403.432_280_405_650_02,
+                    2.032_479_539_244_376_8,
+                    0.028_467_897_006_803_74,
+                    4.046_151_633_439_779,
+                    0.130_382_479_624_932_8,
+                    1.942_035_282_193_233_3,
+                ],
+            ),
+        ] {
+            let half = |[low, high]: [f64; 2]| 0.5 * (high - low);
+            let found = [
+                fit.a.value,
+                fit.limit_m_s.value,
+                fit.p,
+                half(fit.a.interval95),
+                half(fit.limit_m_s.interval95),
+                fit.p95.map_or(0.0, half),
+                fit.deviation_m_s,
+            ];
+            assert_eq!(fit.shots, 6);
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert_relative_eq!(found, expected, max_relative = 1e-12);
+            }
+            assert_eq!(fit.at(fit.limit_m_s.value), 0.0);
+        }
+    }
+
+    #[test]
+    fn residual_velocities_that_show_no_limit_have_no_curve() {
+        assert_eq!(of_residuals(&RESIDUALS[..2]), [None; 2]);
+        assert_eq!(of_residuals(&[(400.0, 400.0), (500.0, 500.0), (600.0, 600.0), (700.0, 700.0)]), [None; 2]);
+        assert_eq!(of_residuals(&[(400.0, 50.0); 5]), [None; 2]);
+        // Faster out than in.
+        assert!(of_residuals(&[(400.0, 900.0), (500.0, 700.0), (600.0, 800.0), (700.0, 600.0)])[0].is_none());
+    }
+
+    /// mpmath, 40 digits: `findroot` of the gradient of the likelihood, and bisection of its profile for the interval.
+    #[test]
+    fn v50_of_mixed_outcomes_is_that_of_greatest_likelihood_in_forty_digits() {
+        let fit = of_outcomes(&OUTCOMES).unwrap();
+        assert_relative_eq!(fit.v50_m_s, 351.237_302_852_528_73, max_relative = 1e-12);
+        assert_relative_eq!(fit.deviation_m_s.unwrap(), 22.985_789_832_471_07, max_relative = 1e-12);
+        assert_relative_eq!(fit.v50_95_m_s[0].unwrap(), 303.221_277_356_335_1, max_relative = 1e-12);
+        assert_relative_eq!(fit.v50_95_m_s[1].unwrap(), 399.715_380_739_124_27, max_relative = 1e-12);
+        assert_eq!((fit.perforated, fit.stopped), (5, 5));
+    }
+
+    #[test]
+    fn outcomes_without_a_mixed_zone_bound_the_limit_and_estimate_no_deviation() {
+        let fit = of_outcomes(&[(300.0, false), (320.0, false), (330.0, true), (400.0, true)]).unwrap();
+        assert_eq!((fit.v50_m_s, fit.v50_95_m_s, fit.deviation_m_s), (325.0, [Some(320.0), Some(330.0)], None));
+        assert_eq!(of_outcomes(&[(300.0, true), (310.0, true)]), None);
+        // The slow ones perforate.
+        assert_eq!(of_outcomes(&[(300.0, true), (310.0, true), (320.0, false), (330.0, false)]), None);
+        // Two of each: nothing bounds the limit at 95 %.
+        let few = of_outcomes(&[(300.0, false), (330.0, true), (340.0, false), (400.0, true)]).unwrap();
+        assert!(few.deviation_m_s.is_some() && few.v50_95_m_s.contains(&None), "{few:?}");
+    }
+}
