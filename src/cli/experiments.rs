@@ -229,8 +229,8 @@ impl ExperimentsJson {
                     with_interval(fit.coefficient.value, fit.coefficient.interval95, 1),
                     or_dash(fit.static_factor.map(|factor| factor.value), |factor| format!("{factor:.2}")),
                     or_dash(fit.strength_pa.map(|strength| 1e-6 * strength.value), |strength| format!("{strength:.0}")),
-                    scatter(&fit.fitted),
-                    scatter(&fit.left_out),
+                    or_dash(fit.fitted.deviation, |deviation| format!("{deviation:.2}")),
+                    or_dash(fit.left_out.deviation, |deviation| format!("{deviation:.2}")),
                 ]
             }),
         );
