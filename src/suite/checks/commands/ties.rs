@@ -652,9 +652,9 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
         holds!(count > 0, "the set {name} has no test");
         let mean = ratios.iter().sum::<f64>() / count as f64;
         let square = ratios.iter().map(|ratio| (ratio - mean).powi(2)).sum::<f64>() / (count - 1).max(1) as f64;
-        // Student's t at 95 % (tables): the half width of the mean is t s/√n.
+        // Student's t at 95 %, by mpmath: the half width of the mean is t s/√n.
         let t =
-            [f64::NAN, 12.706_204_736_432_095, 4.302_652_729_911_275, 3.182_446_305_284_263_3, 2.776_445_105_197_801_4];
+            [f64::NAN, 12.706_204_736_174_705, 4.302_652_729_749_464, 3.182_446_305_283_709_6, 2.776_445_105_197_794_4];
         let half = t[count - 1] * square.sqrt() / (count as f64).sqrt();
         let uncertainty =
             members.iter().map(|s| (of(s, "validation_uncertainty_m") / of(s, "measured_depth_m")).powi(2));
