@@ -343,7 +343,9 @@ impl ExperimentsJson {
         if !notes.is_empty() {
             text.gap();
         }
-        notes.iter().for_each(|note| text.wrapped("  ", note));
+        for note in &notes {
+            text.wrapped("  ", note);
+        }
     }
 }
 

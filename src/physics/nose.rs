@@ -121,7 +121,7 @@ mod tests {
     fn factors_are_those_published() {
         // Li & Chen (2003), table of shapes; digits by quadrature of the integral.
         assert_eq!(NoseShape::Flat.factor(), 1.0);
-        assert_eq!(ogive(2.0).factor(), 0.15625);
+        assert_eq!(ogive(2.0).factor(), 0.156_25);
         for (psi, factor) in [(3.0, 0.106_481), (4.25, 0.076_125), (4.5, 0.072_016), (6.0, 0.054_398)] {
             assert_relative_eq!(ogive(psi).factor(), factor, epsilon = 5e-7);
         }
@@ -132,10 +132,14 @@ mod tests {
     }
 
     const TRUNCATED: [(NoseShape, f64, f64); 5] = [
-        (NoseShape::TruncatedOgive { caliber_radius_head: 3.0, tip_ratio: 0.4 }, 0.2298, 1.3076696830622021),
-        (NoseShape::TruncatedOgive { caliber_radius_head: 1.5, tip_ratio: 0.7 }, 0.53645, 0.65383484153110103),
-        (NoseShape::TruncatedOgive { caliber_radius_head: 0.5, tip_ratio: 0.25 }, 0.501953125, 0.48412291827592711),
-        (NoseShape::TruncatedCone { length_ratio: 1.5, tip_ratio: 0.4 }, 0.19230769230769231, 1.5),
+        (NoseShape::TruncatedOgive { caliber_radius_head: 3.0, tip_ratio: 0.4 }, 0.2298, 1.307_669_683_062_202),
+        (NoseShape::TruncatedOgive { caliber_radius_head: 1.5, tip_ratio: 0.7 }, 0.536_45, 0.653_834_841_531_101),
+        (
+            NoseShape::TruncatedOgive { caliber_radius_head: 0.5, tip_ratio: 0.25 },
+            0.501_953_125,
+            0.484_122_918_275_927_1,
+        ),
+        (NoseShape::TruncatedCone { length_ratio: 1.5, tip_ratio: 0.4 }, 0.192_307_692_307_692_32, 1.5),
         (NoseShape::TruncatedCone { length_ratio: 0.3, tip_ratio: 0.8 }, 0.676, 0.3),
     ];
 

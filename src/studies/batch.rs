@@ -215,13 +215,11 @@ pub fn nose_of(row: &Row<'_>) -> Result<Option<NoseShape>, Box<TableError>> {
     let given = || behind.map_or_else(|| row.number(NOSE_NUMBER), Ok);
     let at_least = |least: f64, includes: bool| {
         let number = given()?;
-        match number >= least && (includes || number > least) && number.is_finite() {
-            true => Ok(number),
-            false => {
-                let reason = format!("not a number {} {least}", if includes { ">=" } else { ">" });
-                Err(row.refuse_cell(NOSE_NUMBER, &Shown(number).to_string(), reason))
-            }
+        if number >= least && (includes || number > least) && number.is_finite() {
+            return Ok(number);
         }
+        let reason = format!("not a number {} {least}", if includes { ">=" } else { ">" });
+        Err(row.refuse_cell(NOSE_NUMBER, &Shown(number).to_string(), reason))
     };
     let half = || at_least(0.5, true);
     Ok(Some(match word.as_str() {
@@ -229,10 +227,9 @@ pub fn nose_of(row: &Row<'_>) -> Result<Option<NoseShape>, Box<TableError>> {
         "ogive" | "ogival" => NoseShape::Ogive { caliber_radius_head: half()? },
         "cone" | "conical" => NoseShape::Cone { length_ratio: at_least(0.0, false)? },
         "spherical" => NoseShape::Spherical { radius_ratio: half()? },
-        "hemispherical" | "hemisphere" => match behind.is_none_or(|number| number == 0.5) {
-            true => NoseShape::Spherical { radius_ratio: 0.5 },
-            false => return Err(row.refuse_cell(NOSE, text, "not a hemisphere, whose number is 0.5")),
-        },
+        "hemispherical" | "hemisphere" if behind.is_none_or(|number| number == 0.5) => {
+            NoseShape::Spherical { radius_ratio: 0.5 }
+        }
         "truncatedogive" => NoseShape::TruncatedOgive { caliber_radius_head: half()?, tip_ratio: row.number(TIP)? },
         "truncatedcone" => {
             NoseShape::TruncatedCone { length_ratio: at_least(0.0, false)?, tip_ratio: row.number(TIP)? }

@@ -587,6 +587,7 @@ fn of_end(value: &Value, index: usize) -> f64 {
     value[index].as_f64().unwrap_or(f64::NAN)
 }
 
+#[expect(clippy::too_many_lines, reason = "one definition behind the other, each beside the number it makes")]
 fn sets_of_tests(subject: &Subject<'_>) -> Found {
     const SPREADS: [(&str, f64); 2] = [("target.strength", 0.1), ("impact.velocity", 0.01)];
     let program = subject.program()?;
