@@ -31,6 +31,13 @@ def test_a_scene_is_the_same_from_text_dict_and_keywords():
     assert pn.solve(text).depth == pn.solve(keywords).depth
 
 
+def test_a_plug_by_keywords_is_that_of_the_scene_that_ships():
+    plug = {"criterion": "plug", "half_angle": 60, "shear_strength": "7.2 MPa"}
+    slab = {"mass": 20, "diameter": "60 mm", "nose": {"shape": "flat"}, "strength": "36 MPa", "density": 2400, "thickness": 0.3}
+    flight = pn.solve(pn.Scene(**slab, **plug, velocity=160))
+    assert flight.velocity == pn.solve(pn.scene("plug")).velocity and [e.event for e in flight.events][1] == "plug"
+
+
 def test_a_scene_with_settings_is_another_one():
     scene = pn.Scene.from_dict(SLAB)
     slower = scene.set({"impact.velocity": "350 m/s"}, k=1.5)
