@@ -230,8 +230,11 @@ def test_an_interrupt_passes_through():
 
 def test_ctrl_c_ends_a_long_call():
     import _thread
+    import signal
     import time
 
+    # A shell that starts tests in the background has them ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     scene = pn.scene("tunnel")
     started = time.monotonic()
     threading.Timer(0.05, _thread.interrupt_main).start()
@@ -267,20 +270,21 @@ def leaks(count):
                 with pytest.raises(pn.Error):
                     wrong()
 
-    # Until the allocator and the threads have the pages that they keep.
-    for i in range(count // 5):
-        round(i)
-    gc.collect()
-    before = memory()
-    for i in range(count):
-        round(i)
-    gc.collect()
-    return (memory() - before) / count
+    # What is lost is lost in every part; the allocator and new threads take and give their pages in some. The median is told.
+    lost = []
+    for _ in range(5):
+        gc.collect()
+        before = memory()
+        for i in range(count // 5):
+            round(i)
+        gc.collect()
+        lost.append((memory() - before) / (count // 5))
+    return sorted(lost)[2]
 
 
 @pytest.mark.skipif("not __import__('sys').platform.startswith('linux')")
 def test_nothing_leaks():
-    # A lost object of any kind is 50 bytes and more a call; the allocator keeps some pages.
+    # A lost object of any kind is 50 bytes and more a call.
     assert leaks(20_000) < 20
 
 
