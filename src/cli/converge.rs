@@ -12,6 +12,7 @@ use super::report_args::ReportArgs;
 use super::verify::progress_bar;
 use super::{Answer, Ask, CliError, SceneArgs};
 use crate::exchange::input::name_of;
+use crate::integrators::central_difference::Steps;
 use crate::integrators::{MethodName, MethodOptions};
 use crate::physics::{Problem, Shown};
 use crate::report::Environment;
@@ -39,6 +40,12 @@ pub struct ConvergeArgs {
     /// Method of integration.
     #[arg(long, value_enum, default_value_t = MethodName::CentralDifference)]
     pub method: MethodName,
+    /// central-difference: automatic steps, auto.
+    ///
+    /// Those of an explicit finite-element code: the sizes are then those of the first step, and their ratio is that of the safety
+    /// factors. `solve --steps` says the rule.
+    #[arg(long, value_name = "auto", value_parser = ["auto"])]
+    pub steps: Option<String>,
     /// central-difference: V in the drag [default: lagged].
     #[arg(long, value_enum)]
     pub velocity: Option<crate::integrators::VelocityAt>,
@@ -132,8 +139,8 @@ impl Ask for ConvergeArgs {
     fn ask(&self) -> Result<Answer<ConvergeJson>, CliError> {
         self.report.check("converge", &[Path::new(&self.scene.path)])?;
         let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
-        let method =
-            MethodArgs { method: self.method, rtol: None, dt: None, velocity: self.velocity, events: self.events };
+        let (rtol, dt, steps) = (None, None, self.steps.clone());
+        let method = MethodArgs { method: self.method, rtol, dt, steps, velocity: self.velocity, events: self.events };
         if self.method == MethodName::ClosedForm {
             return Err(CliError::usage("the closed form has no order of convergence", "choose an integrator"));
         }
@@ -154,7 +161,13 @@ impl Ask for ConvergeArgs {
         let points = usize::from(self.points);
         let options = method.options()?;
         let study = if fixed {
-            let with_step = |size| MethodOptions { dt: Some(size), ..options.clone() }.central_difference();
+            // The first step at the safety factor one, to which all automatic steps are in proportion.
+            let whole = MethodOptions { steps: Some(Steps::Automatic(1.0)), ..options.clone() }.central_difference();
+            let whole = whole.time_step(&problem);
+            let with_step = |size| {
+                let steps = options.steps.as_ref().map(|_| Steps::Automatic(size / whole));
+                MethodOptions { dt: Some(size), steps, ..options.clone() }.central_difference()
+            };
             let bar = progress_bar(0, "runs");
             let progress = |done, planned| {
                 bar.set_length(planned);

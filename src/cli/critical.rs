@@ -12,7 +12,7 @@ use crate::integrators::{Detail, Integrator};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
 use crate::physics::{Criterion, Scene, Shown, groups};
 use crate::studies::critical_velocity::CriticalVelocity;
-use crate::studies::sensitivity::{self, Share, Spread, Uncertainty};
+use crate::studies::sensitivity::{self, Design, Share, Spread, Uncertainty};
 use crate::studies::{applicability, critical_velocity};
 
 /// What is said where no velocity is critical.
@@ -30,7 +30,8 @@ pub struct CriticalArgs {
     pub method: MethodArgs,
     /// Uncertainty for target.strength=5%; repeatable.
     ///
-    /// Each gives the relative standard deviation of a number of the scene.
+    /// Each gives the relative standard deviation of a number of the scene, which is lognormal unless :normal or :uniform follows, as in
+    /// projectile.mass=1%:normal. eq14 is the scatter of Eq. 14 itself, on S, by the measured depths that ship.
     #[arg(long, value_name = "PATH=REL")]
     pub spread: Vec<String>,
     /// Random scenes behind it.
@@ -39,6 +40,20 @@ pub struct CriticalArgs {
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 1, requires = "spread")]
     pub seed: u64,
+    /// Probability of the design value.
+    ///
+    /// Share of the random scenes whose V_c may lie below it.
+    #[arg(long, value_name = "P", default_value = "5%", requires = "spread", value_parser = probability)]
+    pub design: f64,
+}
+
+/// A probability between zero and one, or percent.
+fn probability(text: &str) -> Result<f64, String> {
+    let (digits, unit) = text.trim().strip_suffix('%').map_or((text, 1.0), |digits| (digits, 0.01));
+    match digits.trim().parse::<f64>().map(|number| number * unit) {
+        Ok(number) if number > 0.0 && number < 1.0 => Ok(number),
+        _ => Err("write a probability between 0 and 1, or percent: 5%".to_owned()),
+    }
 }
 
 /// What `critical --json` prints.
@@ -144,7 +159,7 @@ impl Ask for CriticalArgs {
         let is_zero = exact == Some(0.0) || shown == 0.0;
         let uncertainty = match spreads.as_slice() {
             [_, ..] if !is_zero && found.is_some() => {
-                Some(sensitivity::uncertainty(&scene, &spreads, self.samples as usize, self.seed)?)
+                Some(sensitivity::uncertainty(&scene, &spreads, self.samples as usize, self.seed, self.design)?)
             }
             _ => None,
         };
@@ -251,8 +266,11 @@ impl CriticalJson {
 /// Adds the uncertainty of V_c to `text`.
 fn add_uncertainty(text: &mut Text, found: &Uncertainty) {
     text.line(format!("  spread     +- {:.4} m/s to first order", found.first_order));
-    for Share { spread: Spread { parameter, relative }, share } in &found.spreads {
-        text.line(format!("             {parameter} {} %: {:.1} % of the variance", 100.0 * relative, 100.0 * share));
+    for Share { spread: Spread { parameter, relative, distribution }, share } in &found.spreads {
+        let relative = significant(100.0 * relative);
+        let relative = relative.trim_end_matches('0').trim_end_matches('.');
+        let (name, share) = (distribution.name(), 100.0 * share);
+        text.line(format!("             {parameter} {relative} %, {name}: {share:.1} % of the variance"));
     }
     let [low, median, high] = found.quantiles;
     text.line(format!("  sampled    mean {:.4}, deviation {:.4} m/s", found.mean, found.deviation));
@@ -262,6 +280,15 @@ fn add_uncertainty(text: &mut Text, found: &Uncertainty) {
         count => format!(", {count} inadmissible left out"),
     };
     text.line(format!("             {} random scenes, seed {}{left_out}", found.samples, found.seed));
+    let Design { probability, velocity_m_s, interval95_m_s, safety_factor } = found.design;
+    let [low, high] = interval95_m_s.map(|end| end.map_or("no bound".to_owned(), |end| format!("{end:.3}")));
+    let percent = significant(100.0 * probability);
+    let percent = percent.trim_end_matches('0').trim_end_matches('.');
+    text.line(format!("  design     {velocity_m_s:.3} m/s ({low} to {high} with 95 %)"));
+    text.wrapped(
+        "             ",
+        &format!("{percent} % of the scenes lie below; safety factor on V_c {safety_factor:.4}"),
+    );
 }
 
 impl Eq15Json {

@@ -14,9 +14,8 @@ use super::output::{
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::input::name_of;
 use crate::exchange::tables::{self, Kind, read_bytes};
-use crate::integrators::Method;
 use crate::physics::semi_empirical::NDRC_END;
-use crate::physics::{Criterion, Outcome, Parameter};
+use crate::physics::{Criterion, Outcome};
 use crate::report::sweep_figures;
 use crate::studies::sweep::{
     Axis, COLUMNS, Conclusion, MeasuredPoint, POINTS, Plan, Row, conclusions, explanation, read_points,
@@ -104,7 +103,7 @@ impl Ask for SweepArgs {
         let method = self.method.build()?;
         let points = self.points(&plan)?;
         let rows = plan.run(method.integrator());
-        let beside = beside(&plan, &points, &method)?;
+        let beside = plan.beside(&points, method.integrator())?;
         let data = SweepJson {
             schema: "penetrode/sweep/1",
             title: plan.scene().title.clone(),
@@ -236,21 +235,6 @@ fn points_table(paths: &[String], rows: &[&Row]) -> (Vec<String>, Vec<&'static s
     }
     let least = columns.len().min(1);
     (lines_of(least, ContentArrangement::Dynamic), names[least..].to_vec())
-}
-
-/// The curves at the measured points, computed there and not interpolated.
-fn beside(plan: &Plan, points: &[(f64, f64)], method: &Method) -> Result<Vec<MeasuredPoint>, CliError> {
-    let mut data = Vec::with_capacity(points.len());
-    for &(thickness_ratio, measured) in points {
-        let parameter = Parameter::ThicknessRatio;
-        let axis = Axis { parameter, from: thickness_ratio, to: thickness_ratio, count: 1, logarithmic: false };
-        let there = Plan::new(plan.scene().clone(), &[axis])?.run(method.integrator());
-        data.extend(there.into_iter().map(|row| {
-            let Row { energy_full_depth, energy_ndrc, eq15_printed, .. } = row;
-            MeasuredPoint { thickness_ratio, measured, energy_full_depth, energy_ndrc, eq15_printed }
-        }));
-    }
-    Ok(data)
 }
 
 /// How the names of the figures beside the table end.

@@ -35,7 +35,7 @@ use crate::physics::{Problem, Scalar, State};
 use boundaries::Run;
 pub(crate) use boundaries::Step;
 use scheme::Stepper;
-pub use stability::{default_time_step, stability_limit};
+pub use stability::{automatic_step, default_time_step, stability_limit};
 
 /// Name of the method (`docs/reference.md`, "Words").
 pub const NAME: &str = "central-difference";
@@ -54,6 +54,10 @@ pub enum Steps {
     /// A sequence of sizes (s), taken in order and started over when it is used up: two entries alternate. A step
     /// that [`Boundaries::Landed`] shortens uses up its entry.
     Given(Vec<f64>),
+    /// As an explicit finite-element code chooses them: this factor times the longest step of the present stage at the present
+    /// velocity, [`automatic_step`]; where the stage has none, the step before is kept. The first step is [`default_time_step`] where
+    /// the first stage has none.
+    Automatic(f64),
 }
 
 /// The velocity V* at which the force of step i is evaluated.
@@ -202,12 +206,19 @@ impl CentralDifference {
         Self { steps: Steps::Uniform(time_step), velocity, boundaries, ..Self::default() }
     }
 
-    /// The step (s) with which `problem` is solved: what a report prints. Of a given sequence, its largest.
+    /// The step (s) with which `problem` is solved: what a report prints. Of a given sequence, its largest; of automatic steps, the
+    /// first.
     pub fn time_step<S: Scalar>(&self, problem: &Problem<S>) -> f64 {
         match &self.steps {
             Steps::Default => default_time_step(problem, self.velocity),
             Steps::Uniform(time_step) => *time_step,
             Steps::Given(sizes) => sizes.iter().copied().fold(0.0, f64::max),
+            Steps::Automatic(safety) => {
+                let at = State::at_impact(problem);
+                let stage = problem.linear(scheme::stage_at(problem, 0, at.depth), at);
+                let step = automatic_step(&stage.values(), problem.mass.value(), problem.impact_speed.value());
+                step.map_or_else(|| default_time_step(problem, self.velocity), |step| safety * step)
+            }
         }
     }
 
@@ -277,7 +288,8 @@ impl CentralDifference {
             Steps::Uniform(size) => (std::slice::from_ref(size), "--dt", "a positive, finite time"),
             Steps::Given(sizes) if sizes.is_empty() => return bad("steps", "[]", "at least one time step"),
             Steps::Given(sizes) => (sizes.as_slice(), "steps", "positive, finite times"),
+            Steps::Automatic(safety) => (std::slice::from_ref(safety), "--steps auto", "a positive, finite factor"),
         };
-        sizes.iter().find(is_bad).map_or(Ok(()), |size| bad(option, &format!("{size} s"), allowed))
+        sizes.iter().find(is_bad).map_or(Ok(()), |size| bad(option, &format!("{size}"), allowed))
     }
 }

@@ -128,6 +128,8 @@ pub struct MethodOptions {
     pub rtol: Option<f64>,
     /// Time step (s), for `central-difference`; chosen from the stages when absent.
     pub dt: Option<f64>,
+    /// Unequal steps in place of `dt`, for `central-difference`.
+    pub steps: Option<Steps>,
     /// Velocity in the force, for `central-difference`.
     pub velocity: Option<VelocityAt>,
     /// Boundary rule, for `central-difference`.
@@ -138,7 +140,7 @@ impl MethodOptions {
     /// The central difference with these options.
     pub fn central_difference(&self) -> CentralDifference {
         CentralDifference {
-            steps: self.dt.map_or(Steps::Default, Steps::Uniform),
+            steps: self.steps.clone().unwrap_or_else(|| self.dt.map_or(Steps::Default, Steps::Uniform)),
             velocity: self.velocity.unwrap_or_default(),
             boundaries: self.events.unwrap_or_default(),
             ..CentralDifference::default()
@@ -169,9 +171,14 @@ impl Method {
     /// [`IntegrationError::BadOption`] for an option that the method does not use or that is out of range,
     /// [`IntegrationError::Refused`] for a method that this build lacks.
     pub fn new(name: MethodName, options: &MethodOptions) -> Result<Self, IntegrationError> {
-        let &MethodOptions { rtol, dt, velocity, events } = options;
+        let &MethodOptions { rtol, dt, velocity, events, ref steps } = options;
         let is_fixed_step = name.accuracy() == Accuracy::Step;
         refuse_unless(is_fixed_step, "--dt", dt.map(Shown), "only central-difference has a fixed step")?;
+        let unequal = steps.as_ref().map(|steps| match steps {
+            Steps::Automatic(safety) => format!("auto:{safety}"),
+            _ => "of a table".to_owned(),
+        });
+        refuse_unless(is_fixed_step, "--steps", unequal, "only central-difference has this choice")?;
         refuse_unless(is_fixed_step, "--velocity", velocity, "only central-difference has this choice")?;
         refuse_unless(is_fixed_step, "--events", events, "only central-difference has this choice")?;
         let is_adaptive = matches!(name.accuracy(), Accuracy::RoundOff | Accuracy::Tolerance);
@@ -305,6 +312,7 @@ mod tests {
     #[test]
     fn an_option_reaches_the_methods_that_use_it_and_the_others_refuse_it() {
         let fixed = MethodOptions {
+            steps: None,
             dt: Some(1e-5),
             velocity: Some(VelocityAt::Centred),
             events: Some(Boundaries::Interpolated),
@@ -328,6 +336,7 @@ mod tests {
             let adapts = matches!(name, MethodName::Taylor | MethodName::Energy);
             for (option, options, used) in [
                 ("--dt", MethodOptions { dt: fixed.dt, ..only() }, steps),
+                ("--steps", MethodOptions { steps: Some(Steps::Automatic(0.9)), ..only() }, steps),
                 ("--velocity", MethodOptions { velocity: fixed.velocity, ..only() }, steps),
                 ("--events", MethodOptions { events: fixed.events, ..only() }, steps),
                 ("--rtol", MethodOptions { rtol: Some(1e-6), ..only() }, adapts),

@@ -597,7 +597,9 @@ impl Advice for ParameterError {
                 Some(dimension) => format!("write {} with its unit, or a bare SI number", dimension.noun()),
                 None => "write a plain number".to_owned(),
             },
-            Self::Spread(_) | Self::Group(_) => "write for example --spread target.strength=5%".to_owned(),
+            Self::Spread(_) | Self::Group(_) => {
+                "write for example --spread target.strength=5%, or 5%:normal, 5%:uniform".to_owned()
+            }
             Self::NoInput(_) => "leave its spread out: V_c is sought whatever the impact velocity".to_owned(),
             Self::Twice(_) => "leave one of the two out".to_owned(),
         }

@@ -56,10 +56,13 @@ fn of_evidence(run: &Run<'_>, judged: &Judged) -> Vec<Figure> {
     let drawn = match &judged.evidence {
         Some(Evidence::Boundary(points)) => vec![stability_figures::boundary(points, &[judged])],
         Some(Evidence::Rounding(rows)) => vec![stability_figures::rounding(rows, &[judged])],
-        Some(Evidence::Sweep { rows, .. }) => vec![
-            sweep_figures::critical_energy(rows, run.points, &[judged]),
-            sweep_figures::critical_energy_difference(rows, &[], &[judged]),
-        ],
+        Some(Evidence::Sweep { plan, rows }) => {
+            let measured = plan.beside(run.points, &Taylor::default()).unwrap_or_default();
+            vec![
+                sweep_figures::critical_energy(rows, run.points, &[judged]),
+                sweep_figures::critical_energy_difference(rows, &measured, &[judged]),
+            ]
+        }
         Some(Evidence::Map { crater_ratio, lines, scenes }) => {
             vec![sweep_figures::applicability(*crater_ratio, lines, scenes, &[judged])]
         }

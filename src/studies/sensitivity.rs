@@ -23,12 +23,13 @@ use serde::Serialize;
 
 use super::critical_velocity;
 use super::error::{Studied, StudyError, Truth};
+use super::experiments::{self, resistance};
 use super::perforating_velocities;
 use super::random::Random;
 use super::sweep::as_text;
 #[cfg(feature = "diffsol")]
 use crate::integrators::diffsol_sensitivity;
-use crate::integrators::{Detail, Energy, Solved, Taylor};
+use crate::integrators::{ClosedForm, Detail, Energy, Solved, Taylor};
 #[cfg(feature = "diffsol")]
 use crate::physics::EventKind;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError};
@@ -374,9 +375,45 @@ pub struct Spread {
     #[serde(rename = "path", serialize_with = "as_text")]
     #[cfg_attr(feature = "report", schemars(with = "String"))]
     pub parameter: Parameter,
-    /// Standard deviation of its logarithm, which for small spreads is its relative standard deviation.
+    /// Relative standard deviation; of a lognormal number that of its logarithm, which for small spreads is the same.
     pub relative: f64,
+    /// How the number is distributed.
+    pub distribution: Distribution,
 }
+
+/// How an uncertain number is distributed about the value v of the scene, with relative standard deviation r.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, strum::EnumString, strum::IntoStaticStr)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+#[strum(serialize_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
+pub enum Distribution {
+    /// `v exp(r z)`, z standard normal: above zero, with the median v.
+    #[default]
+    Lognormal,
+    /// `v (1 + r z)`: below zero it is left out.
+    Normal,
+    /// `v (1 + r u)`, u uniform from -√3 to √3, so that r is the standard deviation here too.
+    Uniform,
+}
+
+impl Distribution {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// A random factor on v.
+    fn factor(self, relative: f64, random: &mut Random) -> f64 {
+        match self {
+            Self::Lognormal => (relative * normal(random)).exp(),
+            Self::Normal => 1.0 + relative * normal(random),
+            Self::Uniform => 1.0 + relative * 3.0_f64.sqrt() * (2.0 * random.unit() - 1.0),
+        }
+    }
+}
+
+/// The text of a spread that is the scatter of Eq. 14 itself.
+const EQ14: &str = "eq14";
 
 /// Reads `texts` as spreads of different numbers.
 ///
@@ -399,7 +436,15 @@ impl std::str::FromStr for Spread {
 
     fn from_str(text: &str) -> Result<Self, ParameterError> {
         let form = || ParameterError::Spread(text.to_owned());
+        if text.trim() == EQ14 {
+            let relative = scatter_of_eq14().relative;
+            return Ok(Self { parameter: Parameter::StaticFactor, relative, distribution: Distribution::Lognormal });
+        }
         let (path, relative) = text.split_once('=').ok_or_else(form)?;
+        let (relative, distribution) = match relative.split_once(':') {
+            Some((relative, name)) => (relative, name.trim().parse().map_err(|_| form())?),
+            None => (relative, Distribution::default()),
+        };
         let parameter: Parameter = path.trim().parse()?;
         if parameter.moves() != parameter {
             return Err(ParameterError::Group(parameter));
@@ -409,7 +454,7 @@ impl std::str::FromStr for Spread {
         if !(0.0..=1.0).contains(&relative) {
             return Err(form());
         }
-        Ok(Self { parameter, relative })
+        Ok(Self { parameter, relative, distribution })
     }
 }
 
@@ -457,6 +502,67 @@ pub struct Uncertainty {
     /// Quantiles 2.5, 50 and 97.5 % of the samples (m/s).
     #[serde(rename = "quantiles_m_s")]
     pub quantiles: [f64; 3],
+    /// What a design may count on.
+    pub design: Design,
+}
+
+/// A critical velocity that few targets fall short of, and the safety factor that leads there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
+pub struct Design {
+    /// Share p of the samples that have a lower critical velocity.
+    pub probability: f64,
+    /// The sample of rank `n p`, rounded up (m/s).
+    pub velocity_m_s: f64,
+    /// 95 % interval of that quantile by the ranks of a binomial distribution; `null` where the samples are too few for an end.
+    pub interval95_m_s: [Option<f64>; 2],
+    /// V_c of the scene as it stands over that velocity.
+    pub safety_factor: f64,
+}
+
+/// Ranks, from 1, between which the quantile p of `count` samples lies with 95 %: `P(B < l) <= 2.5 %`, `P(B >= u) <= 2.5 %`, B binomial.
+///
+/// `None` where there is no such rank.
+fn ranks_of_quantile(count: usize, p: f64) -> [Option<usize>; 2] {
+    /// Half the level that is left out.
+    const TAIL: f64 = 0.025;
+    let n = count as f64;
+    let deviation = (n * p * (1.0 - p)).sqrt();
+    // Twelve deviations about the mean: less than 1e-30 lies outside.
+    let first = (n * p - 12.0 * deviation - 12.0).floor().max(0.0) as usize;
+    let last = (n * p + 12.0 * deviation + 12.0).ceil().min(n) as usize;
+    let ln_choose = |k: f64| libm::lgamma(n + 1.0) - libm::lgamma(k + 1.0) - libm::lgamma(n - k + 1.0);
+    let (mut below, mut low, mut high) = (0.0, None, None);
+    for k in first..=last {
+        // P(B < k) is `below` here.
+        if below <= TAIL && k > 0 {
+            low = Some(k);
+        }
+        if high.is_none() && below >= 1.0 - TAIL {
+            high = Some(k);
+        }
+        below += (ln_choose(k as f64) + k as f64 * p.ln() + (n - k as f64) * (-p).ln_1p()).exp();
+    }
+    [low, high.filter(|rank| *rank <= count)]
+}
+
+/// How far the depths that ship lie from those of Eq. 14.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScatterOfEq14 {
+    /// Root mean square of the logarithm of the S that a depth shows over that of Eq. 14.
+    pub relative: f64,
+    /// Depths within the range of the fit, and no shallower than X/d = 0.5.
+    pub shots: usize,
+}
+
+/// The scatter of Eq. 14 by the depths that ship, bias included.
+pub fn scatter_of_eq14() -> ScatterOfEq14 {
+    let depths = experiments::shipped().unwrap_or_default();
+    let comparisons = experiments::compare(&depths, None, &[], &ClosedForm).unwrap_or_default();
+    let within = comparisons.iter().filter(|comparison| comparison.experiment.is_in_range_of_fit());
+    let logs: Vec<f64> = within.filter_map(|comparison| Some(resistance::shown_over_eq14(comparison)?.ln())).collect();
+    let squares: f64 = logs.iter().map(|ln| ln * ln).sum();
+    ScatterOfEq14 { relative: (squares / logs.len() as f64).sqrt(), shots: logs.len() }
 }
 
 /// A spread and its part in the uncertainty.
@@ -475,14 +581,21 @@ const CHUNK: usize = 4096;
 
 /// Uncertainty of V_c of `scene` from independent `spreads`: to first order, and by `samples` random scenes.
 ///
-/// Each input is multiplied by `exp(r z)`, z normal: it stays above zero, and its median is the scene's value. S is
-/// multiplied on top of what Eq. 14 makes of the strength. V_c of a sample is the exact one, or through the energy
+/// Each input is multiplied by a random factor of its [`Distribution`]. S is multiplied on top of what Eq. 14 makes of the strength. V_c of a sample is the exact one, or through the energy
 /// method. The same seed gives the same numbers on any number of threads.
 ///
 /// # Errors
 /// [`StudyError`]: no critical velocity, a number that the scene lacks or that V_c does not depend on, or no
 /// admissible sample at all.
-pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64) -> Studied<Uncertainty> {
+///
+/// `probability` is that of the design value, between zero and one.
+pub fn uncertainty(
+    scene: &Scene,
+    spreads: &[Spread],
+    samples: usize,
+    seed: u64,
+    probability: f64,
+) -> Studied<Uncertainty> {
     if spreads.iter().any(|spread| spread.parameter == Parameter::Velocity) {
         return Err(ParameterError::NoInput(Parameter::Velocity).into());
     }
@@ -529,7 +642,15 @@ pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64)
     let mean = velocities.iter().sum::<f64>() / count;
     let squares: f64 = velocities.iter().map(|v| (v - mean) * (v - mean)).sum();
     let quantile = |share: f64| velocities[(share * (count - 1.0)).round() as usize];
+    let ranked = |rank: usize| velocities[rank - 1];
+    let design = ranked(((probability * count).ceil() as usize).clamp(1, velocities.len()));
     Ok(Uncertainty {
+        design: Design {
+            probability,
+            velocity_m_s: design,
+            interval95_m_s: ranks_of_quantile(velocities.len(), probability).map(|rank| rank.map(ranked)),
+            safety_factor: critical / design,
+        },
         spreads: shares,
         first_order: variance.sqrt() * critical,
         samples: velocities.len(),
@@ -544,8 +665,8 @@ pub fn uncertainty(scene: &Scene, spreads: &[Spread], samples: usize, seed: u64)
 /// V_c of one random scene; `None` where it is not admissible.
 fn sample(base: &Scene, spreads: &[Spread], random: &mut Random) -> Option<f64> {
     let mut scene = base.clone();
-    for Spread { parameter, relative } in spreads {
-        let value = parameter.get(&scene).ok()? * (relative * normal(random)).exp();
+    for Spread { parameter, relative, distribution } in spreads {
+        let value = parameter.get(&scene).ok()? * distribution.factor(*relative, random);
         parameter.set(&mut scene, value).ok()?;
     }
     critical_velocity::exact(&scene)
@@ -746,7 +867,7 @@ mod tests {
             assert!(derivatives.notes[0].contains("left out"), "{:?}", derivatives.notes);
         }
         let spread = "stage.3.static_force=1%".parse().unwrap();
-        assert!(uncertainty(&scene, &[spread], 2, 1).unwrap().first_order > 0.0);
+        assert!(uncertainty(&scene, &[spread], 2, 1, 0.05).unwrap().first_order > 0.0);
     }
 
     #[test]
@@ -756,31 +877,94 @@ mod tests {
         assert_eq!(twice, Err(ParameterError::Twice(Parameter::Strength)));
         let two = texts(&["target.strength=2%", "impact.velocity=1%"]).unwrap();
         assert_eq!(
-            uncertainty(&shipped("paper-slab"), &two, 10, 1),
+            uncertainty(&shipped("paper-slab"), &two, 10, 1, 0.05),
             Err(ParameterError::NoInput(Parameter::Velocity).into())
         );
-        assert!(uncertainty(&shipped("paper-slab"), &two[..1], 10, 1).is_ok());
+        assert!(uncertainty(&shipped("paper-slab"), &two[..1], 10, 1, 0.05).is_ok());
     }
 
     #[test]
     fn monte_carlo_meets_first_order_for_small_spreads_and_repeats_itself() {
         let scene = shipped("paper-slab");
         let spreads = ["target.strength=2%", "projectile.mass=0.01", "resistance.S=0.02"].map(|s| s.parse().unwrap());
-        let found = uncertainty(&scene, &spreads, 20_000, 7).unwrap();
+        let found = uncertainty(&scene, &spreads, 20_000, 7, 0.05).unwrap();
         assert_eq!((found.samples, found.inadmissible), (20_000, 0));
         // The deviation of 20,000 samples has a standard error of 0.5 %.
         assert!((found.deviation / found.first_order - 1.0).abs() < 0.02, "{found:?}");
         assert!((found.mean / critical_velocity::exact(&scene).unwrap() - 1.0).abs() < 1e-3);
         assert!((found.spreads.iter().map(|share| share.share).sum::<f64>() - 1.0).abs() < 1e-12);
-        assert_eq!(found, uncertainty(&scene, &spreads, 20_000, 7).unwrap());
-        assert_ne!(found.mean, uncertainty(&scene, &spreads, 20_000, 8).unwrap().mean);
+        assert_eq!(found, uncertainty(&scene, &spreads, 20_000, 7, 0.05).unwrap());
+        assert_ne!(found.mean, uncertainty(&scene, &spreads, 20_000, 8, 0.05).unwrap().mean);
+    }
+
+    /// mpmath, 40 digits: sums of `binomial(n, k) p^k (1 - p)^(n - k)` up to 2.5 % from either end.
+    #[test]
+    fn ranks_of_a_quantile_are_those_of_the_binomial_distribution() {
+        for (count, p, low, high) in RANKS {
+            assert_eq!(ranks_of_quantile(count, p), [low, high], "{count} {p}");
+        }
+    }
+
+    const RANKS: [(usize, f64, Option<usize>, Option<usize>); 5] = [
+        (10, 0.5, Some(2), Some(9)),
+        (10, 0.05, None, Some(3)),
+        (100, 0.05, Some(1), Some(11)),
+        (1000, 0.05, Some(37), Some(65)),
+        (20_000, 0.1, Some(1917), Some(2085)),
+    ];
+
+    /// Of 20,000 samples moments have a standard error of 0.7 %; the uniform one has no tail beyond its ends.
+    #[test]
+    fn a_number_is_distributed_as_it_is_said_with_the_same_deviation() {
+        for (name, kurtosis) in [("normal", 3.0), ("uniform", 1.8), ("lognormal", 3.0)] {
+            let spread: Spread = format!("projectile.mass=2%:{name}").parse().unwrap();
+            assert_eq!(spread.distribution.name(), name);
+            let mut random = Random::for_part(3, name);
+            let values: Vec<f64> = (0..20_000).map(|_| spread.distribution.factor(0.02, &mut random) - 1.0).collect();
+            let moment = |power: i32| values.iter().map(|v| v.powi(power)).sum::<f64>() / 20_000.0;
+            assert!((moment(2).sqrt() / 0.02 - 1.0).abs() < 0.02, "{name}");
+            assert!((moment(4) / moment(2).powi(2) / kurtosis - 1.0).abs() < 0.08, "{name}: {}", moment(4));
+            assert!(name != "uniform" || values.iter().all(|v| v.abs() <= 0.02 * 3.0_f64.sqrt()));
+        }
+        for text in ["projectile.mass=2%:gauss", "projectile.mass=2%:", "projectile.mass:normal"] {
+            assert!(text.parse::<Spread>().is_err(), "{text}");
+        }
+    }
+
+    /// mpmath, 40 digits: of each shipped depth in range, from X/d = 0.5, S by the inverse of Li & Chen's depth; the root mean square of
+    /// `ln(S √fc/72)`.
+    #[test]
+    fn the_scatter_of_eq_14_is_that_of_the_depths_that_ship() {
+        let ScatterOfEq14 { relative, shots } = scatter_of_eq14();
+        assert_eq!(shots, 86);
+        assert!((relative - 0.180_233_884_820_654_63).abs() < 1e-12, "{relative}");
+        let spread: Spread = "eq14".parse().unwrap();
+        assert_eq!((spread.parameter, spread.relative), (Parameter::StaticFactor, relative));
+        let twice = spreads(&["eq14".to_owned(), "resistance.S=2%".to_owned()]);
+        assert_eq!(twice, Err(ParameterError::Twice(Parameter::StaticFactor)));
+    }
+
+    /// With one lognormal number of which V_c goes as a power, quantiles are known: V_c of the crater as the root of 1/M.
+    #[test]
+    fn the_design_value_holds_the_quantile_and_the_safety_factor_leads_to_it() {
+        let scene = shipped("paper-slab");
+        let spread = ["projectile.mass=10%".parse().unwrap()];
+        let found = uncertainty(&scene, &spread, 20_000, 7, 0.05).unwrap();
+        let [low, high] = found.design.interval95_m_s.map(Option::unwrap);
+        let mut heavy = scene.clone();
+        Parameter::Mass.set(&mut heavy, 20.0 * (0.1 * 1.644_853_626_951_472_7_f64).exp()).unwrap();
+        let exact = critical_velocity::exact(&heavy).unwrap();
+        assert!(low <= exact && exact <= high && high - low < 0.01 * exact, "{low} {exact} {high}");
+        let critical = critical_velocity::exact(&scene).unwrap();
+        assert!((found.design.safety_factor * found.design.velocity_m_s / critical - 1.0).abs() < 1e-15);
+        assert!(uncertainty(&scene, &spread, 10, 7, 0.05).unwrap().design.interval95_m_s[0].is_none());
     }
 
     #[test]
     fn samples_beyond_the_admissible_are_counted_and_left_out() {
         let scene = shipped("paper-slab");
         let spreads = ["projectile.nose.factor=0.1".parse().unwrap()];
-        let found = uncertainty(&scene, &spreads, 1000, 1).unwrap();
+        let found = uncertainty(&scene, &spreads, 1000, 1, 0.05).unwrap();
         // The nose is flat, N* = 1: half of the samples are above one.
         assert!((400..600).contains(&found.inadmissible), "{found:?}");
     }

@@ -236,6 +236,28 @@ impl Row {
 }
 
 impl Plan {
+    /// The curves at measured points, H/d and `E_c/(d³ fc)`, computed there and not interpolated.
+    ///
+    /// # Errors
+    /// [`SweepError`]: the scene has no H/d.
+    pub fn beside(
+        &self,
+        points: &[(f64, f64)],
+        integrator: &(dyn Integrator + Sync),
+    ) -> Result<Vec<MeasuredPoint>, SweepError> {
+        let mut data = Vec::with_capacity(points.len());
+        for &(thickness_ratio, measured) in points {
+            let parameter = Parameter::ThicknessRatio;
+            let axis = Axis { parameter, from: thickness_ratio, to: thickness_ratio, count: 1, logarithmic: false };
+            let there = Self::new(self.scene().clone(), &[axis])?.run(integrator);
+            data.extend(there.into_iter().map(|row| {
+                let Row { energy_full_depth, energy_ndrc, eq15_printed, .. } = row;
+                MeasuredPoint { thickness_ratio, measured, energy_full_depth, energy_ndrc, eq15_printed }
+            }));
+        }
+        Ok(data)
+    }
+
     /// A sweep of `scene` over `axes`.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! Equations 6 to 8, step by step: the force rule, the sums, the clock, and the loop over whole steps.
 
-use super::stability::stability_limit;
+use super::stability::{automatic_step, stability_limit};
 use super::{CentralDifference, Steps, Summation, VelocityAt};
 use crate::integrators::outcome::{Cost, IntegrationError, Solved, StepLimit};
 use crate::physics::{Law, Problem, Scalar, Stage, State};
@@ -39,6 +39,9 @@ pub(super) trait Deceleration<S> {
         false
     }
 
+    /// The stage about a state, per unit mass: its stiffness, and a drag or a viscosity with the slope of the force over V there.
+    fn linear(&self, x: S, v: S) -> Stage;
+
     /// The solution V of `V = u - half F(x, V)/M`.
     fn centred(&self, x: S, u: S, half: S) -> S;
 
@@ -59,6 +62,10 @@ impl<S: Scalar> Deceleration<S> for Stage<S> {
     #[inline(always)]
     fn at(&self, x: S, v: S) -> S {
         self.force(x, v)
+    }
+
+    fn linear(&self, _x: S, _v: S) -> Stage {
+        self.values()
     }
 
     #[inline(always)]
@@ -89,6 +96,12 @@ impl<S: Scalar> Deceleration<S> for (&Law<S>, S, f64) {
         // Below zero a power of V has no value; the step that comes to rest then ends with the force at rest.
         let force = if force.value().is_nan() && v.value() < 0.0 { self.0.force(x, S::zero()) } else { force };
         force.over(self.1)
+    }
+
+    fn linear(&self, x: S, v: S) -> Stage {
+        let mass = self.1.value();
+        let (by_depth, by_velocity) = self.0.slopes(x.value(), v.value());
+        Stage { stiffness: by_depth / mass, viscosity: by_velocity / mass, ..Stage::free() }
     }
 
     /// As the root between rest and u, if it lies there; the force at rest does what is beyond.
@@ -154,6 +167,13 @@ impl<S: Scalar> Deceleration<S> for Rule<'_, S> {
         }
     }
 
+    fn linear(&self, x: S, v: S) -> Stage {
+        match self {
+            Self::Stage(stage) => stage.linear(x, v),
+            Self::Law(law, mass, side) => (*law, *mass, *side).linear(x, v),
+        }
+    }
+
     #[inline(always)]
     fn centred(&self, x: S, u: S, half: S) -> S {
         match self {
@@ -204,6 +224,8 @@ pub(super) enum Clock<'a, S> {
     Equal { size: S, since: S, count: u64 },
     /// [`Steps::Given`]: the index of the next size, and the sum of those before.
     Given { sizes: &'a [f64], next: usize, time: Sum<S> },
+    /// [`Steps::Automatic`]: the factor, the last step, and the sum of those before.
+    Automatic { safety: f64, step: S, time: Sum<S> },
 }
 
 impl<S: Scalar> Clock<'_, S> {
@@ -213,6 +235,7 @@ impl<S: Scalar> Clock<'_, S> {
         match *self {
             Self::Equal { size, .. } => size,
             Self::Given { sizes, next, .. } => S::from_f64(sizes[next]),
+            Self::Automatic { step, .. } => step,
         }
     }
 
@@ -220,7 +243,17 @@ impl<S: Scalar> Clock<'_, S> {
     pub(super) fn now(&self) -> S {
         match *self {
             Self::Equal { size, since, count } => since + S::from_f64(count as f64) * size,
-            Self::Given { time, .. } => time.value,
+            Self::Given { time, .. } | Self::Automatic { time, .. } => time.value,
+        }
+    }
+
+    /// Chooses the step ahead from a node of a stage, whose coefficients are per unit mass.
+    #[inline(always)]
+    fn adapt(&mut self, law: &impl Deceleration<S>, node: &Node<S>) {
+        if let Self::Automatic { safety, step, .. } = self
+            && let Some(longest) = automatic_step(&law.linear(node.x.value, node.v), 1.0, node.v.value())
+        {
+            *step = S::from_f64(*safety * longest);
         }
     }
 
@@ -229,7 +262,7 @@ impl<S: Scalar> Clock<'_, S> {
     pub(super) fn tick(&mut self) {
         match self {
             Self::Equal { count, .. } => *count += 1,
-            Self::Given { .. } => self.tick_part(self.step()),
+            Self::Given { .. } | Self::Automatic { .. } => self.tick_part(self.step()),
         }
     }
 
@@ -242,6 +275,7 @@ impl<S: Scalar> Clock<'_, S> {
                 *time = time.plus(part, Summation::Compensated);
                 *next = if *next + 1 == sizes.len() { 0 } else { *next + 1 };
             }
+            Self::Automatic { time, .. } => *time = time.plus(part, Summation::Compensated),
         }
     }
 }
@@ -324,6 +358,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let impact = State::at_impact(problem);
         let clock = match &options.steps {
             Steps::Given(sizes) => Clock::Given { sizes, next: 0, time: Sum::new(S::zero()) },
+            Steps::Automatic(safety) => {
+                let step = S::from_f64(options.time_step(problem));
+                Clock::Automatic { safety: *safety, step, time: Sum::new(S::zero()) }
+            }
             _ => Clock::Equal { size: S::from_f64(options.time_step(problem)), since: S::zero(), count: 0 },
         };
         let stage = stage_at(problem, 0, impact.depth);
@@ -427,6 +465,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             if taken == allowance {
                 break Pause::Allowance;
             }
+            clock.adapt(law, &here);
             let h = clock.step();
             let (x, u) = here.ahead(h, summation);
             // Both tests are written so that NaN leaves the loop.
@@ -522,7 +561,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 /// Index of the stage whose force holds at depth `x`, not before `from`: beyond every end at or before `x`.
 ///
 /// An end at the exit depth, or past it, changes nothing: the projectile does not get there.
-fn stage_at<S: Scalar>(problem: &Problem<S>, from: usize, x: S) -> usize {
+pub(super) fn stage_at<S: Scalar>(problem: &Problem<S>, from: usize, x: S) -> usize {
     let is_behind = |end: f64| end <= x.value() && end < problem.exit_depth.value();
     from + problem.stages[from..].iter().take_while(|stage| is_behind(stage.end.value())).count()
 }

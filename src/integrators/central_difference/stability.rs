@@ -42,6 +42,15 @@ pub(super) fn cannot_end<S: Scalar>(problem: &Problem<S>, time: f64) -> bool {
     reach < problem.exit_depth.value() && met.all(keeps_moving)
 }
 
+/// The longest step (s) that an explicit finite-element code takes in `stage`, of mass `mass` (kg) at speed `speed` (m/s): the shorter of
+/// `2/w` and `M/(r/2 + q V)`; `None` where neither exists.
+pub fn automatic_step(stage: &Stage, mass: f64, speed: f64) -> Option<f64> {
+    let by_spring = 2.0 * (mass / stage.stiffness).sqrt();
+    let by_drag = mass / (0.5 * stage.viscosity + stage.drag * speed);
+    let times = [by_spring, by_drag].into_iter().filter(|time| time.is_finite() && *time > 0.0);
+    times.reduce(f64::min)
+}
+
 /// The default time step (s), from the coefficients of the stages and the impact speed alone.
 ///
 /// A thousandth of the shortest time scale among the stages that start before the exit: `sqrt(M/|s|)` (half of 2/w),

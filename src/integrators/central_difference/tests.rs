@@ -813,3 +813,50 @@ fn places_located_in_double_double_are_those_of_the_parabola_to_30_digits() {
         assert!(off.iter().all(|error| *error < 1e-29), "{velocity} {boundaries}: {off:?}");
     }
 }
+
+/// The paper's slab; mpmath, 40 digits: Eq. 6-8 with lagged drag and whole steps, written out, each step ahead chosen from the node
+/// behind it by the rule, or from the list. Steps, depth, time and velocity of the last whole step; at rest the larger of the last two
+/// depths.
+#[test]
+fn automatic_and_given_steps_are_those_of_eq_6_in_forty_digits() {
+    let slab = crate::testing::shipped("paper-slab");
+    let given = Steps::Given(vec![1e-5, 2e-5, 5e-6]);
+    let perforated = [0.333_391_016_418_287_7, 0.002_534_814_558_979_753, 49.498_537_302_436_56];
+    let with_list = [0.301_106_175_667_480_64, 0.002_025, 83.270_448_928_919_13];
+    for (speed, steps, has_far_side, taken, [depth, time, velocity]) in [
+        (200.0, Steps::Automatic(0.02), true, 17, perforated),
+        (150.0, Steps::Automatic(0.02), false, 19, [0.223_294_136_005_130_37, 0.003_309_417_022_843_134_5, 0.0]),
+        (200.0, Steps::Automatic(0.3), false, 2, [0.155_217_123_278_397_15, 0.005_945_758_262_080_287, 0.0]),
+        (200.0, given, true, 173, with_list),
+    ] {
+        let scene = crate::physics::Scene { thickness: slab.thickness.filter(|_| has_far_side), ..slab.clone() };
+        let problem = scene.resolve(speed).unwrap();
+        let flight = CentralDifference { steps, ..CentralDifference::default() }.solve(&problem, Detail::End).unwrap();
+        assert_eq!(flight.cost.steps, taken, "{flight:?}");
+        for (found, expected) in [(flight.end.depth, depth), (flight.end.time, time), (flight.end.velocity, velocity)] {
+            assert!((found - expected).abs() <= 1e-12 * expected, "{found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn where_a_stage_has_no_longest_step_the_last_one_is_kept() {
+    assert_eq!(automatic_step(&Stage::tunnel(1e6, 0.0), 2.0, 300.0), None);
+    assert_eq!(automatic_step(&stage(0.0, 8.0, 0.0, 0.0, INF), 2.0, 300.0), Some(1.0));
+    assert_eq!(automatic_step(&stage(0.0, 0.0, 4.0, 1.0, INF), 2.0, 8.0), Some(0.2));
+    // A crater and a tunnel without drag behind it: equal steps throughout.
+    let problem = concrete(0.0, 1.0, SPEED, 0.2);
+    let longest = 2.0 * (MASS / problem.stages[0].stiffness).sqrt();
+    let solve = |steps| {
+        let scheme = CentralDifference { steps, ..CentralDifference::default() };
+        scheme.solve(&problem, Detail::Events).unwrap()
+    };
+    let [automatic, equal] = [Steps::Automatic(0.01), Steps::Uniform(0.01 * longest)].map(solve);
+    assert_eq!(automatic.cost.steps, equal.cost.steps);
+    // The two steps differ by an ulp.
+    assert!((automatic.end.velocity - equal.end.velocity).abs() < 1e-11 * SPEED, "{automatic:?} {equal:?}");
+    // A first stage that has none begins with the default.
+    let endless = endless(&[Stage::tunnel(STRENGTH, 0.0)]);
+    let scheme = CentralDifference { steps: Steps::Automatic(0.5), ..CentralDifference::default() };
+    assert_eq!(scheme.time_step(&endless), default_time_step(&endless, scheme.velocity));
+}

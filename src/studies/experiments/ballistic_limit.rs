@@ -186,16 +186,18 @@ impl Residuals {
 /// The curve through `residuals`, impact and residual velocities (m/s) of which those above zero count, with p = 2 (Recht and
 /// Ipson) and with p free (Lambert and Jonas).
 ///
-/// `None` for fewer than three, or four with p free, for those whose best limit is zero, and for a p at an end of 1 to 10.
+/// `None` for fewer than three different impact velocities, or four with p free, for those whose best limit is zero, and for a p at an end of 1 to 10.
 pub fn of_residuals(residuals: &[(f64, f64)]) -> [Option<ResidualFit>; 2] {
     let perforated = residuals.iter().filter(|(_, residual)| *residual > 0.0);
     let unit = perforated.clone().map(|(speed, _)| *speed).fold(0.0, f64::max);
     let scaled = Residuals(perforated.map(|(speed, residual)| (speed / unit, residual / unit)).collect());
-    if scaled.0.len() < 3 {
+    // Shots of equal velocity say no more of the curve than one.
+    let distinct = scaled.0.iter().map(|(v, _)| v.to_bits()).collect::<std::collections::BTreeSet<_>>().len();
+    if distinct < 3 {
         return [None; 2];
     }
     let plain = scaled.limit(2.0).and_then(|b| scaled.fit(b, 2.0, false, unit));
-    let free = (scaled.0.len() > 3)
+    let free = (distinct > 3)
         .then(|| {
             let squares = |p| scaled.limit(p).map_or(f64::INFINITY, |b| scaled.best(b, p).squares);
             // Where no limit fits there is no minimum either.
@@ -361,6 +363,7 @@ mod tests {
         assert_eq!(of_residuals(&RESIDUALS[..2]), [None; 2]);
         assert_eq!(of_residuals(&[(400.0, 400.0), (500.0, 500.0), (600.0, 600.0), (700.0, 700.0)]), [None; 2]);
         assert_eq!(of_residuals(&[(400.0, 50.0); 5]), [None; 2]);
+        assert_eq!(of_residuals(&[(400.0, 200.0); 4]), [None; 2]);
         // Faster out than in.
         assert!(of_residuals(&[(400.0, 900.0), (500.0, 700.0), (600.0, 800.0), (700.0, 600.0)])[0].is_none());
     }

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::statistics::Sample;
 use super::{Comparison, grouped};
-use crate::physics::CraterStiffness;
+use crate::physics::{CraterStiffness, semi_empirical};
 use crate::studies::applicability::{depth_ratio, impact_at};
 
 use super::ballistic_limit::Estimate;
@@ -87,8 +87,17 @@ impl Shown {
     /// Predicted over measured depth with `coefficient`.
     fn ratio(&self, coefficient: f64) -> f64 {
         let impact = self.impact * (self.strength / 1e6).sqrt() / coefficient;
-        depth_ratio(impact, self.geometry.unwrap_or(f64::INFINITY), self.crater_ratio) / self.depth_ratio
+        let predicted = match self.geometry {
+            Some(geometry) => depth_ratio(impact, geometry, self.crater_ratio),
+            None => semi_empirical::depth_ratio(impact, self.crater_ratio),
+        };
+        predicted / self.depth_ratio
     }
+}
+
+/// The S at which the depth of `comparison` is exact over that of Eq. 14; `None` below half a diameter.
+pub(in crate::studies) fn shown_over_eq14(comparison: &Comparison) -> Option<f64> {
+    Shown::of(comparison).map(|shown| shown.coefficient / 72.0)
 }
 
 /// The exponential of the mean of logarithms, with its interval.
@@ -159,6 +168,23 @@ mod tests {
             assert_relative_eq!(found.deviation.unwrap(), expected.1, max_relative = 1e-12);
         }
         assert!(fits(&comparisons[..2]).is_empty());
+    }
+
+    /// Without drag S goes as V²/(X - k d/2) in the tunnel, Eq. 12.
+    #[test]
+    fn without_drag_the_fit_is_that_of_eq_12() {
+        let rows = [(300.0, 0.12), (320.0, 0.14), (350.0, 0.16)];
+        let row = |(v, x): (f64, f64)| format!("0.5,25,flat,40,0,{v},{}\n", 1e3 * x);
+        let table = "M_kg,d_mm,nose,fc_MPa,rho_kg_m3,V0_m_s,depth_mm\n".to_owned() + &rows.map(row).concat();
+        let shots = shot::read("own.csv", table.as_bytes(), "own").unwrap().shots;
+        let fit = &fits(&compare(&depths(&shots), None, &[], &Taylor::default()).unwrap())[0];
+        let factor = |(v, x): (f64, f64)| {
+            let impact = std::f64::consts::FRAC_PI_2 * (x / 0.025 - 0.5 * 0.707);
+            0.5 * v * v / (40e6 * 0.025_f64.powi(3) * impact)
+        };
+        let expected = rows.map(factor).iter().product::<f64>().cbrt();
+        assert_relative_eq!(fit.static_factor.unwrap().value, expected, max_relative = 1e-13);
+        assert!(fit.fitted.mean.is_finite() && fit.left_out.deviation.unwrap() > 0.0);
     }
 
     /// c, S and R (Pa), each with its interval.
