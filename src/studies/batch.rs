@@ -545,9 +545,10 @@ mod tests {
         Method::new(MethodName::Taylor, &MethodOptions::default()).unwrap()
     }
 
-    /// Scenes with these cells below the names of all columns.
+    /// Scenes with these cells below the names of the columns up to the criterion.
     fn table(lines: &str) -> Scenes {
-        let text = format!("{}\n{lines}", SCENES.header());
+        let names = COLUMNS[..=CRITERION].iter().map(|column| column.name).collect::<Vec<_>>().join(",");
+        let text = format!("{names}\n{lines}");
         let mut table = CsvTable::new("t.csv", text.as_bytes(), &SCENES).unwrap();
         Scenes::Table(table.next_rows(100, None).unwrap())
     }

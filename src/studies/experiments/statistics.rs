@@ -118,7 +118,7 @@ pub(super) fn ln_normal(z: f64) -> (f64, f64) {
     let ln_density = -0.5 * z * z - 0.5 * (2.0 * PI).ln();
     if z <= -35.0 {
         let w = 1.0 / (z * z);
-        let series = -w * (1.0 - 3.0 * w * (1.0 - 5.0 * w * (1.0 - 7.0 * w)));
+        let series = -w * (1.0 - 3.0 * w * (1.0 - 5.0 * w * (1.0 - 7.0 * w * (1.0 - 9.0 * w))));
         return (ln_density - (-z).ln() + series.ln_1p(), -z / (1.0 + series));
     }
     // Near one the logarithm is that of what is missing.
