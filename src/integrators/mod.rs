@@ -14,6 +14,7 @@ pub mod diffsol_sensitivity;
 #[path = "tests/ends.rs"]
 #[expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 mod ends;
+pub mod enclosure;
 pub mod energy;
 #[cfg(test)]
 #[path = "tests/every_method.rs"]
@@ -34,6 +35,7 @@ pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, Ve
 pub use closed_form::ClosedForm;
 #[cfg(feature = "diffsol")]
 pub use diffsol::{Diffsol, Scheme};
+pub use enclosure::Enclosure;
 pub use energy::Energy;
 pub use method::{Accuracy, Method, MethodName, MethodOptions};
 pub use outcome::{Cost, Detail, Events, Flight, IntegrationError, Integrator, Margin, Sample, Solved, StepLimit};

@@ -1,6 +1,7 @@
 //! The equation of motion, what a scene says about it, and what is known of it exactly.
 
 pub mod advice;
+pub mod ball;
 pub mod closed_form;
 pub mod condition;
 pub mod elementary;

@@ -360,6 +360,12 @@ impl<S: Scalar> State<S> {
         self.time.value().is_finite() && self.depth.value().is_finite() && self.velocity.value().is_finite()
     }
 
+    /// The state with these values in another number type.
+    pub fn cast<T: Scalar>(&self) -> State<T> {
+        let State { time, depth, velocity } = self.values();
+        State { time: T::from_f64(time), depth: T::from_f64(depth), velocity: T::from_f64(velocity) }
+    }
+
     /// Values as `f64`.
     pub fn values(&self) -> State {
         State { time: self.time.value(), depth: self.depth.value(), velocity: self.velocity.value() }

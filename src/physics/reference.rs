@@ -67,6 +67,13 @@ impl Exact {
         if value.is_finite() { quotient(big(value, FIRST_BITS) - &self.0, &scale.0, 0) } else { f64::INFINITY }
     }
 
+    /// Whether it lies between two numbers, either of which may be infinite.
+    pub fn lies_between(&self, (low, high): (f64, f64)) -> bool {
+        let is_above = low == f64::NEG_INFINITY || (low < f64::INFINITY && big(low, FIRST_BITS) <= self.0);
+        let is_below = high == f64::INFINITY || (high > f64::NEG_INFINITY && self.0 <= big(high, FIRST_BITS));
+        is_above && is_below
+    }
+
     /// Decimal digits, `digits` significant ones.
     pub fn to_decimal(&self, digits: usize) -> String {
         let decimal = self.0.to_decimal().value();

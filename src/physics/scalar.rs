@@ -51,6 +51,17 @@ pub trait Scalar:
         true
     }
 
+    /// The decimal that `value` is the shortest text of: 0.1 and not the `f64` beside it, in a number type that tells them
+    /// apart.
+    fn decimal(value: f64) -> Self {
+        Self::from_f64(value)
+    }
+
+    /// pi/4, as exact as the number type says that it is.
+    fn quarter_pi() -> Self {
+        Self::from_f64(std::f64::consts::FRAC_PI_4)
+    }
+
     /// Zero.
     fn zero() -> Self {
         Self::from_f64(0.0)

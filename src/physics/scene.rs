@@ -3,7 +3,6 @@
 //! A scene may come from a file ([`crate::exchange::scene_file`]), a table or a sweep. [`Scene::resolve`] therefore checks
 //! every number before it returns a [`Problem`].
 
-use std::f64::consts::FRAC_PI_4;
 use std::sync::LazyLock;
 
 use thiserror::Error;
@@ -431,7 +430,7 @@ impl Concrete {
         number: &impl Fn(Parameter, f64) -> S,
     ) -> Resolved<Stage<S>> {
         let of_medium = |which: LayerNumber| number(name(which), which.of(*medium));
-        let (d, area) = (number(Parameter::Diameter, self.diameter), S::from_f64(FRAC_PI_4));
+        let (d, area) = (number(Parameter::Diameter, self.diameter), S::quarter_pi());
         let static_force = area * (of_medium(LayerNumber::StaticFactor) * d) * (of_medium(LayerNumber::Strength) * d);
         let no_force = medium.static_factor == 0.0 || medium.strength == 0.0;
         let nose =
@@ -946,7 +945,7 @@ mod tests {
     }
 
     fn layer_force(strength: f64) -> f64 {
-        FRAC_PI_4 * 0.0269 * 0.0269 * 12.0 * strength
+        std::f64::consts::FRAC_PI_4 * 0.0269 * 0.0269 * 12.0 * strength
     }
 
     #[test]

@@ -163,11 +163,12 @@ pub fn model_difference(impact: f64, geometry: f64, crater_ratio: f64) -> f64 {
 pub fn perforating_depth_ratio<S: Scalar>(thickness_ratio: S) -> S {
     let (h, [a, b], [c, d]) = (thickness_ratio, NDRC_PARABOLA, NDRC_LINE);
     if h.value() <= NDRC_FIRST_BRANCH_END {
-        let a = S::from_f64(a / (2.0 * b));
-        let scaled = h / S::from_f64(b);
+        let [a, b] = [S::decimal(a), S::decimal(b)];
+        let a = a / (b + b);
+        let scaled = h / b;
         scaled / (a + (a * a - scaled).sqrt())
     } else {
-        (h - S::from_f64(c)) / S::from_f64(d)
+        (h - S::decimal(c)) / S::decimal(d)
     }
 }
 

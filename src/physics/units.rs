@@ -341,7 +341,7 @@ fn product(number: &str, coefficient: f64) -> String {
 }
 
 /// Signed digits and power of ten of a decimal.
-fn decimal(text: &str) -> Option<(i128, i64)> {
+pub(crate) fn decimal(text: &str) -> Option<(i128, i64)> {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
     let exponent: i64 = exponent.parse().ok()?;

@@ -1,0 +1,823 @@
+//! Between which two numbers does the exact answer lie? Taylor series whose errors are bounded by a proof.
+//!
+//! A step is taken with numbers, not with intervals: polynomials `x(t)` and `v(t)`, the first coefficients as double words,
+//! the others as `f64`. What they miss of the equation of motion is their defect, and it is bounded term by term:
+//!
+//! ```text
+//! dx = x' - v,   dv = v' + (p + s x + r v + q v²)/M      rounding of the low orders, truncation above order K
+//! N' <= |dv| + w |dx|,   N = sqrt(ev² + w² ex²),  w² = s/M     for s, r, q >= 0 while V >= 0 and v >= 0
+//! N' <= w N + |dv| + w |dx|,   N = |ev| + w |ex|,  w² = -s/M   for s < 0, r = q = 0
+//! ```
+//!
+//! Resistance never lets the error N of a flight grow, so that no interval is ever wrapped in another. The last few
+//! digits of a step to an event are a mean value over a tiny box, by which the event also is proved to be the first.
+//!
+//! docs/enclosures.md has the proof, inequality by inequality.
+
+use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
+use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved};
+use crate::physics::ball::{Ball, DoubleWord, TINY, UNIT, UP};
+use crate::physics::{Outcome, Problem, Scalar, Stage, State};
+
+/// Order K: v has the powers 0 to K, and x one more.
+const ORDER: usize = 24;
+
+/// Coefficients below this index are double words.
+const FINE: usize = 8;
+
+/// Truncation error of a step over the velocity at its start: far below the spacing of `f64`.
+const TRUNCATION: f64 = 1.0 / (1_u128 << 70) as f64;
+
+/// Unit roundoff of `f64`, 2^-53.
+const ROUNDOFF: f64 = 0.5 * f64::EPSILON;
+
+/// Longest step over the shortest time scale of its stage.
+const SPAN_MAX: f64 = 16.0;
+
+/// Largest `w h` of a step, short of the half period in which V could vanish twice.
+const PHASE_MAX: f64 = 1.8;
+
+/// Largest `w h` of a step through a falling force, for which `e^y <= 1 + y + y²`.
+const GROWTH_MAX: f64 = 1.0;
+
+/// Panels into which a step is divided to prove that V does not vanish inside.
+const PANELS_MAX: u32 = 200;
+
+/// Shorter steps tried where a proof fails.
+const RETRIES_MAX: u32 = 8;
+
+/// Steps allowed for one flight.
+const STEPS_MAX: u64 = 100_000;
+
+/// Least and greatest magnitude of a number for which a bound was derived (docs/enclosures.md, section 2).
+const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+
+/// What is said of a flight whose end no proof was found for.
+pub(crate) const UNPROVED: &str = "no proof was found of how the flight ends; the interval holds every end that is left open";
+
+/// The enclosure: exact answers between two numbers.
+///
+/// As an [`Integrator`] it takes the numbers of the problem for exact and gives the middle of each interval, with half its
+/// width in [`Flight::notes`]; [`Enclosure::enclose`] gives the intervals, of problems whose numbers are intervals.
+///
+/// # Example
+/// ```
+/// use penetrode::integrators::{Detail, Enclosure};
+/// use penetrode::physics::{Problem, Stage, Scalar, ball::Ball};
+///
+/// // Constant resistance: X = M V0²/(2 P) = 0.09 m, which is no f64.
+/// let problem = Problem::crater_and_tunnel(2.0, 300.0, None, Stage::tunnel(1.0e6, 0.0));
+/// let flight = Enclosure.enclose(&problem.cast(), Detail::Events)?;
+/// let (low, high) = flight.end.depth.interval();
+/// assert!(low <= 0.09 && 0.09 <= high && high - low < 3e-17);
+/// # Ok::<(), penetrode::integrators::IntegrationError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Enclosure;
+
+impl Enclosure {
+    /// Encloses the flight of `problem`, whatever numbers of its balls are meant.
+    ///
+    /// The outcome is proved, or `Undecided`. Two boundaries of the problem are the same ball or differ as `f64`.
+    ///
+    /// # Errors
+    /// [`IntegrationError::Refused`] for a law of its own, or numbers beyond 1e-100 to 1e100;
+    /// [`IntegrationError::NeverEnds`]; [`IntegrationError::StepBudgetSpent`] where a target without a far side is left without
+    /// a proof.
+    pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
+        let refuse = |why: &str| IntegrationError::Refused { method: "enclosure", why: why.to_owned() };
+        if !problem.laws.is_empty() {
+            return Err(refuse(
+                "its proofs are those of p + s x + r V + q V² and of ends at depths, and a stage has a law or an end of its \
+                 own; take --method taylor",
+            ));
+        }
+        let numbers = problem.stages.iter().flat_map(|stage| {
+            [stage.static_force, stage.stiffness, stage.viscosity, stage.drag, stage.end].map(|number| number / problem.mass)
+        });
+        let numbers = numbers.chain([problem.mass, problem.impact_speed, problem.exit_depth]);
+        for number in numbers.filter(|number| number.value().abs() < f64::INFINITY) {
+            if !(number.is_zero() || MAGNITUDES.contains(&number.value().abs())) {
+                return Err(refuse("its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor"));
+            }
+        }
+        if !boundaries_are_apart(problem) {
+            return Err(refuse(
+                "two of its depths differ, and not as 64-bit numbers: which comes first is not told; make them equal, or \
+                 move one by 1e-15 of itself",
+            ));
+        }
+        let mut steps = Steps::default();
+        let mut flight = flight::solve(problem, detail, &mut steps)?;
+        if flight.outcome == Outcome::Undecided {
+            // What was listed for the end that is not proved.
+            let end = flight.end;
+            flight.events.retain(|event| event.state != end);
+        }
+        Ok(flight)
+    }
+}
+
+/// Whether any two ends, and the exit, are the same ball or differ as `f64` and as balls.
+fn boundaries_are_apart(problem: &Problem<Ball>) -> bool {
+    let ends: Vec<Ball> = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]).collect();
+    let is_told = |a: Ball, b: Ball| a == b || (a.value() < b.value() && a.upper() <= b.lower()) || b.value() == f64::INFINITY;
+    let [inner @ .., exit] = ends.as_slice() else { return true };
+    inner.windows(2).all(|pair| is_told(pair[0], pair[1]))
+        && inner.iter().all(|end| is_told(*end, *exit) || is_told(*exit, *end))
+        && inner.iter().all(|end| is_told(Ball::zero(), *end))
+}
+
+impl Integrator for Enclosure {
+    fn name(&self) -> &'static str {
+        "enclosure"
+    }
+
+    fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
+        self.enclose(&problem.cast(), detail).map(|flight| flight.values())
+    }
+
+    fn explain(&self, _problem: &Problem, flight: &Flight) -> Vec<String> {
+        vec![format!("{} steps of a series of order {ORDER}, each with a proved bound of its error", flight.cost.steps)]
+    }
+}
+
+/// The method, as the loop sees it.
+#[derive(Debug, Default)]
+struct Steps {
+    /// Whether the end of the flight is open.
+    is_unproved: bool,
+}
+
+/// The error of a state in the present stage, in m/s and m: N, and a bound of |ex| alone.
+#[derive(Clone, Copy, Debug)]
+struct Error {
+    norm: f64,
+    depth: f64,
+}
+
+/// The law of a stage over the mass, and what its proofs need of it.
+struct Law {
+    /// Coefficients over the mass.
+    per_mass: Stage<Ball>,
+    /// Whether the force falls with depth.
+    falls: bool,
+    /// Upper bound of w, `w² = |s|/M` (1/s).
+    rate: f64,
+}
+
+impl Law {
+    fn new(stage: &Stage<Ball>, mass: Ball) -> Option<Self> {
+        let per_mass = stage.per_mass(mass);
+        let Stage { stiffness, viscosity, drag, .. } = per_mass;
+        let falls = stiffness.value() < 0.0;
+        let is_proved = if falls {
+            stiffness.upper() <= 0.0 && viscosity.is_zero() && drag.is_zero()
+        } else {
+            stiffness.lower() >= 0.0 && viscosity.lower() >= 0.0 && drag.lower() >= 0.0
+        };
+        let rate = if stiffness.is_zero() { 0.0 } else { stiffness.magnitude().sqrt() * UP };
+        let is_finite = per_mass.static_force.radius.is_finite() && rate.is_finite() && drag.radius.is_finite();
+        (is_proved && is_finite && viscosity.radius.is_finite()).then_some(Self { per_mass, falls, rate })
+    }
+
+    /// Deceleration (m/s²) at every depth in `x` and every velocity in `v`, not negative.
+    fn deceleration(&self, x: Ball, v: Ball) -> Ball {
+        let Stage { static_force, stiffness, viscosity, drag, .. } = self.per_mass;
+        let mut sum = static_force;
+        if !stiffness.is_zero() {
+            sum += stiffness * x;
+        }
+        if !(viscosity.is_zero() && drag.is_zero()) {
+            sum += (viscosity + drag * v) * v;
+        }
+        sum
+    }
+}
+
+/// The polynomials of one step, in units of time and velocity that are powers of two, from `x = 0`.
+struct Series {
+    /// Unit of time (s) and of velocity (m/s).
+    time: f64,
+    velocity: f64,
+    /// The first coefficients of v, and of x.
+    fine: [DoubleWord; FINE],
+    fine_depth: [DoubleWord; FINE + 1],
+    /// All of them, rounded.
+    coarse: [f64; ORDER + 1],
+    coarse_depth: [f64; ORDER + 2],
+    /// The coefficients p, s, r, q of the law in these units.
+    law: [Ball; 4],
+}
+
+/// `1/k`, rounded.
+const RECIPROCALS: [f64; ORDER + 3] = {
+    let mut table = [0.0; ORDER + 3];
+    let mut k = 1;
+    while k < table.len() {
+        table[k] = 1.0 / k as f64;
+        k += 1;
+    }
+    table
+};
+
+/// The power of two at or below a positive number.
+fn power_of_two_below(x: f64) -> f64 {
+    f64::from_bits(x.clamp(1e-290, 1e290).to_bits() & (0x7ff << 52))
+}
+
+impl Series {
+    /// The series from depth `x` and velocity `v`, both exact.
+    fn new(law: &Law, x: DoubleWord, v: DoubleWord, limit: f64) -> Self {
+        let Stage { static_force, stiffness, viscosity, drag, .. } = law.per_mass;
+        let mut at_start = static_force;
+        if !stiffness.is_zero() {
+            at_start += stiffness * Ball::around(x, 0.0);
+        }
+        let speed = v.hi;
+        let mut rate = (at_start.magnitude() / speed).max(law.rate);
+        rate = rate.max(viscosity.magnitude() + 2.0 * drag.magnitude() * speed);
+        if rate == 0.0 {
+            rate = speed / (limit - x.hi).max(1e-100);
+        }
+        let (time, velocity) = (power_of_two_below(1.0 / rate), power_of_two_below(speed));
+        let per_velocity = time / velocity;
+        let law = [
+            at_start.scaled(per_velocity),
+            stiffness.scaled(time * time),
+            viscosity.scaled(time),
+            drag.scaled(time * velocity),
+        ];
+        let mut series = Self {
+            time,
+            velocity,
+            fine: [DoubleWord::default(); FINE],
+            fine_depth: [DoubleWord::default(); FINE + 1],
+            coarse: [0.0; ORDER + 1],
+            coarse_depth: [0.0; ORDER + 2],
+            law,
+        };
+        series.fill(v.scaled(1.0 / velocity));
+        series
+    }
+
+    /// `v[k+1] = -([k = 0] p + s x[k] + r v[k] + q sum of v[i] v[k-i])/(k+1)`, `x[k+1] = v[k]/(k+1)`.
+    fn fill(&mut self, start: DoubleWord) {
+        let [p, s, r, q] = self.law.map(|number| number.mid);
+        let has = self.law.map(|number| !number.is_zero());
+        let fine = &mut self.fine;
+        let depth = &mut self.fine_depth;
+        fine[0] = start;
+        for k in 0..FINE {
+            depth[k + 1] = fine[k].over((k + 1) as f64);
+            if k + 1 == FINE {
+                break;
+            }
+            let mut sum = if k == 0 { p } else { DoubleWord::default() };
+            if has[1] && k > 0 {
+                sum = sum.plus(s.times(depth[k]));
+            }
+            if has[2] {
+                sum = sum.plus(r.times(fine[k]));
+            }
+            if has[3] {
+                let mut square = DoubleWord::default();
+                for i in 0..k.div_ceil(2) {
+                    square = square.plus(fine[i].times(fine[k - i]));
+                }
+                square = square.scaled(2.0);
+                if k % 2 == 0 {
+                    square = square.plus(fine[k / 2].times(fine[k / 2]));
+                }
+                sum = sum.plus(q.times(square));
+            }
+            fine[k + 1] = -sum.over((k + 1) as f64);
+        }
+        let (v, x) = (&mut self.coarse, &mut self.coarse_depth);
+        for k in 0..FINE {
+            v[k] = fine[k].hi;
+            x[k] = depth[k].hi;
+        }
+        x[FINE] = depth[FINE].hi;
+        let [s, r, q] = [s.hi, r.hi, q.hi];
+        for k in FINE - 1..ORDER {
+            let mut sum = s * x[k] + r * v[k];
+            if has[3] {
+                let mut square = 0.0;
+                for i in 0..k.div_ceil(2) {
+                    square += v[i] * v[k - i];
+                }
+                square *= 2.0;
+                if k % 2 == 0 {
+                    square += v[k / 2] * v[k / 2];
+                }
+                sum += q * square;
+            }
+            v[k + 1] = -sum / (k + 1) as f64;
+            if k + 1 > FINE {
+                x[k + 1] = v[k] * RECIPROCALS[k + 1];
+            }
+        }
+        x[ORDER + 1] = v[ORDER] * RECIPROCALS[ORDER + 1];
+    }
+
+    /// Length of a step that truncates about [`TRUNCATION`] of the velocity.
+    fn span(&self, law: &Law) -> f64 {
+        let goal = TRUNCATION * self.coarse[0];
+        let by = |k: usize| (goal / self.coarse[k].abs()).powf(RECIPROCALS[k]);
+        let cap = match law.rate * self.time {
+            0.0 => SPAN_MAX,
+            phase => SPAN_MAX.min(if law.falls { 0.99 * GROWTH_MAX } else { PHASE_MAX } / phase),
+        };
+        by(ORDER).min(by(ORDER - 1)).min(cap)
+    }
+
+    /// Approximate v, its slope, and x at `time`.
+    fn near(&self, time: f64) -> [f64; 3] {
+        let (mut v, mut slope, mut x) = (0.0, 0.0, self.coarse_depth[ORDER + 1]);
+        for k in (0..=ORDER).rev() {
+            slope = slope * time + v;
+            v = v * time + self.coarse[k];
+            x = x * time + self.coarse_depth[k];
+        }
+        [v, slope, x]
+    }
+
+    /// What bounds the coefficients up to `time`: `|v[k]| time^k` and `|x[k]| time^k`, with all powers and roundings.
+    fn sizes(&self, time: f64) -> Sizes {
+        let (mut v, mut x) = ([0.0; ORDER + 1], [0.0; ORDER + 2]);
+        let mut power = 1.0;
+        for k in 0..=ORDER {
+            v[k] = self.coarse[k].abs() * power * UP;
+            x[k] = self.coarse_depth[k].abs() * power * UP;
+            power *= time;
+        }
+        x[ORDER + 1] = self.coarse_depth[ORDER + 1].abs() * power * UP;
+        let mut behind = [0.0; ORDER + 2];
+        for k in (0..=ORDER).rev() {
+            behind[k] = behind[k + 1] + v[k];
+        }
+        Sizes { v, x, behind }
+    }
+
+    /// Bounds of the integrals of |dv| and |dx| from 0 to `time`.
+    fn defects(&self, time: f64, sizes: &Sizes) -> [f64; 2] {
+        let Sizes { v, x, behind } = sizes;
+        let [p, s, r, q] = self.law.map(Ball::magnitude);
+        let speed = behind[0];
+        let depth: f64 = x.iter().sum();
+        let order = FINE - 1;
+        let depth_behind: f64 = x[order..].iter().sum();
+        // Products of two coefficients of v whose orders sum up to `order` or more.
+        let products = |order: usize| -> f64 { (0..=ORDER).map(|i| v[i] * behind[order.saturating_sub(i)]).sum() };
+        let has_drag = !self.law[3].is_zero();
+        let of_order = |order: usize| if has_drag { q * products(order) } else { 0.0 };
+        let of_one = r * behind[ORDER] + s * (x[ORDER] + x[ORDER + 1]);
+        let truncation = (of_one + of_order(ORDER)) * RECIPROCALS[ORDER + 1];
+        let fine = (FINE + 12) as f64 * UNIT * (p + s * depth + r * speed + q * speed * speed);
+        let coarse = s * depth_behind + r * behind[order] + of_order(order);
+        let coarse = (ORDER + 16) as f64 * ROUNDOFF * coarse * RECIPROCALS[FINE];
+        let [of_p, of_s, of_r, of_q] = self.law.map(|number| number.radius);
+        let uncertain = of_p + of_s * depth + of_r * speed + of_q * speed * speed;
+        let force = time * (truncation + fine + coarse + uncertain);
+        let path = time * (4.0 * UNIT * speed + 4.0 * ROUNDOFF * behind[FINE]);
+        [force * UP + TINY, path * UP + TINY]
+    }
+
+    /// v and x at `time`, and bounds of what evaluating them rounds.
+    fn at(&self, time: f64, sizes: &Sizes) -> ([DoubleWord; 2], [f64; 2]) {
+        let (mut tail, mut depth_tail) = (0.0, self.coarse_depth[ORDER + 1]);
+        for k in (FINE..=ORDER).rev() {
+            tail = tail * time + self.coarse[k];
+            if k > FINE {
+                depth_tail = depth_tail * time + self.coarse_depth[k];
+            }
+        }
+        let h = DoubleWord::of(time);
+        let (mut v, mut x) = (DoubleWord::of(tail), DoubleWord::of(depth_tail));
+        x = x.times(h).plus(self.fine_depth[FINE]);
+        for k in (0..FINE).rev() {
+            v = v.times(h).plus(self.fine[k]);
+            x = x.times(h).plus(self.fine_depth[k]);
+        }
+        let (speed, depth): (f64, f64) = (sizes.behind[0], sizes.x.iter().sum());
+        let rounding = |tail: f64, whole: f64| {
+            (2 * ORDER) as f64 * ROUNDOFF * tail + (2 * FINE + 8) as f64 * UNIT * whole
+        };
+        let depth_behind: f64 = sizes.x[FINE + 1..].iter().sum();
+        let errors = [rounding(sizes.behind[FINE], speed), rounding(depth_behind, depth)];
+        ([v, x], errors.map(|error| error * UP + TINY))
+    }
+
+    /// Whether v stays above `error` from 0 to `time`.
+    ///
+    /// Between two places of a panel v is above the lesser of both by no less than `-(b - a)²/8 max|v''|`. Where the slope is
+    /// negative throughout a panel, v is above its end.
+    fn stays_above(&self, error: f64, time: f64, sizes: &Sizes) -> bool {
+        let (mut second, mut third) = (0.0, 0.0);
+        for k in 2..=ORDER {
+            let k_f = k as f64;
+            let size = sizes.v[k] * k_f * (k_f - 1.0);
+            second += size;
+            third += size * (k_f - 2.0);
+        }
+        let (second, third) = (second / (time * time) * UP, third / (time * time * time) * UP);
+        let slope_size: f64 = (1..=ORDER).map(|k| k as f64 * sizes.v[k]).sum::<f64>() / time;
+        let rounding = (4 * ORDER) as f64 * ROUNDOFF;
+        let (value_error, slope_error) = (rounding * sizes.behind[0] * UP, rounding * slope_size * UP);
+        // The last place is that of an event, where v is known better than its approximation says.
+        let end = {
+            let ([v, _], [rounding, _]) = self.at(time, sizes);
+            Ball::around(v, rounding).lower()
+        };
+        if !(end > error) {
+            return false;
+        }
+        let mut panels = vec![(0.0, time)];
+        let mut count = 0;
+        while let Some((a, b)) = panels.pop() {
+            count += 1;
+            let ([at_a, slope_a, _], [at_b, slope_b, _]) = (self.near(a), self.near(b));
+            let (at_a, at_b) = (at_a - value_error, if b == time { end } else { at_b - value_error });
+            let width = b - a;
+            let sag = width * width * 0.125 * UP;
+            let is_above = at_a.min(at_b) - sag * second > error * UP;
+            let falls = at_b > error * UP && slope_a.max(slope_b) + slope_error + sag * third < 0.0;
+            if is_above || falls {
+                continue;
+            }
+            let middle = 0.5 * (a + b);
+            if count > PANELS_MAX || middle <= a || middle >= b {
+                return false;
+            }
+            panels.push((middle, b));
+            panels.push((a, middle));
+        }
+        true
+    }
+
+    /// A place in 0 to `end` near which `f` changes its sign from positive, by regula falsi and bisection.
+    fn root(&self, end: f64, f: impl Fn([f64; 3]) -> (f64, f64)) -> f64 {
+        let (mut low, mut high) = (0.0, end);
+        let mut t = end;
+        for _ in 0..100 {
+            let (value, slope) = f(self.near(t));
+            if value > 0.0 {
+                low = t;
+            } else {
+                high = t;
+            }
+            let newton = t - value / slope;
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if (next - t).abs() <= 2.0 * ROUNDOFF * t || next <= low || next >= high {
+                return next;
+            }
+            t = next;
+        }
+        t
+    }
+}
+
+/// Bounds of the coefficients of a step at its end.
+struct Sizes {
+    v: [f64; ORDER + 1],
+    x: [f64; ORDER + 2],
+    /// Sums of `v[k]` from k on.
+    behind: [f64; ORDER + 2],
+}
+
+/// A state in a step: exact numbers, and how far off they may be.
+#[derive(Clone, Copy, Debug)]
+struct Centre {
+    time: Ball,
+    x: DoubleWord,
+    v: DoubleWord,
+    error: Error,
+}
+
+/// What a step leads to.
+enum Step {
+    /// On to the next.
+    Whole(Centre),
+    /// To the end of the stage.
+    Limit(State<Ball>),
+    /// To rest before it.
+    Rest(State<Ball>),
+    /// To either.
+    Either(State<Ball>),
+    /// No proof was found.
+    Unproved,
+}
+
+impl Centre {
+    fn new(state: State<Ball>, law: &Law) -> Self {
+        let State { time, depth, velocity } = state;
+        let error = Error { norm: (velocity.radius + law.rate * depth.radius) * UP, depth: depth.radius };
+        Self { time, x: depth.mid, v: velocity.mid, error }
+    }
+
+    fn depth(&self) -> Ball {
+        Ball::around(self.x, self.error.depth)
+    }
+
+    fn velocity(&self) -> Ball {
+        Ball::around(self.v, self.error.norm)
+    }
+
+    fn state(&self) -> State<Ball> {
+        State { time: self.time, depth: self.depth(), velocity: self.velocity() }
+    }
+
+    /// The state `time` units of `series` later, provided that v stays positive until then; `None` where that is not proved.
+    fn after(&self, law: &Law, series: &Series, time: f64) -> Option<Self> {
+        if time <= 0.0 {
+            return Some(*self);
+        }
+        let sizes = series.sizes(time);
+        let [force, path] = series.defects(time, &sizes);
+        let phase = law.rate * series.time;
+        let added = series.velocity * (force + phase * path) * UP;
+        let growth = if law.falls {
+            let y = phase * time * UP;
+            if y > GROWTH_MAX {
+                return None;
+            }
+            1.0 + y + y * y
+        } else {
+            1.0
+        };
+        let norm = (self.error.norm + added) * growth * UP;
+        if !series.stays_above(norm / series.velocity * UP, time, &sizes) {
+            return None;
+        }
+        let length = series.velocity * series.time;
+        let ([v, x], [of_v, of_x]) = series.at(time, &sizes);
+        let reached = Ball::around(self.x, 0.0) + Ball::around(x.scaled(length), length * of_x * UP);
+        let depth = self.error.depth + length * path + series.time * time * norm;
+        let depth = if law.rate > 0.0 { depth.min(norm / law.rate * UP) } else { depth };
+        let error = Error {
+            norm: (norm + series.velocity * of_v + law.rate * reached.radius) * UP,
+            depth: (depth * UP + reached.radius) * UP,
+        };
+        let time = self.time + Ball::from_f64(time * series.time);
+        Some(Self { time, x: reached.mid, v: v.scaled(series.velocity), error })
+    }
+
+    /// From here to rest, over a box so small that the force hardly changes: `T = v/a`, `X = v²/(2 a)` with a mean `a`.
+    fn to_rest(&self, law: &Law) -> Option<State<Ball>> {
+        let (depth, velocity) = (self.depth(), self.velocity());
+        let fastest = velocity.upper();
+        let speeds = Ball::between(0.0, fastest);
+        let weakest = law.deceleration(depth, speeds).lower();
+        if !(weakest > 0.0 && velocity.lower() > 0.0) {
+            return None;
+        }
+        let reach = fastest * fastest / weakest * UP;
+        let box_of = Ball::between(depth.lower(), (depth + Ball::from_f64(reach)).upper());
+        let deceleration = law.deceleration(box_of, speeds);
+        let way = (velocity * velocity / deceleration).scaled(0.5);
+        let is_inside = deceleration.lower() > 0.0 && way.upper() <= reach;
+        let time = self.time + velocity / deceleration;
+        is_inside.then(|| State { time, depth: depth + way, velocity: Ball::zero() })
+    }
+
+    /// From here to `limit`, over a box as small: `T = d/v` with a mean v.
+    fn to_limit(&self, law: &Law, limit: Ball) -> Option<State<Ball>> {
+        let (depth, velocity) = (self.depth(), self.velocity());
+        let way = limit - depth;
+        let (slowest, fastest) = (velocity.lower(), velocity.upper());
+        if !(way.lower() >= 0.0 && slowest > 0.0) {
+            return None;
+        }
+        let box_of = depth.hull(limit);
+        let mut speeds = Ball::between(0.5 * slowest, 2.0 * fastest);
+        let longest = way.upper() / (0.5 * slowest) * UP;
+        for _ in 0..2 {
+            let change = law.deceleration(box_of, speeds).magnitude() * longest * UP;
+            if !(change < 0.5 * slowest) {
+                return None;
+            }
+            speeds = velocity.widened(change);
+        }
+        let time = way / speeds;
+        let velocity = velocity - law.deceleration(box_of, speeds) * time;
+        Some(State { time: self.time + time, depth: limit, velocity })
+    }
+}
+
+impl Steps {
+    /// One step from `centre` towards `limit`.
+    fn step(law: &Law, centre: &Centre, limit: Ball, series: &Series) -> Step {
+        let length = series.velocity * series.time;
+        let far = (limit - Ball::around(centre.x, 0.0)).value() / length;
+        let mut span = series.span(law);
+        for _ in 0..RETRIES_MAX {
+            let [v, _, x] = series.near(span);
+            if v > 0.0 && x < far {
+                match centre.after(law, series, span) {
+                    Some(next) if next.depth().upper() < limit.lower() => return Step::Whole(next),
+                    _ => {}
+                }
+            } else {
+                let found = Self::event(law, centre, limit, series, span, far);
+                if !matches!(found, Step::Unproved) {
+                    return found;
+                }
+            }
+            span *= 0.5;
+        }
+        Step::Unproved
+    }
+
+    /// The event within `span`, proved to be the first.
+    fn event(law: &Law, centre: &Centre, limit: Ball, series: &Series, span: f64, far: f64) -> Step {
+        let length = series.velocity * series.time;
+        let rest = if series.near(span)[0] > 0.0 { None } else { Some(series.root(span, |[v, slope, _]| (v, slope))) };
+        let until = rest.unwrap_or(span);
+        let passes = far < f64::INFINITY && series.near(until)[2] > far;
+        let place = |from: f64| {
+            // Just before the event, by what the numbers round and by the error.
+            let [v, slope, _] = series.near(from);
+            let error = if passes { centre.error.depth / length / v.abs() } else { centre.error.norm / series.velocity / slope.abs() };
+            (16.0 * ROUNDOFF * from + 8.0 * error, from)
+        };
+        let at_limit = |gap: f64, from: f64| {
+            let before = centre.after(law, series, (from - gap).max(0.0))?;
+            before.to_limit(law, limit)
+        };
+        let at_rest = |gap: f64, from: f64| {
+            let before = centre.after(law, series, (from - gap).max(0.0))?;
+            Some((before, before.to_rest(law)?))
+        };
+        if passes {
+            let (mut gap, from) = place(series.root(until, |[v, _, x]| (far - x, -v)));
+            for _ in 0..RETRIES_MAX {
+                if let Some(state) = at_limit(gap, from).filter(|state| state.velocity.lower() > 0.0) {
+                    return Step::Limit(state);
+                }
+                gap *= 16.0;
+            }
+        }
+        let Some(rest) = rest else { return Step::Unproved };
+        let (mut gap, from) = place(rest);
+        for _ in 0..RETRIES_MAX {
+            if let Some((before, state)) = at_rest(gap, from) {
+                if state.depth.upper() < limit.lower() {
+                    return Step::Rest(state);
+                }
+                if state.depth.lower() <= limit.upper() && before.depth().upper() <= limit.lower() {
+                    // Rest or the limit, whichever comes first, comes before either ends.
+                    let depth = before.depth().hull(limit);
+                    let velocity = Ball::around(DoubleWord::default(), before.velocity().upper());
+                    return Step::Either(State { time: before.time.hull(state.time), depth, velocity });
+                }
+            }
+            gap *= 16.0;
+        }
+        Step::Unproved
+    }
+
+    /// Everything that may follow from `state` on where nothing is proved: at the end of the flight, until the exit.
+    fn anything(course: &Course<'_, Ball>, state: State<Ball>) -> State<Ball> {
+        let resist = course.problem.stages[course.stage..].iter().all(Stage::resists);
+        let fastest = if resist { state.velocity.upper() } else { f64::INFINITY };
+        State {
+            time: Ball::around(DoubleWord::of(state.time.lower()), f64::INFINITY),
+            depth: Ball::between(state.depth.lower(), course.problem.exit_depth.upper()),
+            velocity: Ball::around(DoubleWord::default(), fastest),
+        }
+    }
+
+    /// No proof: the end that is open.
+    ///
+    /// # Errors
+    /// [`IntegrationError::StepBudgetSpent`] without a far side.
+    fn give_up(&mut self, course: &mut Course<'_, Ball>, state: State<Ball>) -> Solved<StageEnd<Ball>> {
+        if !course.problem.has_exit() {
+            let remedy = "no proof of the end was found; give the target a thickness, or take --method taylor";
+            return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: state.values() });
+        }
+        self.is_unproved = true;
+        course.notes.push(UNPROVED.to_owned());
+        Ok(StageEnd::Rest(state))
+    }
+
+    /// Whether speed remains at `limit` through a stage that only slows, `v' = -(r + q v) v`: by its closed form.
+    fn arrives(law: &Law, centre: &Centre, limit: Ball) -> Option<bool> {
+        let Stage { static_force, stiffness, viscosity, drag, .. } = law.per_mass;
+        if !(static_force.is_zero() && stiffness.is_zero()) || viscosity.is_zero() {
+            return Some(true);
+        }
+        let way = limit - centre.depth();
+        let left = if drag.is_zero() {
+            centre.velocity() - viscosity * way
+        } else {
+            let terminal = viscosity / drag;
+            (terminal + centre.velocity()) * crate::physics::elementary::Elementary::exp(-(drag * way)) - terminal
+        };
+        if left.lower() > 0.0 {
+            Some(true)
+        } else if left.upper() < 0.0 {
+            Some(false)
+        } else {
+            None
+        }
+    }
+
+    /// Whether an overdamped driven stage has trapped the projectile before its equilibrium, as in
+    /// [`Course::refuse_creep`], proved.
+    fn creeps(law: &Law, centre: &Centre, limit: Ball) -> bool {
+        let Stage { static_force, stiffness, viscosity, .. } = law.per_mass;
+        if law.falls || !(static_force.upper() < 0.0 && stiffness.lower() > 0.0 && viscosity.lower() > 0.0) {
+            return false;
+        }
+        let half = viscosity.scaled(0.5);
+        let root = half * half - stiffness;
+        let equilibrium = -static_force / stiffness;
+        let missing = equilibrium - centre.depth();
+        root.lower() >= 0.0
+            && limit.lower() >= equilibrium.upper()
+            && missing.lower() > 0.0
+            && centre.velocity().upper() <= ((half + root.sqrt()) * missing).lower()
+    }
+}
+
+impl StageSolver<Ball> for Steps {
+    fn solve_stage(&mut self, course: &mut Course<'_, Ball>) -> Solved<StageEnd<Ball>> {
+        let limit = course.limit()?;
+        let impact = course.problem.impact_speed.value();
+        let Some(law) = Law::new(&course.problem.stages[course.stage], course.mass) else {
+            let state = Self::anything(course, course.state);
+            return self.give_up(course, state);
+        };
+        let mut centre = Centre::new(course.state, &law);
+        match Self::arrives(&law, &centre, limit) {
+            Some(true) => {}
+            Some(false) => {
+                let why = "viscosity slows it towards a place before the far side, which it never reaches";
+                return Err(IntegrationError::NeverEnds { why, last: course.state.values() });
+            }
+            None => {
+                let state = Self::anything(course, course.state);
+                return self.give_up(course, state);
+            }
+        }
+        while course.cost.steps < STEPS_MAX {
+            if Self::creeps(&law, &centre, limit) {
+                let why = "viscosity lets it only creep towards the depth where the spring balances the drive";
+                return Err(IntegrationError::NeverEnds { why, last: centre.state().values() });
+            }
+            let series = Series::new(&law, centre.x, centre.v, limit.value());
+            course.cost += Cost { steps: 1, rejected_steps: 0, force_evaluations: ORDER as u64 };
+            let step = Self::step(&law, &centre, limit, &series);
+            let end = match &step {
+                Step::Whole(next) => next.state(),
+                Step::Limit(state) | Step::Rest(state) | Step::Either(state) => *state,
+                Step::Unproved => break,
+            };
+            let start = centre;
+            course.sample_until(end, |time| {
+                let [v, _, x] = series.near((time - start.time.value()) / series.time);
+                let depth = start.x.hi + x * series.velocity * series.time;
+                State { time, depth, velocity: v * series.velocity }.cast::<Ball>()
+            });
+            course.error_bound = 2.0 * end.velocity.magnitude() * end.velocity.radius / impact / impact * UP;
+            match step {
+                Step::Whole(next) => {
+                    centre = next;
+                    course.sample(end);
+                }
+                Step::Limit(state) => return Ok(StageEnd::Limit(state)),
+                Step::Rest(state) => return Ok(StageEnd::Rest(state)),
+                Step::Either(state) => {
+                    let is_last = limit == course.problem.exit_depth;
+                    let state = if is_last { state } else { Self::anything(course, centre.state()) };
+                    return self.give_up(course, state);
+                }
+                Step::Unproved => break,
+            }
+        }
+        let state = Self::anything(course, centre.state());
+        self.give_up(course, state)
+    }
+
+    fn margin(&mut self, course: &mut Course<'_, Ball>) -> Solved<Bounded> {
+        let margin = course.margin();
+        if self.is_unproved {
+            return Ok(Bounded { bound: margin.value.abs(), ..margin });
+        }
+        if margin.is_decided() || course.is_through {
+            return Ok(margin);
+        }
+        // Proved, and lost in the rounding of the margin: what the rest of the stage takes at least.
+        let (problem, stage) = (course.problem, course.stage);
+        let work = problem.stages[stage].static_work(course.state.depth, problem.limit_of(stage));
+        let energy = problem.mass * problem.impact_speed * problem.impact_speed;
+        let lacking = (work / energy).scaled(-2.0);
+        Ok(Bounded { value: lacking.value(), bound: lacking.radius * UP })
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests;
