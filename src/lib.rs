@@ -8,7 +8,7 @@
 //! tunnel  k d <= x     :  F = P + Q V²            (Eq. 5)
 //! ```
 //!
-//! Here stand nine integrators of this equation, its closed form, its solution in 50 digits, and the studies that show
+//! Here stand nine integrators of this equation, its closed form, its solution in 50 digits, proved enclosures, and the studies that show
 //! whether an integrator, ours or yours, is right: orders of convergence, critical velocity, cost against error. Every
 //! stage of the target is `F = p + s x + r V + q V²`, so layers, air gaps and springs are the same problem.
 //!

@@ -72,6 +72,38 @@ pub fn digits_text(value: f64, digits: i32) -> String {
     }
 }
 
+/// The digits that two numbers, neither negative, have in common, and in brackets those from `low` to `high`, two of them
+/// as a rule: `0.14482678906(54..57)`. The numbers shown hold those given between them.
+pub fn digits_between(low: f64, high: f64) -> String {
+    let width = high - low;
+    if low == high || !width.is_finite() || !(1e-12..1e12).contains(&high) {
+        return if low == high { Shown(low).to_string() } else { format!("({}..{})", Shown(low), Shown(high)) };
+    }
+    let places = (2.0 - width.log10()).floor().clamp(0.0, 30.0) as usize;
+    let exact = |value: f64| format!("{value:.60}");
+    let cut = |text: &str| text.find('.').map_or(text.len(), |point| (point + 1 + places).min(text.len()));
+    let (low, high) = (exact(low), exact(high));
+    let floor = low[..cut(&low)].to_owned();
+    let mut ceiling: Vec<u8> = high[..cut(&high)].bytes().collect();
+    if high[cut(&high)..].bytes().any(|digit| digit != b'0') {
+        let mut carries = true;
+        for digit in ceiling.iter_mut().rev().filter(|digit| **digit != b'.') {
+            *digit = if *digit == b'9' { b'0' } else { *digit + 1 };
+            carries = *digit == b'0';
+            if !carries {
+                break;
+            }
+        }
+        if carries {
+            ceiling.insert(0, b'1');
+        }
+    }
+    let ceiling: String = ceiling.into_iter().map(char::from).collect();
+    let common = floor.bytes().zip(ceiling.bytes()).take_while(|(a, b)| a == b).count();
+    let common = if floor.len() == ceiling.len() { common } else { 0 };
+    format!("{}({}..{})", &floor[..common], &floor[common..], &ceiling[common..])
+}
+
 /// `value` with `format` where there is one, else a dash.
 pub fn or_dash(value: Option<f64>, format: impl FnOnce(f64) -> String) -> String {
     value.map_or_else(|| "-".to_owned(), format)
@@ -202,6 +234,21 @@ pub(crate) fn nearest<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
 #[expect(clippy::unwrap_used, reason = "a text that is no number is a failed test")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn digits_between_two_numbers_hold_both() {
+        for (low, high, text) in [
+            (0.25, 0.25, "0.25"),
+            (0.144_826_789_065_454, 0.144_826_789_065_457, "0.14482678906545(39..71)"),
+            (0.999_999_999_999_999_9, 1.0, "(0.99999999999999988..1.00000000000000000)"),
+            (177.949_686_027_945_63, 177.949_686_027_945_66, "177.949686027945(621..664)"),
+            (0.0, 0.5, "(0.00..0.50)"),
+            (1.0, f64::INFINITY, "(1..inf)"),
+            (1e-20, 2e-20, "(1e-20..2e-20)"),
+        ] {
+            assert_eq!(digits_between(low, high), text);
+        }
+    }
 
     #[test]
     fn a_number_in_a_message_is_short_and_reads_back() {

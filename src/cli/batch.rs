@@ -19,7 +19,7 @@ use crate::exchange::tables::parquet::ParquetReader;
 use crate::exchange::tables::{self, CsvTable, Rows, TableWriter};
 use crate::integrators::Method;
 use crate::physics::Scene;
-use crate::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, Varied, solve};
+use crate::studies::batch::{PART, SCENES, Scenes, Tally, Varied, columns, solve};
 use crate::text::count;
 
 /// Progress over a known number of rows.
@@ -107,7 +107,7 @@ type Sink = TableWriter<BufWriter<Destination>>;
 impl BatchArgs {
     fn sink(&self) -> io::Result<Sink> {
         let output = BufWriter::with_capacity(1 << 20, Destination::open(&self.out)?);
-        TableWriter::new(output, &RESULT_COLUMNS, is_parquet(&self.out))
+        TableWriter::new(output, &columns(self.method.method, self.critical), is_parquet(&self.out))
     }
 
     /// Solves one chunk, `scenes` to begin with, which come behind `before` others, while the one before is written and the next is read.

@@ -8,12 +8,14 @@ use super::method_args::{MethodArgs, MethodJson};
 use super::output::{Text, engineering, error_text, say, significant};
 use super::scene_json::SceneJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
-use crate::integrators::{Detail, Integrator};
+use crate::exchange::scene_file::SceneFile;
+use crate::integrators::{Detail, Integrator, MethodName, Taylor};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
 use crate::physics::{Criterion, Scene, Shown, groups};
 use crate::studies::critical_velocity::CriticalVelocity;
 use crate::studies::sensitivity::{self, Design, Share, Spread, Uncertainty};
-use crate::studies::{applicability, critical_velocity};
+use crate::studies::{applicability, critical_velocity, enclosure};
+use crate::text::digits_between;
 
 /// What is said where no velocity is critical.
 const SEVERAL: &str = "paths cross here: no velocity is critical, and the intervals were found by a scan";
@@ -74,6 +76,9 @@ pub struct CriticalJson {
     closed_form: Option<ClosedCriticalJson>,
     relative_error: Option<f64>,
     eq15: Option<Eq15Json>,
+    /// With `--method enclosure`: between which numbers V_c lies, of the numbers as written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    enclosure: Option<EnclosureJson>,
     /// V_c of the same slab by other criteria, with the criterion `plug`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(default)]
@@ -86,6 +91,13 @@ pub struct CriticalJson {
     uncertainty: Option<Uncertainty>,
     /// What was asked for and not computed, and why.
     skipped: Vec<String>,
+}
+
+/// What is proved of V_c.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct EnclosureJson {
+    /// Least and greatest (m/s): at the one the projectile stops, at the other it perforates. `null` without a proof.
+    critical_velocity_m_s: Option<(f64, f64)>,
 }
 
 /// V_c by another criterion; `null` where there is none.
@@ -137,7 +149,7 @@ impl Ask for CriticalArgs {
     type Answer = CriticalJson;
 
     fn ask(&self) -> Result<Answer<CriticalJson>, CliError> {
-        let scene = self.scene.settings.read(&self.scene.path)?;
+        let SceneFile { scene, written } = self.scene.settings.read_file(&self.scene.path)?;
         if scene.thickness.is_none() {
             return Err(CliError::usage(
                 "a semi-infinite target has no critical velocity",
@@ -147,7 +159,26 @@ impl Ask for CriticalArgs {
         }
         let method = self.method.build()?;
         let spreads = sensitivity::spreads(&self.spread)?;
-        let (intervals, found) = critical_velocity::speeds(&scene, method.integrator())?;
+        let encloses = self.method.method == MethodName::Enclosure;
+        // The proof needs a guess, and takes the fastest method for it.
+        let taylor = Taylor::default();
+        let integrator = if encloses { &taylor } else { method.integrator() };
+        if encloses {
+            // What no flight is enclosed of has no V_c that is.
+            enclosure::refusal(&scene, &written)?;
+        }
+        let (intervals, mut found) = critical_velocity::speeds(&scene, integrator)?;
+        let enclosure = encloses.then(|| {
+            let near = found.as_ref().map(|found| found.velocity);
+            EnclosureJson { critical_velocity_m_s: near.and_then(|near| enclosure::between(&scene, &written, near)) }
+        });
+        if let (Some(found), Some(EnclosureJson { critical_velocity_m_s: Some((low, high)) })) =
+            (&mut found, &enclosure)
+        {
+            found.velocity = low + 0.5 * (high - low);
+            found.error_bar = Some(0.5 * (high - low));
+            found.energy = 0.5 * scene.mass * found.velocity * found.velocity;
+        }
         let shown = found.as_ref().map_or(intervals[0].low.velocity, |found| found.velocity);
         let exact = critical_velocity::exact(&scene).ok();
         let problem = scene.resolve(shown)?;
@@ -191,12 +222,15 @@ impl Ask for CriticalArgs {
             }),
             relative_error: exact.map(|exact| if shown == exact { 0.0 } else { ((shown - exact) / exact).abs() }),
             eq15: Eq15Json::new(&scene),
-            criteria: criteria(&scene, method.integrator()),
-            residual_velocity_at_limit_m_s: at_limit(&scene, found.as_ref(), method.integrator()),
+            enclosure,
+            criteria: criteria(&scene, integrator),
+            residual_velocity_at_limit_m_s: at_limit(&scene, found.as_ref(), integrator),
             uncertainty,
             skipped: no_spread.into_iter().collect(),
         };
-        Ok(Answer { text: data.text(scene.criterion), data: Some(data), exit: Exit::Success })
+        let is_open = data.enclosure.as_ref().is_some_and(|enclosure| enclosure.critical_velocity_m_s.is_none());
+        let exit = if is_open { Exit::Undecided } else { Exit::Success };
+        Ok(Answer { text: data.text(scene.criterion), data: Some(data), exit })
     }
 }
 
@@ -225,6 +259,13 @@ impl CriticalJson {
             (self.critical_velocity_m_s, self.critical_energy_j, self.evaluations)
         {
             text.line(format!("  V_c        {}{bar} m/s, {flights} flights", Shown(velocity)));
+            if let Some(EnclosureJson { critical_velocity_m_s: proved }) = &self.enclosure {
+                let shown = proved.map_or_else(
+                    || "no proof was found that speeds below stop and speeds above perforate".to_owned(),
+                    |(low, high)| format!("{} m/s", digits_between(low, high)),
+                );
+                text.line(format!("  proved     {shown}"));
+            }
             text.line(format!("  E_c        {}", engineering(energy, "J")));
         }
         if self.critical_velocity_m_s.is_none()

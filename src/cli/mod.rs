@@ -39,6 +39,7 @@ use serde_json::json;
 use crate::exchange::SceneError;
 use crate::exchange::input::{holding, is_standard, name_of};
 use crate::exchange::interruption::clean_up_when_interrupted;
+use crate::exchange::scene_file::SceneFile;
 use crate::physics::{Advice, Problem, Scene, State};
 use crate::report::folder::{FolderError, without_temporary_name};
 use crate::suite::Verdict;
@@ -503,7 +504,12 @@ pub struct Settings {
 impl Settings {
     /// The scene in the file at `path`, or of that name; `-` is standard input.
     fn read(&self, path: &str) -> Result<Scene, Box<SceneError>> {
-        Scene::read_with(Path::new(path), &self.set)
+        self.read_file(path).map(|file| file.scene)
+    }
+
+    /// As [`Settings::read`], with what was written for its numbers.
+    fn read_file(&self, path: &str) -> Result<SceneFile, Box<SceneError>> {
+        SceneFile::read(Path::new(path), &self.set)
     }
 
     /// The scene in the file at `path` and its problem; what is wrong with it names the file.

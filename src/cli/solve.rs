@@ -13,14 +13,17 @@ use super::scene_json::{ForceJson, SceneJson};
 use super::sensitivities::SensitivitiesJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::input::name_of;
+use crate::exchange::scene_file::SceneFile;
 use crate::exchange::tables::{self, Column, Format, Kind, Others, Value, table_of};
-use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Method, Sample};
+use crate::integrators::{ClosedForm, Cost, Detail, Flight, Integrator, Method, MethodName, Sample};
+use crate::physics::ball::Ball;
 use crate::physics::groups::Groups;
-use crate::physics::{Criterion, Event, EventKind, Outcome, Problem, Range, Scene, State};
+use crate::physics::{Criterion, Event, EventKind, Outcome, Range, Scene, Shown, State};
 use crate::studies::applicability;
+use crate::studies::enclosure::{self, Intervals};
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
-use crate::text::count;
+use crate::text::{count, digits_between};
 
 /// Arguments of `solve`.
 #[derive(Args, Debug)]
@@ -84,12 +87,56 @@ pub struct SolveJson {
     #[serde(skip_serializing_if = "Option::is_none")]
     trajectory: Option<Vec<Sample>>,
     skipped: Vec<String>,
+    /// With `--method enclosure`: between which numbers the exact answers lie, of the numbers as written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    enclosure: Option<EnclosureJson>,
     /// The same slab by other criteria, with the criterion `plug`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(default)]
     criteria: Vec<ByCriterionJson>,
     /// Asked for with `--sensitivities`; `null` otherwise.
     sensitivities: Option<SensitivitiesJson>,
+}
+
+/// What is proved of a flight.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct EnclosureJson {
+    /// At the end.
+    #[serde(flatten)]
+    end: Intervals,
+    /// The events, in time order.
+    events: Vec<EnclosedEventJson>,
+}
+
+/// What is proved of an event.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct EnclosedEventJson {
+    /// What happened.
+    #[serde(flatten)]
+    kind: EventKind,
+    /// When and where.
+    #[serde(flatten)]
+    state: Intervals,
+}
+
+impl EnclosureJson {
+    fn new(flight: &Flight<Ball>) -> Self {
+        let event = |event: &Event<Ball>| EnclosedEventJson { kind: event.kind, state: Intervals::of(&event.state) };
+        Self { end: Intervals::of(&flight.end), events: flight.events.iter().map(event).collect() }
+    }
+
+    /// The digits that are certain, and those that are not.
+    fn add_to(&self, text: &mut Text, is_proved: bool) {
+        let Intervals { depth_m, time_s, velocity_m_s } = self.end;
+        let what = if is_proved { "proved" } else { "not ruled out" };
+        for (name, unit, (low, high)) in
+            [("depth", "m", depth_m), ("time", "s", time_s), ("velocity", "m/s", velocity_m_s)]
+        {
+            let low = low.unwrap_or(0.0);
+            let shown = high.map_or_else(|| format!("from {}", Shown(low)), |high| digits_between(low, high));
+            text.line(format!("  {what}   {name:8} {shown} {unit}"));
+        }
+    }
 }
 
 /// The outcome by another criterion, and the velocity at its end.
@@ -182,21 +229,33 @@ impl Ask for SolveArgs {
     }
 
     fn ask(&self) -> Result<Answer<SolveJson>, CliError> {
-        let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
+        let SceneFile { scene, written } = self.scene.settings.read_file(&self.scene.path)?;
+        let problem = scene.problem().map_err(|error| CliError::from(error).in_file(&self.scene.path))?;
         if let Some(path) = &self.trajectory {
             let times = self.times.as_deref().map(|path| ("the times", path));
             let inputs: Vec<_> = [("the scene", Path::new(&self.scene.path))].into_iter().chain(times).collect();
             check_outputs(&inputs, &[("the trajectory", path)])?;
         }
         let method = self.method.build()?;
-        let times = self.wanted_times(&problem, &method)?;
+        let encloses = self.method.method == MethodName::Enclosure;
+        let times = self.wanted_times(|| {
+            Ok(if encloses {
+                enclosure::flight(&scene, &written, Detail::End)??.end.time.value()
+            } else {
+                method.integrator().solve(&problem, Detail::Events)?.end.time
+            })
+        })?;
         let detail = match &times {
             Some(times) => Detail::Times(times),
             None if self.trajectory.is_some() => Detail::Trajectory,
             None => Detail::Events,
         };
         let started = Instant::now();
-        let flight = method.integrator().solve(&problem, detail)?;
+        let enclosed = if encloses { Some(enclosure::flight(&scene, &written, detail)??) } else { None };
+        let flight = match &enclosed {
+            Some(flight) => flight.values(),
+            None => method.integrator().solve(&problem, detail)?,
+        };
         let wall_ns = u64::try_from(started.elapsed().as_nanos()).unwrap_or(u64::MAX);
         if let Some(path) = &self.trajectory {
             let table = table_of(&TRAJECTORY, false, flight.trajectory.iter().map(trajectory_row));
@@ -238,6 +297,7 @@ impl Ask for SolveArgs {
             relative_error: exact.and_then(|exact| RelativeErrorJson::new(&flight, &exact, problem.impact_speed)),
             trajectory: times.is_some().then(|| flight.trajectory.clone()),
             skipped,
+            enclosure: enclosed.as_ref().map(EnclosureJson::new),
             criteria: criteria(&scene, problem.impact_speed, &method),
             sensitivities,
         };
@@ -262,12 +322,12 @@ fn criteria(scene: &Scene, speed: f64, method: &Method) -> Vec<ByCriterionJson> 
 
 impl SolveArgs {
     /// The times (s) at which states are asked for, if any are.
-    fn wanted_times(&self, problem: &Problem, method: &Method) -> Result<Option<Vec<f64>>, CliError> {
+    fn wanted_times(&self, end: impl FnOnce() -> Result<f64, CliError>) -> Result<Option<Vec<f64>>, CliError> {
         if let Some(path) = &self.times {
             return Ok(Some(read_times(path)?));
         }
         let Some(points) = self.points else { return Ok(None) };
-        let end = method.integrator().solve(problem, Detail::Events)?.end.time;
+        let end = end()?;
         let time = |i: u32| end * (f64::from(i) / f64::from(points - 1));
         Ok(Some((0..points).map(time).collect()))
     }
@@ -341,6 +401,9 @@ impl SolveArgs {
             text.table(&["time", "depth", "velocity", "force"], rows.iter().map(row));
         }
         text.gap();
+        if let Some(enclosure) = &data.enclosure {
+            enclosure.add_to(&mut text, data.outcome != Outcome::Undecided);
+        }
         data.add_exact(&mut text);
         if data.outcome == Outcome::Undecided {
             let notes = flight.notes.iter().map(String::as_str).chain([UNDECIDED]);

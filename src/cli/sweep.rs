@@ -18,7 +18,7 @@ use crate::physics::semi_empirical::NDRC_END;
 use crate::physics::{Criterion, Outcome};
 use crate::report::sweep_figures;
 use crate::studies::sweep::{
-    Axis, COLUMNS, Conclusion, MeasuredPoint, POINTS, Plan, Row, conclusions, explanation, read_points,
+    Axis, Conclusion, MeasuredPoint, POINTS, Plan, Row, conclusions, explanation, read_points,
 };
 use crate::text::or_dash;
 
@@ -258,7 +258,8 @@ fn write_files(path: &Path, plan: &Plan, rows: &[Row], measured: &[MeasuredPoint
     };
     let paths = plan.paths();
     let axes = paths.iter().map(|path| (path.as_str(), Kind::Number));
-    let columns: Vec<_> = axes.chain(COLUMNS.map(|(name, kind, _)| (name, kind))).collect();
+    let is_enclosed = rows.iter().any(|row| row.bounds.is_some());
+    let columns: Vec<_> = axes.chain(Row::columns(is_enclosed)).collect();
     let table = tables::table_of(&columns, is_parquet(path), rows.iter().map(Row::cells));
     write_table(path, table, endings(plan), figures)
 }

@@ -16,6 +16,7 @@ use super::diagnostic::{
     Dialect, Fault, SceneError, Span, did_you_mean, key_of, nearest, parse, quoted, read_text, type_of,
 };
 use super::input;
+use crate::physics::decimals::Written;
 use crate::physics::expression::{ExpressionError, Known, RESERVED, Tape, Unit, is_name};
 use crate::physics::law::{Name, OwnParameter};
 use crate::physics::nose::NoseShape;
@@ -151,8 +152,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`]; also a setting that is none, or that the scene cannot have.
     pub fn read_with(path: &Path, settings: &[String]) -> Result<Self, Box<SceneError>> {
-        let (file, text) = text_at(path)?;
-        SceneFile::from_toml(&text, &file, settings).map(|read| read.scene)
+        SceneFile::read(path, settings).map(|read| read.scene)
     }
 }
 
@@ -161,12 +161,21 @@ impl Scene {
 pub struct SceneFile {
     /// The scene.
     pub scene: Scene,
-    /// Every number that the file itself gives and the scene holds, in the order read; rows of tables beside it are not. A computation that must enclose the
-    /// numbers as written, and not as rounded to `f64`, starts from these.
-    pub given: Vec<(Parameter, Quantity)>,
+    /// Every number that the file itself gives and the scene holds; rows of tables beside it are not. A computation that must
+    /// enclose the numbers as written, and not as rounded to `f64`, starts from these.
+    pub written: Written,
 }
 
 impl SceneFile {
+    /// The scene file at `path`, or the shipped scene of that name, with the `settings` of [`SceneFile::from_toml`].
+    ///
+    /// # Errors
+    /// As [`Scene::read_with`].
+    pub fn read(path: &Path, settings: &[String]) -> Result<Self, Box<SceneError>> {
+        let (file, text) = text_at(path)?;
+        Self::from_toml(&text, &file, settings)
+    }
+
     /// The scene file `text`, where each of the `settings`, such as `target.thickness=0.3 m`, stands as if the file gave
     /// it, in place of what the file gives there. All numbers and words of a scene file can be set, with values as there
     /// but without quotes; a nose factor or shape replaces the whole nose of the file.
@@ -185,8 +194,8 @@ impl SceneFile {
                 set(root.get_mut(), &whole, start..start + line.len(), text.len())?;
                 start += line.len() + 1;
             }
-            let mut reader = Reader { file, text: &whole, root, units, given: Vec::new() };
-            Ok(Self { scene: reader.scene()?, given: reader.given })
+            let mut reader = Reader { file, text: &whole, root, units, written: Written::default() };
+            Ok(Self { scene: reader.scene()?, written: reader.written })
         });
         read.map_err(|mut fault| {
             let mut source = (file, text);
@@ -430,7 +439,7 @@ struct Reader<'t> {
     root: Spanned<DeTable<'t>>,
     /// Of parameters, before settings.
     units: BTreeMap<String, Unit>,
-    given: Vec<(Parameter, Quantity)>,
+    written: Written,
 }
 
 type Value<'t> = Spanned<DeValue<'t>>;
@@ -466,7 +475,7 @@ impl<'t> Reader<'t> {
         let entry = parameter.entry();
         let quantity = self.quantity(parameter.key(), entry.dimension, entry.range, number)?;
         let value = quantity.value;
-        self.given.push((parameter, quantity));
+        self.written.numbers.push((parameter, quantity));
         Ok(Some(value))
     }
 
@@ -679,7 +688,7 @@ impl<'t> Reader<'t> {
         if !parameter.entry().range.contains(angle) {
             return Err(refused(format!("`half_angle` = {} is out of range", Shown(angle))));
         }
-        self.given.push((parameter, quantity));
+        self.written.numbers.push((parameter, quantity));
         Ok(angle)
     }
 
@@ -759,7 +768,7 @@ impl<'t> Reader<'t> {
             parameters.push(OwnParameter { name, value: quantity.value, unit });
             given.push((Parameter::Own(name), quantity));
         }
-        self.given.extend(given);
+        self.written.numbers.extend(given);
         Ok(parameters)
     }
 
@@ -1070,7 +1079,10 @@ impl<'t> Reader<'t> {
         let key = key_of(path);
         without(Some(index), &format!("the shape `{name}` takes `{key}`"))?;
         let (_, number) = self.at(path).ok_or_else(|| self.missing(path, "3.0"))?;
-        Ok(of(self.quantity(key, None, range, number)?.value).factor())
+        let ratio = self.quantity(key, None, range, number)?;
+        let shape = of(ratio.value);
+        self.written.nose = Some((shape, ratio));
+        Ok(shape.factor())
     }
 }
 

@@ -53,7 +53,8 @@ const STEPS_MAX: u64 = 100_000;
 const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
 /// What is said of a flight whose end no proof was found for.
-pub(crate) const UNPROVED: &str = "no proof was found of how the flight ends; the interval holds every end that is left open";
+pub(crate) const UNPROVED: &str =
+    "no proof was found of how the flight ends; the interval holds every end that is left open";
 
 /// The enclosure: exact answers between two numbers.
 ///
@@ -92,13 +93,17 @@ impl Enclosure {
                  own; take --method taylor",
             ));
         }
-        let numbers = problem.stages.iter().flat_map(|stage| {
-            [stage.static_force, stage.stiffness, stage.viscosity, stage.drag, stage.end].map(|number| number / problem.mass)
-        });
-        let numbers = numbers.chain([problem.mass, problem.impact_speed, problem.exit_depth]);
+        let over_mass = |stage: &Stage<Ball>| {
+            [stage.static_force, stage.stiffness, stage.viscosity, stage.drag].map(|number| number / problem.mass)
+        };
+        let numbers = problem.stages.iter().flat_map(over_mass);
+        let ends = problem.stages.iter().map(|stage| stage.end);
+        let numbers = numbers.chain(ends).chain([problem.mass, problem.impact_speed, problem.exit_depth]);
         for number in numbers.filter(|number| number.value().abs() < f64::INFINITY) {
-            if !(number.is_zero() || MAGNITUDES.contains(&number.value().abs())) {
-                return Err(refuse("its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor"));
+            if !(number.value() == 0.0 || MAGNITUDES.contains(&number.value().abs())) {
+                return Err(refuse(
+                    "its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor",
+                ));
             }
         }
         if !boundaries_are_apart(problem) {
@@ -118,10 +123,16 @@ impl Enclosure {
     }
 }
 
+/// Whether everything in `depth` lies in front of `limit`, which is infinite where rest alone can end a stage.
+fn is_before(depth: Ball, limit: Ball) -> bool {
+    limit.value() == f64::INFINITY || depth.upper() < limit.lower()
+}
+
 /// Whether any two ends, and the exit, are the same ball or differ as `f64` and as balls.
 fn boundaries_are_apart(problem: &Problem<Ball>) -> bool {
     let ends: Vec<Ball> = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]).collect();
-    let is_told = |a: Ball, b: Ball| a == b || (a.value() < b.value() && a.upper() <= b.lower()) || b.value() == f64::INFINITY;
+    let is_told =
+        |a: Ball, b: Ball| a == b || (a.value() < b.value() && a.upper() <= b.lower()) || b.value() == f64::INFINITY;
     let [inner @ .., exit] = ends.as_slice() else { return true };
     inner.windows(2).all(|pair| is_told(pair[0], pair[1]))
         && inner.iter().all(|end| is_told(*end, *exit) || is_told(*exit, *end))
@@ -164,6 +175,8 @@ struct Law {
     falls: bool,
     /// Upper bound of w, `w² = |s|/M` (1/s).
     rate: f64,
+    /// Lower bound of w (1/s).
+    least_rate: f64,
 }
 
 impl Law {
@@ -177,8 +190,9 @@ impl Law {
             stiffness.lower() >= 0.0 && viscosity.lower() >= 0.0 && drag.lower() >= 0.0
         };
         let rate = if stiffness.is_zero() { 0.0 } else { stiffness.magnitude().sqrt() * UP };
+        let least_rate = if falls { -stiffness } else { stiffness }.lower().max(0.0).sqrt() / UP;
         let is_finite = per_mass.static_force.radius.is_finite() && rate.is_finite() && drag.radius.is_finite();
-        (is_proved && is_finite && viscosity.radius.is_finite()).then_some(Self { per_mass, falls, rate })
+        (is_proved && is_finite && viscosity.radius.is_finite()).then_some(Self { per_mass, falls, rate, least_rate })
     }
 
     /// Deceleration (m/s²) at every depth in `x` and every velocity in `v`, not negative.
@@ -401,9 +415,8 @@ impl Series {
             x = x.times(h).plus(self.fine_depth[k]);
         }
         let (speed, depth): (f64, f64) = (sizes.behind[0], sizes.x.iter().sum());
-        let rounding = |tail: f64, whole: f64| {
-            (2 * ORDER) as f64 * ROUNDOFF * tail + (2 * FINE + 8) as f64 * UNIT * whole
-        };
+        let rounding =
+            |tail: f64, whole: f64| (2 * ORDER) as f64 * ROUNDOFF * tail + (2 * FINE + 8) as f64 * UNIT * whole;
         let depth_behind: f64 = sizes.x[FINE + 1..].iter().sum();
         let errors = [rounding(sizes.behind[FINE], speed), rounding(depth_behind, depth)];
         ([v, x], errors.map(|error| error * UP + TINY))
@@ -554,7 +567,7 @@ impl Centre {
         let ([v, x], [of_v, of_x]) = series.at(time, &sizes);
         let reached = Ball::around(self.x, 0.0) + Ball::around(x.scaled(length), length * of_x * UP);
         let depth = self.error.depth + length * path + series.time * time * norm;
-        let depth = if law.rate > 0.0 { depth.min(norm / law.rate * UP) } else { depth };
+        let depth = if law.least_rate > 0.0 { depth.min(norm / law.least_rate * UP) } else { depth };
         let error = Error {
             norm: (norm + series.velocity * of_v + law.rate * reached.radius) * UP,
             depth: (depth * UP + reached.radius) * UP,
@@ -609,13 +622,14 @@ impl Steps {
     /// One step from `centre` towards `limit`.
     fn step(law: &Law, centre: &Centre, limit: Ball, series: &Series) -> Step {
         let length = series.velocity * series.time;
-        let far = (limit - Ball::around(centre.x, 0.0)).value() / length;
+        let is_endless = limit.value() == f64::INFINITY;
+        let far = if is_endless { f64::INFINITY } else { (limit - Ball::around(centre.x, 0.0)).value() / length };
         let mut span = series.span(law);
         for _ in 0..RETRIES_MAX {
             let [v, _, x] = series.near(span);
             if v > 0.0 && x < far {
                 match centre.after(law, series, span) {
-                    Some(next) if next.depth().upper() < limit.lower() => return Step::Whole(next),
+                    Some(next) if is_before(next.depth(), limit) => return Step::Whole(next),
                     _ => {}
                 }
             } else {
@@ -638,7 +652,11 @@ impl Steps {
         let place = |from: f64| {
             // Just before the event, by what the numbers round and by the error.
             let [v, slope, _] = series.near(from);
-            let error = if passes { centre.error.depth / length / v.abs() } else { centre.error.norm / series.velocity / slope.abs() };
+            let error = if passes {
+                centre.error.depth / length / v.abs()
+            } else {
+                centre.error.norm / series.velocity / slope.abs()
+            };
             (16.0 * ROUNDOFF * from + 8.0 * error, from)
         };
         let at_limit = |gap: f64, from: f64| {
@@ -662,7 +680,7 @@ impl Steps {
         let (mut gap, from) = place(rest);
         for _ in 0..RETRIES_MAX {
             if let Some((before, state)) = at_rest(gap, from) {
-                if state.depth.upper() < limit.lower() {
+                if is_before(state.depth, limit) {
                     return Step::Rest(state);
                 }
                 if state.depth.lower() <= limit.upper() && before.depth().upper() <= limit.lower() {
@@ -736,7 +754,7 @@ impl Steps {
         let equilibrium = -static_force / stiffness;
         let missing = equilibrium - centre.depth();
         root.lower() >= 0.0
-            && limit.lower() >= equilibrium.upper()
+            && (limit.value() == f64::INFINITY || limit.lower() >= equilibrium.upper())
             && missing.lower() > 0.0
             && centre.velocity().upper() <= ((half + root.sqrt()) * missing).lower()
     }

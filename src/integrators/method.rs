@@ -8,6 +8,7 @@ use super::central_difference::{Boundaries, CentralDifference, Steps, VelocityAt
 use super::closed_form::ClosedForm;
 #[cfg(feature = "diffsol")]
 use super::diffsol::{Diffsol, Scheme};
+use super::enclosure::Enclosure;
 use super::energy::Energy;
 use super::outcome::{Detail, Flight, IntegrationError, Integrator};
 use super::taylor::Taylor;
@@ -55,6 +56,8 @@ pub enum MethodName {
     CentralDifference,
     /// The exact solution, where one exists.
     ClosedForm,
+    /// Two numbers between which the exact answer lies, proved.
+    Enclosure,
 }
 
 /// How accurate a method is, and which option says so.
@@ -62,7 +65,7 @@ pub enum MethodName {
 pub enum Accuracy {
     /// As good as the numbers allow, or within `--rtol` if one is given.
     RoundOff,
-    /// As good as the numbers allow: a formula.
+    /// As good as the numbers allow: a formula, or a proof.
     Exact,
     /// Within `--rtol`, by default [`RTOL_DEFAULT`].
     Tolerance,
@@ -83,7 +86,7 @@ impl MethodName {
     pub const fn accuracy(self) -> Accuracy {
         match self {
             Self::Taylor | Self::Energy => Accuracy::RoundOff,
-            Self::ClosedForm => Accuracy::Exact,
+            Self::ClosedForm | Self::Enclosure => Accuracy::Exact,
             Self::Tsit45 | Self::Bdf | Self::Esdirk34 | Self::TrBdf2 | Self::Adaptive => Accuracy::Tolerance,
             Self::CentralDifference => Accuracy::Step,
         }
@@ -190,6 +193,11 @@ impl Method {
         Ok(Self { name, options: options.clone(), integrator: integrator(name, options)? })
     }
 
+    /// Its name.
+    pub fn name(&self) -> MethodName {
+        self.name
+    }
+
     /// Whether it is the method `name` with no option set.
     pub fn is_plain(&self, name: MethodName) -> bool {
         self.name == name && self.options == MethodOptions::default()
@@ -255,6 +263,7 @@ fn integrator(
         MethodName::Taylor => Box::new(options.rtol.map_or_else(|| Ok(Taylor::default()), Taylor::with_rtol)?),
         MethodName::Energy => Box::new(options.rtol.map_or_else(|| Ok(Energy::default()), Energy::with_rtol)?),
         MethodName::ClosedForm => Box::new(ClosedForm),
+        MethodName::Enclosure => Box::new(Enclosure),
         MethodName::CentralDifference => Box::new(options.central_difference()),
         #[cfg(feature = "diffsol")]
         MethodName::Adaptive | MethodName::Tsit45 | MethodName::Bdf | MethodName::Esdirk34 | MethodName::TrBdf2 => {
@@ -287,7 +296,8 @@ mod tests {
     use super::*;
     use crate::physics::Stage;
 
-    const NAMES: &str = "taylor, tsit45, bdf, esdirk34, tr-bdf2, adaptive, energy, central-difference, closed-form";
+    const NAMES: &str = "taylor, tsit45, bdf, esdirk34, tr-bdf2, adaptive, energy, central-difference, closed-form, \
+                         enclosure";
 
     fn slab(exit_depth: f64, speed: f64) -> Problem {
         let crater = Stage::crater(8e6, 0.1);

@@ -10,11 +10,11 @@ pub mod closed_form;
 pub mod diffsol;
 #[cfg(feature = "diffsol")]
 pub mod diffsol_sensitivity;
+pub mod enclosure;
 #[cfg(test)]
 #[path = "tests/ends.rs"]
 #[expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 mod ends;
-pub mod enclosure;
 pub mod energy;
 #[cfg(test)]
 #[path = "tests/every_method.rs"]

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use super::problem::Stage;
+use super::scalar::Scalar;
 use crate::text::Shown;
 
 /// Most rows of a table. Each is a stage or two, of which every method solves some thousands in milliseconds.
@@ -105,17 +106,26 @@ impl ForceTable {
     /// # Ok::<(), penetrode::physics::force_table::RowsRefused>(())
     /// ```
     pub fn stages(&self, from: f64) -> impl Iterator<Item = Stage> {
+        self.stages_in(from)
+    }
+
+    /// As [`ForceTable::stages`], in any number type.
+    pub(crate) fn stages_in<S: Scalar>(&self, from: f64) -> impl Iterator<Item = Stage<S>> {
         let behind = self.0.partition_point(|row| row.depth <= from);
         self.0[behind.saturating_sub(1)..].windows(2).flat_map(move |rows| {
             let (a, b) = (rows[0], rows[1]);
-            let stiffness = (b.force - a.force) / (b.depth - a.depth);
-            let static_force = if stiffness == 0.0 { a.force } else { a.force - stiffness * a.depth };
+            let [ax, af, bx, bf] = [a.depth, a.force, b.depth, b.force].map(S::decimal);
+            let stiffness = (bf - af).over(bx - ax);
+            let static_force = if stiffness.value() == 0.0 { af } else { af - stiffness * ax };
             let law = Stage { static_force, stiffness, ..Stage::free() };
-            let (start, force) =
-                if from > a.depth { (from, static_force + stiffness * from) } else { (a.depth, a.force) };
+            let (start, force) = if from > a.depth {
+                (from, (static_force + stiffness * S::from_f64(from)).value())
+            } else {
+                (a.depth, a.force)
+            };
             let balance = -static_force / stiffness;
-            let falls_through = force > 0.0 && b.force < 0.0 && start < balance && balance < b.depth;
-            falls_through.then_some(law.until(balance)).into_iter().chain([law.until(b.depth)])
+            let falls_through = force > 0.0 && b.force < 0.0 && start < balance.value() && balance.value() < b.depth;
+            falls_through.then_some(law.until(balance)).into_iter().chain([law.until(bx)])
         })
     }
 }

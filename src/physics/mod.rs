@@ -4,6 +4,7 @@ pub mod advice;
 pub mod ball;
 pub mod closed_form;
 pub mod condition;
+pub mod decimals;
 pub mod elementary;
 pub mod exit_energy;
 pub mod expression;

@@ -7,6 +7,8 @@
 //! The nose acts on the drag alone: the static force of Eq. 5 does not depend on it.
 //! Source: Li & Chen (2003), Eq. 2 and 3a-c; heights by geometry.
 
+use super::scalar::Scalar;
+
 /// A nose of a shape whose factor is known in closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NoseShape {
@@ -59,20 +61,38 @@ impl NoseShape {
     ///
     /// The ogive is evaluated as `(8 - 1/psi)/(24 psi)`, so that no square overflows.
     pub fn factor(self) -> f64 {
+        self.factor_in(|psi| psi)
+    }
+
+    /// As [`NoseShape::factor`], in the number type into which `ratio` lifts psi and t.
+    pub(crate) fn factor_in<S: Scalar>(self, ratio: impl Fn(f64) -> S) -> S {
+        let number = S::from_f64;
         match self {
-            Self::Flat => 1.0,
-            Self::Ogive { caliber_radius_head: psi } => (8.0 - 1.0 / psi) / (24.0 * psi),
-            Self::Cone { length_ratio: psi } => 1.0 / (1.0 + 4.0 * psi * psi),
+            Self::Flat => number(1.0),
+            Self::Ogive { caliber_radius_head: psi } => {
+                let psi = ratio(psi);
+                (number(8.0) - number(1.0) / psi) / (number(24.0) * psi)
+            }
+            Self::Cone { length_ratio: psi } => {
+                let psi = ratio(psi);
+                number(1.0) / (number(1.0) + number(4.0) * psi * psi)
+            }
             Self::TruncatedOgive { caliber_radius_head: psi, tip_ratio: t } => {
+                let [psi, t, one] = [ratio(psi), ratio(t), number(1.0)];
                 // With u = 1 - cos a: 2/3 - cos a + cos³a/3 = u² (1 - u/3), sin²a = u (2 - u); nothing cancels.
-                let u = 0.5 * (1.0 - t) / psi;
-                t * t + 8.0 * psi * u * u * ((0.5 - psi) * (1.0 - u / 3.0) + 0.25 * psi * (2.0 - u) * (2.0 - u))
+                let u = number(0.5) * (one - t) / psi;
+                let [rest, wide] = [one - u / number(3.0), number(2.0) - u];
+                t * t + number(8.0) * psi * u * u * ((number(0.5) - psi) * rest + number(0.25) * psi * wide * wide)
             }
             Self::TruncatedCone { length_ratio: psi, tip_ratio: t } => {
-                let (flat, slope) = (t * t, 2.0 * psi / (1.0 - t));
-                flat + (1.0 - flat) / (1.0 + slope * slope)
+                let [psi, t, one] = [ratio(psi), ratio(t), number(1.0)];
+                let (flat, slope) = (t * t, number(2.0) * psi / (one - t));
+                flat + (one - flat) / (one + slope * slope)
             }
-            Self::Spherical { radius_ratio: psi } => 1.0 - 0.125 / psi / psi,
+            Self::Spherical { radius_ratio: psi } => {
+                let psi = ratio(psi);
+                number(1.0) - number(0.125) / psi / psi
+            }
         }
     }
 

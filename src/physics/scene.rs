@@ -813,13 +813,13 @@ impl Scene {
                 continue;
             }
             let mut reached = start;
-            for piece in table.stages(start) {
+            for piece in table.stages_in::<S>(start) {
                 representable("the stiffness between two rows of a table [N/m]", piece.stiffness, true)?;
                 representable("the static force of a piece of a table [N]", piece.static_force, true)?;
-                let is_last = piece.end >= end;
-                let until = if is_last { stage.end } else { S::from_f64(piece.end) };
-                stages.push(Stage { end: until, ..piece.map(S::from_f64) });
-                reached = piece.end;
+                reached = piece.end.value();
+                let is_last = reached >= end;
+                let until = if is_last { stage.end } else { piece.end };
+                stages.push(Stage { end: until, ..piece });
                 if is_last || reached >= exit_depth {
                     break;
                 }

@@ -58,7 +58,12 @@ const THIRD_BRANCH: f64 = 3.8;
 ///
 /// `S = 72 (fc/MPa)^(-1/2)`, Not finite for fc = 0.
 pub fn static_factor(strength: f64) -> f64 {
-    72.0 / (strength / 1e6).sqrt()
+    static_factor_in(strength)
+}
+
+/// As [`static_factor`], in any number type.
+pub(crate) fn static_factor_in<S: Scalar>(strength: S) -> S {
+    S::from_f64(72.0) / (strength / S::from_f64(1e6)).sqrt()
 }
 
 /// As [`static_factor`], and 0 for an air gap, which has no strength for Eq. 14 to go by.

@@ -208,6 +208,22 @@ pub struct Quantity {
     /// The decimal as written, times that of the unit: `269e-4` for `26.9 mm`. It is the exact value where that of the
     /// unit is a decimal of at most 17 digits, as for metric units; see [`quantity`] for others.
     pub decimal: String,
+    /// Whether the decimal is the exact value.
+    pub is_exact: bool,
+}
+
+/// Most digits of the SI value of a unit that are taken for all of them: 45 units have 16 or 17, rounded, and some of 14 and 15
+/// are rounded too.
+const EXACT_DIGITS: usize = 13;
+
+/// The pound-force has 14, by definition.
+const POUND_FORCE: &str = "44482216152605";
+
+/// Whether the decimal nearest to the SI value `coefficient` of a unit is that value.
+fn is_decimal(coefficient: f64) -> bool {
+    let text = format!("{coefficient:e}");
+    let digits: String = text.split('e').next().unwrap_or_default().chars().filter(char::is_ascii_digit).collect();
+    digits.len() <= EXACT_DIGITS || digits == POUND_FORCE
 }
 
 impl Quantity {
@@ -216,7 +232,7 @@ impl Quantity {
     /// # Errors
     /// As [`number`].
     pub fn bare(decimal: &str) -> Result<Self, QuantityError> {
-        Ok(Self { value: number(decimal)?, decimal: decimal.to_owned() })
+        Ok(Self { value: number(decimal)?, decimal: decimal.to_owned(), is_exact: true })
     }
 
     /// A number with a unit of `dimension`.
@@ -229,7 +245,8 @@ impl Quantity {
             Some(has) => QuantityError::WrongDimension { unit: unit.to_owned(), has },
             None => QuantityError::UnknownUnit { unit: unit.to_owned() },
         })?;
-        Self::bare(&product(digits, coefficient))
+        let (decimal, is_exact) = product(digits, coefficient);
+        Ok(Self { is_exact, ..Self::bare(&decimal)? })
     }
 
     /// A number with any unit, and the powers of dimensions that the unit is made of ([`compound`]).
@@ -240,7 +257,8 @@ impl Quantity {
         let (digits, unit) = number_and_unit(text)?;
         let unknown = || QuantityError::UnknownUnit { unit: unit.to_owned() };
         let (coefficient, powers) = compound(unit).ok_or_else(unknown)?;
-        Ok((Self::bare(&product(digits, coefficient))?, powers))
+        let (decimal, _) = product(digits, coefficient);
+        Ok((Self { is_exact: false, ..Self::bare(&decimal)? }, powers))
     }
 }
 
@@ -326,18 +344,21 @@ pub fn quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> 
 /// As [`number`].
 pub fn scaled(digits: &str, coefficient: f64) -> Result<f64, QuantityError> {
     number(digits)?;
-    number(&product(digits, coefficient))
+    number(&product(digits, coefficient).0)
 }
 
-/// Decimal text of `number · coefficient`, exact where 38 digits hold it.
-fn product(number: &str, coefficient: f64) -> String {
+/// Decimal text of `number · coefficient`, and whether it is exact: 38 digits hold it, and the coefficient is a decimal.
+fn product(number: &str, coefficient: f64) -> (String, bool) {
     let exact = || {
         let (left, left_exponent) = decimal(number)?;
         let (right, right_exponent) = decimal(&format!("{coefficient:e}"))?;
         Some(format!("{}e{}", left.checked_mul(right)?, left_exponent.checked_add(right_exponent)?))
     };
     // Beyond 38 digits the last ones do not matter: two roundings more.
-    exact().unwrap_or_else(|| format!("{:e}", number.parse().unwrap_or(f64::NAN) * coefficient))
+    match exact() {
+        Some(text) => (text, is_decimal(coefficient)),
+        None => (format!("{:e}", number.parse().unwrap_or(f64::NAN) * coefficient), false),
+    }
 }
 
 /// Signed digits and power of ten of a decimal.

@@ -11,10 +11,12 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::critical_velocity::{self, CriticalError};
+use super::enclosure::{self, Bounds};
 use super::random_scenes::Generator;
 use crate::exchange::tables::{Block, Column, Format, Kind, Need, Others, Place, Row, Rows, TableError, Value};
 use crate::integrators::lanes::{Batch, Summary};
-use crate::integrators::{Detail, IntegrationError, Method, MethodName};
+use crate::integrators::{Detail, IntegrationError, Method, MethodName, Taylor};
+use crate::physics::decimals::Written;
 use crate::physics::groups::Groups;
 use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, Parameter, ParameterError};
@@ -168,6 +170,17 @@ pub const RESULT_COLUMNS: [(&str, Kind); 11] = [
     ("X_over_d_eq11_12", Kind::Number),
     ("error", Kind::Text),
 ];
+
+/// The columns of the results of `method`, with V_c or without.
+pub fn columns(method: MethodName, with_critical: bool) -> Vec<(&'static str, Kind)> {
+    let count = match (method, with_critical) {
+        (MethodName::Enclosure, true) => enclosure::COLUMNS.len(),
+        (MethodName::Enclosure, false) => enclosure::COLUMNS.len() - 2,
+        _ => 0,
+    };
+    let enclosed = enclosure::COLUMNS.into_iter().take(count).map(|(name, _)| (name, Kind::Number));
+    RESULT_COLUMNS.into_iter().chain(enclosed).collect()
+}
 
 /// Rows that are solved together: one block of lanes.
 pub const PART: usize = 256;
@@ -363,8 +376,15 @@ impl Scenes {
     }
 
     /// The rows of results of `answers`, which begin with scene `from`; their numbers in the table begin with `first`.
-    pub fn results(&self, from: usize, first: u64, answers: &[Result<Answer, RowError>], is_parquet: bool) -> Block {
-        let mut block = Block::empty(&RESULT_COLUMNS, is_parquet);
+    pub fn results(
+        &self,
+        from: usize,
+        first: u64,
+        answers: &[Result<Answer, RowError>],
+        columns: &[(&'static str, Kind)],
+        is_parquet: bool,
+    ) -> Block {
+        let mut block = Block::empty(columns, is_parquet);
         if let Block::Lines(lines) = &mut block {
             lines.reserve(160 * answers.len());
         }
@@ -375,7 +395,15 @@ impl Scenes {
                 Err(_) => ("", [None; 8]),
             };
             let [a, b, c, d, e, f, g, h] = numbers.map(Value::Number);
-            block.push(&[Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, h, Value::Text(&message)]);
+            let cells = [Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, h, Value::Text(&message)];
+            let enclosed = columns.len() - cells.len();
+            if enclosed == 0 {
+                block.push(&cells);
+            } else {
+                let bounds = answer.as_ref().ok().and_then(|answer| answer.bounds).unwrap_or_default();
+                let proved = enclosure::COLUMNS.iter().take(enclosed).map(|(_, cell)| Value::Number(cell(&bounds)));
+                block.push(&cells.iter().copied().chain(proved).collect::<Vec<_>>());
+            }
         }
         block
     }
@@ -400,6 +428,8 @@ pub struct Answer {
     pub stable: bool,
     /// True if S is left to Eq. 14 outside the experiments to which it was fitted.
     pub outside_eq14: bool,
+    /// What is proved, with the method `enclosure`.
+    pub bounds: Option<Bounds>,
 }
 
 impl Answer {
@@ -432,10 +462,19 @@ pub fn answers(
     // Why a scene has no problem; scenes are large and stay where they are.
     let causes: Vec<Option<ResolveError>> =
         scenes.iter().map(|scene| scene.as_ref().ok()?.problem().map(|problem| problems.push(problem)).err()).collect();
-    let answer =
-        |solution, stable| Answer { solution, critical: None, depth_ratio_eq11_12: None, stable, outside_eq14: false };
+    let answer = |solution, stable| Answer {
+        solution,
+        critical: None,
+        depth_ratio_eq11_12: None,
+        stable,
+        outside_eq14: false,
+        bounds: None,
+    };
     let solved: Vec<Result<Answer, IntegrationError>> = if method.is_plain(MethodName::Taylor) {
         Batch::new().solve(&problems).into_iter().map(|solution| Ok(answer(solution?, true))).collect()
+    } else if method.name() == MethodName::Enclosure {
+        let solvable = scenes.iter().zip(&causes).filter(|(_, cause)| cause.is_none());
+        solvable.filter_map(|(scene, _)| Some(enclosed(scene.as_ref().ok()?, with_critical))).collect()
     } else {
         let reused = method.integrator().reusing();
         let integrator = reused.as_deref().unwrap_or(method.integrator());
@@ -456,7 +495,7 @@ pub fn answers(
         answer.outside_eq14 = scene.concrete().zip(scene.velocity).is_some_and(|(concrete, speed)| {
             concrete.follows_eq14 && concrete.layers.is_empty() && !concrete.use_of_eq14(speed).is_in_range()
         });
-        if with_critical && scene.thickness.is_some() {
+        if with_critical && scene.thickness.is_some() && answer.critical.is_none() {
             let critical = critical_velocity::of_scene(&scene, method.integrator());
             answer.critical = Some(critical.map(|critical| critical.velocity).map_err(Box::new));
         }
@@ -465,10 +504,45 @@ pub fn answers(
     answers.collect()
 }
 
+/// The flight of `scene` between two numbers, and its V_c if `with_critical`.
+fn enclosed(scene: &Scene, with_critical: bool) -> Result<Answer, IntegrationError> {
+    // Its numbers count as the shortest decimals of what was read.
+    let written = Written::default();
+    let out_of_range = |error: ResolveError| IntegrationError::Refused { method: "enclosure", why: error.to_string() };
+    let flight = enclosure::flight(scene, &written, Detail::Events).map_err(out_of_range)??;
+    let mut answer = Answer {
+        solution: Summary::from(&flight.values()),
+        critical: None,
+        depth_ratio_eq11_12: None,
+        stable: true,
+        outside_eq14: false,
+        bounds: None,
+    };
+    let mut bounds = Bounds::default().with_end(&flight.end);
+    if with_critical && scene.thickness.is_some() {
+        let found = critical_velocity::of_scene(scene, &Taylor::default());
+        let proved = found.as_ref().ok().and_then(|found| enclosure::between(scene, &written, found.velocity));
+        answer.critical = Some(match (found, proved) {
+            (Ok(_), Some((low, high))) => {
+                bounds = bounds.with_critical(proved);
+                Ok(low + 0.5 * (high - low))
+            }
+            (Ok(found), None) => {
+                let remedy = "no proof was found; take --method taylor";
+                Err(CriticalError::Undecided { velocity: found.velocity, error_bar: f64::INFINITY, remedy }.into())
+            }
+            (Err(error), _) => Err(error.into()),
+        });
+    }
+    answer.bounds = Some(bounds);
+    Ok(answer)
+}
+
 /// Results of `scenes`, part by part on all threads of the pool at hand, and how many came to what; `first` is the number of
 /// the first row, from 1.
 pub fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parquet: bool) -> (Tally, Vec<Block>) {
     let total = scenes.len();
+    let columns = &columns(method.name(), critical);
     let (tallies, blocks): (Vec<Tally>, Vec<Block>) = (0..total.div_ceil(PART))
         .into_par_iter()
         // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
@@ -476,7 +550,7 @@ pub fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_pa
         .map(|index| {
             let from = index * PART;
             let answers = answers(scenes.scenes(from..total.min(from + PART)), method, critical);
-            (Tally::of(&answers), scenes.results(from, first + from as u64, &answers, is_parquet))
+            (Tally::of(&answers), scenes.results(from, first + from as u64, &answers, columns, is_parquet))
         })
         .unzip();
     let mut tally = Tally::default();
@@ -604,7 +678,7 @@ mod tests {
             "7,,,,,,,,,,\"line 2: the strength fc [Pa] = -36000000 is not admissible: it must be a number > 0\"\n",
             "8,,,,,,,,,,\"line 3, column 12: `a \"\"b\"\"\u{fffd}` in `criterion` is not full-depth or ndrc\"\n",
         ];
-        let Block::Lines(text) = scenes.results(0, 7, &found, false) else { unreachable!("not CSV") };
+        let Block::Lines(text) = scenes.results(0, 7, &found, &RESULT_COLUMNS, false) else { unreachable!("not CSV") };
         assert_eq!(text, lines.concat());
         assert_eq!((Tally::of(&found).rows, Tally::of(&found).bad), (2, 2));
     }

@@ -10,6 +10,7 @@ pub mod convergence;
 pub mod critical_velocity;
 pub mod diagnosis;
 pub mod edge_problems;
+pub mod enclosure;
 pub mod error;
 pub mod experiments;
 pub mod extreme_scenes;

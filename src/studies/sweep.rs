@@ -14,9 +14,10 @@ use thiserror::Error;
 
 pub use self::conclusions::{Conclusion, MeasuredPoint, Standing, conclusions};
 use super::critical_velocity;
+use super::enclosure::{self, Bounds};
 use super::error::{Studied, StudyError};
 use crate::exchange::tables::{self, Column, Format, Kind, Others, TableError, Value};
-use crate::integrators::{Detail, Integrator};
+use crate::integrators::{Detail, Integrator, MethodName};
 use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::parameter::{Parameter, ParameterError};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
@@ -203,6 +204,9 @@ pub struct Row {
     /// Geometry function N; absent without drag.
     #[serde(rename = "N")]
     pub geometry: Option<f64>,
+    /// What is proved, with the method `enclosure`.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<Bounds>,
     /// Why the point has no answer, or not all of it. Empty when all is well.
     pub error: String,
 }
@@ -228,10 +232,19 @@ pub const COLUMNS: [RowColumn; 13] = [
 ];
 
 impl Row {
-    /// Its cells in the table: the varied numbers, then [`COLUMNS`].
+    /// Its cells in the table: the varied numbers, then [`COLUMNS`], then what is proved.
     pub fn cells(&self) -> Vec<Value<'_>> {
         let values = self.values.iter().map(|value| Value::Number(Some(*value)));
-        values.chain(COLUMNS.iter().map(|(.., cell)| cell(self))).collect()
+        let proved =
+            self.bounds.iter().flat_map(|bounds| enclosure::COLUMNS.map(|(_, cell)| Value::Number(cell(bounds))));
+        values.chain(COLUMNS.iter().map(|(.., cell)| cell(self))).chain(proved).collect()
+    }
+
+    /// The names and kinds of the columns behind the varied numbers.
+    pub fn columns<'a>(is_enclosed: bool) -> impl Iterator<Item = (&'a str, Kind)> {
+        let proved = enclosure::COLUMNS.map(|(name, _)| (name, Kind::Number));
+        let proved = proved.into_iter().filter(move |_| is_enclosed);
+        COLUMNS.map(|(name, kind, _)| (name, kind)).into_iter().chain(proved)
     }
 }
 
@@ -350,7 +363,8 @@ impl Plan {
 
     fn row(&self, index: usize, integrator: &dyn Integrator) -> Row {
         let (values, scene) = self.point(index);
-        let mut row = Row { values, ..Row::default() };
+        let encloses = integrator.name() == MethodName::Enclosure.name();
+        let mut row = Row { values, bounds: encloses.then(Bounds::default), ..Row::default() };
         let filled = scene.map_err(StudyError::from).and_then(|scene| self.fill(&mut row, &scene, integrator));
         row.error = filled.err().map_or_else(String::new, |error| error.to_string());
         row
@@ -368,6 +382,9 @@ impl Plan {
             (row.critical_velocity_m_s, row.critical_energy_j) = (Some(found.velocity), Some(found.energy));
         }
         self.compare(scene, integrator, row);
+        if let Some(bounds) = &mut row.bounds {
+            *bounds = enclosure::bounds(scene)?;
+        }
         critical?;
         let is_nothing = row.dimensionless_energy == Some(0.0) && row.eq15_unrounded == Some(0.0);
         row.thickness_ratio.filter(|_| is_nothing).map_or(Ok(()), |ratio| Err(StudyError::NoDifference(ratio)))

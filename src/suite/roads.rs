@@ -31,6 +31,8 @@ pub enum Source {
     Taylor,
     /// The energy formulation.
     Energy,
+    /// Series with proved errors. They run in the loop over stages, each number a ball.
+    Enclosure,
     /// diffsol.
     Library,
     /// The central difference.
@@ -48,8 +50,8 @@ pub enum Source {
 }
 
 use Source::{
-    Check as Itself, ClosedForm, Commands, Duals, Elsewhere, Energy, FiftyDigits, Formulas, Lanes, Library, Loop,
-    Search, Steps, Taylor,
+    Check as Itself, ClosedForm, Commands, Duals, Elsewhere, Enclosure, Energy, FiftyDigits, Formulas, Lanes, Library,
+    Loop, Search, Steps, Taylor,
 };
 
 impl Source {
@@ -59,6 +61,7 @@ impl Source {
             MethodName::Taylor => vec![Taylor, Loop],
             MethodName::Energy => vec![Energy, Loop],
             MethodName::ClosedForm => vec![ClosedForm, Loop],
+            MethodName::Enclosure => vec![Enclosure, Loop],
             method if method.accuracy() == Accuracy::Step => vec![Steps],
             _ => vec![Library, Loop],
         }
@@ -147,6 +150,9 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::MarginBound(_)
         | Check::MarginOfAStop(_)
         | Check::Response(_) => [method, vec![FiftyDigits]],
+        Check::Encloses(_) => [vec![Enclosure, Loop], vec![FiftyDigits]],
+        Check::EnclosesTexts(_) => [vec![Enclosure, Loop], vec![Elsewhere]],
+        Check::Refuted(_) => [method.into_iter().filter(|of| *of != Loop).collect(), vec![Enclosure]],
         Check::RandomScenes(_) => [vec![ClosedForm, Taylor, Energy, Loop], vec![FiftyDigits]],
         Check::TableOfScenes(_) => [vec![Lanes], vec![FiftyDigits]],
         Check::Pair(pair) => [method, Source::of(pair.with)],

@@ -99,6 +99,52 @@ fn every_method_finds_the_critical_velocity_of_the_slab() {
 }
 
 #[test]
+fn an_enclosure_holds_the_closed_form() {
+    for scene in ["tunnel", "perforate", "crater", "layered", "viscous", "constant-force", "air-gap"] {
+        let answer = json(&format!("solve @{scene} --method enclosure"));
+        for field in ["depth_m", "time_s", "velocity_m_s"] {
+            let [low, high, exact] =
+                [&answer["enclosure"][field][0], &answer["enclosure"][field][1], &answer["closed_form"][field]]
+                    .map(|number| number.as_f64().unwrap());
+            // The closed form is that of the numbers as rounded.
+            let rounding = 64.0 * f64::EPSILON * exact.abs();
+            assert!(
+                low - rounding <= exact && exact <= high + rounding,
+                "{scene}: {field} {exact} and {low} to {high}"
+            );
+            assert!(high - low <= 64.0 * f64::EPSILON * exact.abs(), "{scene}: {field} from {low} to {high}");
+        }
+        let events = answer["enclosure"]["events"].as_array().unwrap();
+        assert_eq!(events.len(), answer["events"].as_array().unwrap().len());
+    }
+}
+
+#[test]
+fn one_end_of_an_enclosed_critical_velocity_stops_and_the_other_perforates() {
+    for scene in ["paper-slab", "thin-slab", "layered"] {
+        let more = if scene == "layered" { "" } else { "--set perforation.criterion=ndrc" };
+        let answer = json(&format!("critical @{scene} --method enclosure {more}"));
+        let [low, high] = [0, 1].map(|end| answer["enclosure"]["critical_velocity_m_s"][end].as_f64().unwrap());
+        assert!(low < high && high - low <= 2.0 * f64::EPSILON * high, "{scene}: {low} to {high}");
+        for (speed, ends) in [(low, "stop"), (high, "perforated")] {
+            let answer = json(&format!("solve @{scene} --method enclosure {more} --set impact.velocity={speed:e}"));
+            assert!(
+                answer["outcome"].as_str().unwrap().starts_with(ends),
+                "{scene} at {speed} m/s: {}",
+                answer["outcome"]
+            );
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_enclosed_is_refused_with_a_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = run_in(folder.path(), "solve law-power --method enclosure").refused();
+    assert!(words.contains("a stage has a law or an end of its own"), "{words}");
+}
+
+#[test]
 fn what_a_command_prints_is_what_its_schema_says() {
     for (command, rest) in [
         ("solve", "@tunnel"),
@@ -107,6 +153,9 @@ fn what_a_command_prints_is_what_its_schema_says() {
         ("solve", "@layered"),
         ("solve", "@tunnel --method central-difference"),
         ("critical", "@paper-slab"),
+        ("solve", "@graze --method enclosure"),
+        ("critical", "@paper-slab --method enclosure"),
+        ("sweep", "@paper-slab --vary H/d=1:3:2 --method enclosure"),
         ("converge", "@tunnel --points 8"),
         ("converge", "@tunnel --method taylor --points 8"),
     ] {

@@ -88,13 +88,16 @@ fn all_exist(document: &str, least: usize, cited: impl Fn(&str) -> Option<String
 }
 
 #[test]
-fn every_cited_section_of_the_theory_exists() -> io::Result<()> {
-    all_exist("theory.md", 30, |rest| {
-        let rest = rest.trim_start_matches(['`', ')', ',', ' ']);
-        let numbers = rest.strip_prefix("sections ").or_else(|| rest.strip_prefix("section "))?;
-        let number: String = numbers.chars().take_while(char::is_ascii_digit).collect();
-        Some(format!("{number}. "))
-    })
+fn every_cited_section_of_the_theory_and_the_proofs_exists() -> io::Result<()> {
+    for (document, least) in [("theory.md", 30), ("enclosures.md", 4)] {
+        all_exist(document, least, |rest| {
+            let rest = rest.trim_start_matches(['`', ')', ',', ' ']);
+            let numbers = rest.strip_prefix("sections ").or_else(|| rest.strip_prefix("section "))?;
+            let number: String = numbers.chars().take_while(char::is_ascii_digit).collect();
+            Some(format!("{number}. "))
+        })?;
+    }
+    Ok(())
 }
 
 #[test]

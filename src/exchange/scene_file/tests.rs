@@ -94,7 +94,7 @@ fn every_key_is_read() {
 #[test]
 fn every_number_of_a_file_stays_as_the_decimal_that_was_written() {
     let text = with("\"50 mm\"", "\"26.90 mm\"").replace("S = 12.0", "S = 1_2.0");
-    let given = SceneFile::from_toml(&text, "scene.toml", &[]).unwrap().given;
+    let given = SceneFile::from_toml(&text, "scene.toml", &[]).unwrap().written.numbers;
     let decimal = |parameter: Parameter| given.iter().find(|(p, _)| *p == parameter).map(|(_, q)| q.decimal.as_str());
     assert_eq!(decimal(Parameter::Diameter), Some("2690e-5"));
     assert_eq!(decimal(Parameter::StaticFactor), Some("12.0"));
@@ -354,7 +354,7 @@ fn admissible_ranges_are_those_of_the_table() {
     let layers = text_of_shipped("layered").replace("density", "viscosity = 5\nS = 9\ndensity");
     let numbers = [f64::MIN_POSITIVE, 1e-9, 0.5, 1.0, 1.1, 1e9, 1e300, 0.0, -0.0, -1e-300, -0.1, -1.0];
     for text in [FULL, STAGES, &layers] {
-        for (parameter, _) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().given {
+        for (parameter, _) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().written.numbers {
             // An air gap has no S; a file gives none that is zero.
             let is_factor = parameter.key() == Parameter::StaticFactor.key();
             let range = if is_factor { Parameter::StaticFactor } else { parameter }.entry().range;
@@ -403,7 +403,7 @@ fn without(text: &str, path: &str) -> String {
 #[test]
 fn what_is_set_is_as_if_the_file_gave_it() {
     for (_, text) in SHIPPED {
-        for (parameter, quantity) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().given {
+        for (parameter, quantity) in SceneFile::from_toml(text, "scene.toml", &[]).unwrap().written.numbers {
             // Has a unit of the file's own.
             if matches!(parameter, Parameter::Own(_)) {
                 continue;

@@ -57,14 +57,21 @@ fn the_exact_flight_lies_in_every_enclosure() {
             let State { time, depth, velocity } = flight.end;
             widths.push([time, depth, velocity].map(|ball| spacings(ball.interval())));
             let widest = widths.last().unwrap().iter().fold(0.0, |a: f64, b| a.max(*b));
-            if widest > 8.0 { eprintln!("{widest} {} steps, {case}", flight.cost.steps); }
+            if widest > 8.0 {
+                eprintln!("{widest} {} steps, {case}", flight.cost.steps);
+            }
         }
     }
     eprintln!("{seen} seen, {undecided} undecided, {unsupported} unsupported");
     for which in 0..3 {
         let mut one: Vec<f64> = widths.iter().map(|widths| widths[which]).collect();
         one.sort_by(f64::total_cmp);
-        eprintln!("{which}: median {} 99 % {} max {}", one[one.len() / 2], one[one.len() * 99 / 100], one[one.len() - 1]);
+        eprintln!(
+            "{which}: median {} 99 % {} max {}",
+            one[one.len() / 2],
+            one[one.len() * 99 / 100],
+            one[one.len() - 1]
+        );
     }
     assert!(undecided == 0 && seen > 300);
 }

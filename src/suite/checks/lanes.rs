@@ -290,7 +290,7 @@ fn read(order: &[usize], lines: &[String]) -> Found<Scenes> {
 
 /// The cells of the results of `scenes`, as their text has them; the first row is number `first`.
 fn written(scenes: &Scenes, first: u64, found: &[Result<Answer, RowError>]) -> Found<Vec<Vec<String>>> {
-    let block: Block = scenes.results(0, first, found, false);
+    let block: Block = scenes.results(0, first, found, &RESULT_COLUMNS, false);
     let mut table = TableWriter::new(Vec::new(), &RESULT_COLUMNS, false)?;
     table.push(block)?;
     let text = String::from_utf8(table.finish()?)?;

@@ -73,6 +73,7 @@ mod manufactured;
 mod orders;
 mod peers;
 mod problems;
+mod proved;
 mod scheme;
 mod texts;
 
@@ -96,7 +97,8 @@ use crate::studies::random::Random;
 
 pub use self::{
     agreement::*, applications::*, by_hand::*, commands::*, counts::*, edges::*, formulas::*, generators::*,
-    invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, scheme::*, texts::*,
+    invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, proved::*, scheme::*,
+    texts::*,
 };
 
 macro_rules! every_check {
@@ -152,7 +154,7 @@ every_check! {
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
-    EveryNumber MarginBound CriticalBound Response StepsByHand Generators
+    EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts Refuted
 }
 
 /// Studies that several claims share, computed once: one run of a scheme gives every quantity.

@@ -280,7 +280,8 @@ fn set_text(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
         let read = |settings: &[String]| {
             SceneFile::from_toml(file, name, settings).map_err(|error| broken(text, &format!("{settings:?}: {error}")))
         };
-        let SceneFile { scene, given } = read(&[])?;
+        let SceneFile { scene, written } = read(&[])?;
+        let given = written.numbers;
         // Two speeds: with a continuous crater constant the problem depends on it.
         let speed = scene.velocity.unwrap_or(123.0);
         let problem = |scene: &Scene| scene.resolve(scene.velocity.unwrap_or(speed)).ok();

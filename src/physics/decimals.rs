@@ -1,0 +1,263 @@
+//! The problem of a scene whose numbers are the decimals that were written, and not the `f64` beside them: for enclosures.
+//!
+//! Products and sums of the scene (the depth k d, P, Q, c, Eq. 14, N* of a shape) are balls then, which hold what the decimals
+//! make exactly. Depths that are equal as decimals, such as k d and H, are made the same ball; the order of others is that of
+//! their values.
+
+use super::ball::Ball;
+use super::nose::NoseShape;
+use super::parameter::{LayerNumber, Parameter, StageNumber};
+use super::problem::Problem;
+use super::scalar::Scalar;
+use super::scene::{Criterion, Force, Resistance, ResolveError, Resolved, Scene, layer_beyond};
+use super::semi_empirical;
+use super::units::{self, Quantity};
+
+/// A decimal, exactly: `digits 10^exponent`.
+#[derive(Clone, Copy, Debug)]
+struct Decimal {
+    digits: i128,
+    exponent: i64,
+}
+
+impl Decimal {
+    fn read(text: &str) -> Option<Self> {
+        units::decimal(text).map(|(digits, exponent)| Self { digits, exponent })
+    }
+
+    fn times(self, other: Self) -> Option<Self> {
+        let digits = self.digits.checked_mul(other.digits)?;
+        Some(Self { digits, exponent: self.exponent.checked_add(other.exponent)? })
+    }
+
+    /// Both with the exponent of the smaller.
+    fn aligned(self, other: Self) -> Option<(i128, i128, i64)> {
+        let exponent = self.exponent.min(other.exponent);
+        let raised = |one: Self| {
+            let power = u32::try_from(one.exponent - exponent).ok()?;
+            one.digits.checked_mul(10_i128.checked_pow(power)?)
+        };
+        Some((raised(self)?, raised(other)?, exponent))
+    }
+
+    fn plus(self, other: Self) -> Option<Self> {
+        let (a, b, exponent) = self.aligned(other)?;
+        Some(Self { digits: a.checked_add(b)?, exponent })
+    }
+
+    fn equals(self, other: Self) -> bool {
+        self.aligned(other).is_some_and(|(a, b, _)| a == b)
+    }
+}
+
+/// What was written for the numbers of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Written {
+    /// The decimal of each number that was written, in the order read. What is missing, or differs from the scene, counts as
+    /// the shortest decimal of its `f64`.
+    pub numbers: Vec<(Parameter, Quantity)>,
+    /// The shape of the nose and its ratio, where the factor N* was not written itself.
+    pub nose: Option<(NoseShape, Quantity)>,
+}
+
+impl Written {
+    fn text(&self, parameter: Parameter, value: f64) -> Option<&Quantity> {
+        let written = self.numbers.iter().rev().find(|(written, _)| *written == parameter);
+        written.map(|(_, quantity)| quantity).filter(|quantity| quantity.value == value)
+    }
+
+    fn decimal(&self, parameter: Parameter, value: f64) -> Option<Decimal> {
+        match self.text(parameter, value) {
+            Some(quantity) => Decimal::read(&quantity.decimal).filter(|_| quantity.is_exact),
+            None => Decimal::read(&format!("{value:e}")),
+        }
+    }
+
+    fn number(&self, parameter: Parameter, value: f64) -> Ball {
+        self.text(parameter, value).map_or_else(|| Ball::decimal(value), ball_of)
+    }
+}
+
+/// What was written, as a ball; the SI value of some units is no decimal, and is known to two roundings.
+fn ball_of(quantity: &Quantity) -> Ball {
+    let exact = units::decimal(&quantity.decimal).map(|(digits, exponent)| Ball::of_decimal(digits, exponent));
+    match exact {
+        Some(exact) if quantity.is_exact => exact,
+        _ => Ball::from_f64(quantity.value).widened(4.0 * f64::EPSILON * quantity.value.abs()),
+    }
+}
+
+impl Scene {
+    /// The equation of motion of the decimals that were `written`, at the impact speed `speed`, or at the scene's own.
+    ///
+    /// # Errors
+    /// As [`Scene::resolve`].
+    pub fn enclosed(&self, written: &Written, speed: Option<Ball>) -> Resolved<Problem<Ball>> {
+        let impact_speed = match speed {
+            Some(speed) => speed.value(),
+            None => self.velocity.ok_or(ResolveError::NoImpactSpeed)?,
+        };
+        let number = |parameter: Parameter, value: f64| match (parameter, &written.nose) {
+            (Parameter::Velocity, _) => speed.unwrap_or_else(|| written.number(parameter, value)),
+            (Parameter::Thickness, _) => self.total_thickness(written, value),
+            (Parameter::NoseFactor, Some((shape, ratio))) if shape.factor() == value => {
+                shape.factor_in(|_| ball_of(ratio))
+            }
+            (Parameter::StaticFactor | Parameter::Layer(_, LayerNumber::StaticFactor), _) => {
+                self.static_factor_of(written, parameter, value)
+            }
+            _ => written.number(parameter, value),
+        };
+        let mut problem = self.resolve_in(impact_speed, number)?;
+        self.unite_depths(written, &mut problem);
+        Ok(problem)
+    }
+
+    /// H, with layers the sum of theirs.
+    fn total_thickness(&self, written: &Written, value: f64) -> Ball {
+        let layers = self.concrete().map_or(&[][..], |concrete| &concrete.layers);
+        let of = |(index, layer): (usize, &super::scene::Layer)| {
+            written.number(Parameter::Layer(index, LayerNumber::Thickness), layer.thickness)
+        };
+        if layers.is_empty() {
+            return written.number(Parameter::Thickness, value);
+        }
+        layers.iter().enumerate().map(of).fold(Ball::zero(), |sum, thickness| sum + thickness)
+    }
+
+    /// S as stated, or by Eq. 14.
+    fn static_factor_of(&self, written: &Written, parameter: Parameter, value: f64) -> Ball {
+        let Some(concrete) = self.concrete() else { return written.number(parameter, value) };
+        let (follows, strength, of) = match parameter {
+            Parameter::Layer(index, _) => {
+                let layer = &concrete.layers[index];
+                (layer.follows_eq14, layer.strength, Parameter::Layer(index, LayerNumber::Strength))
+            }
+            _ => (concrete.follows_eq14, concrete.strength, Parameter::Strength),
+        };
+        if follows && strength > 0.0 {
+            semi_empirical::static_factor_in(written.number(of, strength))
+        } else {
+            written.number(parameter, value)
+        }
+    }
+
+    /// Gives depths that are equal as decimals the same ball.
+    fn unite_depths(&self, written: &Written, problem: &mut Problem<Ball>) {
+        let (ends, exit) = self.written_depths(written);
+        if ends.len() != problem.stages.len() {
+            return;
+        }
+        let are_equal = |a: Option<Decimal>, b: Option<Decimal>| a.zip(b).is_some_and(|(a, b)| a.equals(b));
+        let mut before: Option<(Option<Decimal>, Ball)> = None;
+        for (stage, end) in problem.stages.iter_mut().zip(&ends) {
+            if let Some((decimal, ball)) = before
+                && are_equal(decimal, *end)
+            {
+                stage.end = ball;
+            }
+            if are_equal(exit, *end) {
+                stage.end = problem.exit_depth;
+            }
+            before = Some((*end, stage.end));
+        }
+    }
+
+    /// The ends of the stages and the exit depth as decimals, where they are such.
+    fn written_depths(&self, written: &Written) -> (Vec<Option<Decimal>>, Option<Decimal>) {
+        let thickness = || written.decimal(Parameter::Thickness, self.thickness?);
+        match &self.resistance {
+            Resistance::Stages(stages) => {
+                if self.forces.iter().any(|(_, force)| matches!(force, Force::Table(_))) {
+                    return (Vec::new(), None);
+                }
+                let end = |(index, stage): (usize, &super::problem::Stage)| {
+                    let is_place = index + 1 < stages.len();
+                    is_place.then(|| written.decimal(Parameter::Stage(index, StageNumber::End), stage.end))?
+                };
+                (stages.iter().enumerate().map(end).collect(), thickness())
+            }
+            Resistance::Concrete(concrete) => {
+                let mut ends = Vec::new();
+                if concrete.crater_ratio != 0.0 {
+                    let ratio = written.decimal(Parameter::CraterRatio, concrete.crater_ratio);
+                    let diameter = written.decimal(Parameter::Diameter, concrete.diameter);
+                    ends.push(ratio.zip(diameter).and_then(|(ratio, diameter)| ratio.times(diameter)));
+                }
+                let first = layer_beyond(&concrete.layers, concrete.crater_depth());
+                let mut sum = Some(Decimal { digits: 0, exponent: 0 });
+                for (index, layer) in concrete.layers.iter().enumerate() {
+                    let thickness = written.decimal(Parameter::Layer(index, LayerNumber::Thickness), layer.thickness);
+                    sum = sum.zip(thickness).and_then(|(sum, thickness)| sum.plus(thickness));
+                    if Some(index) >= first {
+                        ends.push(sum.filter(|_| index + 1 < concrete.layers.len()));
+                    }
+                }
+                if concrete.layers.is_empty() {
+                    ends.push(None);
+                }
+                let exit = if self.criterion != Criterion::FullDepth {
+                    None
+                } else if concrete.layers.is_empty() {
+                    thickness()
+                } else {
+                    sum
+                };
+                (ends, exit)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
+mod tests {
+    use super::*;
+    use crate::exchange::scene_file::SceneFile;
+
+    fn problem(text: &str) -> Problem<Ball> {
+        let file = SceneFile::from_toml(text, "scene.toml", &[]).unwrap();
+        file.scene.enclosed(&file.written, None).unwrap()
+    }
+
+    fn slab(diameter: &str, thickness: &str, more: &str) -> String {
+        format!(
+            "[projectile]\nmass = \"2 kg\"\ndiameter = \"{diameter}\"\nnose = {{ shape = \"ogive\", caliber_radius_head = 3.1 }}\n\
+             [target]\nstrength = \"36 MPa\"\ndensity = \"2300 kg/m3\"\nthickness = \"{thickness}\"\n\
+             [crater]\ndepth_ratio = 3\n[impact]\nvelocity = \"300.1 m/s\"\n{more}"
+        )
+    }
+
+    fn lies_in(ball: Ball, text: &str) {
+        // 17 digits beside the exact ones.
+        let (low, high) = ball.interval();
+        let value: f64 = text.parse().unwrap();
+        assert!(low <= value && value <= high && high - low <= 2.0 * f64::EPSILON * value.abs(), "{ball:?} {text}");
+        assert!(ball.radius <= 1e-28 * value, "{ball:?}");
+    }
+
+    /// mpmath, 40 digits, of the decimals: P = pi d²/4 S fc with S = 72/sqrt(36), Q with N* = 1/(3 psi) - 1/(24 psi²).
+    #[test]
+    fn coefficients_are_those_of_the_decimals() {
+        let of = problem(&slab("50.1 mm", "300 mm", ""));
+        lies_in(of.stages[1].static_force, "851626.3294551871");
+        lies_in(of.stages[1].drag, "0.46788109409703093");
+        lies_in(of.stages[0].end, "0.1503");
+        lies_in(of.stages[0].stiffness, "5744546.13534595");
+    }
+
+    #[test]
+    fn depths_that_are_equal_as_decimals_are_one_ball_and_others_are_not() {
+        let exit_of = |diameter: &str, thickness: &str| {
+            let of = problem(&slab(diameter, thickness, ""));
+            (of.stages[0].end, of.exit_depth)
+        };
+        let (end, exit) = exit_of("33.4 mm", "100.2 mm");
+        assert_eq!(end, exit);
+        // Equal as f64, and not as written.
+        let (end, exit) = exit_of("33.4 mm", "100.20000000000000000001 mm");
+        assert!(end != exit && end.value() == exit.value());
+        let (end, exit) = exit_of("33.4 mm", "100.3 mm");
+        assert!(end.upper() < exit.lower());
+    }
+}
