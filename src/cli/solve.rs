@@ -240,7 +240,7 @@ impl Ask for SolveArgs {
         let encloses = self.method.method == MethodName::Enclosure;
         let times = self.wanted_times(|| {
             Ok(if encloses {
-                enclosure::flight(&scene, &written, Detail::End)??.end.time.value()
+                enclosure::flight(&scene, &written, Detail::End)??.values().end.time
             } else {
                 method.integrator().solve(&problem, Detail::Events)?.end.time
             })

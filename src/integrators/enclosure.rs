@@ -14,6 +14,8 @@
 //!
 //! docs/enclosures.md has the proof, inequality by inequality.
 
+use smallvec::SmallVec;
+
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved};
 use crate::physics::ball::{Ball, DoubleWord, TINY, UNIT, UP};
@@ -160,10 +162,11 @@ struct Steps {
     is_unproved: bool,
 }
 
-/// The error of a state in the present stage, in m/s and m: N, and a bound of |ex| alone.
+/// The error of a state in the present stage, in m/s and m: N, and bounds of |ev| and |ex| alone.
 #[derive(Clone, Copy, Debug)]
 struct Error {
     norm: f64,
+    velocity: f64,
     depth: f64,
 }
 
@@ -446,9 +449,11 @@ impl Series {
         if !(end > error) {
             return false;
         }
-        let mut panels = vec![(0.0, time)];
+        // Depth first from the start: at most one panel waits at each level.
+        let mut waiting = SmallVec::<[(f64, f64); 64]>::new();
         let mut count = 0;
-        while let Some((a, b)) = panels.pop() {
+        waiting.push((0.0, time));
+        while let Some((a, b)) = waiting.pop() {
             count += 1;
             let ([at_a, slope_a, _], [at_b, slope_b, _]) = (self.near(a), self.near(b));
             let (at_a, at_b) = (at_a - value_error, if b == time { end } else { at_b - value_error });
@@ -463,8 +468,8 @@ impl Series {
             if count > PANELS_MAX || middle <= a || middle >= b {
                 return false;
             }
-            panels.push((middle, b));
-            panels.push((a, middle));
+            waiting.push((middle, b));
+            waiting.push((a, middle));
         }
         true
     }
@@ -525,7 +530,8 @@ enum Step {
 impl Centre {
     fn new(state: State<Ball>, law: &Law) -> Self {
         let State { time, depth, velocity } = state;
-        let error = Error { norm: (velocity.radius + law.rate * depth.radius) * UP, depth: depth.radius };
+        let norm = (velocity.radius + law.rate * depth.radius) * UP;
+        let error = Error { norm, velocity: velocity.radius, depth: depth.radius };
         Self { time, x: depth.mid, v: velocity.mid, error }
     }
 
@@ -534,7 +540,7 @@ impl Centre {
     }
 
     fn velocity(&self) -> Ball {
-        Ball::around(self.v, self.error.norm)
+        Ball::around(self.v, self.error.velocity)
     }
 
     fn state(&self) -> State<Ball> {
@@ -560,17 +566,25 @@ impl Centre {
             1.0
         };
         let norm = (self.error.norm + added) * growth * UP;
-        if !series.stays_above(norm / series.velocity * UP, time, &sizes) {
+        let length = series.velocity * series.time;
+        let duration = series.time * time;
+        let depth = self.error.depth + length * path + duration * norm;
+        let depth = if law.least_rate > 0.0 { depth.min(norm / law.least_rate * UP) } else { depth } * UP;
+        // The same of ev alone: viscosity lets it die out.
+        let added = (series.velocity * force + law.rate * law.rate * depth * duration) * UP;
+        let damping = law.per_mass.viscosity.lower().max(0.0) * duration / UP;
+        let rest = UP / (1.0 + damping + 0.5 * damping * damping);
+        let velocity = norm.min(self.error.velocity * rest + added) * UP;
+        let greatest = norm.min(self.error.velocity + added) * UP;
+        if !series.stays_above(greatest / series.velocity * UP, time, &sizes) {
             return None;
         }
-        let length = series.velocity * series.time;
         let ([v, x], [of_v, of_x]) = series.at(time, &sizes);
         let reached = Ball::around(self.x, 0.0) + Ball::around(x.scaled(length), length * of_x * UP);
-        let depth = self.error.depth + length * path + series.time * time * norm;
-        let depth = if law.least_rate > 0.0 { depth.min(norm / law.least_rate * UP) } else { depth };
         let error = Error {
             norm: (norm + series.velocity * of_v + law.rate * reached.radius) * UP,
-            depth: (depth * UP + reached.radius) * UP,
+            velocity: (velocity + series.velocity * of_v) * UP,
+            depth: (depth + reached.radius) * UP,
         };
         let time = self.time + Ball::from_f64(time * series.time);
         Some(Self { time, x: reached.mid, v: v.scaled(series.velocity), error })
@@ -655,7 +669,7 @@ impl Steps {
             let error = if passes {
                 centre.error.depth / length / v.abs()
             } else {
-                centre.error.norm / series.velocity / slope.abs()
+                centre.error.velocity / series.velocity / slope.abs()
             };
             (16.0 * ROUNDOFF * from + 8.0 * error, from)
         };

@@ -146,7 +146,9 @@ fn encloses_texts(subject: &Subject<'_>) -> Found {
             holds!(is_met, "{path} of `{name}` is not between {} and {}", interval.0, interval.1);
             compared += 1;
             // A unit that is no decimal leaves four roundings in each number of the scene.
-            worst.take(spacings(interval), || format!("{path} of `{name}`"));
+            if interval.0 > 0.0 {
+                worst.take(spacings(interval), || format!("{path} of `{name}`"));
+            }
             Ok(())
         };
         if read.velocity.is_some() {
