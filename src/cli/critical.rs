@@ -1,5 +1,7 @@
 //! `penetrode critical`: V_c and E_c by argmin, closed form and Eq. 15 beside them.
 
+use std::collections::BTreeMap;
+
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -7,11 +9,13 @@ use serde::Serialize;
 use super::method_args::{MethodArgs, MethodJson};
 use super::output::{Text, engineering, error_text, say, significant};
 use super::scene_json::SceneJson;
+use super::solve::boxed_sides;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::scene_file::SceneFile;
 use crate::integrators::{Detail, Integrator, MethodName, Taylor};
 use crate::physics::semi_empirical::{eq15_printed, eq15_printed_validity, eq15_unrounded, perforation_validity};
 use crate::physics::{Criterion, Scene, Shown, groups};
+use crate::studies::boxes::Region;
 use crate::studies::critical_velocity::CriticalVelocity;
 use crate::studies::sensitivity::{self, Design, Share, Spread, Uncertainty};
 use crate::studies::{applicability, critical_velocity, enclosure};
@@ -30,6 +34,11 @@ pub struct CriticalArgs {
     /// Method and its options.
     #[command(flatten)]
     pub method: MethodArgs,
+    /// enclosure: V_c for target.strength=34MPa:38MPa; repeatable.
+    ///
+    /// The number lies anywhere between the two values. Nothing perforates below the least V_c of the box.
+    #[arg(long = "box", value_name = "PATH=A:B", conflicts_with = "spread")]
+    pub sides: Vec<String>,
     /// Uncertainty for target.strength=5%; repeatable.
     ///
     /// Each gives the relative standard deviation of a number of the scene, which is lognormal unless :normal or :uniform follows, as in
@@ -79,6 +88,10 @@ pub struct CriticalJson {
     /// With `--method enclosure`: between which numbers V_c lies, of the numbers as written.
     #[serde(skip_serializing_if = "Option::is_none")]
     enclosure: Option<EnclosureJson>,
+    /// With `--box`: the numbers that vary, and from which value to which; the enclosure is that of all of it.
+    #[serde(rename = "box", skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(default)]
+    sides: BTreeMap<String, (f64, f64)>,
     /// V_c of the same slab by other criteria, with the criterion `plug`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(default)]
@@ -168,12 +181,17 @@ impl Ask for CriticalArgs {
             enclosure::refusal(&scene, &written)?;
         }
         let (intervals, mut found) = critical_velocity::speeds(&scene, integrator)?;
-        let enclosure = encloses.then(|| {
-            let near = found.as_ref().map(|found| found.velocity);
-            EnclosureJson { critical_velocity_m_s: near.and_then(|near| enclosure::between(&scene, &written, near)) }
-        });
-        if let (Some(found), Some(EnclosureJson { critical_velocity_m_s: Some((low, high)) })) =
-            (&mut found, &enclosure)
+        let sides = boxed_sides(&self.sides, encloses)?;
+        let proved = match (&found, sides.as_slice()) {
+            _ if !encloses => None,
+            (Some(found), []) => enclosure::between(&scene, &written, found.velocity),
+            (_, []) => None,
+            (_, sides) => Region::new(&scene, &written, sides)?.critical(),
+        };
+        let enclosure = encloses.then_some(EnclosureJson { critical_velocity_m_s: proved });
+        if sides.is_empty()
+            && let (Some(found), Some(EnclosureJson { critical_velocity_m_s: Some((low, high)) })) =
+                (&mut found, &enclosure)
         {
             found.velocity = low + 0.5 * (high - low);
             found.error_bar = Some(0.5 * (high - low));
@@ -223,6 +241,7 @@ impl Ask for CriticalArgs {
             relative_error: exact.map(|exact| if shown == exact { 0.0 } else { ((shown - exact) / exact).abs() }),
             eq15: Eq15Json::new(&scene),
             enclosure,
+            sides: sides.iter().map(|side| (side.parameter.to_string(), (side.low, side.high))).collect(),
             criteria: criteria(&scene, integrator),
             residual_velocity_at_limit_m_s: at_limit(&scene, found.as_ref(), integrator),
             uncertainty,
@@ -264,6 +283,9 @@ impl CriticalJson {
                     || "no proof was found that speeds below stop and speeds above perforate".to_owned(),
                     |(low, high)| format!("{} m/s", digits_between(low, high)),
                 );
+                for (path, (low, high)) in &self.sides {
+                    text.line(format!("  box        {path} from {} to {}", Shown(*low), Shown(*high)));
+                }
                 text.line(format!("  proved     {shown}"));
             }
             text.line(format!("  E_c        {}", engineering(energy, "J")));

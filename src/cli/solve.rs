@@ -1,5 +1,6 @@
 //! `penetrode solve`: one scene solved, beside the exact answer.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -20,6 +21,7 @@ use crate::physics::ball::Ball;
 use crate::physics::groups::Groups;
 use crate::physics::{Criterion, Event, EventKind, Outcome, Range, Scene, Shown, State};
 use crate::studies::applicability;
+use crate::studies::boxes::{BoxError, Fate, Ranges, Region, Side};
 use crate::studies::enclosure::{self, Intervals};
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
@@ -52,6 +54,11 @@ pub struct SolveArgs {
     /// Times behind the end are left out, with a warning.
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
+    /// enclosure: the range of every answer for target.strength=34MPa:38MPa; repeatable.
+    ///
+    /// The number lies anywhere between the two values, whatever the others do in theirs.
+    #[arg(long = "box", value_name = "PATH=A:B", conflicts_with_all = ["trajectory", "points", "times"])]
+    pub sides: Vec<String>,
     /// Say what the scene let the method skip, and why.
     #[arg(long)]
     pub explain: bool,
@@ -69,7 +76,7 @@ pub struct SolveJson {
     scene: SceneJson,
     groups: GroupsJson,
     method: MethodJson,
-    outcome: Outcome,
+    outcome: OutcomeJson,
     stage: usize,
     #[serde(flatten)]
     end: State,
@@ -90,6 +97,10 @@ pub struct SolveJson {
     /// With `--method enclosure`: between which numbers the exact answers lie, of the numbers as written.
     #[serde(skip_serializing_if = "Option::is_none")]
     enclosure: Option<EnclosureJson>,
+    /// With `--box`: the numbers that vary, and from which value to which; outcome and enclosure are those of all of it.
+    #[serde(rename = "box", skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(default)]
+    sides: BTreeMap<String, (f64, f64)>,
     /// The same slab by other criteria, with the criterion `plug`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(default)]
@@ -98,13 +109,40 @@ pub struct SolveJson {
     sensitivities: Option<SensitivitiesJson>,
 }
 
+/// How the projectile ends.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OutcomeJson {
+    /// So.
+    One(Outcome),
+    /// At some points of a box it stops, at others it perforates.
+    Either(Either),
+}
+
+/// The word for both.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Either {
+    /// Stopped or perforated.
+    Either,
+}
+
+impl OutcomeJson {
+    fn name(self) -> &'static str {
+        match self {
+            Self::One(outcome) => outcome.name(),
+            Self::Either(_) => "either",
+        }
+    }
+}
+
 /// What is proved of a flight.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct EnclosureJson {
     /// At the end.
     #[serde(flatten)]
     end: Intervals,
-    /// The events, in time order.
+    /// The events, in time order; none of a box.
     events: Vec<EnclosedEventJson>,
 }
 
@@ -123,6 +161,12 @@ impl EnclosureJson {
     fn new(flight: &Flight<Ball>) -> Self {
         let event = |event: &Event<Ball>| EnclosedEventJson { kind: event.kind, state: Intervals::of(&event.state) };
         Self { end: Intervals::of(&flight.end), events: flight.events.iter().map(event).collect() }
+    }
+
+    fn of_box(ranges: Option<Ranges>) -> Self {
+        let anything = (Some(0.0), None);
+        let unproved = Intervals { depth_m: anything, time_s: anything, velocity_m_s: anything };
+        Self { end: ranges.map_or(unproved, |ranges| ranges.end), events: Vec::new() }
     }
 
     /// The digits that are certain, and those that are not.
@@ -251,6 +295,11 @@ impl Ask for SolveArgs {
             None => Detail::Events,
         };
         let started = Instant::now();
+        let sides = boxed_sides(&self.sides, encloses)?;
+        let ranges = match sides.as_slice() {
+            [] => None,
+            sides => Some(Region::new(&scene, &written, sides)?.flight()?),
+        };
         let enclosed = if encloses { Some(enclosure::flight(&scene, &written, detail)??) } else { None };
         let flight = match &enclosed {
             Some(flight) => flight.values(),
@@ -280,7 +329,12 @@ impl Ask for SolveArgs {
             scene: SceneJson::new(&scene, &problem),
             groups: GroupsJson::new(&scene, problem.impact_speed, flight.end.depth),
             method: MethodJson::new(self.method.method, &self.method.options()?, Some(&problem), Some(&flight)),
-            outcome: flight.outcome,
+            outcome: match ranges {
+                None => OutcomeJson::One(flight.outcome),
+                Some(None) => OutcomeJson::One(Outcome::Undecided),
+                Some(Some(Ranges { fate: Fate::One(outcome), .. })) => OutcomeJson::One(outcome),
+                Some(Some(_)) => OutcomeJson::Either(Either::Either),
+            },
             stage: flight.stage,
             end: flight.end,
             velocity_at_far_side_m_s: far_side,
@@ -297,18 +351,33 @@ impl Ask for SolveArgs {
             relative_error: exact.and_then(|exact| RelativeErrorJson::new(&flight, &exact, problem.impact_speed)),
             trajectory: times.is_some().then(|| flight.trajectory.clone()),
             skipped,
-            enclosure: enclosed.as_ref().map(EnclosureJson::new),
+            enclosure: match ranges {
+                None => enclosed.as_ref().map(EnclosureJson::new),
+                Some(ranges) => Some(EnclosureJson::of_box(ranges)),
+            },
+            sides: sides.iter().map(|side| (side.parameter.to_string(), (side.low, side.high))).collect(),
             criteria: criteria(&scene, problem.impact_speed, &method),
             sensitivities,
         };
         let is_unstable = flight.step_limit.is_some_and(|limit| !limit.stable);
-        let exit = match flight.outcome {
+        let exit = match data.outcome {
             _ if is_unstable => Exit::Criterion,
-            Outcome::Undecided => Exit::Undecided,
+            OutcomeJson::One(Outcome::Undecided) => Exit::Undecided,
             _ => Exit::Success,
         };
         Ok(Answer { text: self.text(&data, &flight), data: Some(data), exit })
     }
+}
+
+/// The sides of a box, which `enclosure` alone takes.
+///
+/// # Errors
+/// A text that is no side (exit 2), and another method.
+pub(super) fn boxed_sides(texts: &[String], encloses: bool) -> Result<Vec<Side>, CliError> {
+    if !(texts.is_empty() || encloses) {
+        return Err(CliError::usage("--box is of --method enclosure alone", "add --method enclosure"));
+    }
+    Ok(texts.iter().map(|text| text.parse()).collect::<Result<_, BoxError>>()?)
 }
 
 /// What `scene` comes to by other criteria, if its own is `plug`.
@@ -335,7 +404,7 @@ impl SolveArgs {
     fn text(&self, data: &SolveJson, flight: &Flight) -> String {
         let mut text = Text::titled(data.scene.title.as_deref());
         text.line(format!("  method   {}", data.method.text()));
-        let place = match (data.outcome, data.scene.criterion, data.velocity_at_far_side_m_s) {
+        let place = match (flight.outcome, data.scene.criterion, data.velocity_at_far_side_m_s) {
             (Outcome::Perforated, Criterion::FullDepth | Criterion::Plug, _) => " at x = H".to_owned(),
             (Outcome::Perforated, criterion, far_side) => {
                 let beyond = far_side.map_or_else(
@@ -353,7 +422,7 @@ impl SolveArgs {
             Some(_) => " (the exit margin leaves the range of 64-bit numbers)".to_owned(),
             None => String::new(),
         };
-        text.line(format!("  outcome  {}{place}{margin}", data.outcome));
+        text.line(format!("  outcome  {}{place}{margin}", data.outcome.name()));
         text.lines(data.groups.text(data.scene.velocity_m_s));
         for ForceJson { stage, force } in &data.scene.forces {
             let whose = if data.scene.stages.len() > 1 { format!("stage {stage}: ") } else { String::new() };
@@ -402,10 +471,13 @@ impl SolveArgs {
         }
         text.gap();
         if let Some(enclosure) = &data.enclosure {
-            enclosure.add_to(&mut text, data.outcome != Outcome::Undecided);
+            for (path, (low, high)) in &data.sides {
+                text.line(format!("  box      {path} from {} to {}", Shown(*low), Shown(*high)));
+            }
+            enclosure.add_to(&mut text, !matches!(data.outcome, OutcomeJson::One(Outcome::Undecided)));
         }
         data.add_exact(&mut text);
-        if data.outcome == Outcome::Undecided {
+        if flight.outcome == Outcome::Undecided {
             let notes = flight.notes.iter().map(String::as_str).chain([UNDECIDED]);
             notes.for_each(|note| text.wrapped("  note     ", note));
         }

@@ -85,8 +85,7 @@ impl Enclosure {
     ///
     /// # Errors
     /// [`IntegrationError::Refused`] for a law of its own, or numbers beyond 1e-100 to 1e100;
-    /// [`IntegrationError::NeverEnds`]; [`IntegrationError::StepBudgetSpent`] where a target without a far side is left without
-    /// a proof.
+    /// [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
         let refuse = |why: &str| IntegrationError::Refused { method: "enclosure", why: why.to_owned() };
         if !problem.laws.is_empty() {
@@ -116,10 +115,11 @@ impl Enclosure {
         }
         let mut steps = Steps::default();
         let mut flight = flight::solve(problem, detail, &mut steps)?;
-        if flight.outcome == Outcome::Undecided {
-            // What was listed for the end that is not proved.
+        if let Some(open) = steps.open {
+            // What was listed for the end is not proved.
             let end = flight.end;
             flight.events.retain(|event| event.state != end);
+            (flight.outcome, flight.end) = (Outcome::Undecided, open);
         }
         Ok(flight)
     }
@@ -158,8 +158,8 @@ impl Integrator for Enclosure {
 /// The method, as the loop sees it.
 #[derive(Debug, Default)]
 struct Steps {
-    /// Whether the end of the flight is open.
-    is_unproved: bool,
+    /// Where the flight ends, if how it ends is open.
+    open: Option<State<Ball>>,
 }
 
 /// The error of a state in the present stage, in m/s and m: N, and bounds of |ev| and |ex| alone.
@@ -592,19 +592,24 @@ impl Centre {
 
     /// From here to rest, over a box so small that the force hardly changes: `T = v/a`, `X = v²/(2 a)` with a mean `a`.
     fn to_rest(&self, law: &Law) -> Option<State<Ball>> {
-        let (depth, velocity) = (self.depth(), self.velocity());
-        let fastest = velocity.upper();
+        let velocity = self.velocity();
+        if velocity.lower() > 0.0 { self.slowed(law, velocity) } else { None }
+    }
+
+    /// The same from any of the `velocities`, none negative, at this time and depth.
+    fn slowed(&self, law: &Law, velocities: Ball) -> Option<State<Ball>> {
+        let (depth, fastest) = (self.depth(), velocities.upper());
         let speeds = Ball::between(0.0, fastest);
         let weakest = law.deceleration(depth, speeds).lower();
-        if !(weakest > 0.0 && velocity.lower() > 0.0) {
+        if !(weakest > 0.0) {
             return None;
         }
         let reach = fastest * fastest / weakest * UP;
         let box_of = Ball::between(depth.lower(), (depth + Ball::from_f64(reach)).upper());
         let deceleration = law.deceleration(box_of, speeds);
-        let way = (velocity * velocity / deceleration).scaled(0.5);
+        let way = (velocities * velocities / deceleration).scaled(0.5);
         let is_inside = deceleration.lower() > 0.0 && way.upper() <= reach;
-        let time = self.time + velocity / deceleration;
+        let time = self.time + velocities / deceleration;
         is_inside.then(|| State { time, depth: depth + way, velocity: Ball::zero() })
     }
 
@@ -720,18 +725,27 @@ impl Steps {
         }
     }
 
+    /// The end of a flight that comes to rest next to the end of a stage, on either side of it, if the next stage resists.
+    fn on_either_side(course: &Course<'_, Ball>, before: State<Ball>, limit: Ball) -> Option<State<Ball>> {
+        let stages = &course.problem.stages;
+        let next = (course.stage + 1..stages.len()).find(|index| stages[*index].end != limit)?;
+        let law = Law::new(&stages[next], course.mass)?;
+        let beyond = Centre::new(State { depth: limit, velocity: before.velocity, ..before }, &law);
+        let speeds = Ball::between(0.0, before.velocity.magnitude());
+        let furthest = beyond.slowed(&law, speeds)?;
+        is_before(furthest.depth, course.problem.limit_of(next)).then(|| State {
+            time: before.time.hull(furthest.time),
+            depth: before.depth.hull(furthest.depth),
+            velocity: Ball::zero(),
+        })
+    }
+
     /// No proof: the end that is open.
-    ///
-    /// # Errors
-    /// [`IntegrationError::StepBudgetSpent`] without a far side.
-    fn give_up(&mut self, course: &mut Course<'_, Ball>, state: State<Ball>) -> Solved<StageEnd<Ball>> {
-        if !course.problem.has_exit() {
-            let remedy = "no proof of the end was found; give the target a thickness, or take --method taylor";
-            return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: state.values() });
-        }
-        self.is_unproved = true;
+    fn give_up(&mut self, course: &mut Course<'_, Ball>, state: State<Ball>) -> StageEnd<Ball> {
+        self.open = Some(state);
         course.notes.push(UNPROVED.to_owned());
-        Ok(StageEnd::Rest(state))
+        // The loop ends at rest.
+        StageEnd::Rest(State { velocity: Ball::zero(), ..state })
     }
 
     /// Whether speed remains at `limit` through a stage that only slows, `v' = -(r + q v) v`: by its closed form.
@@ -780,7 +794,7 @@ impl StageSolver<Ball> for Steps {
         let impact = course.problem.impact_speed.value();
         let Some(law) = Law::new(&course.problem.stages[course.stage], course.mass) else {
             let state = Self::anything(course, course.state);
-            return self.give_up(course, state);
+            return Ok(self.give_up(course, state));
         };
         let mut centre = Centre::new(course.state, &law);
         match Self::arrives(&law, &centre, limit) {
@@ -791,7 +805,7 @@ impl StageSolver<Ball> for Steps {
             }
             None => {
                 let state = Self::anything(course, course.state);
-                return self.give_up(course, state);
+                return Ok(self.give_up(course, state));
             }
         }
         while course.cost.steps < STEPS_MAX {
@@ -823,28 +837,38 @@ impl StageSolver<Ball> for Steps {
                 Step::Rest(state) => return Ok(StageEnd::Rest(state)),
                 Step::Either(state) => {
                     let is_last = limit == course.problem.exit_depth;
-                    let state = if is_last { state } else { Self::anything(course, centre.state()) };
-                    return self.give_up(course, state);
+                    let beside = || Self::on_either_side(course, state, limit);
+                    let state = if is_last { Some(state) } else { beside() };
+                    let state = state.unwrap_or_else(|| Self::anything(course, centre.state()));
+                    return Ok(self.give_up(course, state));
                 }
                 Step::Unproved => break,
             }
         }
         let state = Self::anything(course, centre.state());
-        self.give_up(course, state)
+        Ok(self.give_up(course, state))
     }
 
     fn margin(&mut self, course: &mut Course<'_, Ball>) -> Solved<Bounded> {
         let margin = course.margin();
-        if self.is_unproved {
+        if self.open.is_some() {
             return Ok(Bounded { bound: margin.value.abs(), ..margin });
         }
+        let energy = course.problem.mass * course.problem.impact_speed * course.problem.impact_speed;
+        // The margin is a number, and that of a stop is continued from the depth as rounded.
+        let rounding = if course.is_through {
+            4.0 * margin.value
+        } else {
+            let force = course.problem.force(course.stage, course.state.depth, Ball::zero());
+            (force * course.state.depth / energy).magnitude()
+        };
+        let margin = Bounded { bound: margin.bound + f64::EPSILON * 2.0 * rounding, ..margin };
         if margin.is_decided() || course.is_through {
             return Ok(margin);
         }
         // Proved, and lost in the rounding of the margin: what the rest of the stage takes at least.
         let (problem, stage) = (course.problem, course.stage);
         let work = problem.stages[stage].static_work(course.state.depth, problem.limit_of(stage));
-        let energy = problem.mass * problem.impact_speed * problem.impact_speed;
         let lacking = (work / energy).scaled(-2.0);
         Ok(Bounded { value: lacking.value(), bound: lacking.radius * UP })
     }

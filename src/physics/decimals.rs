@@ -58,6 +58,8 @@ pub struct Written {
     pub numbers: Vec<(Parameter, Quantity)>,
     /// The shape of the nose and its ratio, where the factor N* was not written itself.
     pub nose: Option<(NoseShape, Quantity)>,
+    /// Numbers that may be anywhere in a ball, in place of what was written.
+    pub ranges: Vec<(Parameter, Ball)>,
 }
 
 impl Written {
@@ -66,7 +68,14 @@ impl Written {
         written.map(|(_, quantity)| quantity).filter(|quantity| quantity.value == value)
     }
 
+    fn range(&self, parameter: Parameter) -> Option<Ball> {
+        self.ranges.iter().find(|(ranged, _)| *ranged == parameter).map(|(_, ball)| *ball)
+    }
+
     fn decimal(&self, parameter: Parameter, value: f64) -> Option<Decimal> {
+        if self.range(parameter).is_some() {
+            return None;
+        }
         match self.text(parameter, value) {
             Some(quantity) => Decimal::read(&quantity.decimal).filter(|_| quantity.is_exact),
             None => Decimal::read(&format!("{value:e}")),
@@ -74,6 +83,9 @@ impl Written {
     }
 
     fn number(&self, parameter: Parameter, value: f64) -> Ball {
+        if let Some(range) = self.range(parameter) {
+            return range;
+        }
         self.text(parameter, value).map_or_else(|| Ball::decimal(value), ball_of)
     }
 }
@@ -100,7 +112,9 @@ impl Scene {
         let number = |parameter: Parameter, value: f64| match (parameter, &written.nose) {
             (Parameter::Velocity, _) => speed.unwrap_or_else(|| written.number(parameter, value)),
             (Parameter::Thickness, _) => self.total_thickness(written, value),
-            (Parameter::NoseFactor, Some((shape, ratio))) if shape.factor() == value => {
+            (Parameter::NoseFactor, Some((shape, ratio)))
+                if shape.factor() == value && written.range(parameter).is_none() =>
+            {
                 shape.factor_in(|_| ball_of(ratio))
             }
             (Parameter::StaticFactor | Parameter::Layer(_, LayerNumber::StaticFactor), _) => {
@@ -135,7 +149,7 @@ impl Scene {
             }
             _ => (concrete.follows_eq14, concrete.strength, Parameter::Strength),
         };
-        if follows && strength > 0.0 {
+        if follows && strength > 0.0 && written.range(parameter).is_none() {
             semi_empirical::static_factor_in(written.number(of, strength))
         } else {
             written.number(parameter, value)
@@ -224,7 +238,7 @@ mod tests {
         format!(
             "[projectile]\nmass = \"2 kg\"\ndiameter = \"{diameter}\"\nnose = {{ shape = \"ogive\", caliber_radius_head = 3.1 }}\n\
              [target]\nstrength = \"36 MPa\"\ndensity = \"2300 kg/m3\"\nthickness = \"{thickness}\"\n\
-             [crater]\ndepth_ratio = 3\n[impact]\nvelocity = \"300.1 m/s\"\n{more}"
+             [resistance]\nk = 3\n[impact]\nvelocity = \"300.1 m/s\"\n{more}"
         )
     }
 

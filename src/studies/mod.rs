@@ -6,6 +6,7 @@ pub mod audit;
 pub mod batch;
 #[cfg(feature = "report")]
 pub mod bench;
+pub mod boxes;
 pub mod convergence;
 pub mod critical_velocity;
 pub mod diagnosis;

@@ -231,7 +231,7 @@ fn speeds_that_perforate_are_intervals_where_a_slower_projectile_misses_a_condit
 
 #[test]
 fn formulas_refuse_ends_that_are_no_depths() {
-    for name in [MethodName::Energy, MethodName::ClosedForm] {
+    for name in [MethodName::Energy, MethodName::ClosedForm, MethodName::Enclosure] {
         let method = Method::new(name, &MethodOptions::default()).unwrap();
         let error = method.integrator().solve(&problem(SAND, 300.0), Detail::End).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("end"), "{error}");

@@ -134,7 +134,8 @@ const KNOWN: [(&str, f64, f64, f64, f64, f64); 14] = [
 /// Methods that take a law, to round-off or to `rtol`.
 pub(super) fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
     let names = MethodName::built().filter(|name| {
-        !matches!(name, MethodName::Energy | MethodName::ClosedForm) && name.accuracy() != Accuracy::Step
+        !matches!(name, MethodName::Energy | MethodName::ClosedForm | MethodName::Enclosure)
+            && name.accuracy() != Accuracy::Step
     });
     names
         .map(|name| {
@@ -216,7 +217,7 @@ fn a_law_in_code_without_a_value_ends_the_flight_with_an_error() {
 
 #[test]
 fn methods_that_are_formulas_refuse_a_law() {
-    for name in [MethodName::Energy, MethodName::ClosedForm] {
+    for name in [MethodName::Energy, MethodName::ClosedForm, MethodName::Enclosure] {
         let method = Method::new(name, &MethodOptions::default()).unwrap();
         let error = method.integrator().solve(&problem("P + Q*V^2", 300.0), Detail::End).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
