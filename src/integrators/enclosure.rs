@@ -51,6 +51,9 @@ const RETRIES_MAX: u32 = 8;
 /// Steps allowed for one flight.
 const STEPS_MAX: u64 = 100_000;
 
+/// Velocity over that at the start of a step, below which a passage is sought in double words.
+const SLOW: f64 = 1e-3;
+
 /// Least and greatest magnitude of a number for which a bound was derived (docs/enclosures.md, section 2).
 const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
@@ -474,6 +477,24 @@ impl Series {
         true
     }
 
+    /// A time nearer to the passage of `far`, from one that is near it: by Newton's method in double words. Where the speed is
+    /// all but lost, the numbers of [`Series::near`] leave half of the digits of the time open.
+    fn passage(&self, mut time: f64, far: DoubleWord) -> f64 {
+        for _ in 0..20 {
+            let ([v, x], _) = self.at(time, &self.sizes(time));
+            let step = x.plus(-far).hi / v.hi;
+            let next = time - step;
+            if !(v.hi > 0.0 && next > 0.0) || next == time {
+                break;
+            }
+            time = next;
+            if step.abs() <= ROUNDOFF * time {
+                break;
+            }
+        }
+        time
+    }
+
     /// A place in 0 to `end` near which `f` changes its sign from positive, by regula falsi and bisection.
     fn root(&self, end: f64, f: impl Fn([f64; 3]) -> (f64, f64)) -> f64 {
         let (mut low, mut high) = (0.0, end);
@@ -687,7 +708,12 @@ impl Steps {
             Some((before, before.to_rest(law)?))
         };
         if passes {
-            let (mut gap, from) = place(series.root(until, |[v, _, x]| (far - x, -v)));
+            let mut near = series.root(until, |[v, _, x]| (far - x, -v));
+            if series.near(near)[0] < SLOW {
+                let missing = (limit - Ball::around(centre.x, 0.0)).mid.scaled(1.0 / length);
+                near = series.passage(near, missing);
+            }
+            let (mut gap, from) = place(near);
             for _ in 0..RETRIES_MAX {
                 if let Some(state) = at_limit(gap, from).filter(|state| state.velocity.lower() > 0.0) {
                     return Step::Limit(state);
