@@ -17,7 +17,7 @@
 use smallvec::SmallVec;
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved};
+use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved, refuse_laws};
 use crate::physics::ball::{Ball, DoubleWord, TINY, UNIT, UP};
 use crate::physics::{Outcome, Problem, Scalar, Stage, State};
 
@@ -91,12 +91,7 @@ impl Enclosure {
     /// [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
         let refuse = |why: &str| IntegrationError::Refused { method: "enclosure", why: why.to_owned() };
-        if !problem.laws.is_empty() {
-            return Err(refuse(
-                "its proofs are those of p + s x + r V + q V² and of ends at depths, and a stage has a law or an end of its \
-                 own; take --method taylor",
-            ));
-        }
+        refuse_laws(problem, "enclosure")?;
         let over_mass = |stage: &Stage<Ball>| {
             [stage.static_force, stage.stiffness, stage.viscosity, stage.drag].map(|number| number / problem.mass)
         };

@@ -171,7 +171,7 @@ impl<'a> Region<'a> {
             | P::StaticFactor
             | P::CraterStiffness
             | P::Thickness
-            | P::Layer(_, L::Strength | L::StaticFactor)
+            | P::Layer(_, L::Strength | L::StaticFactor | L::Viscosity)
             | P::Stage(_, S::StaticForce | S::Stiffness | S::Viscosity | S::Drag) => Some(Rises::No),
             P::Density | P::NoseFactor | P::InertiaFactor | P::Layer(_, L::Density) if drag_only_slows => {
                 Some(Rises::No)

@@ -142,7 +142,7 @@ fn one_end_of_an_enclosed_critical_velocity_stops_and_the_other_perforates() {
 fn what_cannot_be_enclosed_is_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let words = run_in(folder.path(), "solve law-power --method enclosure").refused();
-    assert!(words.contains("a stage has a law or an end of its own"), "{words}");
+    assert!(words.contains("a stage has a law of its own"), "{words}");
 }
 
 #[test]
