@@ -13,6 +13,7 @@ use super::output::{
 };
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::input::name_of;
+use crate::exchange::scene_file::SceneFile;
 use crate::exchange::tables::{self, Kind, read_bytes};
 use crate::physics::semi_empirical::NDRC_END;
 use crate::physics::{Criterion, Outcome};
@@ -90,12 +91,12 @@ impl Ask for SweepArgs {
 
     fn ask(&self) -> Result<Answer<SweepJson>, CliError> {
         self.table().map(check_format).transpose()?;
-        let scene = self.scene.settings.read(&self.scene.path)?;
+        let SceneFile { scene, written } = self.scene.settings.read_file(&self.scene.path)?;
         let axes: Vec<Axis> = self.vary.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         if axes.len() > 2 {
             return Err(CliError::usage("--vary may be given once or twice", "sweep the third number in another run"));
         }
-        let plan = Plan::new(scene, &axes)?;
+        let plan = Plan::new(scene, &axes)?.of_written(written);
         // Table and figures replace neither the scene nor the measured points, nor one another.
         let mut inputs = vec![("the scene", Path::new(&self.scene.path))];
         inputs.extend(self.data.as_deref().map(|path| ("the measured points", path)));

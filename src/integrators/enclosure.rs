@@ -92,18 +92,19 @@ impl Enclosure {
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
         let refuse = |why: &str| IntegrationError::Refused { method: "enclosure", why: why.to_owned() };
         refuse_laws(problem, "enclosure")?;
-        let over_mass = |stage: &Stage<Ball>| {
-            [stage.static_force, stage.stiffness, stage.viscosity, stage.drag].map(|number| number / problem.mass)
+        let is_in_range = |number: Ball| {
+            let size = number.value().abs();
+            size == 0.0 || size == f64::INFINITY || MAGNITUDES.contains(&size)
         };
-        let numbers = problem.stages.iter().flat_map(over_mass);
-        let ends = problem.stages.iter().map(|stage| stage.end);
-        let numbers = numbers.chain(ends).chain([problem.mass, problem.impact_speed, problem.exit_depth]);
-        for number in numbers.filter(|number| number.value().abs() < f64::INFINITY) {
-            if !(number.value() == 0.0 || MAGNITUDES.contains(&number.value().abs())) {
-                return Err(refuse(
-                    "its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor",
-                ));
-            }
+        let is_suited = |stage: &Stage<Ball>| {
+            let forces = [stage.static_force, stage.stiffness, stage.viscosity, stage.drag];
+            is_in_range(stage.end) && forces.iter().all(|f| is_in_range(*f) && is_in_range(*f / problem.mass))
+        };
+        let whole = [problem.mass, problem.impact_speed, problem.exit_depth];
+        if !(whole.into_iter().all(is_in_range) && problem.stages.iter().all(is_suited)) {
+            return Err(refuse(
+                "its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor",
+            ));
         }
         if !boundaries_are_apart(problem) {
             return Err(refuse(
@@ -118,6 +119,10 @@ impl Enclosure {
             let end = flight.end;
             flight.events.retain(|event| event.state != end);
             (flight.outcome, flight.end) = (Outcome::Undecided, open);
+        } else if flight.outcome == Outcome::Undecided {
+            // Proved, however wide its margin is.
+            let is_stop = flight.end.velocity.is_zero();
+            flight.outcome = if is_stop { problem.stop_in(flight.stage) } else { Outcome::Perforated };
         }
         Ok(flight)
     }
@@ -688,7 +693,7 @@ impl Steps {
             // Just before the event, by what the numbers round and by the error.
             let [v, slope, _] = series.near(from);
             let error = if passes {
-                centre.error.depth / length / v.abs()
+                (centre.error.depth + limit.radius) / length / v.abs()
             } else {
                 centre.error.velocity / series.velocity / slope.abs()
             };
@@ -737,7 +742,8 @@ impl Steps {
 
     /// Everything that may follow from `state` on where nothing is proved: at the end of the flight, until the exit.
     fn anything(course: &Course<'_, Ball>, state: State<Ball>) -> State<Ball> {
-        let resist = course.problem.stages[course.stage..].iter().all(Stage::resists);
+        let resists = |stage: &Stage<Ball>| stage.static_force.lower() >= 0.0 && stage.stiffness.lower() >= 0.0;
+        let resist = course.problem.stages[course.stage..].iter().all(resists);
         let fastest = if resist { state.velocity.upper() } else { f64::INFINITY };
         State {
             time: Ball::around(DoubleWord::of(state.time.lower()), f64::INFINITY),
@@ -811,6 +817,15 @@ impl Steps {
 
 impl StageSolver<Ball> for Steps {
     fn solve_stage(&mut self, course: &mut Course<'_, Ball>) -> Solved<StageEnd<Ball>> {
+        let stage = &course.problem.stages[course.stage];
+        let is_open = |number: Ball| number.lower() < 0.0 && number.upper() > 0.0;
+        if course.problem.limit_of(course.stage).value() == f64::INFINITY
+            && (is_open(stage.static_force) || is_open(stage.stiffness))
+        {
+            // Whether anything stops it is not known.
+            let state = Self::anything(course, course.state);
+            return Ok(self.give_up(course, state));
+        }
         let limit = course.limit()?;
         let impact = course.problem.impact_speed.value();
         let Some(law) = Law::new(&course.problem.stages[course.stage], course.mass) else {

@@ -149,8 +149,11 @@ impl Ball {
         Self::between(a.min(c), b.max(d))
     }
 
-    /// The whole number `digits`.
+    /// The whole number `digits`; nothing is known of one beyond 2^126.
     pub fn whole(digits: i128) -> Self {
+        if digits.unsigned_abs() > 1 << 126 {
+            return Self::from_f64(f64::NAN);
+        }
         let hi = digits as f64;
         let rest = digits.saturating_sub(hi as i128);
         let lo = rest as f64;
@@ -291,7 +294,9 @@ impl Div for Ball {
         let mid = quick_two_sum(first, rest.mid.hi / other.mid.hi);
         let residual = dividend - divisor * Self::around(mid, 0.0);
         let quotient = mid.hi.abs() * UP;
-        let error = (residual.magnitude() + self.radius + quotient * other.radius) * UP / least * UP;
+        let is_exact = self.radius == 0.0 && other.radius == 0.0 && residual.is_zero();
+        let underflow = if is_exact && mid.hi.abs() > 1e-250 { 0.0 } else { TINY };
+        let error = (residual.magnitude() + self.radius + quotient * other.radius) * UP / least * UP + underflow;
         Self { mid, radius: if least > 0.0 && error.is_finite() { error } else { f64::INFINITY } }
     }
 }
@@ -337,9 +342,11 @@ impl Scalar for Ball {
         let mid = quick_two_sum(first, rest.mid.hi / (2.0 * first));
         let root = Self::around(mid, 0.0);
         // |sqrt(m) - y| = |m - y²|/(sqrt(m) + y), and |sqrt(m + r) - sqrt(m)| <= r/sqrt(m).
-        let error = ((radicand - root * root).magnitude() + self.radius) * UP / (mid.hi / UP) * UP;
-        // A midpoint that is no root to 12 digits proves nothing.
-        Self { mid, radius: if error < mid.hi * (UP - 1.0) { error } else { f64::INFINITY } }
+        let least = mid.hi / UP;
+        let residual = (radicand - root * root).magnitude() * UP / least * UP;
+        let error = (residual + self.radius / least) * UP;
+        // With a midpoint that is a root to 12 digits, sqrt(mc) is no less than mid/UP.
+        Self { mid, radius: if residual < mid.hi * (UP - 1.0) { error } else { f64::INFINITY } }
     }
 
     fn decimal(value: f64) -> Self {

@@ -4,7 +4,7 @@
 //! make exactly. Depths that are equal as decimals, such as k d and H, are made the same ball; the order of others is that of
 //! their values.
 
-use super::ball::Ball;
+use super::ball::{Ball, TINY};
 use super::nose::NoseShape;
 use super::parameter::{LayerNumber, Parameter, StageNumber};
 use super::problem::Problem;
@@ -45,6 +45,10 @@ impl Decimal {
         Some(Self { digits: a.checked_add(b)?, exponent })
     }
 
+    fn is_above(self, other: Self) -> Option<bool> {
+        self.aligned(other).map(|(a, b, _)| a > b)
+    }
+
     fn equals(self, other: Self) -> bool {
         self.aligned(other).is_some_and(|(a, b, _)| a == b)
     }
@@ -77,7 +81,7 @@ impl Written {
             return None;
         }
         match self.text(parameter, value) {
-            Some(quantity) => Decimal::read(&quantity.decimal).filter(|_| quantity.is_exact),
+            Some(quantity) => Decimal::read(&quantity.decimal).filter(|_| quantity.relative_error == 0.0),
             None => Decimal::read(&format!("{value:e}")),
         }
     }
@@ -90,12 +94,15 @@ impl Written {
     }
 }
 
-/// What was written, as a ball; the SI value of some units is no decimal, and is known to two roundings.
+/// What was written, as a ball; the SI value of some units is no decimal.
 fn ball_of(quantity: &Quantity) -> Ball {
-    let exact = units::decimal(&quantity.decimal).map(|(digits, exponent)| Ball::of_decimal(digits, exponent));
-    match exact {
-        Some(exact) if quantity.is_exact => exact,
-        _ => Ball::from_f64(quantity.value).widened(4.0 * f64::EPSILON * quantity.value.abs()),
+    let decimal = units::decimal(&quantity.decimal).map(|(digits, exponent)| Ball::of_decimal(digits, exponent));
+    match decimal {
+        Some(exact) if quantity.relative_error == 0.0 => exact,
+        _ => {
+            let error = quantity.relative_error + 2.0 * f64::EPSILON;
+            Ball::from_f64(quantity.value).widened(error * quantity.value.abs())
+        }
     }
 }
 
@@ -123,8 +130,55 @@ impl Scene {
             _ => written.number(parameter, value),
         };
         let mut problem = self.resolve_in(impact_speed, number)?;
+        self.check_choices(written)?;
         self.unite_depths(written, &mut problem);
         Ok(problem)
+    }
+
+    /// Which layer lies behind k d, and which branch of the NDRC relation holds, is chosen by `f64`: the decimals must choose
+    /// the same.
+    fn check_choices(&self, written: &Written) -> Resolved<()> {
+        let Some(concrete) = self.concrete() else { return Ok(()) };
+        let number = |parameter, value| written.decimal(parameter, value);
+        if !concrete.layers.is_empty() && concrete.crater_ratio != 0.0 {
+            let crater = number(Parameter::CraterRatio, concrete.crater_ratio)
+                .zip(number(Parameter::Diameter, concrete.diameter))
+                .and_then(|(ratio, diameter)| ratio.times(diameter));
+            let mut sum = Some(Decimal { digits: 0, exponent: 0 });
+            let mut end = 0.0;
+            for (index, layer) in concrete.layers.iter().enumerate().take(concrete.layers.len() - 1) {
+                let thickness = number(Parameter::Layer(index, LayerNumber::Thickness), layer.thickness);
+                sum = sum.zip(thickness).and_then(|(sum, thickness)| sum.plus(thickness));
+                end += layer.thickness;
+                let told = sum.zip(crater).and_then(|(sum, crater)| sum.is_above(crater));
+                let depth = concrete.crater_depth();
+                let is_told = match told {
+                    Some(is_behind) => is_behind == (end > depth),
+                    // Without the decimals, what no rounding changes.
+                    None => (end - depth).abs() > 1e-6 * depth,
+                };
+                if !is_told {
+                    return Err(ResolveError::ChosenByRounding("the end of a layer and the crater depth k d"));
+                }
+            }
+        }
+        if let (Criterion::Ndrc, Some(thickness)) = (self.criterion, self.thickness) {
+            let ratio = thickness / concrete.diameter;
+            let is_far = (ratio / semi_empirical::NDRC_FIRST_BRANCH_END - 1.0).abs() > 1e-6;
+            if !is_far || written.range(Parameter::Thickness).or(written.range(Parameter::Diameter)).is_some() {
+                let wide =
+                    self.total_thickness(written, thickness) / written.number(Parameter::Diameter, concrete.diameter);
+                let beyond = wide - Ball::decimal(semi_empirical::NDRC_FIRST_BRANCH_END);
+                if !(beyond.lower() > 0.0 || beyond.upper() < 0.0)
+                    || (beyond.value() <= 0.0) != (ratio <= semi_empirical::NDRC_FIRST_BRANCH_END)
+                {
+                    return Err(ResolveError::ChosenByRounding(
+                        "H/d and the end of the first branch of the NDRC relation",
+                    ));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// H, with layers the sum of theirs.
@@ -172,6 +226,9 @@ impl Scene {
             }
             if are_equal(exit, *end) {
                 stage.end = problem.exit_depth;
+            } else if stage.end == problem.exit_depth && stage.end.radius > 0.0 {
+                // Two decimals of so many digits that their balls are the same.
+                stage.end = stage.end.widened(TINY);
             }
             before = Some((*end, stage.end));
         }
@@ -258,6 +315,25 @@ mod tests {
         lies_in(of.stages[1].drag, "0.46788109409703093");
         lies_in(of.stages[0].end, "0.1503");
         lies_in(of.stages[0].stiffness, "5744546.13534595");
+    }
+
+    /// 100 mm and 50 mm are 0.15000000000000002 m as `f64`, behind k d = 0.15 m; as written they end there.
+    #[test]
+    fn a_layer_that_ends_at_k_d_as_written_and_not_as_rounded_is_refused() {
+        let text = "[projectile]\nmass = 5\ndiameter = \"75 mm\"\nnose.factor = 0.5\n[resistance]\nk = 2\n[impact]\nvelocity = 250\n\
+                    [[target.layer]]\nthickness = \"100 mm\"\nstrength = \"20 MPa\"\ndensity = 2300\n\
+                    [[target.layer]]\nthickness = \"50 mm\"\nstrength = \"20 MPa\"\ndensity = 2300\n\
+                    [[target.layer]]\nthickness = \"1 m\"\nstrength = \"100 MPa\"\ndensity = 2300\n";
+        let file = SceneFile::from_toml(text, "layers.toml", &[]).unwrap();
+        assert!(matches!(file.scene.enclosed(&file.written, None), Err(ResolveError::ChosenByRounding(_))));
+    }
+
+    /// H/d = 2.997945 + 2e-16, and the f64 nearest to that is 2.997945.
+    #[test]
+    fn a_branch_of_the_ndrc_relation_that_rounding_would_choose_is_refused() {
+        let text = slab("10.2 mm", "30.579039000000002 mm", "[perforation]\ncriterion = \"ndrc\"\n");
+        let file = SceneFile::from_toml(&text, "scene.toml", &[]).unwrap();
+        assert!(matches!(file.scene.enclosed(&file.written, None), Err(ResolveError::ChosenByRounding(_))));
     }
 
     #[test]

@@ -115,7 +115,8 @@ impl ForceTable {
         self.0[behind.saturating_sub(1)..].windows(2).flat_map(move |rows| {
             let (a, b) = (rows[0], rows[1]);
             let [ax, af, bx, bf] = [a.depth, a.force, b.depth, b.force].map(S::decimal);
-            let stiffness = (bf - af).over(bx - ax);
+            // A plateau has none, exactly.
+            let stiffness = if a.force == b.force { S::zero() } else { (bf - af).over(bx - ax) };
             let static_force = if stiffness.value() == 0.0 { af } else { af - stiffness * ax };
             let law = Stage { static_force, stiffness, ..Stage::free() };
             let (start, force) = if from > a.depth {

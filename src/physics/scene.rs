@@ -319,6 +319,9 @@ pub enum ResolveError {
         /// Thickness of the target (m); infinite when absent.
         thickness: f64,
     },
+    /// Two depths that 64-bit numbers do not tell apart as the decimals do, of which one would decide the force.
+    #[error("{0} lie so close that rounding decides which comes first")]
+    ChosenByRounding(&'static str),
     /// A coefficient overflows, or underflows to where its digits are lost.
     #[error("{quantity} comes to {}, beyond the range of 64-bit numbers", Shown(*.value))]
     OutOfRange {
@@ -349,6 +352,7 @@ impl Advice for ResolveError {
             Self::NothingFollows(_) => "add the stage that follows",
             Self::TargetGoesOn(_) => "leave out the end of the last stage, or end the target there",
             Self::LayersDoNotSumUp { .. } => "leave out the thickness; it follows from the layers",
+            Self::ChosenByRounding(_) => "move one of them by 1e-15 of itself, or take --method taylor",
             Self::OutOfRange { .. } => "check the units of the scene; its numbers lie too far apart",
         }
         .to_owned()

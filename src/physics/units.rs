@@ -208,22 +208,21 @@ pub struct Quantity {
     /// The decimal as written, times that of the unit: `269e-4` for `26.9 mm`. It is the exact value where that of the
     /// unit is a decimal of at most 17 digits, as for metric units; see [`quantity`] for others.
     pub decimal: String,
-    /// Whether the decimal is the exact value.
-    pub is_exact: bool,
+    /// How far off the decimal may be, over itself: zero where it is the exact value.
+    pub relative_error: f64,
 }
 
-/// Most digits of the SI value of a unit that are taken for all of them: 45 units have 16 or 17, rounded, and some of 14 and 15
-/// are rounded too.
-const EXACT_DIGITS: usize = 13;
-
-/// The pound-force has 14, by definition.
-const POUND_FORCE: &str = "44482216152605";
-
-/// Whether the decimal nearest to the SI value `coefficient` of a unit is that value.
-fn is_decimal(coefficient: f64) -> bool {
+/// How far off the decimal nearest to the SI value `coefficient` of a unit may be: nothing up to 13 digits and for the
+/// pound-force, which has 14 by definition; the rounding of 14 or 15 digits; that of an `f64`, and of the product, beyond.
+fn error_of(coefficient: f64) -> f64 {
     let text = format!("{coefficient:e}");
     let digits: String = text.split('e').next().unwrap_or_default().chars().filter(char::is_ascii_digit).collect();
-    digits.len() <= EXACT_DIGITS || digits == POUND_FORCE
+    match digits.len() {
+        ..=13 => 0.0,
+        _ if digits == "44482216152605" => 0.0,
+        14 | 15 => 1e-13,
+        _ => 4.0 * f64::EPSILON,
+    }
 }
 
 impl Quantity {
@@ -232,7 +231,7 @@ impl Quantity {
     /// # Errors
     /// As [`number`].
     pub fn bare(decimal: &str) -> Result<Self, QuantityError> {
-        Ok(Self { value: number(decimal)?, decimal: decimal.to_owned(), is_exact: true })
+        Ok(Self { value: number(decimal)?, decimal: decimal.to_owned(), relative_error: 0.0 })
     }
 
     /// A number with a unit of `dimension`.
@@ -245,8 +244,8 @@ impl Quantity {
             Some(has) => QuantityError::WrongDimension { unit: unit.to_owned(), has },
             None => QuantityError::UnknownUnit { unit: unit.to_owned() },
         })?;
-        let (decimal, is_exact) = product(digits, coefficient);
-        Ok(Self { is_exact, ..Self::bare(&decimal)? })
+        let (decimal, relative_error) = product(digits, coefficient);
+        Ok(Self { relative_error, ..Self::bare(&decimal)? })
     }
 
     /// A number with any unit, and the powers of dimensions that the unit is made of ([`compound`]).
@@ -257,8 +256,10 @@ impl Quantity {
         let (digits, unit) = number_and_unit(text)?;
         let unknown = || QuantityError::UnknownUnit { unit: unit.to_owned() };
         let (coefficient, powers) = compound(unit).ok_or_else(unknown)?;
-        let (decimal, _) = product(digits, coefficient);
-        Ok((Self { is_exact: false, ..Self::bare(&decimal)? }, powers))
+        let (decimal, relative_error) = product(digits, coefficient);
+        // The coefficient of a product of units is rounded at each of them.
+        let relative_error = relative_error + 8.0 * f64::EPSILON;
+        Ok((Self { relative_error, ..Self::bare(&decimal)? }, powers))
     }
 }
 
@@ -347,8 +348,8 @@ pub fn scaled(digits: &str, coefficient: f64) -> Result<f64, QuantityError> {
     number(&product(digits, coefficient).0)
 }
 
-/// Decimal text of `number · coefficient`, and whether it is exact: 38 digits hold it, and the coefficient is a decimal.
-fn product(number: &str, coefficient: f64) -> (String, bool) {
+/// Decimal text of `number · coefficient`, and how far off it may be, over itself.
+fn product(number: &str, coefficient: f64) -> (String, f64) {
     let exact = || {
         let (left, left_exponent) = decimal(number)?;
         let (right, right_exponent) = decimal(&format!("{coefficient:e}"))?;
@@ -356,8 +357,11 @@ fn product(number: &str, coefficient: f64) -> (String, bool) {
     };
     // Beyond 38 digits the last ones do not matter: two roundings more.
     match exact() {
-        Some(text) => (text, is_decimal(coefficient)),
-        None => (format!("{:e}", number.parse().unwrap_or(f64::NAN) * coefficient), false),
+        Some(text) => (text, error_of(coefficient)),
+        None => {
+            let rounded = number.parse().unwrap_or(f64::NAN) * coefficient;
+            (format!("{rounded:e}"), error_of(coefficient) + 4.0 * f64::EPSILON)
+        }
     }
 }
 

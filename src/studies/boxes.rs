@@ -167,10 +167,10 @@ impl<'a> Region<'a> {
         match parameter {
             P::Velocity => Some(Rises::Yes),
             P::Mass if self.resists() => Some(Rises::Yes),
+            P::Thickness if self.resists() => Some(Rises::No),
             P::Strength
             | P::StaticFactor
             | P::CraterStiffness
-            | P::Thickness
             | P::Layer(_, L::Strength | L::StaticFactor | L::Viscosity)
             | P::Stage(_, S::StaticForce | S::Stiffness | S::Viscosity | S::Drag) => Some(Rises::No),
             P::Density | P::NoseFactor | P::InertiaFactor | P::Layer(_, L::Density) if drag_only_slows => {
@@ -185,7 +185,9 @@ impl<'a> Region<'a> {
         match &self.scene.resistance {
             Resistance::Concrete(_) => true,
             Resistance::Stages(stages) => {
-                let is_changed = self.sides.iter().any(|side| matches!(side.parameter, Parameter::Stage(..)));
+                // A table may drive.
+                let is_changed = !self.scene.forces.is_empty()
+                    || self.sides.iter().any(|side| matches!(side.parameter, Parameter::Stage(..)));
                 !is_changed && stages.iter().all(crate::physics::Stage::resists)
             }
         }
@@ -195,7 +197,8 @@ impl<'a> Region<'a> {
     /// c rises with Q if `M V0² >= k d P`.
     fn drag_only_slows(&self, slowest: f64) -> bool {
         let Some(concrete) = self.scene.concrete() else { return true };
-        if concrete.crater_ratio == 0.0 || concrete.crater_stiffness != CraterStiffness::Continuous {
+        let has_no_crater = concrete.crater_ratio == 0.0 && self.side(Parameter::CraterRatio).is_none();
+        if has_no_crater || concrete.crater_stiffness != CraterStiffness::Continuous {
             return true;
         }
         let highest = |side: &Side| {
@@ -204,10 +207,21 @@ impl<'a> Region<'a> {
         };
         let corner = self.sides.iter().filter(|side| side.parameter != Parameter::Velocity).map(highest);
         let Some(scene) = self.at(corner) else { return false };
-        let speed = Ball::from_f64(slowest);
-        let Ok(problem) = scene.enclosed(self.written, Some(speed)) else { return false };
+        // Below the decimal that a speed is written as.
+        let speed = Ball::from_f64(slowest.next_down().max(0.0));
+        let Ok(problem) = scene.enclosed(&self.unwritten(), Some(speed)) else { return false };
         let (depth, beyond) = problem.crater_depth_and_tunnel();
         (problem.mass * speed * speed - depth * beyond.static_force).lower() >= 0.0
+    }
+
+    /// What was written, but for the sides: their values are shortest decimals.
+    fn unwritten(&self) -> Written {
+        let mut written = self.written.clone();
+        written.numbers.retain(|(parameter, _)| self.side(*parameter).is_none());
+        if self.side(Parameter::NoseFactor).is_some() {
+            written.nose = None;
+        }
+        written
     }
 
     /// The scene with these numbers.
@@ -242,7 +256,7 @@ impl<'a> Region<'a> {
         let scene = self.at(self.sides.iter().filter_map(number).chain(middles))?;
         let range =
             |&(parameter, low, high): &(Parameter, f64, f64)| (parameter, Ball::decimal(low).hull(Ball::decimal(high)));
-        Some((scene, Written { ranges: piece.iter().map(range).collect(), ..self.written.clone() }))
+        Some((scene, Written { ranges: piece.iter().map(range).collect(), ..self.unwritten() }))
     }
 
     /// The pieces of the `open` sides.
@@ -277,7 +291,10 @@ impl<'a> Region<'a> {
             )
         });
         let has_layers = self.scene.concrete().is_some_and(|concrete| !concrete.layers.is_empty());
-        moves_depths && (has_layers || self.scene.criterion != Criterion::FullDepth)
+        // Which rows of a table a stage has is no one answer where its end is none.
+        let cuts_tables = open.iter().any(|side| matches!(side.parameter, Parameter::Stage(_, StageNumber::End)))
+            && !self.scene.forces.is_empty();
+        cuts_tables || (moves_depths && (has_layers || self.scene.criterion != Criterion::FullDepth))
     }
 
     /// What becomes of the projectile anywhere in the box.
@@ -285,7 +302,7 @@ impl<'a> Region<'a> {
     /// `None` without a proof.
     ///
     /// # Errors
-    /// As [`Scene::resolve`], and of [`crate::integrators::Enclosure::enclose`].
+    /// As [`Scene::resolve`].
     pub fn flight(&self) -> Studied<Option<Ranges>> {
         let slows = self.drag_only_slows(self.slowest_speed());
         let open: Vec<Side> = self.open(self.slowest_speed()).copied().collect();
@@ -296,8 +313,9 @@ impl<'a> Region<'a> {
         for piece in Self::pieces(&open) {
             let solved = |asked, is_least| -> Studied<Option<Flight<Ball>>> {
                 let Some((scene, written)) = self.corner(asked, is_least, slows, &piece) else { return Ok(None) };
-                let flight = enclosure::flight(&scene, &written, Detail::End)??;
-                Ok(Some(flight).filter(|flight| flight.outcome != Outcome::Undecided))
+                // A piece that is refused, or a corner without an end, leaves the box without a proof.
+                let flight = enclosure::flight(&scene, &written, Detail::End)?.ok();
+                Ok(flight.filter(|flight| flight.outcome != Outcome::Undecided))
             };
             let (Some(slow), Some(fast)) = (solved(Asked::Energy, true)?, solved(Asked::Energy, false)?) else {
                 return Ok(None);
@@ -346,7 +364,7 @@ impl<'a> Region<'a> {
             let Some(scene) = self.at(middles) else { return unknown };
             let ranges =
                 piece.iter().map(|&(parameter, low, high)| (parameter, Ball::decimal(low).hull(Ball::decimal(high))));
-            let written = Written { ranges: ranges.collect(), ..self.written.clone() };
+            let written = Written { ranges: ranges.collect(), ..self.unwritten() };
             let Ok(Ok(flight)) = enclosure::flight(&scene, &written, Detail::End) else { return unknown };
             if flight.outcome == Outcome::Undecided {
                 return unknown;
@@ -486,6 +504,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Driven and then braked: more thickness is less speed, and then more.
+    #[test]
+    fn a_thickness_has_no_sign_where_a_stage_drives() {
+        let text = "projectile.mass = 2\nimpact.velocity = 100\ntarget.thickness = 0.2\n\
+                    [[stage]]\nstatic_force = 20000\nend = 0.2\n[[stage]]\nstatic_force = -20000\n";
+        let SceneFile { scene, written } = SceneFile::from_toml(text, "driven.toml", &[]).unwrap();
+        let of = Region::new(&scene, &written, &sides(&["target.thickness=0.1:0.3"])).unwrap();
+        // sqrt(100² - 2 · 20000 · 0.2/2) at H = 0.2 m.
+        let least = of.flight().unwrap().map_or(0.0, |ranges| ranges.end.velocity_m_s.0.unwrap());
+        assert!(least <= 77.459_666_924_148_34, "{least}");
     }
 
     #[test]

@@ -111,19 +111,18 @@ pub fn flight(
     Ok(Enclosure.enclose(&scene.enclosed(written, None)?, detail))
 }
 
-/// What is proved of `scene`, whose numbers count as their shortest decimals: of its flight, if it has a speed, and of V_c, if
-/// it has a far side.
+/// What is proved of `scene`, of the numbers that were `written`: of its flight, if it has a speed, and of V_c, if it has a far
+/// side.
 ///
 /// # Errors
 /// As [`flight`].
-pub fn bounds(scene: &Scene) -> Studied<Bounds> {
-    let written = Written::default();
+pub fn bounds(scene: &Scene, written: &Written) -> Studied<Bounds> {
     let mut bounds = Bounds::default();
     if scene.velocity.is_some() {
-        bounds = bounds.with_end(&flight(scene, &written, Detail::End)??.end);
+        bounds = bounds.with_end(&flight(scene, written, Detail::End)??.end);
     }
     if scene.thickness.is_some() {
-        bounds = bounds.with_critical(critical(scene, &written));
+        bounds = bounds.with_critical(critical(scene, written));
     }
     Ok(bounds)
 }

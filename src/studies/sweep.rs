@@ -18,6 +18,7 @@ use super::enclosure::{self, Bounds};
 use super::error::{Studied, StudyError};
 use crate::exchange::tables::{self, Column, Format, Kind, Others, TableError, Value};
 use crate::integrators::{Detail, Integrator, MethodName};
+use crate::physics::decimals::Written;
 use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::parameter::{Parameter, ParameterError};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
@@ -164,6 +165,7 @@ impl Axis {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     scene: Scene,
+    written: Written,
     axes: SmallVec<[Axis; 2]>,
 }
 
@@ -293,7 +295,13 @@ impl Plan {
         for axis in axes {
             axis.parameter.set(&mut probe, axis.from)?;
         }
-        Ok(Self { scene, axes: axes.iter().cloned().collect() })
+        Ok(Self { scene, written: Written::default(), axes: axes.iter().cloned().collect() })
+    }
+
+    /// The same sweep, with what was written for the numbers of its scene: for enclosures.
+    #[must_use]
+    pub fn of_written(self, written: Written) -> Self {
+        Self { written, ..self }
     }
 
     /// The axes.
@@ -383,7 +391,7 @@ impl Plan {
         }
         self.compare(scene, integrator, row);
         if let Some(bounds) = &mut row.bounds {
-            *bounds = enclosure::bounds(scene)?;
+            *bounds = enclosure::bounds(scene, &self.written)?;
         }
         critical?;
         let is_nothing = row.dimensionless_energy == Some(0.0) && row.eq15_unrounded == Some(0.0);
