@@ -90,21 +90,10 @@ impl Enclosure {
     /// [`IntegrationError::Refused`] for a law of its own, or numbers beyond 1e-100 to 1e100;
     /// [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
-        let refuse = |why: &str| IntegrationError::Refused { method: "enclosure", why: why.to_owned() };
         refuse_laws(problem, "enclosure")?;
-        let is_in_range = |number: Ball| {
-            let size = number.value().abs();
-            size == 0.0 || size == f64::INFINITY || MAGNITUDES.contains(&size)
-        };
-        let is_suited = |stage: &Stage<Ball>| {
-            let forces = [stage.static_force, stage.stiffness, stage.viscosity, stage.drag];
-            is_in_range(stage.end) && forces.iter().all(|f| is_in_range(*f) && is_in_range(*f / problem.mass))
-        };
-        let whole = [problem.mass, problem.impact_speed, problem.exit_depth];
-        if !(whole.into_iter().all(is_in_range) && problem.stages.iter().all(is_suited)) {
-            return Err(refuse(
-                "its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor",
-            ));
+        let depths = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]);
+        if !depths.chain([problem.mass, problem.impact_speed]).all(is_in_range) {
+            return Err(out_of_range());
         }
         if !boundaries_are_apart(problem) {
             return Err(refuse(
@@ -126,6 +115,20 @@ impl Enclosure {
         }
         Ok(flight)
     }
+}
+
+/// Whether bounds are derived for numbers of this size: none, or infinite, or in [`MAGNITUDES`].
+fn is_in_range(number: Ball) -> bool {
+    let size = number.value().abs();
+    size == 0.0 || size == f64::INFINITY || MAGNITUDES.contains(&size)
+}
+
+fn refuse(why: &str) -> IntegrationError {
+    IntegrationError::Refused { method: "enclosure", why: why.to_owned() }
+}
+
+fn out_of_range() -> IntegrationError {
+    refuse("its bounds are derived for numbers from 1e-100 to 1e100 in SI units; take --method taylor")
 }
 
 /// Whether everything in `depth` lies in front of `limit`, which is infinite where rest alone can end a stage.
@@ -818,6 +821,10 @@ impl Steps {
 impl StageSolver<Ball> for Steps {
     fn solve_stage(&mut self, course: &mut Course<'_, Ball>) -> Solved<StageEnd<Ball>> {
         let stage = &course.problem.stages[course.stage];
+        let forces = [stage.static_force, stage.stiffness, stage.viscosity, stage.drag];
+        if !forces.iter().all(|force| is_in_range(*force) && is_in_range(*force / course.mass)) {
+            return Err(out_of_range());
+        }
         let is_open = |number: Ball| number.lower() < 0.0 && number.upper() > 0.0;
         if course.problem.limit_of(course.stage).value() == f64::INFINITY
             && (is_open(stage.static_force) || is_open(stage.stiffness))
