@@ -615,7 +615,7 @@ impl Centre {
     }
 
     /// From here to rest, over a box so small that the force hardly changes: `T = v/a`, `X = v²/(2 a)` with a mean `a`.
-    fn to_rest(&self, law: &Law) -> Option<State<Ball>> {
+    fn until_rest(&self, law: &Law) -> Option<State<Ball>> {
         let velocity = self.velocity();
         if velocity.lower() > 0.0 { self.slowed(law, velocity) } else { None }
     }
@@ -638,7 +638,7 @@ impl Centre {
     }
 
     /// From here to `limit`, over a box as small: `T = d/v` with a mean v.
-    fn to_limit(&self, law: &Law, limit: Ball) -> Option<State<Ball>> {
+    fn until_limit(&self, law: &Law, limit: Ball) -> Option<State<Ball>> {
         let (depth, velocity) = (self.depth(), self.velocity());
         let way = limit - depth;
         let (slowest, fastest) = (velocity.lower(), velocity.upper());
@@ -704,11 +704,11 @@ impl Steps {
         };
         let at_limit = |gap: f64, from: f64| {
             let before = centre.after(law, series, (from - gap).max(0.0))?;
-            before.to_limit(law, limit)
+            before.until_limit(law, limit)
         };
         let at_rest = |gap: f64, from: f64| {
             let before = centre.after(law, series, (from - gap).max(0.0))?;
-            Some((before, before.to_rest(law)?))
+            Some((before, before.until_rest(law)?))
         };
         if passes {
             let mut near = series.root(until, |[v, _, x]| (far - x, -v));
@@ -857,7 +857,8 @@ impl StageSolver<Ball> for Steps {
                 return Err(IntegrationError::NeverEnds { why, last: centre.state().values() });
             }
             let series = Series::new(&law, centre.x, centre.v, limit.value());
-            course.cost += Cost { steps: 1, rejected_steps: 0, force_evaluations: ORDER as u64 };
+            let work = Cost { steps: 1, rejected_steps: 0, force_evaluations: ORDER as u64 };
+            course.cost = course.cost + work;
             let step = Self::step(&law, &centre, limit, &series);
             let end = match &step {
                 Step::Whole(next) => next.state(),

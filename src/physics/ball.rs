@@ -383,7 +383,7 @@ impl Ball {
             if k > 0 {
                 term = term * self / Self::from_f64(k as f64);
             }
-            if k >= first && (k - first) % step == 0 {
+            if k >= first && (k - first).is_multiple_of(step) {
                 let is_minus = step == 2 && (k - first) % 4 == 2;
                 sum += if is_minus { -term } else { term };
             }

@@ -356,13 +356,11 @@ fn product(number: &str, coefficient: f64) -> (String, f64) {
         Some(format!("{}e{}", left.checked_mul(right)?, left_exponent.checked_add(right_exponent)?))
     };
     // Beyond 38 digits the last ones do not matter: two roundings more.
-    match exact() {
-        Some(text) => (text, error_of(coefficient)),
-        None => {
-            let rounded = number.parse().unwrap_or(f64::NAN) * coefficient;
-            (format!("{rounded:e}"), error_of(coefficient) + 4.0 * f64::EPSILON)
-        }
+    if let Some(text) = exact() {
+        return (text, error_of(coefficient));
     }
+    let rounded = number.parse().unwrap_or(f64::NAN) * coefficient;
+    (format!("{rounded:e}"), error_of(coefficient) + 4.0 * f64::EPSILON)
 }
 
 /// Signed digits and power of ten of a decimal.
