@@ -81,7 +81,11 @@ pub fn digits_between(low: f64, high: f64) -> String {
     }
     let places = (2.0 - width.log10()).floor().clamp(0.0, 30.0) as usize;
     let exact = |value: f64| format!("{value:.60}");
-    let cut = |text: &str| text.find('.').map_or(text.len(), |point| (point + 1 + places).min(text.len()));
+    let cut = |text: &str| match text.find('.') {
+        Some(point) if places > 0 => point + 1 + places,
+        Some(point) => point,
+        None => text.len(),
+    };
     let (low, high) = (exact(low), exact(high));
     let floor = low[..cut(&low)].to_owned();
     let mut ceiling: Vec<u8> = high[..cut(&high)].bytes().collect();
@@ -243,6 +247,8 @@ mod tests {
             (0.999_999_999_999_999_9, 1.0, "(0.99999999999999988..1.00000000000000000)"),
             (177.949_686_027_945_63, 177.949_686_027_945_66, "177.9496860279456(31..60)"),
             (0.0, 0.5, "0.(00..50)"),
+            (136.2, 149.9, "1(36..50)"),
+            (1936.2, 2149.9, "(1936..2150)"),
             (1.0, f64::INFINITY, "(1..inf)"),
             (1e-20, 2e-20, "(1e-20..2e-20)"),
         ] {

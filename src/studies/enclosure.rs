@@ -16,6 +16,9 @@ use crate::physics::{Outcome, Resolved, Scalar, Scene, State};
 /// Flights that narrow the interval of V_c.
 const FLIGHTS_MAX: u32 = 80;
 
+/// How much wider than the speeds of which nothing is proved the interval of V_c may be.
+const OPEN_SHARE: f64 = 0.03;
+
 /// Impact speed (m/s) at which a target that is perforated at any speed is shown to be.
 const SLOWEST: f64 = 1e-9;
 
@@ -177,15 +180,23 @@ pub fn between(scene: &Scene, written: &Written, near: f64) -> Option<(f64, f64)
         None
     };
     let (mut low, mut high) = (away(false)?, away(true)?);
+    // Speeds between which no outcome is proved.
+    let mut open: Option<(f64, f64)> = None;
     while flights.get() < FLIGHTS_MAX {
-        let middle = low + 0.5 * (high - low);
-        if middle <= low || middle >= high {
+        let (from, to) = match open {
+            None => (low, high),
+            Some((from, to)) if from - low > high - to => (low, from),
+            Some((_, to)) => (to, high),
+        };
+        let middle = from + 0.5 * (to - from);
+        let is_narrow = open.is_some_and(|(least, greatest)| to - from <= OPEN_SHARE * (greatest - least));
+        if middle <= from || middle >= to || is_narrow {
             break;
         }
         match perforates(middle) {
             Some(true) => high = middle,
             Some(false) => low = middle,
-            None => break,
+            None => open = Some(open.map_or((middle, middle), |(from, to)| (from.min(middle), to.max(middle)))),
         }
     }
     Some((low, high))
