@@ -54,7 +54,7 @@ impl Chosen {
         let events = events
             .map(|text| text.parse().map_err(|_| word("events", text, "step-end, interpolated, landed")))
             .transpose()?;
-        let options = MethodOptions { rtol, dt: dt.map(|dt| step(py, dt)).transpose()?, velocity, events };
+        let options = MethodOptions { rtol, dt: dt.map(|dt| step(py, dt)).transpose()?, velocity, events, steps: None };
         let chosen = Self { name, options };
         chosen.build().map_err(|error| advised(py, "OptionError", &error))?;
         Ok(chosen)
@@ -72,7 +72,7 @@ impl Chosen {
 
     /// The words of a command line that choose it.
     fn words(&self) -> Vec<String> {
-        let MethodOptions { rtol, dt, velocity, events } = &self.options;
+        let MethodOptions { rtol, dt, velocity, events, steps: _ } = &self.options;
         let rtol = rtol.map(|rtol| format!("--rtol={rtol:?}"));
         let dt = dt.map(|dt| format!("--dt={dt:?}"));
         let velocity = velocity.map(|velocity| format!("--velocity={}", velocity.name()));
