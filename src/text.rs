@@ -72,14 +72,14 @@ pub fn digits_text(value: f64, digits: i32) -> String {
     }
 }
 
-/// The digits that two numbers, neither negative, have in common, and in brackets those from `low` to `high`, two of them
-/// as a rule: `0.14482678906(54..57)`. The numbers shown hold those given between them.
+/// The digits that two numbers, neither negative, have in common, and in brackets those from `low` to `high`: two of them, or
+/// as many as give `high` six: `0.14482678906(54..57)`. The numbers shown hold those given between them.
 pub fn digits_between(low: f64, high: f64) -> String {
     let width = high - low;
     if low == high || !width.is_finite() || !(1e-12..1e12).contains(&high) {
         return if low == high { Shown(low).to_string() } else { format!("({}..{})", Shown(low), Shown(high)) };
     }
-    let places = (2.0 - width.log10()).floor().clamp(0.0, 30.0) as usize;
+    let places = (2.0 - width.log10()).max(6.0 - high.log10()).floor().clamp(0.0, 30.0) as usize;
     let exact = |value: f64| format!("{value:.60}");
     let cut = |text: &str| match text.find('.') {
         Some(point) if places > 0 => point + 1 + places,
@@ -246,9 +246,9 @@ mod tests {
             (0.144_826_789_065_454, 0.144_826_789_065_457, "0.14482678906545(39..71)"),
             (0.999_999_999_999_999_9, 1.0, "(0.99999999999999988..1.00000000000000000)"),
             (177.949_686_027_945_63, 177.949_686_027_945_66, "177.9496860279456(31..60)"),
-            (0.0, 0.5, "0.(00..50)"),
-            (136.2, 149.9, "1(36..50)"),
-            (1936.2, 2149.9, "(1936..2150)"),
+            (0.0, 0.5, "0.(000000..500000)"),
+            (136.2, 149.9, "1(36.199..49.901)"),
+            (1_936_200.0, 2_149_900.0, "(1936200..2149900)"),
             (1.0, f64::INFINITY, "(1..inf)"),
             (1e-20, 2e-20, "(1e-20..2e-20)"),
         ] {

@@ -404,25 +404,7 @@ impl SolveArgs {
     fn text(&self, data: &SolveJson, flight: &Flight) -> String {
         let mut text = Text::titled(data.scene.title.as_deref());
         text.line(format!("  method   {}", data.method.text()));
-        let place = match (flight.outcome, data.scene.criterion, data.velocity_at_far_side_m_s) {
-            (Outcome::Perforated, Criterion::FullDepth | Criterion::Plug, _) => " at x = H".to_owned(),
-            (Outcome::Perforated, criterion, far_side) => {
-                let beyond = far_side.map_or_else(
-                    || "it stops before x = H".to_owned(),
-                    |speed| format!("{} at x = H", engineering(speed, "m/s")),
-                );
-                format!(" at {}; {beyond}", criterion.place())
-            }
-            _ => String::new(),
-        };
-        let margin = match data.exit_margin.zip(data.exit_margin_error) {
-            Some((margin, bar)) if margin.is_finite() && bar.is_finite() => {
-                format!(" (exit margin {} +- {bar:.0e} of V0²)", significant(margin))
-            }
-            Some(_) => " (the exit margin leaves the range of 64-bit numbers)".to_owned(),
-            None => String::new(),
-        };
-        text.line(format!("  outcome  {}{place}{margin}", data.outcome.name()));
+        data.add_outcome(&mut text, flight);
         text.lines(data.groups.text(data.scene.velocity_m_s));
         for ForceJson { stage, force } in &data.scene.forces {
             let whose = if data.scene.stages.len() > 1 { format!("stage {stage}: ") } else { String::new() };
@@ -523,6 +505,35 @@ impl GroupsJson {
 }
 
 impl SolveJson {
+    /// The outcome, where the projectile leaves and the exit margin; of a box, also those of the scene itself.
+    fn add_outcome(&self, text: &mut Text, flight: &Flight) {
+        let place = match (flight.outcome, self.scene.criterion, self.velocity_at_far_side_m_s) {
+            (Outcome::Perforated, Criterion::FullDepth | Criterion::Plug, _) => " at x = H".to_owned(),
+            (Outcome::Perforated, criterion, far_side) => {
+                let beyond = far_side.map_or_else(
+                    || "it stops before x = H".to_owned(),
+                    |speed| format!("{} at x = H", engineering(speed, "m/s")),
+                );
+                format!(" at {}; {beyond}", criterion.place())
+            }
+            _ => String::new(),
+        };
+        let margin = match self.exit_margin.zip(self.exit_margin_error) {
+            Some((margin, bar)) if margin.is_finite() && bar.is_finite() => {
+                format!(" (exit margin {} +- {bar:.0e} of V0²)", significant(margin))
+            }
+            Some(_) => " (the exit margin leaves the range of 64-bit numbers)".to_owned(),
+            None => String::new(),
+        };
+        if self.sides.is_empty() {
+            text.line(format!("  outcome  {}{place}{margin}", self.outcome.name()));
+        } else {
+            text.line(format!("  outcome  {}, in the box", self.outcome.name()));
+            let itself = format!("{}{place}{margin}, and so the events and the table below", flight.outcome);
+            text.wrapped("  itself   ", &itself);
+        }
+    }
+
     /// Adds the end of the solution beside the exact one.
     fn add_exact(&self, text: &mut Text) {
         let Some(exact) = &self.closed_form else {

@@ -18,7 +18,9 @@ use smallvec::SmallVec;
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved, refuse_laws};
+use super::taylor::power_of_two_below;
 use crate::physics::ball::{Ball, DoubleWord, TINY, UNIT, UP};
+use crate::physics::scalar::reciprocal;
 use crate::physics::{Outcome, Problem, Scalar, Stage, State};
 
 /// Order K: v has the powers 0 to K, and x one more.
@@ -63,8 +65,9 @@ pub(crate) const UNPROVED: &str =
 
 /// The enclosure: exact answers between two numbers.
 ///
-/// As an [`Integrator`] it takes the numbers of the problem for exact and gives the middle of each interval, with half its
-/// width in [`Flight::notes`]; [`Enclosure::enclose`] gives the intervals, of problems whose numbers are intervals.
+/// [`Enclosure::enclose`] gives the intervals, of problems whose numbers are intervals, in the units of the problem (SI). As an
+/// [`Integrator`] it takes the numbers of the problem for exact and gives the middle of each interval, rounded. The
+/// proof is docs/enclosures.md.
 ///
 /// # Example
 /// ```
@@ -233,22 +236,6 @@ struct Series {
     law: [Ball; 4],
 }
 
-/// `1/k`, rounded.
-const RECIPROCALS: [f64; ORDER + 3] = {
-    let mut table = [0.0; ORDER + 3];
-    let mut k = 1;
-    while k < table.len() {
-        table[k] = 1.0 / k as f64;
-        k += 1;
-    }
-    table
-};
-
-/// The power of two at or below a positive number.
-fn power_of_two_below(x: f64) -> f64 {
-    f64::from_bits(x.clamp(1e-290, 1e290).to_bits() & (0x7ff << 52))
-}
-
 impl Series {
     /// The series from depth `x` and velocity `v`, both exact.
     fn new(law: &Law, x: DoubleWord, v: DoubleWord, limit: f64) -> Self {
@@ -338,16 +325,16 @@ impl Series {
             }
             v[k + 1] = -sum / (k + 1) as f64;
             if k + 1 > FINE {
-                x[k + 1] = v[k] * RECIPROCALS[k + 1];
+                x[k + 1] = v[k] * reciprocal::<f64>(k + 1);
             }
         }
-        x[ORDER + 1] = v[ORDER] * RECIPROCALS[ORDER + 1];
+        x[ORDER + 1] = v[ORDER] * reciprocal::<f64>(ORDER + 1);
     }
 
     /// Length of a step that truncates about [`TRUNCATION`] of the velocity.
     fn span(&self, law: &Law) -> f64 {
         let goal = TRUNCATION * self.coarse[0];
-        let by = |k: usize| (goal / self.coarse[k].abs()).powf(RECIPROCALS[k]);
+        let by = |k: usize| (goal / self.coarse[k].abs()).powf(reciprocal::<f64>(k));
         let cap = match law.rate * self.time {
             0.0 => SPAN_MAX,
             phase => SPAN_MAX.min(if law.falls { 0.99 * GROWTH_MAX } else { PHASE_MAX } / phase),
@@ -396,10 +383,10 @@ impl Series {
         let has_drag = !self.law[3].is_zero();
         let of_order = |order: usize| if has_drag { q * products(order) } else { 0.0 };
         let of_one = r * behind[ORDER] + s * (x[ORDER] + x[ORDER + 1]);
-        let truncation = (of_one + of_order(ORDER)) * RECIPROCALS[ORDER + 1];
+        let truncation = (of_one + of_order(ORDER)) * reciprocal::<f64>(ORDER + 1);
         let fine = (FINE + 12) as f64 * UNIT * (p + s * depth + r * speed + q * speed * speed);
         let coarse = s * depth_behind + r * behind[order] + of_order(order);
-        let coarse = (ORDER + 16) as f64 * ROUNDOFF * coarse * RECIPROCALS[FINE];
+        let coarse = (ORDER + 16) as f64 * ROUNDOFF * coarse * reciprocal::<f64>(FINE);
         let [of_p, of_s, of_r, of_q] = self.law.map(|number| number.radius);
         let uncertain = of_p + of_s * depth + of_r * speed + of_q * speed * speed;
         let force = time * (truncation + fine + coarse + uncertain);

@@ -334,7 +334,7 @@ fn rough_exp2(y: f64) -> f64 {
 
 /// The power of two at or below a positive number (the least normal number for what is smaller).
 #[inline(always)]
-fn power_of_two_below(x: f64) -> f64 {
+pub(super) fn power_of_two_below(x: f64) -> f64 {
     f64::from_bits(x.clamp(f64::MIN_POSITIVE, 0.5 * f64::MAX).to_bits() & (0x7ff << 52))
 }
 

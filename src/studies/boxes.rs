@@ -13,6 +13,7 @@ use crate::integrators::{Detail, Flight};
 use crate::physics::ball::Ball;
 use crate::physics::decimals::Written;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError, StageNumber};
+use crate::physics::units::number;
 use crate::physics::{Advice, CraterStiffness, Criterion, Outcome, Resistance, Scalar, Scene, State};
 
 /// Pieces along each number whose sign is not proved, by how many there are.
@@ -42,6 +43,9 @@ pub enum BoxError {
     /// A group, which moves another number.
     #[error("`{0}` is a group of numbers, and a box is of numbers of the scene")]
     Group(Parameter),
+    /// One end with a unit and one without: a bare number is SI, which is hardly meant.
+    #[error("`{0}` has one unit and needs two")]
+    OneUnit(String),
     /// The greatest value lies below the least.
     #[error("`{0}` falls: the least value comes first")]
     Falls(String),
@@ -58,6 +62,7 @@ impl Advice for BoxError {
         match self {
             Self::Parameter(error) => error.help(),
             Self::Group(parameter) => format!("give `{}` in its place", parameter.moves()),
+            Self::OneUnit(_) => "give both ends a unit, or neither for SI".to_owned(),
             Self::TooMany(_) => "leave one of them at its value".to_owned(),
             _ => "write for example target.strength=34MPa:38MPa".to_owned(),
         }
@@ -70,12 +75,17 @@ impl FromStr for Side {
     fn from_str(text: &str) -> Result<Self, BoxError> {
         let form = || BoxError::Form(text.to_owned());
         let (path, range) = text.split_once('=').ok_or_else(form)?;
-        let (low, high) = range.split_once(':').ok_or_else(form)?;
+        let (from, to) = range.split_once(':').ok_or_else(form)?;
         let parameter: Parameter = path.trim().parse()?;
         if parameter.moves() != parameter {
             return Err(BoxError::Group(parameter));
         }
-        let (low, high) = (parameter.parse_value(low)?, parameter.parse_value(high)?);
+        let (low, high) = (parameter.parse_value(from)?, parameter.parse_value(to)?);
+        let [low_is_bare, high_is_bare] = [from, to].map(|text| number(text.trim()).is_ok());
+        // Zero is zero in every unit.
+        if low_is_bare != high_is_bare && low != 0.0 && high != 0.0 {
+            return Err(BoxError::OneUnit(text.to_owned()));
+        }
         if high < low { Err(BoxError::Falls(text.to_owned())) } else { Ok(Self { parameter, low, high }) }
     }
 }
@@ -535,7 +545,14 @@ mod tests {
     #[test]
     fn a_box_that_is_none_is_refused() {
         let SceneFile { scene, written } = file("tunnel");
-        for text in ["target.strength", "target.strength=1", "H/d=1:2", "target.strength=3MPa:2MPa", "nothing=1:2"] {
+        for text in [
+            "target.strength=34MPa:38",
+            "target.strength",
+            "target.strength=1",
+            "H/d=1:2",
+            "target.strength=3MPa:2MPa",
+            "nothing=1:2",
+        ] {
             assert!(text.parse::<Side>().is_err(), "{text}");
         }
         let twice = sides(&["projectile.mass=1:2", "projectile.mass=1:3"]);

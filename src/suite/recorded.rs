@@ -22,7 +22,7 @@ pub struct RecordedScene {
     pub text: Option<String>,
     /// Words by the path of the field in the answers of `solve --json` and `critical --json`.
     pub words: BTreeMap<String, String>,
-    /// Numbers in SI units with 25 digits, by that path.
+    /// Numbers in SI units with 25 digits (19 where the scene is a text of the record), by that path.
     pub numbers: BTreeMap<String, String>,
     /// Condition numbers of some of them, where one is large.
     #[serde(default)]

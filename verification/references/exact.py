@@ -1,4 +1,6 @@
-"""Solves scenes from their text to 25 digits and records the numbers: `python3 verification/references/exact.py`.
+"""Solves scenes from their text and records the numbers: `python3 verification/references/exact.py`.
+
+The numbers of shipped scenes have 25 digits, those of the texts below 19.
 
 Needs mpmath (`pip install mpmath`), Python 3.11 or later, and nothing of the program. It reads each text as TOML, converts
 every quantity by the definition of its unit as an exact fraction, resolves the scene by docs/theory.md, section 1, and
