@@ -120,14 +120,14 @@ impl Stage {
                       layers command/slopes";
         suite.claims.retain(|claim| starts.split(' ').any(|start| claim.id.starts_with(start)));
         let program = Program::new(Path::new(env!("CARGO_BIN_EXE_penetrode")))?;
-        let inputs = Inputs { seed: 1, peers: &PeerAnswers::recorded()?, program: Some(&program) };
+        let inputs = Inputs { seed: 1, peers: &PeerAnswers::recorded()?, program: Some(&program), points: &[] };
         let judged = suite.run(inputs, &|_| ());
         let environment = Environment::here(1, "penetrode verify --seed 1".to_owned(), &suite, Vec::new());
         let folder = tempfile::tempdir()?;
         let run = Run { suite: &suite, judged: &judged, environment, points: &[(5.0, 30.0)], random: None };
         folder::write(folder::files(&run), &folder.path().join(PAGES[0]))?;
         let suite = Suite::edges()?;
-        let judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::default(), program: None }, &|_| ());
+        let judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::default(), program: None, points: &[] }, &|_| ());
         let summary = extreme_scenes::run(200, 1, &|| ());
         let environment = Environment::here(1, "penetrode stress --seed 1".to_owned(), &suite, Vec::new());
         let run = Run { suite: &suite, judged: &judged, environment, points: &[], random: Some((&summary, 1.0)) };

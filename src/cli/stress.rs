@@ -59,7 +59,7 @@ impl Ask for StressArgs {
         }
         self.out.as_deref().map(|folder| folder::check(folder, "stress")).transpose()?;
         // No case is about commands.
-        let inputs = Inputs { seed: self.seed, peers: &PeerAnswers::default(), program: None };
+        let inputs = Inputs { seed: self.seed, peers: &PeerAnswers::default(), program: None, points: &[] };
         let mut peers = Vec::new();
         let (judged, random) = if let Some(command) = &self.peer {
             let (identity, judged) = self.run_peer(command, &suite)?;

@@ -77,9 +77,9 @@ impl Ask for VerifyArgs {
             return Ok(Answer { data: None, text: list(&suite), exit: Exit::Success });
         }
         let points = self.data.as_deref().map(read_data).transpose()?.unwrap_or_default();
-        if !points.is_empty() && !suite.claims.iter().any(|claim| matches!(claim.check, Check::Sweep(_))) {
+        if !points.is_empty() && !suite.claims.iter().any(|claim| uses_points(&claim.check)) {
             return Err(CliError::usage(
-                "no claim of the suite sweeps H/d, so --data would not be shown",
+                "no claim of the suite sweeps H/d or is about measured energies, so --data would not be used",
                 "leave out --data, or --only",
             ));
         }
@@ -89,7 +89,8 @@ impl Ask for VerifyArgs {
             let help = "its claims run it in a temporary folder: let TMPDIR name one that can be written";
             CliError::failed(format!("the program cannot be run again: {cause}"), help)
         })?;
-        let judged = judge_all(&suite, Inputs { seed: self.seed, peers: &peers, program: Some(&program) }, "claims");
+        let inputs = Inputs { seed: self.seed, peers: &peers, program: Some(&program), points: &points };
+        let judged = judge_all(&suite, inputs, "claims");
         let run = Run {
             suite: &suite,
             judged: &judged,
@@ -113,6 +114,11 @@ impl Ask for VerifyArgs {
         let data = VerifyJson::new(&run);
         Ok(Answer { text: text.finish(), exit: data.verdict.into(), data: Some(data) })
     }
+}
+
+/// Whether a claim shows measured energies, or tests a conclusion with them.
+fn uses_points(check: &Check) -> bool {
+    matches!(check, Check::Sweep(_) | Check::BoundOfData(_))
 }
 
 impl VerifyArgs {

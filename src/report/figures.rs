@@ -67,7 +67,7 @@ fn of_evidence(run: &Run<'_>, judged: &Judged) -> Vec<Figure> {
             vec![sweep_figures::applicability(*crater_ratio, lines, scenes, &[judged])]
         }
         Some(Evidence::Depths(comparisons)) => vec![sweep_figures::measured_depths(comparisons, &[judged])],
-        Some(Evidence::Fit { .. } | Evidence::Series(_)) | None => Vec::new(),
+        Some(Evidence::Conclusion(_) | Evidence::Fit { .. } | Evidence::Series(_)) | None => Vec::new(),
     };
     drawn.into_iter().flatten().collect()
 }

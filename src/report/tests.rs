@@ -17,7 +17,8 @@ static JUDGED: LazyLock<(Suite, Vec<Judged>)> = LazyLock::new(|| {
         claim.id.starts_with("order/jump") && claim.id.ends_with("/depth")
             || starts.split(' ').any(|start| claim.id.starts_with(start))
     });
-    let mut judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::recorded().unwrap(), program: None }, &|_| ());
+    let mut judged =
+        suite.run(Inputs { seed: 1, peers: &PeerAnswers::recorded().unwrap(), program: None, points: &[] }, &|_| ());
     for verdict in [Verdict::Failed, Verdict::Undecided, Verdict::Skipped] {
         let mut hostile = judged[0].clone();
         hostile.claim.id = format!("{HOSTILE}/{}", verdict.name());
@@ -241,7 +242,7 @@ fn a_report_that_cannot_be_made_is_refused_before_the_work() {
 fn the_largest_error_is_read_first() {
     let mut suite = Suite::embedded().unwrap();
     suite.claims.retain(|claim| claim.id.starts_with("agreement/taylor"));
-    let mut judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::default(), program: None }, &|_| ());
+    let mut judged = suite.run(Inputs { seed: 1, peers: &PeerAnswers::default(), program: None, points: &[] }, &|_| ());
     let first_screen = |judged: &[Judged]| {
         let page = files(&suite, judged).into_iter().find(|(name, _)| name == "report.html").unwrap().1;
         let head = page.split("<nav").next().unwrap();

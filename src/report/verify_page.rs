@@ -9,14 +9,14 @@ use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
 use super::text::{count, number, one_line};
 use super::{Environment, Run, coverage, nomenclature, typeset};
-use crate::integrators::{Boundaries, MethodName, Taylor, VelocityAt};
+use crate::integrators::{Boundaries, MethodName, VelocityAt};
 use crate::physics::groups::Groups;
 use crate::studies::experiments;
-use crate::studies::sweep::{WHY, conclusions, explanation};
+use crate::studies::sweep::{WHY, explanation};
 use crate::studies::{Path, Quantity, Stretch, formal_order};
 use crate::suite::checks::{FIXED, Order, StepPattern};
 use crate::suite::{
-    Check, Counts, Evidence, Judged, LOOSENESS_MAX, SeededFault, grouped, looseness, seeded_faults, skipped,
+    Check, Counts, Evidence, Judged, LOOSENESS_MAX, SeededFault, grouped, looseness, seeded_faults, skipped, tables,
 };
 
 /// The page of `run` with its figures.
@@ -159,20 +159,28 @@ fn build(e: &Environment) -> Markup {
 
 fn why_above_eq15(run: &Run<'_>) -> Markup {
     let why = run.judged.iter().find_map(|judged| match &judged.evidence {
-        Some(Evidence::Sweep { plan, rows }) => {
-            let measured = plan.beside(run.points, &Taylor::default()).unwrap_or_default();
-            Some((explanation(plan, rows), conclusions(rows, &measured)))
-        }
+        Some(Evidence::Sweep { plan, rows }) => Some(explanation(plan, rows)),
         _ => None,
     });
-    html! { @if let Some((why, conclusions)) = why {
-        h3 { (WHY) }
-        p { (typeset::html(why.strip_prefix(WHY).unwrap_or(&why).trim_start_matches(". "))) }
-        h3 { "What becomes of the paper's conclusions" }
-        (Table::cards("", ["conclusion", "here", "by which numbers, or why not"]).rows(conclusions, |found| {
-            [cell(found.statement), cell(found.standing.to_string()), html! { (typeset::html(&found.reason)) }]
-        }))
-    } }
+    // One a table: several methods conclude the same.
+    let concluded = tables(run.judged).filter_map(|claims| match &claims.first()?.evidence {
+        Some(Evidence::Conclusion(found)) => Some((claims[0].claim.table.as_str(), found)),
+        _ => None,
+    });
+    let concluded: Vec<_> = concluded.collect();
+    html! {
+        @if let Some(why) = why {
+            h3 { (WHY) }
+            p { (typeset::html(why.strip_prefix(WHY).unwrap_or(&why).trim_start_matches(". "))) }
+        }
+        @if !concluded.is_empty() {
+            h3 { "What becomes of the paper's conclusions" }
+            (Table::cards("", ["conclusion", "here", "by which numbers, or why not", "claim"]).rows(concluded, |(id, found)| {
+                let id = html! { code { (one_line(id)) } };
+                [cell(found.statement), cell(found.standing.to_string()), html! { (typeset::html(&found.reason)) }, id]
+            }))
+        }
+    }
 }
 
 /// The tables of the suite that claim something of layered scenes.

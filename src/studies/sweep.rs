@@ -12,7 +12,7 @@ use serde::{Serialize, Serializer};
 use smallvec::SmallVec;
 use thiserror::Error;
 
-pub use self::conclusions::{Conclusion, MeasuredPoint, Standing, conclusions};
+pub use self::conclusions::{Conclusion, MeasuredPoint, Side, Standing, bound, conclusions, falls};
 use super::critical_velocity;
 use super::enclosure::{self, Bounds};
 use super::error::{Studied, StudyError};
@@ -699,6 +699,9 @@ mod tests {
         assert_eq!(standing, [Standing::NotTestable, Standing::NotTestable, Standing::Refuted]);
         let reason = &found[2].reason;
         assert!(reason.contains("+80.7 % at H/d = 10.2") && reason.contains("+96.5 % at H/d = 18"), "{reason}");
+        // However fine the sweep: from one point to the next the difference rises by next to nothing.
+        let fine = Plan::new(slab(), &["H/d=3.5:18:20000".parse().unwrap()]).unwrap();
+        assert_eq!(falls(&fine.run(&Taylor::default())).standing, Standing::Refuted);
         let mut bare = slab();
         Parameter::Density.set(&mut bare, 0.0).unwrap();
         let point = |measured| MeasuredPoint {

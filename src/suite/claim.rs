@@ -20,7 +20,7 @@ use crate::studies::order::OrderFit;
 use crate::studies::quantity::Quantity;
 use crate::studies::rounding::Floor;
 use crate::studies::stability::BoundaryPoint;
-use crate::studies::sweep::{Plan, Row};
+use crate::studies::sweep::{Conclusion, Plan, Row};
 
 /// One `[[claim]]` table.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -373,6 +373,8 @@ pub enum Evidence {
         /// Its points.
         rows: Vec<Row>,
     },
+    /// What becomes of a conclusion of the paper.
+    Conclusion(Conclusion),
     /// Measured depths beside their predictions.
     Depths(Vec<Comparison>),
     /// The map of Eq. 11-12 for one k.

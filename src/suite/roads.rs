@@ -165,6 +165,7 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         }
         Check::NdrcCriterion(_) => [with(method, Search), vec![Formulas]],
         Check::Sweep(_) => [with(method, Search), vec![ClosedForm]],
+        Check::BoundOfData(_) | Check::GapFalls(_) => [with(with(method, Search), Formulas), vec![Elsewhere]],
         Check::ThicknessLimit(_) => [method, vec![ClosedForm, Formulas]],
         Check::Order(_) | Check::SelfConvergence(_) | Check::GridConvergence(_) => [vec![Steps], truth],
         Check::OrdersByRule(_) | Check::OrderCrossover(_) => [vec![Steps], vec![FiftyDigits]],

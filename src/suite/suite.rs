@@ -57,6 +57,8 @@ pub struct Inputs<'a> {
     pub peers: &'a PeerAnswers,
     /// The program; without it, claims about its commands are skipped.
     pub program: Option<&'a Program>,
+    /// Measured energies, (H/d, `E_c/(d³ fc)`), with which the paper's conclusions are tested.
+    pub points: &'a [(f64, f64)],
 }
 
 /// A suite of claims for `penetrode verify`.
@@ -216,8 +218,8 @@ impl Suite {
     /// Judges every claim, in parallel, in the suite's order; `done` is called with each once it is judged.
     pub fn run(&self, inputs: Inputs<'_>, done: &(dyn Fn(&Judged) + Sync)) -> Vec<Judged> {
         let memo = Memo::default();
-        let Inputs { seed, peers, program } = inputs;
-        let context = Context { scenes: &self.scenes, peers, memo: &memo, program, judged: None, seed };
+        let Inputs { seed, peers, program, points } = inputs;
+        let context = Context { scenes: &self.scenes, peers, memo: &memo, program, points, judged: None, seed };
         let judge_those = |is_last, context| {
             let those = self.claims.iter().enumerate().filter(|(_, claim)| claim.check.is_last() == is_last);
             let (of_peers, others): (Vec<_>, Vec<_>) = those.partition(|(_, c)| matches!(c.check, Check::Peer(_)));

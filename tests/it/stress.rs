@@ -16,8 +16,9 @@ use crate::program::{conforms, run_in};
 fn every_stress_case_passes_for_every_method_that_this_build_has() {
     // k/N is 1e4 in a scene of S3 of this seed: its crater constant, rounded to f64, once passed for a fault. The
     // seed of the command is the next test's.
-    let judged =
-        Suite::edges().unwrap().run(Inputs { seed: 11, peers: &PeerAnswers::default(), program: None }, &|_| {});
+    let judged = Suite::edges()
+        .unwrap()
+        .run(Inputs { seed: 11, peers: &PeerAnswers::default(), program: None, points: &[] }, &|_| {});
     let bad: Vec<&Judged> =
         judged.iter().filter(|case| !matches!(case.verdict, Verdict::Passed | Verdict::Skipped)).collect();
     assert!(bad.is_empty(), "{bad:#?}");

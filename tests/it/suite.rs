@@ -19,7 +19,7 @@ fn run(seed: u64) -> Vec<Judged> {
 fn judged(suite: &Suite, seed: u64) -> Vec<Judged> {
     let peers = PeerAnswers::recorded().unwrap_or_else(|error| panic!("{error}"));
     let program = Program::new(Path::new(env!("CARGO_BIN_EXE_penetrode"))).unwrap_or_else(|error| panic!("{error}"));
-    suite.run(Inputs { seed, peers: &peers, program: Some(&program) }, &|_| ())
+    suite.run(Inputs { seed, peers: &peers, program: Some(&program), points: &[] }, &|_| ())
 }
 
 /// One line for each claim that did not hold.

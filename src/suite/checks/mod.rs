@@ -62,6 +62,7 @@ mod agreement;
 mod applications;
 mod by_hand;
 mod commands;
+mod conclusions;
 mod counts;
 mod edges;
 mod formulas;
@@ -96,9 +97,9 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, by_hand::*, commands::*, counts::*, edges::*, formulas::*, generators::*,
-    invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, proved::*, scheme::*,
-    texts::*,
+    agreement::*, applications::*, by_hand::*, commands::*, conclusions::*, counts::*, edges::*, formulas::*,
+    generators::*, invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, proved::*,
+    scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -147,7 +148,7 @@ every_check! {
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
     EnergyBalance TimeReversal Similarity Split
-    Sweep ThicknessLimit Map MeasuredDepth Sensitivities Peer
+    Sweep BoundOfData GapFalls ThicknessLimit Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop
     Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag
@@ -182,6 +183,8 @@ pub struct Context<'a> {
     pub memo: &'a Memo,
     /// The program, for claims about its commands.
     pub program: Option<&'a Program>,
+    /// Measured energies, (H/d, `E_c/(d³ fc)`).
+    pub points: &'a [(f64, f64)],
     /// The other claims, judged, for claims about them; `None` while they are, and where a part of the suite is run.
     pub judged: Option<&'a [Judged]>,
     /// Seed of every random number.

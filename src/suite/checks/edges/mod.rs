@@ -55,7 +55,7 @@ impl Violations {
         }
     }
 
-    fn measurement(self) -> Measurement {
+    pub(in crate::suite::checks) fn measurement(self) -> Measurement {
         let mut remark = format!("{} checks", self.checks);
         for note in self.notes.into_iter().chain(self.first.map(|first| format!("first violation: {first}"))) {
             remark = format!("{remark}; {note}");

@@ -382,7 +382,8 @@ mod tests {
         let (scenes, peers, memo) = (Scenes::default(), PeerAnswers::default(), Memo::default());
         // The last two once fell on steps outside the asymptotic range.
         for seed in [1, u64::MAX - 1, u64::MAX] {
-            let context = Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, judged: None, seed };
+            let context =
+                Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, points: &[], judged: None, seed };
             let measured = claim.check.measure(&Subject { claim, context, flaw: None }).unwrap();
             assert!(measured.value <= claim.limit, "seed {seed}: {}", measured.remark);
         }
