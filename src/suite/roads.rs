@@ -91,6 +91,7 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::TimeReversal(_)
         | Check::Similarity(_)
         | Check::Split(_)
+        | Check::Ranges(_)
         | Check::ScaledForces(_)
         | Check::BoundsOfLanes(_)
         | Check::DigitsLost(_)
@@ -166,6 +167,7 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         Check::NdrcCriterion(_) => [with(method, Search), vec![Formulas]],
         Check::Sweep(_) => [with(method, Search), vec![ClosedForm]],
         Check::BoundOfData(_) | Check::GapFalls(_) => [with(with(method, Search), Formulas), vec![Elsewhere]],
+        Check::Intervals(_) => [with(method, Search), vec![Itself]],
         Check::ThicknessLimit(_) => [method, vec![ClosedForm, Formulas]],
         Check::Order(_) | Check::SelfConvergence(_) | Check::GridConvergence(_) => [vec![Steps], truth],
         Check::OrdersByRule(_) | Check::OrderCrossover(_) => [vec![Steps], vec![FiftyDigits]],
@@ -180,7 +182,7 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::Growth(_)
         | Check::StepsByHand(_)
         | Check::StatedStepLimits(_) => [vec![Steps], vec![Itself]],
-        Check::EnergyBalance(_) | Check::Plateau(_) | Check::ApproachedForEver(_) => [method, vec![Itself]],
+        Check::EnergyBalance(_) | Check::JoinedMasses(_) | Check::Plateau(_) | Check::ApproachedForEver(_) => [method, vec![Itself]],
         Check::Sensitivities(_) => [with(method, Duals), vec![Duals, ClosedForm]],
         Check::Objectives(_) => [vec![Energy, Search], vec![ClosedForm]],
         Check::CriticalErrorBound(_) | Check::CriticalBound(_) => [with(method, Search), vec![FiftyDigits]],

@@ -37,6 +37,9 @@ check! {
     /// Elasticities of every quantity to every number of the scene, by the method against the closed form in dual
     /// numbers: worst difference, relative to those above 1.
     Sensitivities {} in Sensitivities, "relative", by sensitivities;
+    /// A scene where a soft stage ends at once for fast shots: the ends of the two intervals of impact velocities that
+    /// perforate, against those by hand, relative.
+    Intervals {} in Slab, "relative", by intervals;
 }
 
 fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
@@ -75,6 +78,7 @@ fn thickness_limit(subject: &Subject<'_>) -> Found {
     let speed = scene.velocity.ok_or_else(|| NotMeasured::skip("the scene gives no impact speed"))?;
     let method = subject.method(None)?;
     let mut worst = Worst::default();
+    let mut bounds = Vec::new();
     for criterion in [Criterion::FullDepth, Criterion::Ndrc] {
         let scene = Scene { criterion, ..scene.clone() };
         if criterion == Criterion::Ndrc && scene.concrete().is_none_or(|concrete| !concrete.layers.is_empty()) {
@@ -83,8 +87,19 @@ fn thickness_limit(subject: &Subject<'_>) -> Found {
         let limit = perforation_limit::of_scene(&scene, method.integrator())?;
         let bound = limit.error.unwrap_or(f64::NAN);
         holds!(bound <= 1e-9 * limit.thickness, "a bound of {bound:e} m for {} m", limit.thickness);
+        bounds.push((bound, limit.thickness));
         let wall = Scene { thickness: Some(limit.thickness), ..scene };
         worst.take(off(critical_velocity::exact(&wall)?, speed), || format!("by {criterion:?}"));
+    }
+    // The relation spreads the bound of the depth by its slope, unless an ulp of the thickness is more than either.
+    if let ([(of_depth, depth), (of_relation, thickness)], Some(c)) = (&bounds[..], scene.concrete()) {
+        let side = |factor: f64| {
+            semi_empirical::perforated_thickness_ratio(depth / c.diameter * factor) / (depth / c.diameter)
+        };
+        let slope = (side(1.0 + 1e-6) - side(1.0 - 1e-6)) / 2e-6;
+        let is_more = of_depth > &(2.0 * f64::EPSILON * depth) && of_relation > &(2.0 * f64::EPSILON * thickness);
+        let spread = of_relation / of_depth;
+        holds!(!is_more || off(spread, slope) < 1e-6, "the bound is spread by {spread}, at a slope of {slope}");
     }
     if let (Some([full, ndrc]), Some(c)) = (perforation_limit::of_eq11_12(scene)?, scene.concrete()) {
         let impact = scene.mass * speed.powi(2) / (c.static_factor * c.strength * c.diameter.powi(3));
@@ -138,4 +153,36 @@ fn sensitivities(subject: &Subject<'_>) -> Found {
         .disagreement(&found)
         .ok_or_else(|| NotMeasured::skip("no quantity of the scene has a derivative in closed form"))?;
     Ok(Measurement::new(difference).remark(format!("{} numbers", exact.entries.len())))
+}
+
+fn intervals(subject: &Subject<'_>) -> Found {
+    // 10 kN until V = v1 + x/tau, and 1 MN behind: a shot slower than v1 never meets that, one just above it at once.
+    const TEXT: &str = "projectile.mass = 1\nimpact.velocity = 50\ntarget.thickness = 0.1\n\
+        [parameters]\np = \"10 kN\"\nv1 = \"60 m/s\"\ntau = \"10 ms\"\n\
+        [[stage]]\nforce = \"p\"\nuntil = \"V = v1 + x/tau\"\n[[stage]]\nstatic_force = 1e6\n";
+    let (soft, hard, thickness, v1, tau) = (1e4_f64, 1e6_f64, 0.1_f64, 60.0_f64, 0.01_f64);
+    // The place where a shot meets the end of the soft stage, and rests at the far side.
+    let (mut low, mut high) = (0.0, thickness);
+    for _ in 0..80 {
+        let place = 0.5 * (low + high);
+        let rests_inside = place + (v1 + place / tau).powi(2) / (2.0 * hard) < thickness;
+        *if rests_inside { &mut low } else { &mut high } = place;
+    }
+    let second = ((v1 + low / tau).powi(2) + 2.0 * soft * low).sqrt();
+    let scene = Scene::from_toml(TEXT, "intervals").map_err(|error| NotMeasured::broken(error.to_string()))?;
+    let (found, one) = critical_velocity::speeds(&scene, subject.method(None)?.integrator())?;
+    holds!(one.is_none(), "one critical velocity where there are two intervals");
+    let ends: Vec<Option<f64>> = found
+        .iter()
+        .flat_map(|interval| [Some(interval.low.velocity), interval.high.map(|high| high.velocity)])
+        .collect();
+    let [Some(first), Some(last), Some(again), None] = ends[..] else {
+        return Err(NotMeasured::broken(format!("the intervals are {found:?}")));
+    };
+    let exact = [(2.0 * soft * thickness).sqrt(), v1, second];
+    let mut worst = Worst::default();
+    for (end, exact) in [first, last, again].into_iter().zip(exact) {
+        worst.take(off(end, exact), || format!("{end} m/s, and by hand {exact} m/s"));
+    }
+    Ok(worst.measurement())
 }

@@ -1,9 +1,9 @@
 //! What holds whatever the answer is: energy, reversal in time, similarity, composition.
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
-use super::{Subject, off, solve, worse, worst_of};
+use super::{Subject, Worst, off, solve, worse, worst_of};
 use crate::integrators::{Detail, Flight};
-use crate::physics::{Problem, Stage, Stages, State, Target};
+use crate::physics::{Problem, Scene, Stage, Stages, State, Target};
 use crate::studies::error::{free_quantities, signed_error, value_of};
 use crate::studies::relations::{Units, in_units, reversed};
 
@@ -27,6 +27,12 @@ check! {
         /// Pieces of a stage.
         pieces: usize,
     } in Energy, "relative", by split;
+    /// Random stages at whose ends masses join, by momentum and energy: worst error of depth, time and velocity at the end,
+    /// and, where no drag acts, of the exit margin.
+    JoinedMasses {
+        /// How many problems.
+        problems: usize,
+    } in Energy, "relative", by joined_masses;
 }
 
 /// The work between two rows is `∫ F dx` along the path that starts from the earlier row's state, integrated here by
@@ -143,4 +149,104 @@ fn compare(problem: &Problem, plain: &Flight, other: &Flight) -> Found {
         Some(signed_error(quantity, value, exact, problem.impact_speed).abs())
     };
     Ok(Measurement::new(worst_of(free.filter_map(change))))
+}
+
+/// A stage of [`joined_masses`]: `p + q V²` over `way`, behind which `added` joins.
+struct Part {
+    p: f64,
+    q: f64,
+    way: f64,
+    added: f64,
+}
+
+fn joined_masses(&JoinedMasses { problems }: &JoinedMasses, subject: &Subject<'_>) -> Found {
+    let mut random = subject.random("joined masses");
+    let method = subject.method(None)?;
+    let mut worst = Worst::default();
+    for index in 0..problems {
+        let mass = random.log_uniform(0.5, 5.0);
+        let drag = if index.is_multiple_of(2) { 0.0 } else { random.log_uniform(0.3, 10.0) };
+        let count = 2 + random.below(3);
+        let parts: Vec<Part> = (0..count)
+            .map(|stage| Part {
+                p: random.log_uniform(1e4, 1e6),
+                q: drag * random.uniform(0.5, 2.0),
+                way: random.log_uniform(0.05, 0.5),
+                added: if stage + 1 < count { random.log_uniform(0.05, 2.0) } else { 0.0 },
+            })
+            .collect();
+        let work: f64 = parts.iter().map(|part| part.p * part.way).sum();
+        let speed = (2.0 * work / mass * random.log_uniform(0.05, 20.0)).sqrt();
+        let (end, margin, slowest) = end_by_hand(&parts, mass, speed);
+        // Near a standstill in front of an end, its time is ill-conditioned.
+        if margin.abs() < 0.01 || slowest < 0.1 * speed {
+            continue;
+        }
+        let problem = with_joined_masses(&parts, mass, speed)?;
+        let flight = solve(&method, &problem, Detail::End)?;
+        let place = |what: &'static str| move || format!("{what} of problem {index}");
+        let State { time, depth, velocity } = flight.end;
+        worst.take(off(depth, end.depth), place("depth"));
+        worst.take(off(time, end.time), place("time"));
+        worst.take((velocity - end.velocity).abs() / speed, place("velocity"));
+        if drag == 0.0 {
+            let error = flight.exit_margin.unwrap_or(f64::NAN) - margin;
+            worst.take(error.abs() / margin.abs().max(1.0), place("margin"));
+        }
+    }
+    Ok(worst.measurement())
+}
+
+/// The end of the flight through `parts`; its exit margin where no drag acts: V²/V0² at the far side, or the least of what a
+/// stop lacks up to the end of any stage; and the least speed behind a stage.
+fn end_by_hand(parts: &[Part], mass: f64, speed: f64) -> (State, f64, f64) {
+    let (mut m, mut v, mut end) = (mass, speed, State { time: 0.0, depth: 0.0, velocity: speed });
+    let (mut lacking, mut least, mut rests, mut slowest) = (0.0_f64, 0.0_f64, false, speed);
+    for &Part { p, q, way, added } in parts {
+        let share = m / (m + added);
+        if rests {
+            lacking -= 2.0 * p * way / m;
+        } else {
+            let decay = -(-2.0 * q * way / m).exp_m1();
+            let w = if q == 0.0 { v * v - 2.0 * p * way / m } else { v * v * (1.0 - decay) - p / q * decay };
+            rests = w <= 0.0;
+            let (passed, after) = match (rests, q == 0.0) {
+                (false, _) => (way, w.sqrt()),
+                (true, true) => (m * v * v / (2.0 * p), 0.0),
+                (true, false) => (m / (2.0 * q) * (q * v * v / p).ln_1p(), 0.0),
+            };
+            let root = (q / p).sqrt();
+            end.time += if q == 0.0 {
+                m * (v - after) / p
+            } else {
+                m / (p * q).sqrt() * ((v - after) * root / (1.0 + root * root * v * after)).atan2(1.0)
+            };
+            end.depth += passed;
+            (v, end.velocity) = (after * share, after);
+            slowest = if rests { slowest } else { slowest.min(v) };
+            lacking = if rests { -2.0 * p * (way - passed) / m } else { 0.0 };
+        }
+        least = least.min(lacking);
+        lacking *= share * share;
+        m += added;
+    }
+    let margin = if rests { least } else { end.velocity * end.velocity };
+    (end, margin / speed / speed, slowest)
+}
+
+/// The same as a scene, from its text.
+fn with_joined_masses(parts: &[Part], mass: f64, speed: f64) -> Found<Problem> {
+    let thickness: f64 = parts.iter().map(|part| part.way).sum();
+    let mut text =
+        format!("impact.velocity = {speed:e}\nprojectile.mass = {mass:e}\ntarget.thickness = {thickness:e}\n");
+    let mut end = 0.0;
+    for &Part { p, q, way, added } in parts {
+        end += way;
+        text += &format!("[[stage]]\nstatic_force = {p:e}\ndrag = {q:e}\n");
+        if added > 0.0 {
+            text += &format!("end = {end:e}\nadd_mass = {added:e}\n");
+        }
+    }
+    let scene = Scene::from_toml(&text, "joined masses").map_err(|error| NotMeasured::broken(error.to_string()))?;
+    scene.problem().map_err(|error| NotMeasured::broken(error.to_string()))
 }

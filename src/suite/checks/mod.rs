@@ -65,6 +65,7 @@ mod commands;
 mod conclusions;
 mod counts;
 mod edges;
+mod expressions;
 mod formulas;
 mod generators;
 mod invariants;
@@ -97,9 +98,9 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, by_hand::*, commands::*, conclusions::*, counts::*, edges::*, formulas::*,
-    generators::*, invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*, problems::*, proved::*,
-    scheme::*, texts::*,
+    agreement::*, applications::*, by_hand::*, commands::*, conclusions::*, counts::*, edges::*, expressions::*,
+    formulas::*, generators::*, invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*,
+    problems::*, proved::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -147,8 +148,8 @@ every_check! {
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
-    EnergyBalance TimeReversal Similarity Split
-    Sweep BoundOfData GapFalls ThicknessLimit Map MeasuredDepth Sensitivities Peer
+    EnergyBalance TimeReversal Similarity Split JoinedMasses Ranges
+    Sweep BoundOfData GapFalls ThicknessLimit Intervals Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop
     Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag

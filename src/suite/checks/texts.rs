@@ -15,6 +15,7 @@ use super::super::claim::{Found, Measurement, NotMeasured};
 use super::super::recorded::{self, RecordedScene};
 use super::edges::Violations;
 use super::{Subject, Worst, build};
+use crate::exchange::peers::wire::PeerScene;
 use crate::exchange::peers::{PeerAnswer, PeerRequest};
 use crate::exchange::scene_file::{SHIPPED, SceneFile};
 use crate::integrators::method::{Method, MethodOptions};
@@ -23,9 +24,12 @@ use crate::physics::groups::{self, Groups};
 use crate::physics::parameter::{LayerNumber, Parameter, StageNumber};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
 use crate::physics::units::{self, Dimension};
-use crate::physics::{Advice, Criterion, EventKind, Outcome, Problem, Resistance, Scene, Stage, State};
+use crate::physics::{
+    Advice, CraterStiffness, Criterion, EventKind, Outcome, Problem, Resistance, Scene, Stage, State,
+};
 use crate::studies::critical_velocity;
 use crate::studies::random::Random;
+use crate::studies::random_scenes::Generator;
 
 check! {
     /// Every recorded text, read and solved: the worst of its `numbers`, in ulp. An ulp is one of the exact value; in a
@@ -43,7 +47,7 @@ check! {
     /// Every unit through the text of a scene, against its definition: error in ulp, and where the unit is in use with fewer
     /// digits, in half units of the last.
     Units {} in Input, "ulp", by every_unit;
-    /// Random problems as a peer reads them: fields that are missing, or that say another number.
+    /// Random problems and scenes as a peer reads them: fields that are missing, or that say another number.
     Wire {
         /// How many.
         problems: usize,
@@ -612,7 +616,43 @@ fn wire(&Wire { problems }: &Wire, subject: &Subject<'_>, seen: &mut Violations)
         let is_same = back.is_some_and(|request| request.problem(problem.crater) == problem);
         seen.expect(is_same, || format!("problem {index} reads back as another"));
     }
+    let mut generator = Generator::new(subject.context.seed, "wire of scenes");
+    for index in 0..problems {
+        let mut scene = generator.next_scene();
+        scene.criterion = if random.chance(0.5) { Criterion::Ndrc } else { Criterion::FullDepth };
+        if let Resistance::Concrete(concrete) = &mut scene.resistance {
+            concrete.inertia_factor = random.uniform(0.5, 1.5);
+            concrete.follows_eq14 = random.chance(0.5);
+        }
+        let told =
+            serde_json::to_value(PeerScene::of(&scene)).map_err(|error| NotMeasured::broken(error.to_string()))?;
+        let expected = told_of(&scene).ok_or_else(|| NotMeasured::broken("a random scene is one of concrete"))?;
+        seen.expect(told == expected, || format!("scene {index} is told as {told}, and is {expected}"));
+    }
     Ok(())
+}
+
+/// What a peer is told of `scene`, by the names of docs/reference.md, "Peer protocol".
+fn told_of(scene: &Scene) -> Option<Value> {
+    let concrete = scene.concrete()?;
+    let stiffness = match concrete.crater_stiffness {
+        CraterStiffness::Given(stiffness) => Some(stiffness),
+        CraterStiffness::Continuous => None,
+    };
+    Some(json!({
+        "mass_kg": scene.mass,
+        "diameter_m": concrete.diameter,
+        "nose_factor": concrete.nose_factor,
+        "strength_pa": concrete.strength,
+        "density_kg_m3": concrete.density,
+        "thickness_m": scene.thickness,
+        "S": if concrete.follows_eq14 { None } else { Some(concrete.static_factor) },
+        "B": concrete.inertia_factor,
+        "k": concrete.crater_ratio,
+        "crater_stiffness_n_m": stiffness,
+        "velocity_m_s": scene.velocity,
+        "criterion": if scene.criterion == Criterion::Ndrc { "ndrc" } else { "full-depth" },
+    }))
 }
 
 /// One to five stages with every term, all numbers different; an exit in three of four.
