@@ -63,7 +63,8 @@ fn every_option_of_every_command_is_in_a_transcript() {
         let words = text.lines().filter_map(|line| {
             let line = line.trim_start();
             let line = line.strip_prefix('-').filter(|rest| !rest.starts_with('-')).map_or(line, |rest| &rest[1..]);
-            line.trim_start_matches([',', ' ']).split_whitespace().next().filter(|word| word.starts_with("--"))
+            let word = line.trim_start_matches([',', ' ']).split(|c: char| !c.is_alphanumeric() && c != '-').next();
+            word.filter(|word| word.starts_with("--"))
         });
         for option in words.filter(|option| !["--help", "--quiet"].contains(option)) {
             let is_given = |run: &Vec<&str>| {
