@@ -23,6 +23,12 @@ use crate::studies::order::student_t;
 /// Places at which a range is looked through before a root is bracketed.
 const SCAN: usize = 200;
 
+/// Shots through which a range is looked at most; of more, neighbours are taken together there, and all of them have the last word.
+const LOOKED_THROUGH: usize = 500;
+
+/// Places by which the turns of few and of all shots may lie apart.
+const APART: usize = 2;
+
 /// Powers p that are searched.
 const POWERS: [f64; 2] = [1.0, 10.0];
 
@@ -102,17 +108,38 @@ fn root(from: f64, to: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
     run.ok()?.state.best_param.filter(|root| root.is_finite())
 }
 
-/// The least minimum of a function whose derivative is `slope`, between `from` and `to` and not at an end.
-fn minimum(from: f64, to: f64, value: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> Option<f64> {
-    let place = |index: usize| from + (to - from) * index as f64 / SCAN as f64;
-    let slopes: Vec<f64> = (0..=SCAN).map(|index| slope(place(index))).collect();
-    let brackets = (0..SCAN).filter(|&index| slopes[index] < 0.0 && slopes[index + 1] >= 0.0);
-    let minima = brackets.filter_map(|index| root(place(index), place(index + 1), &slope));
-    minima.min_by(|a, b| value(*a).total_cmp(&value(*b)))
+/// A function of one number to be made least, and its derivative.
+struct Objective<V, S> {
+    value: V,
+    slope: S,
 }
 
-/// Residual velocities over impact velocities, both over the greatest impact velocity.
-struct Residuals(Vec<(f64, f64)>);
+/// The least minimum between `from` and `to`, and not at an end.
+///
+/// `coarse` is near `fine` and cheaper: it is looked through for the places where its slope turns, and there `fine` has its root.
+fn minimum(
+    [from, to]: [f64; 2],
+    coarse: impl Fn(f64) -> f64,
+    fine: &Objective<impl Fn(f64) -> f64, impl Fn(f64) -> f64>,
+) -> Option<f64> {
+    let place = |index: usize| from + (to - from) * index as f64 / SCAN as f64;
+    let turns = |slopes: &[f64]| -> Vec<usize> {
+        (0..slopes.len() - 1).filter(|&index| slopes[index] < 0.0 && slopes[index + 1] >= 0.0).collect()
+    };
+    let looked: Vec<f64> = (0..=SCAN).map(|index| coarse(place(index))).collect();
+    // The two turn at most a few places apart.
+    let near = |index: usize| {
+        let (first, last) = (index.saturating_sub(APART), (index + 1 + APART).min(SCAN));
+        let slopes: Vec<f64> = (first..=last).map(|index| (fine.slope)(place(index))).collect();
+        turns(&slopes).into_iter().map(move |turn| first + turn)
+    };
+    let turns: std::collections::BTreeSet<usize> = turns(&looked).into_iter().flat_map(near).collect();
+    let minima = turns.into_iter().filter_map(|index| root(place(index), place(index + 1), &fine.slope));
+    minima.min_by(|a, b| (fine.value)(*a).total_cmp(&(fine.value)(*b)))
+}
+
+/// Residual velocities over impact velocities, both over the greatest impact velocity, and how many shots each stands for.
+struct Residuals(Vec<(f64, f64, f64)>);
 
 /// The curve of given p and limit that fits best.
 struct Best {
@@ -122,36 +149,71 @@ struct Best {
 
 impl Residuals {
     fn best(&self, b: f64, p: f64) -> Best {
-        let of = |&(v, r): &(f64, f64)| (curve(v, b, p), r);
-        let a = self.0.iter().map(of).map(|(g, r)| g * r).sum::<f64>()
-            / self.0.iter().map(of).map(|(g, _)| g * g).sum::<f64>();
-        Best { a, squares: self.0.iter().map(of).map(|(g, r)| (r - a * g).powi(2)).sum() }
+        let [rg, gg] = self.0.iter().fold([0.0; 2], |[rg, gg], &(v, r, count)| {
+            let g = curve(v, b, p);
+            [rg + count * r * g, gg + count * g * g]
+        });
+        let a = rg / gg;
+        Best { a, squares: self.0.iter().map(|&(v, r, count)| count * (r - a * curve(v, b, p)).powi(2)).sum() }
     }
 
-    /// dg/db and dg/dp of `curve`.
-    fn slopes(v: f64, b: f64, p: f64) -> [f64; 2] {
-        let g = curve(v, b, p);
-        let [vp, bp] = [v, b].map(|x| x.powf(p));
-        let by_limit = -(b / g).powf(p - 1.0);
-        let b_ln_b = if b > 0.0 { bp * b.ln() } else { 0.0 };
-        [by_limit, g * ((vp * v.ln() - b_ln_b) / (p * (vp - bp)) - g.ln() / p)]
+    /// `curve`, and its dg/db and dg/dp, of one power and two logarithms.
+    fn slopes(v: f64, b: f64, p: f64) -> [f64; 3] {
+        let ln_ratio = (b / v).ln();
+        let q = (p * ln_ratio).exp();
+        let ln_rest = (-q).ln_1p() / p;
+        let g = v * ln_rest.exp();
+        // Without a limit its logarithm is none.
+        if q == 0.0 {
+            return [g, -(b / g).powf(p - 1.0), 0.0];
+        }
+        let by_power = -ln_rest - q * ln_ratio / (1.0 - q);
+        [g, -((p - 1.0) * (ln_ratio - ln_rest)).exp(), g * by_power / p]
     }
 
     /// Half the derivative of the sum of squares over a: that by the limit, and by p.
     fn gradient(&self, b: f64, p: f64) -> [f64; 2] {
-        let Best { a, .. } = self.best(b, p);
-        self.0.iter().fold([0.0; 2], |sum, &(v, r)| {
-            let residual = r - a * curve(v, b, p);
-            let slopes = Self::slopes(v, b, p);
-            [sum[0] - residual * slopes[0], sum[1] - residual * slopes[1]]
-        })
+        let [rg, gg, rb, gb, rp, gp] = self.0.iter().fold([0.0; 6], |sum, &(v, r, count)| {
+            let [g, by_limit, by_power] = Self::slopes(v, b, p);
+            let term = [r * g, g * g, r * by_limit, g * by_limit, r * by_power, g * by_power];
+            std::array::from_fn(|index| sum[index] + count * term[index])
+        });
+        let a = rg / gg;
+        [a * gb - rb, a * gp - rp]
     }
 
-    /// The best limit of given p; `None` where it is zero.
-    fn limit(&self, p: f64) -> Option<f64> {
-        let slowest = self.0.iter().map(|(v, _)| *v).fold(f64::INFINITY, f64::min);
+    /// The best limit of given p, looked for by the curve through `coarse`; `None` where it is zero.
+    fn limit(&self, coarse: &Self, p: f64) -> Option<f64> {
+        let slowest = self.0.iter().map(|(v, ..)| *v).fold(f64::INFINITY, f64::min);
+        let fine = Objective { value: |b| self.best(b, p).squares, slope: |b| self.gradient(b, p)[0] };
         // At the slowest shot itself the slope is infinite.
-        minimum(0.0, slowest * (1.0 - 1e-9), |b| self.best(b, p).squares, |b| self.gradient(b, p)[0])
+        minimum([0.0, slowest * (1.0 - 1e-9)], |b| coarse.gradient(b, p)[0], &fine)
+    }
+
+    /// The best limit and p that is free.
+    fn free(&self, coarse: &Self) -> Option<(f64, f64)> {
+        // Where no limit fits there is no minimum either.
+        let slope_of = |shots: &Self, p| shots.limit(coarse, p).map_or(-1.0, |b| shots.gradient(b, p)[1]);
+        let value = |p| self.limit(coarse, p).map_or(f64::INFINITY, |b| self.best(b, p).squares);
+        let fine = Objective { value, slope: |p| slope_of(self, p) };
+        let p = minimum(POWERS, |p| slope_of(coarse, p), &fine)?;
+        Some((self.limit(coarse, p)?, p))
+    }
+
+    /// Neighbours in the impact velocity taken together, [`LOOKED_THROUGH`] at most. The slowest stay alone: near them the curve is
+    /// steep, and at the slowest of all ends the range of the limit.
+    fn coarse(&self) -> Self {
+        let mut shots = self.0.clone();
+        shots.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mean = |shots: &[(f64, f64, f64)]| {
+            let count = shots.len() as f64;
+            let of = |number: fn(&(f64, f64, f64)) -> f64| shots.iter().map(number).sum::<f64>() / count;
+            (of(|shot| shot.0), of(|shot| shot.1), count)
+        };
+        let alone = LOOKED_THROUGH / 2;
+        let (slowest, others) = shots.split_at(shots.len().min(alone));
+        let together = others.chunks(others.len().div_ceil(alone).max(1)).map(mean);
+        Self(slowest.iter().copied().chain(together).collect())
     }
 
     /// The curve of `b` and `p` with its intervals; velocities times `unit`.
@@ -160,9 +222,8 @@ impl Residuals {
         let parameters = if is_free { 3 } else { 2 };
         let dof = self.0.len().checked_sub(parameters).filter(|dof| *dof > 0)?;
         let rows = DMatrix::from_fn(self.0.len(), 3, |row, column| {
-            let v = self.0[row].0;
-            let [by_limit, by_power] = Self::slopes(v, b, p);
-            [curve(v, b, p), a * by_limit, if is_free { a * by_power } else { 0.0 }][column]
+            let [g, by_limit, by_power] = Self::slopes(self.0[row].0, b, p);
+            [g, a * by_limit, if is_free { a * by_power } else { 0.0 }][column]
         });
         let mut normal = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
         if !is_free {
@@ -190,36 +251,45 @@ impl Residuals {
 pub fn of_residuals(residuals: &[(f64, f64)]) -> [Option<ResidualFit>; 2] {
     let perforated = residuals.iter().filter(|(_, residual)| *residual > 0.0);
     let unit = perforated.clone().map(|(speed, _)| *speed).fold(0.0, f64::max);
-    let scaled = Residuals(perforated.map(|(speed, residual)| (speed / unit, residual / unit)).collect());
+    let scaled = Residuals(perforated.map(|(speed, residual)| (speed / unit, residual / unit, 1.0)).collect());
     // Shots of equal velocity say no more of the curve than one.
-    let distinct = scaled.0.iter().map(|(v, _)| v.to_bits()).collect::<std::collections::BTreeSet<_>>().len();
+    let distinct = scaled.0.iter().map(|(v, ..)| v.to_bits()).collect::<std::collections::BTreeSet<_>>().len();
     if distinct < 3 {
         return [None; 2];
     }
-    let plain = scaled.limit(2.0).and_then(|b| scaled.fit(b, 2.0, false, unit));
-    let free = (distinct > 3)
-        .then(|| {
-            let squares = |p| scaled.limit(p).map_or(f64::INFINITY, |b| scaled.best(b, p).squares);
-            // Where no limit fits there is no minimum either.
-            let slope = |p| scaled.limit(p).map_or(-1.0, |b| scaled.gradient(b, p)[1]);
-            let p = minimum(POWERS[0], POWERS[1], squares, slope)?;
-            scaled.fit(scaled.limit(p)?, p, true, unit)
-        })
-        .flatten();
-    [plain, free]
+    let coarse = scaled.coarse();
+    let plain = scaled.limit(&coarse, 2.0).and_then(|b| scaled.fit(b, 2.0, false, unit));
+    let free = || scaled.free(&coarse).and_then(|(b, p)| scaled.fit(b, p, true, unit));
+    [plain, if distinct > 3 { free() } else { None }]
 }
 
-/// Outcomes over impact velocities, these from their mean in units of their greatest distance from it.
-struct Outcomes(Vec<(f64, bool)>);
+/// Impact velocities, from their mean in units of their greatest distance from it, and how many perforated and stopped at each.
+struct Outcomes(Vec<(f64, [f64; 2])>);
 
 impl Outcomes {
     /// Logarithm of the likelihood of V50 = `middle` and 1/σ = `steepness`, and its derivatives by both.
     fn likelihood(&self, middle: f64, steepness: f64) -> [f64; 3] {
-        self.0.iter().fold([0.0; 3], |sum, &(v, perforated)| {
-            let sign = if perforated { 1.0 } else { -1.0 };
-            let (ln, slope) = ln_normal(sign * steepness * (v - middle));
-            [sum[0] + ln, sum[1] - sign * steepness * slope, sum[2] + sign * (v - middle) * slope]
-        })
+        let mut sum = [0.0; 3];
+        for &(v, counts) in &self.0 {
+            for (sign, count) in [1.0, -1.0].into_iter().zip(counts).filter(|(_, count)| *count > 0.0) {
+                let (ln, slope) = ln_normal(sign * steepness * (v - middle));
+                sum[0] += count * ln;
+                sum[1] -= count * sign * steepness * slope;
+                sum[2] += count * sign * (v - middle) * slope;
+            }
+        }
+        sum
+    }
+
+    /// Neighbours in the impact velocity taken together, [`LOOKED_THROUGH`] at most.
+    fn coarse(&self) -> Self {
+        let mut shots = self.0.clone();
+        shots.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mean = |shots: &[(f64, [f64; 2])]| {
+            let velocity = shots.iter().map(|shot| shot.0).sum::<f64>() / shots.len() as f64;
+            (velocity, [0, 1].map(|index| shots.iter().map(|shot| shot.1[index]).sum()))
+        };
+        Self(shots.chunks(shots.len().div_ceil(LOOKED_THROUGH).max(1)).map(mean).collect())
     }
 
     /// The best 1/σ for given V50: the likelihood is concave in it. `None` where none is best, for a `middle` that parts the outcomes.
@@ -272,9 +342,12 @@ pub fn of_outcomes(outcomes: &[(f64, bool)]) -> Option<OutcomeFit> {
     }
     let center = outcomes.iter().map(|shot| shot.0).sum::<f64>() / outcomes.len() as f64;
     let unit = outcomes.iter().map(|shot| (shot.0 - center).abs()).fold(0.0, f64::max);
-    let scaled = Outcomes(outcomes.iter().map(|&(v, outcome)| ((v - center) / unit, outcome)).collect());
-    let slope = |middle: f64| -scaled.steepness(middle).map_or(0.0, |s| scaled.likelihood(middle, s)[1]);
-    let middle = minimum(-1.0, 1.0, |middle| -scaled.profile(middle), slope)?;
+    let counts = |perforated: bool| if perforated { [1.0, 0.0] } else { [0.0, 1.0] };
+    let scaled = Outcomes(outcomes.iter().map(|&(v, outcome)| ((v - center) / unit, counts(outcome))).collect());
+    let slope = |of: &Outcomes, middle: f64| -of.steepness(middle).map_or(0.0, |s| of.likelihood(middle, s)[1]);
+    let fine = Objective { value: |middle| -scaled.profile(middle), slope: |middle| slope(&scaled, middle) };
+    let coarse = scaled.coarse();
+    let middle = minimum([-1.0, 1.0], |middle| slope(&coarse, middle), &fine)?;
     let steepness = scaled.steepness(middle).filter(|steepness| *steepness > 0.0)?;
     let most = scaled.profile(middle);
     let beyond = |at: f64| most - scaled.profile(at) - 0.5 * CHI_SQUARED_95;
@@ -356,6 +429,37 @@ mod tests {
             }
             assert_eq!(fit.at(fit.limit_m_s.value), 0.0);
         }
+    }
+
+    /// The same fits by all shots at every place, which took minutes for tens of thousands.
+    #[test]
+    fn thousands_of_shots_have_the_curve_and_the_limit_that_all_of_them_show() {
+        let mut random = crate::studies::random::Random::for_part(5, "ballistic limit");
+        let mut speed = || random.log_uniform(250.0, 800.0);
+        // Limits that scatter, so that some shots are slower than the limit of the others.
+        let limit = |index: usize| 400.0 * (1.0 + 0.05 * (index as f64 * 0.7).sin());
+        let shots: Vec<(f64, f64)> = (0..3000).map(|index| (speed(), limit(index))).collect();
+        let residuals: Vec<(f64, f64)> =
+            shots.iter().filter(|(v, b)| v > b).map(|(v, b)| (*v, (v * v - b * b).sqrt())).collect();
+        let unit = residuals.iter().map(|(speed, _)| *speed).fold(0.0, f64::max);
+        let scaled = Residuals(residuals.iter().map(|(v, r)| (v / unit, r / unit, 1.0)).collect());
+        assert!(scaled.coarse().0.len() <= LOOKED_THROUGH && scaled.0.len() > 2 * LOOKED_THROUGH);
+        let [plain, free] = of_residuals(&residuals).map(Option::unwrap);
+        assert_eq!(plain.limit_m_s.value, unit * scaled.limit(&scaled, 2.0).unwrap());
+        let (b, p) = (free.limit_m_s.value / unit, free.p);
+        // No place far and near has less squares.
+        let least = scaled.best(b, p).squares;
+        for power in [1.0, 1.2, 1.5, p - 0.01, p + 0.01, 2.0, 3.0, 6.0] {
+            let other = scaled.limit(&scaled, power).map_or(f64::INFINITY, |b| scaled.best(b, power).squares);
+            assert!(other >= least, "{power}: {other} {least}");
+        }
+        let outcomes: Vec<(f64, bool)> = shots.iter().map(|(v, b)| (*v, v > b)).collect();
+        let fit = of_outcomes(&outcomes).unwrap();
+        // Twice the same shots: the same limit, and bars less by the root of two.
+        let twice = of_outcomes(&[&outcomes[..], &outcomes[..]].concat()).unwrap();
+        assert_relative_eq!(fit.v50_m_s, twice.v50_m_s, max_relative = 1e-9);
+        let [width, half] = [&fit, &twice].map(|fit| fit.v50_95_m_s[1].unwrap() - fit.v50_95_m_s[0].unwrap());
+        assert_relative_eq!(width / half, std::f64::consts::SQRT_2, max_relative = 1e-2);
     }
 
     #[test]
