@@ -293,6 +293,11 @@ impl<'py> Input<'py> {
     ) -> PyResult<Self> {
         let layout =
             Layout::new(names, "the table", At::Table, format).map_err(|error| advised(py, "TableError", &*error))?;
+        // The answers have the columns of the answers alone.
+        if let Some(other) = layout.kept().first() {
+            let message = format!("there is no column `{}`", other.name);
+            return Err(table_error(py, &message, "leave it out, and join it to the answers by their rows"));
+        }
         let places = layout.places().to_vec();
         for (known, place) in format.columns.iter().zip(&places) {
             let Some(place) = *place else { continue };

@@ -16,11 +16,11 @@ use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::interruption::whole;
 #[cfg(feature = "parquet")]
 use crate::exchange::tables::parquet::ParquetReader;
-use crate::exchange::tables::{self, CsvTable, Rows, TableWriter};
+use crate::exchange::tables::{self, CsvTable, Kept, Rows, TableWriter};
 use crate::integrators::Method;
 use crate::physics::Scene;
-use crate::studies::batch::{PART, SCENES, Scenes, Tally, Varied, columns, solve};
-use crate::text::count;
+use crate::studies::batch::{PART, SCENES, Scenes, Tally, Varied, check_kept, columns_with, solve};
+use crate::text::{count, shortened};
 
 /// Progress over a known number of rows.
 const ROWS_BAR: &str = "{bar:30} {human_pos}/{human_len} rows, {eta} left";
@@ -82,10 +82,12 @@ impl Run for BatchArgs {
             source.skip(rows.start)?;
         }
         let mut source = Cut { source, left: rows.end - rows.start };
+        let kept = source.source.kept().to_vec();
+        check_kept(&kept, self.scene.is_some()).map_err(|(message, help)| CliError::usage(message, help))?;
         // A table that cannot be read leaves standard output empty, unless it ends badly far behind its beginning.
         let first = source.next_scenes(None)?;
         let unwritable = |cause| CliError::write(&self.out, cause);
-        let mut sink = self.sink().map_err(unwritable)?;
+        let mut sink = self.sink(&kept).map_err(unwritable)?;
         let tally = match pool.install(|| self.solve_all(first, rows.start, &mut source, &mut sink, &method)) {
             // Whoever reads the results (`| head`) has enough.
             Err(CliError::Write { cause, .. }) if is_standard(&self.out) && cause.kind() == BrokenPipe => {
@@ -96,6 +98,10 @@ impl Run for BatchArgs {
         let written = sink.finish().and_then(|output| Ok(output.into_inner()?));
         written.and_then(|output| whole(|| output.finish(&self.out))).map_err(unwritable)?;
         progress.finish_and_clear();
+        if !kept.is_empty() {
+            let names: Vec<_> = kept.iter().map(|kept| shortened(&kept.name)).collect();
+            say("", &format!("carried through unread: {}", names.join(", ")));
+        }
         say("", &summary(&tally, self.part));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })
     }
@@ -105,9 +111,9 @@ impl Run for BatchArgs {
 type Sink = TableWriter<BufWriter<Destination>>;
 
 impl BatchArgs {
-    fn sink(&self) -> io::Result<Sink> {
+    fn sink(&self, kept: &[Kept]) -> io::Result<Sink> {
         let output = BufWriter::with_capacity(1 << 20, Destination::open(&self.out)?);
-        TableWriter::new(output, &columns(self.method.method, self.critical), is_parquet(&self.out))
+        TableWriter::new(output, &columns_with(self.method.method, self.critical, kept), is_parquet(&self.out))
     }
 
     /// Solves one chunk, `scenes` to begin with, which come behind `before` others, while the one before is written and the next is read.
@@ -242,6 +248,16 @@ impl Source {
             }
         };
         Ok(Self::Csv(CsvTable::new(&name, input, format)?, varied))
+    }
+
+    /// Columns that go with the scenes.
+    fn kept(&self) -> &[Kept] {
+        match self {
+            Self::Csv(table, _) => table.layout().kept(),
+            #[cfg(feature = "parquet")]
+            Self::Parquet(table, ..) => table.layout().kept(),
+            Self::Random { .. } => &[],
+        }
     }
 
     /// How many scenes there are, from the beginning; `path` is theirs. A table without a number of rows is read through.

@@ -110,6 +110,27 @@ impl Column {
         })
     }
 
+    /// Whether `name`, which is none of this column, may be meant for it: the whole, or with a unit at its end the part before
+    /// it, is a name of the column but for a letter or two; for none where that is a word of less than five letters.
+    pub fn may_be_meant(&self, name: &str) -> bool {
+        let bare =
+            |text: &str| text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect::<String>();
+        let is_near = |known: &str, read: &str| {
+            let (known, read) = (bare(known), bare(read));
+            let edits = match known.chars().count() {
+                ..5 => 0,
+                5..8 => 1,
+                _ => 2,
+            };
+            !known.is_empty() && strsim::osa_distance(&known, &read) <= edits
+        };
+        let stem = self.measure.map(|(stem, _)| stem);
+        let known = || [self.name].into_iter().chain(stem).chain(self.aliases.iter().copied());
+        let ends =
+            name.char_indices().filter(|(_, c)| self.measure.is_some() && "_ ([-".contains(*c)).map(|(end, _)| end);
+        ends.chain([name.len()]).any(|end| known().any(|known| is_near(known, &name[..end])))
+    }
+
     /// A required column of text.
     pub const fn text(name: &'static str) -> Self {
         Self { kind: Kind::Text, ..Self::number(name) }
@@ -159,6 +180,8 @@ pub(crate) fn spellings(unit: &str) -> [String; 2] {
 pub enum Others {
     /// The table is refused.
     Refused,
+    /// They are not read, and go with their rows ([`Row::kept`]). A name that may be meant for a column is refused.
+    Kept,
     /// They are not read.
     Ignored,
     /// The caller reads them by [`Row::names`] and [`Row::cell`], and sees to it that none is missing or there twice.
@@ -218,6 +241,18 @@ impl Format {
         text
     }
 
+    /// Whether a column `name` is kept.
+    ///
+    /// # Errors
+    /// The known column that may be meant, or `None` for no name at all: a line with another separator is one.
+    fn keeps(&self, name: &str) -> Result<(), Option<&'static str>> {
+        if name.is_empty() || name.contains(['"', '=', '{', '}', ';']) || name.contains(char::is_control) {
+            return Err(self.resembling(name));
+        }
+        let meant = self.columns.iter().find(|column| column.may_be_meant(name));
+        meant.map_or(Ok(()), |column| Err(Some(column.name)))
+    }
+
     /// The column whose name `name` resembles, if it is a word at all.
     fn resembling(&self, name: &str) -> Option<&'static str> {
         let is_word = name.chars().all(|c| c.is_alphanumeric() || "_ ()/".contains(c));
@@ -237,8 +272,21 @@ pub struct Layout {
     factors: Vec<f64>,
     /// Names as they stand, without blanks at their ends, unknown ones among them.
     names: Vec<String>,
+    /// Columns that the format does not have and the table keeps.
+    kept: Vec<Kept>,
     /// Line of the names.
     header: At,
+}
+
+/// A column that goes unread with its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// Its name.
+    pub name: String,
+    /// What it holds; a CSV table holds texts.
+    pub kind: Kind,
+    /// Its place in the table, from 0.
+    place: usize,
 }
 
 impl Layout {
@@ -253,6 +301,7 @@ impl Layout {
         }
         let mut places = vec![None; format.columns.len()];
         let mut factors = vec![1.0; format.columns.len()];
+        let mut kept: Vec<Kept> = Vec::new();
         for (index, name) in names.iter().map(|name| name.trim()).enumerate() {
             let known =
                 format.columns.iter().enumerate().find_map(|(known, column)| Some((known, column.factor(name)?)));
@@ -268,6 +317,15 @@ impl Layout {
                     let near = format.resembling(name);
                     return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
                 }
+                None if format.others == Others::Kept => {
+                    if let Err(near) = format.keeps(name) {
+                        return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
+                    }
+                    if kept.iter().any(|other| other.name == name) {
+                        return refuse(index + 1, Fault::ColumnTwice(name.to_owned()));
+                    }
+                    kept.push(Kept { name: name.to_owned(), kind: Kind::Text, place: index });
+                }
                 _ => {}
             }
         }
@@ -275,13 +333,18 @@ impl Layout {
         let mut missing = format.columns.iter().zip(&places);
         match missing.find(|(column, place)| format.lacks(column, **place, &places)) {
             Some((column, _)) if format.others != Others::Read => refuse(0, Fault::MissingColumn(column.name)),
-            _ => Ok(Self { columns: format.columns, places, factors, names, header: at }),
+            _ => Ok(Self { columns: format.columns, places, factors, names, kept, header: at }),
         }
     }
 
     /// Place in the table, from 0, of each column of the format.
     pub fn places(&self) -> &[Option<usize>] {
         &self.places
+    }
+
+    /// Columns that the format does not have and the table keeps, in its order.
+    pub fn kept(&self) -> &[Kept] {
+        &self.kept
     }
 }
 
@@ -298,19 +361,19 @@ pub struct Rows {
 enum Data {
     /// Records of a CSV table, and the line of each.
     Csv(Vec<ByteRecord>, Vec<u64>),
-    /// Columns of a table without lines in the order of the format, an empty one where the table has none, and the number
-    /// of the first row, from 1.
+    /// Columns of a table without lines in the order of the format, an empty one where the table has none, those that it keeps
+    /// behind them, and the number of the first row, from 1.
     Columns(Vec<Cells>, u64),
 }
 
 impl Rows {
     /// Rows of a table in memory: `columns` in the order of the format of `layout`, without a cell where the table has no
-    /// such column; the first is row `first`, from 1.
+    /// such column, and those that it keeps; the first is row `first`, from 1.
     ///
     /// # Panics
-    /// If the columns are not those of the format, or differ in length: a mistake of the caller.
+    /// If the columns are not those, or differ in length: a mistake of the caller.
     pub fn of_columns(layout: &Arc<Layout>, columns: Vec<Cells>, first: u64) -> Self {
-        assert_eq!(columns.len(), layout.columns.len(), "one entry a column of the format");
+        assert_eq!(columns.len(), layout.columns.len() + layout.kept.len(), "one entry a column");
         let count = columns.iter().map(Cells::len).max().unwrap_or(0);
         assert!(columns.iter().all(|cells| [0, count].contains(&cells.len())), "columns of one length");
         Self { layout: Arc::clone(layout), count, data: Data::Columns(columns, first) }
@@ -324,6 +387,11 @@ impl Rows {
     /// True if there is none.
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// The layout that they are read by.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
     }
 
     /// Line or number of row `index` in its table.
@@ -392,8 +460,24 @@ impl<'a> Row<'a> {
         self.rows.layout.places[column].map_or(0, |place| place + 1)
     }
 
+    /// The cells that the table keeps, in the order of [`Layout::kept`]; one that is no text is empty.
+    pub fn kept(&self) -> impl Iterator<Item = Value<'a>> {
+        let (row, layout) = (*self, &self.rows.layout);
+        layout.kept.iter().enumerate().map(move |(index, kept)| match &row.rows.data {
+            Data::Csv(..) => Value::Text(row.cell(kept.place).unwrap_or_default()),
+            Data::Columns(columns, _) => match &columns[layout.columns.len() + index] {
+                Cells::Texts(cells) => Value::Text(cells[row.index].as_deref().unwrap_or_default()),
+                Cells::Numbers(cells) => Value::Number(cells[row.index]),
+                Cells::Counts(cells) => Value::Count(cells[row.index]),
+            },
+        })
+    }
+
     /// Refuses a cell that is not text, whether it is used or not.
-    fn check_text(&self) -> Result<(), Box<TableError>> {
+    ///
+    /// # Errors
+    /// [`Fault::NotText`].
+    pub fn check_text(&self) -> Result<(), Box<TableError>> {
         let bad = match &self.rows.data {
             Data::Csv(records, _) => records[self.index].iter().position(|cell| std::str::from_utf8(cell).is_err()),
             Data::Columns(..) => None,
@@ -744,7 +828,11 @@ impl<W: Write + Send> TableWriter<W> {
             return Ok(Self::Parquet(Box::new(parquet::ParquetWriter::new(output, columns)?)));
         }
         debug_assert!(!is_parquet, "this build writes CSV only");
-        let names: Vec<_> = columns.iter().map(|(name, _)| *name).collect();
+        let quoted = |name: &str| {
+            let is_plain = !name.contains([',', '"']);
+            if is_plain { name.to_owned() } else { format!("\"{}\"", name.replace('"', "\"\"")) }
+        };
+        let names: Vec<_> = columns.iter().map(|(name, _)| quoted(name)).collect();
         writeln!(output, "{}", names.join(","))?;
         Ok(Self::Csv(output))
     }

@@ -13,7 +13,9 @@ use thiserror::Error;
 use super::critical_velocity::{self, CriticalError};
 use super::enclosure::{self, Bounds};
 use super::random_scenes::Generator;
-use crate::exchange::tables::{Block, Column, Format, Kind, Need, Others, Place, Row, Rows, TableError, Value};
+use crate::exchange::tables::{
+    Block, Column, Columns, Format, Kept, Kind, Need, Others, Place, Row, Rows, TableError, Value,
+};
 use crate::integrators::lanes::{Batch, Summary};
 use crate::integrators::{Detail, IntegrationError, Method, MethodName, Taylor};
 use crate::physics::decimals::Written;
@@ -22,10 +24,10 @@ use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, Parameter, ParameterError};
 use crate::physics::units::Dimension;
 use crate::physics::{Concrete, CraterStiffness, Criterion, Outcome, Problem, Resistance, ResolveError, Scene};
-use crate::text::Shown;
+use crate::text::{Shown, shortened};
 
-/// A table of scenes; whether its numbers are admissible is for [`Scene::resolve`] to say.
-pub static SCENES: Format = Format { columns: &COLUMNS, others: Others::Refused, has_comments: false };
+/// A table of scenes; whether its numbers are admissible is for [`Scene::resolve`] to say. Other columns go with their rows.
+pub static SCENES: Format = Format { columns: &COLUMNS, others: Others::Kept, has_comments: false };
 
 /// The columns of the first numbers in [`Parameter::PLAIN`], by the names that [`Parameter::column`] gives them.
 const NUMBERS: [&str; 11] = [
@@ -135,7 +137,7 @@ impl Varied {
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         let format = *known.entry(parameters.clone()).or_insert_with(|| {
             let columns: &'static [Column] = Box::leak(parameters.iter().map(column).collect());
-            Box::leak(Box::new(Format { columns, others: Others::Refused, has_comments: false }))
+            Box::leak(Box::new(Format { columns, others: Others::Kept, has_comments: false }))
         });
         Self { scene, parameters, format }
     }
@@ -170,6 +172,36 @@ pub const RESULT_COLUMNS: [(&str, Kind); 11] = [
     ("X_over_d_eq11_12", Kind::Number),
     ("error", Kind::Text),
 ];
+
+/// Why a column that a table of scenes keeps cannot go with its rows, and what to do.
+///
+/// The results have one of that name, or it is a number of a scene as the other kind of table names it: `is_varied` where rows
+/// vary a scene.
+///
+/// # Errors
+/// Message and help.
+pub fn check_kept(kept: &[Kept], is_varied: bool) -> Result<(), (String, String)> {
+    let results: Vec<_> = columns(MethodName::Enclosure, true).iter().map(|(name, _)| *name).collect();
+    for Kept { name, .. } in kept {
+        let refuse =
+            |what, help: String| Err((format!("the scenes have a column `{}`, {what}", shortened(name)), help));
+        if results.contains(&name.as_str()) {
+            return refuse("and so have the results", format!("rename it, say to `given_{name}`"));
+        }
+        if !is_varied && name.parse::<Parameter>().is_ok() {
+            return refuse(
+                "the path of a number",
+                "name the columns as in docs/reference.md, or give --scene".to_owned(),
+            );
+        }
+        let is_of_scenes = COLUMNS.iter().any(|column| column.name == name || column.may_be_meant(name));
+        if is_varied && (name.contains('.') || is_of_scenes) {
+            let help = "with --scene columns are paths, such as impact.velocity; rename any other".to_owned();
+            return refuse("which is no number of this scene", help);
+        }
+    }
+    Ok(())
+}
 
 /// The columns of the results of `method`, with V_c or without.
 pub fn columns(method: MethodName, with_critical: bool) -> Vec<(&'static str, Kind)> {
@@ -350,12 +382,32 @@ impl Scenes {
     /// The scenes of `part`, which begins at a multiple of [`PART`] and is no longer than that.
     pub fn scenes(&self, part: Range<usize>) -> Vec<Result<Scene, RowError>> {
         match self {
-            Self::Table(rows) => part.map(|index| scene_of(&rows.row(index)?)).collect(),
-            Self::Varied(rows, of) => part.map(|index| of.scene_of(&rows.row(index)?)).collect(),
+            Self::Table(rows) => part.map(|index| scene_of(&whole(rows, index)?)).collect(),
+            Self::Varied(rows, of) => part.map(|index| of.scene_of(&whole(rows, index)?)).collect(),
             Self::Random { seed, rows } => {
                 let first = rows.start + part.start as u64;
                 random_rows(*seed, first / PART as u64).take(part.len()).map(Ok).collect()
             }
+        }
+    }
+
+    /// Columns that go with the scenes.
+    pub fn kept(&self) -> &[Kept] {
+        match self {
+            Self::Table(rows) | Self::Varied(rows, _) => rows.layout().kept(),
+            Self::Random { .. } => &[],
+        }
+    }
+
+    /// The cells of scene `index` in the columns that go with it; empty ones of a row that cannot be read.
+    fn kept_cells(&self, index: usize) -> Vec<Value<'_>> {
+        let empty = |kept: &Kept| if kept.kind == Kind::Text { Value::Text("") } else { Value::Number(None) };
+        match self {
+            Self::Table(rows) | Self::Varied(rows, _) => match rows.row(index) {
+                Ok(row) => row.kept().collect(),
+                Err(_) => self.kept().iter().map(empty).collect(),
+            },
+            Self::Random { .. } => Vec::new(),
         }
     }
 
@@ -381,9 +433,10 @@ impl Scenes {
         from: usize,
         first: u64,
         answers: &[Result<Answer, RowError>],
-        columns: &[(&'static str, Kind)],
+        columns: &Columns<'_>,
         is_parquet: bool,
     ) -> Block {
+        let kept = self.kept().len();
         let mut block = Block::empty(columns, is_parquet);
         if let Block::Lines(lines) = &mut block {
             lines.reserve(160 * answers.len());
@@ -396,17 +449,33 @@ impl Scenes {
             };
             let [a, b, c, d, e, f, g, h] = numbers.map(Value::Number);
             let cells = [Value::Count(row), Value::Text(outcome), a, b, c, d, e, f, g, h, Value::Text(&message)];
-            let enclosed = columns.len() - cells.len();
-            if enclosed == 0 {
+            let enclosed = columns.len() - cells.len() - kept;
+            if enclosed + kept == 0 {
                 block.push(&cells);
             } else {
+                let kept = self.kept_cells(index);
                 let bounds = answer.as_ref().ok().and_then(|answer| answer.bounds).unwrap_or_default();
                 let proved = enclosure::COLUMNS.iter().take(enclosed).map(|(_, cell)| Value::Number(cell(&bounds)));
-                block.push(&cells.iter().copied().chain(proved).collect::<Vec<_>>());
+                block.push(&cells.iter().copied().chain(proved).chain(kept).collect::<Vec<_>>());
             }
         }
         block
     }
+}
+
+/// Row `index`; one with a cell that goes with it and is no text is refused like any other.
+fn whole(rows: &Rows, index: usize) -> Result<Row<'_>, Box<TableError>> {
+    let row = rows.row(index)?;
+    if !rows.layout().kept().is_empty() {
+        row.check_text()?;
+    }
+    Ok(row)
+}
+
+/// The columns of the results of `method` with those `kept` of the scenes behind them.
+pub fn columns_with(method: MethodName, with_critical: bool, kept: &[Kept]) -> Vec<(&str, Kind)> {
+    let kept = kept.iter().map(|kept| (kept.name.as_str(), kept.kind));
+    columns(method, with_critical).into_iter().chain(kept).collect()
 }
 
 /// The scenes of part `part` of the endless random table with `seed`; a part has [`PART`] rows.
@@ -542,7 +611,7 @@ fn enclosed(scene: &Scene, with_critical: bool) -> Result<Answer, IntegrationErr
 /// the first row, from 1.
 pub fn solve(scenes: &Scenes, first: u64, method: &Method, critical: bool, is_parquet: bool) -> (Tally, Vec<Block>) {
     let total = scenes.len();
-    let columns = &columns(method.name(), critical);
+    let columns = &columns_with(method.name(), critical, scenes.kept());
     let (tallies, blocks): (Vec<Tally>, Vec<Block>) = (0..total.div_ceil(PART))
         .into_par_iter()
         // Single parts: a thread that takes several at once keeps the others waiting at the end of the chunk.
@@ -640,8 +709,9 @@ mod tests {
         assert!((end(0).depth - 0.05).abs() < 1e-16, "{}", end(0));
         assert_eq!((end(1).depth, end(1).velocity), (0.4, 0.0));
         assert_eq!(answers[2], Err(RowError::Scene(ResolveError::NoImpactSpeed)));
-        let error = CsvTable::new("t.csv", "parameters.Q\n1\n".as_bytes(), scenes_format()).err().unwrap();
-        assert!(error.to_string().contains("parameters.Q"), "{error}");
+        let table = CsvTable::new("t.csv", "parameters.Q\n1\n".as_bytes(), scenes_format()).unwrap();
+        let (error, _) = check_kept(table.layout().kept(), true).unwrap_err();
+        assert!(error.contains("parameters.Q"), "{error}");
     }
 
     fn scenes_format() -> &'static Format {

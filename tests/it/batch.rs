@@ -193,3 +193,76 @@ fn columns_may_be_in_other_units() {
     let [si, other] = [si, other].map(|table| run_with(table, "batch - --out -").expect(0).out);
     assert_eq!(si, other);
 }
+
+/// Against the same table without them, line by line.
+#[test]
+fn columns_that_are_not_read_go_with_their_rows() {
+    let rows = [("2,0.05,0.72,36e6,2300,300", "A-1,\"a, \"\"b\"\"\",-3.50"), ("2,0.05,0.72,-1,2300,300", "A-2,,=1")];
+    let header = "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,velocity_m_s";
+    let lines = |with: bool| {
+        let line = |(scene, kept): &(&str, &str)| if with { format!("{kept},{scene}\n") } else { format!("{scene}\n") };
+        let names = if with { "shot id,note,\"dx, dy\"," } else { "" };
+        format!("{names}{header}\n{}", rows.iter().map(line).collect::<String>())
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let said = run(folder.path(), &lines(true), "--out results.csv --threads 1").expect(3);
+    assert!(said.words().contains("carried through unread: shot id, note, dx, dy"), "{}", said.words());
+    let found = fs::read_to_string(folder.path().join("results.csv")).unwrap();
+    run(folder.path(), &lines(false), "--out results.csv").expect(3);
+    let plain = fs::read_to_string(folder.path().join("results.csv")).unwrap();
+    let kept = ["shot id,note,\"dx, dy\"", "A-1,\"a, \"\"b\"\"\",\"-3.50\"", "A-2,,\"'=1\""];
+    for ((found, plain), kept) in found.lines().zip(plain.lines()).zip(kept) {
+        // The message says in which column of the table the cell stands.
+        assert_eq!(found.replace("column 7", "column 4"), format!("{plain},{kept}"));
+    }
+    // A cell that is no text is not lost in silence.
+    fs::write(
+        folder.path().join("bytes.csv"),
+        [header.as_bytes(), b",lab\n", rows[0].0.as_bytes(), b",\xff\n"].concat(),
+    )
+    .unwrap();
+    run_in(folder.path(), "batch bytes.csv --out bytes-out.csv").expect(3);
+    assert!(fs::read_to_string(folder.path().join("bytes-out.csv")).unwrap().contains("column 7: not text"));
+}
+
+#[test]
+fn columns_that_may_be_meant_for_others_are_refused() {
+    let table = |name: &str| {
+        format!(
+            "mass_kg,diameter_m,nose_factor,strength_pa,density_kg_m3,velocity_m_s,{name}\n2,0.05,0.72,36e6,2300,300,1\n"
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    for (name, meant) in [
+        ("thicknes_m", "`thickness_m` meant"),
+        ("Thickness_mm", "`thickness_m` meant"),
+        ("thickness_stone", "`thickness_m` meant"),
+        ("tihckness (mm)", "`thickness_m` meant"),
+        ("critereon", "`criterion` meant"),
+        ("crater_stifness_kN_mm", "`crater_stiffness_n_m` meant"),
+        ("b", "`B` meant"),
+        ("K", "`k` meant"),
+        ("s", "`S` meant"),
+        ("crh", "`CRH` meant"),
+        ("tip ratio", "`tip_ratio` meant"),
+        ("h_mm", "`thickness_m` meant"),
+        ("", "there is no column ``"),
+        ("depth_m", "and so have the results"),
+        ("error", "and so have the results"),
+        ("impact.velocity", "`velocity_m_s` meant"),
+        ("target.density", "the path of a number"),
+        ("mass_g", "twice"),
+    ] {
+        let said = run(folder.path(), &table(name), "--out results.csv").refused();
+        assert!(said.contains(meant), "{name}: {said}");
+    }
+    for name in ["note", "shot", "id", "No.", "measured_depth_mm", "lab (city)", "date", "source", "case"] {
+        run(folder.path(), &table(name), "--out results.csv").expect(0);
+    }
+    let varied = |name: &str| format!("impact.velocity,{name}\n300,1\n");
+    for name in ["velocity_m_s", "impact.velocty", "target.thicknes", "parameters.P", "mass_kg", "row"] {
+        run(folder.path(), &varied(name), "--scene tunnel --out results.csv").refused();
+    }
+    let said = run(folder.path(), &varied("shot"), "--scene tunnel --out results.csv").expect(0);
+    assert!(said.words().contains("carried through unread: shot"), "{}", said.words());
+}

@@ -267,3 +267,26 @@ fn a_sweep_writes_the_bits_of_its_csv() {
     assert_eq!((found["H/d"].len(), found.len()), (27, 15));
     assert!(found["error"].iter().any(|cell| matches!(cell, Cell::Text(_))));
 }
+
+/// The CSV with the same cells has the same results.
+#[test]
+fn columns_that_are_not_read_go_with_their_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = [&NEEDED[..], &["measured"]].concat();
+    let rows: Vec<Vec<Option<f64>>> =
+        (0..5).map(|i| GOOD.into_iter().map(Some).chain([(i != 2).then_some(0.1 + f64::from(i))]).collect()).collect();
+    write_numbers(&folder.path().join("s.parquet"), &names, &rows, Compression::SNAPPY);
+    let said = run_in(folder.path(), "batch s.parquet --out r.parquet").expect(0);
+    assert!(said.words().contains("carried through unread: measured"), "{}", said.words());
+    let cell = |row: &Vec<Option<f64>>| row[6].map_or(Cell::Absent, |value| Cell::Bits(value.to_bits()));
+    assert_eq!(columns(&folder.path().join("r.parquet"))["measured"], rows.iter().map(cell).collect::<Vec<_>>());
+    run_in(folder.path(), "batch s.parquet --out r.csv").expect(0);
+    assert_eq!(columns(&folder.path().join("r.parquet")), csv_columns(&folder.path().join("r.csv")));
+    // Texts of CSV are texts of Parquet, of any length.
+    let long = "x".repeat(500);
+    let line = GOOD.map(|value| value.to_string()).join(",");
+    fs::write(folder.path().join("s.csv"), format!("{},note\n{line},{long}\n{line},\n", NEEDED.join(","))).unwrap();
+    run_in(folder.path(), "batch s.csv --out t.parquet").expect(0);
+    let texts = [Cell::Text(long), Cell::Absent];
+    assert_eq!(columns(&folder.path().join("t.parquet"))["note"], texts);
+}

@@ -50,6 +50,11 @@ impl<R: Read> CsvTable<R> {
         Ok(Self { file: file.to_owned(), reader, layout, format })
     }
 
+    /// The layout that its first line describes.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
     /// At most `count` rows, none at the end; `used` is an earlier chunk whose memory is reused.
     ///
     /// # Errors

@@ -78,7 +78,7 @@ pub enum Fault {
     #[error("the column `{0}` is missing")]
     MissingColumn(&'static str),
     #[error("the column `{name}` holds {found}, not {expected}")]
-    WrongType { name: &'static str, found: String, expected: &'static str },
+    WrongType { name: Cow<'static, str>, found: String, expected: &'static str },
     #[error("compressed by {0}, which this program does not read")]
     Compressed(String),
     #[error("this line has no end within 1 MiB: it is no table, or a quote is not closed")]

@@ -5,6 +5,7 @@
 //! compressed by Snappy; other compressions need a C library and are refused by name. Tables that go out are not
 //! compressed: digits of solutions have no pattern to find.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +21,7 @@ use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::{ColumnDescriptor, ColumnPath, Type};
 
 use super::error::{At, Fault, Place, TableError};
-use super::{Cells, Column, Format, Kind, Layout, Rows};
+use super::{Cells, Format, Kind, Layout, Rows};
 use crate::text::shortened;
 
 /// Rows of a row group that is written: some megabytes.
@@ -46,11 +47,11 @@ pub struct ParquetReader {
     reader: SerializedFileReader<File>,
     layout: Arc<Layout>,
     format: &'static Format,
-    /// Which columns hold integers without a sign, in the order of the format.
+    /// Which columns hold integers without a sign, in the order of the format, those that are kept behind them.
     unsigned: Vec<bool>,
     /// The row group that is read next.
     group: usize,
-    /// Columns of the present row group, in the order of the format.
+    /// Columns of the present row group, in the same order.
     columns: Vec<Option<ColumnReader>>,
     /// Rows left in the present row group.
     left: usize,
@@ -71,12 +72,20 @@ impl ParquetReader {
         let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         // A file without lines: its columns have numbers all the same.
-        let layout = Layout::new(&names, file, At::Table, format)?;
-        let mut unsigned = vec![false; format.columns.len()];
-        for ((known, place), unsigned) in format.columns.iter().zip(&layout.places).zip(&mut unsigned) {
-            let Some(place) = *place else { continue };
+        let mut layout = Layout::new(&names, file, At::Table, format)?;
+        for kept in &mut layout.kept {
+            let is_text = schema.column(kept.place).physical_type() == Physical::BYTE_ARRAY;
+            kept.kind = if is_text { Kind::Text } else { Kind::Number };
+        }
+        let known =
+            format.columns.iter().zip(&layout.places).map(|(known, place)| (known.name.into(), known.kind, *place));
+        let kept = layout.kept.iter().map(|kept| (kept.name.clone().into(), kept.kind, Some(kept.place)));
+        let all: Vec<(Cow<'static, str>, Kind, Option<usize>)> = known.chain(kept).collect();
+        let mut unsigned = vec![false; all.len()];
+        for ((name, kind, place), unsigned) in all.into_iter().zip(&mut unsigned) {
+            let Some(place) = place else { continue };
             let column = schema.column(place);
-            check_type(known, &column).map_err(refuse)?;
+            check_type(name, kind, &column).map_err(refuse)?;
             *unsigned = UNSIGNED.contains(&column.converted_type())
                 || matches!(column.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
             for chunk in metadata.row_groups().iter().filter_map(|group| group.columns().get(place)) {
@@ -89,6 +98,11 @@ impl ParquetReader {
         }
         let (file, layout) = (file.to_owned(), Arc::new(layout));
         Ok(Self { file, reader, layout, format, unsigned, group: 0, columns: Vec::new(), left: 0, rows: 0 })
+    }
+
+    /// The layout that its columns have.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
     }
 
     /// Rows of the whole table.
@@ -127,17 +141,25 @@ impl ParquetReader {
     }
 
     fn read(&mut self, count: usize) -> Result<Rows, ParquetError> {
-        let mut cells: Vec<_> = self.format.columns.iter().map(|column| Cells::empty(column.kind)).collect();
+        let kinds = self.format.columns.iter().map(|column| column.kind);
+        let mut cells: Vec<_> = kinds.chain(self.layout.kept.iter().map(|kept| kept.kind)).map(Cells::empty).collect();
+        let known = self.format.columns.len();
         let mut read = 0;
         while read < count {
             if self.left == 0 && !self.next_group()? {
                 break;
             }
             let part = self.left.min(count - read);
-            for ((reader, cells), unsigned) in self.columns.iter_mut().zip(&mut cells).zip(&self.unsigned) {
+            for (index, (reader, cells)) in self.columns.iter_mut().zip(&mut cells).enumerate() {
                 match (reader, cells) {
-                    (Some(reader), Cells::Numbers(numbers)) => read_numbers(reader, *unsigned, part, numbers)?,
-                    (Some(reader), Cells::Texts(texts)) => read_texts(reader, part, texts)?,
+                    (Some(reader), Cells::Numbers(numbers)) => {
+                        let had = numbers.len();
+                        read_numbers(reader, self.unsigned[index], part, numbers)?;
+                        if index >= known && is_integer(reader) {
+                            check_integers(&numbers[had..], &self.layout.kept[index - known].name)?;
+                        }
+                    }
+                    (Some(reader), Cells::Texts(texts)) => read_texts(reader, part, texts, index >= known)?,
                     _ => {}
                 }
             }
@@ -160,7 +182,8 @@ impl ParquetReader {
                 .map_err(|_| ParquetError::General("a row group has fewer than no rows".to_owned()))?;
             if self.left > 0 {
                 let open = |at: &Option<usize>| at.map(|at| group.get_column_reader(at)).transpose();
-                self.columns = self.layout.places.iter().map(open).collect::<Result<_, _>>()?;
+                let kept = self.layout.kept.iter().map(|kept| Some(kept.place)).collect::<Vec<_>>();
+                self.columns = self.layout.places.iter().chain(&kept).map(open).collect::<Result<_, _>>()?;
                 return Ok(true);
             }
         }
@@ -172,16 +195,18 @@ fn unsound(error: &ParquetError) -> Fault {
     Fault::Unreadable(format!("not a sound Parquet table: {error}"))
 }
 
-/// Refuses a column whose type is not that of `known`.
-fn check_type(known: &Column, column: &ColumnDescriptor) -> Result<(), Fault> {
+/// Refuses a column `name` whose type is not of `kind`.
+fn check_type(name: Cow<'static, str>, kind: Kind, column: &ColumnDescriptor) -> Result<(), Fault> {
     let (logical, converted) = (column.logical_type_ref(), column.converted_type());
     let is_plain = logical.is_none() && converted == ConvertedType::NONE;
     let is_integer = is_plain
         || matches!(logical, Some(LogicalType::Integer(_)))
         || (logical.is_none() && (UNSIGNED.contains(&converted) || SIGNED.contains(&converted)));
     let is_text = is_plain || converted == ConvertedType::UTF8;
-    let wants_text = known.kind == Kind::Text;
+    let wants_text = kind == Kind::Text;
+    // A part of another column is null with it.
     let fits = column.max_rep_level() == 0
+        && column.max_def_level() <= 1
         // A column that was written without a value has no type.
         && (logical == Some(&LogicalType::Unknown)
             || match column.physical_type() {
@@ -195,11 +220,12 @@ fn check_type(known: &Column, column: &ColumnDescriptor) -> Result<(), Fault> {
     }
     let found = match (column.max_rep_level(), logical) {
         (1.., _) => "lists".to_owned(),
+        _ if column.max_def_level() > 1 => "parts of another column".to_owned(),
         (_, Some(logical)) => format!("{} ({logical:?})", column.physical_type()),
         (_, None) if converted == ConvertedType::NONE => column.physical_type().to_string(),
         (_, None) => format!("{} ({converted})", column.physical_type()),
     };
-    Err(Fault::WrongType { name: known.name, found, expected: if wants_text { "text" } else { "numbers" } })
+    Err(Fault::WrongType { name, found, expected: if wants_text { "text" } else { "numbers" } })
 }
 
 /// Appends `count` cells of `reader` to `cells`.
@@ -244,11 +270,30 @@ fn read_numbers(
     }
 }
 
-fn read_texts(reader: &mut ColumnReader, count: usize, cells: &mut Vec<Option<String>>) -> Result<(), ParquetError> {
+fn is_integer(reader: &ColumnReader) -> bool {
+    matches!(reader, ColumnReader::Int64ColumnReader(_))
+}
+
+/// Refuses integers that a number of 64 bits would round: a label that is kept must stay the same.
+fn check_integers(cells: &[Option<f64>], name: &str) -> Result<(), ParquetError> {
+    const EXACT: f64 = (1_u64 << 53) as f64;
+    if cells.iter().flatten().any(|value| value.abs() >= EXACT) {
+        return Err(ParquetError::General(format!("the column `{name}` holds integers beyond 2^53; leave it out")));
+    }
+    Ok(())
+}
+
+/// Appends texts: as they stand where they are kept, else no longer than a message quotes, for a cell may be of any size.
+fn read_texts(
+    reader: &mut ColumnReader,
+    count: usize,
+    cells: &mut Vec<Option<String>>,
+    is_kept: bool,
+) -> Result<(), ParquetError> {
     match reader {
         ColumnReader::ByteArrayColumnReader(reader) => read_cells(reader, count, cells, |value: ByteArray| {
-            // No longer than a message quotes: a cell may be of any size.
-            shortened(&String::from_utf8_lossy(value.data()))
+            let text = String::from_utf8_lossy(value.data());
+            if is_kept { text.into_owned() } else { shortened(&text) }
         }),
         // A column without a value.
         ColumnReader::Int32ColumnReader(reader) => read_cells(reader, count, cells, |value| value.to_string()),
