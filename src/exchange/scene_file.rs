@@ -233,8 +233,12 @@ const FORCE: &str = "stage.*.force";
 const PARAMETERS: &str = "parameters";
 
 /// Paths of numbers that shape a nose, and are none of the scene itself.
-const RATIOS: [&str; 3] =
-    ["projectile.nose.caliber_radius_head", "projectile.nose.length_ratio", "projectile.nose.radius_ratio"];
+const RATIOS: [&str; 4] = [
+    "projectile.nose.caliber_radius_head",
+    "projectile.nose.length_ratio",
+    "projectile.nose.radius_ratio",
+    "projectile.nose.tip_ratio",
+];
 
 /// What [projectile] has besides its mass, unless the force is given by stages.
 const MATERIAL_OF_PROJECTILE: [&str; 2] = ["projectile.diameter", "projectile.nose"];
@@ -248,13 +252,22 @@ const PLUG: [&str; 2] = ["perforation.half_angle", "perforation.shear_strength"]
 /// What [target] leaves to its layers, where it has any.
 const LAYERED_TARGET: [&str; 3] = ["target.strength", "target.density", "target.thickness"];
 
-type Shape = (&'static str, &'static str, Range, fn(f64) -> NoseShape);
+/// A shape of a nose: its name, path and range of each ratio that it takes, and what they make.
+type Shape = (&'static str, &'static [(&'static str, Range)], fn(&[f64]) -> NoseShape);
 
-/// The shapes of a nose that take a ratio: name, path and range of the ratio.
-const NOSES: [Shape; 3] = [
-    ("ogive", RATIOS[0], Range::AtLeastHalf, |psi| NoseShape::Ogive { caliber_radius_head: psi }),
-    ("cone", RATIOS[1], Range::Positive, |psi| NoseShape::Cone { length_ratio: psi }),
-    ("spherical", RATIOS[2], Range::AtLeastHalf, |psi| NoseShape::Spherical { radius_ratio: psi }),
+/// The shapes of a nose.
+const NOSES: [Shape; 7] = [
+    ("flat", &[], |_| NoseShape::Flat),
+    ("ogive", &[(RATIOS[0], Range::AtLeastHalf)], |r| NoseShape::Ogive { caliber_radius_head: r[0] }),
+    ("cone", &[(RATIOS[1], Range::Positive)], |r| NoseShape::Cone { length_ratio: r[0] }),
+    ("spherical", &[(RATIOS[2], Range::AtLeastHalf)], |r| NoseShape::Spherical { radius_ratio: r[0] }),
+    ("hemispherical", &[], |_| NoseShape::Spherical { radius_ratio: 0.5 }),
+    ("truncated-ogive", &[(RATIOS[0], Range::AtLeastHalf), (RATIOS[3], Range::UnitInterval)], |r| {
+        NoseShape::TruncatedOgive { caliber_radius_head: r[0], tip_ratio: r[1] }
+    }),
+    ("truncated-cone", &[(RATIOS[1], Range::Positive), (RATIOS[3], Range::UnitInterval)], |r| {
+        NoseShape::TruncatedCone { length_ratio: r[0], tip_ratio: r[1] }
+    }),
 ];
 
 /// The numbers that a scene file may give, of one layer and one stage.
@@ -1041,8 +1054,9 @@ impl<'t> Reader<'t> {
         if self.at(NOSE).is_none() {
             return Err(self.missing(NOSE, "{ shape = \"flat\" }"));
         }
-        let without = |taken: Option<usize>, why: &str| {
-            let others: Vec<_> = (0..3).filter(|i| Some(*i) != taken).map(|i| RATIOS[i]).collect();
+        let without = |taken: &[(&str, Range)], why: &str| {
+            let is_taken = |path: &&str| taken.iter().any(|(known, _)| known == path);
+            let others: Vec<_> = RATIOS.into_iter().filter(|path| !is_taken(path)).collect();
             self.without("the nose", &others, why)
         };
         let one_of_two = |span, fault: &str, help: &str| {
@@ -1052,7 +1066,7 @@ impl<'t> Reader<'t> {
         match (factor, shape) {
             (None, Some(_)) => {}
             (Some(_), None) => {
-                without(None, "a `factor` takes no parameter of a shape")?;
+                without(&[], "a `factor` takes no parameter of a shape")?;
                 return self.value(Parameter::NoseFactor);
             }
             (Some(_), Some((key, _))) => {
@@ -1064,24 +1078,26 @@ impl<'t> Reader<'t> {
             }
         }
         let (name, span) = self.word("projectile.nose.shape").unwrap_or_default();
-        if name == "flat" {
-            without(None, "the shape `flat` takes no parameter")?;
-            return Ok(NoseShape::Flat.factor());
-        }
-        let Some(index) = NOSES.iter().position(|(shape, ..)| *shape == name) else {
-            let known = ["flat", "ogive", "cone", "spherical"];
+        let Some((_, ratios, of)) = NOSES.into_iter().find(|(shape, ..)| *shape == name) else {
+            let known = NOSES.map(|(shape, ..)| shape);
             let help = nearest(&name, &known)
                 .map_or_else(|| "give the nose factor: { factor = 0.72 }".to_owned(), did_you_mean);
             let message = format!("unknown nose shape {}", quoted(&name));
             return Err(Fault::new(span, message, format!("one of {}", known.join(", ")), help));
         };
-        let (_, path, range, of) = NOSES[index];
-        let key = key_of(path);
-        without(Some(index), &format!("the shape `{name}` takes `{key}`"))?;
-        let (_, number) = self.at(path).ok_or_else(|| self.missing(path, "3.0"))?;
-        let ratio = self.quantity(key, None, range, number)?;
-        let shape = of(ratio.value);
-        self.written.nose = Some((shape, ratio));
+        let keys: Vec<String> = ratios.iter().map(|(path, _)| format!("`{}`", key_of(path))).collect();
+        let takes = if keys.is_empty() { "no parameter".to_owned() } else { keys.join(" and ") };
+        without(ratios, &format!("the shape `{name}` takes {takes}"))?;
+        let mut given = Vec::with_capacity(ratios.len());
+        for &(path, range) in ratios {
+            let example = if range == Range::UnitInterval { "0.3" } else { "3.0" };
+            let (_, number) = self.at(path).ok_or_else(|| self.missing(path, example))?;
+            given.push(self.quantity(key_of(path), None, range, number)?);
+        }
+        let shape = of(&given.iter().map(|ratio| ratio.value).collect::<Vec<_>>());
+        if !given.is_empty() {
+            self.written.nose = Some((shape, given));
+        }
         Ok(shape.factor())
     }
 }

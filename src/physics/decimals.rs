@@ -60,8 +60,8 @@ pub struct Written {
     /// The decimal of each number that was written, in the order read. What is missing, or differs from the scene, counts as
     /// the shortest decimal of its `f64`.
     pub numbers: Vec<(Parameter, Quantity)>,
-    /// The shape of the nose and its ratio, where the factor N* was not written itself.
-    pub nose: Option<(NoseShape, Quantity)>,
+    /// The shape of the nose and its ratios, psi and t, where the factor N* was not written itself.
+    pub nose: Option<(NoseShape, Vec<Quantity>)>,
     /// Numbers that may be anywhere in a ball, in place of what was written.
     pub ranges: Vec<(Parameter, Ball)>,
 }
@@ -119,10 +119,10 @@ impl Scene {
         let number = |parameter: Parameter, value: f64| match (parameter, &written.nose) {
             (Parameter::Velocity, _) => speed.unwrap_or_else(|| written.number(parameter, value)),
             (Parameter::Thickness, _) => self.total_thickness(written, value),
-            (Parameter::NoseFactor, Some((shape, ratio)))
+            (Parameter::NoseFactor, Some((shape, ratios)))
                 if shape.factor() == value && written.range(parameter).is_none() =>
             {
-                shape.factor_in(|_| ball_of(ratio))
+                shape.factor_in([0, 1].map(|index| ratios.get(index).map_or_else(|| Ball::from_f64(0.0), ball_of)))
             }
             (Parameter::StaticFactor | Parameter::Layer(_, LayerNumber::StaticFactor), _) => {
                 self.static_factor_of(written, parameter, value)

@@ -61,38 +61,37 @@ impl NoseShape {
     ///
     /// The ogive is evaluated as `(8 - 1/psi)/(24 psi)`, so that no square overflows.
     pub fn factor(self) -> f64 {
-        self.factor_in(|psi| psi)
+        let ratios = match self {
+            Self::Flat => [0.0; 2],
+            Self::Ogive { caliber_radius_head: psi }
+            | Self::Cone { length_ratio: psi }
+            | Self::Spherical { radius_ratio: psi } => [psi, 0.0],
+            Self::TruncatedOgive { caliber_radius_head: psi, tip_ratio: t }
+            | Self::TruncatedCone { length_ratio: psi, tip_ratio: t } => [psi, t],
+        };
+        self.factor_in(ratios)
     }
 
-    /// As [`NoseShape::factor`], in the number type into which `ratio` lifts psi and t.
-    pub(crate) fn factor_in<S: Scalar>(self, ratio: impl Fn(f64) -> S) -> S {
+    /// As [`NoseShape::factor`], in the number type of psi and t, which stand for those of the shape.
+    pub(crate) fn factor_in<S: Scalar>(self, [psi, t]: [S; 2]) -> S {
         let number = S::from_f64;
         match self {
             Self::Flat => number(1.0),
-            Self::Ogive { caliber_radius_head: psi } => {
-                let psi = ratio(psi);
-                (number(8.0) - number(1.0) / psi) / (number(24.0) * psi)
-            }
-            Self::Cone { length_ratio: psi } => {
-                let psi = ratio(psi);
-                number(1.0) / (number(1.0) + number(4.0) * psi * psi)
-            }
-            Self::TruncatedOgive { caliber_radius_head: psi, tip_ratio: t } => {
-                let [psi, t, one] = [ratio(psi), ratio(t), number(1.0)];
+            Self::Ogive { .. } => (number(8.0) - number(1.0) / psi) / (number(24.0) * psi),
+            Self::Cone { .. } => number(1.0) / (number(1.0) + number(4.0) * psi * psi),
+            Self::TruncatedOgive { .. } => {
+                let one = number(1.0);
                 // With u = 1 - cos a: 2/3 - cos a + cos³a/3 = u² (1 - u/3), sin²a = u (2 - u); nothing cancels.
                 let u = number(0.5) * (one - t) / psi;
                 let [rest, wide] = [one - u / number(3.0), number(2.0) - u];
                 t * t + number(8.0) * psi * u * u * ((number(0.5) - psi) * rest + number(0.25) * psi * wide * wide)
             }
-            Self::TruncatedCone { length_ratio: psi, tip_ratio: t } => {
-                let [psi, t, one] = [ratio(psi), ratio(t), number(1.0)];
+            Self::TruncatedCone { .. } => {
+                let one = number(1.0);
                 let (flat, slope) = (t * t, number(2.0) * psi / (one - t));
                 flat + (one - flat) / (one + slope * slope)
             }
-            Self::Spherical { radius_ratio: psi } => {
-                let psi = ratio(psi);
-                number(1.0) - number(0.125) / psi / psi
-            }
+            Self::Spherical { .. } => number(1.0) - number(0.125) / psi / psi,
         }
     }
 

@@ -334,6 +334,7 @@ def read(text):
     words["nose"] = nose.get("shape", "factor")
     for key in ("factor", "caliber_radius_head", "length_ratio", "radius_ratio"):
         put("nose", nose, key)
+    put("tip", nose, "tip_ratio")
     put("strength", target, "strength", "pressure")
     put("density", target, "density", "density")
     laws = root.get("resistance", {})
@@ -363,10 +364,18 @@ class Stage:
         return self.p + self.s * x + self.r * v + self.q * v * v
 
 
-def nose_factor(shape, psi):
-    """N* (docs/theory.md, section 1)."""
+def nose_factor(shape, psi, tip):
+    """N* (docs/theory.md, section 1); of truncated noses by quadrature of the definition, 8 y sin² over the radius."""
     if shape == "flat":
         return mpf(1)
+    if shape == "hemispherical":
+        return mpf(1) / 2
+    if shape.startswith("truncated"):
+        sine = {
+            "truncated-ogive": lambda y: 1 - ((y + psi - mpf(1) / 2) / psi) ** 2,
+            "truncated-cone": lambda y: (1 - tip) ** 2 / ((1 - tip) ** 2 + 4 * psi**2),
+        }[shape]
+        return tip**2 + mp.quad(lambda y: 8 * y * sine(y), [tip / 2, mpf(1) / 2])
     return {
         "factor": lambda: psi,
         "ogive": lambda: 1 / (3 * psi) - 1 / (24 * psi**2),
@@ -421,7 +430,7 @@ class Problem:
             return
         d = self.d = n["diameter"]
         self.area = mp.pi * d * d / 4
-        self.nose = nose_factor(words["nose"], n.get("nose"))
+        self.nose = nose_factor(words["nose"], n.get("nose"), n.get("tip"))
         self.B, self.k = n.get("B", mpf(1)), n.get("k", mpf(2))
         self.plain = words["layers"] == 0
         crater_depth = self.k * d
@@ -1128,6 +1137,15 @@ def texts():
         law = {key: float(digits(w.between(low, high), 3)) for key, low, high in (("S", 4, 20), ("B", 0.4, 2.5), ("k", 0.5, 4))}
         H = w.between(0.8, 12)
         add(f"mixed {i}", w.concrete(nose, H, w.between(0.5, 2), fc=w.between(9e6, 180e6), c=w.between(0.3, 2), **law))
+    # Behind all others, whose random numbers stay the same.
+    for nose, H, reach in (
+        ("shape = 'truncated-ogive', caliber_radius_head = 2.9, tip_ratio = 0.37", None, 0.9),
+        ("shape = 'truncated-ogive', tip_ratio = 0.71, caliber_radius_head = 0.55", 3.9, 1.4),
+        ("shape = 'truncated-cone', length_ratio = 0.83, tip_ratio = 0.29", 5.3, 0.8),
+        ("shape = 'truncated-cone', length_ratio = 1.7, tip_ratio = 0.62", None, 1.3),
+        ("shape = 'hemispherical'", 2.7, 1.6),
+    ):
+        add(nose.split("'")[1] + (" exit" if H else " stop"), w.concrete(f"{{ {nose} }}", H, reach))
     return found
 
 

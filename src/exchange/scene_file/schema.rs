@@ -185,16 +185,19 @@ fn force() -> Value {
 
 /// The nose in one of its forms.
 fn nose() -> Value {
-    let form = |shape: Option<&str>, ratio: Option<(&str, Range)>| {
+    let form = |shape: Option<&str>, ratios: &[(&str, Range)]| {
         let shape = shape.map(|name| ("shape".to_owned(), json!({ "const": name })));
-        let ratio = ratio.map(|(key, range)| (key.to_owned(), in_range(range)));
-        let properties: Map<String, Value> = shape.into_iter().chain(ratio).collect();
+        let ratios = ratios.iter().map(|(key, range)| ((*key).to_owned(), in_range(*range)));
+        let properties: Map<String, Value> = shape.into_iter().chain(ratios).collect();
         let required: Vec<_> = properties.keys().cloned().collect();
         json!({ "type": "object", "additionalProperties": false, "properties": properties, "required": required })
     };
     let factor = Parameter::NoseFactor;
-    let mut forms = vec![form(None, Some((factor.key(), factor.entry().range))), form(Some("flat"), None)];
-    forms.extend(NOSES.map(|(shape, path, range, _)| form(Some(shape), Some((key_of(path), range)))));
+    let shapes = NOSES.map(|(shape, ratios, _)| {
+        let keys: Vec<_> = ratios.iter().map(|(path, range)| (key_of(path), *range)).collect();
+        form(Some(shape), &keys)
+    });
+    let forms: Vec<_> = [form(None, &[(factor.key(), factor.entry().range)])].into_iter().chain(shapes).collect();
     json!({ "oneOf": forms })
 }
 

@@ -227,6 +227,11 @@ fn noses_are_read_by_shape() {
         ("{ shape = \"ogive\", caliber_radius_head = 2 }", 0.15625),
         ("{ shape = \"cone\", length_ratio = 1.0 }", 0.2),
         ("{ shape = \"spherical\", radius_ratio = 0.5 }", 0.5),
+        ("{ shape = \"hemispherical\" }", 0.5),
+        ("{ shape = \"truncated-ogive\", caliber_radius_head = 2, tip_ratio = 0 }", 0.15625),
+        ("{ shape = \"truncated-ogive\", caliber_radius_head = 2, tip_ratio = 1 }", 1.0),
+        // t² + (1 - t²)/(1 + (2 psi/(1 - t))²) = 1/4 + (3/4)/17.
+        ("{ shape = \"truncated-cone\", length_ratio = 1, tip_ratio = 0.5 }", 0.25 + 0.75 / 17.0),
         ("{ factor = 0 }", 0.0),
     ] {
         let scene = read(&with("{ factor = 0.72 }", nose));
@@ -313,6 +318,9 @@ fn every_other_refusal_names_its_place_its_cause_and_a_remedy() {
         with(nose, "{ shape = \"flat\", radius_ratio = 1.0 }"),
         with(nose, "{ shape = 3 }"),
         with(nose, "{ shape = \"cone\" }"),
+        with(nose, "{ shape = \"truncated-cone\", length_ratio = 1.0 }"),
+        with(nose, "{ shape = \"truncated-ogive\", length_ratio = 1.0, tip_ratio = 0.2 }"),
+        with(nose, "{ shape = \"truncated-ogive\", caliber_radius_head = 3, tip_ratio = 1.2 }"),
         with("8.48e6 N/m", "continous"),
         with("8.48e6 N/m", "8.48e6 N"),
         with("[target]\n", "[target]\nlayer = []\n"),

@@ -112,10 +112,13 @@ pub(super) fn solved_depth_ratio(subject: &Subject<'_>, geometry: Option<f64>, i
 /// In the radius y the integrand is a cubic for every shape, which Simpson's rule integrates exactly; `sin²` of the angle
 /// between axis and tangent comes from the normal of the circle.
 fn nose(_: &Subject<'_>) -> Found {
-    let integral = |sine_squared: &dyn Fn(f64) -> f64| {
+    // A flat of t d in front, and the face behind it.
+    let truncated = |t: f64, sine_squared: &dyn Fn(f64) -> f64| {
         let f = |y: f64| 8.0 * y * sine_squared(y);
-        (f(0.0) + 4.0 * f(0.25) + f(0.5)) * 0.5 / 6.0
+        let from = 0.5 * t;
+        t * t + (f(from) + 4.0 * f(0.5 * (from + 0.5)) + f(0.5)) * (0.5 - from) / 6.0
     };
+    let integral = |sine_squared: &dyn Fn(f64) -> f64| truncated(0.0, sine_squared);
     let mut worst = Worst::default();
     let mut take = |shape: NoseShape, found: f64, exact: f64| {
         worst.take(off(found, exact), || format!("for {shape:?}"));
@@ -127,6 +130,14 @@ fn nose(_: &Subject<'_>) -> Found {
         take(cone, cone.factor(), integral(&|_| 0.25 / (0.25 + psi * psi)));
         let cap = NoseShape::Spherical { radius_ratio: psi };
         take(cap, cap.factor(), integral(&|y| 1.0 - (y / psi).powi(2)));
+        for t in [0.15, 0.5, 0.8] {
+            let ogive = NoseShape::TruncatedOgive { caliber_radius_head: psi, tip_ratio: t };
+            take(ogive, ogive.factor(), truncated(t, &|y| 1.0 - ((y + psi - 0.5) / psi).powi(2)));
+            take(ogive, (ogive.height_ratio().powi(2) + (0.5 * t + psi - 0.5).powi(2)).sqrt(), psi);
+            let cone = NoseShape::TruncatedCone { length_ratio: psi, tip_ratio: t };
+            let rise = 0.5 * (1.0 - t);
+            take(cone, cone.factor(), truncated(t, &|_| rise * rise / (rise * rise + psi * psi)));
+        }
         // Tip and shoulder lie on one circle: about the foot psi - 1/2 beyond the axis, or the centre of the sphere.
         let (h, foot) = (ogive.height_ratio(), psi - 0.5);
         take(ogive, (h * h + foot * foot).sqrt(), psi);

@@ -488,6 +488,8 @@ fn nose_ranges(nose: &str, mut expect: impl FnMut(&str, bool)) {
     let Some((shape, number)) = nose.trim_end_matches([' ', '}']).rsplit_once(" = ") else { return };
     let edges: &[(&str, bool)] = if number.parse::<f64>().is_err() {
         &[("'round'", false), ("3", false), ("'flat', factor = 0.7", false), ("'flat', radius_ratio = 0.7", false)]
+    } else if shape.ends_with("tip_ratio") {
+        &[("0", true), ("1", true), ("-0.001", false), ("1.001", false), ("inf", false)]
     } else if shape.ends_with("factor") {
         &[("0", true), ("1", true), ("-0.001", false), ("1.001", false), ("nan", false)]
     } else if shape.ends_with("length_ratio") {
