@@ -21,6 +21,10 @@ use crate::studies::sensitivity::{self, Design, Share, Spread, Uncertainty};
 use crate::studies::{applicability, critical_velocity, enclosure};
 use crate::text::digits_between;
 
+/// Random scenes of `--spread` where nothing else is asked for, and with the criterion `plug`.
+const SAMPLES: u32 = 100_000;
+const SAMPLES_OF_PLUG: u32 = 200;
+
 /// What is said where no velocity is critical.
 const SEVERAL: &str = "paths cross here: no velocity is critical, and the intervals were found by a scan";
 
@@ -45,9 +49,11 @@ pub struct CriticalArgs {
     /// projectile.mass=1%:normal. eq14 is the scatter of Eq. 14 itself, on S, by the measured depths that ship.
     #[arg(long, value_name = "PATH=REL")]
     pub spread: Vec<String>,
-    /// Random scenes behind it.
-    #[arg(long, default_value_t = 100_000, requires = "spread", value_parser = clap::value_parser!(u32).range(2..=100_000_000))]
-    pub samples: u32,
+    /// Random scenes behind it [default: 100000].
+    ///
+    /// With the criterion plug 200 by default: each V_c is found by a scan there.
+    #[arg(long, requires = "spread", value_parser = clap::value_parser!(u32).range(2..=100_000_000))]
+    pub samples: Option<u32>,
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 1, requires = "spread")]
     pub seed: u64,
@@ -208,12 +214,18 @@ impl Ask for CriticalArgs {
         let is_zero = exact == Some(0.0) || shown == 0.0;
         let uncertainty = match spreads.as_slice() {
             [_, ..] if !is_zero && found.is_some() => {
-                Some(sensitivity::uncertainty(&scene, &spreads, self.samples as usize, self.seed, self.design)?)
+                let samples = self.samples.unwrap_or(if scene.plug.is_some() { SAMPLES_OF_PLUG } else { SAMPLES });
+                Some(sensitivity::uncertainty(&scene, &spreads, samples as usize, self.seed, self.design)?)
             }
             _ => None,
         };
-        let no_spread = (is_zero && !spreads.is_empty())
-            .then(|| "the uncertainty does not apply: V_c is 0, and no spread is relative to it".to_owned());
+        let why_none = if is_zero {
+            Some("V_c is 0, and no spread is relative to it")
+        } else {
+            found.is_none().then_some("several ranges of velocities perforate, and no velocity is critical")
+        };
+        let no_spread =
+            why_none.filter(|_| !spreads.is_empty()).map(|why| format!("the uncertainty does not apply: {why}"));
         let concrete = scene.concrete().filter(|concrete| concrete.layers.is_empty());
         let dimensionless = |energy: f64| concrete.map(|concrete| groups::dimensionless_energy(energy, concrete));
         let data = CriticalJson {
@@ -340,7 +352,7 @@ fn add_uncertainty(text: &mut Text, found: &Uncertainty) {
     text.line(format!("             95 % within {low:.3} to {high:.3} m/s, median {median:.3}"));
     let left_out = match found.inadmissible {
         0 => String::new(),
-        count => format!(", {count} inadmissible left out"),
+        count => format!(", {count} inadmissible or without one V_c left out"),
     };
     text.line(format!("             {} random scenes, seed {}{left_out}", found.samples, found.seed));
     let Design { probability, velocity_m_s, interval95_m_s, safety_factor } = found.design;
