@@ -9,10 +9,10 @@ use super::figures::{fit_of, scenes_in_order, words_for};
 use super::page::{Page, Table, cell, claims_table, counts_cell, facts, folded, number_cell, sign, slot, tally};
 use super::text::{count, number, one_line};
 use super::{Environment, Run, coverage, nomenclature, typeset};
-use crate::integrators::{Boundaries, MethodName, VelocityAt};
+use crate::integrators::{Boundaries, MethodName, Taylor, VelocityAt};
 use crate::physics::groups::Groups;
 use crate::studies::experiments;
-use crate::studies::sweep::{WHY, explanation};
+use crate::studies::sweep::{WHY, conclusions, explanation};
 use crate::studies::{Path, Quantity, Stretch, formal_order};
 use crate::suite::checks::{FIXED, Order, StepPattern};
 use crate::suite::{
@@ -158,16 +158,21 @@ fn build(e: &Environment) -> Markup {
 }
 
 fn why_above_eq15(run: &Run<'_>) -> Markup {
-    let why = run.judged.iter().find_map(|judged| match &judged.evidence {
-        Some(Evidence::Sweep { plan, rows }) => Some(explanation(plan, rows)),
+    let swept = run.judged.iter().find_map(|judged| match &judged.evidence {
+        Some(Evidence::Sweep { plan, rows }) => Some((plan, rows)),
         _ => None,
     });
     // One a table: several methods conclude the same.
-    let concluded = tables(run.judged).filter_map(|claims| match &claims.first()?.evidence {
-        Some(Evidence::Conclusion(found)) => Some((claims[0].claim.table.as_str(), found)),
+    let claimed = tables(run.judged).filter_map(|claims| match &claims.first()?.evidence {
+        Some(Evidence::Conclusion(found)) => Some(found.clone()),
         _ => None,
     });
-    let concluded: Vec<_> = concluded.collect();
+    let mut concluded: Vec<_> = claimed.collect();
+    if let Some((plan, rows)) = swept.filter(|_| concluded.is_empty()) {
+        let measured = plan.beside(run.points, &Taylor::default()).unwrap_or_default();
+        concluded = conclusions(rows, &measured);
+    }
+    let why = swept.map(|(plan, rows)| explanation(plan, rows));
     html! {
         @if let Some(why) = why {
             h3 { (WHY) }
@@ -175,9 +180,8 @@ fn why_above_eq15(run: &Run<'_>) -> Markup {
         }
         @if !concluded.is_empty() {
             h3 { "What becomes of the paper's conclusions" }
-            (Table::cards("", ["conclusion", "here", "by which numbers, or why not", "claim"]).rows(concluded, |(id, found)| {
-                let id = html! { code { (one_line(id)) } };
-                [cell(found.statement), cell(found.standing.to_string()), html! { (typeset::html(&found.reason)) }, id]
+            (Table::cards("", ["conclusion", "here", "by which numbers, or why not"]).rows(concluded, |found| {
+                [cell(found.statement), cell(found.standing.to_string()), html! { (typeset::html(&found.reason)) }]
             }))
         }
     }
