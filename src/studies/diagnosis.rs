@@ -310,6 +310,35 @@ pub fn at_edges(solver: &mut dyn Solver, plan: Plan, progress: &dyn Fn(usize, us
 }
 
 /// A solver that may have to be started again.
+/// Faults that change an answer at the very number at which nothing is wrong, as sentences, and how many answers were looked at:
+/// to `count` questions about stages and as many about scenes. A fault with another number would be named with a wrong one.
+#[cfg(feature = "report")]
+pub(crate) fn changed_by_nothing(seed: u64, count: usize) -> (usize, Vec<String>) {
+    const LEFT: f64 = 1e-7;
+    let all: Vec<Question> =
+        [false, true].into_iter().flat_map(|of_scenes| questions(seed, count, of_scenes)).collect();
+    let usable = all.iter().filter(|question| question.problem.impact_speed > 0.0 && !question.is_on_a_border());
+    let usable: Vec<&Question> = usable.collect();
+    let (mut answers, mut changed) = (0, Vec::new());
+    for fault in hypotheses::hypotheses() {
+        let numbers = fault.parameter.neutral();
+        let mut is_changed = |question: &&Question, number: f64| {
+            let Some((problem, found)) = hypotheses::predict(question, &[(fault, number)], How::Exact) else {
+                return false;
+            };
+            answers += 1;
+            let off = errors(found.end, question.exact.end, problem.impact_speed);
+            (0..3).any(|i| !(off[i].abs() <= LEFT * question.conditions[i]))
+        };
+        let by: Option<Vec<&&Question>> =
+            numbers.iter().map(|number| usable.iter().find(|question| is_changed(question, *number))).collect();
+        if let Some((question, number)) = by.and_then(|by| Some((*by.first()?, *numbers.first()?))) {
+            changed.push(format!("{} ({})", fault.says(number), question.id));
+        }
+    }
+    (answers, changed)
+}
+
 struct Asking<'a> {
     solver: &'a mut dyn Solver,
     reads_scene: bool,
@@ -1062,11 +1091,7 @@ fn orders(right: &[(&Question, &[Rung])], identity: &PeerIdentity) -> Vec<Quanti
         // Large steps may not show the order yet.
         let small = slope(&errors[errors.len() / 2..]);
         let line = fitted.as_ref().and_then(|fitted| fitted.line);
-        let is_lower = |formal: f64| {
-            let line = line.as_ref()?;
-            let is_below = |order: f64| order < (1.0 - ORDER_MARGIN) * formal;
-            Some(is_below(line.interval95[1]) && small.is_some_and(is_below))
-        };
+        let is_lower = |formal: f64| Some(is_short_of(formal, line.as_ref()?.interval95, small));
         let verdict = match formal {
             None => Verdict::Skipped,
             Some(formal) => match is_lower(formal) {
@@ -1086,6 +1111,13 @@ fn orders(right: &[(&Question, &[Rung])], identity: &PeerIdentity) -> Vec<Quanti
         }
     };
     [0, 1, 2].map(of).into()
+}
+
+/// Whether the whole interval of an order lies below the formal one, and what the smallest steps show does too.
+fn is_short_of(formal: f64, interval95: [f64; 2], small: Option<f64>) -> bool {
+    let is_below = |order: f64| order < (1.0 - ORDER_MARGIN) * formal;
+    let [_, high] = interval95;
+    is_below(high) && small.is_some_and(is_below)
 }
 
 /// The slope of ln error over ln step; `None` for fewer than two errors above zero.

@@ -92,6 +92,7 @@ pub fn roads(claim: &Claim) -> Option<[Vec<Source>; 2]> {
         | Check::Similarity(_)
         | Check::Split(_)
         | Check::Ranges(_)
+        | Check::Neutral(_)
         | Check::ScaledForces(_)
         | Check::BoundsOfLanes(_)
         | Check::DigitsLost(_)

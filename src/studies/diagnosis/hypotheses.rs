@@ -35,8 +35,8 @@ pub(super) enum Parameter {
     Factor,
     /// A factor as of units: many powers of ten, of either sign.
     Unit,
-    /// An exponent, the same in every answer.
-    Exponent,
+    /// An exponent, the same in every answer; here the right one.
+    Exponent(#[cfg_attr(not(feature = "report"), expect(dead_code, reason = "a claim asks for it"))] f64),
     /// A speed (m/s), the same in every answer.
     Speed,
     /// Part of the impact speed, the same in every answer.
@@ -99,6 +99,18 @@ impl Parameter {
         }
     }
 
+    /// Numbers at one of which nothing is wrong: none for one that has no such number; a factor of something that is added
+    /// has none of it at zero.
+    #[cfg(feature = "report")]
+    pub(super) fn neutral(self) -> Vec<f64> {
+        match self {
+            Self::Factor | Self::Unit => vec![1.0, 0.0],
+            Self::Nearness => vec![1.0],
+            Self::Exponent(right) => vec![right],
+            _ => Vec::new(),
+        }
+    }
+
     /// Whether the number is the factor of a cause.
     pub(super) fn is_factor(self) -> bool {
         matches!(self, Self::Factor | Self::Unit | Self::Speed)
@@ -119,7 +131,7 @@ impl Parameter {
             Self::Unit => both(spread(1e-7, 1e7, 42).collect()),
             Self::OneOf(numbers) => numbers.to_vec(),
             Self::Value => spread(1e-6, 1e9, 120).collect(),
-            Self::Exponent => (0..=24).map(|i| 0.25 * f64::from(i)).collect(),
+            Self::Exponent(_) => (0..=24).map(|i| 0.25 * f64::from(i)).collect(),
             Self::Speed => spread(1e-9, 1e3, 72).collect(),
             Self::Fraction => spread(1e-12, 0.9, 60).collect(),
             Self::Delay => spread(1e-10, 10.0, 44).map(|part| part * question.exact.end.depth).collect(),

@@ -94,7 +94,7 @@ fn number(hypothesis: &Hypothesis) -> f64 {
     match hypothesis.parameter {
         Parameter::Factor => 1.25,
         Parameter::Unit => 1e3,
-        Parameter::Exponent => 1.7,
+        Parameter::Exponent(_) => 1.7,
         Parameter::Speed => 0.5,
         Parameter::Fraction => 0.01,
         Parameter::OneOf(numbers) => numbers[1],
@@ -334,4 +334,12 @@ fn a_sum_in_single_precision_is_found_though_every_limit_looks_right() {
         let found = diagnose(&mut Forgetful(scheme.clone()), Plan { seed, ..Plan::default() }, &|_, _| {});
         assert_eq!(found.verdict, Verdict::Failed, "seed {seed}: {:?} {:?}", found.counts, found.causes);
     }
+}
+
+#[test]
+fn an_order_falls_short_only_where_its_whole_interval_and_the_smallest_steps_do() {
+    assert!(is_short_of(2.0, [1.5, 1.69], Some(1.6)));
+    assert!(!is_short_of(2.0, [1.5, 1.71], Some(1.6)));
+    assert!(!is_short_of(2.0, [1.5, 1.69], Some(1.8)));
+    assert!(!is_short_of(2.0, [1.5, 1.69], None));
 }

@@ -8,6 +8,7 @@ use super::{Subject, Worst};
 use crate::exchange::peers::{self, NO_LAWS, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
 use crate::integrators::Detail;
 use crate::physics::Problem;
+use crate::studies::diagnosis;
 
 check! {
     /// Answers of another program: largest difference from the claim's method, over its conditioning and the tolerance.
@@ -17,6 +18,11 @@ check! {
         /// Relative tolerance claimed.
         tolerance: f64,
     } in CrossCode, "tolerance", by agreement;
+    /// Faults that `diagnose` knows, at the number at which nothing is wrong: those that change an answer all the same.
+    Neutral {
+        /// How many questions about stages, and how many about scenes.
+        questions: usize,
+    } in CrossCode, "faults", by neutral;
 }
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
@@ -198,4 +204,12 @@ fn agreement(Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {
     Ok(Measurement::new(worst.value / tolerance)
         .resolving(resolution)
         .remark(format!("largest in {}: {:.1e}", worst.place, worst.value)))
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn neutral(&Neutral { questions }: &Neutral, subject: &Subject<'_>) -> Found {
+    let (answers, changed) = diagnosis::changed_by_nothing(subject.context.seed, questions);
+    // No answer at all shows nothing.
+    let value = if answers == 0 { f64::NAN } else { changed.len() as f64 };
+    Ok(Measurement::new(value).remark(changed.join("; ")).cases(answers))
 }

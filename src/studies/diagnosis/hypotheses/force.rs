@@ -284,13 +284,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "drag-power",
         "the drag q is multiplied by V^{}, not by V²",
-        Parameter::Exponent,
+        Parameter::Exponent(2.0),
         &[Change::Force(|at, n| with_drag(at, at.velocity.abs().powf(n)))],
     ),
     of(
         "drag-power",
         "the drag is q V0² (V/V0)^{}, not q V²",
-        Parameter::Exponent,
+        Parameter::Exponent(2.0),
         &[Change::Force(|at, n| {
             with_drag(at, at.impact_speed * at.impact_speed * (at.velocity.abs() / at.impact_speed).powf(n))
         })],
@@ -298,13 +298,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "viscosity-power",
         "the viscosity r is multiplied by V^{}, not by V",
-        Parameter::Exponent,
+        Parameter::Exponent(1.0),
         &[Change::Force(|at, n| with_viscosity(at, at.velocity.abs().powf(n)))],
     ),
     of(
         "stiffness-power",
         "the stiffness s is multiplied by x^{}, not by x",
-        Parameter::Exponent,
+        Parameter::Exponent(1.0),
         &[Change::Force(|at, n| {
             let &Stage { static_force, stiffness, viscosity, drag, .. } = at.law;
             static_force + stiffness * at.depth.abs().powf(n) + (viscosity + drag * at.velocity) * at.velocity

@@ -93,7 +93,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "parameter:nose-factor",
         "the nose factor enters as N*^{}",
-        Parameter::Exponent,
+        Parameter::Exponent(1.0),
         &[Change::Scene(|s, n| {
             concrete(s, |c| {
                 c.density *= c.nose_factor.powf(n - 1.0);
@@ -109,7 +109,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "parameter:B",
         "B enters as B^{}",
-        Parameter::Exponent,
+        Parameter::Exponent(1.0),
         &[Change::Scene(|s, n| concrete(s, |c| c.inertia_factor = c.inertia_factor.powf(n)))],
     ),
     of(
@@ -145,8 +145,8 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "parameter:S",
-        "S by Eq. 14 holds (fc/MPa)^{}, not ^-0.5",
-        Parameter::Exponent,
+        "S by Eq. 14 holds (fc/MPa)^-{}, not ^-0.5",
+        Parameter::Exponent(0.5),
         &[Change::Scene(|s, n| {
             concrete(s, |c| {
                 if c.follows_eq14 {
