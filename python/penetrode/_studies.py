@@ -512,6 +512,41 @@ def sweep(scene: Scene | PathLike, vary: Mapping[str, Any] | None = None, **keyw
     return Answer(_ask([*words, *_words({"out": out})], **of), _of_table(words, **of))
 
 
+def enclose(scene: Scene | PathLike, box: Mapping[str, Any] | None = None, **options: Any) -> Answer:
+    """Two numbers between which every answer of the scene as written is proved to lie.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        With an impact velocity.
+    box : dict, optional
+        Least and greatest value of numbers of the scene, by their paths: ``{"target.strength": ("34MPa", "38MPa")}``. The answers are
+        then those of all of the box.
+    **options
+        Those of the command.
+
+    Returns
+    -------
+    Answer
+        The fields of ``penetrode solve --method enclosure --json``; ``enclosure`` has ``depth_m`` [m], ``time_s`` [s] and
+        ``velocity_m_s`` [m/s], each as least and greatest number. V_c: ``pn.critical(scene, "enclosure").enclosure``.
+
+    Raises
+    ------
+    OptionError, SceneError, RunError
+        As the command.
+
+    Examples
+    --------
+    >>> import penetrode as pn
+    >>> pn.enclose("tunnel").enclosure["depth_m"]
+    [0.14482620011221706, 0.14482620011221709]
+    """
+    ranges = [f"{path}={_colons(value)}" for path, value in (box or {}).items()]
+    words = ["solve", "--method=enclosure", *_words({"box": ranges, **options})]
+    return Answer(_ask(words, _scene(scene)))
+
+
 def limit(scene: Scene | PathLike, **options: Any) -> Answer:
     """The perforation limit: the thickness that just stops the projectile.
 

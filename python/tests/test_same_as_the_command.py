@@ -82,6 +82,16 @@ def test_map(ask):
     assert pn.map(1.5).to_dict() == ask("map", "--k=1.5")
 
 
+@pytest.mark.parametrize("scene", ["tunnel", "perforate", "law-power"])
+def test_enclose(ask, scene):
+    assert pn.enclose(scene).to_dict() == ask("solve", scene, "--method=enclosure")
+    box = {"projectile.mass": (1.9, 2.1)}
+    assert pn.enclose(scene, box).to_dict() == ask("solve", scene, "--method=enclosure", "--box=projectile.mass=1.9:2.1")
+    low, high = pn.enclose(scene).enclosure["depth_m"]
+    assert low <= high <= low + 4e-16
+    assert pn.solve(pn.scene(scene)).depth == pytest.approx(low, rel=4e-15)
+
+
 @pytest.mark.parametrize("scene", ["tunnel", "paper-slab", "layered"])
 def test_limit(ask, scene):
     assert pn.limit(scene).to_dict() == ask("limit", scene)

@@ -9,12 +9,14 @@ use super::report_args::ReportArgs;
 use super::runs::RunArgs;
 use super::{Answer, Ask, CliError, Settings};
 use crate::exchange::input::{is_standard, name_of};
+use crate::exchange::scene_file::SceneFile;
 use crate::exchange::tables::read_bytes;
-use crate::physics::{Problem, Scene};
+use crate::physics::Problem;
 use crate::report::environment::hash;
 use crate::report::refinement::Refinement;
 use crate::studies::audit::{Audit, ErrorBand, Exact, ExactValues, FormalOrders, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::critical_velocity;
+use crate::studies::enclosure;
 use crate::studies::error::Truth;
 use crate::studies::error::{is_fixed, value_of};
 use crate::studies::grid_convergence::ThreeGrids;
@@ -67,7 +69,7 @@ impl Ask for AuditArgs {
         let runs = self.runs.runs.iter().map(|(path, _)| path.as_path());
         let inputs = runs.chain(self.results.as_deref()).chain(self.scene.as_deref().map(Path::new));
         self.report.check("audit", &inputs.collect::<Vec<_>>())?;
-        let scene = self.scene.as_deref().map(|path| self.settings.read_problem(path)).transpose()?;
+        let scene = self.scene.as_deref().map(|path| self.settings.read_file_and_problem(path)).transpose()?;
         let file = self.results.as_deref().map_or_else(|| format!("{} runs", self.runs.runs.len()), name_of);
         let (results, hashed) = if let Some(path) = &self.results {
             let bytes = read_bytes(path, &RESULTS)?;
@@ -91,7 +93,8 @@ impl Ask for AuditArgs {
 }
 
 /// What the scene gives exactly.
-fn exact_values(scene: &Scene, problem: &Problem) -> Result<ExactValues, CliError> {
+fn exact_values(file: &SceneFile, problem: &Problem) -> Result<ExactValues, CliError> {
+    let SceneFile { scene, written } = file;
     let exact = Truth::of(problem)?.flight;
     let values = Quantity::ALL.map(|quantity| match value_of(quantity, &exact) {
         Some(value) if is_fixed(quantity, &exact) => Exact::Fixed(value),
@@ -100,7 +103,8 @@ fn exact_values(scene: &Scene, problem: &Problem) -> Result<ExactValues, CliErro
         None if !problem.has_exit() => Exact::Absent("the target has no far side"),
         None => critical_velocity::exact_or_refined(scene).map_or(Exact::Unknown, Exact::Free),
     });
-    Ok(ExactValues { impact_velocity: problem.impact_speed, stops: exact.outcome.is_stop(), values })
+    let proved = enclosure::quantities(scene, written).unwrap_or_default();
+    Ok(ExactValues { impact_velocity: problem.impact_speed, stops: exact.outcome.is_stop(), values, proved })
 }
 
 fn text(file: &str, judged: &Audit) -> String {
@@ -166,6 +170,9 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
         );
     } else if let Some(limit) = q.limit {
         text.line(format!("  limit {}{unit}", significant(limit)));
+    }
+    if let Some(proof) = &q.proof {
+        text.wrapped("  ", proof);
     }
     if q.local_orders.len() > 1 {
         let shown = q.local_orders.iter().take(8).map(|order| or_dash(*order, |order| format!("{order:.2}")));

@@ -241,6 +241,7 @@ impl QuantityJson {
             verdict: self.verdict,
             class: self.class.name(),
             reason: self.reason.clone(),
+            proved: None,
             advice: None,
             formal_order: self.formal_order,
             observed_order: self.observed_order,

@@ -514,9 +514,14 @@ impl Settings {
 
     /// The scene in the file at `path` and its problem; what is wrong with it names the file.
     fn read_problem(&self, path: &str) -> Result<(Scene, Problem), CliError> {
-        let scene = self.read(path)?;
-        let problem = scene.problem().map_err(|error| CliError::from(error).in_file(path))?;
-        Ok((scene, problem))
+        self.read_file_and_problem(path).map(|(file, problem)| (file.scene, problem))
+    }
+
+    /// As [`Settings::read_problem`], with what was written for the numbers of the scene.
+    fn read_file_and_problem(&self, path: &str) -> Result<(SceneFile, Problem), CliError> {
+        let file = self.read_file(path)?;
+        let problem = file.scene.problem().map_err(|error| CliError::from(error).in_file(path))?;
+        Ok((file, problem))
     }
 }
 

@@ -460,7 +460,9 @@ impl SolveArgs {
         }
         data.add_exact(&mut text);
         if flight.outcome == Outcome::Undecided {
-            let notes = flight.notes.iter().map(String::as_str).chain([UNDECIDED]);
+            // An enclosure says itself what is open.
+            let why = if data.enclosure.is_some() { None } else { Some(UNDECIDED) };
+            let notes = flight.notes.iter().map(String::as_str).chain(why);
             notes.for_each(|note| text.wrapped("  note     ", note));
         }
         if let Some(limit) = flight.step_limit.filter(|limit| !limit.stable) {

@@ -14,7 +14,11 @@
 //!
 //! docs/enclosures.md has the proof, inequality by inequality.
 
+mod law;
+
 use smallvec::SmallVec;
+
+use law::{Expression, Misses};
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved, refuse_laws};
@@ -53,6 +57,9 @@ const RETRIES_MAX: u32 = 8;
 /// Steps allowed for one flight.
 const STEPS_MAX: u64 = 100_000;
 
+/// Steps allowed for a stage with an expression, which take longer: a force may vanish with the velocity.
+const OWN_STEPS_MAX: u64 = 5_000;
+
 /// Velocity over that at the start of a step, below which a passage is sought in double words.
 const SLOW: f64 = 1e-3;
 
@@ -90,10 +97,13 @@ impl Enclosure {
     /// The outcome is proved, or `Undecided`. Two boundaries of the problem are the same ball or differ as `f64`.
     ///
     /// # Errors
-    /// [`IntegrationError::Refused`] for a law of its own, or numbers beyond 1e-100 to 1e100;
+    /// [`IntegrationError::Refused`] for a law in code or with ends on conditions, or numbers beyond 1e-100 to 1e100;
     /// [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
-        refuse_laws(problem, "enclosure")?;
+        let is_text = |index: usize| problem.laws.of(index).is_none_or(|law| law.bound().is_some());
+        if problem.laws.have_conditions() || !(0..problem.stages.len()).all(is_text) {
+            refuse_laws(problem, "enclosure")?;
+        }
         let depths = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]);
         if !depths.chain([problem.mass, problem.impact_speed]).all(is_in_range) {
             return Err(out_of_range());
@@ -180,8 +190,41 @@ struct Error {
 }
 
 /// The law of a stage over the mass, and what its proofs need of it.
-struct Law {
-    /// Coefficients over the mass.
+enum Law<'a> {
+    /// p, s, r and q.
+    Coefficients(Coefficients),
+    /// An expression.
+    Expression(Expression<'a>),
+}
+
+impl<'a> Law<'a> {
+    /// The law of stage `index`, for the `mass` that moves there; `None` where no bound is derived for it.
+    fn new(problem: &'a Problem<Ball>, index: usize, mass: Ball) -> Option<Self> {
+        match problem.laws.of(index) {
+            Some(law) => Some(Self::Expression(Expression::new(law.bound()?, mass))),
+            None => Coefficients::new(&problem.stages[index], mass).map(Self::Coefficients),
+        }
+    }
+
+    /// Deceleration (m/s²) at every depth in `x` and every velocity in `v`, not negative.
+    fn deceleration(&self, x: Ball, v: Ball) -> Ball {
+        match self {
+            Self::Coefficients(law) => law.deceleration(x, v),
+            Self::Expression(law) => law.deceleration(x, v),
+        }
+    }
+
+    /// Upper bound of w, with which the error N is carried through the stage (1/s).
+    fn rate(&self) -> f64 {
+        match self {
+            Self::Coefficients(law) => law.rate,
+            Self::Expression(_) => 0.0,
+        }
+    }
+}
+
+/// The coefficients of a stage over the mass.
+struct Coefficients {
     per_mass: Stage<Ball>,
     /// Whether the force falls with depth.
     falls: bool,
@@ -191,7 +234,7 @@ struct Law {
     least_rate: f64,
 }
 
-impl Law {
+impl Coefficients {
     fn new(stage: &Stage<Ball>, mass: Ball) -> Option<Self> {
         let per_mass = stage.per_mass(mass);
         let Stage { stiffness, viscosity, drag, .. } = per_mass;
@@ -232,13 +275,40 @@ struct Series {
     /// All of them, rounded.
     coarse: [f64; ORDER + 1],
     coarse_depth: [f64; ORDER + 2],
-    /// The coefficients p, s, r, q of the law in these units.
-    law: [Ball; 4],
+    defect: Defect,
+}
+
+/// What bounds the defect of the polynomials.
+enum Defect {
+    /// The coefficients p, s, r, q of the law in units of the series.
+    Coefficients([Ball; 4]),
+    /// What the polynomials miss, order by order.
+    Misses(Box<Misses>),
 }
 
 impl Series {
-    /// The series from depth `x` and velocity `v`, both exact.
-    fn new(law: &Law, x: DoubleWord, v: DoubleWord, limit: f64) -> Self {
+    /// The series from depth `x` and velocity `v`, both exact; `None` where an expression has none.
+    fn new(law: &Law<'_>, x: DoubleWord, v: DoubleWord, limit: f64) -> Option<Self> {
+        match law {
+            Law::Coefficients(law) => Some(Self::of_coefficients(law, x, v, limit)),
+            Law::Expression(law) => law.series(x, v, limit),
+        }
+    }
+
+    /// Polynomials without coefficients yet.
+    fn empty(time: f64, velocity: f64, defect: Defect) -> Self {
+        Self {
+            time,
+            velocity,
+            fine: [DoubleWord::default(); FINE],
+            fine_depth: [DoubleWord::default(); FINE + 1],
+            coarse: [0.0; ORDER + 1],
+            coarse_depth: [0.0; ORDER + 2],
+            defect,
+        }
+    }
+
+    fn of_coefficients(law: &Coefficients, x: DoubleWord, v: DoubleWord, limit: f64) -> Self {
         let Stage { static_force, stiffness, viscosity, drag, .. } = law.per_mass;
         let mut at_start = static_force;
         if !stiffness.is_zero() {
@@ -258,23 +328,15 @@ impl Series {
             viscosity.scaled(time),
             drag.scaled(time * velocity),
         ];
-        let mut series = Self {
-            time,
-            velocity,
-            fine: [DoubleWord::default(); FINE],
-            fine_depth: [DoubleWord::default(); FINE + 1],
-            coarse: [0.0; ORDER + 1],
-            coarse_depth: [0.0; ORDER + 2],
-            law,
-        };
-        series.fill(v.scaled(1.0 / velocity));
+        let mut series = Self::empty(time, velocity, Defect::Coefficients(law));
+        series.fill(&law, v.scaled(1.0 / velocity));
         series
     }
 
     /// `v[k+1] = -([k = 0] p + s x[k] + r v[k] + q sum of v[i] v[k-i])/(k+1)`, `x[k+1] = v[k]/(k+1)`.
-    fn fill(&mut self, start: DoubleWord) {
-        let [p, s, r, q] = self.law.map(|number| number.mid);
-        let has = self.law.map(|number| !number.is_zero());
+    fn fill(&mut self, law: &[Ball; 4], start: DoubleWord) {
+        let [p, s, r, q] = law.map(|number| number.mid);
+        let has = law.map(|number| !number.is_zero());
         let fine = &mut self.fine;
         let depth = &mut self.fine_depth;
         fine[0] = start;
@@ -332,14 +394,18 @@ impl Series {
     }
 
     /// Length of a step that truncates about [`TRUNCATION`] of the velocity.
-    fn span(&self, law: &Law) -> f64 {
+    fn span(&self, law: &Law<'_>) -> f64 {
         let goal = TRUNCATION * self.coarse[0];
         let by = |k: usize| (goal / self.coarse[k].abs()).powf(reciprocal::<f64>(k));
-        let cap = match law.rate * self.time {
-            0.0 => SPAN_MAX,
-            phase => SPAN_MAX.min(if law.falls { 0.99 * GROWTH_MAX } else { PHASE_MAX } / phase),
-        };
-        by(ORDER).min(by(ORDER - 1)).min(cap)
+        let span = by(ORDER).min(by(ORDER - 1));
+        match law {
+            Law::Coefficients(law) if law.rate > 0.0 => {
+                let phase = law.rate * self.time;
+                span.min(SPAN_MAX.min(if law.falls { 0.99 * GROWTH_MAX } else { PHASE_MAX } / phase))
+            }
+            Law::Coefficients(_) => span.min(SPAN_MAX),
+            Law::Expression(_) => (law::SHARE * span).min(SPAN_MAX),
+        }
     }
 
     /// Approximate v, its slope, and x at `time`.
@@ -371,23 +437,23 @@ impl Series {
     }
 
     /// Bounds of the integrals of |dv| and |dx| from 0 to `time`.
-    fn defects(&self, time: f64, sizes: &Sizes) -> [f64; 2] {
+    fn defects(&self, law: &[Ball; 4], time: f64, sizes: &Sizes) -> [f64; 2] {
         let Sizes { v, x, behind } = sizes;
-        let [p, s, r, q] = self.law.map(Ball::magnitude);
+        let [p, s, r, q] = law.map(Ball::magnitude);
         let speed = behind[0];
         let depth: f64 = x.iter().sum();
         let order = FINE - 1;
         let depth_behind: f64 = x[order..].iter().sum();
         // Products of two coefficients of v whose orders sum up to `order` or more.
         let products = |order: usize| -> f64 { (0..=ORDER).map(|i| v[i] * behind[order.saturating_sub(i)]).sum() };
-        let has_drag = !self.law[3].is_zero();
+        let has_drag = !law[3].is_zero();
         let of_order = |order: usize| if has_drag { q * products(order) } else { 0.0 };
         let of_one = r * behind[ORDER] + s * (x[ORDER] + x[ORDER + 1]);
         let truncation = (of_one + of_order(ORDER)) * reciprocal::<f64>(ORDER + 1);
         let fine = (FINE + 12) as f64 * UNIT * (p + s * depth + r * speed + q * speed * speed);
         let coarse = s * depth_behind + r * behind[order] + of_order(order);
         let coarse = (ORDER + 16) as f64 * ROUNDOFF * coarse * reciprocal::<f64>(FINE);
-        let [of_p, of_s, of_r, of_q] = self.law.map(|number| number.radius);
+        let [of_p, of_s, of_r, of_q] = law.map(|number| number.radius);
         let uncertain = of_p + of_s * depth + of_r * speed + of_q * speed * speed;
         let force = time * (truncation + fine + coarse + uncertain);
         let path = time * (4.0 * UNIT * speed + 4.0 * ROUNDOFF * behind[FINE]);
@@ -539,9 +605,9 @@ enum Step {
 }
 
 impl Centre {
-    fn new(state: State<Ball>, law: &Law) -> Self {
+    fn new(state: State<Ball>, law: &Law<'_>) -> Self {
         let State { time, depth, velocity } = state;
-        let norm = (velocity.radius + law.rate * depth.radius) * UP;
+        let norm = (velocity.radius + law.rate() * depth.radius) * UP;
         let error = Error { norm, velocity: velocity.radius, depth: depth.radius };
         Self { time, x: depth.mid, v: velocity.mid, error }
     }
@@ -559,12 +625,34 @@ impl Centre {
     }
 
     /// The state `time` units of `series` later, provided that v stays positive until then; `None` where that is not proved.
-    fn after(&self, law: &Law, series: &Series, time: f64) -> Option<Self> {
+    fn after(&self, law: &Law<'_>, series: &Series, time: f64) -> Option<Self> {
         if time <= 0.0 {
             return Some(*self);
         }
         let sizes = series.sizes(time);
-        let [force, path] = series.defects(time, &sizes);
+        let (error, greatest) = match law {
+            Law::Coefficients(law) => self.error_after(law, series, time, &sizes)?,
+            Law::Expression(law) => law.error_after(self, series, time)?,
+        };
+        if !series.stays_above(greatest / series.velocity * UP, time, &sizes) {
+            return None;
+        }
+        let ([v, x], [of_v, of_x]) = series.at(time, &sizes);
+        let length = series.velocity * series.time;
+        let reached = Ball::around(self.x, 0.0) + Ball::around(x.scaled(length), length * of_x * UP);
+        let error = Error {
+            norm: (error.norm + series.velocity * of_v + law.rate() * reached.radius) * UP,
+            velocity: (error.velocity + series.velocity * of_v) * UP,
+            depth: (error.depth + reached.radius) * UP,
+        };
+        let time = self.time + Ball::from_f64(time * series.time);
+        Some(Self { time, x: reached.mid, v: v.scaled(series.velocity), error })
+    }
+
+    /// The error of the polynomials at `time`, and the greatest of V until then.
+    fn error_after(&self, law: &Coefficients, series: &Series, time: f64, sizes: &Sizes) -> Option<(Error, f64)> {
+        let Defect::Coefficients(numbers) = &series.defect else { return None };
+        let [force, path] = series.defects(numbers, time, sizes);
         let phase = law.rate * series.time;
         let added = series.velocity * (force + phase * path) * UP;
         let growth = if law.falls {
@@ -587,28 +675,17 @@ impl Centre {
         let rest = UP / (1.0 + damping + 0.5 * damping * damping);
         let velocity = norm.min(self.error.velocity * rest + added) * UP;
         let greatest = norm.min(self.error.velocity + added) * UP;
-        if !series.stays_above(greatest / series.velocity * UP, time, &sizes) {
-            return None;
-        }
-        let ([v, x], [of_v, of_x]) = series.at(time, &sizes);
-        let reached = Ball::around(self.x, 0.0) + Ball::around(x.scaled(length), length * of_x * UP);
-        let error = Error {
-            norm: (norm + series.velocity * of_v + law.rate * reached.radius) * UP,
-            velocity: (velocity + series.velocity * of_v) * UP,
-            depth: (depth + reached.radius) * UP,
-        };
-        let time = self.time + Ball::from_f64(time * series.time);
-        Some(Self { time, x: reached.mid, v: v.scaled(series.velocity), error })
+        Some((Error { norm, velocity, depth }, greatest))
     }
 
     /// From here to rest, over a box so small that the force hardly changes: `T = v/a`, `X = v²/(2 a)` with a mean `a`.
-    fn until_rest(&self, law: &Law) -> Option<State<Ball>> {
+    fn until_rest(&self, law: &Law<'_>) -> Option<State<Ball>> {
         let velocity = self.velocity();
         if velocity.lower() > 0.0 { self.slowed(law, velocity) } else { None }
     }
 
     /// The same from any of the `velocities`, none negative, at this time and depth.
-    fn slowed(&self, law: &Law, velocities: Ball) -> Option<State<Ball>> {
+    fn slowed(&self, law: &Law<'_>, velocities: Ball) -> Option<State<Ball>> {
         let (depth, fastest) = (self.depth(), velocities.upper());
         let speeds = Ball::between(0.0, fastest);
         let weakest = law.deceleration(depth, speeds).lower();
@@ -625,7 +702,7 @@ impl Centre {
     }
 
     /// From here to `limit`, over a box as small: `T = d/v` with a mean v.
-    fn until_limit(&self, law: &Law, limit: Ball) -> Option<State<Ball>> {
+    fn until_limit(&self, law: &Law<'_>, limit: Ball) -> Option<State<Ball>> {
         let (depth, velocity) = (self.depth(), self.velocity());
         let way = limit - depth;
         let (slowest, fastest) = (velocity.lower(), velocity.upper());
@@ -650,12 +727,18 @@ impl Centre {
 
 impl Steps {
     /// One step from `centre` towards `limit`.
-    fn step(law: &Law, centre: &Centre, limit: Ball, series: &Series) -> Step {
+    fn step(law: &Law<'_>, centre: &Centre, limit: Ball, series: &Series) -> Step {
         let length = series.velocity * series.time;
         let is_endless = limit.value() == f64::INFINITY;
         let far = if is_endless { f64::INFINITY } else { (limit - Ball::around(centre.x, 0.0)).value() / length };
         let mut span = series.span(law);
+        if let Law::Expression(law) = law {
+            span = law.until_kink(centre, series, span);
+        }
         for _ in 0..RETRIES_MAX {
+            if matches!(law, Law::Expression(_)) && span < law::SPAN_MIN {
+                break;
+            }
             let [v, _, x] = series.near(span);
             if v > 0.0 && x < far {
                 match centre.after(law, series, span) {
@@ -674,7 +757,7 @@ impl Steps {
     }
 
     /// The event within `span`, proved to be the first.
-    fn event(law: &Law, centre: &Centre, limit: Ball, series: &Series, span: f64, far: f64) -> Step {
+    fn event(law: &Law<'_>, centre: &Centre, limit: Ball, series: &Series, span: f64, far: f64) -> Step {
         let length = series.velocity * series.time;
         let rest = if series.near(span)[0] > 0.0 { None } else { Some(series.root(span, |[v, slope, _]| (v, slope))) };
         let until = rest.unwrap_or(span);
@@ -730,6 +813,26 @@ impl Steps {
         Step::Unproved
     }
 
+    /// A step through an expression: that of its series, unless rest is near or the series proves nothing.
+    fn step_of_expression(
+        law: &Law<'_>,
+        own: &Expression<'_>,
+        centre: &Centre,
+        limit: Ball,
+        (step, series): (Step, Option<&Series>),
+    ) -> Step {
+        match step {
+            Step::Whole(next) => own.rest(law, centre, limit).map_or(Step::Whole(next), Step::Rest),
+            Step::Unproved => {
+                if let Some(state) = own.rest(law, centre, limit) {
+                    return Step::Rest(state);
+                }
+                own.across(centre, limit, series.map_or(1.0, |series| series.time))
+            }
+            event => event,
+        }
+    }
+
     /// Everything that may follow from `state` on where nothing is proved: at the end of the flight, until the exit.
     fn anything(course: &Course<'_, Ball>, state: State<Ball>) -> State<Ball> {
         let resists = |stage: &Stage<Ball>| stage.static_force.lower() >= 0.0 && stage.stiffness.lower() >= 0.0;
@@ -746,7 +849,7 @@ impl Steps {
     fn on_either_side(course: &Course<'_, Ball>, before: State<Ball>, limit: Ball) -> Option<State<Ball>> {
         let stages = &course.problem.stages;
         let next = (course.stage + 1..stages.len()).find(|index| stages[*index].end != limit)?;
-        let law = Law::new(&stages[next], course.mass)?;
+        let law = Law::new(course.problem, next, course.mass)?;
         let beyond = Centre::new(State { depth: limit, velocity: before.velocity, ..before }, &law);
         let speeds = Ball::between(0.0, before.velocity.magnitude());
         let furthest = beyond.slowed(&law, speeds)?;
@@ -766,7 +869,8 @@ impl Steps {
     }
 
     /// Whether speed remains at `limit` through a stage that only slows, `v' = -(r + q v) v`: by its closed form.
-    fn arrives(law: &Law, centre: &Centre, limit: Ball) -> Option<bool> {
+    fn arrives(law: &Law<'_>, centre: &Centre, limit: Ball) -> Option<bool> {
+        let Law::Coefficients(law) = law else { return Some(true) };
         let Stage { static_force, stiffness, viscosity, drag, .. } = law.per_mass;
         if !(static_force.is_zero() && stiffness.is_zero()) || viscosity.is_zero() {
             return Some(true);
@@ -789,7 +893,8 @@ impl Steps {
 
     /// Whether an overdamped driven stage has trapped the projectile before its equilibrium, as in
     /// [`Course::refuse_creep`], proved.
-    fn creeps(law: &Law, centre: &Centre, limit: Ball) -> bool {
+    fn creeps(law: &Law<'_>, centre: &Centre, limit: Ball) -> bool {
+        let Law::Coefficients(law) = law else { return false };
         let Stage { static_force, stiffness, viscosity, .. } = law.per_mass;
         if law.falls || !(static_force.upper() < 0.0 && stiffness.lower() > 0.0 && viscosity.lower() > 0.0) {
             return false;
@@ -809,11 +914,13 @@ impl StageSolver<Ball> for Steps {
     fn solve_stage(&mut self, course: &mut Course<'_, Ball>) -> Solved<StageEnd<Ball>> {
         let stage = &course.problem.stages[course.stage];
         let forces = [stage.static_force, stage.stiffness, stage.viscosity, stage.drag];
-        if !forces.iter().all(|force| is_in_range(*force) && is_in_range(*force / course.mass)) {
+        let is_own = course.problem.laws.of(course.stage).is_some();
+        if !is_own && !forces.iter().all(|force| is_in_range(*force) && is_in_range(*force / course.mass)) {
             return Err(out_of_range());
         }
         let is_open = |number: Ball| number.lower() < 0.0 && number.upper() > 0.0;
-        if course.problem.limit_of(course.stage).value() == f64::INFINITY
+        if !is_own
+            && course.problem.limit_of(course.stage).value() == f64::INFINITY
             && (is_open(stage.static_force) || is_open(stage.stiffness))
         {
             // Whether anything stops it is not known.
@@ -822,7 +929,7 @@ impl StageSolver<Ball> for Steps {
         }
         let limit = course.limit()?;
         let impact = course.problem.impact_speed.value();
-        let Some(law) = Law::new(&course.problem.stages[course.stage], course.mass) else {
+        let Some(law) = Law::new(course.problem, course.stage, course.mass) else {
             let state = Self::anything(course, course.state);
             return Ok(self.give_up(course, state));
         };
@@ -838,15 +945,19 @@ impl StageSolver<Ball> for Steps {
                 return Ok(self.give_up(course, state));
             }
         }
-        while course.cost.steps < STEPS_MAX {
+        let steps_max = course.cost.steps + if is_own { OWN_STEPS_MAX } else { STEPS_MAX };
+        while course.cost.steps < steps_max.min(STEPS_MAX) {
             if Self::creeps(&law, &centre, limit) {
                 let why = "viscosity lets it only creep towards the depth where the spring balances the drive";
                 return Err(IntegrationError::NeverEnds { why, last: centre.state().values() });
             }
-            let series = Series::new(&law, centre.x, centre.v, limit.value());
             let work = Cost { steps: 1, rejected_steps: 0, force_evaluations: ORDER as u64 };
             course.cost = course.cost + work;
-            let step = Self::step(&law, &centre, limit, &series);
+            let series = Series::new(&law, centre.x, centre.v, limit.value());
+            let mut step = series.as_ref().map_or(Step::Unproved, |series| Self::step(&law, &centre, limit, series));
+            if let Law::Expression(own) = &law {
+                step = Self::step_of_expression(&law, own, &centre, limit, (step, series.as_ref()));
+            }
             let end = match &step {
                 Step::Whole(next) => next.state(),
                 Step::Limit(state) | Step::Rest(state) | Step::Either(state) => *state,
@@ -854,6 +965,7 @@ impl StageSolver<Ball> for Steps {
             };
             let start = centre;
             course.sample_until(end, |time| {
+                let Some(series) = &series else { return start.state() };
                 let [v, _, x] = series.near((time - start.time.value()) / series.time);
                 let depth = start.x.hi + x * series.velocity * series.time;
                 State { time, depth, velocity: v * series.velocity }.cast::<Ball>()
@@ -884,6 +996,9 @@ impl StageSolver<Ball> for Steps {
         let margin = course.margin();
         if self.open.is_some() {
             return Ok(Bounded { bound: margin.value.abs(), ..margin });
+        }
+        if course.problem.laws.of(course.stage.min(course.problem.stages.len() - 1)).is_some() {
+            return Ok(margin);
         }
         let energy = course.problem.mass * course.problem.impact_speed * course.problem.impact_speed;
         // The margin is a number, and that of a stop is continued from the depth as rounded.

@@ -209,11 +209,6 @@ impl Ball {
         Self { radius: (self.radius + more) * UP, ..self }
     }
 
-    /// Whether it is one number and that number is zero.
-    pub fn is_zero(self) -> bool {
-        self == Self::default()
-    }
-
     /// Product with a power of two.
     #[inline]
     #[must_use]
@@ -324,10 +319,10 @@ impl Scalar for Ball {
         self.mid.hi
     }
 
-    /// Of a ball that holds negative numbers too, the root of what is not negative.
+    /// Of a ball that reaches below zero by rounding, the root of what is not negative.
     fn sqrt(self) -> Self {
         let (low, high) = self.interval();
-        if high < 0.0 || high.is_nan() {
+        if is_negative(low, high) {
             return Self::from_f64(f64::NAN);
         }
         if self.is_zero() {
@@ -356,11 +351,44 @@ impl Scalar for Ball {
         }
     }
 
+    fn literal(value: f64, short: bool) -> Self {
+        match value {
+            _ if !short => Self::from_f64(value).widened(f64::EPSILON * value.abs()),
+            std::f64::consts::PI => Self::quarter_pi().scaled(4.0),
+            std::f64::consts::E => Elementary::exp(Self::one()),
+            _ => Self::decimal(value),
+        }
+    }
+
+    fn is_zero(self) -> bool {
+        self == Self::default()
+    }
+
+    /// Everything in both where the sign is open.
+    fn select(self, above: Self, below: Self) -> Self {
+        if self.lower() >= 0.0 {
+            above
+        } else if self.upper() < 0.0 {
+            below
+        } else {
+            above.hull(below)
+        }
+    }
+
+    fn is_constant(self) -> bool {
+        self.radius == 0.0 && self.mid.lo == 0.0
+    }
+
     fn quarter_pi() -> Self {
         // 0.785398163397448309615660845819875721049292349843776455243736..., to 2^-107 of itself.
         let mid = DoubleWord { hi: std::f64::consts::FRAC_PI_4, lo: 3.061_616_997_868_383e-17 };
         Self { mid, radius: 1e-32 }
     }
+}
+
+/// Whether an interval holds negative numbers, other than by the rounding of [`Ball::between`].
+fn is_negative(low: f64, high: f64) -> bool {
+    !(low >= -high * (UP - 1.0) * 4.0 - 4.0 * TINY)
 }
 
 /// Terms of the series of e^z, sin z and cos z, for |z| <= 1/64.
@@ -467,8 +495,22 @@ impl Elementary for Ball {
         }
     }
 
+    /// Of a ball that reaches below zero by rounding, the powers of what is not negative.
     fn powf(self, exponent: Self) -> Self {
-        Elementary::exp(Elementary::ln(self) * exponent)
+        let power = |base: Self| Elementary::exp(Elementary::ln(base) * exponent);
+        let (low, high) = self.interval();
+        if low <= 0.0 && high >= 0.0 && exponent.lower() > 0.0 {
+            // A whole power of a negative number has a value.
+            let is_whole = exponent.is_constant() && exponent.value().fract() == 0.0;
+            return if (is_whole && low < 0.0) || is_negative(low, high) {
+                Self::from_f64(f64::NAN)
+            } else if high > 0.0 {
+                Self::between(0.0, power(Self::from_f64(high)).upper())
+            } else {
+                Self::zero()
+            };
+        }
+        power(self)
     }
 
     fn with_slope(self, value: Self, _slope: impl FnOnce() -> f64) -> Self {

@@ -57,6 +57,30 @@ pub trait Scalar:
         Self::from_f64(value)
     }
 
+    /// What a number in a text means whose `f64` is `value`. A `short` one has at most 15 digits, and is the shortest decimal of
+    /// its `f64`; pi and e count as short.
+    fn literal(value: f64, _short: bool) -> Self {
+        Self::from_f64(value)
+    }
+
+    /// Whether it is known to be zero.
+    fn is_zero(self) -> bool {
+        self.value() == 0.0
+    }
+
+    /// `above` where this is not negative, else `below`; none where this has no value.
+    #[must_use]
+    #[inline]
+    fn select(self, above: Self, below: Self) -> Self {
+        if self.value() >= 0.0 {
+            above
+        } else if self.value() < 0.0 {
+            below
+        } else {
+            self
+        }
+    }
+
     /// pi/4, as exact as the number type says that it is.
     fn quarter_pi() -> Self {
         Self::from_f64(std::f64::consts::FRAC_PI_4)

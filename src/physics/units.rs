@@ -255,7 +255,10 @@ impl Quantity {
     pub fn with_any_unit(text: &str) -> Result<(Self, Vec<(Dimension, i8)>), QuantityError> {
         let (digits, unit) = number_and_unit(text)?;
         let unknown = || QuantityError::UnknownUnit { unit: unit.to_owned() };
-        let (coefficient, powers) = compound(unit).ok_or_else(unknown)?;
+        let Compound { coefficient, exact, powers } = compounded(unit).ok_or_else(unknown)?;
+        if let Some(text) = exact.and_then(|exact| exact_product(digits, exact)) {
+            return Ok((Self::bare(&text)?, powers));
+        }
         let (decimal, relative_error) = product(digits, coefficient);
         // The coefficient of a product of units is rounded at each of them.
         let relative_error = relative_error + 8.0 * f64::EPSILON;
@@ -295,10 +298,35 @@ fn number_and_unit(text: &str) -> Result<(&str, &str), QuantityError> {
 /// assert_eq!(compound("1/ms"), Some((1e3, vec![(Dimension::Time, -1)])));
 /// ```
 pub fn compound(unit: &str) -> Option<(f64, Vec<(Dimension, i8)>)> {
+    compounded(unit).map(|compound| (compound.coefficient, compound.powers))
+}
+
+/// A unit made of others.
+struct Compound {
+    coefficient: f64,
+    /// Signed digits and power of ten of the coefficient, where it is known exactly.
+    exact: Option<(i128, i64)>,
+    powers: Vec<(Dimension, i8)>,
+}
+
+/// The exact coefficient of one unit to a `power`; of a quotient only by a power of ten.
+fn exact_power(coefficient: f64, power: i8) -> Option<(i128, i64)> {
+    let (mut digits, mut exponent) = decimal(&format!("{coefficient:e}")).filter(|_| error_of(coefficient) == 0.0)?;
+    while digits % 10 == 0 && digits != 0 {
+        (digits, exponent) = (digits / 10, exponent + 1);
+    }
+    let count = u32::try_from(power).ok().or_else(|| (digits == 1).then_some(0))?;
+    Some((digits.checked_pow(count)?, exponent * i64::from(power)))
+}
+
+fn compounded(unit: &str) -> Option<Compound> {
     if let Some(dimension) = Dimension::of(unit) {
-        return Some((dimension.coefficient(unit)?, vec![(dimension, 1)]));
+        let coefficient = dimension.coefficient(unit)?;
+        let exact = exact_power(coefficient, 1);
+        return Some(Compound { coefficient, exact, powers: vec![(dimension, 1)] });
     }
     let (mut coefficient, mut powers) = (1.0, Vec::new());
+    let mut exact = Some((1_i128, 0_i64));
     for (index, part) in unit.split('/').enumerate() {
         let part = part.trim();
         let inner = part.strip_prefix('(').and_then(|part| part.strip_suffix(')')).unwrap_or(part);
@@ -312,11 +340,15 @@ pub fn compound(unit: &str) -> Option<(f64, Vec<(Dimension, i8)>)> {
                 digits => digits.parse::<i8>().ok().filter(|power| (-9..=9).contains(power))?,
             };
             let (dimension, power) = (Dimension::of(base)?, if index == 0 { power } else { -power });
-            coefficient *= dimension.coefficient(base)?.powi(i32::from(power));
+            let one = dimension.coefficient(base)?;
+            coefficient *= one.powi(i32::from(power));
+            exact = exact
+                .zip(exact_power(one, power))
+                .and_then(|((digits, exponent), (more, shift))| Some((digits.checked_mul(more)?, exponent + shift)));
             powers.push((dimension, power));
         }
     }
-    (!powers.is_empty() && coefficient.is_normal()).then_some((coefficient, powers))
+    (!powers.is_empty() && coefficient.is_normal()).then_some(Compound { coefficient, exact, powers })
 }
 
 /// SI value of a text `number unit`, of `dimension`. White space around and between is free, and may be absent.
@@ -350,17 +382,19 @@ pub fn scaled(digits: &str, coefficient: f64) -> Result<f64, QuantityError> {
 
 /// Decimal text of `number · coefficient`, and how far off it may be, over itself.
 fn product(number: &str, coefficient: f64) -> (String, f64) {
-    let exact = || {
-        let (left, left_exponent) = decimal(number)?;
-        let (right, right_exponent) = decimal(&format!("{coefficient:e}"))?;
-        Some(format!("{}e{}", left.checked_mul(right)?, left_exponent.checked_add(right_exponent)?))
-    };
+    let exact = decimal(&format!("{coefficient:e}")).and_then(|coefficient| exact_product(number, coefficient));
     // Beyond 38 digits the last ones do not matter: two roundings more.
-    if let Some(text) = exact() {
+    if let Some(text) = exact {
         return (text, error_of(coefficient));
     }
     let rounded = number.parse().unwrap_or(f64::NAN) * coefficient;
     (format!("{rounded:e}"), error_of(coefficient) + 4.0 * f64::EPSILON)
+}
+
+/// Decimal text of `number` times digits and a power of ten; `None` beyond 38 digits.
+fn exact_product(number: &str, (digits, exponent): (i128, i64)) -> Option<String> {
+    let (left, left_exponent) = decimal(number)?;
+    Some(format!("{}e{}", left.checked_mul(digits)?, left_exponent.checked_add(exponent)?))
 }
 
 /// Signed digits and power of ten of a decimal.

@@ -13,6 +13,7 @@ use crate::studies::error::compare;
 use crate::studies::grid_convergence::{ThreeGrids, Uncertainty};
 use crate::studies::order::Exclusion;
 use crate::studies::{Quantity, Verdict};
+use crate::text::digits_between;
 
 /// Points of a series that are drawn at most; all of them are in the JSON.
 const DRAWN_MAX: usize = 400;
@@ -109,6 +110,8 @@ pub struct Series {
     pub reason: String,
     /// What would decide it.
     pub advice: Option<String>,
+    /// Two numbers between which the exact value is proved to lie.
+    pub proved: Option<(f64, f64)>,
     /// Order expected.
     pub formal_order: Option<f64>,
     /// Order found.
@@ -177,6 +180,7 @@ impl Series {
             verdict: audit.verdict,
             class: audit.class.name(),
             reason: audit.reason.clone(),
+            proved: audit.proved,
             advice: audit.advice.clone(),
             formal_order: audit.formal_order,
             observed_order: audit.observed_order,
@@ -424,12 +428,28 @@ impl Refinement {
     /// Quantity by quantity: what is read first.
     fn results(&self) -> Sheet {
         let expected = if self.size == Size::Step { "expected" } else { "in proportion" };
-        let header =
-            ["quantity", "verdict", "finest value", "±", "relative error", "order", "95 % interval", expected, "why"];
+        let header = [
+            "quantity",
+            "verdict",
+            "finest value",
+            "±",
+            "relative error",
+            "order",
+            "95 % interval",
+            expected,
+            "proved",
+            "why",
+        ];
         // A pass needs no reason.
         let has_why = self.series.iter().any(|series| series.verdict != Verdict::Passed);
-        let columns = if has_why { header.len() } else { header.len() - 1 };
-        let header = header[..columns].iter().copied().map(Prose::from);
+        let has_proof = self.series.iter().any(|series| series.proved.is_some());
+        let shown = |name: &str| match name {
+            "why" => has_why,
+            "proved" => has_proof,
+            _ => true,
+        };
+        let is_shown = header.map(shown);
+        let header = header.into_iter().filter(|name| shown(name)).map(Prose::from);
         // Verdicts and reasons belong to the page.
         let sheet = Sheet::cards("results", "Result by quantity".into(), header).for_papers(2..7);
         sheet.rows(&self.series, |series| {
@@ -446,10 +466,12 @@ impl Refinement {
                 Cell::Order(series.observed_order),
                 Cell::Interval(series.interval),
                 Cell::Order(series.formal_order),
+                Cell::text(series.proved.map_or_else(String::new, |(low, high)| digits_between(low, high))),
                 Cell::text(why),
             ]
             .into_iter()
-            .take(columns)
+            .zip(is_shown)
+            .filter_map(|(cell, shown)| shown.then_some(cell))
             .collect::<Vec<_>>()
         })
     }

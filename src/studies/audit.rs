@@ -17,6 +17,7 @@ use std::str::FromStr;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::enclosure;
 use super::grid_convergence::{
     Behaviour, EcaHoekstra, GridValue, ThreeGrids, Uncertainty, eca_hoekstra, local_order, range, roache, three_grids,
     xing_stern,
@@ -183,6 +184,8 @@ pub struct ExactValues {
     pub stops: bool,
     /// What it says of each quantity, in the order of [`Quantity::ALL`].
     pub values: [Exact; Quantity::ALL.len()],
+    /// Two numbers between which each is proved to lie, in the same order.
+    pub proved: [Option<(f64, f64)>; Quantity::ALL.len()],
 }
 
 impl ExactValues {
@@ -293,6 +296,10 @@ pub struct QuantityAudit {
     pub relative_error: Option<f64>,
     /// Whether the scene fixes it, whatever the step.
     pub fixed: bool,
+    /// Two numbers between which the exact value is proved to lie (docs/enclosures.md); `null` where none are.
+    pub proved: Option<(f64, f64)>,
+    /// What that proves of the finest value, in one sentence.
+    pub proof: Option<String>,
     /// Whether the values approach it; `null` where it or the limit is not known.
     pub agrees_with_exact: Option<bool>,
     /// Error bars of the value at the finest step, each by its rule.
@@ -487,6 +494,10 @@ impl<'a> Judge<'a> {
         let said = self.exact.zip(quantity).map_or(Exact::Unknown, |(exact, quantity)| exact.values[quantity as usize]);
         if let Exact::Free(value) | Exact::Fixed(value) = said {
             self.judged.exact = Some(value);
+            self.judged.proved = self.exact.zip(quantity).and_then(|(exact, quantity)| exact.proved[quantity as usize]);
+            let GridValue { value: finest, round_off, .. } = self.finest();
+            let said = |proved| enclosure::sentence("the finest value", finest, round_off, proved, quantity?.unit());
+            self.judged.proof = self.judged.proved.and_then(said);
             let scale = self.exact.zip(quantity).and_then(|(exact, quantity)| exact.scale(quantity, value));
             self.judged.relative_error = scale.map(|scale| (self.finest().value - value).abs() / scale);
         }

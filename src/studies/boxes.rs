@@ -1,4 +1,4 @@
-//! What may every answer be, if numbers of the scene lie anywhere between two values? Proved (docs/enclosures.md, section 6).
+//! What may every answer be, if numbers of the scene lie anywhere between two values? Proved (docs/enclosures.md, section 7).
 //!
 //! Where the sign of an answer's derivative is proved over the whole box, its range is that of two corners. Where it is not,
 //! the box is cut, and each piece is one flight whose numbers are as wide as the piece.

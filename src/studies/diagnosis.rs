@@ -23,13 +23,14 @@ use self::fixed_steps::{FINER, LADDER, Rung, coarsest_step, limit, order, pooled
 use self::hypotheses::How;
 pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, questions};
+use super::enclosure;
 use super::order::{OrderFit, StepError, fit};
 use super::verdict::Verdict;
 use crate::exchange::peers::process::ORDER_OF_ALL;
 use crate::exchange::peers::wire::errors;
 use crate::exchange::peers::{Peer, PeerAnswer, PeerFailure, PeerFault, PeerIdentity, PeerRequest};
-use crate::integrators::{Boundaries, VelocityAt};
-use crate::physics::{Criterion, Event, Outcome, Scene, State};
+use crate::integrators::{Boundaries, Detail, Enclosure, VelocityAt};
+use crate::physics::{Criterion, Event, Outcome, Problem, Scene, Shown, State};
 
 /// Relative tolerances at which an adaptive solver is asked.
 pub const TOLERANCES: [f64; 3] = [1e-6, 1e-9, 1e-12];
@@ -445,7 +446,8 @@ fn judge(question: &Question, rtol: f64, answer: &PeerAnswer) -> Judged {
         .max_by(|a, b| (errors[*a].abs() / limits[*a]).total_cmp(&(errors[*b].abs() / limits[*b])))
     {
         let said = format!("{} off by {:+.2e}, limit {:.1e}", QUANTITIES[worst], errors[worst], limits[worst]);
-        return judged(Verdict::Failed, said, false);
+        let proof = proof(problem, worst, end).map_or_else(String::new, |proof| format!("; {proof}"));
+        return judged(Verdict::Failed, said + &proof, false);
     }
     if !answer.has_events_in_order(&asked) {
         return in_events("the events listed are not of the stages, each once, in the order of time".to_owned());
@@ -467,6 +469,20 @@ fn judge(question: &Question, rtol: f64, answer: &PeerAnswer) -> Judged {
         return in_events(said);
     }
     judged(Verdict::Passed, String::new(), false)
+}
+
+/// What is proved of the answer's quantity `index` of [`QUANTITIES`]; the numbers of a question are exact.
+fn proof(problem: &Problem, index: usize, end: State) -> Option<String> {
+    let flight = Enclosure.enclose(&problem.cast(), Detail::End).ok()?;
+    let (value, ball, unit) = [
+        (end.depth, flight.end.depth, "m"),
+        (end.time, flight.end.time, "s"),
+        (end.velocity, flight.end.velocity, "m/s"),
+    ][index];
+    let is_proved = flight.outcome != Outcome::Undecided;
+    let said =
+        || enclosure::sentence(&Shown(value).to_string(), value, 0.0, (ball.lower().max(0.0), ball.upper()), unit);
+    is_proved.then(said).flatten()
 }
 
 fn end_of(answer: &PeerAnswer) -> End {

@@ -2,16 +2,18 @@
 //!
 //! V_c is enclosed by two flights: at a speed below that the projectile stops, and at one above that it perforates. Stages
 //! that end at depths let no two paths cross, and the continuous crater constant c leaves the speed at k d rising with the
-//! impact speed, so that all speeds below stop and all above perforate (docs/enclosures.md, section 5).
+//! impact speed, so that all speeds below stop and all above perforate (docs/enclosures.md, section 6).
 
 use serde::Serialize;
 
 use super::critical_velocity;
 use super::error::Studied;
+use super::quantity::Quantity;
 use crate::integrators::{Detail, Enclosure, Flight, IntegrationError, Taylor};
 use crate::physics::ball::Ball;
 use crate::physics::decimals::Written;
-use crate::physics::{Outcome, Resolved, Scalar, Scene, State};
+use crate::physics::{EventKind, Outcome, Resolved, Scalar, Scene, State};
+use crate::text::digits_between;
 
 /// Flights that narrow the interval of V_c.
 const FLIGHTS_MAX: u32 = 80;
@@ -128,6 +130,56 @@ pub fn bounds(scene: &Scene, written: &Written) -> Studied<Bounds> {
         bounds = bounds.with_critical(critical(scene, written));
     }
     Ok(bounds)
+}
+
+/// What is proved of each quantity of `scene`, in the order of [`Quantity::ALL`]; `None` where nothing is.
+///
+/// # Errors
+/// As [`flight`].
+pub fn quantities(scene: &Scene, written: &Written) -> Studied<[Option<(f64, f64)>; Quantity::ALL.len()]> {
+    let flight = flight(scene, written, Detail::Events)??;
+    let is_decided = flight.outcome != Outcome::Undecided;
+    let crater = flight.events.iter().find(|event| event.kind == EventKind::CraterEnd).map(|event| event.state);
+    let interval =
+        |ball: Ball| Some((ball.lower().max(0.0), ball.upper())).filter(|(_, high)| is_decided && high.is_finite());
+    Ok(Quantity::ALL.map(|quantity| match quantity {
+        Quantity::Depth => interval(flight.end.depth),
+        Quantity::Time => interval(flight.end.time),
+        Quantity::Velocity => interval(flight.end.velocity),
+        Quantity::CraterEndTime => interval(crater?.time),
+        Quantity::CraterEndVelocity => interval(crater?.velocity),
+        Quantity::CriticalVelocity => scene.thickness.and_then(|_| critical(scene, written)),
+    }))
+}
+
+/// That `value`, rounded by `round_off` at most, is proved wrong and from which digit on, or right in every digit, where the exact one
+/// is `proved` to lie between two numbers.
+///
+/// # Example
+/// ```
+/// use penetrode::studies::enclosure::sentence;
+///
+/// let proved = (0.144_826_789_065_4, 0.144_826_789_065_6);
+/// assert_eq!(
+///     sentence("the depth", 0.14483, 1e-10, proved, "m").unwrap(),
+///     "the depth is wrong from digit 5 on: the exact value is proved to lie in 0.144826789065(400..600) m"
+/// );
+/// ```
+pub fn sentence(name: &str, value: f64, round_off: f64, proved: (f64, f64), unit: &str) -> Option<String> {
+    let (low, high) = proved;
+    let interval = format!("the exact value is proved to lie in {} {unit}", digits_between(low, high));
+    let miss = (low - value).max(value - high).max(0.0);
+    // Of 0.14483 and 0.144826 the first digit counts 1e-1, and 4e-6 is first seen in the fifth.
+    let digit = (value.abs().log10().floor() - miss.log10()).floor() + 1.0;
+    if !value.is_finite() || low < 0.0 {
+        None
+    } else if miss <= round_off {
+        Some(format!("{name} is right in every digit: {interval}"))
+    } else if value == 0.0 || digit < 2.0 {
+        Some(format!("{name} is wrong: {interval}"))
+    } else {
+        Some(format!("{name} is wrong from digit {digit} on: {interval}"))
+    }
 }
 
 /// Refuses a scene of which no flight can be enclosed.

@@ -78,8 +78,10 @@ class Scene:
         self.far = self.thickness if self.thickness is not None else mp.inf
 
     def function(self, text, known):
-        code = compile(text.replace("^", "**").strip(), self.name, "eval")
-        return lambda x, V: eval(code, known, {"x": mpf(x), "V": mpf(V)})
+        # Every number is the decimal that stands there: 1/3 of two floats has 16 digits.
+        text = re.sub(r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?)", r"mpf('\1')", text.replace("^", "**").strip())
+        code = compile(text, self.name, "eval")
+        return lambda x, V: eval(code, known | {"mpf": mpf}, {"x": mpf(x), "V": mpf(V)})
 
     # ---- F of V alone
 

@@ -2,12 +2,17 @@
 
 use std::sync::Arc;
 
+use twofloat::TwoFloat;
+
 use super::*;
+use crate::integrators::Enclosure;
+use crate::physics::ball::Ball;
 use crate::physics::reference::{self, Source};
-use crate::physics::{Advice, EventKind, ForceFunction, Law, Outcome, Problem, Scene, Stage};
+use crate::physics::{Advice, EventKind, ForceFunction, Law, Outcome, Problem, Scalar, Scene, Stage};
 use crate::studies::error::Errors;
 use crate::studies::formal_order::{Path, formal_order};
 use crate::studies::quantity::Quantity;
+use crate::studies::random_problems::Kind;
 use crate::testing::{Random, kinds, random_concrete};
 
 /// 2 kg, a force of the parameters below, no far side.
@@ -217,7 +222,7 @@ fn a_law_in_code_without_a_value_ends_the_flight_with_an_error() {
 
 #[test]
 fn methods_that_are_formulas_refuse_a_law() {
-    for name in [MethodName::Energy, MethodName::ClosedForm, MethodName::Enclosure] {
+    for name in [MethodName::Energy, MethodName::ClosedForm] {
         let method = Method::new(name, &MethodOptions::default()).unwrap();
         let error = method.integrator().solve(&problem("P + Q*V^2", 300.0), Detail::End).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
@@ -465,4 +470,122 @@ fn the_critical_speed_of_a_viscous_barrier_is_found() {
     let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
     let off = (critical.velocity - exact).abs();
     assert!(off <= critical.error_bar.unwrap() && off < 1e-6 * exact, "{critical:?} and {exact}");
+}
+
+/// Enclosures of a force that vanishes at rest are wide; all others are as narrow as numbers allow.
+#[test]
+fn enclosures_of_laws_hold_the_known_rest() {
+    for (force, speed, depth, time, ..) in KNOWN.into_iter().filter(|(force, ..)| *force != "R*(V/v1)^0.2") {
+        let flight = Enclosure.enclose(&problem(force, speed).cast(), Detail::Events).unwrap();
+        assert_eq!(flight.outcome, Outcome::Stopped, "{force}");
+        for (ball, known) in [(flight.end.depth, depth), (flight.end.time, time)] {
+            let (low, high) = ball.interval();
+            // The known numbers are rounded, and so are the parameters.
+            let slack = 4.0 * f64::EPSILON * known;
+            assert!(low - slack <= known && known <= high + slack, "{force}: {known} in {low} .. {high}");
+            assert!(high - low <= slack, "{force}: {low} .. {high}");
+        }
+    }
+    let open = Enclosure.enclose(&problem("R*(V/v1)^0.2", 202.0).cast(), Detail::Events).unwrap();
+    assert_eq!(open.outcome, Outcome::Undecided);
+}
+
+/// Whether two balls have a number in common.
+fn meet(a: Ball, b: Ball) -> bool {
+    (a - b).value().abs() <= (a - b).radius
+}
+
+/// Two proofs of the same flight that share the arithmetic alone.
+#[test]
+fn an_enclosure_of_coefficients_meets_that_of_the_same_expression() {
+    let random = &mut Random::new(77);
+    let (mut compared, mut widest) = (0, 0.0_f64);
+    for kind in [Kind::Crater, Kind::Tunnel, Kind::SpringAndDrag, Kind::Viscous, Kind::ViscousSpring, Kind::Several] {
+        for _ in 0..40 {
+            let Some(problem) = kind.draw(random) else { continue };
+            let as_text = written(&problem);
+            let [one, other] =
+                [&problem, &as_text].map(|problem| Enclosure.enclose(&problem.cast::<Ball>(), Detail::Events));
+            let (Ok(one), Ok(other)) = (one, other) else { continue };
+            if [one.outcome, other.outcome].contains(&Outcome::Undecided) {
+                continue;
+            }
+            compared += 1;
+            assert_eq!(one.outcome.is_stop(), other.outcome.is_stop(), "{problem:?}");
+            assert_eq!(one.events.len(), other.events.len(), "{problem:?}");
+            for (one, other) in one.events.iter().zip(&other.events) {
+                let (one, other) = (one.state, other.state);
+                let meets = [(one.time, other.time), (one.depth, other.depth), (one.velocity, other.velocity)];
+                assert!(meets.iter().all(|(one, other)| meet(*one, *other)), "{one:?} {other:?} {problem:?}");
+                widest = widest.max(other.time.radius / other.time.value());
+            }
+        }
+    }
+    println!("{compared} compared, times known to {widest:e}");
+    assert!(compared > 150 && widest < 1e-12, "{compared} {widest:e}");
+}
+
+/// A random force of two or three terms, with kinks, slopes of either sign, and branch points at rest. Its numbers are the same in
+/// binary: an enclosure takes them for decimals.
+fn random_force(random: &mut Random) -> String {
+    const TERMS: [&str; 18] = [
+        "P",
+        "R",
+        "Q*V^2",
+        "R*(V/v1)^1.5",
+        "P*exp(-V/v1)",
+        "P*b*log(1 + V/v1)",
+        "R*sqrt(1 + (V/v1)^2)",
+        "P*tanh(x/l)",
+        "R*abs(x/l - 1)",
+        "P*max(0, 1 - abs(x/l - 1)/0.25)",
+        "R*min(1, V/v1)",
+        "P*(1 + b*cos(3*V/v1))",
+        "Q*max(V^2 - v1^2, 0)",
+        "R*(1 - x/l)",
+        "P*atan(V/v1)*b",
+        "R*sqrt(x/l)",
+        "P*exp(-((x/l - 1)/0.375)^2)",
+        "R*(0.5 + V/v1)^-0.75",
+    ];
+    let mut terms = vec!["P"; usize::from(random.chance(0.7))];
+    for _ in 0..1 + random.below(2) {
+        terms.push(TERMS[random.below(TERMS.len())]);
+    }
+    terms.join(" + ")
+}
+
+/// Series of double-doubles know flights through kinks and branch points to 17 digits.
+#[test]
+fn enclosures_of_random_laws_hold_the_answer_in_double_double() {
+    let random = &mut Random::new(20);
+    let (mut compared, mut undecided) = (0, 0);
+    let count = std::env::var("PENETRODE_CASES").map_or(150, |cases| cases.parse().unwrap());
+    while compared < count {
+        let force = random_force(random);
+        let mut problem = problem(&force, random.log_uniform(10.0, 700.0));
+        if random.chance(0.6) {
+            problem = problem.with_exit(random.log_uniform(2e-3, 0.3));
+        }
+        let Ok(exact) = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events) else { continue };
+        let flight = Enclosure.enclose(&problem.cast(), Detail::Events).unwrap();
+        compared += 1;
+        if flight.outcome == Outcome::Undecided || exact.outcome == Outcome::Undecided {
+            undecided += 1;
+            continue;
+        }
+        assert_eq!(flight.outcome, exact.outcome, "{force} {problem:?}");
+        let scale = [exact.end.time.value(), exact.end.depth.value(), problem.impact_speed];
+        for (event, exact) in flight.events.iter().zip(&exact.events) {
+            let (ours, known) = (event.state, exact.state);
+            let pairs = [(ours.time, known.time), (ours.depth, known.depth), (ours.velocity, known.velocity)];
+            for ((ball, exact), scale) in pairs.into_iter().zip(scale) {
+                let distance = ((exact.hi() - ball.mid.hi) + (exact.lo() - ball.mid.lo)).abs();
+                let slack = 1e-16 * scale;
+                assert!(distance <= ball.radius + slack, "{force}: {ball:?} {exact:?}, {problem:?}");
+            }
+        }
+    }
+    println!("{compared} compared, {undecided} undecided");
+    assert!(undecided * 10 <= compared, "{undecided}");
 }

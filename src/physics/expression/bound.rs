@@ -171,7 +171,7 @@ impl<S: Scalar> Step<S> {
             Self::Divide { a, b } => (at(a).over(at(b)), T::one().over(at(b))),
             Self::Ratio { dividend, b } => (lift(dividend).over(at(b)), T::one().over(at(b))),
             Self::Slope { .. } => (zero, zero),
-            Self::Select { switch, above, below, .. } => (tape::side(at(switch), at(above), at(below)), zero),
+            Self::Select { switch, above, below, .. } => (at(switch).select(at(above), at(below)), zero),
             Self::Sqrt { a } => {
                 let root = at(a).sqrt();
                 (root, T::from_f64(0.5).over(root))
@@ -320,11 +320,16 @@ impl<S: Scalar> Bound<S> {
 
     /// The side of each of [`Bound::switches`] at (`x`, `v`): whether its register is not negative.
     pub fn sides(&self, x: S, v: S) -> SmallVec<[bool; 4]> {
+        self.switch_values(x, v).iter().map(|value| value.value() >= 0.0).collect()
+    }
+
+    /// The values of [`Bound::switches`] at (`x`, `v`).
+    pub(crate) fn switch_values(&self, x: S, v: S) -> SmallVec<[S; 4]> {
         if self.switches.is_empty() {
             return SmallVec::new();
         }
-        let sides = |registers: &[S]| self.switches.iter().map(|switch| registers[*switch].value() >= 0.0).collect();
-        self.run(x, v, |constant| constant, sides)
+        let values = |registers: &[S]| self.switches.iter().map(|switch| registers[*switch]).collect();
+        self.run(x, v, |constant| constant, values)
     }
 
     /// The first term that has no value at depth `x` (m) and velocity `v` (m/s), and why; `None` if each has one.
@@ -435,7 +440,18 @@ impl<S: Scalar> Making<S> {
             term.operands().for_each(|operand| uses[operand] += 1);
         }
         for term in tape.terms() {
-            let value = self.term(term, parameters, &values, &uses);
+            let value = match term {
+                Term::Number(bits) => Value::Constant(tape.number(bits)),
+                Term::Parameter(index) => Value::Constant(parameters[index]),
+                Term::X => Value::Register(0),
+                Term::V => Value::Register(1),
+                Term::Negative(of) => self.negative(values[of]),
+                Term::Call(function, of) => match values[of] {
+                    Value::Constant(of) => Value::Constant(tape::call(function, of)),
+                    Value::Register(a) => Value::Register(self.call(function, a)),
+                },
+                Term::Binary(operation, a, b) => self.operation(operation, [values[a], values[b]], [uses[a], uses[b]]),
+            };
             values.push(value);
         }
         values.last().copied().unwrap_or(Value::Constant(S::zero()))
@@ -479,34 +495,22 @@ impl<S: Scalar> Making<S> {
         }
     }
 
-    fn term(&mut self, term: Term, parameters: &[S], values: &[Value<S>], uses: &[usize]) -> Value<S> {
-        use Value::{Constant, Register};
-        let minus = S::from_f64(-1.0);
-        match term {
-            Term::Number(bits) => Constant(S::from_f64(f64::from_bits(bits))),
-            Term::Parameter(index) => Constant(parameters[index]),
-            Term::X => Register(0),
-            Term::V => Register(1),
-            Term::Negative(of) => match values[of] {
-                Constant(of) => Constant(-of),
-                Register(a) => Register(self.affine(a, minus, S::zero())),
-            },
-            Term::Call(function, of) => match values[of] {
-                Constant(of) => Constant(tape::call(function, of)),
-                Register(a) => Register(self.call(function, a)),
-            },
-            Term::Binary(operation, a, b) => match (values[a], values[b]) {
-                (Constant(a), Constant(b)) => Constant(tape::binary(operation, a, b)),
-                (first, second) => {
-                    let joined = match operation {
-                        Binary::Add => self.joined(first, second, S::one(), uses[a], uses[b]),
-                        Binary::Subtract => self.joined(first, second, minus, uses[a], uses[b]),
-                        _ => None,
-                    };
-                    joined.unwrap_or_else(|| self.binary(operation, first, second))
-                }
-            },
+    fn negative(&mut self, of: Value<S>) -> Value<S> {
+        match of {
+            Value::Constant(of) => Value::Constant(-of),
+            Value::Register(a) => Value::Register(self.affine(a, S::from_f64(-1.0), S::zero())),
         }
+    }
+
+    /// Of two values, and how often each is used.
+    fn operation(&mut self, operation: Binary, [first, second]: [Value<S>; 2], uses: [usize; 2]) -> Value<S> {
+        let joined = match (operation, first, second) {
+            (_, Value::Constant(a), Value::Constant(b)) => Some(Value::Constant(tape::binary(operation, a, b))),
+            (Binary::Add, ..) => self.joined(first, second, S::one(), uses[0], uses[1]),
+            (Binary::Subtract, ..) => self.joined(first, second, S::from_f64(-1.0), uses[0], uses[1]),
+            _ => None,
+        };
+        joined.unwrap_or_else(|| self.binary(operation, first, second))
     }
 
     fn call(&mut self, function: Function, a: usize) -> usize {

@@ -166,7 +166,7 @@ impl<S: Scalar> Step<S> {
             Self::Slope { a } => (order * series(a)[k], zero),
             // A root or power of nothing is nothing, where it has a value.
             Self::Sqrt { a } | Self::Power { a, .. }
-                if own[0][0].value() == 0.0 && series(a)[..=k].iter().all(|c| c.value() == 0.0) =>
+                if own[0][0].is_zero() && series(a)[..=k].iter().all(|c| c.is_zero()) =>
             {
                 (zero, zero)
             }
@@ -175,7 +175,7 @@ impl<S: Scalar> Step<S> {
                 let (a, slope, slopes) = (series(a), series(slope), &own[1]);
                 // A whole power of a series that begins with t begins with that power of t.
                 let is_late = exponent.value() > k as f64 && exponent.value().fract() == 0.0;
-                if a[0].value() == 0.0 && is_late && exponent.is_constant() {
+                if a[0].is_zero() && is_late && exponent.is_constant() {
                     return (zero, zero);
                 }
                 let sum = exponent * (slope[k] * own[0][0] + inner(slope, &own[0], k)) - inner(slopes, a, k);

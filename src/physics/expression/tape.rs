@@ -27,6 +27,8 @@ struct Program {
     varies: Vec<bool>,
     /// Values of all known quantities, used or not.
     parameters: Vec<f64>,
+    /// Whether no number in the text has more than 15 digits.
+    numbers_are_short: bool,
 }
 
 /// The same function of x, V and its parameters, whatever the values that it was read with.
@@ -130,6 +132,11 @@ impl Tape {
         &self.0.parameters
     }
 
+    /// What the number with these `bits` means in its text.
+    pub(super) fn number<S: Scalar>(&self, bits: u64) -> S {
+        S::literal(f64::from_bits(bits), self.0.numbers_are_short)
+    }
+
     /// Whether it uses the known quantity of this index.
     pub fn uses(&self, parameter: usize) -> bool {
         self.contains(Term::Parameter(parameter))
@@ -168,7 +175,7 @@ impl Tape {
         let mut values: Vec<S> = Vec::with_capacity(self.0.nodes.len());
         for term in self.terms() {
             values.push(match term {
-                Term::Number(bits) => S::from_f64(f64::from_bits(bits)),
+                Term::Number(bits) => self.number(bits),
                 Term::Parameter(index) => parameters[index],
                 Term::X => x,
                 Term::V => v,
@@ -237,8 +244,16 @@ impl Program {
             });
             moved.push(place);
         }
-        Self { text, nodes: kept, varies, parameters }
+        let numbers_are_short = has_short_numbers(&text);
+        Self { text, nodes: kept, varies, parameters, numbers_are_short }
     }
+}
+
+/// Whether no number in `text` has more than 15 digits. Digits of names and exponents are too few to count.
+fn has_short_numbers(text: &str) -> bool {
+    let runs = text.split(|c: char| !c.is_ascii_digit() && c != '.');
+    let digits = |run: &str| run.trim_start_matches(['0', '.']).bytes().filter(u8::is_ascii_digit).count();
+    runs.map(digits).all(|digits| digits <= 15)
 }
 
 /// The value of a function.
@@ -252,7 +267,7 @@ pub(super) fn call<S: Scalar>(function: Function, of: S) -> S {
         Function::Sin => of.sin(),
         Function::Cos => of.cos(),
         Function::Atan => of.atan(),
-        Function::Abs => side(of, of, -of),
+        Function::Abs => of.select(of, -of),
     }
 }
 
@@ -264,20 +279,8 @@ pub(super) fn binary<S: Scalar>(operation: Binary, a: S, b: S) -> S {
         Binary::Multiply => a * b,
         Binary::Divide => a.over(b),
         Binary::Power => a.powf(b),
-        Binary::Min => side(a - b, b, a),
-        Binary::Max => side(a - b, a, b),
-    }
-}
-
-/// `above` if `switch` is not negative, else `below`; a switch without a value gives none.
-#[inline]
-pub(super) fn side<S: Scalar>(switch: S, above: S, below: S) -> S {
-    if switch.value() >= 0.0 {
-        above
-    } else if switch.value() < 0.0 {
-        below
-    } else {
-        switch
+        Binary::Min => (a - b).select(b, a),
+        Binary::Max => (a - b).select(a, b),
     }
 }
 

@@ -18,7 +18,7 @@ fn judge_text(text: &str, order: Option<f64>, exact: Option<f64>) -> Audit {
     let exact = exact.map(|depth| {
         let mut values = [Exact::Unknown; Quantity::ALL.len()];
         values[Quantity::Depth as usize] = Exact::Free(depth);
-        ExactValues { impact_velocity: 300.0, stops: true, values }
+        ExactValues { impact_velocity: 300.0, stops: true, values, ..ExactValues::default() }
     });
     let table = Table::read("run.csv", text.as_bytes()).unwrap();
     audit(&table, &FormalOrders::of_all(order), exact.as_ref(), None).unwrap()
@@ -156,7 +156,7 @@ fn rows_that_differ_from_the_exact_value_by_their_printed_digits_only_are_left_o
 fn exact(quantity: Quantity, value: Exact, stops: bool) -> ExactValues {
     let mut values = [Exact::Unknown; Quantity::ALL.len()];
     values[quantity as usize] = value;
-    ExactValues { impact_velocity: 300.0, stops, values }
+    ExactValues { impact_velocity: 300.0, stops, values, ..ExactValues::default() }
 }
 
 fn judge_against(text: &str, order: Option<f64>, exact: &ExactValues) -> Audit {
