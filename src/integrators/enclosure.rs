@@ -436,30 +436,6 @@ impl Series {
         Sizes { v, x, behind }
     }
 
-    /// Bounds of the integrals of |dv| and |dx| from 0 to `time`.
-    fn defects(&self, law: &[Ball; 4], time: f64, sizes: &Sizes) -> [f64; 2] {
-        let Sizes { v, x, behind } = sizes;
-        let [p, s, r, q] = law.map(Ball::magnitude);
-        let speed = behind[0];
-        let depth: f64 = x.iter().sum();
-        let order = FINE - 1;
-        let depth_behind: f64 = x[order..].iter().sum();
-        // Products of two coefficients of v whose orders sum up to `order` or more.
-        let products = |order: usize| -> f64 { (0..=ORDER).map(|i| v[i] * behind[order.saturating_sub(i)]).sum() };
-        let has_drag = !law[3].is_zero();
-        let of_order = |order: usize| if has_drag { q * products(order) } else { 0.0 };
-        let of_one = r * behind[ORDER] + s * (x[ORDER] + x[ORDER + 1]);
-        let truncation = (of_one + of_order(ORDER)) * reciprocal::<f64>(ORDER + 1);
-        let fine = (FINE + 12) as f64 * UNIT * (p + s * depth + r * speed + q * speed * speed);
-        let coarse = s * depth_behind + r * behind[order] + of_order(order);
-        let coarse = (ORDER + 16) as f64 * ROUNDOFF * coarse * reciprocal::<f64>(FINE);
-        let [of_p, of_s, of_r, of_q] = law.map(|number| number.radius);
-        let uncertain = of_p + of_s * depth + of_r * speed + of_q * speed * speed;
-        let force = time * (truncation + fine + coarse + uncertain);
-        let path = time * (4.0 * UNIT * speed + 4.0 * ROUNDOFF * behind[FINE]);
-        [force * UP + TINY, path * UP + TINY]
-    }
-
     /// v and x at `time`, and bounds of what evaluating them rounds.
     fn at(&self, time: f64, sizes: &Sizes) -> ([DoubleWord; 2], [f64; 2]) {
         let (mut tail, mut depth_tail) = (0.0, self.coarse_depth[ORDER + 1]);
@@ -581,6 +557,32 @@ struct Sizes {
     behind: [f64; ORDER + 2],
 }
 
+impl Sizes {
+    /// Bounds of the integrals of |dv| and |dx| from 0 to `time`, with the coefficients p, s, r, q in units of the step.
+    fn defects(&self, law: &[Ball; 4], time: f64) -> [f64; 2] {
+        let Self { v, x, behind } = self;
+        let [p, s, r, q] = law.map(Ball::magnitude);
+        let speed = behind[0];
+        let depth: f64 = x.iter().sum();
+        let order = FINE - 1;
+        let depth_behind: f64 = x[order..].iter().sum();
+        // Products of two coefficients of v whose orders sum up to `order` or more.
+        let products = |order: usize| -> f64 { (0..=ORDER).map(|i| v[i] * behind[order.saturating_sub(i)]).sum() };
+        let has_drag = !law[3].is_zero();
+        let of_order = |order: usize| if has_drag { q * products(order) } else { 0.0 };
+        let of_one = r * behind[ORDER] + s * (x[ORDER] + x[ORDER + 1]);
+        let truncation = (of_one + of_order(ORDER)) * reciprocal::<f64>(ORDER + 1);
+        let fine = (FINE + 12) as f64 * UNIT * (p + s * depth + r * speed + q * speed * speed);
+        let coarse = s * depth_behind + r * behind[order] + of_order(order);
+        let coarse = (ORDER + 16) as f64 * ROUNDOFF * coarse * reciprocal::<f64>(FINE);
+        let [of_p, of_s, of_r, of_q] = law.map(|number| number.radius);
+        let uncertain = of_p + of_s * depth + of_r * speed + of_q * speed * speed;
+        let force = time * (truncation + fine + coarse + uncertain);
+        let path = time * (4.0 * UNIT * speed + 4.0 * ROUNDOFF * behind[FINE]);
+        [force * UP + TINY, path * UP + TINY]
+    }
+}
+
 /// A state in a step: exact numbers, and how far off they may be.
 #[derive(Clone, Copy, Debug)]
 struct Centre {
@@ -652,7 +654,7 @@ impl Centre {
     /// The error of the polynomials at `time`, and the greatest of V until then.
     fn error_after(&self, law: &Coefficients, series: &Series, time: f64, sizes: &Sizes) -> Option<(Error, f64)> {
         let Defect::Coefficients(numbers) = &series.defect else { return None };
-        let [force, path] = series.defects(numbers, time, sizes);
+        let [force, path] = sizes.defects(numbers, time);
         let phase = law.rate * series.time;
         let added = series.velocity * (force + phase * path) * UP;
         let growth = if law.falls {

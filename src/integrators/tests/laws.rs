@@ -549,7 +549,7 @@ fn random_force(random: &mut Random) -> String {
         "R*(0.5 + V/v1)^-0.75",
     ];
     let mut terms = vec!["P"; usize::from(random.chance(0.7))];
-    for _ in 0..1 + random.below(2) {
+    for _ in 0..=random.below(2) {
         terms.push(TERMS[random.below(TERMS.len())]);
     }
     terms.join(" + ")
