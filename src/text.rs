@@ -89,7 +89,7 @@ pub fn digits_between(low: f64, high: f64) -> String {
     let (low, high) = (exact(low), exact(high));
     let floor = low[..cut(&low)].to_owned();
     let mut ceiling: Vec<u8> = high[..cut(&high)].bytes().collect();
-    if high[cut(&high)..].bytes().any(|digit| digit != b'0') {
+    if high[cut(&high)..].bytes().any(|digit| digit.is_ascii_digit() && digit != b'0') {
         let mut carries = true;
         for digit in ceiling.iter_mut().rev().filter(|digit| **digit != b'.') {
             *digit = if *digit == b'9' { b'0' } else { *digit + 1 };

@@ -734,10 +734,13 @@ impl Steps {
         let is_endless = limit.value() == f64::INFINITY;
         let far = if is_endless { f64::INFINITY } else { (limit - Ball::around(centre.x, 0.0)).value() / length };
         let mut span = series.span(law);
+        let mut retries = RETRIES_MAX;
         if let Law::Expression(law) = law {
             span = law.until_kink(centre, series, span);
+            // Near a kink the box of a step shows its side in a short step only.
+            retries = 32;
         }
-        for _ in 0..RETRIES_MAX {
+        for _ in 0..retries {
             if matches!(law, Law::Expression(_)) && span < law::SPAN_MIN {
                 break;
             }

@@ -135,6 +135,9 @@ impl Ball {
 
     /// Everything from `low` to `high`.
     pub fn between(low: f64, high: f64) -> Self {
+        if low == 0.0 && high > 4.0 * TINY {
+            return Self { mid: DoubleWord::of(0.5 * high), radius: 0.5 * high };
+        }
         // Twice the rounding of the middle and of each difference.
         let middle = 0.5 * low + 0.5 * high;
         let radius = (high - middle).max(middle - low) * UP + TINY;
@@ -182,8 +185,8 @@ impl Ball {
     #[inline]
     pub fn upper(self) -> f64 {
         let tail = self.mid.lo + self.radius;
-        // The sum is exact with radius zero; else rounded, by less than a spacing.
-        let tail = if self.radius == 0.0 { tail } else { tail.next_up() };
+        // The sum is exact if one of both is zero; else rounded, by less than a spacing.
+        let tail = if self.radius == 0.0 || self.mid.lo == 0.0 { tail } else { tail.next_up() };
         let DoubleWord { hi, lo } = two_sum(self.mid.hi, tail);
         let upper = if lo > 0.0 { hi.next_up() } else { hi };
         if upper.is_nan() || lo.is_nan() { f64::INFINITY } else { upper }
@@ -319,10 +322,10 @@ impl Scalar for Ball {
         self.mid.hi
     }
 
-    /// Of a ball that reaches below zero by rounding, the root of what is not negative.
+    /// Nothing is known of the root of a ball that reaches below zero.
     fn sqrt(self) -> Self {
         let (low, high) = self.interval();
-        if is_negative(low, high) {
+        if !(low >= 0.0) {
             return Self::from_f64(f64::NAN);
         }
         if self.is_zero() {
@@ -364,6 +367,16 @@ impl Scalar for Ball {
         self == Self::default()
     }
 
+    const HAS_RANGE: bool = true;
+
+    fn is_not_negative(self) -> bool {
+        self.lower() >= 0.0
+    }
+
+    fn not_negative(self) -> Self {
+        if self.lower() >= 0.0 { self } else { Self::between(0.0, self.upper().max(0.0)) }
+    }
+
     /// Everything in both where the sign is open.
     fn select(self, above: Self, below: Self) -> Self {
         if self.lower() >= 0.0 {
@@ -384,11 +397,6 @@ impl Scalar for Ball {
         let mid = DoubleWord { hi: std::f64::consts::FRAC_PI_4, lo: 3.061_616_997_868_383e-17 };
         Self { mid, radius: 1e-32 }
     }
-}
-
-/// Whether an interval holds negative numbers, other than by the rounding of [`Ball::between`].
-fn is_negative(low: f64, high: f64) -> bool {
-    !(low >= -high * (UP - 1.0) * 4.0 - 4.0 * TINY)
 }
 
 /// Terms of the series of e^z, sin z and cos z, for |z| <= 1/64.
@@ -483,7 +491,7 @@ impl Elementary for Ball {
 
     fn atan(self) -> Self {
         // The angle between it and any y near it has the tangent (z - tan y)/(1 + z tan y).
-        let near = Self::from_f64(self.mid.hi.atan());
+        let near = Self::from_f64(self.mid.hi.atan().clamp(-1.570_796, 1.570_796));
         let (sin, cos) = near.sin_cos();
         let below = cos + self * sin;
         let w = (self * cos - sin) / below;
@@ -495,20 +503,12 @@ impl Elementary for Ball {
         }
     }
 
-    /// Of a ball that reaches below zero by rounding, the powers of what is not negative.
+    /// Nothing is known of the powers of a ball that reaches below zero.
     fn powf(self, exponent: Self) -> Self {
         let power = |base: Self| Elementary::exp(Elementary::ln(base) * exponent);
         let (low, high) = self.interval();
-        if low <= 0.0 && high >= 0.0 && exponent.lower() > 0.0 {
-            // A whole power of a negative number has a value.
-            let is_whole = exponent.is_constant() && exponent.value().fract() == 0.0;
-            return if (is_whole && low < 0.0) || is_negative(low, high) {
-                Self::from_f64(f64::NAN)
-            } else if high > 0.0 {
-                Self::between(0.0, power(Self::from_f64(high)).upper())
-            } else {
-                Self::zero()
-            };
+        if low == 0.0 && exponent.lower() > 0.0 {
+            return if high > 0.0 { Self::between(0.0, power(Self::from_f64(high)).upper()) } else { Self::zero() };
         }
         power(self)
     }
@@ -616,6 +616,8 @@ mod tests {
         for ball in [Ball::one() / zero, Ball::from_f64(f64::MAX) * Ball::from_f64(2.0), Elementary::ln(zero)] {
             assert_eq!(ball.interval(), everything, "{ball:?}");
         }
-        assert!(zero.sqrt().interval().0 <= 0.0 && zero.sqrt().interval().1 >= 1.0);
+        assert_eq!(zero.sqrt().interval(), everything);
+        assert_eq!(Ball::between(0.0, 1.0).interval(), (0.0, 1.0));
+        assert_eq!(Ball::between(0.0, 4.0).sqrt().interval().0, 0.0);
     }
 }

@@ -68,6 +68,20 @@ pub trait Scalar:
         self.value() == 0.0
     }
 
+    /// Whether numbers are known in a range, which rounding may carry beyond zero.
+    const HAS_RANGE: bool = false;
+
+    /// Whether it is known not to be negative.
+    fn is_not_negative(self) -> bool {
+        self.value() >= 0.0
+    }
+
+    /// The same of a number that cannot be negative: without what lies below zero.
+    #[must_use]
+    fn not_negative(self) -> Self {
+        self
+    }
+
     /// `above` where this is not negative, else `below`; none where this has no value.
     #[must_use]
     #[inline]

@@ -255,13 +255,13 @@ impl Quantity {
     pub fn with_any_unit(text: &str) -> Result<(Self, Vec<(Dimension, i8)>), QuantityError> {
         let (digits, unit) = number_and_unit(text)?;
         let unknown = || QuantityError::UnknownUnit { unit: unit.to_owned() };
-        let Compound { coefficient, exact, powers } = compounded(unit).ok_or_else(unknown)?;
+        let Compound { coefficient, exact, error, powers } = compounded(unit).ok_or_else(unknown)?;
         if let Some(text) = exact.and_then(|exact| exact_product(digits, exact)) {
             return Ok((Self::bare(&text)?, powers));
         }
-        let (decimal, relative_error) = product(digits, coefficient);
-        // The coefficient of a product of units is rounded at each of them.
-        let relative_error = relative_error + 8.0 * f64::EPSILON;
+        // The decimal of the coefficient says nothing of how far off it is.
+        let (decimal, _) = product(digits, coefficient);
+        let relative_error = error + 4.0 * f64::EPSILON;
         Ok((Self { relative_error, ..Self::bare(&decimal)? }, powers))
     }
 }
@@ -306,6 +306,8 @@ struct Compound {
     coefficient: f64,
     /// Signed digits and power of ten of the coefficient, where it is known exactly.
     exact: Option<(i128, i64)>,
+    /// How far off the coefficient may be, over itself.
+    error: f64,
     powers: Vec<(Dimension, i8)>,
 }
 
@@ -323,10 +325,10 @@ fn compounded(unit: &str) -> Option<Compound> {
     if let Some(dimension) = Dimension::of(unit) {
         let coefficient = dimension.coefficient(unit)?;
         let exact = exact_power(coefficient, 1);
-        return Some(Compound { coefficient, exact, powers: vec![(dimension, 1)] });
+        return Some(Compound { coefficient, exact, error: error_of(coefficient), powers: vec![(dimension, 1)] });
     }
     let (mut coefficient, mut powers) = (1.0, Vec::new());
-    let mut exact = Some((1_i128, 0_i64));
+    let (mut exact, mut error) = (Some((1_i128, 0_i64)), 0.0);
     for (index, part) in unit.split('/').enumerate() {
         let part = part.trim();
         let inner = part.strip_prefix('(').and_then(|part| part.strip_suffix(')')).unwrap_or(part);
@@ -342,13 +344,15 @@ fn compounded(unit: &str) -> Option<Compound> {
             let (dimension, power) = (Dimension::of(base)?, if index == 0 { power } else { -power });
             let one = dimension.coefficient(base)?;
             coefficient *= one.powi(i32::from(power));
+            // Each factor as far off as it is, and the roundings of its products.
+            error += f64::from(power.unsigned_abs()) * (error_of(one) + 2.0 * f64::EPSILON) + 2.0 * f64::EPSILON;
             exact = exact
                 .zip(exact_power(one, power))
                 .and_then(|((digits, exponent), (more, shift))| Some((digits.checked_mul(more)?, exponent + shift)));
             powers.push((dimension, power));
         }
     }
-    (!powers.is_empty() && coefficient.is_normal()).then_some(Compound { coefficient, exact, powers })
+    (!powers.is_empty() && coefficient.is_normal()).then_some(Compound { coefficient, exact, error, powers })
 }
 
 /// SI value of a text `number unit`, of `dimension`. White space around and between is free, and may be absent.

@@ -173,8 +173,10 @@ pub fn sentence(name: &str, value: f64, round_off: f64, proved: (f64, f64), unit
     let digit = (value.abs().log10().floor() - miss.log10()).floor() + 1.0;
     if !value.is_finite() || low < 0.0 {
         None
-    } else if miss <= round_off {
+    } else if (high - value).max(value - low) <= round_off {
         Some(format!("{name} is right in every digit: {interval}"))
+    } else if miss <= round_off {
+        Some(format!("{name} is not told apart from the exact one: {interval}"))
     } else if value == 0.0 || digit < 2.0 {
         Some(format!("{name} is wrong: {interval}"))
     } else {

@@ -5,7 +5,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Centre, Defect, DoubleWord, Error, FINE, ORDER, Series, Step, is_before};
+use super::{Centre, Defect, DoubleWord, Error, FINE, MAGNITUDES, ORDER, Series, Step, is_before};
 use crate::physics::State;
 use crate::physics::ball::{Ball, TINY, UP};
 use crate::physics::expression::{Bound, Jets};
@@ -107,6 +107,9 @@ impl<'a> Expression<'a> {
             return None;
         }
         let (time, velocity) = (power_of_two_below(1.0 / rate), power_of_two_below(v.hi));
+        if ![time, velocity, time * velocity].iter().all(|unit| MAGNITUDES.contains(unit)) {
+            return None;
+        }
         let misses = Misses { sides: sides.clone(), force: [0.0; ORDER], path: [0.0; ORDER + 1] };
         let mut series = Series::empty(time, velocity, Defect::Misses(Box::new(misses)));
         self.fill(&mut series, start, v).then_some(series)
@@ -223,9 +226,13 @@ impl<'a> Expression<'a> {
             let greatest = sum / (1.0 - coupling * duration * UP) * UP;
             let depth = (centre.error.depth + path + duration * greatest) * UP;
             if greatest < tube && depth < wide {
-                let y = damping.max(0.0) * duration / UP;
-                let left = centre.error.velocity * UP / (1.0 + y + 0.5 * y * y);
-                let velocity = greatest.min((left + force + duration * stiffness * depth) * UP);
+                let velocity = if damping >= 0.0 {
+                    let y = damping * duration / UP;
+                    let left = centre.error.velocity * UP / (1.0 + y + 0.5 * y * y);
+                    greatest.min((left + force + duration * stiffness * depth) * UP)
+                } else {
+                    greatest
+                };
                 return Some((Error { norm: velocity, velocity, depth }, greatest));
             }
             tube *= 16.0;
@@ -274,7 +281,7 @@ impl<'a> Expression<'a> {
         let state = centre.until_rest(law)?;
         let left = centre.velocity() / self.deceleration(centre.depth(), centre.velocity());
         let open = OPEN_AT_REST * state.time.value() + 4.0 * (left.radius + centre.time.radius);
-        (state.time.radius <= open && is_before(state.depth, limit)).then_some(state)
+        (left.radius.is_finite() && state.time.radius <= open && is_before(state.depth, limit)).then_some(state)
     }
 
     /// From `centre` through a box in which the force hardly changes, of the length at which that adds little: across a kink,

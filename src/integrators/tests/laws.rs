@@ -5,6 +5,7 @@ use std::sync::Arc;
 use twofloat::TwoFloat;
 
 use super::*;
+use crate::exchange::scene_file::SceneFile;
 use crate::integrators::Enclosure;
 use crate::physics::ball::Ball;
 use crate::physics::reference::{self, Source};
@@ -588,4 +589,45 @@ fn enclosures_of_random_laws_hold_the_answer_in_double_double() {
     }
     println!("{compared} compared, {undecided} undecided");
     assert!(undecided * 10 <= compared, "{undecided}");
+}
+
+/// Exit velocity of M V' = -(a - b V) by mpmath, 30 digits: the error of a number of the law grows as the force falls with V.
+#[test]
+fn an_enclosure_grows_where_the_force_falls_with_the_velocity() {
+    for (exit, known) in [("2 m", 299.764_384_762_091_07), ("3 m", 293.241_881_203_045_2)] {
+        let text = format!(
+            "projectile.mass = 1\nimpact.velocity = 300\ntarget.thickness = \"{exit}\"\n[parameters]\nF0 = \"1 N\"\n\
+             v1 = \"1 m/s\"\n[[stage]]\nforce = \"F0*(300000.30000000002620 - 1000*V/v1)\"\n"
+        );
+        let file = SceneFile::from_toml(&text, "law", &[]).unwrap();
+        let flight = crate::studies::enclosure::flight(&file.scene, &file.written, Detail::End).unwrap().unwrap();
+        let (low, high) = flight.end.velocity.interval();
+        assert!(low <= known && known <= high && high - low < 1e-7, "{exit}: {known} in {low} .. {high}");
+    }
+}
+
+/// Of a base that may be negative, and of a force without a value, nothing is proved.
+#[test]
+fn powers_and_roots_of_what_may_be_negative_prove_nothing_false() {
+    for (force, rest) in [
+        ("P*(1.00000000000000001 + (V/v1 - 1)^2)", Some(0.156_712_816_475_2)),
+        ("P*(1 + (V/v1 - 1)^(1/3*6))", None),
+        ("P*(1 + (V/v1 - 1)^(0.1*30))", None),
+        ("P*(1 + (1 - V/v1)^(0.1*30))", None),
+        ("P*(1 + sqrt((V - v1)/v1))", None),
+        ("P*(1 + sqrt((x - l)*(x - l - 1e-12*l)/l^2))", None),
+    ] {
+        let text = format!(
+            "projectile.mass = 2\nimpact.velocity = 300\n[parameters]\nP = \"300 kN\"\nv1 = \"100 m/s\"\nl = \"0.05 m\"\n\
+             [[stage]]\nforce = \"{force}\"\n"
+        );
+        let text = if force.contains('l') { text } else { text.replace("l = \"0.05 m\"\n", "") };
+        let text = if force.contains("v1") { text } else { text.replace("v1 = \"100 m/s\"\n", "") };
+        let file = SceneFile::from_toml(&text, "law", &[]).unwrap();
+        let flight = crate::studies::enclosure::flight(&file.scene, &file.written, Detail::End).unwrap().unwrap();
+        match rest {
+            Some(rest) => assert!((flight.end.depth.value() - rest).abs() < 1e-12, "{force}: {:?}", flight.end),
+            None => assert_eq!(flight.outcome, Outcome::Undecided, "{force}"),
+        }
+    }
 }

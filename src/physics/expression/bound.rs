@@ -35,6 +35,8 @@ pub struct Bound<S = f64> {
     beside: Option<Value<S>>,
     /// e of each register that is a constant times `V^e`; NaN for others.
     powers: Vec<f64>,
+    /// Whether each register is known not to be negative, whatever x and V are.
+    signs: Vec<bool>,
 }
 
 /// What a term became.
@@ -220,6 +222,41 @@ fn powers<S: Scalar>(steps: &[Step<S>], registers: usize) -> Vec<f64> {
     powers
 }
 
+/// Whether each register is not negative by what it is made of: x and V, squares, roots and exponentials, and sums and products of
+/// such.
+fn signs<S: Scalar>(steps: &[Step<S>], registers: usize) -> Vec<bool> {
+    let mut signs = Vec::with_capacity(registers);
+    signs.extend([true, true]);
+    for step in steps {
+        let of = |register: usize| signs[register];
+        let (first, second) = match *step {
+            Step::Constant { value } => (value.is_not_negative(), false),
+            Step::Affine { a, factor, shift } => (of(a) && factor.is_not_negative() && shift.is_not_negative(), false),
+            Step::Sum { a, b, factor } => (of(a) && of(b) && factor.is_not_negative(), false),
+            Step::Share { a, divisor, .. } => (of(a) && divisor.is_not_negative(), false),
+            Step::Multiply { a, b } => (of(a) && of(b), false),
+            Step::Divide { a, b } => (of(a) && of(b), of(b)),
+            Step::Ratio { dividend, b } => (dividend.is_not_negative() && of(b), of(b)),
+            Step::Square { .. } | Step::HalfPower { .. } | Step::Exp { .. } => (true, false),
+            Step::Sqrt { .. } => (true, true),
+            Step::Power { a, .. } | Step::Tanh { a, .. } | Step::Integral { function: Function::Atan, a, .. } => {
+                (of(a), false)
+            }
+            // abs(a) is a or -a, as a is not negative or is.
+            Step::Select { switch, above, below, greater, .. } => {
+                let is_either = of(above) || of(below) || switch == above;
+                (of(above) && of(below) || greater && is_either, false)
+            }
+            Step::Slope { .. } | Step::SinCos { .. } | Step::Integral { .. } => (false, false),
+        };
+        signs.push(first);
+        if step.width() == 2 {
+            signs.push(second);
+        }
+    }
+    signs
+}
+
 impl<S: Scalar> Bound<S> {
     pub(super) fn new(tape: Tape, parameters: &[S]) -> Self {
         Self::of(tape, parameters, None)
@@ -231,8 +268,9 @@ impl<S: Scalar> Bound<S> {
         let beside = beside.map(|(tape, parameters)| making.value(tape, parameters));
         let Making { steps, registers, switches, .. } = making;
         let powers = powers(&steps, registers);
+        let signs = signs(&steps, registers);
         let parameters = parameters.iter().copied().collect();
-        Self { tape, parameters, steps, registers, switches, result, beside, powers }
+        Self { tape, parameters, steps, registers, switches, result, beside, powers, signs }
     }
 
     /// The same expression with a second one `beside` it, at `parameters` of its own: a series of the one comes with that
@@ -291,17 +329,23 @@ impl<S: Scalar> Bound<S> {
 
     #[inline]
     fn fill<T: Scalar>(&self, registers: &mut [T], x: T, v: T, lift: impl Fn(S) -> T + Copy) {
-        registers[..2].copy_from_slice(&[x, v]);
+        registers[..2].copy_from_slice(&[self.signed(0, x), self.signed(1, v)]);
         let mut place = 2;
         for step in &self.steps {
             let (first, second) = step.values(|register| registers[register], lift);
-            registers[place] = first;
+            registers[place] = self.signed(place, first);
             place += 1;
             if step.width() == 2 {
-                registers[place] = second;
+                registers[place] = self.signed(place, second);
                 place += 1;
             }
         }
+    }
+
+    /// `value` of a register, without what rounding put below zero.
+    #[inline(always)]
+    pub(super) fn signed<T: Scalar>(&self, register: usize, value: T) -> T {
+        if T::HAS_RANGE && self.signs[register] { value.not_negative() } else { value }
     }
 
     /// The expression that was bound.

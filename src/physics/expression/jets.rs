@@ -94,8 +94,9 @@ impl<S: Scalar> Jets<S> {
         let k = self.filled;
         assert!(k < ORDERS_MAX, "the series has its {ORDERS_MAX} coefficients");
         self.filled += 1;
-        self.coefficients[0][k] = x;
-        self.coefficients[1][k] = v;
+        let signed = |register, value| if k == 0 { bound.signed(register, value) } else { value };
+        self.coefficients[0][k] = signed(0, x);
+        self.coefficients[1][k] = signed(1, v);
         let mut place = 2;
         for step in bound.steps() {
             let (done, rest) = self.coefficients.split_at_mut(place);
@@ -106,7 +107,11 @@ impl<S: Scalar> Jets<S> {
                     let is_lost = k == 0 && done[switch][0].value().is_nan();
                     (if is_lost { done[switch][0] } else { chosen }, S::zero())
                 }
-                _ if k == 0 => step.values(|register| done[register][0], |constant| constant),
+                _ if k == 0 => {
+                    let (first, second) = step.values(|register| done[register][0], |constant| constant);
+                    let behind = place + step.width() - 1;
+                    (bound.signed(place, first), bound.signed(behind, second))
+                }
                 Step::Power { .. } | Step::Sqrt { .. }
                     if self.falling > 0
                         && let Some(power) = bound.power(place) =>

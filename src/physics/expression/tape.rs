@@ -27,8 +27,8 @@ struct Program {
     varies: Vec<bool>,
     /// Values of all known quantities, used or not.
     parameters: Vec<f64>,
-    /// Whether no number in the text has more than 15 digits.
-    numbers_are_short: bool,
+    /// The bits of numbers of which the text has more than 15 digits.
+    long_numbers: Vec<u64>,
 }
 
 /// The same function of x, V and its parameters, whatever the values that it was read with.
@@ -134,7 +134,7 @@ impl Tape {
 
     /// What the number with these `bits` means in its text.
     pub(super) fn number<S: Scalar>(&self, bits: u64) -> S {
-        S::literal(f64::from_bits(bits), self.0.numbers_are_short)
+        S::literal(f64::from_bits(bits), !self.0.long_numbers.contains(&bits))
     }
 
     /// Whether it uses the known quantity of this index.
@@ -231,7 +231,13 @@ impl Program {
         let mut moved = Vec::with_capacity(nodes.len());
         let mut kept: Vec<Node> = Vec::with_capacity(nodes.len());
         let mut varies: Vec<bool> = Vec::with_capacity(nodes.len());
+        let mut long_numbers = Vec::new();
         for Node { term, span } in nodes {
+            if let Term::Number(bits) = term
+                && is_long(text.get(span.clone()).unwrap_or_default())
+            {
+                long_numbers.push(bits);
+            }
             let mut term = term.moved(|operand| moved[operand]);
             // A sum and a product are the same whichever operand comes first, to the last bit.
             if let Term::Binary(operation @ (Binary::Add | Binary::Multiply), a, b) = term {
@@ -244,16 +250,14 @@ impl Program {
             });
             moved.push(place);
         }
-        let numbers_are_short = has_short_numbers(&text);
-        Self { text, nodes: kept, varies, parameters, numbers_are_short }
+        Self { text, nodes: kept, varies, parameters, long_numbers }
     }
 }
 
-/// Whether no number in `text` has more than 15 digits. Digits of names and exponents are too few to count.
-fn has_short_numbers(text: &str) -> bool {
-    let runs = text.split(|c: char| !c.is_ascii_digit() && c != '.');
-    let digits = |run: &str| run.trim_start_matches(['0', '.']).bytes().filter(u8::is_ascii_digit).count();
-    runs.map(digits).all(|digits| digits <= 15)
+/// Whether a number has more than 15 digits, its exponent aside.
+fn is_long(number: &str) -> bool {
+    let digits = number.split(['e', 'E']).next().unwrap_or_default().trim_start_matches(['0', '.']);
+    digits.bytes().filter(u8::is_ascii_digit).count() > 15
 }
 
 /// The value of a function.
