@@ -4,6 +4,7 @@
 //! radius what it may have rounded. Nothing is assumed of `f64` but IEEE 754 with rounding to nearest; no function of the
 //! platform's mathematical library has a part in a bound.
 
+use std::f64::consts::FRAC_PI_2;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::elementary::Elementary;
@@ -491,7 +492,7 @@ impl Elementary for Ball {
 
     fn atan(self) -> Self {
         // The angle between it and any y near it has the tangent (z - tan y)/(1 + z tan y).
-        let near = Self::from_f64(self.mid.hi.atan().clamp(-1.570_796, 1.570_796));
+        let near = Self::from_f64(self.mid.hi.atan().clamp(-FRAC_PI_2, FRAC_PI_2));
         let (sin, cos) = near.sin_cos();
         let below = cos + self * sin;
         let w = (self * cos - sin) / below;

@@ -594,7 +594,7 @@ fn enclosures_of_random_laws_hold_the_answer_in_double_double() {
 /// Exit velocity of M V' = -(a - b V) by mpmath, 30 digits: the error of a number of the law grows as the force falls with V.
 #[test]
 fn an_enclosure_grows_where_the_force_falls_with_the_velocity() {
-    for (exit, known) in [("2 m", 299.764_384_762_091_07), ("3 m", 293.241_881_203_045_2)] {
+    for (exit, known) in [("2 m", 299.764_384_762_091_1), ("3 m", 293.241_881_203_045_2)] {
         let text = format!(
             "projectile.mass = 1\nimpact.velocity = 300\ntarget.thickness = \"{exit}\"\n[parameters]\nF0 = \"1 N\"\n\
              v1 = \"1 m/s\"\n[[stage]]\nforce = \"F0*(300000.30000000002620 - 1000*V/v1)\"\n"
