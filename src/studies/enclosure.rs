@@ -162,7 +162,7 @@ pub fn quantities(scene: &Scene, written: &Written) -> Studied<[Option<(f64, f64
 /// let proved = (0.144_826_789_065_4, 0.144_826_789_065_6);
 /// assert_eq!(
 ///     sentence("the depth", 0.14483, 1e-10, proved, "m").unwrap(),
-///     "the depth is wrong from digit 5 on: the exact value is proved to lie in 0.144826789065(400..600) m"
+///     "the depth is wrong from digit 5 on: the exact value is proved to lie in 0.144826789065(40..61) m"
 /// );
 /// ```
 pub fn sentence(name: &str, value: f64, round_off: f64, proved: (f64, f64), unit: &str) -> Option<String> {
