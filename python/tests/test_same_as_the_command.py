@@ -84,10 +84,12 @@ def test_map(ask):
 
 @pytest.mark.parametrize("scene", ["tunnel", "perforate", "law-power"])
 def test_enclose(ask, scene):
-    assert pn.enclose(scene).to_dict() == ask("solve", scene, "--method=enclosure")
+    found = pn.enclose(scene)
+    assert without_times(found.to_dict()) == without_times(ask("solve", scene, "--method=enclosure"))
     box = {"projectile.mass": (1.9, 2.1)}
-    assert pn.enclose(scene, box).to_dict() == ask("solve", scene, "--method=enclosure", "--box=projectile.mass=1.9:2.1")
-    low, high = pn.enclose(scene).enclosure["depth_m"]
+    words = ("solve", scene, "--method=enclosure", "--box=projectile.mass=1.9:2.1")
+    assert without_times(pn.enclose(scene, box).to_dict()) == without_times(ask(*words))
+    low, high = found.enclosure["depth_m"]
     assert low <= high <= low + 4e-16
     assert pn.solve(pn.scene(scene)).depth == pytest.approx(low, rel=4e-15)
 
