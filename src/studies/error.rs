@@ -265,6 +265,7 @@ pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, Integ
     for index in 0..problem.stages.len() {
         add(&|p| &mut p.stages[index].static_force)?;
         add(&|p| &mut p.stages[index].stiffness)?;
+        add(&|p| &mut p.stages[index].viscosity)?;
         add(&|p| &mut p.stages[index].drag)?;
         add(&|p| &mut p.stages[index].end)?;
     }
@@ -276,7 +277,7 @@ pub fn conditions_in_dual_numbers(problem: &Problem) -> Result<Conditions, Integ
 mod tests {
     use super::*;
     use crate::physics::reference::{self, Source};
-    use crate::physics::{Event, EventKind};
+    use crate::physics::{Event, EventKind, Stage};
     use crate::testing::scene;
 
     #[test]
@@ -300,5 +301,20 @@ mod tests {
         let state = State { velocity: 1e-9, ..touching.end };
         touching.events.insert(0, Event { kind: EventKind::CraterEnd, state });
         assert!(!Errors::in_50_digits(&touching, &exact, &conditions).exceed(TIE));
+    }
+
+    /// Beside differences of flights at 50 digits, which move every input by 2^-80.
+    #[test]
+    fn condition_numbers_in_dual_numbers_are_those_of_50_digits() {
+        let near = Stage { static_force: 2e5, stiffness: 4e6, viscosity: 300.0, drag: 0.0, end: 0.05 };
+        let far = Stage { static_force: 4e5, stiffness: 1e5, viscosity: 900.0, drag: 0.0, end: f64::INFINITY };
+        for exit in [f64::INFINITY, 0.12] {
+            let problem = Problem::of_stages(2.0, 300.0, [near, far]).with_exit(exit);
+            let ours = conditions_in_dual_numbers(&problem).unwrap();
+            let theirs = reference::conditions(Source::Problem(&problem)).unwrap();
+            for (ours, theirs) in ours.into_iter().zip(theirs) {
+                assert!((ours - theirs).abs() <= 1e-9 * theirs, "{ours} {theirs}");
+            }
+        }
     }
 }

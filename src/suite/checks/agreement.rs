@@ -19,38 +19,38 @@ check! {
         /// Random scenes besides those named.
         #[serde(default)]
         random: usize,
-    } in Exact, "ulp x condition", by reference;
+    } in Exact, "ulp x condition", by reference, compares (ClosedForm Loop | FiftyDigits);
     /// Method against the exact answer; relative error over max(1, condition number).
     Agreement {
         /// Relative tolerance of the method.
         rtol: Option<f64>,
-    } in Exact, "relative x condition", by with_exact;
+    } in Exact, "relative x condition", by with_exact, compares (Method | Truth);
     /// The claim's quantity of its scene against a number stated in the suite: published, measured, or computed
     /// elsewhere; relative difference.
     Stated {
         /// The number, in SI units.
         value: f64,
-    } in Exact, "relative", by stated;
+    } in Exact, "relative", by stated, compares (Method | Elsewhere);
     /// Exit margin and outcome against 50 digits at `points` impact speeds from a fifth of the critical velocity to
     /// five times it: worst error of the margin over its error bound. A wrong outcome that is not `undecided` breaks it.
     Margin {
         /// How many, log-uniform from the seed.
         points: usize,
-    } in Events, "error bars", by margin;
+    } in Events, "error bars", by margin, compares (Method | FiftyDigits);
     /// Outcome of the method: 0 if it is right or undecided, 1 if it is wrong.
     Outcome {
         /// Name of the right outcome.
         is: String,
-    } in Events, "wrong outcomes", by outcome;
+    } in Events, "wrong outcomes", by outcome, compares (Method | Elsewhere);
     /// One method against another; difference over the tolerance that both may claim.
     Pair {
         /// The other method.
         with: MethodName,
         /// Tolerance that each may claim, relative.
         tolerance: f64,
-    } in CrossCode, "tolerance", by pair;
+    } in CrossCode, "tolerance", by pair, compares (Method | OtherMethod);
     /// Events in time order, each at its place, none missing or twice; number of violations.
-    EventOrder {} in Events, "violations", by event_order;
+    EventOrder {} in Events, "violations", by event_order, compares nothing;
 }
 
 fn reference(&Reference { random }: &Reference, subject: &Subject<'_>) -> Found {

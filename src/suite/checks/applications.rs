@@ -21,25 +21,25 @@ check! {
         to: f64,
         /// How many, evenly.
         points: usize,
-    } in Slab, "relative", by sweep;
+    } in Slab, "relative", by sweep, compares (Method Search | ClosedForm);
     /// Perforation limit of the scene by both criteria: critical velocity of that thickness against the impact speed, and
     /// Eq. 15 at the limit of Eq. 11-12 against the energy of the shot; worst relative difference.
-    ThicknessLimit {} in Slab, "relative", by thickness_limit;
+    ThicknessLimit {} in Slab, "relative", by thickness_limit, compares (Method | ClosedForm Formulas);
     /// Depth computed at places of each line of equal error of Eq. 11-12, k = 2: worst relative distance of its error
     /// from that of the line.
     Map {
         /// How many places of each line.
         points: usize,
-    } in Applicability, "relative", by map;
+    } in Applicability, "relative", by map, compares (Method | Formulas);
     /// Median of predicted over measured depth of each set of the shipped data, shallow tests apart: worst distance
     /// from 1.
-    MeasuredDepth {} in Measured, "relative", by measured_depth;
+    MeasuredDepth {} in Measured, "relative", by measured_depth, compares (Method | Elsewhere);
     /// Elasticities of every quantity to every number of the scene, by the method against the closed form in dual
     /// numbers: worst difference, relative to those above 1.
-    Sensitivities {} in Sensitivities, "relative", by sensitivities;
+    Sensitivities {} in Sensitivities, "relative", by sensitivities, compares (Method Duals | Duals ClosedForm);
     /// A scene where a soft stage ends at once for fast shots: the ends of the two intervals of impact velocities that
     /// perforate, against those by hand, relative.
-    Intervals {} in Slab, "relative", by intervals;
+    Intervals {} in Slab, "relative", by intervals, compares (Method Search | Itself);
 }
 
 fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {

@@ -14,7 +14,7 @@ check! {
     StepsByHand {
         /// How many problems of each kind.
         count: usize,
-    } in Steps, "relative", by steps_by_hand;
+    } in Steps, "relative", by steps_by_hand, compares (Steps | Itself);
 }
 
 const KINDS: [Kind; 7] =

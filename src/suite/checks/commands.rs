@@ -17,7 +17,7 @@ check! {
         run: String,
         /// The exit code that is right.
         code: i32,
-    } in Commands, "wrong exit codes", by exits;
+    } in Commands, "wrong exit codes", by exits, compares (Commands | Elsewhere);
 
     /// Runs of the program beside what they said when a person last read it.
     Recorded {
@@ -25,7 +25,7 @@ check! {
         runs: String,
         /// Relative tolerance of the numbers.
         tolerance: f64,
-    } in Commands, "lines that differ", by recorded;
+    } in Commands, "lines that differ", by recorded, compares nothing;
 }
 
 fn exits(Exits { run, code }: &Exits, subject: &Subject<'_>) -> Found {

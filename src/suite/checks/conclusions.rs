@@ -16,7 +16,7 @@ check! {
         side: Side,
         /// The curve, (H/d, `E_c/(d³ fc)`).
         curve: Vec<(f64, f64)>,
-    } in Slab, "wrong verdicts", by bound_of_data;
+    } in Slab, "wrong verdicts", by bound_of_data, compares (Method Search Formulas | Elsewhere);
     /// "The difference falls with H/d": borne out up to the place of the least difference as computed elsewhere, refuted beyond
     /// and over all, and borne out without drag; whether 200 points are asked or 5000.
     GapFalls {
@@ -26,7 +26,7 @@ check! {
         least: (f64, f64),
         /// The difference at the largest H/d, over Eq. 15.
         last: f64,
-    } in Slab, "wrong verdicts", by gap_falls;
+    } in Slab, "wrong verdicts", by gap_falls, compares (Method Search Formulas | Elsewhere);
 }
 
 /// What was counted, with the verdict on the conclusion in front.

@@ -19,7 +19,7 @@ use crate::studies::random::Random;
 check! {
     /// N* and height of every nose shape against the integral and the circle that they stand for; worst relative
     /// difference.
-    Nose {} in Exact, "relative", by nose;
+    Nose {} in Exact, "relative", by nose, compares (Formulas | Itself);
     /// Method at Q = 0 and continuous c against Eq. 11-12, `points` impact functions I from `from` to `to`; worst
     /// relative difference of X/d.
     SmallImpact {
@@ -29,17 +29,17 @@ check! {
         to: f64,
         /// How many, log-uniform from the seed.
         points: usize,
-    } in Exact, "relative", by small_impact;
+    } in Exact, "relative", by small_impact, compares (Method | Formulas);
     /// X/d at finite N against Eq. 11-12 as N grows: distance of the fitted order in 1/N from 1.
     ApproachOrder {
         /// Impact function I; its side of k pi/4 decides between Eq. 11 and Eq. 12.
         impact: f64,
-    } in Exact, "order", by approach_order;
+    } in Exact, "order", by approach_order, compares (Method | Formulas);
     /// The same: relative distance of the constant from docs/theory.md, section 3.
     ApproachConstant {
         /// Impact function I.
         impact: f64,
-    } in Exact, "relative", by approach_constant;
+    } in Exact, "relative", by approach_constant, compares (Method | Formulas);
     /// Eq. 15 against Eq. 11-12 with the ACE/NDRC relation over H/d; worst relative difference.
     Eq15 {
         /// `unrounded` or `printed`.
@@ -48,7 +48,7 @@ check! {
         from: f64,
         /// Largest H/d.
         to: f64,
-    } in Exact, "relative", by eq15;
+    } in Exact, "relative", by eq15, compares (Formulas | Itself);
     /// Jump of Eq. 15 at a joint, in units of S: distance from the stated one.
     Eq15Jump {
         /// `unrounded` or `printed`.
@@ -57,13 +57,13 @@ check! {
         at: f64,
         /// Stated jump in units of S.
         jump: f64,
-    } in Exact, "S", by eq15_jump;
+    } in Exact, "S", by eq15_jump, compares (Formulas | Elsewhere);
     /// Critical velocity with the NDRC criterion and Q = 0 against unrounded Eq. 15 for H/d in (0, 18.06], the ends of the
     /// branches and their neighbours among them; worst relative difference.
     NdrcCriterion {
         /// How many H/d, log-uniform from the seed.
         points: usize,
-    } in Exact, "relative", by ndrc_criterion;
+    } in Exact, "relative", by ndrc_criterion, compares (Method Search | Formulas);
 }
 
 /// Which coefficients of Eq. 15.

@@ -9,10 +9,10 @@ use crate::studies::relations::{Units, in_units, reversed};
 
 check! {
     /// Kinetic energy lost against work done, at every row of the trajectory; worst residual over M V0²/2.
-    EnergyBalance {} in Energy, "relative", by energy_balance;
+    EnergyBalance {} in Energy, "relative", by energy_balance, compares (Method | Itself);
     /// Back from the end of a perforation to the face, which must be left at V0 after the same time; worst relative
     /// difference.
-    TimeReversal {} in Energy, "relative", by time_reversal;
+    TimeReversal {} in Energy, "relative", by time_reversal, compares nothing;
     /// The scene scaled in length, mass and time; relative change of depth, time and velocity in scaled units.
     Similarity {
         /// Factor of length.
@@ -21,18 +21,18 @@ check! {
         mass: f64,
         /// Factor of time.
         time: f64,
-    } in Energy, "relative", by similarity;
+    } in Energy, "relative", by similarity, compares nothing;
     /// Every stage cut into pieces and restarted; relative change of depth, time and velocity.
     Split {
         /// Pieces of a stage.
         pieces: usize,
-    } in Energy, "relative", by split;
+    } in Energy, "relative", by split, compares nothing;
     /// Random stages at whose ends masses join, by momentum and energy: worst error of depth, time and velocity at the end,
     /// and, where no drag acts, of the exit margin.
     JoinedMasses {
         /// How many problems.
         problems: usize,
-    } in Energy, "relative", by joined_masses;
+    } in Energy, "relative", by joined_masses, compares (Method | Itself);
 }
 
 /// The work between two rows is `∫ F dx` along the path that starts from the earlier row's state, integrated here by

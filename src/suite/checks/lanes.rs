@@ -21,13 +21,13 @@ check! {
     TableOfScenes {
         /// How many, besides one that is bad.
         rows: usize,
-    } in Random, "promises x condition", by table_of_scenes;
+    } in Random, "promises x condition", by table_of_scenes, compares (Lanes | FiftyDigits);
     /// Error bounds of `rows` margins computed in lanes against those of the Taylor series alone: the worst quotient of
     /// the larger and the smaller.
     BoundsOfLanes {
         /// How many.
         rows: usize,
-    } in Random, "quotient", by bounds_of_lanes;
+    } in Random, "quotient", by bounds_of_lanes, compares nothing;
 }
 
 /// Names of the columns, as a person writes them.

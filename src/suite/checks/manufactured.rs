@@ -30,7 +30,7 @@ check! {
         path: ManufacturedPath,
         /// Order expected.
         order: f64,
-    } in Orders, "order", by order;
+    } in Orders, "order", by order, compares (Steps | Itself);
 }
 
 /// Which manufactured path.

@@ -1,15 +1,19 @@
 //! How each kind of claim is measured. A check is one struct: the fields that the suite file gives, the unit of the
-//! measured value, the section of the report, and the function that measures.
+//! measured value, the section of the report, the function that measures, and what the two computations that it compares
+//! come from.
 //!
 //! To add one, declare it with `check!` in the file it belongs to, above its function, and name it in `every_check!` here.
 
-/// Declares checks: `Name { fields } in Section, "unit", by function;`.
+/// Declares checks: `Name { fields } in Section, "unit", by function, compares (Sources | Sources);`.
+///
+/// The sources are those of [`crate::suite::roads::Source`] that each of the two computations comes from, besides the scene. A
+/// check that compares no two computations `compares nothing`.
 ///
 /// The function is called with the subject, after the check itself where that has fields. One that is declared with
 /// `counting` in place of `by` counts violations.
 macro_rules! check {
     ($($(#[$about:meta])* $name:ident { $($(#[$of:meta])* $field:ident: $type:ty),* $(,)? }
-        in $section:ident, $unit:literal, $how:ident $measure:ident;)*) => {$(
+        in $section:ident, $unit:literal, $how:ident $measure:ident, compares $roads:tt;)*) => {$(
         $(#[$about])*
         #[doc = concat!("\n\nUnit: ", $unit, ".")]
         #[derive(Clone, Debug, PartialEq, serde::Deserialize, schemars::JsonSchema)]
@@ -21,6 +25,7 @@ macro_rules! check {
         impl $name {
             pub(in crate::suite) const SECTION: $crate::suite::Section = $crate::suite::Section::$section;
             pub(in crate::suite) const UNIT: &str = $unit;
+            pub(in crate::suite) const ROADS: Option<[&[$crate::suite::roads::Source]; 2]> = check!(@roads $roads);
 
             pub(in crate::suite) fn measure(
                 &self,
@@ -30,6 +35,10 @@ macro_rules! check {
             }
         }
     )*};
+    (@roads nothing) => { None };
+    (@roads ($($one:ident)* | $($other:ident)*)) => {
+        Some([&[$($crate::suite::roads::Source::$one),*], &[$($crate::suite::roads::Source::$other),*]])
+    };
     (@by $self:ident, $subject:ident, $measure:ident,) => { $measure($subject) };
     (@by $self:ident, $subject:ident, $measure:ident, $($field:ident)+) => { $measure($self, $subject) };
     (@counting $self:ident, $subject:ident, $measure:ident,) => { $crate::suite::checks::edges::counted(|seen| $measure($subject, seen)) };
@@ -88,6 +97,7 @@ use serde::Deserialize;
 use super::claim::{Claim, Found, Judged, Measurement, NotMeasured, Section};
 use super::program::Program;
 use super::recorded::shipped;
+use super::roads::Source;
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
@@ -121,6 +131,11 @@ macro_rules! every_check {
             /// Section of the report that shows such claims.
             pub fn section(&self) -> Section {
                 match self { $(Self::$name(_) => $name::SECTION,)* }
+            }
+
+            /// What the two computations that it compares come from.
+            pub(in crate::suite) fn roads(&self) -> Option<[&'static [Source]; 2]> {
+                match self { $(Self::$name(_) => $name::ROADS,)* }
             }
 
             /// Whether it is about the other claims, and measured after them.

@@ -26,28 +26,28 @@ check! {
         steps: StepPattern,
         /// How many step sizes; 60 where it is left out.
         points: Option<usize>,
-    } in Orders, "order", by fixed_step;
+    } in Orders, "order", by fixed_step, compares (Steps | Truth);
     /// Error against tolerance: distance of the slope from 1.
     Proportionality {
         /// Largest tolerance.
         from: f64,
         /// Smallest tolerance.
         to: f64,
-    } in Orders, "order", by proportionality;
+    } in Orders, "order", by proportionality, compares (Method | Truth);
     /// Error against work: distance of the slope of error over 1/evaluations from the order of the method.
     WorkOrder {
         /// Largest tolerance.
         from: f64,
         /// Smallest tolerance.
         to: f64,
-    } in Orders, "order", by work_order;
+    } in Orders, "order", by work_order, compares (Method | Truth);
     /// Self-convergence without the exact answer: distance of the extrapolated value from the exact one over the
     /// uncertainty that the fit itself states.
-    SelfConvergence {} in Solution, "uncertainty", by self_convergence;
+    SelfConvergence {} in Solution, "uncertainty", by self_convergence, compares (Steps | Truth);
     /// Roache's GCI and Richardson's extrapolation on three runs of the central difference against the true error:
     /// worst of |GCI/(1.25 |error|) - 1|, |extrapolated error/error|, and the distance of Celik's order from the formal
     /// one over it.
-    GridConvergence {} in Solution, "relative", by grid_convergence;
+    GridConvergence {} in Solution, "relative", by grid_convergence, compares (Steps | Truth);
 }
 
 /// How the steps of one run are laid out.

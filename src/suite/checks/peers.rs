@@ -17,12 +17,12 @@ check! {
         name: String,
         /// Relative tolerance claimed.
         tolerance: f64,
-    } in CrossCode, "tolerance", by agreement;
+    } in CrossCode, "tolerance", by agreement, compares (Method | Elsewhere);
     /// Faults that `diagnose` knows, at the number at which nothing is wrong: those that change an answer all the same.
     Neutral {
         /// How many questions about stages, and how many about scenes.
         questions: usize,
-    } in CrossCode, "faults", by neutral;
+    } in CrossCode, "faults", by neutral, compares nothing;
 }
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].

@@ -24,7 +24,7 @@ check! {
         count: usize,
         /// Relative tolerance of the method.
         rtol: Option<f64>,
-    } in Random, "promises x condition", by every_number;
+    } in Random, "promises x condition", by every_number, compares (Method | FiftyDigits);
     /// Error bounds of the exit margin of `count` random problems of each of `kinds`: how many times the bound holds the
     /// error that a tenth of the problems of a kind exceed, of the kind where it is most. An error beyond its bound breaks
     /// it, and so does a kind below `least`.
@@ -37,7 +37,7 @@ check! {
         least: f64,
         /// Relative tolerance of the method.
         rtol: Option<f64>,
-    } in Random, "bound/error", by margin_bound;
+    } in Random, "bound/error", by margin_bound, compares (Method | FiftyDigits);
     /// The same of the critical velocity, found by halving in double-double.
     CriticalBound {
         /// Kinds of the problems.
@@ -48,7 +48,7 @@ check! {
         least: f64,
         /// Relative tolerance of the method.
         rtol: Option<f64>,
-    } in Random, "bound/error", by critical_bound;
+    } in Random, "bound/error", by critical_bound, compares (Method Search | FiftyDigits);
     /// Mean error over random problems against the tolerance, from `from` to `to`: distance of the slope from `slope`. A
     /// cost that does not rise breaks it, and so does an error at `to` that is not within a factor 10 of `level` tolerances.
     Response {
@@ -62,7 +62,7 @@ check! {
         level: f64,
         /// How many problems.
         count: usize,
-    } in Random, "order", by response;
+    } in Random, "order", by response, compares (Method | FiftyDigits);
 }
 
 /// `count` problems of `kind` for the claim.

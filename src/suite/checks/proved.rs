@@ -24,10 +24,10 @@ check! {
         kinds: Vec<Kind>,
         /// How many of each.
         count: usize,
-    } in Random, "spacings", by encloses;
+    } in Random, "spacings", by encloses, compares (Enclosure Loop | FiftyDigits);
     /// The scenes with numbers computed elsewhere, from their texts: end and V_c must lie in the enclosures of the decimals as
     /// written. The widest of them.
-    EnclosesTexts {} in Random, "spacings", by encloses_texts;
+    EnclosesTexts {} in Random, "spacings", by encloses_texts, compares (Enclosure Loop | Elsewhere);
     /// On `count` random problems of each of `kinds`: how often the method decides another outcome than is proved, or its
     /// margin with its error bound misses the interval of W at the exit.
     Refuted {
@@ -35,7 +35,7 @@ check! {
         kinds: Vec<Kind>,
         /// How many of each.
         count: usize,
-    } in Random, "refuted", by refuted;
+    } in Random, "refuted", by refuted, compares (MethodItself | Enclosure);
 }
 
 /// Width of an interval in spacings of its greater end.

@@ -16,28 +16,28 @@ check! {
         step: f64,
         /// Number of steps at most.
         steps: usize,
-    } in Constants, "relative", by discrete_solution;
+    } in Constants, "relative", by discrete_solution, compares (Steps | Itself);
     /// Central difference: worst relative distance of the time of step i from i dt, over `steps` steps.
     Clock {
         /// How many steps.
         steps: usize,
-    } in Constants, "relative", by clock;
+    } in Constants, "relative", by clock, compares (Steps | Itself);
     /// Central difference at rest in the crater, rest located: relative distance of error/(w dt)² from 1/8 (depth) or
     /// -1/24 (time).
-    CraterConstant {} in Constants, "relative", by crater_constant;
+    CraterConstant {} in Constants, "relative", by crater_constant, compares (Steps | Itself);
     /// Central difference at rest in the crater, step ends: how far (X(dt)/X - 1)/(w dt)² leaves 0 to 1/8, over many
     /// steps, and how far its extremes stay inside; relative to 1/8.
-    CraterBand {} in Constants, "relative", by crater_band;
+    CraterBand {} in Constants, "relative", by crater_band, compares (Steps | Itself);
     /// Lagged drag: relative distance of error/dt from the modified equation's constant.
-    LaggedConstant {} in Constants, "relative", by lagged_constant;
+    LaggedConstant {} in Constants, "relative", by lagged_constant, compares (Steps | Itself);
     /// Central difference of undamped crater motion: |w dt - 2|/2 at which growth sets in.
-    StabilityLimit {} in Stability, "relative", by stability_limit;
+    StabilityLimit {} in Stability, "relative", by stability_limit, compares (Steps | Itself);
     /// Central difference: worst relative distance of the measured boundary of stability in w dt from the theoretical
     /// one over the drag group Q V dt/M, for every velocity rule.
     StabilityMap {
         /// How many drag groups, for each velocity rule.
         points: usize,
-    } in Stability, "relative", by stability_map;
+    } in Stability, "relative", by stability_map, compares (Steps | Itself);
     /// Central difference: rounding error of the depth with compensated sums over that with plain ones, after
     /// 2^`from` to 2^`to` steps; not a number unless truncation falls at second order.
     RoundingFloor {
@@ -45,7 +45,7 @@ check! {
         from: u32,
         /// Power of two of the most steps.
         to: u32,
-    } in Stability, "compensated/plain", by rounding_floor;
+    } in Stability, "compensated/plain", by rounding_floor, compares nothing;
 }
 
 /// Solution by the claim's velocity rule and `boundaries` at equal steps of `dt` (s).

@@ -37,26 +37,26 @@ check! {
     ExactText {
         /// Which of its numbers.
         numbers: Numbers,
-    } in Input, "ulp", by exact_text;
+    } in Input, "ulp", by exact_text, compares (Method | Elsewhere);
     /// Every number of every recorded text, set to what it is, in another unit: numbers that read back as another, and
     /// problems that are another.
-    SetText {} in Input, "differences", counting set_text;
+    SetText {} in Input, "differences", counting set_text, compares nothing;
     /// Every line of the recorded texts, made wrong in each way that docs/reference.md, "Scene files", excludes, and at the
     /// edge of what it admits: texts that are refused or read otherwise, or blamed at another place.
-    RefuseText {} in Input, "differences", counting refuse_text;
+    RefuseText {} in Input, "differences", counting refuse_text, compares nothing;
     /// Every unit through the text of a scene, against its definition: error in ulp, and where the unit is in use with fewer
     /// digits, in half units of the last.
-    Units {} in Input, "ulp", by every_unit;
+    Units {} in Input, "ulp", by every_unit, compares (| Elsewhere);
     /// Random problems and scenes as a peer reads them: fields that are missing, or that say another number.
     Wire {
         /// How many.
         problems: usize,
-    } in CrossCode, "differences", counting wire;
+    } in CrossCode, "differences", counting wire, compares nothing;
     /// Random answers of a peer: numbers that are read otherwise, and differences between two answers other than those put in.
     WireAnswer {
         /// How many.
         problems: usize,
-    } in CrossCode, "differences", counting wire_answer;
+    } in CrossCode, "differences", counting wire_answer, compares nothing;
 }
 
 /// A group of the numbers of a text.

@@ -15,10 +15,10 @@ check! {
     Printed {
         /// Only each so-manieth scene.
         each: usize,
-    } in Commands, "relative x condition", by printed;
+    } in Commands, "relative x condition", by printed, compares (Commands | Elsewhere);
 
     /// Each number in the text of `solve` and `critical` on the shipped scenes, found by its label, against that of the JSON.
-    PrintedText {} in Commands, "half units of the last digit", by printed_text;
+    PrintedText {} in Commands, "half units of the last digit", by printed_text, compares nothing;
 }
 
 fn printed(Printed { each }: &Printed, subject: &Subject<'_>) -> Found {

@@ -16,16 +16,16 @@ check! {
     PathRows {
         /// Options of the method.
         options: String,
-    } in Commands, "relative", by path_rows;
+    } in Commands, "relative", by path_rows, compares (Commands | Itself);
 
     /// Rows of a trajectory: the force over the time is the change of momentum, the velocity over it the way.
     PathMomentum {
         /// Options of the method.
         options: String,
-    } in Commands, "relative", by path_momentum;
+    } in Commands, "relative", by path_momentum, compares (Commands | Itself);
 
     /// `--rtol`: the error falls with it and stays beside it, and nothing of the scene moves.
-    Tolerance {} in Commands, "violations", by tolerance;
+    Tolerance {} in Commands, "violations", by tolerance, compares (Commands | Elsewhere);
 
     /// `--dt`, `--velocity`, `--events`: distance of the order between two steps, a quarter apart, from `order`; the
     /// options are those asked for, and events stand where the rule puts them.
@@ -34,31 +34,31 @@ check! {
         order: f64,
         /// The longer step (s).
         step: f64,
-    } in Commands, "order", by step_option;
+    } in Commands, "order", by step_option, compares (Commands | Itself);
 
     /// `--sensitivities`: elasticities against central differences of `solve --set` and `critical --set`.
     Slopes {
         /// Relative change of each number.
         by: f64,
-    } in Commands, "relative", by slopes;
+    } in Commands, "relative", by slopes, compares (Duals | Itself);
 
     /// `critical --spread`: first order and shares from the elasticities of `solve --sensitivities`.
     SpreadParts {
         /// Spreads, `PATH=REL`.
         spreads: Vec<String>,
-    } in Commands, "relative", by spread_parts;
+    } in Commands, "relative", by spread_parts, compares (Commands | Itself);
 
     /// `critical --spread`: distance of the sampled mean and deviation from first order, in what so many samples leave.
     SpreadSamples {
         /// Spreads, `PATH=REL`.
         spreads: Vec<String>,
-    } in Commands, "standard errors", by spread_samples;
+    } in Commands, "standard errors", by spread_samples, compares (Commands | Itself);
 
     /// Each column of `batch` on random rows against `solve` and `critical` on the same numbers.
     BatchRows {
         /// Rows.
         rows: usize,
-    } in Commands, "relative", by batch_rows;
+    } in Commands, "relative", by batch_rows, compares nothing;
 
     /// Rows of `sweep` against `solve --set` and `critical --set` at the values that the axis asks for.
     SweepRows {
@@ -70,23 +70,23 @@ check! {
         to: f64,
         /// Whether the ratio of two values is the same.
         log: bool,
-    } in Commands, "relative", by sweep_rows;
+    } in Commands, "relative", by sweep_rows, compares nothing;
 
     /// Points of `map`: the error of Eq. 11-12 there, from both formulas, against the level of its line.
     MapLines {
         /// Crater depth in diameters.
         k: f64,
-    } in Commands, "relative", by map_lines;
+    } in Commands, "relative", by map_lines, compares (Commands | Itself);
 
     /// `experiments`: each test against `solve` on its scene, and the numbers of each set by their definitions, in JSON, in
     /// the table and in text.
-    SetsOfTests {} in Commands, "relative", by sets_of_tests;
+    SetsOfTests {} in Commands, "relative", by sets_of_tests, compares (Commands | Itself);
 
     /// `converge`: each error is that of `solve` with the same step; the order is the slope of the errors used.
     StepErrors {
         /// Options: rules, steps, points.
         options: String,
-    } in Commands, "relative", by step_errors;
+    } in Commands, "relative", by step_errors, compares (Commands | Itself);
 
     /// `audit`: the three grids by the procedure of Celik et al. (2008), from the table itself.
     ThreeGridRule {
@@ -94,7 +94,7 @@ check! {
         steps: [f64; 3],
         /// Values.
         values: [f64; 3],
-    } in Commands, "relative", by three_grid_rule;
+    } in Commands, "relative", by three_grid_rule, compares (Commands | Itself);
 }
 
 /// Whether `holds`: no error, or one beyond any limit.

@@ -10,13 +10,13 @@ use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 check! {
     /// V1 of `verification/edges.toml`.
-    Objectives {} in Critical, "violations", counting objectives;
+    Objectives {} in Critical, "violations", counting objectives, compares (Energy Search | ClosedForm);
     /// V2 of `verification/edges.toml`.
-    NoRoot {} in Critical, "violations", counting no_root;
+    NoRoot {} in Critical, "violations", counting no_root, compares nothing;
     /// V3 of `verification/edges.toml`.
-    CriticalErrorBound {} in Critical, "error/bar", by critical_error_bound;
+    CriticalErrorBound {} in Critical, "error/bar", by critical_error_bound, compares (Method Search | FiftyDigits);
     /// V4 of `verification/edges.toml`.
-    JumpsOfEq15 {} in Critical, "S", by jumps_of_eq15;
+    JumpsOfEq15 {} in Critical, "S", by jumps_of_eq15, compares (Formulas | Itself);
 }
 
 /// What a search may be given in place of the signed energy: from the margin, and the share of the target crossed.

@@ -15,46 +15,46 @@ use crate::suite::claim::{Found, Measurement, NotMeasured};
 
 check! {
     /// E1 of `verification/edges.toml`.
-    GrazingLadder {} in Events, "violations", counting grazing_ladder;
+    GrazingLadder {} in Events, "violations", counting grazing_ladder, compares (Method | FiftyDigits);
     /// E2 of `verification/edges.toml`.
-    Scan {} in Events, "violations", counting scan;
+    Scan {} in Events, "violations", counting scan, compares (Method | FiftyDigits);
     /// E3 of `verification/edges.toml`.
-    BothCrossings {} in Events, "violations", counting both_crossings;
+    BothCrossings {} in Events, "violations", counting both_crossings, compares (Method | FiftyDigits);
     /// E4 of `verification/edges.toml`.
-    ExactlyCritical {} in Events, "violations", counting exactly_critical;
+    ExactlyCritical {} in Events, "violations", counting exactly_critical, compares (Method | FiftyDigits);
     /// E5 of `verification/edges.toml`.
-    TripleCoincidence {} in Events, "violations", counting triple_coincidence;
+    TripleCoincidence {} in Events, "violations", counting triple_coincidence, compares (Method | FiftyDigits);
     /// E6 of `verification/edges.toml`.
-    ThinTargets {} in Events, "violations", counting thin_targets;
+    ThinTargets {} in Events, "violations", counting thin_targets, compares (Method | FiftyDigits);
     /// E7 to E9 of `verification/edges.toml`: a constant force over 1 m from 10 m/s, in stages that end at `ends`.
     StageEnds {
         /// Depths (m), ascending.
         ends: Vec<f64>,
         /// How many events there are.
         events: usize,
-    } in Events, "violations", counting stage_ends;
+    } in Events, "violations", counting stage_ends, compares (Method | FiftyDigits);
     /// E10 of `verification/edges.toml`.
-    ScaledForces {} in Events, "promises", by scaled_forces;
+    ScaledForces {} in Events, "promises", by scaled_forces, compares nothing;
     /// E11 of `verification/edges.toml`.
-    Plateau {} in Events, "violations", counting plateau;
+    Plateau {} in Events, "violations", counting plateau, compares (Method | Itself);
     /// E12 of `verification/edges.toml`.
-    AtAStepEnd {} in Events, "violations", counting at_a_step_end;
+    AtAStepEnd {} in Events, "violations", counting at_a_step_end, compares (Method | FiftyDigits);
     /// E13 of `verification/edges.toml`.
-    SmallTimesAndFarStarts {} in Events, "promises", by small_times_and_far_starts;
+    SmallTimesAndFarStarts {} in Events, "promises", by small_times_and_far_starts, compares (Method | FiftyDigits);
     /// E14 of `verification/edges.toml`.
-    VanishingSpeed {} in Events, "promises", by vanishing_speed;
+    VanishingSpeed {} in Events, "promises", by vanishing_speed, compares (Method | FiftyDigits);
     /// E15 of `verification/edges.toml`.
-    LawsOutsideTheirRange {} in Events, "ulp", by laws_outside_their_range;
+    LawsOutsideTheirRange {} in Events, "ulp", by laws_outside_their_range, compares (Formulas | Itself);
     /// E16 of `verification/edges.toml`.
-    ForceJump {} in Events, "promises", by force_jump;
+    ForceJump {} in Events, "promises", by force_jump, compares (Method | FiftyDigits);
     /// E17 of `verification/edges.toml`.
-    BackAgain {} in Events, "promises", by back_again;
+    BackAgain {} in Events, "promises", by back_again, compares (Method | FiftyDigits);
     /// E18 of `verification/edges.toml`.
-    AcrossTheCraterEnd {} in Events, "promises", by across_the_crater_end;
+    AcrossTheCraterEnd {} in Events, "promises", by across_the_crater_end, compares (Method | FiftyDigits);
     /// E19 of `verification/edges.toml`.
-    ApproachedForEver {} in Events, "violations", counting approached_for_ever;
+    ApproachedForEver {} in Events, "violations", counting approached_for_ever, compares (Method | Itself);
     /// E20 of `verification/edges.toml`.
-    MarginOfAStop {} in Events, "error bounds", by margin_of_a_stop;
+    MarginOfAStop {} in Events, "error bounds", by margin_of_a_stop, compares (Method | FiftyDigits);
 }
 
 /// Widest |margin| at which a method may still be undecided.

@@ -20,31 +20,31 @@ use crate::suite::{Check, Suite, Verdict};
 
 check! {
     /// S1 of `verification/edges.toml`.
-    Growth {} in Steps, "relative", by growth;
+    Growth {} in Steps, "relative", by growth, compares (Steps | Itself);
     /// S2 of `verification/edges.toml`.
-    StatedStepLimits {} in Steps, "violations", counting stated_step_limits;
+    StatedStepLimits {} in Steps, "violations", counting stated_step_limits, compares (Steps | Itself);
     /// S3 of `verification/edges.toml`.
-    ClosedFormEverywhere {} in Steps, "ulp x condition", by closed_form_everywhere;
+    ClosedFormEverywhere {} in Steps, "ulp x condition", by closed_form_everywhere, compares (ClosedForm Loop | FiftyDigits);
     /// S4 of `verification/edges.toml`.
-    ToleranceSweep {} in Steps, "error/rtol", by tolerance_sweep;
+    ToleranceSweep {} in Steps, "error/rtol", by tolerance_sweep, compares (Method | FiftyDigits);
     /// S5 of `verification/edges.toml`.
-    SlabRounding {} in Steps, "compensated/plain", by slab_rounding;
+    SlabRounding {} in Steps, "compensated/plain", by slab_rounding, compares nothing;
     /// S6 of `verification/edges.toml`.
-    LadderRatios {} in Steps, "order", by ladder_ratios;
+    LadderRatios {} in Steps, "order", by ladder_ratios, compares nothing;
     /// S7 of `verification/edges.toml`.
-    OrdersByRule {} in Steps, "violations", counting orders_by_rule;
+    OrdersByRule {} in Steps, "violations", counting orders_by_rule, compares (Steps | FiftyDigits);
     /// S8 of `verification/edges.toml`.
-    VanishingDrag {} in Steps, "promises", by vanishing_drag;
+    VanishingDrag {} in Steps, "promises", by vanishing_drag, compares nothing;
     /// S8-order of `verification/edges.toml`.
-    OrderCrossover {} in Steps, "order", by order_crossover;
+    OrderCrossover {} in Steps, "order", by order_crossover, compares (Steps | FiftyDigits);
     /// S9 of `verification/edges.toml`.
-    RandomScenes {} in Steps, "defects", by random_scenes;
+    RandomScenes {} in Steps, "defects", by random_scenes, compares (ClosedForm Taylor Energy Loop | FiftyDigits);
     /// S10 of `verification/edges.toml`.
-    DigitsLost {} in Steps, "digits", by digits_lost;
+    DigitsLost {} in Steps, "digits", by digits_lost, compares nothing;
     /// S11 of `verification/edges.toml`.
-    ViscousResisting {} in Steps, "force evaluations", by viscous_resisting;
+    ViscousResisting {} in Steps, "force evaluations", by viscous_resisting, compares (Method | FiftyDigits);
     /// S12 of `verification/edges.toml`.
-    ViscousDriven {} in Steps, "slope of cost", by viscous_driven;
+    ViscousDriven {} in Steps, "slope of cost", by viscous_driven, compares nothing;
 }
 
 fn growth(_: &Subject<'_>) -> Found {
