@@ -76,6 +76,13 @@ pub struct Cause {
     pub largest_difference: Option<f64>,
 }
 
+impl Cause {
+    /// A cause without a number, found otherwise than by what it would answer.
+    pub(super) fn plain(id: &str, statement: String, certainty: Certainty, explains: usize, of: usize) -> Self {
+        Self { id: id.to_owned(), factor: None, certainty, statement, explains, of, largest_difference: None }
+    }
+}
+
 /// An answer to a question, and how near a sound one would be.
 #[derive(Clone, Debug)]
 pub(super) struct Seen<'a> {

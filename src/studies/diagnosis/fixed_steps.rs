@@ -1,205 +1,452 @@
-//! Solvers of fixed steps: one question is a problem with its ladder of steps, judged by its limit.
+//! Is a solver of fixed steps right, in which order do its answers converge, and what is wrong with it?
 //!
-//! Errors of a consistent scheme vanish with the step, at whatever order and with whatever noise the events make:
-//!
-//! ```text
-//! e(h) = L + h (C + D h + noise)
-//! ```
-//!
-//! L differs from zero where the scheme converges to something else. Divided by h the noise is even, and least squares
-//! give L with its standard error; a limit that seems wrong is looked at again with finer steps.
+//! A question is a problem with its ladder of steps, and its limit is judged (`ladder`). A consistent scheme is sound whatever its
+//! order; what lowers the order is named.
 
-use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 
-use super::hypotheses::{How, predict};
+use super::causes::{Cause, Certainty, Effort, Seen, causes};
+use super::hypotheses::How;
+use super::ladder::{
+    FINER, LADDER, Limit, REPRODUCED, Rung, coarsest_step, limit, order, pooled, rung_errors, schemes,
+};
+use super::numbers::few_digits;
 use super::questions::{Content, Question};
+use super::{
+    Asked, Asking, Diagnosis, Each, End, QUANTITIES, QuantityOrder, Reproduced, Subject, TOLERANCES, count, end_of,
+    expected, finish, request,
+};
+use crate::exchange::peers::process::ORDER_OF_ALL;
 use crate::exchange::peers::wire::errors;
-use crate::integrators::VelocityAt;
-use crate::integrators::central_difference::stability_limit;
-use crate::physics::{EventKind, State};
-use crate::studies::order::{StepError, fit};
+use crate::exchange::peers::{PeerIdentity, PeerRequest};
+use crate::integrators::{Boundaries, VelocityAt};
+use crate::physics::{Outcome, State};
+use crate::studies::order::{Class, OrderFit, StepError, fit};
 use crate::studies::scheme_of_table::Scheme;
+use crate::studies::verdict::Verdict;
 
-/// Steps of a ladder over the coarsest one: ratios that no event time is a multiple of.
-pub(super) const LADDER: [f64; 8] = [1.0, 0.7053, 0.4913, 0.3331, 0.2294, 0.1571, 0.1069, 0.0731];
-/// Steps asked in addition where a limit seems wrong.
-pub(super) const FINER: [f64; 4] = [0.0437, 0.0241, 0.0134, 0.0071];
-/// Coarsest step over the duration of the flight.
-const COARSEST: f64 = 1.0 / 30.0;
-/// Largest step over the shortest stage passed.
-const PART_OF_STAGE: f64 = 1.0 / 20.0;
-/// Largest step over the stability limit of a stage.
-const PART_OF_LIMIT: f64 = 0.5;
-/// A question whose coarsest step is a smaller part of its flight is not asked.
-const FINEST_START: f64 = 1.0 / 400.0;
-/// Standard errors beyond which a limit is looked at again, and beyond which it is wrong.
-pub(super) const SUSPECT: f64 = 8.0;
-const WRONG: f64 = 12.0;
-/// Relative error, times the condition, below which a limit is right.
-const FLOOR: f64 = 1e-8;
-/// Relative difference, before the condition, of an answer and a scheme that reproduces it.
-pub(super) const REPRODUCED: f64 = 1e-10;
-/// Part of the answers that a scheme must reproduce: whether a node falls on an event, round-off decides.
-const REPRODUCED_PART: f64 = 0.97;
+/// Questions of fixed steps.
+const FIXED_QUESTIONS: usize = 120;
+/// Steps of all questions of fixed steps at most.
+const STEPS_TOTAL: f64 = 1e6;
+/// Questions that are asked at a far smaller step, and that step over the coarsest.
+const FLOOR_QUESTIONS: usize = 8;
+const FLOOR_STEP: f64 = 0.002;
+/// Error over the condition above which one that does not fall is no round-off of 64-bit numbers, and how far above what
+/// its order promises.
+const FLOOR_MAX: f64 = 1e-8;
+const FLOOR_EXCESS: f64 = 10.0;
+/// Least order with which errors of a sound scheme fall.
+const FLOOR_ORDER: f64 = 0.8;
+/// An order claimed may exceed the one found by this part of it: the steps are not small for every question.
+const ORDER_MARGIN: f64 = 0.15;
 
-/// The coarsest step (s) for `question`; `None` where it asks for too many steps, or for what fixed steps cannot resolve.
-pub(super) fn coarsest_step(question: &Question) -> Option<f64> {
-    let exact = &question.exact;
-    let unfit = [Content::Grazing, Content::ShortStage, Content::NoSpeed, Content::ExitAtStageEnd, Content::Stiff];
-    if question.contains.iter().any(|content| unfit.contains(content)) {
-        return None;
+/// Diagnosis of a solver that is told its step.
+pub(super) fn in_fixed_steps(
+    asking: &mut Asking<'_>,
+    peer: Subject,
+    identity: &PeerIdentity,
+    all: &[Question],
+    progress: &dyn Fn(usize, usize),
+) -> Diagnosis {
+    let usable: Vec<(&Question, f64)> =
+        all.iter().filter_map(|question| Some((question, coarsest_step(question)?))).take(FIXED_QUESTIONS).collect();
+    let mut steps = 0.0;
+    let mut laddered: Vec<Laddered<'_>> = Vec::new();
+    for (index, (question, coarsest)) in usable.iter().enumerate() {
+        let mut next = Laddered { question, coarsest: *coarsest, rungs: Vec::new(), failure: None };
+        steps += next.climb(asking, &LADDER);
+        // A limit that seems wrong is looked at again.
+        if next.failure.is_none() && next.is(Limit::is_suspect) {
+            steps += next.climb(asking, &FINER);
+        }
+        laddered.push(next);
+        progress(index + 1, usable.len());
+        if asking.is_gone || steps > STEPS_TOTAL {
+            break;
+        }
     }
-    let duration = exact.end.time;
-    let mut step = COARSEST * duration;
-    let mut since = 0.0;
-    for event in exact.events.iter().filter(|event| !matches!(event.kind, EventKind::Rest)) {
-        step = step.min(PART_OF_STAGE * (event.state.time - since).max(f64::MIN_POSITIVE));
-        since = event.state.time;
-    }
-    let fastest = exact.events.iter().map(|event| event.state.velocity).fold(question.problem.impact_speed, f64::max);
-    for law in &question.problem.stages {
-        let limit = stability_limit(law, question.problem.mass, fastest, VelocityAt::LaggedHalfStep);
-        step = step.min(PART_OF_LIMIT * limit);
-    }
-    (step >= FINEST_START * duration).then_some(step)
-}
-
-/// An answer at a step.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rung {
-    /// Step (s).
-    pub step: f64,
-    /// Numbers of the answer.
-    pub answer: State,
-    /// Whether its outcome is the right one.
-    pub is_outcome_right: bool,
-}
-
-/// The limit of one quantity as the step vanishes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Limit {
-    /// Its relative error.
-    pub error: f64,
-    /// The standard error of that.
-    pub standard_error: f64,
-    /// Error at the finest step.
-    pub finest: f64,
-}
-
-impl Limit {
-    /// Whether it may be wrong.
-    pub(super) fn is_suspect(&self, condition: f64) -> bool {
-        self.error.abs() > SUSPECT * self.standard_error && self.is_seen(condition)
-    }
-
-    /// Whether it is.
-    pub(super) fn is_wrong(&self, condition: f64) -> bool {
-        self.error.abs() > WRONG * self.standard_error && self.is_seen(condition)
-    }
-
-    fn is_seen(&self, condition: f64) -> bool {
-        // What still falls at the finest step is no limit.
-        self.error.abs() > FLOOR * condition && self.error.abs() > 0.5 * self.finest.abs()
-    }
-}
-
-/// Relative errors of depth, time and velocity on each rung.
-pub(super) fn rung_errors(question: &Question, rungs: &[Rung]) -> Vec<[f64; 3]> {
-    rungs.iter().map(|rung| errors(rung.answer, question.exact.end, question.problem.impact_speed)).collect()
-}
-
-/// The limit of quantity `which`; `None` with too few rungs.
-pub(super) fn limit(question: &Question, rungs: &[Rung], which: usize) -> Option<Limit> {
-    let errors = rung_errors(question, rungs);
-    let coarsest = rungs.iter().map(|rung| rung.step).fold(0.0, f64::max);
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    let rows: Vec<(Vector3<f64>, f64)> = rungs
+    let rows: Vec<Asked> = laddered.iter().map(Laddered::row).collect();
+    let counts = count(&rows, usable.len());
+    let right: Vec<(&Question, &[Rung])> = laddered
         .iter()
-        .zip(&errors)
-        .map(|(rung, errors)| {
-            let h = rung.step / coarsest;
-            (Vector3::new(1.0 / h, 1.0, h), errors[which] / h)
-        })
+        .zip(&rows)
+        .filter(|(_, row)| row.verdict == Verdict::Passed)
+        .map(|(laddered, _)| (laddered.question, &laddered.rungs[..]))
         .collect();
-    for (row, value) in &rows {
-        normal += row * row.transpose();
-        right += row * *value;
+    let reproducing = schemes(&right);
+    let orders = orders(&right, identity);
+    let fails_an_order = orders.iter().any(|order| order.verdict == Verdict::Failed);
+    let floor = floor(asking, &right)
+        .or_else(|| few_digits(&laddered.iter().flat_map(Laddered::numbers).collect::<Vec<_>>(), counts.failed));
+    let verdict = match () {
+        () if counts.failed > 0 || fails_an_order || floor.is_some() => Verdict::Failed,
+        () if counts.passed == 0 || counts.undecided > counts.passed => Verdict::Undecided,
+        () => Verdict::Passed,
+    };
+    let mut causes: Vec<Cause> = floor.into_iter().collect();
+    let is_same = |one: &&Laddered<'_>| one.rungs.windows(2).all(|pair| pair[0].answer == pair[1].answer);
+    if counts.failed > 0 && laddered.iter().filter(is_same).count() * 10 >= laddered.len() * 9 {
+        let statement = "answers are the same whatever the step: dt_s is ignored".to_owned();
+        causes.push(Cause::plain("step-ignored", statement, Certainty::Certain, counts.failed, counts.failed));
+    } else if counts.failed > 0 {
+        causes.extend(fixed_causes(&laddered, &rows, &reproducing, identity, all));
     }
-    let inverse = normal.try_inverse()?;
-    let solution = inverse * right;
-    let freedom = rows.len().checked_sub(3).filter(|freedom| *freedom > 0)?;
-    let squares: f64 = rows.iter().map(|(row, value)| (value - row.dot(&solution)).powi(2)).sum();
-    let finest = rungs.iter().zip(&errors).min_by(|a, b| a.0.step.total_cmp(&b.0.step))?.1[which];
-    Some(Limit {
-        error: solution[0],
-        standard_error: (squares / freedom as f64 * inverse[(0, 0)]).sqrt().max(f64::EPSILON),
-        finest,
-    })
+    let scheme = reproducing.first();
+    // What has no order is lowered by nothing else.
+    if counts.failed == 0 && causes.is_empty() {
+        causes.extend(what_lowers(scheme.map(|(scheme, _)| *scheme), &right, &orders));
+    }
+    let scheme = scheme.map(|(scheme, largest)| Reproduced {
+        name: scheme.name(),
+        velocity: scheme.velocity().map(VelocityAt::name),
+        events: Some(scheme.events().name()),
+        largest_difference: *largest,
+    });
+    let scheme = scheme.filter(|_| counts.failed == 0);
+    let diagnosis = Diagnosis { verdict, peer, counts, causes, scheme, orders, separation: None, questions: rows };
+    if counts.failed > 0 { finish(diagnosis) } else { diagnosis }
 }
 
-/// The schemes that reproduce `ladders`, of which one at least is needed.
-pub(super) fn schemes(ladders: &[(&Question, &[Rung])]) -> Vec<(Scheme, f64)> {
-    let mut found: Vec<(Scheme, f64)> = Vec::new();
-    for scheme in Scheme::all() {
-        let (mut reproduced, mut all, mut largest) = (0, 0, 0.0_f64);
-        'ladders: for (question, rungs) in ladders {
-            for rung in *rungs {
-                all += 1;
-                if let Some(difference) = difference(scheme, question, rung) {
-                    reproduced += 1;
-                    largest = largest.max(difference);
+/// A question of fixed steps and its answers.
+struct Laddered<'a> {
+    question: &'a Question,
+    coarsest: f64,
+    rungs: Vec<Rung>,
+    failure: Option<String>,
+}
+
+impl Laddered<'_> {
+    /// Asks on `parts` of the coarsest step; the number of steps that took.
+    fn climb(&mut self, asking: &mut Asking<'_>, parts: &[f64]) -> f64 {
+        let mut steps = 0.0;
+        for part in parts {
+            let step = part * self.coarsest;
+            steps += self.question.exact.end.time / step;
+            let asked = PeerRequest { dt_s: Some(step), ..request(self.question, TOLERANCES[0]) };
+            match asking.ask(&asked) {
+                Ok(answer) => self.rungs.push(Rung {
+                    step,
+                    answer: end_of(&answer).state,
+                    is_outcome_right: answer.outcome.agrees_with(self.question.exact.outcome),
+                }),
+                Err(why) => {
+                    self.failure = (!asking.may_decline(self.question)).then_some(why);
+                    break;
                 }
             }
-            // Most schemes are out after the first question.
-            if f64::from(reproduced) < REPRODUCED_PART * f64::from(all) - 2.0 {
-                break 'ladders;
+        }
+        steps
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        let answers = self.rungs.iter().map(|rung| rung.answer);
+        answers.flat_map(|end| [end.depth, end.time, end.velocity]).filter(|number| *number != 0.0).collect()
+    }
+
+    fn limits(&self) -> [Option<Limit>; 3] {
+        [0, 1, 2].map(|which| limit(self.question, &self.rungs, which))
+    }
+
+    fn is(&self, of: impl Fn(&Limit, f64) -> bool) -> bool {
+        let wrong_outcome = self.rungs.last().is_some_and(|rung| !rung.is_outcome_right);
+        wrong_outcome || (0..3).any(|i| self.limits()[i].is_some_and(|limit| of(&limit, self.question.conditions[i])))
+    }
+
+    fn row(&self) -> Asked {
+        let question = self.question;
+        let last = self.rungs.iter().min_by(|a, b| a.step.total_cmp(&b.step));
+        let limits = self.limits();
+        let is_wrong = |i: usize| limits[i].is_some_and(|limit| limit.is_wrong(question.conditions[i]));
+        let wrong = (0..3).find(|i| is_wrong(*i));
+        let suspect = (0..3).find(|i| limits[*i].is_some_and(|limit| limit.is_suspect(question.conditions[*i])));
+        let finest: Vec<&Rung> = self.rungs.iter().rev().take(2).collect();
+        let (verdict, reason) = if let Some(why) = &self.failure {
+            (Verdict::Failed, why.clone())
+        } else if finest.is_empty() {
+            (Verdict::Skipped, String::new())
+        } else if finest.iter().all(|rung| !rung.is_outcome_right) {
+            (Verdict::Failed, format!("the outcome at small steps is not {}", question.exact.outcome))
+        } else if let Some(i) = wrong {
+            let error = limits[i].map_or(f64::NAN, |limit| limit.error);
+            (Verdict::Failed, format!("{} goes to a limit that is off by {error:+.2e}", QUANTITIES[i]))
+        } else if suspect.is_some() || finest.iter().any(|rung| !rung.is_outcome_right) {
+            (Verdict::Undecided, "the steps are too large to tell the limit".to_owned())
+        } else {
+            (Verdict::Passed, String::new())
+        };
+        let answered = last.map(|rung| End {
+            outcome: if rung.is_outcome_right { question.exact.outcome } else { other_outcome(question) },
+            state: rung.answer,
+        });
+        Asked {
+            id: question.id.clone(),
+            contains: question.contains.clone(),
+            verdict,
+            rtol: None,
+            dt_s: last.map(|rung| rung.step),
+            expected: expected(question),
+            answered,
+            relative_error: Some(Each::of(limits.map(|limit| limit.map_or(f64::NAN, |limit| limit.error))))
+                .filter(|each| each.depth.is_finite() && each.time.is_finite() && each.velocity.is_finite()),
+            limit: None,
+            reason,
+        }
+    }
+}
+
+/// The outcome that is not the right one.
+fn other_outcome(question: &Question) -> Outcome {
+    if question.exact.outcome == Outcome::Perforated { Outcome::Stopped } else { Outcome::Perforated }
+}
+
+/// Orders over the questions that pass, and how the ones claimed fare.
+fn orders(right: &[(&Question, &[Rung])], identity: &PeerIdentity) -> Vec<QuantityOrder> {
+    let claims: &BTreeMap<String, f64> = &identity.claimed_orders;
+    let of = |which: usize| {
+        let quantity = QUANTITIES[which];
+        let formal = claims.get(quantity).or_else(|| claims.get(ORDER_OF_ALL)).copied();
+        let errors = pooled(right, which);
+        let fitted: Option<OrderFit> = fit(&errors).ok();
+        // Large steps may not show the order yet.
+        let small = slope(&errors[errors.len() / 2..]);
+        let line = fitted.as_ref().and_then(|fitted| fitted.line);
+        let is_lower = |formal: f64| Some(is_short_of(formal, line.as_ref()?.interval95, small));
+        let verdict = match formal {
+            None => Verdict::Skipped,
+            Some(formal) => match is_lower(formal) {
+                Some(true) => Verdict::Failed,
+                Some(false) => Verdict::Passed,
+                // No errors above round-off: nothing contradicts the claim.
+                None => Verdict::Skipped,
+            },
+        };
+        QuantityOrder {
+            quantity,
+            formal_order: formal,
+            observed_order: line.as_ref().map(|line| line.order),
+            interval: line.as_ref().map(|line| line.interval95),
+            class: fitted.as_ref().map_or(Class::AtFloor, |fitted| fitted.class),
+            verdict,
+        }
+    };
+    [0, 1, 2].map(of).into()
+}
+
+/// Whether the whole interval of an order lies below the formal one, and what the smallest steps show does too.
+pub(super) fn is_short_of(formal: f64, interval95: [f64; 2], small: Option<f64>) -> bool {
+    let is_below = |order: f64| order < (1.0 - ORDER_MARGIN) * formal;
+    let [_, high] = interval95;
+    is_below(high) && small.is_some_and(is_below)
+}
+
+/// The slope of ln error over ln step; `None` for fewer than two errors above zero.
+fn slope(errors: &[StepError]) -> Option<f64> {
+    let points: Vec<(f64, f64)> =
+        errors.iter().filter(|point| point.error > 0.0).map(|point| (point.step.ln(), point.error.ln())).collect();
+    let count = points.len() as f64;
+    let (x, y) = (points.iter().map(|p| p.0).sum::<f64>() / count, points.iter().map(|p| p.1).sum::<f64>() / count);
+    let over: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    let under: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
+    Some(over / under).filter(|slope| slope.is_finite())
+}
+
+/// Causes of the limits of a solver of fixed steps.
+fn fixed_causes(
+    laddered: &[Laddered<'_>],
+    rows: &[Asked],
+    reproducing: &[(Scheme, f64)],
+    identity: &PeerIdentity,
+    all: &[Question],
+) -> Vec<Cause> {
+    let others: Vec<&Question> = all.iter().collect();
+    let answered = || laddered.iter().zip(rows).filter(|(laddered, _)| laddered.failure.is_none());
+    // Step by step, where the passing answers show which scheme it is.
+    for (scheme, _) in reproducing.iter().take(3) {
+        let mut seen = Vec::new();
+        for (laddered, row) in answered().filter(|(_, row)| row.verdict != Verdict::Undecided) {
+            for rung in [laddered.rungs.first(), laddered.rungs.get(LADDER.len() - 1)].into_iter().flatten() {
+                seen.push(Seen {
+                    question: laddered.question,
+                    answer: rung.answer,
+                    how: How::Scheme(*scheme, rung.step),
+                    accuracy: REPRODUCED,
+                    fails: row.verdict == Verdict::Failed,
+                    is_misnamed: false,
+                });
             }
         }
-        if all > 0 && f64::from(reproduced) >= REPRODUCED_PART * f64::from(all) {
-            found.push((scheme, largest));
+        let causes = causes(&seen, identity.reads_scene, &others, Effort::Singles);
+        if causes.first().is_some_and(|cause| cause.certainty != Certainty::Possible) {
+            return causes;
         }
     }
-    found
-}
-
-/// Largest relative difference of `rung` from the scheme, if that reproduces it.
-fn difference(scheme: Scheme, question: &Question, rung: &Rung) -> Option<f64> {
-    let (problem, found) = predict(question, &[], How::Scheme(scheme, rung.step))?;
-    let mut differences = errors(rung.answer, found.end, problem.impact_speed);
-    if found.end.velocity <= 0.0 {
-        // What a code prints for the velocity at rest is a matter of taste: zero, or that of the last step.
-        differences[2] = 0.0;
-    }
-    let allowed = |i: usize| REPRODUCED * question.conditions[i];
-    (0..3)
-        .all(|i| differences[i].abs() <= allowed(i))
-        .then(|| differences.iter().fold(0.0, |a, b| f64::max(a, b.abs())))
-}
-
-/// The order of one quantity over all ladders, by the mean square of their errors on each rung.
-pub(super) fn pooled(ladders: &[(&Question, &[Rung])], which: usize) -> Vec<StepError> {
-    let mut sums = [0.0; LADDER.len()];
-    let mut count = 0;
-    for (question, rungs) in ladders {
-        let errors: Vec<f64> = rung_errors(question, rungs).iter().take(LADDER.len()).map(|all| all[which]).collect();
-        let size = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
-        // Round-off and what the problem fixes have no order.
-        if errors.len() < LADDER.len() || !(size > 1e-9 * question.conditions[which]) {
+    // By the limits, as far as they are known.
+    let mut seen = Vec::new();
+    for (laddered, row) in answered() {
+        let question = laddered.question;
+        let limits = laddered.limits();
+        let [Some(depth), Some(time), Some(velocity)] = limits else { continue };
+        let right = question.exact.end;
+        let answer = State {
+            depth: right.depth * (1.0 + depth.error),
+            time: right.time * (1.0 + time.error),
+            velocity: right.velocity + question.problem.impact_speed * velocity.error,
+        };
+        let sure =
+            |i: usize| limits[i].map_or(f64::INFINITY, |limit| 6.0 * limit.standard_error / question.conditions[i]);
+        let accuracy = sure(0).max(sure(1)).max(sure(2)).max(1e-9);
+        let finest = laddered.rungs.iter().min_by(|a, b| a.step.total_cmp(&b.step));
+        // Where the outcome is another, the limit of the numbers is that of a flight that ends elsewhere.
+        let answer = match finest {
+            Some(rung) if !rung.is_outcome_right => State { ..rung.answer },
+            _ => answer,
+        };
+        let is_other = finest.is_some_and(|rung| !rung.is_outcome_right);
+        if row.verdict == Verdict::Undecided {
             continue;
         }
-        count += 1;
-        for (sum, error) in sums.iter_mut().zip(&errors) {
-            *sum += (error / size).powi(2);
-        }
+        seen.push(Seen {
+            question,
+            answer,
+            how: How::Exact,
+            accuracy: if is_other { 0.1 } else { accuracy },
+            fails: row.verdict == Verdict::Failed,
+            is_misnamed: false,
+        });
     }
-    if count == 0 {
-        return Vec::new();
-    }
-    let mean = |sum: f64| (sum / f64::from(count)).sqrt();
-    LADDER.iter().zip(sums).map(|(step, sum)| StepError::new(*step, mean(sum))).collect()
+    causes(&seen, identity.reads_scene, &others, Effort::Pairs)
 }
 
-/// The order over `ladders`, if there are enough errors above round-off.
-pub(super) fn order(ladders: &[(&Question, &[Rung])], which: usize) -> Option<f64> {
-    fit(&pooled(ladders, which)).ok()?.line.map(|line| line.order)
+/// The cause of errors that no longer fall with the step, far above the round-off of 64-bit numbers: a few questions are
+/// asked again at a far smaller step.
+fn floor(asking: &mut Asking<'_>, right: &[(&Question, &[Rung])]) -> Option<Cause> {
+    let orders = [0, 1, 2].map(|which| order(right, which).map_or(FLOOR_ORDER, |order| (order - 0.2).max(FLOOR_ORDER)));
+    let (mut compared, mut stays, mut largest) = (0, [0; 3], [0.0_f64; 3]);
+    for (question, rungs) in right.iter().take(FLOOR_QUESTIONS) {
+        let Some(coarsest) = rungs.first() else { continue };
+        let asked = PeerRequest { dt_s: Some(FLOOR_STEP * coarsest.step), ..request(question, TOLERANCES[0]) };
+        let Ok(answer) = asking.ask(&asked) else { continue };
+        let found = errors(end_of(&answer).state, question.exact.end, question.problem.impact_speed);
+        compared += 1;
+        // Of several steps, since one may be right by chance.
+        let before = &rung_errors(question, rungs)[LADDER.len() / 2..LADDER.len()];
+        let ratio = LADDER[LADDER.len() / 2] / FLOOR_STEP;
+        for which in 0..3 {
+            let relative = found[which].abs() / question.conditions[which];
+            let expected = before.iter().map(|all| all[which].abs()).fold(0.0, f64::max) / ratio.powf(orders[which]);
+            if relative > FLOOR_MAX && found[which].abs() > FLOOR_EXCESS * expected {
+                stays[which] += 1;
+                largest[which] = largest[which].max(relative);
+            }
+        }
+    }
+    let which = (0..3).max_by_key(|which| stays[*which]).filter(|which| 2 * stays[*which] > compared)?;
+    let statement = format!(
+        "the error of the {} does not fall below {:.0e} with the step: round-off far above that of 64-bit numbers, as of a \
+         sum in single precision",
+        QUANTITIES[which], largest[which]
+    );
+    Some(Cause::plain("round-off", statement, Certainty::Likely, stays[which], compared))
+}
+
+/// What lowers the order of a sound scheme: of one that reproduces the answers, its rules; of another, what the questions of
+/// order one have in common.
+fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &[QuantityOrder]) -> Vec<Cause> {
+    let of = right.len();
+    if let Some(scheme) = scheme {
+        return rules_that_lower(scheme, right);
+    }
+    let first_order = orders.iter().any(|order| order.observed_order.is_some_and(|order| order < 1.5));
+    if !first_order {
+        let below = orders.iter().find(|order| order.verdict == Verdict::Failed);
+        let cause = below.map(|below| {
+            let (found, claimed) = (below.observed_order.unwrap_or(0.0), below.formal_order.unwrap_or(0.0));
+            let statement =
+                format!("the order of the {} is {found:.1} in questions of every kind, not {claimed}", below.quantity);
+            Cause::plain("order", statement, Certainty::Likely, of, of)
+        });
+        return cause.into_iter().collect();
+    }
+    let is_first = |which: usize| order(right, which).map(|order| order < 1.5);
+    if is_first(1) == Some(true) && [0, 2].iter().all(|which| is_first(*which) != Some(true)) {
+        let statement = "the time alone has order 1: it is that of the end of a step".to_owned();
+        return vec![Cause::plain("event-time-late", statement, Certainty::Likely, of, of)];
+    }
+    let mut causes = Vec::new();
+    for (id, contents, statement) in LOWERS {
+        if causes.len() == 2 || (*id == "start-kick" && !causes.is_empty()) {
+            break;
+        }
+        let holds = |question: &Question| question.contains.iter().any(|content| contents.contains(content));
+        let part = |is_with: bool| -> Vec<(&Question, &[Rung])> {
+            right.iter().copied().filter(|(question, _)| holds(question) == is_with).collect()
+        };
+        let lowest =
+            |part: &[(&Question, &[Rung])]| (0..3).filter_map(|which| order(part, which)).fold(f64::INFINITY, f64::min);
+        let (inside, outside) = (part(true), part(false));
+        if !inside.is_empty() && !outside.is_empty() && lowest(&inside) < 1.5 && lowest(&outside) > 1.6 {
+            causes.push(Cause::plain(id, (*statement).to_owned(), Certainty::Likely, inside.len(), of));
+        }
+    }
+    causes.dedup_by(|a, b| a.id == b.id);
+    if causes.is_empty() {
+        let statement = "the order is about 1 in questions of every kind".to_owned();
+        causes.push(Cause::plain("first-order-scheme", statement, Certainty::Likely, of, of));
+    }
+    causes
+}
+
+/// Id, contents and sentence of what lowers an order to one, where every question of that order holds one of the contents.
+const LOWERS: &[(&str, &[Content], &str)] = &[
+    ("drag-lagged", &[Content::Drag, Content::Viscosity], "the order falls to 1 where the force depends on V"),
+    (
+        "force-stale",
+        &[Content::Stiffness, Content::LaterStiffness],
+        "the order falls to 1 where the force depends on x: its depth is that of another time",
+    ),
+    ("stage-end-late", &[Content::ForceJump], "the order falls to 1 where the force jumps at the end of a stage"),
+    ("stage-end-late", &[Content::StageEnd], "the order falls to 1 where the end of a stage is passed"),
+    ("exit-late", &[Content::Exit], "the order falls to 1 at the exit"),
+    ("rest-late", &[Content::Rest], "the order falls to 1 at rest: it is taken at a step"),
+    (
+        "start-kick",
+        &[Content::StaticForce, Content::Drive, Content::Viscosity, Content::Drag],
+        "the order falls to 1 where there is a force at impact: V half a step back is V0 itself",
+    ),
+];
+
+/// The rules of a known scheme that lower its order.
+fn rules_that_lower(scheme: Scheme, right: &[(&Question, &[Rung])]) -> Vec<Cause> {
+    let with = |content: Content| right.iter().filter(|(question, _)| question.contains.contains(&content)).count();
+    let certain = |id: &str, statement: String, explains: usize| {
+        Cause::plain(id, statement, Certainty::Certain, explains, right.len())
+    };
+    let mut causes = Vec::new();
+    if scheme.velocity() == Some(VelocityAt::LaggedHalfStep) && with(Content::Drag) + with(Content::Viscosity) > 0 {
+        let statement = "the force is evaluated with V half a step behind: order 1 wherever it depends on V".to_owned();
+        causes.push(certain("drag-lagged", statement, with(Content::Drag).max(with(Content::Viscosity))));
+    }
+    let of_name = match scheme.name() {
+        "euler" => Some(("first-order-scheme", "the scheme is forward Euler, of order 1")),
+        "semi-implicit-euler" => Some((
+            "start-kick",
+            "the scheme is semi-implicit Euler, of order 1: central difference started without its first half step of V is the same",
+        )),
+        _ => None,
+    };
+    causes.extend(of_name.map(|(id, statement)| certain(id, statement.to_owned(), right.len())));
+    if scheme.events() == Boundaries::StepEnd {
+        for (id, content, what) in [
+            ("stage-end-late", Content::StageEnd, "the end of a stage"),
+            ("exit-late", Content::Exit, "the exit"),
+            ("rest-late", Content::Rest, "rest"),
+        ] {
+            if with(content) > 0 {
+                let statement = format!("{what} is taken at the end of the step that passes it: order 1");
+                causes.push(certain(id, statement, with(content)));
+            }
+        }
+    }
+    causes
 }

@@ -9,7 +9,11 @@ mod report;
 mod scene;
 
 use super::questions::Question;
+#[cfg(feature = "report")]
+use super::questions::questions;
 use super::simulation::{AtStageEnd, Force, Rules, Simulated, simulate, solve};
+#[cfg(feature = "report")]
+use crate::exchange::peers::wire::errors;
 use crate::physics::{Problem, Scene};
 use crate::studies::scheme_of_table::Scheme;
 
@@ -266,4 +270,33 @@ impl Hypothesis {
         }
         self.statement.replacen("{}", &shown, 1)
     }
+}
+
+/// Faults that change an answer at the very number at which nothing is wrong, as sentences, and how many answers were looked at:
+/// to `count` questions about stages and as many about scenes. A fault with another number would be named with a wrong one.
+#[cfg(feature = "report")]
+pub(crate) fn changed_by_nothing(seed: u64, count: usize) -> (usize, Vec<String>) {
+    const LEFT: f64 = 1e-7;
+    let all: Vec<Question> =
+        [false, true].into_iter().flat_map(|of_scenes| questions(seed, count, of_scenes)).collect();
+    let usable = all.iter().filter(|question| question.problem.impact_speed > 0.0 && !question.is_on_a_border());
+    let usable: Vec<&Question> = usable.collect();
+    let (mut answers, mut changed) = (0, Vec::new());
+    for fault in hypotheses() {
+        let numbers = fault.parameter.neutral();
+        let mut is_changed = |question: &&Question, number: f64| {
+            let Some((problem, found)) = predict(question, &[(fault, number)], How::Exact) else {
+                return false;
+            };
+            answers += 1;
+            let off = errors(found.end, question.exact.end, problem.impact_speed);
+            (0..3).any(|i| !(off[i].abs() <= LEFT * question.conditions[i]))
+        };
+        let by: Option<Vec<&&Question>> =
+            numbers.iter().map(|number| usable.iter().find(|question| is_changed(question, *number))).collect();
+        if let Some((question, number)) = by.and_then(|by| Some((*by.first()?, *numbers.first()?))) {
+            changed.push(format!("{} ({})", fault.says(number), question.id));
+        }
+    }
+    (answers, changed)
 }

@@ -113,6 +113,11 @@ impl Question {
         is_usable.then_some(Self { id, problem, scene, exact, contains, conditions })
     }
 
+    /// The largest of the errors of depth, time and velocity over their condition numbers.
+    pub(super) fn over_condition(&self, errors: [f64; 3]) -> f64 {
+        (0..3).map(|i| errors[i].abs() / self.conditions[i]).fold(0.0, f64::max)
+    }
+
     /// Whether the flight ends so near the end of a stage that a fault there decides it by round-off.
     pub(super) fn is_on_a_border(&self) -> bool {
         let depth = self.exact.end.depth;

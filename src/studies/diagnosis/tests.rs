@@ -2,9 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::hypotheses::{Fault, Hypothesis, Parameter, hypotheses, predict};
+use super::fixed_steps::is_short_of;
+use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
+use super::numbers::few_digits;
 use super::*;
-use crate::integrators::{CentralDifference, Detail, Integrator, Taylor};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Taylor, VelocityAt};
 use crate::physics::Problem;
 
 /// A solver with faults, exact but for them.
@@ -149,7 +151,7 @@ fn two_faults_at_once_are_both_named() {
 #[test]
 fn numbers_of_single_precision_and_of_few_digits_are_seen() {
     let exact: Vec<f64> = (1..40).map(|i| f64::from(i).sqrt()).collect();
-    let id = |numbers: Vec<f64>| of_numbers(&numbers, 3).map(|cause| cause.id);
+    let id = |numbers: Vec<f64>| few_digits(&numbers, 3).map(|cause| cause.id);
     assert_eq!(id(exact.clone()), None);
     assert_eq!(id(exact.iter().map(|x| f64::from(*x as f32)).collect()).as_deref(), Some("single-precision"));
     let printed = |digits: usize| exact.iter().map(|x| format!("{x:.digits$e}").parse().unwrap()).collect();
