@@ -248,6 +248,16 @@ struct Answered<'a> {
 /// Diagnoses `solver`; `progress` is called after each question with the number of questions asked and to be asked.
 pub fn diagnose(solver: &mut dyn Solver, plan: Plan, progress: &dyn Fn(usize, usize)) -> Diagnosis {
     let identity = solver.identity();
+    let mut all = questions(plan.seed, plan.questions, identity.reads_scene);
+    if plan.asks_edges && !identity.fixed_step && !identity.reads_scene {
+        all.extend(edge_questions());
+    }
+    by_questions(solver, &all, progress)
+}
+
+/// Diagnoses `solver` by `all` questions.
+fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usize, usize)) -> Diagnosis {
+    let identity = solver.identity();
     let peer = Subject {
         name: identity.name.clone(),
         version: identity.version.clone(),
@@ -256,15 +266,11 @@ pub fn diagnose(solver: &mut dyn Solver, plan: Plan, progress: &dyn Fn(usize, us
         fixed_step: identity.fixed_step,
         reads: if identity.reads_scene { "scene" } else { "stages" },
     };
-    let mut all = questions(plan.seed, plan.questions, identity.reads_scene);
-    if plan.asks_edges && !identity.fixed_step && !identity.reads_scene {
-        all.extend(edge_questions());
-    }
     let mut asking = Asking::new(solver);
     if identity.fixed_step {
-        in_fixed_steps(&mut asking, peer, &identity, &all, progress)
+        in_fixed_steps(&mut asking, peer, &identity, all, progress)
     } else {
-        at_tolerances(&mut asking, peer, &identity, &all, progress)
+        at_tolerances(&mut asking, peer, &identity, all, progress)
     }
 }
 

@@ -7,11 +7,10 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
+use super::hypotheses::{Fault, How, Hypothesis, Parameter, Predicted, hypotheses, predicted};
 use super::questions::{Content, Question};
-use super::simulation::Simulated;
 use crate::exchange::peers::wire::{conditioning, errors};
-use crate::physics::{Problem, State};
+use crate::physics::State;
 
 /// Failing answers from which the number of a hypothesis is fitted.
 const FITTED: usize = 6;
@@ -23,6 +22,10 @@ const TRIED: usize = 8;
 const COARSE: usize = 4;
 /// What is so near to zero, in units of the accuracy, is a root.
 const NEAR_ROOT: f64 = 1e-4;
+/// A quantity whose distance from zero is so many times its change hardly changes.
+const FAR: f64 = 10.0;
+/// Width of a bracket, relative to its numbers, in which a quantity that still changes much jumps.
+const JUMP_WIDTH: f64 = 1e-7;
 /// Rounds of a search between two numbers.
 const ROUNDS_MAX: usize = 80;
 /// Numbers that lie within this factor are one.
@@ -109,10 +112,13 @@ impl Seen<'_> {
         self.question.contains.contains(&Content::Stiff)
     }
 
-    /// Errors of the answer against `end`, the end of a flight through `problem`, each over what is allowed.
-    fn excess(&self, problem: &Problem, end: State) -> [f64; 3] {
+    fn predicted(&self, faults: &[Fault<'static>]) -> Option<Predicted> {
+        predicted(self.question, faults, self.how)
+    }
+
+    /// Errors of the answer against what is predicted, each over what is allowed.
+    fn excess(&self, Predicted { end, conditions }: Predicted) -> [f64; 3] {
         let errors = errors(self.answer, end, self.question.problem.impact_speed);
-        let conditions = conditioning(end, problem);
         std::array::from_fn(|i| {
             let condition = conditions[i].max(self.question.conditions[i]);
             errors[i] / (self.accuracy * condition)
@@ -121,33 +127,36 @@ impl Seen<'_> {
 
     /// Whether `excess` leaves next to nothing of what is wrong with the answer.
     fn is_near(&self, excess: [f64; 3], mask: Mask) -> bool {
-        let wrong = self.excess(&self.question.problem, self.question.exact.end);
+        let end = self.question.exact.end;
+        let wrong = self.excess(Predicted { end, conditions: conditioning(end, &self.question.problem) });
         let wrong = wrong.iter().fold(0.0, |a, b| f64::max(a, b.abs()));
         let allowed = if self.fails { (LEFT * wrong).clamp(1.0, LEFT_MAX) } else { 1.0 };
         (0..3).all(|i| !mask[i] || excess[i].abs() <= allowed)
     }
 
     /// Largest relative error against what `faults` give, if they explain the answer.
-    fn explained_by(&self, faults: &[Fault<'_>], mask: Mask) -> Option<f64> {
-        let (problem, Simulated { end, .. }) = predict(self.question, faults, self.how)?;
-        let excess = self.excess(&problem, end);
-        let is_near = self.is_near(excess, mask);
-        let errors = errors(self.answer, end, self.question.problem.impact_speed);
+    fn explained_by(&self, faults: &[Fault<'static>], mask: Mask) -> Option<f64> {
+        self.predicted(faults).and_then(|predicted| self.explained(predicted, mask))
+    }
+
+    /// The same of what is `predicted`.
+    fn explained(&self, predicted: Predicted, mask: Mask) -> Option<f64> {
+        let is_near = self.is_near(self.excess(predicted), mask);
+        let errors = errors(self.answer, predicted.end, self.question.problem.impact_speed);
         let largest = (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max);
         (is_near && largest <= EXPLAINED_MAX).then_some(largest)
     }
 
     /// Whether `faults` give another answer. Where none can be computed, nothing is contradicted.
-    fn contradicts(&self, faults: &[Fault<'_>], mask: Mask) -> bool {
-        predict(self.question, faults, self.how).is_some() && self.explained_by(faults, mask).is_none()
+    fn contradicts(&self, faults: &[Fault<'static>], mask: Mask) -> bool {
+        self.predicted(faults).is_some_and(|predicted| self.explained(predicted, mask).is_none())
     }
 
     /// Whether what `faults` give is another answer than the right one.
-    fn is_told_apart(&self, faults: &[Fault<'_>]) -> bool {
-        let Some((_, found)) = predict(self.question, faults, self.how) else { return false };
-        let Some((problem, right)) = predict(self.question, &[], self.how) else { return false };
+    fn is_told_apart(&self, faults: &[Fault<'static>]) -> bool {
+        let (Some(found), Some(right)) = (self.predicted(faults), self.predicted(&[])) else { return false };
         let faulty = Seen { answer: found.end, ..self.clone() };
-        let told = faulty.excess(&problem, right.end).iter().filter(|excess| excess.abs() > TELLING).count();
+        let told = faulty.excess(right).iter().filter(|excess| excess.abs() > TELLING).count();
         // A number of its own in every answer explains one quantity by itself.
         let is_fitted = |(fault, _): &Fault<'_>| {
             matches!(fault.parameter, Parameter::Delay | Parameter::Lateness | Parameter::Nearness)
@@ -157,13 +166,10 @@ impl Seen<'_> {
     }
 
     /// Numbers of `hypothesis` that explain the answer, together with `others`; `None` where no number changes it.
-    fn fit(&self, hypothesis: &Hypothesis, others: &[Fault<'_>], mask: Mask) -> Option<Vec<f64>> {
+    fn fit(&self, hypothesis: &'static Hypothesis, others: &[Fault<'static>], mask: Mask) -> Option<Vec<f64>> {
         let with =
-            |number: f64| -> Vec<(&Hypothesis, f64)> { others.iter().copied().chain([(hypothesis, number)]).collect() };
-        let excess = |number: f64| {
-            let (problem, found) = predict(self.question, &with(number), self.how)?;
-            Some(self.excess(&problem, found.end))
-        };
+            |number: f64| -> Vec<Fault<'static>> { others.iter().copied().chain([(hypothesis, number)]).collect() };
+        let excess = |number: f64| Some(self.excess(self.predicted(&with(number))?));
         let mut fitting: Vec<f64> = Vec::new();
         if hypothesis.changes.is_empty() {
             return Some(if self.explained_by(&with(1.0), mask).is_some() { vec![1.0] } else { fitting });
@@ -211,14 +217,13 @@ impl Seen<'_> {
             return Some(fitting);
         }
         for pair in known.windows(2) {
-            let [(low_number, low), (high_number, high)] = [pair[0], pair[1]];
+            let [(_, low), (_, high)] = [pair[0], pair[1]];
             // The number is a root in every quantity that it moves: the one that it moves most tells.
             let moves = |i: &usize| (high[*i] - low[*i]).abs();
-            if let Some(quantity) = crosses(low, high).max_by(|a, b| moves(a).total_cmp(&moves(b))) {
-                let ends = (low_number, low[quantity], high_number, high[quantity]);
-                if let Some(root) = root(ends, |number| Some(excess(number)?[quantity])) {
-                    add(root);
-                }
+            if let Some(quantity) = crosses(low, high).max_by(|a, b| moves(a).total_cmp(&moves(b)))
+                && let Some(root) = root([pair[0], pair[1]], quantity, mask, excess)
+            {
+                add(root);
             }
         }
         Some(fitting)
@@ -230,31 +235,49 @@ fn is_of_one_number(fault: &Hypothesis) -> bool {
     fault.id.starts_with("event-time") || fault.id == "velocity-stale"
 }
 
-/// A root of `g` between two numbers at which its signs differ.
+/// A root of the quantity `which` of `excess` between two numbers at which its signs differ.
+///
+/// `None` too where no number between the two explains an answer: another quantity of `mask` hardly changes from one to the
+/// other, far from zero, or this one jumps over zero.
 fn root(
-    (mut low, mut g_low, mut high, mut g_high): (f64, f64, f64, f64),
-    g: impl Fn(f64) -> Option<f64>,
+    [mut low, mut high]: [(f64, [f64; 3]); 2],
+    which: usize,
+    mask: Mask,
+    excess: impl Fn(f64) -> Option<[f64; 3]>,
 ) -> Option<f64> {
+    let moved = |low: [f64; 3], high: [f64; 3], i: usize| (high[i] - low[i]).abs();
+    let is_elsewhere = |low: [f64; 3], high: [f64; 3]| {
+        let least = |i: usize| if low[i] * high[i] > 0.0 { low[i].abs().min(high[i].abs()) } else { 0.0 };
+        (0..3).any(|i| mask[i] && i != which && least(i) > (FAR * moved(low, high, i)).max(2.0 * LEFT_MAX))
+    };
+    let at_first = moved(low.1, high.1, which);
+    // As Illinois has it: the value at an end that stays is halved.
+    let (mut g_low, mut g_high) = (low.1[which], high.1[which]);
     for round in 0..ROUNDS_MAX {
-        let width = high - low;
-        if width <= f64::EPSILON * high.abs().max(low.abs()) {
+        let (width, size) = (high.0 - low.0, high.0.abs().max(low.0.abs()));
+        if width <= f64::EPSILON * size {
             break;
         }
-        let falsi = low - g_low * width / (g_high - g_low);
-        let next = if round % 3 == 2 || !(low < falsi && falsi < high) { 0.5 * (low + high) } else { falsi };
-        let value = g(next)?;
+        let jumps = width <= JUMP_WIDTH * size && moved(low.1, high.1, which) > (at_first / FAR).max(FAR * LEFT_MAX);
+        if jumps || is_elsewhere(low.1, high.1) {
+            return None;
+        }
+        let falsi = low.0 - g_low * width / (g_high - g_low);
+        let next = if round % 3 == 2 || !(low.0 < falsi && falsi < high.0) { 0.5 * (low.0 + high.0) } else { falsi };
+        let values = excess(next)?;
+        let value = values[which];
         if value.abs() < NEAR_ROOT {
             return Some(next);
         }
         if (value < 0.0) == (g_low < 0.0) {
-            (low, g_low) = (next, value);
+            (low, g_low) = ((next, values), value);
             g_high *= 0.5;
         } else {
-            (high, g_high) = (next, value);
+            (high, g_high) = ((next, values), value);
             g_low *= 0.5;
         }
     }
-    Some(if g_low.abs() < g_high.abs() { low } else { high })
+    Some(if g_low.abs() < g_high.abs() { low.0 } else { high.0 })
 }
 
 /// `number`, or the round one that it is within its accuracy.
@@ -327,8 +350,7 @@ impl Evidence<'_> {
                 number.map(|number| others.iter().copied().chain([(hypothesis, number)]).collect());
             let found = faults.as_ref().and_then(|faults| Some((seen.explained_by(faults, mask)?, faults)));
             // A stiff flight may take more steps than a simulation has.
-            let is_open =
-                |faults: &Vec<Fault<'_>>| seen.is_stiff() && predict(seen.question, faults, seen.how).is_none();
+            let is_open = |faults: &Vec<Fault<'static>>| seen.is_stiff() && seen.predicted(faults).is_none();
             explained.push(if found.is_none() && faults.as_ref().is_some_and(is_open) {
                 None
             } else {
@@ -482,11 +504,11 @@ fn cause((hypothesis, number): Fault<'static>, explanation: &Explanation, certai
 /// Whether two explanations answer every question alike.
 fn are_twins(a: &Explanation, b: &Explanation, seen: &Seen<'_>, others: &[&Question]) -> bool {
     others.iter().all(|question| {
-        let of = |explanation: &Explanation| predict(question, &explanation.faults, seen.how);
+        let of = |explanation: &Explanation| predicted(question, &explanation.faults, seen.how);
         match (of(a), of(b)) {
-            (Some((problem, a)), Some((_, b))) => {
+            (Some(a), Some(b)) => {
                 let seen = Seen { question, answer: b.end, ..seen.clone() };
-                seen.excess(&problem, a.end).iter().all(|excess| excess.abs() <= 1.0)
+                seen.excess(a).iter().all(|excess| excess.abs() <= 1.0)
             }
             (None, None) => true,
             _ => false,

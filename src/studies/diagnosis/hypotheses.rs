@@ -8,13 +8,17 @@ mod force;
 mod report;
 mod scene;
 
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
 use super::questions::Question;
 #[cfg(feature = "report")]
 use super::questions::questions;
 use super::simulation::{AtStageEnd, Force, Rules, Simulated, simulate, solve};
+use crate::exchange::peers::wire::conditioning;
 #[cfg(feature = "report")]
 use crate::exchange::peers::wire::errors;
-use crate::physics::{Problem, Scene};
+use crate::physics::{Problem, Scene, State};
 use crate::studies::scheme_of_table::Scheme;
 
 /// A fault, and what it does.
@@ -226,6 +230,41 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
         }
     }
     found.end.is_finite().then_some((problem, found))
+}
+
+/// What causes are compared by: how a flight ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Predicted {
+    /// Its end.
+    pub end: State,
+    /// Condition numbers of depth, time and velocity there.
+    pub conditions: [f64; 3],
+}
+
+/// What exact solvers with one fault or none answer to a question, by fault and number. It does not depend on what was
+/// answered, and causes are looked for several times.
+#[derive(Debug, Default)]
+pub(super) struct Predictions(Mutex<HashMap<(usize, u64), Option<Predicted>>>);
+
+/// The end of [`predict`].
+pub(super) fn predicted(question: &Question, faults: &[Fault<'static>], how: How) -> Option<Predicted> {
+    let find = || {
+        let (problem, Simulated { end, .. }) = predict(question, faults, how)?;
+        Some(Predicted { end, conditions: conditioning(end, &problem) })
+    };
+    let key = match (how, faults) {
+        (How::Exact, []) => (0, 0),
+        (How::Exact, [(fault, number)]) => (std::ptr::from_ref(*fault).addr(), number.to_bits()),
+        _ => return find(),
+    };
+    let known = || question.predicted.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let there = known().get(&key).copied();
+    // Two threads may compute the same: the lock is not held meanwhile.
+    there.unwrap_or_else(|| {
+        let found = find();
+        known().insert(key, found);
+        found
+    })
 }
 
 const fn of(id: &'static str, statement: &'static str, parameter: Parameter, changes: &'static [Change]) -> Hypothesis {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::hypotheses::Predictions;
 use crate::exchange::peers::wire::PeerScene;
 use crate::integrators::Flight;
 use crate::physics::{CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, Stage};
@@ -81,7 +82,7 @@ pub enum Content {
 }
 
 /// A problem that a solver is asked.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Question {
     /// Name: what kind, and which.
     pub id: String,
@@ -95,6 +96,8 @@ pub(super) struct Question {
     pub contains: Vec<Content>,
     /// Condition numbers of depth, time and velocity at the end, at least one.
     pub conditions: [f64; 3],
+    /// What single faults make of it.
+    pub predicted: Predictions,
 }
 
 impl Question {
@@ -110,7 +113,8 @@ impl Question {
             [1.0; 3]
         };
         let is_usable = exact.outcome != Outcome::Undecided && conditions.iter().all(|condition| *condition <= allowed);
-        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions })
+        let predicted = Predictions::default();
+        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, predicted })
     }
 
     /// The largest of the errors of depth, time and velocity over their condition numbers.

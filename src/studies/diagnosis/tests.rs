@@ -10,19 +10,30 @@ use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Tayl
 use crate::physics::Problem;
 
 /// A solver with faults, exact but for them.
-struct Faulty {
+struct Faulty<'a> {
     faults: Vec<Fault<'static>>,
-    questions: Vec<Question>,
+    questions: &'a [Question],
     reads_scene: bool,
 }
 
-impl Faulty {
-    fn new(faults: Vec<Fault<'static>>, plan: Plan) -> Self {
+impl<'a> Faulty<'a> {
+    fn new(faults: Vec<Fault<'static>>, questions: &'a [Question]) -> Self {
         let reads_scene = faults.iter().any(|(fault, _)| fault.needs_scene());
-        let mut questions = questions(plan.seed, plan.questions, reads_scene);
-        questions.extend(edge_questions());
         Self { faults, questions, reads_scene }
     }
+
+    /// What is found of it by its questions.
+    fn diagnosed(mut self) -> Diagnosis {
+        let questions = self.questions;
+        by_questions(&mut self, questions, &|_, _| {})
+    }
+}
+
+/// The questions of `seed`, those at the edges among them.
+fn all_questions(seed: u64) -> Vec<Question> {
+    let mut all = questions(seed, Plan::default().questions, false);
+    all.extend(edge_questions());
+    all
 }
 
 fn failure(why: &str) -> PeerFailure {
@@ -43,7 +54,7 @@ fn answer(outcome: Outcome, State { time, depth, velocity }: State) -> PeerAnswe
     }
 }
 
-impl Solver for Faulty {
+impl Solver for Faulty<'_> {
     fn identity(&self) -> PeerIdentity {
         PeerIdentity { name: "faulty".to_owned(), reads_scene: self.reads_scene, ..PeerIdentity::default() }
     }
@@ -108,8 +119,7 @@ fn number(hypothesis: &Hypothesis) -> f64 {
 #[test]
 fn a_right_solver_is_sound_and_has_no_cause() {
     for seed in 1..=3 {
-        let plan = Plan { seed, ..Plan::default() };
-        let found = diagnose(&mut Faulty::new(Vec::new(), plan), plan, &|_, _| {});
+        let found = Faulty::new(Vec::new(), &all_questions(seed)).diagnosed();
         assert_eq!(found.verdict, Verdict::Passed);
         assert!(found.counts.asked > 200 && found.causes.is_empty());
     }
@@ -117,7 +127,8 @@ fn a_right_solver_is_sound_and_has_no_cause() {
 
 #[test]
 fn every_fault_that_is_known_is_named() {
-    let plan = Plan { questions: 60, asks_edges: false, ..Plan::default() };
+    // Shared: what a fault makes of a question is computed once, and not for each solver.
+    let of_stages_and_of_scenes = [false, true].map(|of_scenes| questions(1, 60, of_scenes));
     let is_tried = |hypothesis: &&Hypothesis| {
         hypothesis.id != "outcome-name" && !matches!(hypothesis.parameter, Parameter::Choice(_))
     };
@@ -126,7 +137,8 @@ fn every_fault_that_is_known_is_named() {
         .par_iter()
         .filter_map(|hypothesis| {
             let number = number(hypothesis);
-            let found = diagnose(&mut Faulty::new(vec![(hypothesis, number)], plan), plan, &|_, _| {});
+            let questions = &of_stages_and_of_scenes[usize::from(hypothesis.needs_scene())];
+            let found = Faulty::new(vec![(hypothesis, number)], questions).diagnosed();
             let first = found.causes.first();
             let is_named = first.is_some_and(|cause| {
                 let is_near = |factor: f64| (factor / number - 1.0).abs() < 0.01;
@@ -141,9 +153,8 @@ fn every_fault_that_is_known_is_named() {
 #[test]
 fn two_faults_at_once_are_both_named() {
     let of = |id: &str| hypotheses().find(|hypothesis| hypothesis.id == id).unwrap();
-    let plan = Plan::default();
     let faults = vec![(of("term:drag"), 0.5), (of("unit:time"), 1e3)];
-    let found = diagnose(&mut Faulty::new(faults, plan), plan, &|_, _| {});
+    let found = Faulty::new(faults, &all_questions(1)).diagnosed();
     let named: Vec<_> = found.causes.iter().map(|cause| (cause.id.as_str(), cause.certainty)).collect();
     assert_eq!(named, [("term:drag", Certainty::Certain), ("unit:time", Certainty::Certain)]);
 }
