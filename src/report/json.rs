@@ -16,6 +16,7 @@ pub struct VerifyJson {
     pub title: String,
     /// Patterns of the claims that were judged; absent where all were.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     pub only: Vec<String>,
     /// Verdict of the whole.
     pub verdict: Verdict,

@@ -464,6 +464,7 @@ fn a_suite_of_ones_own_runs_on_ones_own_scene() {
     fs::write(&suite, text).unwrap();
     let said = run_in(folder.path(), "verify suite.toml --out report --json").expect(0);
     assert_eq!(said.json()["counts"]["passed"], 1);
+    conforms("verify", &said.json());
     assert!(folder.path().join("report/report.json").exists());
     // Far looser than what is measured: a warning, no more.
     assert!(said.err.contains("guards"));

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use penetrode::physics::Range;
 use penetrode::physics::parameter::{Absence, Entry, Parameter};
 
-use crate::program::run_in;
+use crate::program::{names, run_in};
 
 /// Folders and files in which a document may be cited.
 const PLACES: [&str; 17] = [
@@ -201,5 +201,44 @@ fn the_reference_gives_each_key_of_a_scene_the_range_and_the_default_of_the_para
         };
         assert!(is_as_in_the_table, "{path}: {}", cells[2]);
     }
+    Ok(())
+}
+
+/// What stands at the top, hidden files apart; and how what builds and commands leave there begins.
+const TOP: [&str; 22] = [
+    "ARCHITECTURE.md",
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "CONTRIBUTING.md",
+    "Cargo.lock",
+    "Cargo.toml",
+    "LICENSE-APACHE",
+    "LICENSE-MIT",
+    "README.md",
+    "SECURITY.md",
+    "benches",
+    "build.rs",
+    "deny.toml",
+    "docs",
+    "examples",
+    "fuzz",
+    "justfile",
+    "python",
+    "rustfmt.toml",
+    "src",
+    "tests",
+    "verification",
+];
+const LEFT_AT_TOP: [&str; 3] = ["target", "penetrode-report", "mutants.out"];
+
+/// A table that a run wrote beside the sources was committed once.
+#[test]
+fn nothing_lies_at_the_top_that_a_run_left_behind() -> io::Result<()> {
+    let strays: Vec<String> = names(root())
+        .into_iter()
+        .filter(|name| !name.starts_with('.') && !TOP.contains(&name.as_str()))
+        .filter(|name| !LEFT_AT_TOP.iter().any(|left| name.starts_with(left)))
+        .collect();
+    assert_eq!(strays, [""; 0], "left by a run, or to be named in this test");
     Ok(())
 }

@@ -88,7 +88,7 @@ pub(crate) fn json(line: &str) -> Value {
     run(&format!("{line} --json")).json()
 }
 
-/// `value` is what the schema of `command` says: both are left for `tests/schemas`, which `.ci/run` runs behind the tests.
+/// `value` is what the schema of `command` says: both are left for `tests/schemas.py`, which `.ci/run` runs behind the tests.
 #[track_caller]
 pub(crate) fn conforms(command: &str, value: &Value) {
     assert_eq!(value["schema"], format!("penetrode/{command}/1"));

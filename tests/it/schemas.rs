@@ -1,4 +1,4 @@
-//! The schemas of the files that the program reads, beside the program: files are left for `tests/schemas`, which `.ci/run`
+//! The schemas of the files that the program reads, beside the program: files are left for `tests/schemas.py`, which `.ci/run`
 //! runs behind the tests, as what a schema must take or must refuse.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot be set up has failed")]
