@@ -233,12 +233,11 @@ const LEFT_AT_TOP: [&str; 3] = ["target", "penetrode-report", "mutants.out"];
 
 /// A table that a run wrote beside the sources was committed once.
 #[test]
-fn nothing_lies_at_the_top_that_a_run_left_behind() -> io::Result<()> {
+fn nothing_lies_at_the_top_that_a_run_left_behind() {
     let strays: Vec<String> = names(root())
         .into_iter()
         .filter(|name| !name.starts_with('.') && !TOP.contains(&name.as_str()))
         .filter(|name| !LEFT_AT_TOP.iter().any(|left| name.starts_with(left)))
         .collect();
     assert_eq!(strays, [""; 0], "left by a run, or to be named in this test");
-    Ok(())
 }
