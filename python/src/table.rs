@@ -12,14 +12,14 @@ use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{
-    Array, ArrayRef, ArrowPrimitiveType, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader,
+    Array, ArrayRef, ArrowPrimitiveType, Float64Array, NullArray, RecordBatch, RecordBatchIterator, RecordBatchReader,
     StringArray, UInt64Array,
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use numpy::{PyArray1, PyReadonlyArray1};
-use penetrode::exchange::tables::{At, Block, Cells, Format, Kind, Layout, Rows};
+use penetrode::exchange::tables::{At, Block, Cells, Format, Kept, Kind, Layout, Rows};
 use penetrode::integrators::Method;
-use penetrode::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, Varied, solve};
+use penetrode::studies::batch::{PART, RESULT_COLUMNS, SCENES, Scenes, Tally, Varied, check_kept, solve};
 use penetrode::text::shortened;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -46,7 +46,7 @@ const PIECES: usize = 4;
 /// ----------
 /// columns : list of str
 ///     ``row, outcome, depth_m, time_s, velocity_m_s, crater_end_time_s, crater_end_velocity_m_s, exit_margin,
-///     critical_velocity_m_s, X_over_d_eq11_12, error``, in SI units.
+///     critical_velocity_m_s, X_over_d_eq11_12, error``, in SI units; then the other columns of the scenes, as they came.
 /// bad, undecided, unstable : int
 ///     Rows without an answer; with an undecided outcome; solved with a step beyond the stability limit.
 #[pyclass(frozen, module = "penetrode")]
@@ -64,7 +64,7 @@ pub struct Table {
 ///     With the columns ``mass_kg, diameter_m, nose_factor, strength_pa, density_kg_m3, velocity_m_s``, and any of
 ///     ``thickness_m, S, B, k, crater_stiffness_n_m, criterion``; a unit at the end of a name may be another (``mass_g``). A
 ///     pandas, polars or pyarrow table, a DuckDB relation, anything with ``__arrow_c_stream__`` or ``__dataframe__``, or a dict
-///     of arrays, where one number stands for all rows.
+///     of arrays, where one number stands for all rows. Any other column goes with its row into the answers, unread.
 /// method : str, default "taylor"
 ///     And ``rtol``, ``dt``, ``velocity``, ``events``, as in `solve`.
 /// critical : bool, default False
@@ -82,7 +82,7 @@ pub struct Table {
 /// Raises
 /// ------
 /// TableError
-///     A table that cannot be read: a column is missing, unknown, there twice, or holds no numbers.
+///     A table that cannot be read: a column is missing, is likely misspelt, there twice, or holds no numbers.
 /// OptionError
 ///     As in `solve`.
 ///
@@ -119,8 +119,9 @@ pub fn batch(
     let varied = scene.map(|scene| Arc::new(Varied::new(scene.get().inner.scene.clone())));
     let format = varied.as_ref().map_or(&SCENES, |varied| varied.format());
     let work = Work { varied, method: &method, critical };
-    let Input { layout, places, mut rows } = Input::new(py, table, format)?;
+    let Input { layout, places, kept, mut rows } = Input::new(py, table, format)?;
     let layout = Arc::new(layout);
+    let schema = schema(&kept);
     let (mut batches, mut tally) = (Vec::new(), Tally::default());
     let size = if chosen.is_plain() && !critical { PARTS_MAX * PART } else { PART };
     // Ends with the table: each turn takes rows from it.
@@ -138,7 +139,9 @@ pub fn batch(
                             None => Cells::empty(known.kind),
                         });
                         let row = first + (from - some[0]) as u64;
-                        work.solve(Rows::of_columns(&layout, cells.collect(), row), to - from, row)
+                        let others = kept.iter().map(|other| columns[other.place].array(from..to)).collect();
+                        let rows = Rows::of_columns(&layout, cells.collect(), row);
+                        work.solve(rows, to - from, row, &schema, others)
                     };
                     some.par_iter().with_max_len(1).map(piece).collect()
                 })
@@ -150,7 +153,7 @@ pub fn batch(
             py.check_signals()?;
         }
     }
-    Ok(Table { schema: schema(), batches, tally })
+    Ok(Table { schema, batches, tally })
 }
 
 /// What is done with rows.
@@ -161,8 +164,15 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// The answers to `rows`, the first of which is row `first`.
-    fn solve(&self, rows: Rows, count: usize, first: u64) -> (Tally, RecordBatch) {
+    /// The answers to `rows`, the first of which is row `first`, with their `others` behind them.
+    fn solve(
+        &self,
+        rows: Rows,
+        count: usize,
+        first: u64,
+        schema: &SchemaRef,
+        others: Vec<ArrayRef>,
+    ) -> (Tally, RecordBatch) {
         let scenes = match &self.varied {
             Some(varied) => Scenes::Varied(rows, Arc::clone(varied)),
             None => Scenes::Table(rows),
@@ -181,19 +191,27 @@ impl Work<'_> {
                 Cells::Texts(cells) => Arc::new(StringArray::from(cells)),
             }
         });
-        let batch = RecordBatch::try_new(schema(), arrays.collect());
+        let batch = RecordBatch::try_new(Arc::clone(schema), arrays.chain(others).collect());
         (tally, batch.unwrap_or_else(|error| unreachable!("columns of one length and of the schema: {error}")))
     }
 }
 
-/// The columns of the answers.
-fn schema() -> SchemaRef {
+/// A column of the scenes that goes unread into the answers.
+struct Other {
+    name: String,
+    place: usize,
+    kind: DataType,
+}
+
+/// The columns of the answers, and those `kept` of the scenes behind them.
+fn schema(kept: &[Other]) -> SchemaRef {
     let field = |(name, kind): &(&str, Kind)| match kind {
         Kind::Count => Field::new(*name, DataType::UInt64, false),
         Kind::Number => Field::new(*name, DataType::Float64, true),
         Kind::Text => Field::new(*name, DataType::Utf8, true),
     };
-    Arc::new(Schema::new(RESULT_COLUMNS.iter().map(field).collect::<Vec<_>>()))
+    let others = kept.iter().map(|other| Field::new(&other.name, other.kind.clone(), true));
+    Arc::new(Schema::new(RESULT_COLUMNS.iter().map(field).chain(others).collect::<Vec<_>>()))
 }
 
 /// A table that comes in.
@@ -201,6 +219,7 @@ struct Input<'py> {
     layout: Layout,
     /// Place in the table of each column of the format.
     places: Vec<Option<usize>>,
+    kept: Vec<Other>,
     rows: Source<'py>,
 }
 
@@ -244,8 +263,8 @@ impl<'py> Input<'py> {
         };
         let fields = source.schema();
         let names: Vec<&str> = fields.fields().iter().map(|field| field.name().as_str()).collect();
-        let texts: Vec<Option<bool>> = fields.fields().iter().map(|field| holds_texts(field.data_type())).collect();
-        let input = Self::with(py, &names, &texts, format, Source::Arrow(source))?;
+        let kinds: Vec<DataType> = fields.fields().iter().map(|field| field.data_type().clone()).collect();
+        let input = Self::with(py, &names, &kinds, format, Source::Arrow(source))?;
         for field in input.places.iter().flatten().map(|place| fields.field(*place)) {
             let kind = field.data_type();
             if !(is_text(kind) || is_number(kind)) {
@@ -276,40 +295,42 @@ impl<'py> Input<'py> {
         }
         let count = rows.map_or(1, |(_, length)| length);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let texts = |held: &Held<'_>| match held {
-            Held::Text(None) => None,
-            held => Some(matches!(held, Held::Texts(_) | Held::Text(_))),
+        let kind = |held: &Held<'_>| match held {
+            Held::Text(None) => DataType::Null,
+            Held::Texts(_) | Held::Text(_) => DataType::Utf8,
+            Held::Numbers(_) | Held::Number(_) => DataType::Float64,
         };
-        let texts: Vec<Option<bool>> = held.iter().map(texts).collect();
-        Self::with(py, &names, &texts, format, Source::Arrays(held, count, false))
+        let kinds: Vec<DataType> = held.iter().map(kind).collect();
+        Self::with(py, &names, &kinds, format, Source::Arrays(held, count, false))
     }
 
     fn with(
         py: Python<'py>,
         names: &[&str],
-        texts: &[Option<bool>],
+        kinds: &[DataType],
         format: &'static Format,
         rows: Source<'py>,
     ) -> PyResult<Self> {
-        let layout =
+        let mut layout =
             Layout::new(names, "the table", At::Table, format).map_err(|error| advised(py, "TableError", &*error))?;
-        // The answers have the columns of the answers alone.
-        if let Some(other) = layout.kept().first() {
-            let message = format!("there is no column `{}`", other.name);
-            return Err(table_error(py, &message, "leave it out, and join it to the answers by their rows"));
-        }
+        // They go into the answers as they are, and not through cells of texts.
+        let kept = layout.take_kept();
+        check_kept(&kept, !std::ptr::eq(format, &raw const SCENES))
+            .map_err(|(message, help)| table_error(py, &message, &help))?;
+        let other = |kept: Kept| Other { kind: kinds[kept.place()].clone(), place: kept.place(), name: kept.name };
+        let kept = kept.into_iter().map(other).collect();
         let places = layout.places().to_vec();
         for (known, place) in format.columns.iter().zip(&places) {
             let Some(place) = *place else { continue };
             // A column without a value fits any.
-            let Some(is_text) = texts[place] else { continue };
+            let Some(is_text) = holds_texts(&kinds[place]) else { continue };
             if is_text != (known.kind == Kind::Text) {
                 let [found, wanted] = if is_text { ["texts", "numbers"] } else { ["numbers", "texts"] };
                 let message = format!("the column `{}` holds {found}", names[place]);
                 return Err(table_error(py, &message, &format!("give {wanted}, the unit in the name of the column")));
             }
         }
-        Ok(Self { layout, places, rows })
+        Ok(Self { layout, places, kept, rows })
     }
 }
 
@@ -341,7 +362,7 @@ impl<'py> Held<'py> {
             return Ok(Self::Text(None));
         }
         if let Ok(text) = given.cast::<PyString>() {
-            return Ok(Self::Text(Some(shortened(text.to_str()?))));
+            return Ok(Self::Text(Some(text.to_str()?.to_owned())));
         }
         let refuse = |why: &str, help: &str| table_error(py, &format!("the column `{name}` {why}"), help);
         let numpy = py.import("numpy")?;
@@ -366,7 +387,7 @@ impl<'py> Held<'py> {
                         return Ok(None);
                     }
                     match cell.extract::<String>() {
-                        Ok(text) => Ok(Some(shortened(&text))),
+                        Ok(text) => Ok(Some(text)),
                         Err(_) => Err(refuse("holds neither numbers nor texts", "give an array of floats")),
                     }
                 });
@@ -404,11 +425,25 @@ impl Column<'_> {
             (Self::Numbers(numbers), Kind::Number) => Cells::Numbers(numbers[rows].iter().map(|n| Some(*n)).collect()),
             (Self::Number(number), Kind::Number) => Cells::Numbers(vec![Some(*number); rows.len()]),
             (Self::Arrow(array), Kind::Number) => Cells::Numbers(numbers_of(&array.slice(rows.start, rows.len()))),
-            (Self::Texts(texts), Kind::Text) => Cells::Texts(texts[rows].to_vec()),
-            (Self::Text(text), Kind::Text) => Cells::Texts(vec![text.map(str::to_owned); rows.len()]),
+            (Self::Texts(texts), Kind::Text) => {
+                Cells::Texts(texts[rows].iter().map(|text| text.as_deref().map(shortened)).collect())
+            }
+            (Self::Text(text), Kind::Text) => Cells::Texts(vec![text.map(shortened); rows.len()]),
             (Self::Arrow(array), Kind::Text) => Cells::Texts(texts_of(&array.slice(rows.start, rows.len()))),
             // A column without a value has no type.
             _ => Cells::empty(kind),
+        }
+    }
+
+    /// The same as they are; those of Arrow without a copy.
+    fn array(&self, rows: Range<usize>) -> ArrayRef {
+        match self {
+            Self::Arrow(array) => array.slice(rows.start, rows.len()),
+            Self::Numbers(numbers) => Arc::new(Float64Array::from(numbers[rows].to_vec())),
+            Self::Number(number) => Arc::new(Float64Array::from(vec![*number; rows.len()])),
+            Self::Texts(texts) => Arc::new(StringArray::from(texts[rows].to_vec())),
+            Self::Text(Some(text)) => Arc::new(StringArray::from(vec![*text; rows.len()])),
+            Self::Text(None) => Arc::new(NullArray::new(rows.len())),
         }
     }
 }
@@ -476,8 +511,8 @@ fn texts_of(array: &ArrayRef) -> Vec<Option<String>> {
 #[pymethods]
 impl Table {
     #[getter]
-    fn columns(&self) -> Vec<&'static str> {
-        RESULT_COLUMNS.iter().map(|(name, _)| *name).collect()
+    fn columns(&self) -> Vec<&str> {
+        self.schema.fields().iter().map(|field| field.name().as_str()).collect()
     }
 
     #[getter]
@@ -500,21 +535,24 @@ impl Table {
     }
 
     /// The column `name`: an array of numpy, of integers for ``row``, of objects for texts; NaN and None where there is none.
-    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let place = RESULT_COLUMNS.iter().position(|(known, _)| *known == name);
+    ///
+    /// Another column of the scenes that holds neither floats nor texts is pyarrow's.
+    fn __getitem__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let (py, table) = (slf.py(), slf.get());
+        let place = table.schema.index_of(name);
         let place =
-            place.ok_or_else(|| PyKeyError::new_err(format!("{name}; there are {}", self.columns().join(", "))))?;
-        let arrays = self.batches.iter().map(|batch| batch.column(place));
-        Ok(match RESULT_COLUMNS[place].1 {
-            Kind::Count => {
+            place.map_err(|_| PyKeyError::new_err(format!("{name}; there are {}", table.columns().join(", "))))?;
+        let arrays = table.batches.iter().map(|batch| batch.column(place));
+        Ok(match table.schema.field(place).data_type() {
+            DataType::UInt64 if place < RESULT_COLUMNS.len() => {
                 let all = arrays.flat_map(|array| array.as_primitive::<UInt64Type>().values().iter().copied());
                 PyArray1::from_vec(py, all.collect()).into_any()
             }
-            Kind::Number => {
+            DataType::Float64 => {
                 let all = arrays.flat_map(|array| array.as_primitive::<Float64Type>().iter());
                 PyArray1::from_vec(py, all.map(|number| number.unwrap_or(f64::NAN)).collect()).into_any()
             }
-            Kind::Text => {
+            DataType::Utf8 => {
                 // Few words and many rows: each word is one object.
                 let mut known: HashMap<&str, Bound<'py, PyAny>> = HashMap::new();
                 let list = PyList::empty(py);
@@ -530,6 +568,7 @@ impl Table {
                 keywords.set_item("dtype", "object")?;
                 py.import("numpy")?.call_method("array", (list,), Some(&keywords))?
             }
+            _ => Self::to_arrow(slf)?.call_method1("column", (name,))?.call_method0("to_numpy")?,
         })
     }
 
@@ -538,10 +577,10 @@ impl Table {
     /// Returns
     /// -------
     /// dict of numpy.ndarray, each of shape (n,)
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = PyDict::new(py);
-        for name in self.columns() {
-            all.set_item(name, self.__getitem__(py, name)?)?;
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(slf.py());
+        for name in slf.get().columns() {
+            all.set_item(name, Self::__getitem__(slf, name)?)?;
         }
         Ok(all)
     }
@@ -554,7 +593,7 @@ impl Table {
     /// The table as a pandas.DataFrame.
     fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
-        py.import("pandas")?.call_method1("DataFrame", (slf.get().to_dict(py)?,))
+        py.import("pandas")?.call_method1("DataFrame", (Self::to_dict(slf)?,))
     }
 
     /// The table as a polars.DataFrame, without a copy.

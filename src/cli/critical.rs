@@ -23,7 +23,7 @@ use crate::text::digits_between;
 
 /// Random scenes of `--spread` where nothing else is asked for, and with the criterion `plug`.
 const SAMPLES: u32 = 100_000;
-const SAMPLES_OF_PLUG: u32 = 200;
+const SAMPLES_OF_PLUG: u32 = 2_000;
 
 /// What is said where no velocity is critical.
 const SEVERAL: &str = "paths cross here: no velocity is critical, and the intervals were found by a scan";
@@ -51,7 +51,7 @@ pub struct CriticalArgs {
     pub spread: Vec<String>,
     /// Random scenes behind it [default: 100000].
     ///
-    /// With the criterion plug 200 by default: each V_c is found by a scan there.
+    /// With the criterion plug 2,000 by default: each V_c takes some fifty flights there.
     #[arg(long, requires = "spread", value_parser = clap::value_parser!(u32).range(2..=100_000_000))]
     pub samples: Option<u32>,
     /// Seed of the random scenes.

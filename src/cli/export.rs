@@ -51,9 +51,10 @@ pub enum Code {
 }
 
 /// Why nothing is written for LS-DYNA.
-const NO_LSDYNA: &str = "nothing is written for LS-DYNA: its public manuals do not say whether the velocity in a *DEFINE_CURVE_FUNCTION, or in \
-                         the user subroutine of *USER_LOADING, is that of the half step or of the step, nor give the arguments \
-                         of that subroutine; so neither a deck nor what to expect of it can be checked";
+const NO_LSDYNA: &str = "nothing is written for LS-DYNA: its user subroutine of *USER_LOADING has nodal velocities among its arguments, and no \
+                         public text says whether they are those of the half step or of the step, how the initial velocity \
+                         enters the first of them, or what becomes of a nodal force on a rigid body; so neither a deck nor \
+                         what to expect of it can be checked";
 
 /// What `export --json` prints, and `report.json` of the folder.
 #[derive(Debug, Serialize, JsonSchema)]

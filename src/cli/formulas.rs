@@ -11,9 +11,10 @@ use super::output::{Text, check_table, engineering, write_table};
 use super::scene_json::SceneJson;
 use super::{Answer, Ask, CliError, Exit, SceneArgs};
 use crate::exchange::tables::{Kind, Value, table_of};
-use crate::physics::Scene;
+use crate::physics::units::{Dimension, quantity};
+use crate::physics::{Range, Scene};
 use crate::report::sweep_figures;
-use crate::studies::formulas::{self, Nose, Said};
+use crate::studies::formulas::{self, Further, Nose, Said};
 use crate::text::or_dash;
 
 /// Arguments of `formulas`.
@@ -30,6 +31,11 @@ pub struct FormulasArgs {
     /// Nose of the formulas [default: the nearest by N*].
     #[arg(long, value_enum)]
     pub nose: Option<Nose>,
+    /// Largest size of the aggregate, such as 20mm.
+    ///
+    /// Whiffen's formula and the limits of Kar's ask for it. A number alone is in metres.
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    pub aggregate: Option<String>,
     /// Write the formulas over the impact velocity to this CSV file, with a figure beside it.
     ///
     /// From a quarter of the impact velocity to twice it. - is standard output, without a figure.
@@ -74,7 +80,8 @@ impl Ask for FormulasArgs {
         check_table(&[("the scene", Path::new(&self.scene.path))], self.table(), &[""])?;
         let (scene, problem) = self.scene.settings.read_problem(&self.scene.path)?;
         let method = self.method.build()?;
-        let of = |scene: &Scene| formulas::of_scene(scene, self.nose, method.integrator());
+        let further = Further { nose: self.nose, aggregate: self.aggregate.as_deref().map(length).transpose()? };
+        let of = |scene: &Scene| formulas::of_scene(scene, further, method.integrator());
         let said = of(&scene).map_err(|error| CliError::from(error).in_file(&self.scene.path))?;
         if let Some(path) = &self.out {
             let speed = |i: u32| problem.impact_speed * (0.25 + 1.75 * f64::from(i) / f64::from(SPEEDS - 1));
@@ -85,7 +92,7 @@ impl Ask for FormulasArgs {
             let table = table_of(&COLUMNS, false, lines.iter().map(Vec::as_slice).map(<[_]>::to_vec));
             write_table(path, table, &[""], [sweep_figures::perforation_limits(&rows)])?;
         }
-        let nose = formulas::nose_of(&scene, self.nose)?;
+        let nose = formulas::nose_of(&scene, further)?;
         let data = FormulasJson {
             schema: "penetrode/formulas/1",
             scene: SceneJson::new(&scene, &problem),
@@ -95,6 +102,17 @@ impl Ask for FormulasArgs {
         };
         Ok(Answer { text: data.text(self.nose.is_some()), data: Some(data), exit: Exit::Success })
     }
+}
+
+/// The length (m) that was given to `--aggregate`.
+fn length(text: &str) -> Result<f64, CliError> {
+    let help = "write a length above zero, such as \"20 mm\", or metres";
+    let value = text.trim().parse().or_else(|_| quantity(text, Dimension::Length));
+    let value: f64 = value.map_err(|cause| CliError::usage(format!("--aggregate {text}: {cause}"), help))?;
+    if Range::Positive.contains(value) {
+        return Ok(value);
+    }
+    Err(CliError::usage(format!("--aggregate {text}: not {}", Range::Positive.description()), help))
 }
 
 /// A row of the table over the impact velocity.

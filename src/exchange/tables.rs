@@ -113,22 +113,26 @@ impl Column {
     /// Whether `name`, which is none of this column, may be meant for it: the whole, or with a unit at its end the part before
     /// it, is a name of the column but for a letter or two; for none where that is a word of less than five letters.
     pub fn may_be_meant(&self, name: &str) -> bool {
-        let bare =
-            |text: &str| text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect::<String>();
-        let is_near = |known: &str, read: &str| {
-            let (known, read) = (bare(known), bare(read));
-            let edits = match known.chars().count() {
-                ..5 => 0,
-                5..8 => 1,
-                _ => 2,
-            };
-            !known.is_empty() && strsim::osa_distance(&known, &read) <= edits
-        };
         let stem = self.measure.map(|(stem, _)| stem);
         let known = || [self.name].into_iter().chain(stem).chain(self.aliases.iter().copied());
         let ends =
             name.char_indices().filter(|(_, c)| self.measure.is_some() && "_ ([-".contains(*c)).map(|(end, _)| end);
         ends.chain([name.len()]).any(|end| known().any(|known| is_near(known, &name[..end])))
+    }
+
+    /// Whether `name`, which is none of this column, is one of its names written wrongly: the whole, or the part in front of a unit that fits,
+    /// but for a letter or two. Words of less than five letters are too short to tell, and one with something else behind it is another.
+    fn is_misspelt(&self, name: &str) -> bool {
+        let (stem, dimension) = self.measure.unzip();
+        let is_unit = |rest: &str| {
+            let unit = dimension.zip(unit_of(rest));
+            unit.is_some_and(|(of, unit)| spellings(unit).iter().any(|unit| of.coefficient(unit).is_some()))
+        };
+        let ends = name.char_indices().filter(|(end, c)| "_ ([".contains(*c) && is_unit(&name[*end..]));
+        let parts: Vec<&str> = ends.map(|(end, _)| &name[..end]).chain([name]).collect();
+        let is_long = |known: &&str| known.chars().filter(|c| c.is_alphanumeric()).count() >= 5;
+        let mut known = [self.name].into_iter().chain(stem).chain(self.aliases.iter().copied()).filter(is_long);
+        known.any(|known| parts.iter().any(|part| is_near(known, part)))
     }
 
     /// A required column of text.
@@ -147,6 +151,19 @@ impl Column {
     pub const fn needed(self, need: Need) -> Self {
         Self { need, ..self }
     }
+}
+
+/// Whether `read` is `known` but for letter case and separators, one letter of five to seven, two of more.
+fn is_near(known: &str, read: &str) -> bool {
+    let bare =
+        |text: &str| text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect::<String>();
+    let (known, read) = (bare(known), bare(read));
+    let edits = match known.chars().count() {
+        ..5 => 0,
+        5..8 => 1,
+        _ => 2,
+    };
+    !known.is_empty() && strsim::osa_distance(&known, &read) <= edits
 }
 
 /// The unit of `dimension` at the end of the name of a column, as units are written: `mm` of `depth_mm` and `x (mm)`, `m/s`
@@ -317,6 +334,12 @@ impl Layout {
                     let near = format.resembling(name);
                     return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
                 }
+                None if format.others == Others::Ignored => {
+                    if let Some(meant) = format.columns.iter().find(|column| column.is_misspelt(name)) {
+                        let near = Some(meant.name);
+                        return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
+                    }
+                }
                 None if format.others == Others::Kept => {
                     if let Err(near) = format.keeps(name) {
                         return refuse(index + 1, Fault::UnknownColumn { name: name.to_owned(), near });
@@ -345,6 +368,18 @@ impl Layout {
     /// Columns that the format does not have and the table keeps, in its order.
     pub fn kept(&self) -> &[Kept] {
         &self.kept
+    }
+
+    /// The columns that it keeps, which it no longer does: for a caller who has them at hand in their own types.
+    pub fn take_kept(&mut self) -> Vec<Kept> {
+        std::mem::take(&mut self.kept)
+    }
+}
+
+impl Kept {
+    /// Its place in the table, from 0.
+    pub fn place(&self) -> usize {
+        self.place
     }
 }
 
@@ -579,9 +614,10 @@ impl<'a> Row<'a> {
         self.optional(column)?.ok_or_else(|| self.refuse_empty(column))
     }
 
-    /// The cell in `column` is empty and must not be.
+    /// The cell in `column` is empty, or there is no such column, and the row needs it.
     pub fn refuse_empty(&self, column: usize) -> Box<TableError> {
-        self.refuse(column, Fault::EmptyCell(self.name(column)))
+        let fault = if self.position(column) == 0 { Fault::NoColumnForRow } else { Fault::EmptyCell };
+        self.refuse(column, fault(self.name(column)))
     }
 }
 

@@ -380,7 +380,18 @@ pub fn perforating(scene: &Scene, integrator: &dyn Integrator) -> Sought<Option<
     let (least, most) = named.fold((work, work), |(least, most), speed| (least.min(speed), most.max(speed)));
     let reused = integrator.reusing();
     let integrator = reused.as_deref().unwrap_or(integrator);
-    perforating_velocities::perforating(|speed| scene.resolve(speed), integrator, (least, most)).map(Some)
+    let resolve = |speed| scene.resolve(speed);
+    let found = if perforates_from_one_on(scene) {
+        perforating_velocities::from_one_on(resolve, integrator, (least, most))
+    } else {
+        perforating_velocities::perforating(resolve, integrator, (least, most))
+    };
+    found.map(Some)
+}
+
+/// Whether all impact speeds above one perforate `scene` although paths may cross: a plug ([`perforating_velocities`]).
+fn perforates_from_one_on(scene: &Scene) -> bool {
+    scene.criterion == Criterion::Plug && scene.ends.is_empty() && scene.concrete().is_some()
 }
 
 /// The impact speeds that perforate `scene`, and its critical velocity if there is one.
@@ -422,7 +433,11 @@ fn of_intervals(scene: &Scene, found: &Perforating) -> Sought {
             evaluations,
             cost,
             bracket: (low.velocity - low.error_bar, low.velocity + low.error_bar),
-            note: "paths may cross here: the velocities that perforate were found by a scan",
+            note: if perforates_from_one_on(scene) {
+                "of two projectiles the faster one breaks the plug no later: V_c was found by halving"
+            } else {
+                "paths may cross here: the velocities that perforate were found by a scan"
+            },
         }),
         _ => Err(CriticalError::Several(intervals.clone())),
     }

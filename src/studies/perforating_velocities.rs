@@ -8,6 +8,11 @@
 //! Flights at a thousand speeds, in equal ratios, show where the outcome changes; between two stops or two
 //! perforations whose exit margins come near to zero the extremum is sought. Each change is then halved to round-off. An
 //! interval narrower than a step of the scan is found only so.
+//!
+//! A plug asks for no scan. The forces in front of it grow with V, or do not depend on it, and what is left of the slab withstands a
+//! force of x alone. Of two projectiles the faster one is the faster at each depth, also in a crater whose constant follows from
+//! V0 (`dV²/dV0² = 1 - Q x²/(k d (M + k d Q)) > 0` up to k d), so that it breaks the plug no later. All speeds above one
+//! perforate, and halving alone finds that one.
 
 use super::critical_velocity::{CriticalError, Sought};
 use crate::integrators::{Cost, Detail, IntegrationError, Integrator};
@@ -56,6 +61,27 @@ pub struct Perforating {
     pub evaluations: u32,
     /// Work of all flights.
     pub cost: Cost,
+}
+
+/// The impact speeds that perforate, where those are all above one: as [`perforating`], by halving alone.
+///
+/// # Errors
+/// [`CriticalError`]: a scene or a flight failed.
+pub fn from_one_on(
+    resolve: impl Fn(f64) -> Resolved,
+    integrator: &dyn Integrator,
+    scale: (f64, f64),
+) -> Sought<Perforating> {
+    let (slowest, fastest) = (SLOWEST * scale.0, FASTEST * scale.1);
+    let mut scan = Scan { resolve, integrator, evaluations: 0, cost: Cost::default() };
+    let (low, high) = (scan.at(slowest)?, scan.at(fastest)?);
+    let low = match (low.perforates(), high.perforates()) {
+        (true, _) => Some(Edge { velocity: 0.0, error_bar: slowest }),
+        (false, true) => Some(scan.change(low, high)?),
+        (false, false) => None,
+    };
+    let intervals = low.into_iter().map(|low| Interval { low, high: None }).collect();
+    Ok(Perforating { intervals, tried: (slowest, fastest), evaluations: scan.evaluations, cost: scan.cost })
 }
 
 /// Whether paths through `problem` may cross, so that several intervals of impact speeds may perforate.

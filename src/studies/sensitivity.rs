@@ -579,13 +579,13 @@ pub struct Share {
 /// Samples per seed: a fixed unit of parallel work, so that results do not depend on the number of threads.
 const CHUNK: usize = 4096;
 
-/// The same where V_c of each is found by a scan.
-const SCANS: usize = 8;
+/// The same where V_c of each takes some fifty flights.
+const HALVED: usize = 8;
 
 /// Uncertainty of V_c of `scene` from independent `spreads`: to first order, and by `samples` random scenes.
 ///
 /// Each input is multiplied by a random factor of its [`Distribution`]. S is multiplied on top of what Eq. 14 makes of the strength. V_c of a sample is the exact one, or through the energy
-/// method; of a scene that plugs it is found by a scan of some milliseconds, and the first order is by differences. The same seed gives the same numbers on any number of threads.
+/// method; of a scene that plugs it is found by halving, in some milliseconds, and the first order is by differences. The same seed gives the same numbers on any number of threads.
 ///
 /// # Errors
 /// [`StudyError`]: no critical velocity, a number that the scene lacks or that V_c does not depend on, or no
@@ -638,7 +638,7 @@ pub fn uncertainty(
         share.share /= variance;
     }
 
-    let size = if base.plug.is_some() { SCANS } else { CHUNK };
+    let size = if base.plug.is_some() { HALVED } else { CHUNK };
     let drawn: Vec<Option<f64>> = (0..samples.div_ceil(size))
         .into_par_iter()
         .flat_map_iter(|chunk| {

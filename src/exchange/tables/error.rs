@@ -101,6 +101,8 @@ pub enum Fault {
     Row(String),
     #[error("the cell in `{0}` is empty")]
     EmptyCell(Cow<'static, str>),
+    #[error("the row needs `{0}`, and the table has no such column")]
+    NoColumnForRow(Cow<'static, str>),
     #[error("`{}` in `{name}` is {reason}", shortened(.text))]
     Cell { name: Cow<'static, str>, text: String, reason: Cow<'static, str> },
 }
@@ -158,6 +160,7 @@ impl Advice for TableError {
             Fault::TooManyRows(_) => "keep every tenth row",
             Fault::TooManyColumns(_) => "keep the columns whose convergence is asked for",
             Fault::EmptyCell(_) => "fill the cell, or remove the row or the column",
+            Fault::NoColumnForRow(_) => "add the column, or remove the row",
             Fault::Cell { reason, .. } if reason.contains("a number") => {
                 "write numbers with a decimal point and without units: 1.25e-6"
             }

@@ -57,7 +57,7 @@ pub struct Shots {
     pub others: Vec<String>,
 }
 
-/// A table of measured tests; columns of other names are kept and not read.
+/// A table of measured tests; columns of other names are kept and not read, and one written wrongly is refused.
 pub static EXPERIMENTS: Format = Format { columns: &COLUMNS, others: Others::Ignored, has_comments: false };
 
 /// Index of the first column behind those of a scene.
@@ -79,19 +79,19 @@ const MEASURED: [Column; 11] = [
         .within(Range::NotNegative),
     Column::number("ballistic_limit_m_s")
         .measured("ballistic_limit", Dimension::Velocity)
-        .called(&["V50", "Vbl", "V_bl", "Vc", "V_c"])
+        .called(&["V50", "Vbl", "V_bl", "Vc", "V_c", "limit"])
         .within(Range::Positive),
     Column::number("ballistic_limit_uncertainty_m_s")
         .measured("ballistic_limit_uncertainty", Dimension::Velocity)
-        .called(&["V50_uncertainty"])
+        .called(&["V50_uncertainty", "limit_uncertainty"])
         .within(Range::NotNegative),
     Column::number("ballistic_limit_low_m_s")
         .measured("ballistic_limit_low", Dimension::Velocity)
-        .called(&["V50_low"])
+        .called(&["V50_low", "limit_low"])
         .within(Range::NotNegative),
     Column::number("ballistic_limit_high_m_s")
         .measured("ballistic_limit_high", Dimension::Velocity)
-        .called(&["V50_high"])
+        .called(&["V50_high", "limit_high"])
         .within(Range::Positive),
     Column::text("outcome").called(&["result"]),
     Column::text("excluded").called(&["exclude"]),
