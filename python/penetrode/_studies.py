@@ -586,7 +586,7 @@ def formulas(scene: Scene | PathLike, out: PathLike | None = None, **options: An
     out : path, optional
         CSV file for the formulas over the impact velocity; the figure goes beside it.
     **options
-        Those of the command: `nose`, and the method and its options.
+        Those of the command: `nose`, `aggregate`, and the method and its options.
 
     Returns
     -------

@@ -82,3 +82,26 @@ def test_rows_do_not_depend_on_threads_or_neighbours():
     for threads in (1, 2, 8):
         assert np.array_equal(pn.batch(COLUMNS, threads=threads)["depth_m"], DEPTHS)
     assert pn.batch({name: column[777:778] for name, column in COLUMNS.items()})["depth_m"][0] == DEPTHS[777]
+
+
+def test_other_columns_go_with_their_rows():
+    few = {name: column[:5] for name, column in COLUMNS.items()}
+    long = "a note of more than forty characters, which nothing cuts: " + 60 * "x"
+    others = {"shot": np.arange(5.0), "note": [long, None, "b", "", "c"], "lab": "one", "ratio": 0.5, "nothing": None}
+    found = pn.batch({**few, **others})
+    assert found.columns[-5:] == ["shot", "note", "lab", "ratio", "nothing"]
+    assert np.array_equal(found["depth_m"], DEPTHS[:5]) and found["shot"].tolist() == [0, 1, 2, 3, 4]
+    assert found["note"].tolist() == [long, None, "b", "", "c"] and found["lab"].tolist() == ["one"] * 5
+    assert found["ratio"].tolist() == [0.5] * 5 and found.to_pandas()["note"][0] == long
+    times = pa.array(np.array(["2024-01-01", "2024-01-02"] * 20_000, dtype="datetime64[s]"))
+    table = pa.table({"id": pa.array(range(COUNT), pa.int64()), **COLUMNS, "time": times})
+    out = pn.batch(table, threads=2).to_arrow()
+    assert out["id"].type == pa.int64() and out["id"].combine_chunks() == table["id"].combine_chunks()
+    assert out["time"].combine_chunks() == times and np.array_equal(out["depth_m"].to_numpy(), DEPTHS)
+    assert pn.batch(table.slice(0, 3))["id"].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("name", ["depth_m", "row", "velocty_m_s", "thickness", "impact.velocity"])
+def test_columns_that_cannot_go_with_their_rows(name):
+    with pytest.raises(pn.TableError, match=name.replace(".", r"\.")):
+        pn.batch({**{known: column[:2] for known, column in COLUMNS.items()}, name: [1.0, 2.0]})

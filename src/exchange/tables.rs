@@ -100,14 +100,17 @@ impl Column {
             return Some(1.0);
         }
         let Some((stem, dimension)) = self.measure else { return self.aliases.contains(&name).then_some(1.0) };
+        let coefficient = |unit: &str| {
+            let is_alike = |known: &str| spellings(unit).iter().any(|unit| unit.to_lowercase() == known.to_lowercase());
+            let exactly = spellings(unit).iter().find_map(|unit| dimension.coefficient(unit));
+            // Names of columns are in small letters: `strength_mpa`.
+            exactly.or_else(|| {
+                dimension.units().iter().find(|known| is_alike(known)).and_then(|unit| dimension.coefficient(unit))
+            })
+        };
+        // One name may begin another: `H` of `H_target_m`.
         let mut stems = [stem].into_iter().chain(self.aliases.iter().copied());
-        let unit = stems.find_map(|stem| unit_of(name.strip_prefix(stem)?).filter(|unit| !unit.is_empty()))?;
-        let is_alike = |known: &str| spellings(unit).iter().any(|unit| unit.to_lowercase() == known.to_lowercase());
-        let exactly = spellings(unit).iter().find_map(|unit| dimension.coefficient(unit));
-        // Names of columns are in small letters: `strength_mpa`.
-        exactly.or_else(|| {
-            dimension.units().iter().find(|known| is_alike(known)).and_then(|unit| dimension.coefficient(unit))
-        })
+        stems.find_map(|stem| coefficient(unit_of(name.strip_prefix(stem)?).filter(|unit| !unit.is_empty())?))
     }
 
     /// Whether `name`, which is none of this column, may be meant for it: the whole, or with a unit at its end the part before

@@ -229,3 +229,48 @@ pub fn perforating(
     }
     Ok(Perforating { intervals, tried: (slowest, fastest), evaluations: scan.evaluations, cost: scan.cost })
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a scene that does not resolve is a failed test")]
+mod tests {
+    use super::*;
+    use crate::integrators::Taylor;
+    use crate::physics::{Concrete, CraterStiffness, Plug, Resistance, Scene};
+    use crate::studies::random::Random;
+    use crate::testing::shipped;
+
+    /// The scan asks a thousand speeds, and knows nothing of an order. Random slabs: thin and thick, weak and strong, with plenty of drag and
+    /// none, a given c and one that follows from V0; of some the plug breaks while the projectile moves, so that V_r jumps.
+    #[test]
+    fn a_plug_perforates_from_the_speed_on_that_the_scan_finds() {
+        let mut random = Random::for_part(1, "plugs");
+        let mut seen = 0;
+        for index in 0..24 {
+            let mut scene = Scene { velocity: None, ..shipped("plug") };
+            let Resistance::Concrete(Concrete { diameter, density, crater_stiffness, .. }) = &mut scene.resistance
+            else {
+                unreachable!("a slab of one concrete")
+            };
+            *density = [0.0, 2400.0, 20_000.0][index % 3];
+            if index % 4 == 3 {
+                *crater_stiffness = CraterStiffness::Given(random.log_uniform(1e6, 3e7));
+            }
+            scene.thickness = Some(*diameter * random.log_uniform(0.5, 12.0));
+            let (half_angle, shear_strength) = (80.0 * random.unit(), random.log_uniform(1e6, 40e6));
+            scene.plug = Some(Plug { half_angle, shear_strength });
+            let resolve = |speed| scene.resolve(speed);
+            let scale = (100.0, 100.0);
+            let scanned = perforating(resolve, &Taylor::default(), scale).unwrap();
+            let halved = from_one_on(resolve, &Taylor::default(), scale).unwrap();
+            assert!(halved.evaluations < 120, "{}", halved.evaluations);
+            assert_eq!(scanned.intervals.len(), halved.intervals.len(), "{index}: {scanned:?} {halved:?}");
+            for (one, other) in scanned.intervals.iter().zip(&halved.intervals) {
+                assert_eq!((one.high, other.high), (None, None), "{index}");
+                let apart = (one.low.velocity - other.low.velocity).abs();
+                assert!(apart <= one.low.error_bar + other.low.error_bar, "{index}: {one:?} {other:?}");
+                seen += 1;
+            }
+        }
+        assert!(seen > 20, "{seen}");
+    }
+}

@@ -327,6 +327,29 @@ mod tests {
         read("own.csv", format!("{HEADER}\n{}\n", rows.join("\n")).as_bytes(), "own")
     }
 
+    /// `H` begins `H_target`, and a misspelt name is none that goes unread: a depth under it would be lost without a word.
+    #[test]
+    fn a_name_that_begins_another_is_read_and_a_misspelt_one_is_refused() {
+        let read_with = |name: &str, cell: &str| {
+            let table =
+                format!("M_kg,d_mm,nose,fc_MPa,rho_kg_m3,V0_m_s,depth_mm,{name}\n2,50,flat,40,2300,200,60,{cell}\n");
+            read("own.csv", table.as_bytes(), "own")
+        };
+        for name in ["H_m", "H_target_m", "thickness_m"] {
+            assert_eq!(read_with(name, "0.3").unwrap().shots[0].scene.thickness, Some(0.3), "{name}");
+        }
+        for name in ["thicknes_m", "Thickness_m", "thickness", "oucome", "residual_velocty_m_s", "exclude_d"] {
+            let error = read_with(name, "").unwrap_err().to_string();
+            assert!(error.contains(name), "{error}");
+        }
+        for name in ["note", "depth_ratio", "length_mm", "L_mm", "certainty", "source_row", "h_mm", "mass_of_sabot"] {
+            let shots = read_with(name, "1").unwrap();
+            assert_eq!(shots.others, [name], "{name}");
+        }
+        let through = read_with("outcome", "perforated").unwrap_err().to_string();
+        assert!(through.contains("`thickness_m`") && through.contains("no such column"), "{through}");
+    }
+
     #[test]
     fn a_row_says_what_was_measured_and_what_follows_from_it() {
         let rows = [
