@@ -266,7 +266,7 @@ def leaks(count):
             pn.batch(GOOD)["outcome"], pn.Scene(mass=1.0, stage=[{"static_force": 1e6 + i}], velocity=10.0)
             pn.batch({"impact.velocity": [100.0]}, scene=scene)
             pn.critical(small)
-            for wrong in (lambda: pn.solve(scene, "euler"), lambda: pn.batch({**GOOD, "x": 1}), lambda: pn.Scene(mass=-1)):
+            for wrong in (lambda: pn.solve(scene, "euler"), lambda: pn.batch({**GOOD, "velocty_m_s": 1}), lambda: pn.Scene(mass=-1)):
                 with pytest.raises(pn.Error):
                     wrong()
 
