@@ -117,7 +117,7 @@ impl Stage {
         let mut suite = Suite::embedded()?;
         // Every kind of section and figure; the whole suite would add length, not kinds.
         let starts = "order/drag order/jump small-impact invariant peer closed-form self-convergence events stab rounding sweep map measured \
-                      layers command/slopes";
+                      layers command/slopes command/experiments";
         suite.claims.retain(|claim| starts.split(' ').any(|start| claim.id.starts_with(start)));
         let program = Program::new(Path::new(env!("CARGO_BIN_EXE_penetrode")))?;
         let inputs = Inputs { seed: 1, peers: &PeerAnswers::recorded()?, program: Some(&program), points: &[] };
@@ -348,7 +348,7 @@ fn catches_a_planted_request(stage: &Stage) -> Check {
 
 fn fits(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
-        for width in [375, 768, 1440] {
+        for width in [390, 768, 1440] {
             let found = stage.measure(folder, width, false)?;
             ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
             for key in ["folded", "unfolded"] {

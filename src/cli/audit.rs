@@ -11,9 +11,10 @@ use super::{Answer, Ask, CliError, Settings};
 use crate::exchange::input::{is_standard, name_of};
 use crate::exchange::scene_file::SceneFile;
 use crate::exchange::tables::read_bytes;
+use crate::integrators::Flight;
 use crate::physics::Problem;
 use crate::report::environment::hash;
-use crate::report::refinement::Refinement;
+use crate::report::refinement::{PathMet, Refinement};
 use crate::studies::audit::{Audit, ErrorBand, Exact, ExactValues, FormalOrders, QuantityAudit, RESULTS, Table, audit};
 use crate::studies::critical_velocity;
 use crate::studies::enclosure;
@@ -79,32 +80,35 @@ impl Ask for AuditArgs {
             let hashed = hash(format!("{table:?}"));
             (table, ("Ends of the runs, as they were read (BLAKE3)", hashed))
         };
-        let exact = scene.as_ref().map(|(scene, problem)| exact_values(scene, problem)).transpose()?;
-        let scheme = scene.and_then(|(_, problem)| identify(&problem, &results));
+        let flight = scene.as_ref().map(|(_, problem)| Truth::of(problem)).transpose()?.map(|truth| truth.flight);
+        let exact = scene.as_ref().zip(flight.as_ref());
+        let exact = exact.map(|((scene, problem), flight)| exact_values(scene, problem, flight));
+        let scheme = scene.as_ref().and_then(|(_, problem)| identify(problem, &results));
         let judged = audit(&results, &self.order.clone().unwrap_or_default(), exact.as_ref(), scheme)?;
         let written = self.report.write(&judged, |environment| {
-            let scene = self.scene.as_deref().map(|path| name_of(Path::new(path)));
+            let name = self.scene.as_deref().map(|path| name_of(Path::new(path)));
+            let path = scene.as_ref().zip(flight.as_ref());
+            let path = path.map(|((file, problem), flight)| PathMet::of(problem, &file.scene, flight));
             let exact = exact.map(|exact| ("Exact values (BLAKE3)", hash(format!("{exact:?}"))));
             let inputs = [hashed].into_iter().chain(exact).collect();
-            Refinement::of_audit(&judged, &file, scene.as_deref(), environment, inputs).report()
+            Refinement::of_audit(&judged, &file, name.as_deref().zip(path), environment, inputs).report()
         })?;
         Ok(Answer { text: text(&file, &judged) + &written, exit: judged.verdict.into(), data: Some(judged) })
     }
 }
 
 /// What the scene gives exactly.
-fn exact_values(file: &SceneFile, problem: &Problem) -> Result<ExactValues, CliError> {
+fn exact_values(file: &SceneFile, problem: &Problem, exact: &Flight) -> ExactValues {
     let SceneFile { scene, written } = file;
-    let exact = Truth::of(problem)?.flight;
-    let values = Quantity::ALL.map(|quantity| match value_of(quantity, &exact) {
-        Some(value) if is_fixed(quantity, &exact) => Exact::Fixed(value),
+    let values = Quantity::ALL.map(|quantity| match value_of(quantity, exact) {
+        Some(value) if is_fixed(quantity, exact) => Exact::Fixed(value),
         Some(value) => Exact::Free(value),
         None if quantity != Quantity::CriticalVelocity => Exact::Absent("the projectile does not reach x = k d"),
         None if !problem.has_exit() => Exact::Absent("the target has no far side"),
         None => critical_velocity::exact_or_refined(scene).map_or(Exact::Unknown, Exact::Free),
     });
     let proved = enclosure::quantities(scene, written).unwrap_or_default();
-    Ok(ExactValues { impact_velocity: problem.impact_speed, stops: exact.outcome.is_stop(), values, proved })
+    ExactValues { impact_velocity: problem.impact_speed, stops: exact.outcome.is_stop(), values, proved }
 }
 
 fn text(file: &str, judged: &Audit) -> String {

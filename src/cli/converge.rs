@@ -17,7 +17,7 @@ use crate::integrators::{MethodName, MethodOptions};
 use crate::physics::{Problem, Shown};
 use crate::report::Environment;
 use crate::report::environment::hash;
-use crate::report::refinement::{Refinement, Series, SeriesPoint, Size, words_of};
+use crate::report::refinement::{PathMet, Refinement, Series, SeriesPoint, Size, words_of};
 use crate::report::study::Prose;
 use crate::studies::asymptotic::TwoPowers;
 use crate::studies::audit::ErrorBand;
@@ -194,7 +194,7 @@ impl Ask for ConvergeArgs {
         let without = |why: String| format!("{} is not studied: {why}", Quantity::CriticalVelocity);
         let data = ConvergeJson {
             schema: "penetrode/converge/1",
-            title: scene.title,
+            title: scene.title.clone(),
             method: MethodJson::new(self.method, &options, None, None),
             seed: self.seed,
             reference: if truth.is_exact { "closed-form" } else { "taylor" },
@@ -203,7 +203,10 @@ impl Ask for ConvergeArgs {
             skipped: study.no_critical_velocity.map(without).into_iter().collect(),
         };
         let mut text = data.text(problem.impact_speed);
-        text += &self.report.write(&data, |e| data.refinement(&self.scene.path, &problem, e).report())?;
+        text += &self.report.write(&data, |e| {
+            let path = PathMet::of(&problem, &scene, &truth.flight);
+            data.refinement(&self.scene.path, &problem, path, e).report()
+        })?;
         Ok(Answer { text, exit: verdict.into(), data: Some(data) })
     }
 }
@@ -302,7 +305,7 @@ impl QuantityJson {
 
 impl ConvergeJson {
     /// The study of the scheme on the scene at `path`, for its report.
-    fn refinement(&self, path: &str, problem: &Problem, environment: Environment) -> Refinement {
+    fn refinement(&self, path: &str, problem: &Problem, met: PathMet, environment: Environment) -> Refinement {
         let file = name_of(Path::new(path));
         let size = if self.method.name == MethodName::CentralDifference.name() { Size::Step } else { Size::Tolerance };
         let reference = match self.reference {
@@ -335,6 +338,8 @@ impl ConvergeJson {
             size,
             verdict: self.verdict,
             series: self.quantities.iter().map(QuantityJson::series).collect(),
+            method: format!("{}{}", self.method.name, self.method.rules()),
+            path: Some(met),
             judged: vec![
                 ("Scheme", format!("{}{}", self.method.name, self.method.rules())),
                 ("Scene", format!("{scene} ({file}), impact velocity {} m/s", Shown(problem.impact_speed))),

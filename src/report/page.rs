@@ -19,7 +19,7 @@ use super::figure::{self, Figure};
 use super::references::{self, Reference, reference};
 use super::text::{count, number, one_line};
 use super::{Environment, Run, typeset};
-use crate::suite::{Claim, Counts, Judged, Verdict, of_cases, tables, worst};
+use crate::suite::{Claim, Counts, Judged, Verdict, grouped, of_cases, tables, worst};
 
 /// A page.
 pub(super) struct Page<'a> {
@@ -524,7 +524,7 @@ fn claims_rows<'a>(
             badge(judged.verdict),
             measured_cell(judged.measured, of_cases([judged])),
             limit_of(claim),
-            cell(&judged.remark),
+            typeset::html(&judged.remark),
         ]);
     }
     table
@@ -562,16 +562,16 @@ fn criteria(heading: &str, tables: &[&[Judged]]) -> Markup {
 
 /// The criteria of a suite, by the first part of their ids.
 fn every_criterion(tables: &[&[Judged]]) -> Markup {
-    let groups = tables.chunk_by(|a, b| a[0].claim.group() == b[0].claim.group());
-    html! { div.groups { @for group in groups { (criteria(group[0][0].claim.group(), group)) } } }
+    let groups = grouped(tables.iter().copied(), |table| table[0].claim.group());
+    html! { div.groups { @for (name, group) in &groups { (criteria(name, group)) } } }
 }
 
 /// Every claim, by the first part of the ids.
 fn every_claim(judged: &[Judged]) -> Markup {
-    html! { div.groups { @for claims in judged.chunk_by(|a, b| a.claim.group() == b.claim.group()) {
-        @let name = one_line(claims[0].claim.group());
+    html! { div.groups { @for (group, claims) in grouped(judged, |judged| judged.claim.group()) {
+        @let name = one_line(group);
         (folded(
-            html! { (name) ": " (tally(Counts::of_claims(claims))) },
+            html! { (name) ": " (tally(Counts::of_claims(claims.iter().copied()))) },
             true,
             claims_rows(&format!("Claims of {name}"), claims, |claim, is_first| html! {
                 @if is_first { span id=(anchor("claims", &claim.table)) {} }

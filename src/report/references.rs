@@ -202,7 +202,7 @@ pub const REFERENCES: [Reference; 18] = [
         title: "A software package for the numerical integration of ODEs by means of high-order Taylor methods",
         place: &[("journal", "Experimental Mathematics"), ("volume", "14"), ("number", "1"), ("pages", "99--117")],
         year: 2005,
-        doi: None,
+        doi: Some("10.1080/10586458.2005.10128904"),
     },
 ];
 

@@ -8,7 +8,10 @@ use super::figure::{Figure, name_of};
 use super::junit::Case;
 use super::study::{Cell, Element, Headline, Prose, Section, Sheet, StudyReport, interval_text, order_text};
 use super::text::{count, number, prefixed};
+use crate::integrators::Flight;
+use crate::physics::{Problem, Scene};
 use crate::studies::audit::{Audit, AuditPoint, ErrorBand, QuantityAudit};
+use crate::studies::diagnosis::{Content, contents};
 use crate::studies::error::compare;
 use crate::studies::grid_convergence::{ThreeGrids, Uncertainty};
 use crate::studies::order::Exclusion;
@@ -85,6 +88,10 @@ pub struct Refinement {
     pub verdict: Verdict,
     /// The quantities, in the order of the command.
     pub series: Vec<Series>,
+    /// The method in words.
+    pub method: String,
+    /// What the path of the scene meets; `None` where there is no scene.
+    pub path: Option<PathMet>,
     /// What was judged, and how: names and facts.
     pub judged: Vec<(&'static str, String)>,
     /// What is to be said besides.
@@ -93,6 +100,34 @@ pub struct Refinement {
     pub environment: Environment,
     /// What went in: names and hashes.
     pub inputs: Vec<(&'static str, String)>,
+}
+
+/// What the path of a scene meets.
+#[derive(Clone, Debug)]
+pub struct PathMet {
+    /// Up to its end.
+    whole: Vec<Content>,
+    /// Up to x = k d.
+    to_crater_end: Vec<Content>,
+}
+
+impl PathMet {
+    /// What the flight `exact` through `problem`, that of `scene`, meets.
+    pub fn of(problem: &Problem, scene: &Scene, exact: &Flight) -> Self {
+        let whole = contents(problem, Some(scene), exact);
+        let first = contents(problem, Some(scene), &Flight { stage: 0, ..exact.clone() });
+        let has_come = |content: &Content| Content::TERMS.contains(content) || *content == Content::StageEnd;
+        let stage_end = whole.iter().filter(|content| **content == Content::StageEnd);
+        let to_crater_end = first.iter().filter(|content| has_come(content)).chain(stage_end).copied().collect();
+        Self { whole, to_crater_end }
+    }
+
+    /// Whether the path has met it where the quantity of this name is taken.
+    fn meets(&self, quantity: &str, content: Content) -> bool {
+        let is_early =
+            [Quantity::CraterEndTime, Quantity::CraterEndVelocity].map(words_of).iter().any(|name| name == quantity);
+        if is_early { &self.to_crater_end } else { &self.whole }.contains(&content)
+    }
 }
 
 /// One quantity.
@@ -257,16 +292,17 @@ fn quantities(number: usize) -> String {
 }
 
 impl Refinement {
-    /// The audit of a table; `file` is its name, `scene` that of the scene that it was judged by.
+    /// The audit of a table; `file` is its name, `scene` that of the scene that it was judged by, and what its path meets.
     pub fn of_audit(
         audit: &Audit,
         file: &str,
-        scene: Option<&str>,
+        scene: Option<(&str, PathMet)>,
         environment: Environment,
         inputs: Vec<(&'static str, String)>,
     ) -> Self {
         let series: Vec<Series> = audit.quantities.iter().map(Series::of_audit).collect();
         let steps = series.first().map_or(0, |series| series.points.len());
+        let (scene, path) = scene.unzip();
         let against = scene.map_or("nothing exact is known of them".to_owned(), str::to_owned);
         let subject = match scene {
             Some(scene) => Prose::new(
@@ -295,6 +331,8 @@ impl Refinement {
             size: Size::Step,
             verdict: audit.verdict,
             series,
+            method: format!("the code behind {file}"),
+            path,
             judged,
             remarks,
             environment,
@@ -305,9 +343,10 @@ impl Refinement {
     /// The report.
     pub fn report(&self) -> StudyReport {
         let mut sections = vec![
-            Section { id: "result", title: "Result", parts: vec![Element::Table(self.results())] },
+            Section { id: "result", title: "Result", parts: self.result_parts() },
             Section { id: "judged", title: "What was judged, and how", parts: self.judged_parts() },
             Section { id: "convergence", title: "Convergence", parts: self.figures() },
+            Section { id: "coverage", title: "What was asked, and what passed", parts: self.coverage() },
             Section { id: "grids", title: "The classical table of three grids", parts: self.classical() },
             Section { id: "uncertainty", title: "Numerical uncertainty", parts: self.uncertainty() },
             Section { id: "rows", title: "Every size", parts: self.every_size() },
@@ -355,7 +394,7 @@ impl Refinement {
                     _ => "cannot be decided",
                 };
                 let first = open.first().map_or(String::new(), |series| format!("{}: {}", series.name, series.reason));
-                Prose::new("{0} {1}. {2}.", &[&of_all, &verb, &first])
+                Prose::new("{0} {1}. ", &[&of_all, &verb]).then(Prose::said(first + "."))
             }
         }
     }
@@ -438,26 +477,14 @@ impl Refinement {
             "95 % interval",
             expected,
             "proved",
-            "why",
         ];
-        // A pass needs no reason.
-        let has_why = self.series.iter().any(|series| series.verdict != Verdict::Passed);
         let has_proof = self.series.iter().any(|series| series.proved.is_some());
-        let shown = |name: &str| match name {
-            "why" => has_why,
-            "proved" => has_proof,
-            _ => true,
-        };
-        let is_shown = header.map(shown);
-        let header = header.into_iter().filter(|name| shown(name)).map(Prose::from);
+        let columns = header.len() - usize::from(!has_proof);
+        let header = header.into_iter().take(columns).map(Prose::from);
         // Verdicts and reasons belong to the page.
         let sheet = Sheet::cards("results", "Result by quantity".into(), header).for_papers(2..7);
         sheet.rows(&self.series, |series| {
-            let why = match &series.advice {
-                Some(advice) => format!("{}. To decide it: {advice}", series.reason),
-                None => series.reason.clone(),
-            };
-            [
+            let cells = [
                 Cell::text(series.head()),
                 Cell::Verdict(series.verdict),
                 Cell::Number(series.finest.map(|(_, value)| value), series.digits()),
@@ -467,17 +494,53 @@ impl Refinement {
                 Cell::Interval(series.interval),
                 Cell::Order(series.formal_order),
                 Cell::text(series.proved.map_or_else(String::new, |(low, high)| digits_between(low, high))),
-                Cell::text(why),
-            ]
-            .into_iter()
-            .zip(is_shown)
-            .filter_map(|(cell, shown)| shown.then_some(cell))
-            .collect::<Vec<_>>()
+            ];
+            cells.into_iter().take(columns).collect::<Vec<_>>()
         })
     }
 
+    /// The table of results, and why what did not pass did not; a pass needs no reason.
+    fn result_parts(&self) -> Vec<Element> {
+        let open = self.series.iter().filter(|series| series.verdict != Verdict::Passed);
+        let reasons = open.map(|series| {
+            let advice = series.advice.as_ref().map_or(String::new(), |advice| format!(" To decide it: {advice}."));
+            let gaps: [&dyn Display; 2] = [&series.name, &series.verdict.name()];
+            let why = Prose::said(format!("{}.{advice}", series.reason));
+            Element::Text(Prose::new("Why `{0}` is called {1}: ", &gaps).then(why))
+        });
+        [Element::Table(self.results())].into_iter().chain(reasons).collect()
+    }
+
+    /// The terms of the force and the events that the path meets against the quantities that were asked for.
+    fn coverage(&self) -> Vec<Element> {
+        let Some(path) = &self.path else { return Vec::new() };
+        let header =
+            ["the path meets".to_owned()].into_iter().chain(self.series.iter().map(|series| series.name.clone()));
+        let caption = Prose::new("Terms of the force and events against quantities, by {0}", &[&self.method]);
+        let sheet = Sheet::grid("coverage", caption, header.map(Prose::text)).for_papers(1..=self.series.len());
+        let of = |series: &Series, content: Content| {
+            let is_met = path.meets(&series.name, content);
+            Cell::Of(usize::from(is_met && series.verdict == Verdict::Passed), usize::from(is_met))
+        };
+        let sheet = sheet.rows(&path.whole, |content| {
+            let cells = self.series.iter().map(|series| of(series, *content));
+            [Cell::text(content.words())].into_iter().chain(cells).collect::<Vec<_>>()
+        });
+        let all = Content::TERMS.into_iter().chain(Content::EVENTS);
+        let others: Vec<_> = all.filter(|content| !path.whole.contains(content)).map(Content::words).collect();
+        vec![
+            Element::Table(sheet),
+            Element::Text(
+                "Each number is how many passed of those that were asked. A dash: the quantity is taken where the path has not met \
+                 it yet."
+                    .into(),
+            ),
+            Element::Text(Prose::new("The path does not meet, and nothing is shown of: {0}.", &[&others.join(", ")])),
+        ]
+    }
+
     fn judged_parts(&self) -> Vec<Element> {
-        let facts = self.judged.iter().map(|(name, fact)| (*name, Prose::text(fact)));
+        let facts = self.judged.iter().map(|(name, fact)| (*name, Prose::said(fact)));
         let mut parts = vec![Element::Facts(facts.collect())];
         parts.push(Element::Text(match self.size {
             Size::Step => "Verification asks whether the equations are solved right, by refinement of the step \
@@ -704,10 +767,9 @@ impl Refinement {
         }
         let unstated = self.series.iter().filter(|series| series.verdict != Verdict::Passed);
         for series in unstated {
-            let (name, verdict, reason) = (&series.name, series.verdict.name(), &series.reason);
-            let gaps: [&dyn Display; 3] = [name, &verdict, reason];
+            let gaps: [&dyn Display; 2] = [&series.name, &series.verdict.name()];
             parts.push(Element::Text(Prose::new(
-                "For {0} no uncertainty is stated, for its verdict is {1}: {2}.",
+                "For {0} no uncertainty is stated, for its verdict is {1}; section 1 says why.",
                 &gaps,
             )));
         }

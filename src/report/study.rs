@@ -226,7 +226,7 @@ impl StudyReport {
         text
     }
 
-    /// For a pull request: verdict, numbers, the first table, the paragraph on uncertainty, and the command.
+    /// For a pull request: verdict, numbers, the first table, what the first section says, the paragraph on uncertainty, and the command.
     fn to_markdown(&self) -> String {
         let verdict = self.verdict;
         let mut text = format!(
@@ -242,6 +242,11 @@ impl StudyReport {
         }
         if let Some(sheet) = self.tables().next() {
             let _ = write!(text, "\n{}\n", sheet.to_markdown());
+        }
+        for part in self.sections.first().into_iter().flat_map(|section| &section.parts) {
+            if let Element::Text(said) = part {
+                let _ = writeln!(text, "{}\n", said.markdown());
+            }
         }
         for paste in self.pastes() {
             let _ = writeln!(text, "{}\n", paste.markdown());

@@ -8,6 +8,7 @@
 //! 10^-j, 2^17           what is raised
 //! 1e-12, 2.5e6          10⁻¹², 2.5 × 10⁶
 //! `--rtol`              code
+//! -2.5                  −2.5, where no word and no number stands in front
 //! V0, fc, +-, ->        V₀, as f_c, ±, →
 //! 20 %                  on one line
 //! ```
@@ -79,6 +80,12 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
             let pieces = [Piece::Line(base.to_owned()), Piece::Below(below.to_owned())];
             return Some((pieces.into_iter().take(if below.is_empty() { 1 } else { 2 }).collect(), after));
         }
+    }
+    if is_start
+        && let Some(number) = rest.strip_prefix('-')
+        && number.starts_with(|c: char| c.is_ascii_digit())
+    {
+        return Some((vec![Piece::Line("−".to_owned())], number));
     }
     if is_start {
         let symbol = SYMBOLS.into_iter().filter_map(|symbol| Some((symbol, rest.strip_prefix(symbol)?)));
@@ -183,6 +190,7 @@ mod tests {
         }
         assert_eq!(page("fc, V0 +-20, a -> b"), "f<sub>c</sub>, V₀ ±20, a → b");
         assert_eq!(page("fc_mpa, V0x, sfc"), "fc_mpa, V0x, sfc");
+        assert_eq!(page("-23.01 to -2.5e6, x-2, 11-12, 1e-3-1"), "−23.01 to −2.5\u{a0}×\u{a0}10⁶, x-2, 11-12, 1e-3-1");
         assert_eq!(page("20 % of 5"), "20\u{a0}% of 5");
         assert_eq!(page("<b> & V_c"), "&lt;b&gt; &amp; V<sub>c</sub>");
     }

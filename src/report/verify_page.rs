@@ -221,7 +221,8 @@ fn scenes(run: &Run<'_>) -> Markup {
             number_cell(groups.map(|groups| groups.geometry.unwrap_or(f64::INFINITY)), 5),
             html! { @for (index, s) in problem.stages.iter().enumerate() {
                 @if index > 0 { br; }
-                ([s.static_force, s.stiffness, s.viscosity, s.drag, s.end].map(|value| number(value, 6)).join(", "))
+                @if problem.laws.of(index).is_some() { "a law of the scene, until " (number(s.end, 6)) }
+                @else { ([s.static_force, s.stiffness, s.viscosity, s.drag, s.end].map(|value| number(value, 6)).join(", ")) }
             } },
         ]
     });

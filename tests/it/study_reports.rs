@@ -124,6 +124,17 @@ fn the_report_of_a_scheme_shows_its_orders_its_table_and_its_uncertainty() {
     let errors = quantities.iter().map(|quantity| quantity["points"][0]["error"].as_f64().unwrap());
     let largest = two_digits(errors.fold(0.0, f64::max));
     assert!(page.contains(&format!("Largest error{largest}relative, of ")), "{largest}: {page:.900}");
+    // The drag acts behind x = k d: what is taken there has not met it.
+    let coverage = report.file("tables/coverage.csv");
+    let row = |name: &str| {
+        coverage.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {coverage}"))
+    };
+    assert_eq!(row("stiffness,"), "stiffness,1,1,1,1,1,1,1,1");
+    assert_eq!(row("drag,"), "drag,1,1,1,1,0,0,0,0");
+    assert!(
+        page.contains("The path does not meet, and nothing is shown of: drive, later stiffness, viscosity,"),
+        "{page:.900}"
+    );
     let table = report.file("tables/grid-convergence.csv");
     let tex = report.file("uncertainty.tex");
     for (index, quantity) in quantities.iter().enumerate() {
@@ -171,6 +182,9 @@ fn the_report_of_a_table_names_it_and_what_is_wrong_with_it() {
     assert!(page.contains("1 of 2 quantities fail"), "{page:.900}");
     // The values approach 135 m/s where the projectile rests: the error is 135.125/300, and not that against their limit.
     assert!(page.contains("Largest error0.45relative, of velocity at Δt = 500 ns"), "{page:.900}");
+    assert!(bad.file("tables/coverage.csv").contains("\nrest,0,1,0,1\n"), "{}", bad.file("tables/coverage.csv"));
+    let why = "Why velocity is called failed: the values approach 135.";
+    assert!(page.contains(why) && bad.file("summary.md").contains("is called failed&#58; the values"), "{page:.900}");
     let unstated = "For velocity no uncertainty is stated, for its verdict is failed";
     assert!(page.contains(unstated) && !bad.file("uncertainty.tex").contains("velocity"));
     assert!(bad.file("junit.xml").contains("<failure message=\"velocity 1.35125e2 m/s, error band "));

@@ -12,7 +12,7 @@ use std::fmt::Display;
 use maud::{Markup, Render, html};
 
 use crate::report::references::{Reference, citation, reference};
-use crate::report::{latex, summary};
+use crate::report::{latex, summary, typeset};
 use crate::text::one_line;
 
 /// A text with citations and symbols.
@@ -38,6 +38,7 @@ impl Symbol {
 #[derive(Clone, Debug, PartialEq)]
 enum Piece {
     Text(String),
+    Said(String),
     Code(String),
     Symbol(Symbol),
     Cite(Vec<&'static Reference>),
@@ -91,6 +92,12 @@ impl Prose {
         Self(vec![Piece::Text(text.to_string())])
     }
 
+    /// A sentence of the program, whose formulas are set where they can be.
+    #[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
+    pub fn said(text: impl ToString) -> Self {
+        Self(vec![Piece::Said(text.to_string())])
+    }
+
     /// A text of the run as code.
     #[expect(clippy::needless_pass_by_value, reason = "every caller makes it in place")]
     pub fn code(text: impl ToString) -> Self {
@@ -118,6 +125,7 @@ impl Prose {
         html! { @for piece in &self.0 {
             @match piece {
                 Piece::Text(text) => (one_line(text)),
+                Piece::Said(text) => (typeset::html(text)),
                 Piece::Code(text) => code { (one_line(text)) },
                 Piece::Symbol(Symbol { base, below, above }) => {
                     var { (base) }
@@ -132,7 +140,7 @@ impl Prose {
     /// For LaTeX; citations need `references.bib`.
     pub fn latex(&self) -> String {
         let piece = |piece: &Piece| match piece {
-            Piece::Text(text) => latex::escape(text),
+            Piece::Text(text) | Piece::Said(text) => latex::escape(text),
             Piece::Code(text) => format!("\\texttt{{{}}}", latex::escape(text)),
             Piece::Symbol(symbol) => latex::symbol(*symbol),
             Piece::Cite(works) => {
@@ -147,6 +155,7 @@ impl Prose {
     pub fn markdown(&self) -> String {
         self.without_citations(|piece| match piece {
             Piece::Text(text) => summary::escape(text),
+            Piece::Said(text) => typeset::markdown(text),
             Piece::Code(text) => summary::code(text),
             Piece::Symbol(symbol) => summary::escape(&symbol.plain()),
             Piece::Cite(_) => String::new(),
@@ -156,7 +165,7 @@ impl Prose {
     /// Without any markup: for tables of data and for test views.
     pub fn plain(&self) -> String {
         self.without_citations(|piece| match piece {
-            Piece::Text(text) | Piece::Code(text) => text.clone(),
+            Piece::Text(text) | Piece::Said(text) | Piece::Code(text) => text.clone(),
             Piece::Symbol(symbol) => symbol.plain(),
             Piece::Cite(_) => String::new(),
         })

@@ -11,6 +11,7 @@ use crate::studies::error::{Truth, condition_of, flight_error, is_fixed, signed_
 use crate::studies::quantity::Quantity;
 use crate::studies::random_scenes;
 use crate::suite::recorded::shipped;
+use crate::text::or_dash;
 
 check! {
     /// Closed form against the 50-digit reference, over the claim's scene and `random` more drawn from the seed; worst
@@ -82,7 +83,7 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
     applies!(is_independent, "no exact answer, and the refined one is the method's own");
     let flight = solve(&method, problem, Detail::Events)?;
     if flight.outcome == physics::Outcome::Undecided {
-        let remark = format!("undecided: margin {:?} within {:?}", flight.exit_margin, flight.exit_margin_error);
+        let remark = format!("undecided: {}", margin_of(&flight));
         return Err(NotMeasured::undecided(remark));
     }
     holds!(flight.outcome.agrees_with(exact.outcome), "{} where {} is right", flight.outcome, exact.outcome);
@@ -149,11 +150,17 @@ fn margin(&Margin { points }: &Margin, subject: &Subject<'_>) -> Found {
     Ok(worst.measurement())
 }
 
+/// `margin 5e-15 +- 2e-15`.
+fn margin_of(flight: &Flight) -> String {
+    let [margin, error] =
+        [flight.exit_margin, flight.exit_margin_error].map(|value| or_dash(value, |value| format!("{value:.2e}")));
+    format!("margin {margin} +- {error}")
+}
+
 fn outcome(Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::End)?;
     let right = flight.outcome.name() == is || flight.outcome == physics::Outcome::Undecided;
-    Ok(Measurement::count(usize::from(!right))
-        .remark(format!("{}, margin {:?} +- {:?}", flight.outcome, flight.exit_margin, flight.exit_margin_error)))
+    Ok(Measurement::count(usize::from(!right)).remark(format!("{}, {}", flight.outcome, margin_of(&flight))))
 }
 
 fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
