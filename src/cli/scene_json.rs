@@ -119,10 +119,14 @@ pub struct OwnParameterJson {
     pub unit: String,
 }
 
-/// The forces of `scene` that are expressions.
+/// The forces of `scene` that are expressions, and of those that are tables of velocity what they hold.
 pub fn forces(scene: &Scene) -> impl Iterator<Item = ForceJson> {
     scene.forces.iter().filter_map(|(stage, force)| match force {
         Force::Expression(tape) => Some(ForceJson { stage: *stage, force: tape.to_text() }),
+        Force::SpeedTable(table) => {
+            let text = format!("a table of V: {} rows, 0 to {} m/s", table.rows().len(), Shown(table.last()));
+            Some(ForceJson { stage: *stage, force: text })
+        }
         Force::Table(_) => None,
     })
 }

@@ -80,6 +80,7 @@ pub const SHIPPED: &[(&str, &str)] = shipped![
     "law-two-layers",
     "law-allen",
     "law-plug",
+    "law-speed-table",
 ];
 
 /// The text of the shipped scene `name`.
@@ -717,7 +718,7 @@ impl<'t> Reader<'t> {
             let places = stages.iter().rev().map(|before| before.end);
             let previous = places.into_iter().find(|end| *end < f64::INFINITY).unwrap_or(0.0);
             let force = self.force(index, previous, &parameters)?;
-            let is_law = matches!(force, Some(Force::Expression(_)));
+            let is_law = matches!(force, Some(Force::Expression(_) | Force::SpeedTable(_)));
             forces.extend(force.map(|force| (index, force)));
             let mut value = |which| self.value(Parameter::Stage(index, which));
             let stage = if is_law {
@@ -874,11 +875,18 @@ impl<'t> Reader<'t> {
             let (message, allowed) = ("this stage ends on two conditions", "one of `end_velocity` and `until`");
             return Err(Fault::new(key.clone(), message, allowed, "remove one of the two"));
         }
-        let is_table = self.at(&format!("stage.{index}.force.table")).is_some();
-        if let (Some(key), true) = (given[0].as_ref().or(given[1].as_ref()), is_table) {
+        let is_there = |key: &str| self.at(&format!("stage.{index}.force.{key}")).is_some();
+        let (is_table, is_of_velocity) = (is_there("table"), is_there("V"));
+        let excluded = given[1].as_ref().or(given[0].as_ref().filter(|_| !is_of_velocity));
+        if let (Some(key), true) = (excluded, is_table) {
             let message = "this stage has a table for its force, and ends on a condition";
             let help = "write the force as an expression, or end the stage at a depth";
-            return Err(Fault::new(key.clone(), message, "an `end` beside a table", help));
+            let allowed = if is_of_velocity {
+                "an `end` or an `end_velocity` beside a table of velocity"
+            } else {
+                "an `end` beside a table of depth"
+            };
+            return Err(Fault::new(key.clone(), message, allowed, help));
         }
         let condition = match self.number(velocity)? {
             Some(velocity) => Some(Ending::Velocity(velocity)),
@@ -928,9 +936,11 @@ impl<'t> Reader<'t> {
         if let Some((text, whole)) = self.word(&home) {
             return Ok(Some(Force::Expression(self.expression(&text, whole, parameters)?)));
         }
-        if let Some((key, _)) = self.at(&format!("{home}.V")) {
-            let help = "give the force over the depth: x = \"depth_mm\"";
-            return Err(Fault::new(key, "a table of the velocity is not known yet", "`x`, a column of depths", help));
+        let (depth, velocity) = (self.at(&format!("{home}.x")), self.at(&format!("{home}.V")));
+        if let (Some(_), Some((key, _))) = (&depth, &velocity) {
+            let message = "the table is one of depth and one of velocity";
+            let help = "remove one of the two; a force of both is an expression";
+            return Err(Fault::new(key.clone(), message, "one of `x` and `V`", help));
         }
         let word = |key: &str, example: &str| {
             self.word(&format!("{home}.{key}")).ok_or_else(|| {
@@ -938,7 +948,12 @@ impl<'t> Reader<'t> {
                 DIALECT.missing("stage.force", self.place(&home), key, help)
             })
         };
-        let (name, x, load) = (word("table", "r.csv")?, word("x", "depth_mm")?, word("force", "force_kN")?);
+        let name = word("table", "r.csv")?;
+        if velocity.is_some() {
+            let (v, load) = (word("V", "speed_m_s")?, word("force", "force_kN")?);
+            return Ok(Some(Force::SpeedTable(force_table::read_of_velocity(self.file, &name, &v, &load)?)));
+        }
+        let (x, load) = (word("x", "depth_mm")?, word("force", "force_kN")?);
         let table = force_table::read(self.file, &name, &x, &load)?;
         let (first, last) = (table.first(), table.last());
         if first <= start && start < last {

@@ -4,11 +4,14 @@
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample, Solved, refuse_laws};
-use crate::physics::closed_form::{cross, cross_continuous_crater, margin_error};
-use crate::physics::{CraterStiffness, Problem, Stage, State};
+use crate::physics::closed_form::{Line, cross, cross_continuous_crater, margin_error};
+use crate::physics::{CraterStiffness, EventKind, Law, Problem, Stage, State};
 
 /// Bound on the places tried for a time; halving alone takes 53, and the parabola three or four.
 const PLACE_STEPS_MAX: u32 = 80;
+
+/// Roundings of V² and of the work over the depth in one piece of a table of velocity.
+const ROUNDINGS_OF_PIECE: f64 = 8.0;
 
 /// Parts of the distance between two events in a trajectory.
 const INTERVALS: u32 = 64;
@@ -37,7 +40,7 @@ impl Integrator for ClosedForm {
     }
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
-        refuse_laws(problem, self.name())?;
+        refuse(problem)?;
         let is_path = matches!(detail, Detail::Trajectory);
         let listed = if is_path { Detail::Events } else { detail };
         let mut flight = flight::solve(problem, listed, &mut Exact { continuous: false })?;
@@ -90,9 +93,18 @@ pub fn state_at(problem: &Problem, depth: f64) -> Solved<Option<State>> {
     if !(0.0..=problem.exit_depth).contains(&depth) || depth.is_infinite() {
         return Ok(None);
     }
-    refuse_laws(problem, ClosedForm.name())?;
+    refuse(problem)?;
     let end = flight::solve(&problem.clone().with_exit(depth), Detail::End, &mut Exact { continuous: false })?.end;
     Ok((end.depth == depth).then_some(end))
+}
+
+/// Refuses a problem with a law of its own that is no table of velocity.
+fn refuse(problem: &Problem) -> Solved<()> {
+    let has_form = |index: usize| {
+        let law = problem.laws.of(index);
+        law.is_none_or(|law| law.table().is_some() && law.joining(0.0).is_none())
+    };
+    if (0..problem.stages.len()).all(has_form) { Ok(()) } else { refuse_laws(problem, ClosedForm.name()) }
 }
 
 /// The formulas, stage by stage.
@@ -107,6 +119,10 @@ impl StageSolver<f64> for Exact {
     fn solve_stage(&mut self, course: &mut Course<'_>) -> Solved<StageEnd> {
         let (problem, stage, entry) = (course.problem, course.stage, course.state);
         let limit = problem.limit_of(stage);
+        if let Some(line) = course.law().and_then(Law::line) {
+            course.limit()?;
+            return cross_piece(course, &line, limit);
+        }
         let end = if self.continuous && problem.crater == Some(stage) {
             cross_continuous_crater(problem, limit)
         } else {
@@ -130,9 +146,31 @@ impl StageSolver<f64> for Exact {
     }
 
     fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
+        if !course.problem.laws.is_empty() {
+            return Ok(course.margin());
+        }
         let value = course.margin().value;
         Ok(Bounded { value, bound: margin_error(course.problem, course.stage, course.state.depth, value) })
     }
+}
+
+/// A piece of a table of velocity, from the state of `course` to `limit`.
+fn cross_piece(course: &mut Course<'_>, line: &Line, limit: f64) -> Solved<StageEnd> {
+    let (entry, mass) = (course.state, course.mass);
+    let end = line.cross(mass, entry, limit);
+    let state = end.state();
+    if !state.is_finite() {
+        return Err(IntegrationError::NotFinite { what: "the closed form", last: entry });
+    }
+    course.sample_until(state, |time| line.after(mass, entry, time - entry.time));
+    // Of W, by roundings of V and of the depth; it grows and falls as the force does.
+    let forces = [entry.velocity, state.velocity].map(|v| line.force(v).abs());
+    let fastest = entry.velocity.max(state.velocity);
+    let growth = (-line.slope / mass * (state.time - entry.time)).exp();
+    let added = ROUNDINGS_OF_PIECE * (fastest * fastest + 2.0 * forces[0].max(forces[1]) * state.depth / mass);
+    let relative = 1.0 / course.problem.impact_speed;
+    course.error_bound = course.error_bound * growth + f64::EPSILON * relative * relative * added;
+    Ok(end)
 }
 
 /// The state at `time` (s) on the way from `entry` to `end` through `law`: the place is sought whose formulas give that time.
@@ -171,7 +209,7 @@ fn state_in(law: &Stage, mass: f64, entry: State, end: State, time: f64) -> Stat
 /// As [`ClosedForm`].
 pub fn path(problem: &Problem, flight: &Flight, intervals: u32, place: impl Fn(f64) -> f64) -> Solved<Vec<Sample>> {
     let sample = |state: State, stage: usize| {
-        let force = problem.stages[stage].force(state.depth, state.velocity);
+        let force = problem.force(stage, state.depth, state.velocity);
         Sample { state, force, stage }
     };
     let mut from = State::at_impact(problem);
@@ -190,7 +228,8 @@ pub fn path(problem: &Problem, flight: &Flight, intervals: u32, place: impl Fn(f
             }
         }
         samples.push(sample(to, stage));
-        if stage < flight.stage && problem.stages[stage].end <= to.depth {
+        let ends = problem.stages[stage].end <= to.depth || matches!(event.kind, EventKind::StageEnd(_));
+        if stage < flight.stage && ends {
             stage += 1;
             samples.push(sample(to, stage));
         }

@@ -353,7 +353,7 @@ impl Reduced {
             return Err(IntegrationError::NotFinite { what: "the force over the mass", last: start });
         }
         course.limit()?;
-        let own = problem.laws.of(course.stage).map(|law| OwnLaw {
+        let own = course.law().map(|law| OwnLaw {
             law: law.clone(),
             start: start.depth,
             length,
@@ -391,7 +391,7 @@ impl Reduced {
             StageEnd::Limit(at) => StageEnd::Limit(State { depth: course.limit()?, ..state(at) }),
             StageEnd::Condition(at) => {
                 let at = state(at);
-                StageEnd::Condition(course.condition().map_or(at, |end| end.settled(at)))
+                StageEnd::Condition(course.law().and_then(Law::end).map_or(at, |end| end.settled(at)))
             }
             StageEnd::Rest(at) => StageEnd::Rest(state(at)),
             StageEnd::Approach(at, why) => StageEnd::Approach(state(at), why),
@@ -436,7 +436,9 @@ impl OwnLaw {
     ) -> Result<(), DiffsolError> {
         let force = |node: Node| self.force(&[node.depth, node.velocity]);
         let falls = [before, after].map(|node| -self.slopes(&[node.depth, node.velocity]).1);
-        seen.growth += (after.time - before.time) * falls[0].max(falls[1]).max(0.0);
+        // On a piece of a table of velocity F_V is one number, and errors fall by it too.
+        let fall = if self.law.line().is_some() { falls[0] } else { falls[0].max(falls[1]).max(0.0) };
+        seen.growth += (after.time - before.time) * fall;
         if !(force(before) > 0.0 && force(after) < 0.0) {
             return Ok(());
         }
@@ -638,7 +640,8 @@ struct Seen {
     kink: Option<f64>,
     /// Of a law of its own: least velocity where the force changes from slowing to driving [V0].
     least: f64,
-    /// Integral of `-F_V` over the time where it is positive: the logarithm by which an error of `W/V0²` may have grown.
+    /// Integral of `-F_V` over the time where it is positive, of a piece of a table over all: the logarithm by which an error of
+    /// `W/V0²` may have grown, or has fallen.
     growth: f64,
 }
 
@@ -650,10 +653,13 @@ impl Seen {
     /// Widens the error bound of `W/V0²` by what `steps` of the scheme at a tolerance leave; by a law of its own also by what
     /// the library allows each step, and by the growth of both.
     fn widen_bound(&self, course: &mut Course<'_>, stage: &Reduced, (scheme, rtol): (Scheme, f64), steps: f64) {
-        course.error_bound += (scheme.margin_error(rtol) + 4.0 * f64::EPSILON * steps) * self.energy_max;
-        if stage.own.is_some() {
-            let of_steps = ERROR_OF_STEP * scheme.library_rtol(rtol) * steps * self.energy_max;
-            course.error_bound = (course.error_bound + of_steps) * self.growth.exp();
+        let of_scheme = (scheme.margin_error(rtol) + 4.0 * f64::EPSILON * steps) * self.energy_max;
+        if stage.own.is_none() {
+            course.error_bound += of_scheme;
+        } else {
+            let added = of_scheme + ERROR_OF_STEP * scheme.library_rtol(rtol) * steps * self.energy_max;
+            // What is added late falls no more.
+            course.error_bound = course.error_bound * self.growth.exp() + added * self.growth.max(0.0).exp();
             course.pass_least(self.least * stage.unit_speed);
         }
     }

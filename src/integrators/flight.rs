@@ -13,7 +13,7 @@ use std::cmp::Ordering;
 use super::outcome::{Cost, Detail, Events, Flight, IntegrationError, Sample, Solved};
 use crate::physics::exit_energy::{energy_beyond_stop_of, speed_missing};
 pub(crate) use crate::physics::problem::StageEnd;
-use crate::physics::{Condition, Event, EventKind, Outcome, Problem, Scalar, Stage, State, Target};
+use crate::physics::{Condition, Event, EventKind, Law, Outcome, Problem, Scalar, Stage, State, Target};
 
 /// What is said of a place that is reached without speed, if it is reached.
 const LEAST_TIME: &str = "the speed vanishes towards the end: the time is the least possible, until 2e-16 of the speed is \
@@ -24,6 +24,12 @@ pub(crate) const SLOW: f64 = 1e-6;
 
 /// Why a law of its own brings nothing to rest.
 pub(crate) const VANISHES: &str = "its resistance vanishes with the velocity, so that it is only slowed for ever";
+
+/// Why nothing ends a stage that drives.
+const DRIVES: &str = "the last stage drives the projectile and has no far side";
+
+/// Why a table of velocity brings nothing to rest.
+const TERMINAL: &str = "the force of its table vanishes at a speed that it approaches for ever, and there is no far side";
 
 /// A method, as the loop sees it.
 pub(crate) trait StageSolver<S: Scalar> {
@@ -96,6 +102,8 @@ pub(crate) struct Course<'a, S = f64> {
     least_at_ends: Bounded,
     /// The stage that ended on its condition in the present state.
     just_met: Option<usize>,
+    /// In a stage whose force is a table of velocity, the law of the piece on which the projectile is.
+    piece: Option<&'a Law<S>>,
 }
 
 impl<'a, S: Scalar> Course<'a, S> {
@@ -118,6 +126,16 @@ impl<'a, S: Scalar> Course<'a, S> {
             passed: 0,
             least_at_ends: Bounded::NONE,
             just_met: None,
+            piece: None,
+        }
+    }
+
+    /// The law of its own that a method has to solve: that of the present stage, of a table of velocity that of the piece.
+    #[inline(always)]
+    pub(crate) fn law(&self) -> Option<&'a Law<S>> {
+        match self.piece {
+            None => self.problem.laws.of(self.stage),
+            piece => piece,
         }
     }
 
@@ -142,11 +160,18 @@ impl<'a, S: Scalar> Course<'a, S> {
     fn limitless(&self) -> Solved<S> {
         self.refuse_unknown_force()?;
         let law = &self.problem.stages[self.stage];
-        if self.problem.laws.of(self.stage).is_some() {
+        if let Some(own) = self.problem.laws.of(self.stage) {
+            let last = self.state.values();
+            if own.end().is_none() && own.table().is_some_and(|table| table.terminal(last.velocity).is_some()) {
+                return Err(IntegrationError::NeverEnds { why: TERMINAL, last });
+            }
+            if own.end().is_none() && own.never_slows(last.depth) {
+                return Err(IntegrationError::NeverEnds { why: DRIVES, last });
+            }
             return Ok(S::from_f64(f64::INFINITY));
         }
         let why = if law.static_force.value() < 0.0 || law.stiffness.value() < 0.0 {
-            "the last stage drives the projectile and has no far side"
+            DRIVES
         } else if law.viscosity.value() == 0.0 && law.drag.value() == 0.0 {
             "the last stage has no resistance and no far side"
         } else {
@@ -162,6 +187,18 @@ impl<'a, S: Scalar> Course<'a, S> {
             return Err(IntegrationError::TableEnds { last: self.state.values() });
         }
         Ok(())
+    }
+
+    /// Error where the projectile goes on to velocities behind the last row of a table.
+    #[cold]
+    pub(crate) fn refuse_unknown_speed(&self) -> Solved<()> {
+        let last = self.state.values();
+        match self.problem.laws.of(self.stage).and_then(Law::table) {
+            Some(table) if table.piece(last.velocity).is_none() => {
+                Err(IntegrationError::SpeedTableEnds { end: table.last(), last })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Adds a row to the trajectory, if one is wanted: `state`, in the present stage.
@@ -482,6 +519,31 @@ fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is
     course.finish((is_through && moves).then_some(Bounded { value: 1.0, bound: 0.0 }))
 }
 
+/// Solves the present stage, whose force is a table of velocity, piece by piece: V falls or rises from row to row.
+#[cold]
+fn through_table<S: Scalar>(course: &mut Course<'_, S>, method: &mut impl StageSolver<S>) -> Solved<StageEnd<S>> {
+    let own = course.problem.laws.of(course.stage);
+    let rows = own.and_then(Law::table).map_or(0, |table| table.rows().len());
+    let ends_at = |state| own.and_then(Law::end).is_some_and(|end| end.is_met(state));
+    for _ in 0..=rows {
+        course.refuse_unknown_speed()?;
+        course.piece = own.and_then(|law| law.piece(course.state.velocity.value()));
+        let was_in_doubt = course.is_in_doubt;
+        let end = method.solve_stage(course);
+        course.piece = None;
+        match end? {
+            StageEnd::Condition(state) if !ends_at(state) => {
+                // The force is the same on both sides of a row: whether one that is touched is passed changes nothing.
+                course.is_in_doubt = was_in_doubt;
+                course.state = state;
+                course.sample(state);
+            }
+            end => return Ok(end),
+        }
+    }
+    Err(IntegrationError::NeverEnds { why: "each piece of its table is passed", last: course.state.values() })
+}
+
 /// Solves `problem` stage by stage with `method`.
 ///
 /// A stage end or an exit that is reached without speed counts as reached. A stage without length is passed where it
@@ -509,7 +571,9 @@ pub(crate) fn solve<S: Scalar>(
             break;
         }
         course.just_met = None;
-        let rests = match method.solve_stage(&mut course)? {
+        let is_table = course.law().is_some_and(|law| law.table().is_some());
+        let end = if is_table { through_table(&mut course, method)? } else { method.solve_stage(&mut course)? };
+        let rests = match end {
             StageEnd::Limit(state) => {
                 course.state = state;
                 false

@@ -29,6 +29,10 @@ mod laws;
 pub mod locate;
 pub mod method;
 pub mod outcome;
+#[cfg(test)]
+#[path = "tests/speed_tables.rs"]
+#[expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+mod speed_tables;
 pub mod taylor;
 
 pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};

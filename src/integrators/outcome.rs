@@ -171,6 +171,17 @@ pub enum IntegrationError {
         /// State at the last row.
         last: State,
     },
+    /// The table of velocity that gives the force ends below the velocity that the projectile has.
+    #[error(
+        "the table of the force ends at V = {} m/s, and the projectile has V = {} m/s at x = {} m, t = {} s after impact",
+        Shown(*.end), Shown(.last.velocity), Shown(.last.depth), Shown(.last.time)
+    )]
+    SpeedTableEnds {
+        /// Velocity of the last row (m/s).
+        end: f64,
+        /// State from which it does not go on.
+        last: State,
+    },
     /// The method cannot treat this problem: a mistake of the caller, exit code 2.
     #[error("{method} cannot treat this scene: {why}")]
     Refused {
@@ -243,6 +254,7 @@ impl Advice for IntegrationError {
             Self::TableEnds { .. } => {
                 "add rows to the table, or end its stage (`end`) or the target (`thickness`) before its last row"
             }
+            Self::SpeedTableEnds { .. } => "add rows to the table, up to the velocities that a projectile has there",
             Self::NoForce { .. } | Self::NoEnd { .. } => {
                 "bound the argument with max or min, end the stage before that place, or try --method tsit45"
             }
@@ -258,6 +270,7 @@ impl Advice for IntegrationError {
             | Self::NotFinite { last, .. }
             | Self::NeverEnds { last, .. }
             | Self::TableEnds { last }
+            | Self::SpeedTableEnds { last, .. }
             | Self::NoForce { last, .. }
             | Self::NoEnd { last, .. }
             | Self::SolverFailed { last, .. } => Some(*last),

@@ -156,6 +156,9 @@ impl Integrator for Taylor {
 
     fn explain(&self, problem: &Problem, flight: &Flight) -> Vec<String> {
         let treatment = |index: usize, law: &Stage| match Shape::of(law) {
+            _ if problem.laws.of(index).is_some_and(|law| law.table().is_some()) => {
+                "a table of velocity: series on each of its pieces, F = p + r V"
+            }
             _ if problem.laws.of(index).is_some() => {
                 "a law of its own: series of its expression, over time or velocity"
             }
@@ -364,7 +367,7 @@ impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> 
         let problem = course.problem;
         let law = &problem.stages[course.stage];
         let limit = course.limit()?;
-        if let Some(law) = problem.laws.of(course.stage) {
+        if let Some(law) = course.law() {
             return self.0.through_law::<S, K>(course, law, limit);
         }
         match Shape::of(law) {

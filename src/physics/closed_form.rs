@@ -426,6 +426,129 @@ fn atan_over(z: f64) -> f64 {
     if z == 0.0 { 1.0 } else { z.atan() / z }
 }
 
+/// A force linear in V, `F = f + r (V - v)`, r of any sign: a piece of a table of velocity, and the speed at which it ends.
+///
+/// With `dV = V0 - V`, `u = F/F0 - 1` and the means `A = ln(1+u)/u`, `C = ((1+u) ln(1+u) - u)/u²` of `1/(1+us)` and
+/// `(1-s)/(1+us)` over s from 0 to 1:
+///
+/// ```text
+/// t(V) = (M dV/F0) A,   x(V) = (M dV/F0) (V A + dV C)
+/// V(t) = V0 - (F0 t/M) E(-r t/M),   x(t) = V0 t - (F0 t²/M) E2(-r t/M),   E(z) = expm1(z)/z, E2(z) = (expm1(z) - z)/z²
+/// ```
+///
+/// t(x) is the root of x(t), to which Newton's method comes from one side, as V keeps its sign and only falls or rises.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Line {
+    /// f (N).
+    pub(crate) force: f64,
+    /// r (kg/s).
+    pub(crate) slope: f64,
+    /// v (m/s).
+    pub(crate) velocity: f64,
+    /// Where it ends (m/s), on the side to which V goes; rest without one.
+    pub(crate) end: Option<f64>,
+}
+
+/// Bound on the steps of Newton's method for the time at a depth: it takes six as a rule, fifty at a double root.
+const TIME_STEPS_MAX: u32 = 200;
+
+impl Line {
+    /// F (N) at `v` (m/s).
+    pub(crate) fn force(&self, v: f64) -> f64 {
+        self.force + self.slope * (v - self.velocity)
+    }
+
+    /// The state `time` (s) after `entry`.
+    pub(crate) fn after(&self, mass: f64, entry: State, time: f64) -> State {
+        let (rate, deceleration) = (self.slope / mass, self.force(entry.velocity) / mass);
+        let z = -rate * time;
+        let velocity = entry.velocity - deceleration * time * expm1_over(z);
+        let distance = if z.abs() < 1.0 || self.slope < 0.0 {
+            time * (entry.velocity - deceleration * time * expm1_over_twice(z))
+        } else {
+            // About the speed at which F is zero.
+            let excess = deceleration / rate;
+            (entry.velocity - excess) * time - excess * z.exp_m1() / rate
+        };
+        State { time: entry.time + time, depth: entry.depth + distance, velocity }
+    }
+
+    /// From `entry` to the end of the piece, to rest, or to `limit` before that.
+    pub(crate) fn cross(&self, mass: f64, entry: State, limit: f64) -> StageEnd {
+        let (v0, room) = (entry.velocity, limit - entry.depth);
+        let force = self.force(v0);
+        let end = self.end.unwrap_or(0.0);
+        let (fall, at_end) = (v0 - end, self.force(end));
+        let u = at_end / force - 1.0;
+        // A force that vanishes with V is approached, from a distance that is finite.
+        if end == 0.0 && at_end == 0.0 {
+            let viscous = Stage { viscosity: self.slope, ..Stage::free() };
+            return cross_viscous(&viscous, mass, entry, limit);
+        }
+        let gets_there = force != 0.0 && u > -1.0;
+        if gets_there {
+            let (mean, late) = means(u);
+            let time = mass * fall / force * mean;
+            let distance = mass * fall / force * (end * mean + fall * late);
+            if distance <= room && time.is_finite() {
+                let state = State { time: entry.time + time, depth: entry.depth + distance, velocity: end };
+                return if end == 0.0 { rests(entry, time, distance) } else { StageEnd::Condition(state) };
+            }
+        }
+        if room == f64::INFINITY {
+            return StageEnd::Approach(entry, "the force of its table vanishes at a speed");
+        }
+        // x(t) bends one way, and V0 t lies on the side from which no step goes too far.
+        let mut time = room / v0;
+        for _ in 0..TIME_STEPS_MAX {
+            let here = self.after(mass, entry, time);
+            let next = time + (room - (here.depth - entry.depth)) / here.velocity;
+            let is_last = !((next - time).abs() > f64::EPSILON * time) || here.velocity <= 0.0;
+            if !is_last {
+                time = next;
+                continue;
+            }
+            break;
+        }
+        let there = self.after(mass, entry, time);
+        let (low, high) = if force > 0.0 { (end, v0) } else { (v0, end.max(v0)) };
+        passes(entry, limit, time, there.velocity.clamp(low, high))
+    }
+}
+
+/// `A` and `C` of [`Line`], for a `change` u > -1.
+fn means(change: f64) -> (f64, f64) {
+    if change.abs() < 0.1 {
+        // Both by their series: the integrals of (-us)^k and (1-s) (-us)^k.
+        let (mut mean, mut late, mut power) = (0.0, 0.0, 1.0);
+        for k in 0..MEAN_TERMS {
+            let order = f64::from(k) + 1.0;
+            mean += power / order;
+            late += power / (order * (order + 1.0));
+            power *= -change;
+        }
+        return (mean, late);
+    }
+    let log = change.ln_1p();
+    (log / change, ((1.0 + change) * log - change) / (change * change))
+}
+
+/// Terms of a series in u, at most a tenth.
+const MEAN_TERMS: u32 = 17;
+
+/// `(expm1(z) - z)/z²`, half at zero.
+fn expm1_over_twice(z: f64) -> f64 {
+    if z.abs() < 1.0 {
+        let (mut term, mut sum) = (0.5, 0.0);
+        for k in 3..22 {
+            sum += term;
+            term *= z / f64::from(k);
+        }
+        return sum;
+    }
+    (z.exp_m1() - z) / (z * z)
+}
+
 /// `atanh(z)/z`, 1 at zero.
 fn atanh_over(z: f64) -> f64 {
     if z == 0.0 { 1.0 } else { z.atanh() / z }

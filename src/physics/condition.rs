@@ -31,7 +31,7 @@ pub struct Condition<S = f64> {
 /// What kind of an end it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A speed, from above.
+    /// A speed, from above; of a piece of a table also from below.
     Speed,
     /// A zero of g, from either side.
     Zero,
@@ -61,6 +61,22 @@ impl<S: Scalar> Condition<S> {
             Some(tape) => Self::new(tape, vec![speed], Kind::Speed, next),
             None => unreachable!("the text of an end at a speed is an equation"),
         }
+    }
+
+    /// V = `speed` (m/s) from below.
+    pub(super) fn of_rise(speed: S) -> Self {
+        static TAPE: LazyLock<Option<Tape>> = LazyLock::new(|| {
+            Tape::read_equation("v = V", &[Known { name: "v", value: 0.0, unit: Dimension::Velocity.into() }]).ok()
+        });
+        match &*TAPE {
+            Some(tape) => Self::new(tape, vec![speed], Kind::Speed, 0),
+            None => unreachable!("the text of an end at a speed is an equation"),
+        }
+    }
+
+    /// The speed (m/s) at which it ends a stage.
+    pub(super) fn speed(&self) -> Option<S> {
+        if self.kind == Kind::Speed { self.parameters.first().copied() } else { None }
     }
 
     /// The zero of the equation `tape` at `parameters` (SI units), with stage `next` behind it.

@@ -1,17 +1,20 @@
-//! Laws of one's own: a force F(x, V) as an expression or in code, in place of the four coefficients of a stage.
+//! Laws of one's own: a force F(x, V) as an expression, a table of V or in code, in place of the four coefficients of a stage.
 //!
 //! A [`Problem`](super::Problem) holds them beside its stages. A stage with a law has NaN for coefficients, and a method
 //! that knows no laws refuses the problem.
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 
+use super::closed_form::Line;
 use super::condition::Condition;
 use super::expression::{Bound, Known, Tape, Unit, is_name};
+use super::force_table::{Piece, SpeedTable};
 use super::problem::{Stage, State};
 use super::scalar::Scalar;
 use super::units::Dimension;
+use crate::text::Shown;
 
 /// A force F(x, V) in code, for what an expression does not hold: a table of two variables, a model fitted to data.
 ///
@@ -76,6 +79,15 @@ pub struct Law<S = f64> {
 enum Form<S> {
     Expression(Box<Expression<S>>),
     Code(Arc<dyn ForceFunction>),
+    Table(Box<Pieces<S>>),
+}
+
+/// A table of velocity, and the laws of the pieces that a flight has come to: each smooth, and ending where the piece does.
+#[derive(Clone, Debug)]
+struct Pieces<S> {
+    table: SpeedTable,
+    /// Of each piece, for a velocity that falls and for one that rises.
+    laws: Arc<[[OnceLock<Law<S>>; 2]]>,
 }
 
 #[derive(Clone, Debug)]
@@ -95,6 +107,7 @@ impl<S: PartialEq> PartialEq for Form<S> {
                 one.parameters == other.parameters && one.values.tape() == other.values.tape()
             }
             (Self::Code(one), Self::Code(other)) => Arc::ptr_eq(one, other),
+            (Self::Table(one), Self::Table(other)) => one.table == other.table,
             _ => false,
         }
     }
@@ -113,6 +126,50 @@ impl<S: Scalar> Law<S> {
     /// The law of a force in code.
     pub fn of_code(force: Arc<dyn ForceFunction>) -> Self {
         Self::of(Form::Code(force))
+    }
+
+    /// The law of a table of velocity.
+    pub fn of_table(table: SpeedTable) -> Self {
+        let laws = table.rows().windows(2).map(|_| Default::default()).collect();
+        Self::of(Form::Table(Box::new(Pieces { table, laws })))
+    }
+
+    /// The table of velocity that it is, if it is one.
+    pub fn table(&self) -> Option<&SpeedTable> {
+        match &self.force {
+            Form::Table(pieces) => Some(&pieces.table),
+            Form::Expression(_) | Form::Code(_) => None,
+        }
+    }
+
+    /// The line that it is, of a piece of a table of velocity ([`Law::piece`]).
+    pub(crate) fn line(&self) -> Option<Line> {
+        let Form::Expression(expression) = &self.force else { return None };
+        let ([force, slope, velocity], true) = (&expression.parameters[..], expression.values.tape() == line()) else {
+            return None;
+        };
+        let end = self.end.as_ref().and_then(Condition::speed).map(|end| end.value());
+        Some(Line { force: force.value(), slope: slope.value(), velocity: velocity.value(), end })
+    }
+
+    /// The law of the piece of its table through which a projectile goes on from `v` (m/s): linear in V, and ending at the speed
+    /// of the next row. `None` behind the last row, and for a law of another kind.
+    pub(crate) fn piece(&self, v: f64) -> Option<&Self> {
+        let Form::Table(pieces) = &self.force else { return None };
+        let Piece { index, rises } = pieces.table.piece(v)?;
+        let law = &pieces.laws[index][usize::from(rises)];
+        Some(law.get_or_init(|| {
+            let law = Self::new(line(), pieces.table.line(index).into());
+            let rows = pieces.table.rows();
+            let own_end = self.end.as_ref().and_then(Condition::speed).filter(|end| end.value() > rows[index].at);
+            match (rises, own_end) {
+                (true, _) => law.ending(Condition::of_rise(S::decimal(rows[index + 1].at))),
+                (false, Some(end)) => law.ending(Condition::of_speed(end, 0)),
+                // The first row is rest.
+                (false, None) if index == 0 => law,
+                (false, None) => law.ending(Condition::of_speed(S::decimal(rows[index].at), 0)),
+            }
+        }))
     }
 
     fn of(force: Form<S>) -> Self {
@@ -147,6 +204,10 @@ impl<S: Scalar> Law<S> {
             powers.extend(end.powers_of_v());
             expression.branch = branch(&powers);
         }
+        if let Form::Table(pieces) = &mut self.force {
+            // Pieces that were made end without it.
+            pieces.laws = pieces.table.rows().windows(2).map(|_| Default::default()).collect();
+        }
         self.end = Some(end);
         self
     }
@@ -176,6 +237,7 @@ impl<S: Scalar> Law<S> {
     pub fn force(&self, x: S, v: S) -> S {
         let code = match &self.force {
             Form::Expression(expression) => return expression.bound.eval(x, v),
+            Form::Table(pieces) => return pieces.table.force(v),
             Form::Code(code) => code,
         };
         let (depth, velocity) = (x.value(), v.value());
@@ -193,11 +255,12 @@ impl<S: Scalar> Law<S> {
     pub(crate) fn force_value(&self, x: f64, v: f64) -> f64 {
         match &self.force {
             Form::Expression(expression) => expression.values.eval(x, v),
+            Form::Table(pieces) => pieces.table.force(v),
             Form::Code(code) => code.force(x, v),
         }
     }
 
-    /// The expression with its parameters, for series; `None` for code.
+    /// The expression with its parameters, for series; `None` for code and tables.
     pub(crate) fn bound(&self) -> Option<&Bound<S>> {
         self.expression().map(|expression| &expression.bound)
     }
@@ -205,20 +268,26 @@ impl<S: Scalar> Law<S> {
     fn expression(&self) -> Option<&Expression<S>> {
         match &self.force {
             Form::Expression(expression) => Some(expression),
-            Form::Code(_) => None,
+            Form::Code(_) | Form::Table(_) => None,
         }
     }
 
     /// Bounds of the force between depths and velocities; those of code are not known.
     fn range(&self, x: (f64, f64), v: (f64, f64)) -> Option<(f64, f64)> {
-        self.expression().map(|expression| expression.values.range(x, v))
+        match &self.force {
+            Form::Expression(expression) => Some(expression.values.range(x, v)),
+            Form::Table(pieces) => Some(pieces.table.range(v)),
+            Form::Code(_) => None,
+        }
     }
 
     /// Why the force has no value at depth `x` (m) and velocity `v` (m/s).
     pub fn explain(&self, x: f64, v: f64) -> String {
         let unknown = "the number is beyond the range of 64 bits".to_owned();
-        let Some(Expression { values, .. }) = self.expression() else {
-            return format!("its code gives {}", self.force_value(x, v));
+        let values = match &self.force {
+            Form::Expression(expression) => &expression.values,
+            Form::Table(pieces) => return format!("its table ends at V = {} m/s", Shown(pieces.table.last())),
+            Form::Code(_) => return format!("its code gives {}", self.force_value(x, v)),
         };
         let reason = values.explain(x, v).or_else(|| values.explain_series(x, v));
         reason.map_or(unknown, |error| format!("in {}, {}", error.term, error.reason))
@@ -231,6 +300,7 @@ impl<S: Scalar> Law<S> {
                 let (_, by_depth, by_velocity) = expression.values.gradient(x, v);
                 (by_depth, by_velocity)
             }
+            Form::Table(pieces) => (0.0, pieces.table.slope(v)),
             Form::Code(code) => code.slopes(x, v),
         }
     }
@@ -250,6 +320,11 @@ impl<S: Scalar> Law<S> {
     /// Whether bounds show that the force drives nowhere from the face to depth `to` (m), at any speed.
     pub(crate) fn never_drives(&self, to: f64) -> bool {
         self.range((0.0, to), (0.0, f64::INFINITY)).is_some_and(|(least, _)| least >= 0.0)
+    }
+
+    /// Whether bounds show that the force slows nothing from depth `from` (m) on, at any speed.
+    pub(crate) fn never_slows(&self, from: f64) -> bool {
+        self.range((from, f64::INFINITY), (0.0, f64::INFINITY)).is_some_and(|(_, most)| most <= 0.0)
     }
 
     /// In how many parts of a way the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
@@ -331,7 +406,12 @@ impl<S: Scalar> Law<S> {
     /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it on the way.
     pub fn static_work(&self, from: f64, to: f64) -> (f64, f64) {
         let force = |x: f64| self.force_value(x, 0.0);
-        if self.expression().is_some_and(|expression| !expression.values.tape().depends_on_x()) {
+        let is_of_velocity = match &self.force {
+            Form::Expression(expression) => !expression.values.tape().depends_on_x(),
+            Form::Table(_) => true,
+            Form::Code(_) => false,
+        };
+        if is_of_velocity {
             let work = force(from) * (to - from);
             return (work, work.max(0.0));
         }
@@ -359,6 +439,7 @@ impl<S: Scalar> Law<S> {
         let to = |parameters: &[S]| parameters.iter().map(|p| T::from_f64(p.value())).collect::<Vec<_>>();
         let mut law = match &self.force {
             Form::Expression(expression) => Law::new(expression.bound.tape(), to(&expression.parameters)),
+            Form::Table(pieces) => Law::of_table(pieces.table.clone()),
             Form::Code(code) => Law::of_code(Arc::clone(code)),
         };
         if let Some(end) = &self.end {
@@ -366,6 +447,19 @@ impl<S: Scalar> Law<S> {
         }
         law.joining = self.joining.as_ref().map(|(tape, parameters)| (tape.clone(), to(parameters)));
         law
+    }
+}
+
+/// The force between two rows of a table of velocity, of the row below: force f, slope r, velocity v.
+fn line() -> &'static Tape {
+    static TAPE: LazyLock<Option<Tape>> = LazyLock::new(|| {
+        let known = [("f", Dimension::Force), ("r", Dimension::Viscosity), ("v", Dimension::Velocity)];
+        let known = known.map(|(name, unit)| Known { name, value: 0.0, unit: unit.into() });
+        Tape::read("f + r*(V - v)", &known, Dimension::Force.into()).ok()
+    });
+    match &*TAPE {
+        Some(tape) => tape,
+        None => unreachable!("the text of a line is an expression"),
     }
 }
 

@@ -24,7 +24,7 @@ pub mod units;
 pub use crate::text::Shown;
 pub use advice::Advice;
 pub use condition::Condition;
-pub use force_table::ForceTable;
+pub use force_table::{ForceTable, SpeedTable};
 pub use law::{ForceFunction, Law, Laws};
 pub use parameter::Parameter;
 pub use plug::Plug;

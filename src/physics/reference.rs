@@ -414,7 +414,7 @@ impl Source<'_> {
         let own = match self {
             Self::Problem(problem) => (0..problem.stages.len()).find(|&index| problem.laws.of(index).is_some()),
             Self::Scene(scene, _) => {
-                let is_law = |(_, force): &&(usize, Force)| matches!(force, Force::Expression(_));
+                let is_law = |(_, force): &&(usize, Force)| !matches!(force, Force::Table(_));
                 let plug = (scene.criterion == Criterion::Plug).then_some(0);
                 let end = scene.ends.first().map(|(stage, _)| *stage).or(plug);
                 scene.forces.iter().find(is_law).map(|(stage, _)| *stage).or(end)

@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::advice::Advice;
 use super::condition::Condition;
 use super::expression::{Known, Tape};
-use super::force_table::ForceTable;
+use super::force_table::{ForceTable, SpeedTable};
 use super::law::{Law, Laws, OwnParameter};
 use super::parameter::{LayerNumber, Parameter, StageNumber};
 use super::plug::{Plug, Slab};
@@ -34,6 +34,8 @@ pub enum Resistance {
 pub enum Force {
     /// A table of depth.
     Table(ForceTable),
+    /// A table of velocity.
+    SpeedTable(SpeedTable),
     /// An expression of x, V and [`Scene::parameters`].
     Expression(Tape),
 }
@@ -302,7 +304,7 @@ pub enum ResolveError {
         /// Where the stage begins (m).
         start: f64,
     },
-    /// A stage has a table for its force, and a condition for its end.
+    /// A stage has a table of depth for its force, and a condition for its end; or one of velocity, and an equation.
     #[error("stage {0} has a table for its force, and ends on a condition")]
     TableOnCondition(usize),
     /// The last stage ends on a condition.
@@ -544,7 +546,7 @@ fn given<S: Scalar>(
 ) -> Resolved<Stages<S>> {
     let mut previous = 0.0;
     for (index, stage) in stages.iter().enumerate() {
-        let has_law = matches!(scene.force_of(index), Some(Force::Expression(_)));
+        let has_law = matches!(scene.force_of(index), Some(Force::Expression(_) | Force::SpeedTable(_)));
         for which in [StageNumber::StaticForce, StageNumber::Stiffness, StageNumber::Viscosity, StageNumber::Drag] {
             if has_law {
                 break;
@@ -561,7 +563,12 @@ fn given<S: Scalar>(
             if index + 1 == stages.len() {
                 return Err(ResolveError::NothingFollows(index));
             }
-            if end.condition.is_some() && matches!(scene.force_of(index), Some(Force::Table(_))) {
+            let has_table = match scene.force_of(index) {
+                Some(Force::Table(_)) => end.condition.is_some(),
+                Some(Force::SpeedTable(_)) => matches!(end.condition, Some(Ending::Until(_))),
+                _ => false,
+            };
+            if has_table {
                 return Err(ResolveError::TableOnCondition(index));
             }
             if stage.end == f64::INFINITY && end.condition.is_some() {
@@ -774,8 +781,8 @@ impl Scene {
         (stages, laws.into_iter().collect())
     }
 
-    /// `given` with the pieces of tables in place of their stages, and the laws of stages whose force is an expression; and
-    /// whether a table ends before its stage and the exit, so that the last stage stands for what lies behind it.
+    /// `given` with the pieces of tables of depth in place of their stages, and the laws of stages whose force is an expression or a
+    /// table of velocity; and whether a table of depth ends before its stage and the exit, so that the last stage stands for what lies behind it.
     fn with_forces<S: Scalar>(
         &self,
         given: &[Stage<S>],
@@ -796,8 +803,16 @@ impl Scene {
             let table = match self.force_of(index) {
                 Some(Force::Table(table)) => table,
                 other => {
-                    if let Some(Force::Expression(tape)) = other {
-                        laws.push(Some(Law::new(tape, parameters.clone())));
+                    match other {
+                        Some(Force::Expression(tape)) => laws.push(Some(Law::new(tape, parameters.clone()))),
+                        Some(Force::SpeedTable(table)) => {
+                            for row in 0..table.rows().len() - 1 {
+                                let [_, slope, _] = table.line::<f64>(row);
+                                representable("the slope between two rows of a table [kg/s]", slope, true)?;
+                            }
+                            laws.push(Some(Law::of_table(table.clone())));
+                        }
+                        _ => {}
                     }
                     stages.push(*stage);
                     pieces.push(first..first + 1);

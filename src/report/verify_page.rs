@@ -250,7 +250,7 @@ fn formal_orders() -> Markup {
             let orders = |velocity: &VelocityAt| {
                 Quantity::ALL.map(|quantity| {
                     let perforates = matches!(quantity, Quantity::Velocity | Quantity::CriticalVelocity);
-                    let path = Path { perforates, to_crater_end, to_end };
+                    let path = Path { perforates, to_crater_end, to_end, time_of_rest: None };
                     (leaves_crater || !perforates)
                         .then(|| formal_order(*velocity, boundaries, &path, quantity))
                         .flatten()

@@ -503,6 +503,9 @@ pub fn exact_or_refined(scene: &Scene) -> Sought<f64> {
     exact(scene).or_else(|_| Ok(of_scene(scene, &Taylor::default())?.velocity))
 }
 
+/// How much of V0² above the fastest flight known is looked at where the force has no value farther up.
+const NO_FARTHER: f64 = 1e-9;
+
 /// The results of two flights, W < 0 at `low` and W > 0 at `high`, strictly.
 #[derive(Clone, Copy, Debug)]
 struct Bracket {
@@ -596,6 +599,33 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
         Ok(point)
     }
 
+    /// As [`Search::at`] at `u`, or at the fastest above `known` (m²/s²) at which the force has a value, and why it has none farther
+    /// up.
+    fn at_or_below(&self, u: f64, known: f64) -> Sought<(Point, Option<CriticalError>)> {
+        use IntegrationError::{NoForce, SpeedTableEnds};
+        let at = |u: f64| match self.at(u) {
+            Err(error @ CriticalError::Flight { cause: NoForce { .. } | SpeedTableEnds { .. }, .. }) => Ok(Err(error)),
+            other => other.map(Ok),
+        };
+        let mut error = match at(u)? {
+            Ok(point) => return Ok((point, None)),
+            Err(error) => error,
+        };
+        let (mut low, mut high, mut fastest) = (known, u, None);
+        while high > low * (1.0 + NO_FARTHER) {
+            let middle = (low * high).sqrt();
+            match at(middle)? {
+                Ok(point) if point.w > 0.0 => return Ok((point, Some(error))),
+                Ok(point) => (low, fastest) = (middle, Some(point)),
+                Err(farther) => (high, error) = (middle, farther),
+            }
+        }
+        match fastest {
+            Some(point) => Ok((point, Some(error))),
+            None => Err(error),
+        }
+    }
+
     /// Two flights with strictly opposite signs; `None` when the target is perforated however slow the projectile.
     fn bracket(&self, probe: &Problem) -> Sought<Option<Bracket>> {
         let first = self.at(lower_bound(probe))?;
@@ -624,7 +654,11 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
                 if expansion == EXPANSIONS_MAX || !next.is_finite() {
                     return Err(CriticalError::NoBracket { low: first, high });
                 }
-                high = self.at(next)?;
+                let (point, farther) = self.at_or_below(next, high.u)?;
+                high = point;
+                if let (false, Some(error)) = (high.w > 0.0, farther) {
+                    return Err(error);
+                }
                 if high.w > 0.0 {
                     low = if before.w < 0.0 { before } else { low };
                     break;

@@ -164,7 +164,7 @@ impl Kind {
                 1 => last,
                 _ => force * (mean + random.uniform(-1.0, 1.0) * random.log_uniform(0.01, 1.0)),
             };
-            let row = Row { depth, force: last };
+            let row = Row { at: depth, force: last };
             depth += scale.length * random.log_uniform(1e-3, 0.3);
             row
         };

@@ -94,12 +94,20 @@ fn a_bad_file_is_refused_at_its_place() {
 /// The table that gives the force of a stage is refused in itself, at its own place.
 #[test]
 fn a_bad_table_of_a_force_is_refused_at_its_place() {
-    let folder = corpus().join("force_tables");
+    assert_snapshot("force_tables", refusals_of_force("force_tables", "x = \"depth_mm\""));
+    assert_snapshot("speed_tables", refusals_of_force("speed_tables", "V = \"speed_m_s\""));
+}
+
+/// What is said of each table of a force in the folder `kind`, one that goes `over` a column.
+fn refusals_of_force(kind: &str, over: &str) -> String {
+    let folder = corpus().join(kind);
     let mut all = String::new();
     for name in names(&folder) {
         let place = workplace();
-        let text = "[projectile]\nmass = \"2 kg\"\n[impact]\nvelocity = \"300 m/s\"\n[[stage]]\n\
-                    force = { table = \"r.csv\", x = \"depth_mm\", force = \"force_kN\" }\n";
+        let text = format!(
+            "[projectile]\nmass = \"2 kg\"\n[impact]\nvelocity = \"300 m/s\"\n[[stage]]\n\
+             force = {{ table = \"r.csv\", {over}, force = \"force_kN\" }}\n"
+        );
         fs::write(place.path().join("scene.toml"), text).unwrap();
         fs::copy(folder.join(&name), place.path().join("r.csv")).unwrap();
         let before = names(place.path());
@@ -110,7 +118,7 @@ fn a_bad_table_of_a_force_is_refused_at_its_place() {
         assert!(said.err.len() < 4000, "{name}: {} bytes of message", said.err.len());
         writeln!(all, "== {name}\n{}", said.err).unwrap();
     }
-    assert_snapshot("force_tables", all);
+    all
 }
 
 /// The results say what is wrong with a row that is no scene, and the others are solved: exit code 3.

@@ -4,6 +4,7 @@ Needs mpmath, Python 3.11 or later, and nothing of the program; units are read b
 the file holds. A force is evaluated as it stands in the scene. No equation of motion is integrated:
 
 - F of V alone: `x = M ∫ V dV/F` and `t = M ∫ dV/F`, from the speed of the end to that of the impact.
+- F of V as a table: as the first, over each of its pieces alone.
 - `F = A(x) + Q V²`: `W(x) = e^(-2 Q x/M) (W0 - (2/M) ∫ A e^(2 Q x/M) dx)`, and `t = ∫ dx/sqrt(W)`.
 - Stages of F of V alone that end at a speed or on a condition g(x, V) = 0: as the first, with x over V; the first zero of g over V.
 - `F = C(x) V^n`, n < 1: `V^(2-n) = V0^(2-n) - ((2-n)/M) ∫ C dx`, and `t = ∫ dx/V`.
@@ -41,6 +42,7 @@ LAWS = {
     "allen": ("ends", []),
     "plug": ("ends", []),
     "two-layers": ("depth", ["0.06", "0.09", "0.11", "0.14"]),
+    "speed-table": ("speed", ["20", "60", "120", "200", "300"]),
 }
 
 
@@ -58,18 +60,32 @@ def ratio(value):
     return mpf(value.numerator) / value.denominator
 
 
+def table(force):
+    """F of V, linear between the rows of a table in m/s and kN."""
+    lines = [line.split(",") for line in (SCENES / force["table"]).read_text().splitlines() if not line.startswith("#")]
+    assert lines[0] == [force["V"], force["force"]] == ["speed_m_s", "force_kN"]
+    rows = [[mpf(speed), 1000 * mpf(load)] for speed, load in lines[1:]]
+
+    def at(x, v):
+        (a, f), (b, g) = next((one, other) for one, other in zip(rows, rows[1:]) if v <= other[0])
+        return f + (g - f) * (v - a) / (b - a)
+
+    return at
+
+
 class Scene:
     def __init__(self, name):
         root = tomllib.loads((SCENES / f"law-{name}.toml").read_text(), parse_float=Decimal)
         self.name, self.title = name, root["title"]
         self.mass, self.speed = number(root["projectile"]["mass"]), number(root["impact"]["velocity"])
         self.thickness = number(root["target"]["thickness"]) if "target" in root else None
-        self.known = {key: number(value) for key, value in root["parameters"].items()}
+        self.known = {key: number(value) for key, value in root.get("parameters", {}).items()}
         known = {name: getattr(mp, name) for name in ("sqrt", "exp", "log", "tanh", "pi")} | {"max": max} | self.known
         self.forces, self.ends = [], []
         self.stages = root["stage"]
         for stage in root["stage"]:
-            self.forces.append(self.function(stage.get("force", "0"), known))
+            force = stage.get("force", "0")
+            self.forces.append(table(force) if isinstance(force, dict) else self.function(force, known))
             self.ends.append(number(stage["end"]) if "end" in stage else mp.inf)
         left, right = zip(*(stage.get("until", "1 = 0").split("=") for stage in root["stage"]))
         self.until = [self.function(f"({a}) - ({b})", known) for a, b in zip(left, right)]

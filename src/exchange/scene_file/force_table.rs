@@ -1,7 +1,7 @@
 //! Which force has a stage that names a table beside the scene, and where and why is it none?
 //!
-//! `force = { table = "r.csv", x = "depth_mm", force = "force_kN" }`: a CSV table, two of its columns by their names, with
-//! the unit at the end of each. What is wrong in the table is underlined there, what names it wrongly in the scene.
+//! `force = { table = "r.csv", x = "depth_mm", force = "force_kN" }`, or `V = "speed_m_s"` in place of `x`: a CSV table, two of
+//! its columns by their names, with the unit at the end of each. What is wrong in the table is underlined there, what names it wrongly in the scene.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::exchange::diagnostic::{Fault, Span, did_you_mean, nearest, quoted, te
 use crate::exchange::input;
 use crate::exchange::scene_file::shipped;
 use crate::exchange::tables::{self, Format, Others, TableError, unit_at_end};
-use crate::physics::force_table::{ForceTable, ROWS_MAX, Row, RowsRefused};
+use crate::physics::force_table::{ForceTable, ROWS_MAX, Row, RowsRefused, SpeedTable};
 use crate::physics::units::{Dimension, QuantityError, scaled};
 use crate::physics::{Advice, Shown};
 
@@ -19,7 +19,10 @@ pub(super) const EXAMPLE: &str = "force = { table = \"r.csv\", x = \"depth_mm\",
 
 /// The tables of shipped scenes, by their file names.
 pub(super) const SHIPPED_TABLES: &[(&str, &str)] =
-    &[("softening.csv", include_str!("../../../verification/scenes/softening.csv"))];
+    &[
+        ("softening.csv", include_str!("../../../verification/scenes/softening.csv")),
+        ("law-speed-table.csv", include_str!("../../../verification/scenes/law-speed-table.csv")),
+    ];
 
 /// Largest table that is read (bytes): [`ROWS_MAX`] rows of many digits and columns.
 const SIZE_MAX: u64 = 8 << 20;
@@ -34,8 +37,26 @@ pub(super) type Word = (String, Span);
 pub(super) fn read(scene: &str, table: &Word, x: &Word, force: &Word) -> Result<ForceTable, Fault> {
     let (file, bytes) = bytes_of(scene, table)?;
     let text = text_of(bytes, &file).map_err(Fault::elsewhere)?;
-    parse(&file, &text, x, force)
+    parse(&file, &text, &OF_DEPTH, x, force, ForceTable::new)
 }
+
+/// As [`read`], the columns `velocity` and `force`.
+pub(super) fn read_of_velocity(scene: &str, table: &Word, velocity: &Word, force: &Word) -> Result<SpeedTable, Fault> {
+    let (file, bytes) = bytes_of(scene, table)?;
+    let text = text_of(bytes, &file).map_err(Fault::elsewhere)?;
+    parse(&file, &text, &OF_VELOCITY, velocity, force, SpeedTable::new)
+}
+
+/// What a table goes by.
+struct Over {
+    dimension: Dimension,
+    name: &'static str,
+    unit: &'static str,
+    column: &'static str,
+}
+
+const OF_DEPTH: Over = Over { dimension: Dimension::Length, name: "depth", unit: "m", column: "depth_mm" };
+const OF_VELOCITY: Over = Over { dimension: Dimension::Velocity, name: "velocity", unit: "m/s", column: "speed_m_s" };
 
 /// Name in messages and content of the table `name` beside `scene`.
 fn bytes_of(scene: &str, (name, span): &Word) -> Result<(String, Vec<u8>), Fault> {
@@ -110,7 +131,14 @@ impl Column {
 }
 
 /// The table in `text`, the content of `file`.
-fn parse(file: &str, text: &str, x: &Word, force: &Word) -> Result<ForceTable, Fault> {
+fn parse<T>(
+    file: &str,
+    text: &str,
+    over: &Over,
+    at: &Word,
+    force: &Word,
+    new: fn(&[Row]) -> Result<T, RowsRefused>,
+) -> Result<T, Fault> {
     let mut columns: Option<[Column; 2]> = None;
     let (mut lines, mut told) = (Vec::new(), None);
     let in_table = |line: u64, column: usize, message: String, allowed: &str, help: String| {
@@ -122,11 +150,11 @@ fn parse(file: &str, text: &str, x: &Word, force: &Word) -> Result<ForceTable, F
             told = Some(fault);
             TableError::of_row(row.at(), 0, tables::Fault::NoResults)
         };
-        let [depth, load] = if let Some(columns) = &columns {
+        let [place, load] = if let Some(columns) = &columns {
             columns
         } else {
-            let found = Column::find(row.names(), x, Dimension::Length, "depth_mm")
-                .and_then(|depth| Ok([depth, Column::find(row.names(), force, Dimension::Force, "force_kN")?]));
+            let found = Column::find(row.names(), at, over.dimension, over.column)
+                .and_then(|place| Ok([place, Column::find(row.names(), force, Dimension::Force, "force_kN")?]));
             columns.insert(found.map_err(&mut refuse)?)
         };
         if lines.len() == ROWS_MAX {
@@ -149,7 +177,7 @@ fn parse(file: &str, text: &str, x: &Word, force: &Word) -> Result<ForceTable, F
                 refuse(in_table(row.at().number(), column.place + 1, message, allowed, help))
             })
         };
-        Ok(Row { depth: number(depth)?, force: number(load)? })
+        Ok(Row { at: number(place)?, force: number(load)? })
     });
     let rows = match (rows, told) {
         (_, Some(fault)) => return Err(fault),
@@ -158,21 +186,32 @@ fn parse(file: &str, text: &str, x: &Word, force: &Word) -> Result<ForceTable, F
             let allowed = "a CSV table whose first line names its columns";
             let help = match error.fault {
                 tables::Fault::Empty | tables::Fault::NoRows | tables::Fault::NoHeader => {
-                    "begin with a line of names, such as depth_mm,force_kN, and a row for each depth".to_owned()
+                    format!(
+                        "begin with a line of names, such as {},force_kN, and a row for each {}",
+                        over.column, over.name
+                    )
                 }
                 _ => error.help(),
             };
             return Err(in_table(error.place.at.number(), error.place.column, error.fault.to_string(), allowed, help));
         }
     };
-    let place = columns.map_or(0, |[depth, _]| depth.place + 1);
-    ForceTable::new(&rows).map_err(|refused| match refused {
+    let place = columns.map_or(0, |[place, _]| place.place + 1);
+    let Over { name, unit, .. } = over;
+    new(&rows).map_err(|refused| match refused {
         RowsRefused::NotRising { row, before } => in_table(
             lines[row],
             place,
-            format!("this depth, {} m, is {refused}", Shown(rows[row].depth)),
-            &format!("a depth beyond {} m", Shown(before)),
-            "order the rows by depth, each depth once; a jump takes two depths close together".to_owned(),
+            format!("this {name}, {} {unit}, is {refused} {unit}", Shown(rows[row].at)),
+            &format!("a {name} beyond {} {unit}", Shown(before)),
+            format!("order the rows by {name}, each {name} once; a jump takes two close together"),
+        ),
+        RowsRefused::NotFromRest(_) => in_table(
+            lines.first().copied().unwrap_or_default(),
+            place,
+            refused.to_string(),
+            "0 m/s in the first row",
+            "add a row for 0 m/s: with the force of the next, where it is no other".to_owned(),
         ),
         RowsRefused::NotFinite { row } => {
             in_table(lines[row], 0, format!("this row is {refused}"), "finite numbers", "correct the row".to_owned())

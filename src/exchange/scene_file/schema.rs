@@ -170,17 +170,21 @@ fn in_range(range: Range) -> Value {
 fn force() -> Value {
     let text = |what: &str| json!({ "type": "string", "description": what });
     let expression = text("F(x, V) in N, such as P + Q*V^2, with P and Q in [parameters]");
-    let table = json!({
-        "type": "object",
-        "additionalProperties": false,
-        "properties": {
-            "table": text("CSV file, its path counted from the folder of the scene"),
-            "x": text("column of depths from the impact face, its unit last: depth_mm"),
-            "force": text("column of forces, its unit last: force_kN"),
-        },
-        "required": ["table", "x", "force"],
-    });
-    json!({ "anyOf": [expression, table] })
+    let table = |over: &str, column: &str| {
+        json!({
+            "type": "object",
+            "additionalProperties": false,
+            "properties": {
+                "table": text("CSV file, its path counted from the folder of the scene"),
+                over: text(column),
+                "force": text("column of forces, its unit last: force_kN"),
+            },
+            "required": ["table", over, "force"],
+        })
+    };
+    let of_depth = table("x", "column of depths from the impact face, its unit last: depth_mm");
+    let of_velocity = table("V", "column of velocities from 0 on, its unit last: speed_m_s");
+    json!({ "anyOf": [expression, of_depth, of_velocity] })
 }
 
 /// The nose in one of its forms.

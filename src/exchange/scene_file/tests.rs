@@ -189,7 +189,9 @@ fn a_force_that_is_no_table_is_refused_where_it_stands_in_the_scene() {
     for (text, message, part) in [
         ("[[stage]]\nforce = \"2*x\"\n".to_owned(), "`2*x` is m", "2*x"),
         ("[[stage]]\nforce = 2\n".to_owned(), "`force` is an integer", "2"),
-        (force("V = \"v_m_s\", force = \"force_kN\""), "velocity", "V"),
+        (force("V = \"v_m_s\", force = \"force_kN\""), "no column `v_m_s`", "\"v_m_s\""),
+        (force("V = \"depth_mm\", force = \"force_kN\""), "no unit of velocity", "\"depth_mm\""),
+        (force("x = \"depth_mm\", V = \"v_m_s\", force = \"force_kN\""), "one of depth and one of velocity", "V"),
         (force("force = \"force_kN\""), "no `x`", "{ table"),
         (force("x = \"depth_mm\""), "no `force`", "{ table"),
         (force("x = 1, force = \"force_kN\""), "`x` is an integer", "1"),

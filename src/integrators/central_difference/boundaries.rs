@@ -131,6 +131,9 @@ impl<'a, S: Scalar> Run<'a, S> {
             }
             (run.course.stage, run.course.state) = (run.stepper.stage, run.stepper.state());
             let limit = run.course.limit()?.value();
+            if !problem.laws.is_empty() {
+                run.course.refuse_unknown_speed()?;
+            }
             if matches!(run.course.detail, Detail::Trajectory) {
                 run.course.push_sample(run.course.state, run.stepper.node.d * run.stepper.mass);
             }

@@ -307,6 +307,8 @@ struct Walk<'l, S, const K: usize> {
     tolerance: f64,
     /// The condition that ends the stage, and the sign of g on the way to it.
     end: Option<(&'l Condition<S>, f64)>,
+    /// `F_V` (kg/s) of a piece of a table of velocity.
+    slope: Option<f64>,
 }
 
 impl Steps {
@@ -331,13 +333,14 @@ impl Steps {
             kink: None,
             goes_by_velocity: false,
             tolerance: self.tolerance,
+            slope: law.line().map(|line| line.slope),
         };
         while course.cost.steps < STEPS_MAX {
             if let Some(end) = walk.step(course, limit)? {
                 return Ok(end);
             }
         }
-        let remedy = "end the target or the stage before V vanishes, or take --method adaptive";
+        let remedy = "give the target or the stage an end, or take --method adaptive";
         Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: course.state.values() })
     }
 }
@@ -780,13 +783,17 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// d(dW)/dt = -(F_V/M) dW      at one depth
     /// ```
     ///
-    /// so that only a force that falls with V lets an error grow. What a step adds is that of [`super`].
+    /// so that only a force that falls with V lets an error grow; on a piece of a table of velocity F_V is one number, and an error
+    /// falls by it too. What a step adds is that of [`super`].
     fn widen_bound(&self, course: &mut Course<'_, S>, force: f64, start: State<S>, next: State<S>) {
         let (a, b) = (start.values(), next.values());
         let (time, distance) = (b.time - a.time, b.depth - a.depth);
         let falls = [a, b].map(|at| self.law.slopes(at.depth, at.velocity).1).into_iter().fold(0.0, f64::min).abs();
         let mass = self.mass.value();
-        let growth = time * falls / mass;
+        let growth = match self.slope {
+            Some(slope) => -time * slope / mass,
+            None => time * falls / mass,
+        };
         let fastest = a.velocity.max(b.velocity);
         let end_force = self.law.force(next.depth, next.velocity).value().abs();
         let largest = force.abs().max(if end_force.is_finite() { end_force } else { 0.0 }) / mass;

@@ -97,7 +97,7 @@ fn random_tables(random: &mut Random, count: usize) -> Vec<Problem> {
 
 /// The pieces of the table of these rows, and the last stage behind it.
 fn table(rows: &[[f64; 2]], behind: Stage) -> Vec<Stage> {
-    let rows: Vec<_> = rows.iter().map(|&[depth, force]| Row { depth, force }).collect();
+    let rows: Vec<_> = rows.iter().map(|&[at, force]| Row { at, force }).collect();
     ForceTable::new(&rows).unwrap().stages(0.0).chain([behind]).collect()
 }
 

@@ -1,0 +1,157 @@
+//! Contracts of a flight under a force that is a table of velocity, for every method that takes one.
+
+use super::laws::methods;
+use super::*;
+use crate::physics::force_table::{Row, SpeedTable};
+use crate::physics::{EventKind, Law, Outcome, Problem, Stage};
+use crate::studies::critical_velocity::critical_velocity;
+use crate::testing::{Random, kinds};
+
+/// Velocities (m/s) and forces (kN): it stops below 16 m/s, drives from there to 67.3, and slows above.
+const ROWS: [[f64; 2]; 6] = [[0.0, 400.0], [20.0, -100.0], [60.0, -50.0], [120.0, 360.0], [200.0, 360.0], [300.0, 1000.0]];
+
+fn law(rows: &[[f64; 2]]) -> Law {
+    let rows: Vec<_> = rows.iter().map(|&[at, force]| Row { at, force: 1e3 * force }).collect();
+    Law::of_table(SpeedTable::new(&rows).unwrap())
+}
+
+/// 2 kg.
+fn problem(rows: &[[f64; 2]], speed: f64, exit: f64) -> Problem {
+    Problem::of_stages(2.0, speed, [Stage::free()]).with_exit(exit).with_law(0, &law(rows))
+}
+
+fn everyone() -> Vec<(MethodName, Method)> {
+    let options = MethodOptions::default();
+    methods(1e-10).into_iter().chain([(MethodName::ClosedForm, Method::new(MethodName::ClosedForm, &options).unwrap())]).collect()
+}
+
+fn allowed(name: MethodName) -> f64 {
+    match name {
+        MethodName::Taylor | MethodName::ClosedForm => 16.0 * f64::EPSILON,
+        _ => 300.0 * name.promise_at(1e-10),
+    }
+}
+
+/// Depth or velocity, and time: `x = M ∫ V dV/F`, `t = M ∫ dV/F` over each piece by quadrature with 40 digits (mpmath).
+#[test]
+fn every_method_goes_through_the_pieces_as_quadrature_over_the_velocity_does() {
+    let inf = f64::INFINITY;
+    let known = [
+        (15.0, inf, 0.002_348_913_564_466_92, 0.0, 0.000_221_807_097_779_182_5),
+        (290.0, 0.1, 0.1, 171.980_846_753_506_46, 0.000_454_259_289_051_593_5),
+        (290.0, 0.2, 0.2, 72.944_323_586_518_25, 0.001_397_677_036_959_140_4),
+        (17.0, 0.01, 0.01, 33.516_858_436_794_676, 0.000_407_028_716_055_971_46),
+        (17.0, 0.2, 0.2, 67.314_004_714_619_57, 0.003_496_073_031_999_497),
+    ];
+    for (name, method) in everyone() {
+        for (speed, exit, depth, velocity, time) in known {
+            let flight = method.integrator().solve(&problem(&ROWS, speed, exit), Detail::Events).unwrap();
+            // A row is no event.
+            let end = if exit == inf { EventKind::Rest } else { EventKind::Exit };
+            assert_eq!(kinds(&flight.events), [end], "{name} from {speed}");
+            for (value, exact, unit) in [
+                (flight.end.depth, depth, depth),
+                (flight.end.velocity, velocity, speed),
+                (flight.end.time, time, time),
+            ] {
+                assert!(((value - exact) / unit).abs() <= allowed(name), "{name} from {speed}: {value} and {exact}");
+            }
+        }
+    }
+}
+
+/// At 67.3 m/s the force vanishes: it is approached from both sides, and with no far side there is no end.
+#[test]
+fn what_no_force_stops_is_said_and_so_is_the_end_of_the_table() {
+    for (name, method) in everyone() {
+        let why = |speed, exit| method.integrator().solve(&problem(&ROWS, speed, exit), Detail::End).unwrap_err().to_string();
+        for speed in [17.0, 60.0, 290.0] {
+            assert!(why(speed, f64::INFINITY).contains("approaches for ever"), "{name}: {}", why(speed, f64::INFINITY));
+        }
+        let said = why(301.0, 0.2);
+        assert!(said.contains("table of the force ends at V = 300 m/s") && said.contains("V = 301 m/s at x = 0 m"), "{name}: {said}");
+        // A drive beyond the last row.
+        let driven = problem(&[[0.0, 10.0], [100.0, -10.0]], 60.0, 9.0);
+        let said = method.integrator().solve(&driven, Detail::End).unwrap_err().to_string();
+        assert!(said.contains("ends at V = 100 m/s") && said.contains("V = 100 m/s at x = "), "{name}: {said}");
+    }
+}
+
+/// 150 m/s is met at 0.119659 m, by quadrature as above; behind it 1 MN.
+#[test]
+fn a_table_ends_at_a_speed_and_at_a_depth_like_another_force() {
+    let text = "projectile.mass = 2\nimpact.velocity = 290\n[[stage]]\n\
+                force = { table = 'law-speed-table.csv', V = 'speed_m_s', force = 'force_kN' }\nend_velocity = 150\n\
+                [[stage]]\nstatic_force = '1 MN'\n";
+    let mut scene = crate::physics::Scene::from_toml(text, "table").unwrap();
+    let rows: Vec<_> = ROWS.iter().map(|&[at, force]| Row { at, force: 1e3 * force }).collect();
+    scene.forces[0].1 = crate::physics::Force::SpeedTable(SpeedTable::new(&rows).unwrap());
+    for (name, method) in methods(1e-10) {
+        let flight = method.integrator().solve(&scene.problem().unwrap(), Detail::Events).unwrap();
+        assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest], "{name}");
+        let (met, exact) = (flight.events[0].state, [0.119_659_476_805_702_98, 0.000_576_375_104_348_851_6]);
+        for (value, exact) in [met.depth, met.time].into_iter().zip(exact) {
+            assert!((value / exact - 1.0).abs() <= allowed(name), "{name}: {value} and {exact}");
+        }
+        assert_eq!(met.velocity, 150.0, "{name}");
+    }
+    let behind = [Stage::free().until(0.05), Stage::tunnel(1e6, 0.0)];
+    let staged = Problem::of_stages(2.0, 290.0, behind).with_law(0, &law(&ROWS));
+    for (name, method) in everyone() {
+        let flight = method.integrator().solve(&staged, Detail::Events).unwrap();
+        assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest], "{name}");
+        let at = flight.events[0].state;
+        let rest = 0.05 + at.velocity * at.velocity / 1e6;
+        assert!((flight.end.depth / rest - 1.0).abs() <= allowed(name), "{name}: {} and {rest}", flight.end);
+    }
+}
+
+/// Random tables whose force resists at rest: the closed form, the series and a library method, and the margins with their bounds.
+#[test]
+fn closed_form_and_series_agree_on_random_tables_within_their_bounds() {
+    let (mut random, mut undecided, mut margins) = (Random::new(29), 0, 0);
+    for case in 0..400 {
+        let mut rows = vec![[0.0, random.uniform(1.0, 900.0)]];
+        for _ in 0..1 + case % 6 {
+            let before = rows[rows.len() - 1];
+            let force = if random.uniform(0.0, 1.0) < 0.2 { before[1] } else { random.uniform(1.0, 900.0) };
+            rows.push([before[0] + random.log_uniform(0.1, 300.0), force]);
+        }
+        let speed = rows[rows.len() - 1][0] * random.uniform(0.05, 1.0);
+        let unlimited = problem(&rows, speed, f64::INFINITY);
+        let rest = ClosedForm.solve(&unlimited, Detail::End).unwrap().end;
+        for (name, method) in everyone() {
+            let flight = method.integrator().solve(&unlimited, Detail::End).unwrap();
+            let error = (flight.end.depth / rest.depth - 1.0).abs().max((flight.end.time / rest.time - 1.0).abs());
+            assert!(error <= 16.0 * allowed(name), "{name} on {rows:?} from {speed}: {error:e}");
+            let exit = rest.depth * (1.0 + 1e-3 * random.uniform(-1.0, 1.0));
+            let against = problem(&rows, speed, exit);
+            let exact = ClosedForm.solve(&against, Detail::End).unwrap();
+            let flight = method.integrator().solve(&against, Detail::End).unwrap();
+            undecided += u32::from(flight.outcome == Outcome::Undecided);
+            let agrees = flight.outcome == Outcome::Undecided || flight.outcome.agrees_with(exact.outcome);
+            assert!(agrees, "{name} on {rows:?} from {speed}, {exit}");
+            if let (Some(margin), Some(bound)) = (flight.exit_margin, flight.exit_margin_error) {
+                let allowed = bound + exact.exit_margin_error.unwrap();
+                assert!((margin - exact.exit_margin.unwrap()).abs() <= allowed, "{name} on {rows:?} from {speed}, {exit}");
+                margins += 1;
+            }
+        }
+    }
+    assert!(undecided <= 8 && margins == 400 * everyone().len(), "{undecided} undecided, {margins} margins");
+}
+
+/// The way of the last row's speed is 0.336 m and more.
+#[test]
+fn a_critical_velocity_below_the_last_row_is_found_though_no_force_is_known_above() {
+    let rows = [[0.0, 100.0], [50.0, 60.0], [300.0, 500.0]];
+    let longest = ClosedForm.solve(&problem(&rows, 300.0, f64::INFINITY), Detail::End).unwrap().end.depth;
+    for share in [0.2, 0.9, 0.999_999] {
+        let resolve = |speed| Ok(problem(&rows, speed, share * longest));
+        let found = critical_velocity(resolve, &Taylor::default()).unwrap();
+        let rest = ClosedForm.solve(&problem(&rows, found.velocity, f64::INFINITY), Detail::End).unwrap().end;
+        assert!((rest.depth / (share * longest) - 1.0).abs() < 1e-13, "{share}: {}", found.velocity);
+    }
+    let error = critical_velocity(|speed| Ok(problem(&rows, speed, 1.01 * longest)), &Taylor::default()).unwrap_err();
+    assert!(error.to_string().contains("the table of the force ends at V = 300 m/s"), "{error}");
+}
