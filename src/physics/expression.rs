@@ -21,6 +21,7 @@
 mod bound;
 mod jets;
 mod parse;
+mod polynomial;
 mod range;
 mod tape;
 #[cfg(test)]

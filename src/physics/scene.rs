@@ -537,6 +537,15 @@ impl Layer {
     }
 }
 
+/// The stage that `tape` is, if it is `p + s x + r V + q V²` with coefficients that a stage may have.
+fn of_coefficients<S: Scalar>(tape: &Tape, parameters: &[S]) -> Option<Stage<S>> {
+    let [static_force, stiffness, viscosity, drag] = tape.coefficients(parameters)?;
+    let stage = Stage { static_force, stiffness, viscosity, drag, ..Stage::free() };
+    let is_one = [static_force, stiffness, viscosity, drag].map(S::value);
+    let is_representable = is_one.iter().all(|value| value.is_normal() || *value == 0.0);
+    (is_representable && is_one[1..].iter().all(|value| *value >= 0.0)).then_some(stage)
+}
+
 /// Stages given directly, the last without an end.
 fn given<S: Scalar>(
     scene: &Scene,
@@ -803,7 +812,16 @@ impl Scene {
             let table = match self.force_of(index) {
                 Some(Force::Table(table)) => table,
                 other => {
+                    let end = stage.end;
                     match other {
+                        Some(Force::Expression(tape))
+                            if self.ends.is_empty()
+                                && let Some(stage) = of_coefficients(tape, &parameters) =>
+                        {
+                            stages.push(Stage { end, ..stage });
+                            pieces.push(first..first + 1);
+                            continue;
+                        }
                         Some(Force::Expression(tape)) => laws.push(Some(Law::new(tape, parameters.clone()))),
                         Some(Force::SpeedTable(table)) => {
                             for row in 0..table.rows().len() - 1 {

@@ -225,13 +225,13 @@ fn a_law_in_code_without_a_value_ends_the_flight_with_an_error() {
 fn methods_that_are_formulas_refuse_a_law() {
     for name in [MethodName::Energy, MethodName::ClosedForm] {
         let method = Method::new(name, &MethodOptions::default()).unwrap();
-        let error = method.integrator().solve(&problem("P + Q*V^2", 300.0), Detail::End).unwrap_err();
+        let error = method.integrator().solve(&problem("P + R*(V/v1)^1.5", 300.0), Detail::End).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
     }
-    assert!(reference::flight(Source::Problem(&problem("P + Q*V^2", 300.0))).is_err());
+    assert!(reference::flight(Source::Problem(&problem("P + R*(V/v1)^1.5", 300.0))).is_err());
 }
 
-/// The same problem with every stage written as an expression.
+/// The same problem with every stage written as an expression, and solved as one: its coefficients are those that are read.
 fn written(problem: &Problem) -> Problem {
     let mut text = format!("projectile.mass = {:e}\nimpact.velocity = {:e}\n", problem.mass, problem.impact_speed);
     if problem.has_exit() {
@@ -250,7 +250,62 @@ fn written(problem: &Problem) -> Problem {
             stages += &format!("end = {end:e}\n");
         }
     }
-    Scene::from_toml(&(text + &stages), "written").unwrap().problem().unwrap()
+    let read = Scene::from_toml(&(text + &stages), "written").unwrap().problem().unwrap();
+    for (index, (given, read_one)) in problem.stages.iter().zip(&read.stages).enumerate() {
+        let is_one = read.laws.of(index).is_none();
+        assert_eq!(is_one, given.stiffness >= 0.0 && given.viscosity >= 0.0 && given.drag >= 0.0);
+        assert!(!is_one || given == read_one, "{given:?} {read_one:?}");
+    }
+    let laws = problem.stages.iter().map(Law::of_coefficients).enumerate();
+    laws.fold(read, |problem, (index, law)| problem.with_law(index, &law))
+}
+
+/// dX/dP and others through the coefficients: by differences of the flights of stages.
+#[test]
+fn an_expression_of_the_four_terms_is_their_stage_for_every_method() {
+    let stage = |force: &str| {
+        let problem = problem(force, 300.0);
+        (problem.laws.is_empty(), problem.stages[0])
+    };
+    let plain = Stage::free();
+    for (force, expected) in [
+        ("P + Q*V^2", Stage { static_force: 848e3, drag: 3.25, ..plain }),
+        ("P*(1 + V/v1)^2", Stage { static_force: 848e3, viscosity: 16960.0, drag: 84.8, ..plain }),
+        ("P*x/l + R", Stage { static_force: 50e3, stiffness: 4.24e7, ..plain }),
+        ("R*sqrt(4)*max(1, 2) - R*V/v1*(-1)", Stage { static_force: 2e5, viscosity: 500.0, ..plain }),
+        ("Q*V*(V + v1)", Stage { viscosity: 325.0, drag: 3.25, ..plain }),
+        ("-R + P*x/l", Stage { static_force: -50e3, stiffness: 4.24e7, ..plain }),
+    ] {
+        let (is_one, found) = stage(force);
+        let numbers = |of: Stage| [of.static_force, of.stiffness, of.viscosity, of.drag];
+        let mut pairs = numbers(found).into_iter().zip(numbers(expected));
+        assert!(is_one && pairs.all(|(a, b)| (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()), "{force}: {found:?}");
+    }
+    // Not: powers and products of other terms, terms that cancel only as numbers, and what no stage may have.
+    for force in ["P*(V/v1)^3", "P*x/l*V/v1", "P*(x/l)^2", "P*max(1, V/v1)", "P + R*(V/v1)^1.5", "P - Q*V^2", "P - R*x/l", "P/(1 + x/l)"]
+    {
+        assert!(!stage(force).0, "{force}");
+    }
+    let text = "projectile.mass = 2\nimpact.velocity = 300\n[parameters]\nP = '848 kN'\nb = 2\nv1 = '100 m/s'\n\
+                [[stage]]\nforce = 'P*(1 + b*(V/v1)^2)'\n";
+    let scene = Scene::from_toml(text, "law").unwrap();
+    let own = |name: &str| scene.parameters.iter().find(|one| one.name.text() == name).unwrap();
+    for name in ["P", "b", "v1"] {
+        let which = crate::physics::parameter::Parameter::Own(own(name).name);
+        let depth = |factor: f64| {
+            let mut moved = scene.clone();
+            which.set(&mut moved, factor * own(name).value).unwrap();
+            ClosedForm.solve(&moved.problem().unwrap(), Detail::End).unwrap().end.depth
+        };
+        let by_differences = (depth(1.0001) / depth(0.9999)).ln() / (1.0001_f64 / 0.9999).ln();
+        let dual = scene
+            .resolve_in(300.0, |parameter, value| {
+                num_dual::Dual64::new(value, if parameter == which { value } else { 0.0 })
+            })
+            .unwrap();
+        let end = Taylor::default().solve_in(&dual, Detail::End).unwrap().end.depth;
+        assert!((end.eps / end.re - by_differences).abs() < 1e-6, "{name}: {} and {by_differences}", end.eps / end.re);
+    }
 }
 
 #[test]
