@@ -29,7 +29,8 @@ pub(crate) const VANISHES: &str = "its resistance vanishes with the velocity, so
 const DRIVES: &str = "the last stage drives the projectile and has no far side";
 
 /// Why a table of velocity brings nothing to rest.
-const TERMINAL: &str = "the force of its table vanishes at a speed that it approaches for ever, and there is no far side";
+const TERMINAL: &str =
+    "the force of its table vanishes at a speed that it approaches for ever, and there is no far side";
 
 /// A method, as the loop sees it.
 pub(crate) trait StageSolver<S: Scalar> {

@@ -6,6 +6,7 @@
 //! # a remark, in front of a run
 //! $ solve own.toml --trajectory path.csv       a run, its words quoted as for a shell; shipped scenes are NAME.toml
 //! - figures/                                   files whose names hold this are not compared
+//! ~ html                                       files whose names hold this are compared by their sums alone
 //! < own.toml                                   a file that the run is given; without lines, the last one of that name
 //! = 0                                          its exit code
 //! > stdout                                     what it said there, or `stderr`, or a file that it wrote
@@ -31,7 +32,7 @@ macro_rules! recorded {
 /// The transcripts of `verification/transcript`, by file name without its ending.
 pub const TRANSCRIPTS: &[(&str, &str)] = recorded![
     "solve", "methods", "paths", "critical", "sweep", "numbers", "batch", "converge", "audit", "studies", "bench",
-    "report", "suites", "peers", "spelled", "refused", "places", "paper", "options",
+    "report", "suites", "peers", "spelled", "refused", "places", "paper", "options", "unusual", "misread",
 ];
 
 /// Runs of the program, and what they said.
@@ -44,6 +45,7 @@ struct Run {
     remarks: Vec<String>,
     line: String,
     left_out: Vec<String>,
+    summed: Vec<String>,
     given: Vec<Text>,
     code: i32,
     said: Vec<Text>,
@@ -91,6 +93,7 @@ impl Transcript {
             let named = || Text { name: rest_trimmed.to_owned(), lines: Vec::new() };
             match kind {
                 "-" => run.left_out.push(rest_trimmed.to_owned()),
+                "~" => run.summed.push(rest_trimmed.to_owned()),
                 "=" => run.code = rest_trimmed.parse().map_err(|_| misplaced())?,
                 "<" => (run.given.push(named()), is_given = true).0,
                 ">" => (run.said.push(named()), is_given = false).0,
@@ -198,7 +201,10 @@ impl Run {
         let mut texts = vec![("stdout".to_owned(), said.out), ("stderr".to_owned(), said.err)];
         texts.extend(written);
         texts.retain(|(name, text)| !text.is_empty() && !self.left_out.iter().any(|part| name.contains(part)));
-        let said_now = texts.into_iter().map(|(name, text)| Text { lines: lasting(&name, &text), name });
+        let said_now = texts.into_iter().map(|(name, text)| {
+            let most = if self.summed.iter().any(|part| name.contains(part)) { 0 } else { LINES_MAX };
+            Text { lines: lasting(&name, &text, most), name }
+        });
         Ok(Self { code: said.code, said: said_now.collect(), ..self.clone() })
     }
 
@@ -215,6 +221,7 @@ impl fmt::Display for Transcript {
             let mut text = run.remarks.iter().fold(String::new(), |text, remark| text + remark + "\n");
             let _ = writeln!(text, "$ {}", run.line);
             run.left_out.iter().for_each(|part| text.push_str(&format!("- {part}\n")));
+            run.summed.iter().for_each(|part| text.push_str(&format!("~ {part}\n")));
             run.given.iter().for_each(|given| given.add_to(&mut text, '<'));
             let _ = writeln!(text, "= {}", run.code);
             run.said.iter().for_each(|said| said.add_to(&mut text, '>'));
@@ -250,20 +257,73 @@ const END_OF_LASTING: [&str; 2] = ["\n  \"fastest\": [", "\n  \"environment\": {
 /// Lines of a text that are kept at most, evenly.
 const LINES_MAX: usize = 150;
 
-/// The lines of `text`, the contents of the file `name`, without what differs between two runs; of a page its tables alone.
-fn lasting(name: &str, text: &str) -> Vec<String> {
-    let text = match name.rsplit('.').next() {
-        Some("html") => &rows_of(text),
-        Some("svg") => &drawn(text),
-        _ => text,
+/// The lines of `text`, the contents of the file `name`, without what differs between two runs; of more than `most`, and of
+/// a page beside its tables, the sums of all, and as many lines, evenly.
+fn lasting(name: &str, text: &str, most: usize) -> Vec<String> {
+    let (text, rows) = match name.rsplit('.').next() {
+        Some("html") => (&shown_of(text), Some(rows_of(text))),
+        Some("svg") => (&drawn(text), None),
+        _ => (&text.to_owned(), None),
     };
-    let text = END_OF_LASTING.iter().fold(text, |text, end| text.split(end).next().unwrap_or_default());
-    let count = text.lines().count();
+    let text = END_OF_LASTING.iter().fold(text.as_str(), |text, end| text.split(end).next().unwrap_or_default());
+    let mut is_time = false;
+    let timeless = text.lines().filter(|line| {
+        let line = line.trim();
+        // A time that was not taken is null, on one line.
+        let is_left_out = is_time || line.starts_with("\"time\": {") || line.starts_with("\"time\": null");
+        is_time = line.starts_with("\"time\": {") || is_time && !line.starts_with('}');
+        !is_left_out
+    });
+    let lines: Vec<String> = timeless.map(lasting_line).collect();
+    let kept: Vec<String> = rows.as_deref().map_or(lines.clone(), |rows| rows.lines().map(lasting_line).collect());
+    let count = kept.len();
     // An odd number, so that each key of the objects of a list comes up.
-    let each = if count > LINES_MAX { count.div_ceil(LINES_MAX) | 1 } else { 1 };
-    let thinned = (each > 1).then(|| format!("{count} lines, one of {each} kept"));
-    thinned.into_iter().chain(text.lines().step_by(each).map(lasting_line)).collect()
+    let each = if count > most { count.div_ceil(most.max(1)) | 1 } else { 1 };
+    let mut lasting = Vec::new();
+    if each > 1 || rows.is_some() || most == 0 {
+        lasting.extend(sums(&lines));
+    }
+    if each > 1 && most > 0 {
+        lasting.push(format!("{count} lines, one of {each} kept"));
+    }
+    lasting.extend(kept.into_iter().step_by(each).take(most));
+    lasting
 }
+
+/// What changes when any of `lines` does: a hash of the words between their numbers, and for each of [`PARTS`] parts how many
+/// numbers it has, how many of them are negative, and the weighted sum of the logarithms of their sizes. Round-off is left out.
+fn sums(lines: &[String]) -> Vec<String> {
+    let mut words = blake3::Hasher::new();
+    let mut sums = Vec::new();
+    for part in lines.chunks(lines.len().div_ceil(PARTS).max(1)) {
+        let (mut count, mut negative, mut sum) = (0, 0, 0.0);
+        for line in part {
+            for piece in pieces(&plain(line)) {
+                match piece.number {
+                    Some(number) => {
+                        count += 1;
+                        if number.abs() >= Numbers::TINY {
+                            negative += usize::from(number < 0.0);
+                            // By its place, so that two that are exchanged show.
+                            sum += (1.0 + f64::from(count % 101) / 101.0) * (40.0 + number.abs().ln());
+                        }
+                    }
+                    None => {
+                        words.update(piece.text.as_bytes());
+                        words.update(b" ");
+                    }
+                }
+            }
+        }
+        sums.push(format!("{count} numbers, {negative} below zero, {sum:.9}"));
+    }
+    // Letters alone: digits would be numbers.
+    let words: String = words.finalize().as_bytes()[..8].iter().map(|byte| char::from(b'a' + byte % 26)).collect();
+    std::iter::once(format!("{} lines, words {words}", lines.len())).chain(sums).collect()
+}
+
+/// Parts of which [`sums`] are made.
+const PARTS: usize = 8;
 
 fn lasting_line(line: &str) -> String {
     let mut line = line.to_owned();
@@ -288,6 +348,27 @@ fn drawn(figure: &str) -> String {
         drawn = rest.fold(first, |drawn, part| drawn + part);
     }
     drawn
+}
+
+/// What a page shows, without its styles, scripts and marks, what it says of the build and its date, and up to what its run
+/// says of the machine.
+fn shown_of(page: &str) -> String {
+    let page = page.split("id=\"reproduction\"").next().unwrap_or_default();
+    let (before, behind) = page.split_once("<p class=\"quiet\">penetrode ").unwrap_or((page, ""));
+    let page = before.to_owned() + behind.split_once("</time>").map_or(behind, |(_, behind)| behind);
+    let mut shown = String::new();
+    let mut hidden = false;
+    for piece in page.split('<') {
+        let (tag, text) = piece.split_once('>').unwrap_or(("", piece));
+        for name in ["style", "script"] {
+            hidden = tag.starts_with(name) || hidden && tag.strip_prefix('/') != Some(name);
+        }
+        if !hidden && !text.trim().is_empty() {
+            shown.push_str(text.trim());
+            shown.push('\n');
+        }
+    }
+    shown
 }
 
 /// The rows of the tables of a page, cells parted by `|`, up to what its run says of the machine.
@@ -494,6 +575,30 @@ mod tests {
         }
     }
 
+    /// Of a text that is thinned, every line counts: its words, its numbers, their signs and their order.
+    #[test]
+    fn what_differs_in_a_line_that_is_not_kept_is_seen() {
+        let text = |line: &str| {
+            let lines =
+                (0..1000).map(|i| if i == 444 { line.to_owned() } else { format!("{i} 1.25e-3 word {}", i + 1) });
+            let said = lasting("a.csv", &lines.collect::<Vec<_>>().join("\n"), LINES_MAX);
+            let said = said.iter().map(|line| format!("|{line}\n")).collect::<String>();
+            Transcript::read(&format!("$ map\n= 0\n> a.csv\n{said}")).unwrap()
+        };
+        let was = text("444 1.25e-3 word 445");
+        assert_eq!(was.differences(&text("444 1.25e-3 word 445"), 1e-9).lines, 0);
+        assert_eq!(was.differences(&text("444 1.2500000000001e-3 word 445"), 1e-9).lines, 0);
+        for other in [
+            "444 1.26e-3 word 445",
+            "444 -1.25e-3 word 445",
+            "444 1.25e-3 work 445",
+            "445 1.25e-3 word 444",
+            "444 word 445",
+        ] {
+            assert!(was.differences(&text(other), 1e-9).lines > 0, "{other}");
+        }
+    }
+
     #[test]
     fn powers_of_ten_are_read_as_a_page_writes_them() {
         assert_eq!(plain("5.4\u{a0}×\u{a0}10⁻¹⁶ of it"), "5.4e-16 of it");
@@ -517,10 +622,20 @@ mod tests {
         assert_eq!(lasting_line("    \"wall_ns\": 5031,"), "    \"wall_ns\": *,");
         assert_eq!(lasting_line("<testcase name=\"a\" time=\"0.250\">"), "<testcase name=\"a\" time=\"*\">");
         let json = "{\n  \"verdict\": \"passed\",\n  \"environment\": {\n    \"date\": 1\n  }\n}";
-        assert_eq!(lasting("report.json", json), ["{", "  \"verdict\": \"passed\","]);
+        assert_eq!(lasting("report.json", json, LINES_MAX), ["{", "  \"verdict\": \"passed\","]);
         let figure =
             "<path d=\"M1 2\" fill=\"none\" stroke=\"#5a6470\" class=\"s-muted\" stroke-dasharray=\"none\"></path>";
-        assert_eq!(lasting("a.svg", figure), ["<path d=\"M1 2\" class=\"s-muted\"></path>"]);
-        assert_eq!(lasting("a.html", "<p>x</p><tr><th>a<td><b>1</b> m</td></tr>y"), ["| a | 1 m"]);
+        assert_eq!(lasting("a.svg", figure, LINES_MAX), ["<path d=\"M1 2\" class=\"s-muted\"></path>"]);
+        let page = |commit: u32, word: &str, style: &str| {
+            let head = format!(
+                "<style>{style}</style><p class=\"quiet\">penetrode 0.1.0, commit {commit}, <time>1</time></p>"
+            );
+            lasting("a.html", &format!("{head}<p>{word}</p><tr><th>a<td><b>1</b> m</td></tr>y"), LINES_MAX)
+        };
+        assert_eq!(page(1, "x", "").last().map(String::as_str), Some("| a | 1 m"));
+        assert_eq!(page(1, "x", "p{}"), page(2, "x", ""));
+        assert_ne!(page(1, "x", ""), page(1, "z", ""));
+        let run = |time: &str| lasting("a.json", &format!("{{\n  \"error\": 2,\n  {time}\n}}"), LINES_MAX);
+        assert_eq!(run("\"time\": null"), run("\"time\": {\n    \"median_ns\": 3,\n    \"samples\": 1\n  }"));
     }
 }

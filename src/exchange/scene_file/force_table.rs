@@ -18,11 +18,10 @@ use crate::physics::{Advice, Shown};
 pub(super) const EXAMPLE: &str = "force = { table = \"r.csv\", x = \"depth_mm\", force = \"force_kN\" }";
 
 /// The tables of shipped scenes, by their file names.
-pub(super) const SHIPPED_TABLES: &[(&str, &str)] =
-    &[
-        ("softening.csv", include_str!("../../../verification/scenes/softening.csv")),
-        ("law-speed-table.csv", include_str!("../../../verification/scenes/law-speed-table.csv")),
-    ];
+pub(super) const SHIPPED_TABLES: &[(&str, &str)] = &[
+    ("softening.csv", include_str!("../../../verification/scenes/softening.csv")),
+    ("law-speed-table.csv", include_str!("../../../verification/scenes/law-speed-table.csv")),
+];
 
 /// Largest table that is read (bytes): [`ROWS_MAX`] rows of many digits and columns.
 const SIZE_MAX: u64 = 8 << 20;

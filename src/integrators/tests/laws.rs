@@ -282,8 +282,16 @@ fn an_expression_of_the_four_terms_is_their_stage_for_every_method() {
         assert!(is_one && pairs.all(|(a, b)| (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()), "{force}: {found:?}");
     }
     // Not: powers and products of other terms, terms that cancel only as numbers, and what no stage may have.
-    for force in ["P*(V/v1)^3", "P*x/l*V/v1", "P*(x/l)^2", "P*max(1, V/v1)", "P + R*(V/v1)^1.5", "P - Q*V^2", "P - R*x/l", "P/(1 + x/l)"]
-    {
+    for force in [
+        "P*(V/v1)^3",
+        "P*x/l*V/v1",
+        "P*(x/l)^2",
+        "P*max(1, V/v1)",
+        "P + R*(V/v1)^1.5",
+        "P - Q*V^2",
+        "P - R*x/l",
+        "P/(1 + x/l)",
+    ] {
         assert!(!stage(force).0, "{force}");
     }
     let text = "projectile.mass = 2\nimpact.velocity = 300\n[parameters]\nP = '848 kN'\nb = 2\nv1 = '100 m/s'\n\

@@ -8,7 +8,8 @@ use crate::studies::critical_velocity::critical_velocity;
 use crate::testing::{Random, kinds};
 
 /// Velocities (m/s) and forces (kN): it stops below 16 m/s, drives from there to 67.3, and slows above.
-const ROWS: [[f64; 2]; 6] = [[0.0, 400.0], [20.0, -100.0], [60.0, -50.0], [120.0, 360.0], [200.0, 360.0], [300.0, 1000.0]];
+const ROWS: [[f64; 2]; 6] =
+    [[0.0, 400.0], [20.0, -100.0], [60.0, -50.0], [120.0, 360.0], [200.0, 360.0], [300.0, 1000.0]];
 
 fn law(rows: &[[f64; 2]]) -> Law {
     let rows: Vec<_> = rows.iter().map(|&[at, force]| Row { at, force: 1e3 * force }).collect();
@@ -22,7 +23,10 @@ fn problem(rows: &[[f64; 2]], speed: f64, exit: f64) -> Problem {
 
 fn everyone() -> Vec<(MethodName, Method)> {
     let options = MethodOptions::default();
-    methods(1e-10).into_iter().chain([(MethodName::ClosedForm, Method::new(MethodName::ClosedForm, &options).unwrap())]).collect()
+    methods(1e-10)
+        .into_iter()
+        .chain([(MethodName::ClosedForm, Method::new(MethodName::ClosedForm, &options).unwrap())])
+        .collect()
 }
 
 fn allowed(name: MethodName) -> f64 {
@@ -64,12 +68,16 @@ fn every_method_goes_through_the_pieces_as_quadrature_over_the_velocity_does() {
 #[test]
 fn what_no_force_stops_is_said_and_so_is_the_end_of_the_table() {
     for (name, method) in everyone() {
-        let why = |speed, exit| method.integrator().solve(&problem(&ROWS, speed, exit), Detail::End).unwrap_err().to_string();
+        let why =
+            |speed, exit| method.integrator().solve(&problem(&ROWS, speed, exit), Detail::End).unwrap_err().to_string();
         for speed in [17.0, 60.0, 290.0] {
             assert!(why(speed, f64::INFINITY).contains("approaches for ever"), "{name}: {}", why(speed, f64::INFINITY));
         }
         let said = why(301.0, 0.2);
-        assert!(said.contains("table of the force ends at V = 300 m/s") && said.contains("V = 301 m/s at x = 0 m"), "{name}: {said}");
+        assert!(
+            said.contains("table of the force ends at V = 300 m/s") && said.contains("V = 301 m/s at x = 0 m"),
+            "{name}: {said}"
+        );
         // A drive beyond the last row.
         let driven = problem(&[[0.0, 10.0], [100.0, -10.0]], 60.0, 9.0);
         let said = method.integrator().solve(&driven, Detail::End).unwrap_err().to_string();
@@ -133,7 +141,10 @@ fn closed_form_and_series_agree_on_random_tables_within_their_bounds() {
             assert!(agrees, "{name} on {rows:?} from {speed}, {exit}");
             if let (Some(margin), Some(bound)) = (flight.exit_margin, flight.exit_margin_error) {
                 let allowed = bound + exact.exit_margin_error.unwrap();
-                assert!((margin - exact.exit_margin.unwrap()).abs() <= allowed, "{name} on {rows:?} from {speed}, {exit}");
+                assert!(
+                    (margin - exact.exit_margin.unwrap()).abs() <= allowed,
+                    "{name} on {rows:?} from {speed}, {exit}"
+                );
                 margins += 1;
             }
         }

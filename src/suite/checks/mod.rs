@@ -73,6 +73,7 @@ mod by_hand;
 mod commands;
 mod conclusions;
 mod counts;
+mod definitions;
 mod edges;
 mod expressions;
 mod formulas;
@@ -108,9 +109,9 @@ use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
 
 pub use self::{
-    agreement::*, applications::*, by_hand::*, commands::*, conclusions::*, counts::*, edges::*, expressions::*,
-    formulas::*, generators::*, invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*, peers::*,
-    problems::*, proved::*, scheme::*, texts::*,
+    agreement::*, applications::*, by_hand::*, commands::*, conclusions::*, counts::*, definitions::*, edges::*,
+    expressions::*, formulas::*, generators::*, invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*,
+    peers::*, problems::*, proved::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -155,6 +156,7 @@ macro_rules! every_check {
 }
 
 every_check! {
+    Gradients TablesInMemory Quartiles Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report

@@ -6,13 +6,19 @@ use super::super::claim::{Found, Measurement, NotMeasured};
 use super::problems::{in_double_double, problems};
 use super::{Subject, Worst, worse, worst_of};
 use crate::exchange::scene_file::SceneFile;
-use crate::integrators::{Detail, Enclosure, Flight};
+use crate::integrators::{ClosedForm, Detail, Enclosure, Flight, Integrator};
 use crate::physics::ball::Ball;
+use crate::physics::decimals::Written;
 use crate::physics::reference::{self, Source};
 use crate::physics::units::decimal;
-use crate::physics::{Advice, Event, EventKind, Outcome, Problem, Scalar, State};
-use crate::studies::enclosure;
+use crate::physics::{
+    Advice, Concrete, CraterStiffness, Event, EventKind, Outcome, Parameter, Problem, Scalar, Scene, State,
+};
+use crate::studies::boxes::{Fate, Region, Side};
+use crate::studies::random::Random;
 use crate::studies::random_problems::Kind;
+use crate::studies::random_scenes::Generator;
+use crate::studies::{critical_velocity, enclosure};
 use crate::suite::recorded::{self, RecordedScene};
 
 check! {
@@ -36,6 +42,105 @@ check! {
         /// How many of each.
         count: usize,
     } in Random, "refuted", by refuted, compares (MethodItself | Enclosure);
+    /// Random boxes around random scenes, half of them where the crater's share of the energy changes what more drag does:
+    /// points of the box, corners among them, whose end or V_c by the closed form lies outside of what is proved of the box.
+    /// At least two in three boxes must have a proof.
+    Boxes {
+        /// How many.
+        boxes: usize,
+    } in Random, "points outside", by boxes, compares (Enclosure | ClosedForm);
+}
+
+/// A box around a scene: two or three of its numbers, each within a tenth or a half.
+fn random_box(generator: &mut Generator, random: &mut Random, is_near_change: bool) -> (Scene, Vec<Side>) {
+    let mut scene = generator.next_scene();
+    if let (true, Some(concrete)) = (is_near_change, scene.concrete()) {
+        // M V0² = k d P, with Q of the size of M/(k d).
+        let mut concrete = Concrete { crater_stiffness: CraterStiffness::Continuous, ..concrete.clone() };
+        let area = std::f64::consts::FRAC_PI_4 * concrete.diameter.powi(2);
+        let depth = concrete.crater_ratio * concrete.diameter;
+        concrete.density = random.uniform(0.3, 3.0) * scene.mass / (depth * area * concrete.nose_factor);
+        let force = area * concrete.static_factor * concrete.strength;
+        let velocity = (random.uniform(0.6, 1.7) * depth * force / scene.mass).sqrt();
+        let thickness = Some(depth * random.uniform(0.3, 1.6));
+        scene = Scene { velocity: Some(velocity), thickness, ..Scene::of_concrete(scene.mass, concrete) };
+    }
+    let width = if random.chance(0.5) { 0.1 } else { 0.4 };
+    let known = [
+        Parameter::Mass,
+        Parameter::Density,
+        Parameter::NoseFactor,
+        Parameter::Strength,
+        Parameter::Velocity,
+        Parameter::Thickness,
+    ];
+    let mut sides: Vec<Side> = Vec::new();
+    for _ in 0..2 + random.below(2) {
+        let parameter = known[random.below(known.len())];
+        let Ok(value) = parameter.get(&scene) else { continue };
+        let high =
+            if parameter == Parameter::NoseFactor { (value * (1.0 + width)).min(1.0) } else { value * (1.0 + width) };
+        if value > 0.0 && value.is_finite() && sides.iter().all(|side| side.parameter != parameter) {
+            sides.push(Side { parameter, low: value * (1.0 - width), high });
+        }
+    }
+    (scene, sides)
+}
+
+fn boxes(&Boxes { boxes }: &Boxes, subject: &Subject<'_>) -> Found {
+    const POINTS: usize = 24;
+    let mut random = subject.random("boxes");
+    let mut generator = Generator::new(subject.context.seed, "boxes");
+    let (mut asked, mut proved, mut points, mut outside, mut first) = (0, 0, 0, 0, String::new());
+    let written = Written::default();
+    for index in 0..boxes {
+        let (scene, sides) = random_box(&mut generator, &mut random, index % 2 == 0);
+        let Ok(region) = Region::new(&scene, &written, &sides) else { continue };
+        asked += 1;
+        let (found, critical) = (region.flight()?, region.critical());
+        proved += usize::from(found.is_some());
+        for point in 0..POINTS {
+            let mut at = scene.clone();
+            for (place, side) in sides.iter().enumerate() {
+                // The corners first.
+                let share = if point < 8 { f64::from((point >> place & 1) as u32) } else { random.unit() };
+                side.parameter.set(&mut at, side.low + share * (side.high - side.low))?;
+            }
+            let holds = |(low, high): (Option<f64>, Option<f64>), exact: f64| {
+                low.is_none_or(|low| exact >= low * (1.0 - 1e-9) - 1e-300)
+                    && high.is_none_or(|high| exact <= high * (1.0 + 1e-9))
+            };
+            let mut see = |holds: bool, what: String| {
+                points += 1;
+                if !holds {
+                    outside += 1;
+                    if first.is_empty() {
+                        first = format!("{what}, of {sides:?} around {scene:?}");
+                    }
+                }
+            };
+            if let (Some(ranges), Ok(flight)) = (&found, ClosedForm.solve(&at.problem()?, Detail::End)) {
+                let is_near = flight.outcome == Outcome::Undecided;
+                let is_right = match ranges.fate {
+                    // To rest in the crater or behind it is one to a box that holds both.
+                    Fate::One(outcome) => flight.outcome.is_stop() == outcome.is_stop(),
+                    Fate::Either => true,
+                };
+                see(is_near || is_right, format!("{} and not {:?}", flight.outcome, ranges.fate));
+                let end = flight.end;
+                see(is_near || holds(ranges.end.depth_m, end.depth), format!("ends at {} m", end.depth));
+                see(is_near || holds(ranges.end.time_s, end.time), format!("ends at {} s", end.time));
+                let velocity = ranges.end.velocity_m_s;
+                see(is_near || holds(velocity, end.velocity), format!("ends with {} m/s", end.velocity));
+            }
+            if let (Some((low, high)), Ok(exact)) = (critical, critical_velocity::of_scene(&at, &ClosedForm)) {
+                see(holds((Some(low), Some(high)), exact.velocity), format!("V_c = {} m/s", exact.velocity));
+            }
+        }
+    }
+    holds!(3 * proved >= 2 * asked, "{proved} of {asked} boxes have a proof");
+    let remark = if outside == 0 { format!("{proved} of {asked} boxes proved") } else { first };
+    Ok(Measurement::count(outside).remark(remark).cases(points))
 }
 
 /// Width of an interval in spacings of its greater end.

@@ -60,6 +60,13 @@ check! {
         rows: usize,
     } in Commands, "relative", by batch_rows, compares nothing;
 
+    /// `critical` and `solve` by enclosure: each number beside an interval is its middle, the error bar of V_c half of its width,
+    /// E_c = M V_c²/2 of that.
+    MiddleAndBar {
+        /// Shipped scenes.
+        of: Vec<String>,
+    } in Commands, "violations", by middle_and_bar, compares (Commands | Itself);
+
     /// Rows of `sweep` against `solve --set` and `critical --set` at the values that the axis asks for.
     SweepRows {
         /// What varies.
@@ -707,6 +714,41 @@ fn sets_of_tests(subject: &Subject<'_>) -> Found {
     }
     holds!(counted == shots.len(), "{counted} of {} tests are in a set", shots.len());
     Ok(worst.measurement())
+}
+
+fn middle_and_bar(MiddleAndBar { of: scenes }: &MiddleAndBar, subject: &Subject<'_>) -> Found {
+    let program = subject.program()?;
+    let mut seen = Vec::new();
+    let ends = |answer: &Answer, path: &str| -> Found<[f64; 2]> {
+        Ok([answer.number(&format!("{path}.0"))?, answer.number(&format!("{path}.1"))?])
+    };
+    // The middle of two neighbours is one of them.
+    let is_middle =
+        |value: f64, [low, high]: [f64; 2]| (value - (low + 0.5 * (high - low))).abs() <= (low.next_up() - low);
+    let mut widths = 0;
+    for scene in scenes {
+        let answer = Answer::of(program, &format!("critical {scene}.toml --method enclosure"), &[])?;
+        let interval = ends(&answer, "enclosure.critical_velocity_m_s")?;
+        let (velocity, bar) = (answer.number("critical_velocity_m_s")?, answer.number("error_bar_m_s")?);
+        let energy = 0.5 * answer.number("scene.mass_kg")? * velocity * velocity;
+        widths += usize::from(interval[1] > interval[0]);
+        if !is_middle(velocity, interval) || 2.0 * bar != interval[1] - interval[0] {
+            seen.push(format!("V_c of {scene}: {velocity} +- {bar}, and {interval:?}"));
+        }
+        if apart(answer.number("critical_energy_j")?, energy) > 1e-14 {
+            seen.push(format!("E_c of {scene} is not {energy}"));
+        }
+        let answer = Answer::of(program, &format!("solve {scene}.toml --method enclosure"), &[])?;
+        for name in ["depth_m", "time_s", "velocity_m_s"] {
+            let (value, interval) = (answer.number(name)?, ends(&answer, &format!("enclosure.{name}"))?);
+            if !is_middle(value, interval) {
+                seen.push(format!("{name} of {scene}: {value} and {interval:?}"));
+            }
+        }
+    }
+    holds!(widths > 0, "no interval has a width");
+    let count = seen.len();
+    Ok(crate::suite::Measurement::count(count).remark(seen.into_iter().next().unwrap_or_default()))
 }
 
 fn step_errors(StepErrors { options }: &StepErrors, subject: &Subject<'_>) -> Found {

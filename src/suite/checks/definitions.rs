@@ -1,0 +1,178 @@
+//! Are numbers what they are defined to be, however they come in or are summed up? Each definition is written again here.
+
+use std::sync::Arc;
+
+use super::super::claim::Found;
+use super::Subject;
+use super::edges::Violations;
+use crate::exchange::tables::{At, Cells, Kind, Layout, Rows};
+use crate::physics::expression::{Known, Tape, Unit};
+use crate::physics::units::{Dimension, quantity};
+use crate::studies::batch::SCENES;
+use crate::studies::bench::Timing;
+use crate::studies::random::Random;
+
+check! {
+    /// Random expressions with powers of every kind: derivatives by x and by V that are not the limit of their differences.
+    Gradients {
+        /// How many expressions.
+        expressions: usize,
+    } in Input, "violations", counting gradients, compares nothing;
+
+    /// Tables of scenes in memory, each column in a random unit: numbers that are not those that the same digits with that
+    /// unit are in a scene file, and rows that do not have their number.
+    TablesInMemory {
+        /// How many tables.
+        tables: usize,
+    } in Input, "violations", counting tables_in_memory, compares nothing;
+
+    /// Quartiles of random times: samples below and above them that are not a quarter and a half, and shares of a time that
+    /// are not in proportion.
+    Quartiles {
+        /// How many samplings.
+        samplings: usize,
+    } in Commands, "violations", counting quartiles, compares nothing;
+}
+
+/// A sum of products of powers of x and V.
+fn sum_of_powers(random: &mut Random) -> String {
+    const EXPONENTS: [&str; 9] = ["0.5", "1.5", "2.5", "3.5", "2", "3", "0.7", "-1.5", "1"];
+    let mut factor = |of: &str| {
+        let exponent = EXPONENTS[random.below(EXPONENTS.len())];
+        let shift = random.uniform(0.2, 2.0);
+        match random.below(6) {
+            0 => format!("({of})^({exponent})"),
+            1 => format!("({of} + {shift:.3})^({exponent})"),
+            2 => format!("sqrt({of} + {shift:.3})"),
+            3 => format!("exp(-{shift:.3}*{of})"),
+            4 => format!("({shift:.3} + ({of})^2)^({exponent})"),
+            _ => format!("log(1 + {of})/({shift:.3} + {of})"),
+        }
+    };
+    (0..3).map(|_| format!("{}*{}", factor("x/a"), factor("V/b"))).collect::<Vec<_>>().join(" + ")
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn gradients(&Gradients { expressions }: &Gradients, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
+    // Differences of the fourth order: the truncation is 1e-12 of what the powers above make of it.
+    const STEP: f64 = 1e-3;
+    let mut random = subject.random("gradients");
+    let known = [("a", Dimension::Length), ("b", Dimension::Velocity)];
+    let known = known.map(|(name, unit)| Known { name, value: 1.0, unit: unit.into() });
+    for _ in 0..expressions {
+        let text = sum_of_powers(&mut random);
+        let Ok(tape) = Tape::read(&text, &known, Unit::NONE) else {
+            seen.expect(false, || format!("`{text}` is refused"));
+            continue;
+        };
+        let bound = tape.bind(tape.parameters());
+        let (x, v) = (random.uniform(0.3, 2.0), random.uniform(0.3, 2.0));
+        let (_, by_x, by_v) = bound.gradient(x, v);
+        let difference = |f: &dyn Fn(f64) -> f64, at: f64| {
+            let h = STEP * at;
+            (8.0 * (f(at + h) - f(at - h)) - (f(at + 2.0 * h) - f(at - 2.0 * h))) / (12.0 * h)
+        };
+        let [d_x, d_v] = [difference(&|x| bound.eval(x, v), x), difference(&|v| bound.eval(x, v), v)];
+        let size = bound.eval(x, v).abs() + d_x.abs() * x + d_v.abs() * v;
+        for (found, exact, at, name) in [(by_x, d_x, x, "x"), (by_v, d_v, v, "V")] {
+            let holds = (found - exact).abs() * at <= 1e-6 * size;
+            seen.expect(holds, || format!("d/d{name} of `{text}` at {x}, {v}: {found}, by differences {exact}"));
+        }
+    }
+    Ok(())
+}
+
+fn tables_in_memory(
+    &TablesInMemory { tables }: &TablesInMemory,
+    subject: &Subject<'_>,
+    seen: &mut Violations,
+) -> Found<()> {
+    const ROWS: u64 = 3;
+    let mut random = subject.random("tables-in-memory");
+    for table in 0..tables {
+        let first = 1 + random.below(1_000_000) as u64;
+        let (mut names, mut columns, mut units) = (Vec::new(), Vec::new(), Vec::new());
+        for column in SCENES.columns {
+            let (name, unit) = match column.measure {
+                Some((stem, dimension)) => {
+                    let unit = dimension.units()[random.below(dimension.units().len())];
+                    (format!("{stem} ({unit})"), Some((unit, dimension)))
+                }
+                None => (column.name.to_owned(), None),
+            };
+            names.push(name);
+            units.push(unit);
+            columns.push(match column.kind {
+                Kind::Number => {
+                    Cells::Numbers((0..ROWS).map(|_| Some(f64::from(1 + random.below(8) as u32) / 8.0)).collect())
+                }
+                kind => Cells::empty(kind),
+            });
+        }
+        let words: Vec<&str> = names.iter().map(String::as_str).collect();
+        let layout = match Layout::new(&words, "memory", At::Table, &SCENES) {
+            Ok(layout) => Arc::new(layout),
+            Err(error) => {
+                seen.expect(false, || format!("table {table}: {error}"));
+                continue;
+            }
+        };
+        let given: Vec<Option<Vec<Option<f64>>>> = columns
+            .iter()
+            .map(|cells| match cells {
+                Cells::Numbers(numbers) => Some(numbers.clone()),
+                _ => None,
+            })
+            .collect();
+        let rows = Rows::of_columns(&layout, columns, first);
+        for index in 0..ROWS as usize {
+            let is_numbered = rows.at(index) == At::Row(first + index as u64);
+            seen.expect(is_numbered, || format!("row {index} of table {table} is not row {}", first + index as u64));
+            let row = rows.row(index)?;
+            for (column, numbers) in given.iter().enumerate() {
+                let Some(Some(number)) = numbers.as_ref().map(|numbers| numbers[index]) else { continue };
+                // An angle or a share may be out of range, and is then refused.
+                let Ok(found) = row.optional(column) else { continue };
+                let exact = match units[column] {
+                    Some((unit, dimension)) => quantity(&format!("{number} {unit}"), dimension)?,
+                    None => number,
+                };
+                let holds = found.is_some_and(|found| (found / exact - 1.0).abs() < 1e-14);
+                seen.expect(holds, || format!("{number} in `{}` is {found:?} and not {exact}", names[column]));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn quartiles(&Quartiles { samplings }: &Quartiles, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
+    let mut random = subject.random("quartiles");
+    for _ in 0..samplings {
+        // With 4 k + 1 samples each quartile is one of them.
+        let quarter = 1 + random.below(6);
+        let samples: Vec<f64> = (0..=4 * quarter).map(|_| random.log_uniform(1.0, 1e6)).collect();
+        let parts = 1 + random.below(1000);
+        let Some(timing) = Timing::of(samples.clone()) else {
+            seen.expect(false, || "samples without a time".to_owned());
+            continue;
+        };
+        let below = |at: f64| samples.iter().filter(|sample| **sample < at).count();
+        for (name, at, count) in [
+            ("low", timing.low_ns, quarter),
+            ("median", timing.median_ns, 2 * quarter),
+            ("high", timing.high_ns, 3 * quarter),
+        ] {
+            let is_one = samples.contains(&at);
+            seen.expect(is_one && below(at) == count, || format!("{} of {} below {name}", below(at), samples.len()));
+        }
+        seen.expect(timing.samples == samples.len(), || format!("{} samples", timing.samples));
+        let share = timing.over(parts);
+        for (whole, part) in
+            [(timing.low_ns, share.low_ns), (timing.median_ns, share.median_ns), (timing.high_ns, share.high_ns)]
+        {
+            seen.expect((part * parts as f64 / whole - 1.0).abs() < 1e-12, || format!("{part} of {whole} in {parts}"));
+        }
+    }
+    Ok(())
+}
