@@ -7,7 +7,7 @@
 //! E_c, x_p(H), u_val    what stands below the line: of the symbols of [`SYMBOLS`] alone
 //! 10^-j, 2^17           what is raised
 //! 1e-12, 2.5e6          10⁻¹², 2.5 × 10⁶
-//! `--rtol`              code
+//! `--rtol`, --dt 1e-9   code: an option with its number stays as it is typed
 //! -2.5                  −2.5, where no word and no number stands in front
 //! V0, fc, +-, ->        V₀, as f_c, ±, →
 //! 20 %                  on one line
@@ -71,6 +71,10 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
     if let Some((code, after)) = rest.strip_prefix('`').and_then(|inside| inside.split_once('`')) {
         return Some((vec![Piece::Code(code.to_owned())], after));
     }
+    if is_start && let Some(length) = option_with_number(rest) {
+        let (option, after) = rest.split_at(length);
+        return Some((vec![Piece::Code(option.to_owned())], after));
+    }
     // As a terminal has it.
     for (typed, printed) in [("+-", "±"), ("->", "→"), ("V0", "V₀"), ("V1", "V₁"), ("fc", "f_c")] {
         let Some(after) = rest.strip_prefix(typed) else { continue };
@@ -104,20 +108,39 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
             if let Ok(power) = power.parse()
                 && ends_word(after)
             {
-                let number = if mantissa == "1" { String::new() } else { format!("{mantissa}\u{a0}×\u{a0}") };
-                return Some((vec![Piece::Line(number + &power_of_ten(power))], after));
+                let number = match (mantissa, power) {
+                    (_, 0) => mantissa.to_owned(),
+                    ("1", _) => power_of_ten(power),
+                    _ => format!("{mantissa}\u{a0}×\u{a0}{}", power_of_ten(power)),
+                };
+                return Some((vec![Piece::Line(number)], after));
             }
         }
     }
     let raised = rest.strip_prefix('^').filter(|_| before.is_some_and(|c| c.is_alphanumeric() || c == ')'))?;
     let digits = raised.strip_prefix('-').unwrap_or(raised);
-    let length = digits.find(|c: char| !c.is_alphanumeric()).unwrap_or(digits.len());
+    let whole = digits.find(|c: char| !c.is_alphanumeric()).unwrap_or(digits.len());
+    // A point that ends a sentence is no decimal one.
+    let decimals = digits[whole..]
+        .strip_prefix('.')
+        .map_or(0, |behind| behind.find(|c: char| !c.is_ascii_digit()).unwrap_or(behind.len()));
+    let length = if decimals > 0 { whole + 1 + decimals } else { whole };
     let (power, after) = raised.split_at(raised.len() - digits.len() + length);
     let power = match power.parse() {
         Ok(number) => Piece::Line(superscript(number)),
         Err(_) => Piece::Above(power.replace('-', "−")),
     };
     (length > 0).then(|| (vec![power], after))
+}
+
+/// The length of the option that begins `text`, together with the number behind it.
+fn option_with_number(text: &str) -> Option<usize> {
+    let name = text.strip_prefix("--")?;
+    let name = &name[..name.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(name.len())];
+    let value = text[2 + name.len()..].strip_prefix(' ')?;
+    let is_number = value.starts_with(|c: char| c.is_ascii_digit()) && !name.is_empty();
+    let end = value.find(|c: char| c.is_whitespace() || ",;)".contains(c)).unwrap_or(value.len());
+    is_number.then(|| 3 + name.len() + value[..end].trim_end_matches('.').len())
 }
 
 /// `text` on a page.
@@ -191,6 +214,10 @@ mod tests {
         assert_eq!(page("fc, V0 +-20, a -> b"), "f<sub>c</sub>, V₀ ±20, a → b");
         assert_eq!(page("fc_mpa, V0x, sfc"), "fc_mpa, V0x, sfc");
         assert_eq!(page("-23.01 to -2.5e6, x-2, 11-12, 1e-3-1"), "−23.01 to −2.5\u{a0}×\u{a0}10⁶, x-2, 11-12, 1e-3-1");
+        assert_eq!(page("h^1.95, h^2. V^-0.5"), "h<sup>1.95</sup>, h². V<sup>−0.5</sup>");
+        assert_eq!(page("error 0.0e0, 6.5e0"), "error 0.0, 6.5");
+        assert_eq!(page("try --dt 4e-9:4e-7."), "try <code>--dt 4e-9:4e-7</code>.");
+        assert_eq!(page("with --peer (10), --"), "with --peer (10), --");
         assert_eq!(page("20 % of 5"), "20\u{a0}% of 5");
         assert_eq!(page("<b> & V_c"), "&lt;b&gt; &amp; V<sub>c</sub>");
     }
