@@ -162,18 +162,16 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
         let step = significant(q.finest.dt_s);
         text.wrapped("  ", &format!("{value}{unit} +- {half:.2e}{unit}{percent} at dt = {step} s: {}", band.rule));
     }
+    let shown = |value| value_text(value, q.error_band);
     if let (Some(limit), Some(exact)) = (q.limit, q.exact) {
         let word = match q.agrees_with_exact {
             Some(true) => "agrees with",
             Some(false) => "misses",
             None => "is too unsure to compare with",
         };
-        text.wrapped(
-            "  ",
-            &format!("limit {}{unit}: {word} the exact {}{unit}", significant(limit), significant(exact)),
-        );
+        text.wrapped("  ", &format!("limit {}{unit}: {word} the exact {}{unit}", shown(limit), shown(exact)));
     } else if let Some(limit) = q.limit {
-        text.line(format!("  limit {}{unit}", significant(limit)));
+        text.line(format!("  limit {}{unit}", shown(limit)));
     }
     if let Some(proof) = &q.proof {
         text.wrapped("  ", proof);
@@ -186,7 +184,7 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
         );
     }
     if let Some(three) = &q.three_grids {
-        three_grids_text(text, three, unit.trim());
+        three_grids_text(text, three, unit.trim(), q.error_band);
     }
     for band in &q.error_bands {
         let digits = format!("{:.2e}{unit}", band.half_width);
@@ -195,19 +193,20 @@ fn quantity_text(text: &mut Text, q: &QuantityAudit) {
 }
 
 /// The table of a grid convergence study, in its usual names.
-fn three_grids_text(text: &mut Text, three: &ThreeGrids, unit: &str) {
-    let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.3} %", 100.0 * share));
+fn three_grids_text(text: &mut Text, three: &ThreeGrids, unit: &str, band: Option<ErrorBand>) {
+    let percent = |share: Option<f64>| or_dash(share, |share| format!("{} %", digits_text(100.0 * share, 3)));
+    let row = |name: String, [a, b, c]: [String; 3]| [name, a, b, c];
+    let name = if unit.is_empty() { "f".to_owned() } else { format!("f ({unit})") };
     text.table(
         &["", "1", "2", "3"],
         [
-            ("h (s)".to_owned(), three.steps),
-            (if unit.is_empty() { "f".to_owned() } else { format!("f ({unit})") }, three.values),
-        ]
-        .map(|(name, row)| [name, significant(row[0]), significant(row[1]), significant(row[2])]),
+            row("h (s)".to_owned(), three.steps.map(significant)),
+            row(name, three.values.map(|value| value_text(value, band))),
+        ],
     );
     let order = or_dash(three.order, |order| format!("{order:.3}"));
     let [r21, r32] = three.ratios;
-    let extrapolated = or_dash(three.extrapolated, significant);
+    let extrapolated = or_dash(three.extrapolated, |value| value_text(value, band));
     let ratio = or_dash(three.asymptotic_ratio, |ratio| format!("{ratio:.4}"));
     let (error, index) = (percent(three.approximate_error), percent(three.grid_convergence_index));
     text.wrapped(

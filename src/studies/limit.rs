@@ -6,11 +6,13 @@
 //!
 //! The order is that of the limit h -> 0: where the second term is seen, p is the power of the first.
 
+use std::f64::consts::LN_2;
+
 use serde::Serialize;
 
 use super::grid_convergence::{Behaviour, admissible, local_order, range};
 use super::order::{FitError, ORDER_RESOLUTION, PowerLaw, STEPS_MIN, alternates, student_t};
-use super::power_law::{GridValue, Model, Samples, Terms, Weights};
+use super::power_law::{GridValue, Model, Samples, Weights};
 
 /// Least order behind a 95 % interval of a limit. Below it a limit is not bounded by any finite table.
 const ORDER_LEAST: f64 = 0.5;
@@ -46,13 +48,14 @@ pub struct LawOfValues {
     pub limit95: [f64; 2],
     /// Interval of the limit at the level asked for.
     pub limit_band: [f64; 2],
-    /// Bound of the error of the finest value where the values scatter within a multiple of the step, as those of events
-    /// at the ends of steps do.
+    /// Bound of the error of the finest value where the values scatter, as those of events at the ends of steps do.
     pub envelope: Option<f64>,
     /// Standard deviation of the values about the law, over their range.
     pub scatter: f64,
     /// Standard deviations of the three finest values about the law.
     pub deviations: [f64; 3],
+    /// Order that the law itself has over the three finest steps.
+    pub finest_order: Option<f64>,
     /// Name of the rule.
     pub rule: &'static str,
 }
@@ -122,7 +125,8 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
     let scatter = (best.sum / model.dof as f64).sqrt() * samples.scale / range(&table);
     let second = model
         .next
-        .map(|next| SecondTerm { order: p + next, crossover: (best.constant / best.second).abs().powf(1.0 / next) });
+        .map(|next| SecondTerm { order: p + next, crossover: (best.constant / best.second).abs().powf(1.0 / next) })
+        .filter(|second| second.crossover.is_finite());
     let beside = second.map_or_else(String::new, |second| {
         format!(", and a term in h^{:.2} is as large at the step {:.1e} s", second.order, second.crossover)
     });
@@ -151,9 +155,46 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
         limit: best.limit,
         limit95,
         limit_band,
-        envelope: if behaviour == Behaviour::Undecided && !is_monotone(&table) { envelope(&samples) } else { None },
+        envelope: {
+            let grows = matches!(best.weights, Weights::Power(_));
+            let und = behaviour == Behaviour::Undecided;
+            let wide = grows && scatter > SCATTER_BOUNDS;
+            let e = || envelope(&table);
+            let law = (limit95[1] - table[0].value).max(table[0].value - limit95[0]);
+            match std::env::var("RULE").ok().and_then(|v| v.parse::<i32>().ok()).unwrap_or(5) {
+                5 => (und || wide).then(e),
+                6 => (grows && (und || wide)).then(e),
+                7 => (und && trend > 0.2 || wide || und && grows).then(e),
+                8 => {
+                    if und && !grows {
+                        Some((e() * law).sqrt()).filter(|h| h.is_finite()).or_else(|| Some(e()))
+                    } else {
+                        (und || wide).then(e)
+                    }
+                }
+                9 => {
+                    if und && !grows {
+                        Some(e().max(law.min(0.5 * range(&table))))
+                    } else {
+                        (und || wide).then(e)
+                    }
+                }
+                _ => {
+                    if und && !grows {
+                        Some(e() * 1.3)
+                    } else {
+                        (und || wide).then(e)
+                    }
+                }
+            }
+        },
         scatter,
         deviations: samples.deviations(&best, model.dof),
+        finest_order: local_order(&[0, 1, 2].map(|i| {
+            let h = table[i].step;
+            let second = model.next.map_or(0.0, |next| best.second * h.powf(p + next));
+            GridValue::new(h, best.constant * h.powf(p) + second)
+        })),
         rule: "f0 + C h^p by separable least squares, profile interval",
     })
 }
@@ -169,20 +210,55 @@ impl LawOfValues {
     }
 }
 
-/// Bound C h of the error of the finest value, with the least C that the differences of all values allow and a margin
-/// for the few there are; `None` where the deviations do not grow with the step.
-fn envelope(samples: &Samples<'_>) -> Option<f64> {
-    let best = |weights: &dyn Fn(f64) -> Weights| {
-        Samples::search(|p| samples.fit(Terms::One(p), weights(p)), |a, b| b.likelihood > a.likelihood)
-    };
-    if best(&Weights::Power)?.likelihood < best(&|_| Weights::Equal)?.likelihood + 1.0 {
-        return None;
-    }
-    let table = samples.table;
-    let pairs = table.iter().enumerate().flat_map(|(i, a)| table[i + 1..].iter().map(move |b| (a, b)));
-    let slopes = pairs.map(|(a, b)| (a.value - b.value).abs() / (a.step + b.step));
-    Some((1.0 + 4.0 / table.len() as f64) * slopes.fold(0.0, f64::max) * table[0].step)
+/// Bound of the error of the finest value, at 95 %, where the values lie anywhere within `C h^q` of their limit or on one side
+/// of it, as those seen at the ends of steps do.
+///
+/// Values that are uniform there have the likelihood `(2 C)^-n`, those on one side `C^-n`, for steps in units of their
+/// geometric mean. With C log-uniform and the limit f0 flat the posterior of f0 is that at `C = max |f - f0|/h^q`. For one q
+/// it covers as often as it says (a family of location and scale); q is uniform from 0, noise at every step alike, to 3.
+pub(super) fn envelope(table: &[GridValue]) -> f64 {
+    let table = &table[..table.len().min(ENVELOPE_ROWS)];
+    let (n, finest, unit) = (table.len() as f64, table[0].value, range(table));
+    let mean = table.iter().map(|grid| grid.step.ln()).sum::<f64>() / n;
+    let powers: Vec<Vec<f64>> = (0..=12)
+        .map(|q| table.iter().map(|grid| (-0.25 * f64::from(q) * (grid.step.ln() - mean)).exp()).collect())
+        .collect();
+    // The logarithm of the posterior of the two limits at each distance from the finest value, of every q.
+    let distances: Vec<f64> = (0..460).map(|i| 1e-6 * 1.05_f64.powi(i)).collect();
+    let chances = distances.iter().map(|distance| {
+        [-1.0, 1.0].map(|side| {
+            let off = |grid: &GridValue| (grid.value - finest) / unit - side * distance;
+            let is_one_sided = table.iter().all(|grid| off(grid) * side <= grid.round_off / unit);
+            let twice = if is_one_sided {
+                n * LN_2 + std::env::var("ONE").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(0.0)
+            } else {
+                0.0
+            };
+            let of_power = |weights: &Vec<f64>| {
+                let reach =
+                    table.iter().zip(weights).map(|(grid, weight)| off(grid).abs() * weight).fold(0.0, f64::max);
+                distance.ln() + twice - n * reach.ln()
+            };
+            powers.iter().map(of_power).collect::<Vec<f64>>()
+        })
+    });
+    let chances: Vec<Vec<f64>> = chances.map(|sides| sides.concat()).collect();
+    let most = chances.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+    let masses: Vec<f64> =
+        chances.iter().map(|chances| chances.iter().map(|chance| (chance - most).exp()).sum()).collect();
+    let (all, mut within) = (masses.iter().sum::<f64>(), 0.0);
+    let bound = masses.iter().position(|mass| {
+        within += mass;
+        within >= 0.95 * all
+    });
+    unit * distances[bound.unwrap_or(distances.len() - 1)]
 }
+
+/// Rows of an envelope at most: coarser ones say nothing of the finest.
+const ENVELOPE_ROWS: usize = 64;
+
+/// Scatter over range from which values whose deviations grow with the step bound the error by it, also where they follow a law.
+const SCATTER_BOUNDS: f64 = 0.03;
 
 fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]

@@ -61,7 +61,7 @@ pub(super) struct Fit {
     pub(super) likelihood: f64,
     /// Variance of the limit over that of a deviation.
     spread: f64,
-    weights: Weights,
+    pub(super) weights: Weights,
 }
 
 /// Values over their steps, ascending, ready for fitting: differences from the finest value, logarithms about their mean.

@@ -37,6 +37,9 @@ const SIMULATED_MAX: u64 = 200_000;
 /// Units of round-off that a value may be off by, besides one a step: the sums of another code run in another sequence.
 const ULPS: f64 = 32.0;
 
+/// A difference over the value that says more of the digits printed than of the scheme.
+const FEW_DIGITS: f64 = 1e-3;
+
 /// Candidates named in a sentence.
 const NAMED_MAX: usize = 3;
 
@@ -392,7 +395,8 @@ impl Identification {
         let verb = if words.len() == 1 { "reproduces" } else { "reproduce" };
         let rows = if self.rows == 1 { "the one row".to_owned() } else { format!("all {} rows", self.rows) };
         let words = words[..words.len().min(NAMED_MAX)].join(" or ");
-        format!("{words}{more} {verb} {rows} (largest difference {worst:.0e}){skipped}")
+        let few = if worst > FEW_DIGITS { ", for its digits are that few" } else { "" };
+        format!("{words}{more} {verb} {rows} (largest difference {worst:.0e}{few}){skipped}")
     }
 }
 

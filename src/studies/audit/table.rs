@@ -158,6 +158,13 @@ impl Table {
             }
             table.columns.push(ResultColumn { column, place, rounding });
         }
+        for index in (0..table.columns.len()).rev() {
+            if table.counts_steps(&table.columns[index]) {
+                let column = table.columns.remove(index).column;
+                let message = format!("`{}` counts the steps of a run, has no limit, and is left out", column.name());
+                table.remark(FindingKind::StepCount, Some(column), message);
+            }
+        }
         if table.columns.is_empty() {
             let place = Place { file: file.to_owned(), at: header, column: 0 };
             return Err(TableError::new(place, Fault::NoResults, &RESULTS).into());
@@ -198,6 +205,22 @@ impl Table {
         }
         table.put_in_order()?;
         Ok(table)
+    }
+
+    /// Whether a column holds whole numbers that times their steps are one time, within two steps.
+    fn counts_steps(&self, column: &ResultColumn) -> bool {
+        let is_count = |row: &StepRow| row.value(column) >= 2.0 && row.value(column).fract() == 0.0;
+        let times = |row: &StepRow| {
+            let time = row.step * row.value(column);
+            [time - 2.0 * row.step, time + 2.0 * row.step]
+        };
+        let [low, high] =
+            self.rows.iter().map(times).fold([0.0, f64::INFINITY], |a, b| [a[0].max(b[0]), a[1].min(b[1])]);
+        let differs = |row: &StepRow| row.value(column) != self.rows[0].value(column);
+        column.column.quantity().is_none()
+            && self.rows.iter().all(is_count)
+            && self.rows.iter().any(differs)
+            && low <= high
     }
 
     fn remark(&mut self, kind: FindingKind, column: Option<Column>, message: String) {

@@ -3,6 +3,8 @@ use std::fmt::Write;
 
 use super::*;
 use crate::studies::order::noise::Noise;
+use crate::studies::order::{Class, Exclusion};
+use crate::studies::quantity::Quantity;
 
 /// A depth table; `f` of the step in units of the coarsest.
 fn table(rows: i32, mut f: impl FnMut(f64, i32) -> f64) -> String {
@@ -386,6 +388,50 @@ fn a_scheme_that_reproduces_depths_and_times_vouches_for_no_velocity_at_rest() {
     let audit = audit(&table, &FormalOrders::default(), Some(&exact), found).unwrap();
     let verdicts: Vec<Verdict> = audit.quantities.iter().map(|column| column.verdict).collect();
     assert_eq!(verdicts, [Verdict::Passed, Verdict::Passed, Verdict::Failed]);
+}
+
+#[test]
+fn times_at_the_ends_of_steps_have_a_bar_of_a_step_although_they_agree() {
+    for (name, least) in [("time_s", 6.25e-7), ("depth_m", 0.0)] {
+        let rows = "1e-5,0.00127\n5e-6,0.00127\n2.5e-6,0.00127\n1.25e-6,0.00127\n6.25e-7,0.001270000\n";
+        let audit = judge_text(&format!("dt_s,{name}\n{rows}"), Some(1.0), None);
+        let band = audit.quantities[0].error_band.unwrap().half_width;
+        assert!(band >= least && (least > 0.0 || band < 1e-8), "{name}: {band:e}");
+    }
+}
+
+#[test]
+fn a_column_that_counts_steps_is_left_out_and_no_other_one() {
+    let mut text = "dt_s,depth_m,steps,peak\n".to_owned();
+    for (i, steps) in [64, 127, 254, 508, 1015].into_iter().enumerate() {
+        let h = 0.5_f64.powi(i as i32);
+        writeln!(text, "{},{},{steps},{}", 1e-5 * h, 5.0 + 0.1 * h, 700 + (1000.0 * h) as i32).unwrap();
+    }
+    let audit = judge_text(&text, Some(1.0), None);
+    assert_eq!(kinds(&audit)[0], FindingKind::StepCount);
+    let names: Vec<&str> = audit.quantities.iter().map(|column| column.quantity.name()).collect();
+    assert_eq!((names, audit.quantities[0].verdict), (vec!["depth", "peak"], Verdict::Passed));
+}
+
+#[test]
+fn three_rows_that_run_away_are_undecided_with_a_bar_and_a_fourth_makes_them_fail() {
+    let rows = "8e-6,1.01\n4e-6,1.04\n2e-6,1.16\n";
+    let audit = judge_text(&format!("dt_s,depth_m\n{rows}"), Some(2.0), None);
+    assert_eq!((audit.verdict, kinds(&audit)), (Verdict::Undecided, vec![FindingKind::Diverging]));
+    assert!(audit.quantities[0].error_band.is_some() && audit.quantities[0].advice.is_some());
+    assert_eq!(judge_text(&format!("dt_s,depth_m\n{rows}1e-6,1.64\n"), Some(2.0), None).verdict, Verdict::Failed);
+}
+
+#[test]
+fn an_order_that_the_finest_rows_exclude_never_passes_as_a_law_of_two_terms() {
+    // The classical Runge-Kutta scheme: the finest rows show 3.99, and h^4.98 beside h^6.98 follows all of them.
+    let text =
+        table(6, |_, i| [9.333_9e-8, 2.973_1e-7, 2.792_5e-6, 1.643_2e-4, -1.458_7e-2, -1.0][5 - i as usize] + 3.0);
+    let steps = [28.5, 17.1, 6.84, 2.342, 1.336, 1.0];
+    let text = text.lines().skip(1).zip(steps).fold("dt_s,depth_m\n".to_owned(), |all, (line, step)| {
+        format!("{all}{step}e-6,{}\n", line.split(',').nth(1).unwrap())
+    });
+    assert_ne!(judge_text(&text, Some(5.0), None).verdict, Verdict::Passed);
 }
 
 #[test]
