@@ -537,13 +537,15 @@ impl Layer {
     }
 }
 
-/// The stage that `tape` is, if it is `p + s x + r V + q V²` with coefficients that a stage may have.
+/// The stage that `tape` is, if it is `p + s x + r V + q V²` with coefficients that a stage may have. One that brings nothing to rest stays
+/// a law: what it approaches then follows from the power of V, to the digits of V_c.
 fn of_coefficients<S: Scalar>(tape: &Tape, parameters: &[S]) -> Option<Stage<S>> {
     let [static_force, stiffness, viscosity, drag] = tape.coefficients(parameters)?;
     let stage = Stage { static_force, stiffness, viscosity, drag, ..Stage::free() };
     let is_one = [static_force, stiffness, viscosity, drag].map(S::value);
     let is_representable = is_one.iter().all(|value| value.is_normal() || *value == 0.0);
-    (is_representable && is_one[1..].iter().all(|value| *value >= 0.0)).then_some(stage)
+    let rests = is_one[0] != 0.0 || is_one[1] != 0.0;
+    (is_representable && rests && is_one[1..].iter().all(|value| *value >= 0.0)).then_some(stage)
 }
 
 /// Stages given directly, the last without an end.

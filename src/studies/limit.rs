@@ -155,39 +155,7 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
         limit: best.limit,
         limit95,
         limit_band,
-        envelope: {
-            let grows = matches!(best.weights, Weights::Power(_));
-            let und = behaviour == Behaviour::Undecided;
-            let wide = grows && scatter > SCATTER_BOUNDS;
-            let e = || envelope(&table);
-            let law = (limit95[1] - table[0].value).max(table[0].value - limit95[0]);
-            match std::env::var("RULE").ok().and_then(|v| v.parse::<i32>().ok()).unwrap_or(5) {
-                5 => (und || wide).then(e),
-                6 => (grows && (und || wide)).then(e),
-                7 => (und && trend > 0.2 || wide || und && grows).then(e),
-                8 => {
-                    if und && !grows {
-                        Some((e() * law).sqrt()).filter(|h| h.is_finite()).or_else(|| Some(e()))
-                    } else {
-                        (und || wide).then(e)
-                    }
-                }
-                9 => {
-                    if und && !grows {
-                        Some(e().max(law.min(0.5 * range(&table))))
-                    } else {
-                        (und || wide).then(e)
-                    }
-                }
-                _ => {
-                    if und && !grows {
-                        Some(e() * 1.3)
-                    } else {
-                        (und || wide).then(e)
-                    }
-                }
-            }
-        },
+        envelope: scatters(behaviour, &best.weights, scatter).then(|| envelope(&table)),
         scatter,
         deviations: samples.deviations(&best, model.dof),
         finest_order: local_order(&[0, 1, 2].map(|i| {
@@ -210,6 +178,12 @@ impl LawOfValues {
     }
 }
 
+/// Whether the values scatter so that their law bounds no error: no trend is seen, or what grows with the step is a large part
+/// of their range.
+fn scatters(behaviour: Behaviour, weights: &Weights, scatter: f64) -> bool {
+    behaviour == Behaviour::Undecided || matches!(weights, Weights::Power(_)) && scatter > SCATTER_BOUNDS
+}
+
 /// Bound of the error of the finest value, at 95 %, where the values lie anywhere within `C h^q` of their limit or on one side
 /// of it, as those seen at the ends of steps do.
 ///
@@ -229,11 +203,7 @@ pub(super) fn envelope(table: &[GridValue]) -> f64 {
         [-1.0, 1.0].map(|side| {
             let off = |grid: &GridValue| (grid.value - finest) / unit - side * distance;
             let is_one_sided = table.iter().all(|grid| off(grid) * side <= grid.round_off / unit);
-            let twice = if is_one_sided {
-                n * LN_2 + std::env::var("ONE").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(0.0)
-            } else {
-                0.0
-            };
+            let twice = if is_one_sided { n * LN_2 } else { 0.0 };
             let of_power = |weights: &Vec<f64>| {
                 let reach =
                     table.iter().zip(weights).map(|(grid, weight)| off(grid).abs() * weight).fold(0.0, f64::max);

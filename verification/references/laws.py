@@ -99,6 +99,25 @@ class Scene:
         code = compile(text, self.name, "eval")
         return lambda x, V: eval(code, known | {"mpf": mpf}, {"x": mpf(x), "V": mpf(V)})
 
+    def coefficients(self, stage):
+        """p, s, r, q of a force that is p + s x + r V + q V², with what a stage may have, in a scene whose stages end at depths."""
+        if any("until" in other or "end_velocity" in other for other in self.stages):
+            return None
+        force, far = self.forces[stage], 2 * self.speed
+        try:
+            p, fast, back = force(0, 0), force(0, far), force(0, -far)
+            s, r, q = force(1, 0) - p, (fast - back) / (2 * far), ((fast + back) / 2 - p) / far**2
+            size = abs(p) + abs(s) + abs(fast)
+            p, s, r, q = (mpf(0) if abs(term) < mpf(10) ** -32 * size else term for term in (p, s, r, q))
+            is_one = all(
+                abs(force(x, v) - (p + s * x + r * v + q * v * v)) <= mpf(10) ** -32 * size * (1 + x)
+                for x, v in ((mpf("0.37"), self.speed), (mpf("0.0213"), self.speed / 3), (mpf("1.9"), mpf("0.03")))
+            )
+        except (StopIteration, TypeError, ValueError, ZeroDivisionError):
+            return None
+        rests = p != 0 or s != 0
+        return (p, s, r, q) if is_one and rests and min(s, r, q) >= 0 else None
+
     # ---- F of V alone
 
     def by_speed(self, power, low, high):
@@ -252,6 +271,10 @@ def solved(name):
     for i, end in enumerate(scene.ends):
         if end < mp.inf:
             numbers[f"scene.stages.{i}.end_m"] = end
+        of = scene.coefficients(i)
+        if of is not None:
+            names = ("static_force_n", "stiffness_n_m", "viscosity_kg_s", "drag_kg_m")
+            numbers |= {f"scene.stages.{i}.{key}": value for key, value in zip(names, of)}
     kind, stage, time, depth, velocity = events[-1]
     words["outcome"] = {"exit": "perforated", "rest": "stopped"}[kind]
     numbers |= {"stage": mpf(stage), "depth_m": depth, "time_s": time, "velocity_m_s": velocity}

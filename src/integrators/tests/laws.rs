@@ -253,7 +253,8 @@ fn written(problem: &Problem) -> Problem {
     let read = Scene::from_toml(&(text + &stages), "written").unwrap().problem().unwrap();
     for (index, (given, read_one)) in problem.stages.iter().zip(&read.stages).enumerate() {
         let is_one = read.laws.of(index).is_none();
-        assert_eq!(is_one, given.stiffness >= 0.0 && given.viscosity >= 0.0 && given.drag >= 0.0);
+        let rests = given.static_force != 0.0 || given.stiffness != 0.0;
+        assert_eq!(is_one, rests && given.stiffness >= 0.0 && given.viscosity >= 0.0 && given.drag >= 0.0);
         assert!(!is_one || given == read_one, "{given:?} {read_one:?}");
     }
     let laws = problem.stages.iter().map(Law::of_coefficients).enumerate();
@@ -273,7 +274,7 @@ fn an_expression_of_the_four_terms_is_their_stage_for_every_method() {
         ("P*(1 + V/v1)^2", Stage { static_force: 848e3, viscosity: 16960.0, drag: 84.8, ..plain }),
         ("P*x/l + R", Stage { static_force: 50e3, stiffness: 4.24e7, ..plain }),
         ("R*sqrt(4)*max(1, 2) - R*V/v1*(-1)", Stage { static_force: 2e5, viscosity: 500.0, ..plain }),
-        ("Q*V*(V + v1)", Stage { viscosity: 325.0, drag: 3.25, ..plain }),
+        ("R + Q*V*(V + v1)", Stage { static_force: 50e3, viscosity: 325.0, drag: 3.25, ..plain }),
         ("-R + P*x/l", Stage { static_force: -50e3, stiffness: 4.24e7, ..plain }),
     ] {
         let (is_one, found) = stage(force);
@@ -291,6 +292,7 @@ fn an_expression_of_the_four_terms_is_their_stage_for_every_method() {
         "P - Q*V^2",
         "P - R*x/l",
         "P/(1 + x/l)",
+        "Q*V^2",
     ] {
         assert!(!stage(force).0, "{force}");
     }
