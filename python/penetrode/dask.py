@@ -93,10 +93,10 @@ def _digest(*parts: bytes) -> str:
 
 def _options(options: Mapping[str, Any]) -> bytes:
     """Options as bytes, the scene among them; how many threads work changes nothing."""
-    told = {key: value for key, value in options.items() if key != "threads" and value is not None}
-    if isinstance(told.get("scene"), Scene):
-        told["scene"] = told["scene"].__reduce__()[1]
-    return json.dumps(told, sort_keys=True).encode()
+    given = {key: value for key, value in options.items() if key != "threads" and value is not None}
+    if isinstance(given.get("scene"), Scene):
+        given["scene"] = given["scene"].__reduce__()[1]
+    return json.dumps(given, sort_keys=True).encode()
 
 
 def _solve(name: str, folder: str, make: Callable[[], Any], options: dict[str, Any]) -> dict[str, Any]:
@@ -106,9 +106,9 @@ def _solve(name: str, folder: str, make: Callable[[], Any], options: dict[str, A
 
     path = Path(folder, f"{name}.parquet")
     if path.exists():
-        told = (pq.read_schema(path).metadata or {}).get(_SAYS)
-        if told:
-            return {**json.loads(told), "name": name, "new": 0}
+        given = (pq.read_schema(path).metadata or {}).get(_SAYS)
+        if given:
+            return {**json.loads(given), "name": name, "new": 0}
     found = _penetrode.batch(make(), **options)
     table = pa.table(found)
     says = {"rows": len(found), "bad": found.bad, "undecided": found.undecided}
@@ -389,7 +389,7 @@ def monte_carlo(
 
 def _numbers(scene: Scene) -> dict[str, float]:
     """The numbers that the scene states, by path."""
-    told = scene.to_dict()
+    given = scene.to_dict()
     names = {
         "projectile.mass": "mass_kg",
         "projectile.diameter": "diameter_m",
@@ -402,6 +402,6 @@ def _numbers(scene: Scene) -> dict[str, float]:
         "resistance.k": "k",
         "impact.velocity": "velocity_m_s",
     }
-    numbers = {path: told[name] for path, name in names.items() if told[name] is not None}
-    own = {f"parameters.{one['name']}": one["value"] for one in told.get("parameters", [])}
+    numbers = {path: given[name] for path, name in names.items() if given[name] is not None}
+    own = {f"parameters.{one['name']}": one["value"] for one in given.get("parameters", [])}
     return dict(itertools.chain(numbers.items(), own.items()))

@@ -100,7 +100,7 @@ impl Run for BatchArgs {
         progress.finish_and_clear();
         if !kept.is_empty() {
             let names: Vec<_> = kept.iter().map(|kept| shortened(&kept.name)).collect();
-            say("", &format!("carried through unread: {}", names.join(", ")));
+            say("", &format!("passed on unread: {}", names.join(", ")));
         }
         say("", &summary(&tally, self.part));
         Ok(if tally.bad > 0 { Exit::Criterion } else { Exit::Success })

@@ -82,9 +82,9 @@ fn text(found: &Diagnosis) -> String {
     let words = [peer.name.as_str(), peer.version.as_str(), peer.method.as_str()];
     let title = words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
     let mut text = Text::titled(Some(&title));
-    let told = if peer.fixed_step { "told its step" } else { "told a tolerance" };
+    let takes = if peer.fixed_step { "takes a fixed step" } else { "takes a tolerance" };
     let counts = found.counts;
-    text.wrapped("  ", &format!("reads the {}, is {told}; {} asked", peer.reads, count(counts.asked, "question")));
+    text.wrapped("  ", &format!("reads the {}, {takes}; {} asked", peer.reads, count(counts.asked, "question")));
     text.gap();
     let verdict = match found.verdict {
         Verdict::Passed => "sound: every answer is right within what it claims".to_owned(),

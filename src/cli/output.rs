@@ -72,7 +72,7 @@ thread_local! {
     static HEARD: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
 }
 
-/// What `work` gives, and what it said on the way (warnings, notes), none of it on standard error.
+/// What `work` gives, and what it said meanwhile (warnings, notes), none of it on standard error.
 ///
 /// Of this thread alone.
 pub fn hearing<R>(work: impl FnOnce() -> R) -> (R, Vec<String>) {
@@ -275,7 +275,7 @@ impl Destination {
             let mode = fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
             fs::set_permissions(file.path(), fs::Permissions::from_mode(mode))?;
         }
-        file.settle(|file| file.persist(followed(path))).map(|_| ()).map_err(|e| e.error)
+        file.finish(|file| file.persist(followed(path))).map(|_| ()).map_err(|e| e.error)
     }
 }
 

@@ -21,7 +21,7 @@ use crate::physics::ball::Ball;
 use crate::physics::groups::Groups;
 use crate::physics::{Criterion, Event, EventKind, Outcome, Range, Scene, Shown, State};
 use crate::studies::applicability;
-use crate::studies::boxes::{BoxError, Fate, Ranges, Region, Side};
+use crate::studies::boxes::{BoxError, Outcomes, Ranges, Region, Side};
 use crate::studies::enclosure::{self, Intervals};
 use crate::studies::error::flight_error;
 use crate::studies::quantity::Quantity;
@@ -332,7 +332,7 @@ impl Ask for SolveArgs {
             outcome: match ranges {
                 None => OutcomeJson::One(flight.outcome),
                 Some(None) => OutcomeJson::One(Outcome::Undecided),
-                Some(Some(Ranges { fate: Fate::One(outcome), .. })) => OutcomeJson::One(outcome),
+                Some(Some(Ranges { outcomes: Outcomes::One(outcome), .. })) => OutcomeJson::One(outcome),
                 Some(Some(_)) => OutcomeJson::Either(Either::Either),
             },
             stage: flight.stage,
@@ -498,11 +498,11 @@ impl GroupsJson {
             let known = list.iter().filter_map(|(name, value)| Some(format!("{name} {}", significant((*value)?))));
             known.collect::<Vec<_>>().join("   ")
         };
-        let flown = shown(&[("N", self.N), ("H/d", self.H_over_d), ("X/d", self.X_over_d)]);
+        let groups = shown(&[("N", self.N), ("H/d", self.H_over_d), ("X/d", self.X_over_d)]);
         let beside =
             [("X/d", self.X_over_d_eq11_12), ("N without N*", self.N_without_nose), ("Johnson number", self.johnson)];
-        let gap = if flown.is_empty() { "" } else { "   " };
-        vec![format!("  groups   I {impact}{gap}{flown}"), format!("  Eq. 11-13  {}", shown(&beside))]
+        let gap = if groups.is_empty() { "" } else { "   " };
+        vec![format!("  groups   I {impact}{gap}{groups}"), format!("  Eq. 11-13  {}", shown(&beside))]
     }
 }
 

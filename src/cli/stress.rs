@@ -28,7 +28,7 @@ pub struct StressArgs {
     pub seed: u64,
     /// Put this solver through events at their edges.
     ///
-    /// And through N random problems: a program that speaks the peer protocol and is told a tolerance.
+    /// And through N random problems: a program that speaks the peer protocol and takes a tolerance.
     #[arg(long, value_name = "CMD")]
     pub peer: Option<String>,
     /// List the cases with what they say, and run none.

@@ -171,14 +171,14 @@ pub(super) fn report_line(folder: &Path) -> String {
 }
 
 /// Adds every failed or undecided claim, with its statement and what was seen; claims of one table of which nothing was
-/// measured, for one reason, are told once.
+/// measured, for one reason, are named once.
 pub(super) fn add_not_passed(text: &mut Text, judged: &[Judged]) {
     let open = judged.iter().filter(|judged| judged.is_open());
-    let told = grouped(open, |judged| {
+    let reasons = grouped(open, |judged| {
         let Judged { claim, verdict, measured, remark, .. } = judged;
         (&claim.table, verdict, remark, measured.map(|_| &claim.id))
     });
-    for (_, claims) in told {
+    for (_, claims) in reasons {
         let Judged { claim, verdict, measured, remark, .. } = claims[0];
         let measured = measured.map_or("nothing measured".to_owned(), |m| {
             format!("{m:.3e}, limit {:.1e} {}", claim.limit, claim.unit_in_words())

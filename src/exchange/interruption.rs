@@ -53,12 +53,12 @@ impl<T> Temporary<T> {
         Ok(Self { made, listed })
     }
 
-    /// What `settle` makes of it, such as moving it to its place.
-    pub fn settle<R>(self, settle: impl FnOnce(T) -> R) -> R {
+    /// What `finish` makes of it, such as moving it to its place.
+    pub fn finish<R>(self, finish: impl FnOnce(T) -> R) -> R {
         let Self { made, listed } = self;
-        let settled = settle(made);
+        let finished = finish(made);
         drop(listed);
-        settled
+        finished
     }
 }
 

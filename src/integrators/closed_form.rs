@@ -173,11 +173,11 @@ fn cross_piece(course: &mut Course<'_>, line: &Line, limit: f64) -> Solved<Stage
     Ok(end)
 }
 
-/// The state at `time` (s) on the way from `entry` to `end` through `law`: the place is sought whose formulas give that time.
+/// The state at `time` (s) between `entry` and `end` to `end` through `law`: the place is sought whose formulas give that time.
 fn state_in(law: &Stage, mass: f64, entry: State, end: State, time: f64) -> State {
     let (mut low, mut high) = (entry, end);
     let mut here = entry;
-    // From a state that is near, the parabola of a constant force goes the rest of the way.
+    // From a state that is near, the parabola of a constant force goes the rest.
     let along = |from: State| {
         let (left, acceleration) = (time - from.time, -law.force(from.depth, from.velocity) / mass);
         let depth = from.depth + left * (from.velocity + 0.5 * left * acceleration);

@@ -391,7 +391,7 @@ impl Reduced {
             StageEnd::Limit(at) => StageEnd::Limit(State { depth: course.limit()?, ..state(at) }),
             StageEnd::Condition(at) => {
                 let at = state(at);
-                StageEnd::Condition(course.law().and_then(Law::end).map_or(at, |end| end.settled(at)))
+                StageEnd::Condition(course.law().and_then(Law::end).map_or(at, |end| end.at_end(at)))
             }
             StageEnd::Rest(at) => StageEnd::Rest(state(at)),
             StageEnd::Approach(at, why) => StageEnd::Approach(state(at), why),
@@ -522,8 +522,8 @@ impl OwnLaw {
         let (depth, velocity) = self.place(&[at.depth, at.velocity]);
         let mass = self.length / self.acceleration / self.speed / self.speed;
         let (place, distance) = (State { time: at.time, depth, velocity }, (end - at.depth) * self.length);
-        let ways = (depth, depth + self.law.reach(mass, place).min(distance));
-        let may_end = self.law.end().is_some_and(|end| end.may_vanish(ways, (0.0, velocity)));
+        let depths = (depth, depth + self.law.reach(mass, place).min(distance));
+        let may_end = self.law.end().is_some_and(|end| end.may_vanish(depths, (0.0, velocity)));
         !may_end && self.law.is_approach(mass, place, distance)
     }
 

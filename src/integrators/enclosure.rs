@@ -110,7 +110,7 @@ impl Enclosure {
         }
         if !boundaries_are_apart(problem) {
             return Err(refuse(
-                "two of its depths differ, and not as 64-bit numbers: which comes first is not told; make them equal, or \
+                "two of its depths differ, and not as 64-bit numbers: which comes first is not known; make them equal, or \
                  move one by 1e-15 of itself",
             ));
         }
@@ -214,7 +214,7 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// Upper bound of w, with which the error N is carried through the stage (1/s).
+    /// Upper bound of w, with which the error N is measured through the stage (1/s).
     fn rate(&self) -> f64 {
         match self {
             Self::Coefficients(law) => law.rate,
@@ -697,23 +697,23 @@ impl Centre {
         let reach = fastest * fastest / weakest * UP;
         let box_of = Ball::between(depth.lower(), (depth + Ball::from_f64(reach)).upper());
         let deceleration = law.deceleration(box_of, speeds);
-        let way = (velocities * velocities / deceleration).scaled(0.5);
-        let is_inside = deceleration.lower() > 0.0 && way.upper() <= reach;
+        let distance = (velocities * velocities / deceleration).scaled(0.5);
+        let is_inside = deceleration.lower() > 0.0 && distance.upper() <= reach;
         let time = self.time + velocities / deceleration;
-        is_inside.then(|| State { time, depth: depth + way, velocity: Ball::zero() })
+        is_inside.then(|| State { time, depth: depth + distance, velocity: Ball::zero() })
     }
 
     /// From here to `limit`, over a box as small: `T = d/v` with a mean v.
     fn until_limit(&self, law: &Law<'_>, limit: Ball) -> Option<State<Ball>> {
         let (depth, velocity) = (self.depth(), self.velocity());
-        let way = limit - depth;
+        let distance = limit - depth;
         let (slowest, fastest) = (velocity.lower(), velocity.upper());
-        if !(way.lower() >= 0.0 && slowest > 0.0) {
+        if !(distance.lower() >= 0.0 && slowest > 0.0) {
             return None;
         }
         let box_of = depth.hull(limit);
         let mut speeds = Ball::between(0.5 * slowest, 2.0 * fastest);
-        let longest = way.upper() / (0.5 * slowest) * UP;
+        let longest = distance.upper() / (0.5 * slowest) * UP;
         for _ in 0..2 {
             let change = law.deceleration(box_of, speeds).magnitude() * longest * UP;
             if !(change < 0.5 * slowest) {
@@ -721,7 +721,7 @@ impl Centre {
             }
             speeds = velocity.widened(change);
         }
-        let time = way / speeds;
+        let time = distance / speeds;
         let velocity = velocity - law.deceleration(box_of, speeds) * time;
         Some(State { time: self.time + time, depth: limit, velocity })
     }
@@ -880,12 +880,12 @@ impl Steps {
         if !(static_force.is_zero() && stiffness.is_zero()) || viscosity.is_zero() {
             return Some(true);
         }
-        let way = limit - centre.depth();
+        let distance = limit - centre.depth();
         let left = if drag.is_zero() {
-            centre.velocity() - viscosity * way
+            centre.velocity() - viscosity * distance
         } else {
             let terminal = viscosity / drag;
-            (terminal + centre.velocity()) * crate::physics::elementary::Elementary::exp(-(drag * way)) - terminal
+            (terminal + centre.velocity()) * crate::physics::elementary::Elementary::exp(-(drag * distance)) - terminal
         };
         if left.lower() > 0.0 {
             Some(true)

@@ -147,14 +147,14 @@ impl<S: Scalar> Condition<S> {
         if self.kind == Kind::Zero { g.abs() <= noise } else { g <= noise }
     }
 
-    /// The sign of g on the way to its zero, for a stage that is entered at a state.
+    /// The sign of g before its zero, for a stage that is entered at a state.
     pub(crate) fn side(&self, at: State<S>) -> f64 {
         let State { depth, velocity, .. } = at.values();
         if self.kind == Kind::Zero { self.value(depth, velocity).signum() } else { 1.0 }
     }
 
     /// `state` with what the end fixes exactly.
-    pub(crate) fn settled(&self, state: State<S>) -> State<S> {
+    pub(crate) fn at_end(&self, state: State<S>) -> State<S> {
         match (self.kind, self.parameters.first()) {
             (Kind::Speed, Some(speed)) => State { velocity: *speed, ..state },
             _ => state,
@@ -167,8 +167,8 @@ impl<S: Scalar> Condition<S> {
         !(least > 0.0 || most < 0.0)
     }
 
-    /// What a way shows of g, which is above zero on `side` where it begins. `place` gives depth (m) and velocity (m/s) at a share
-    /// of the way from 0 to 1.
+    /// What a path shows of g, which is above zero on `side` where it begins. `place` gives depth (m) and velocity (m/s) at a share
+    /// of the path from 0 to 1.
     ///
     /// A part is looked at in halves until bounds exclude a zero, or until g is shown by its values.
     ///
@@ -254,14 +254,14 @@ impl<S: Scalar> Condition<S> {
     }
 }
 
-/// What a way shows of a condition.
+/// What a path shows of a condition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Sight {
     /// Its sign does not change.
     Clear,
-    /// Its sign changes first between these shares of the way.
+    /// Its sign changes first between these shares of the path.
     Crossed(f64, f64),
-    /// Between these shares of the way bounds leave room for zeros that the values do not show.
+    /// Between these shares of the path bounds leave room for zeros that the values do not show.
     Hidden(f64, f64),
 }
 
@@ -271,8 +271,8 @@ fn span<const N: usize>(numbers: [f64; N]) -> (f64, f64) {
     numbers.into_iter().fold(ends, |(least, most), number| (least.min(number), most.max(number)))
 }
 
-/// Halvings of a way that is looked at, where the values do not show g; where they do and its zeros may be close; and how many
-/// such parts of a way are halved.
+/// Halvings of a path that is looked at, where the values do not show g; where they do and its zeros may be close; and how many
+/// such parts of a path are halved.
 const LEVELS: u32 = 10;
 const DEEPEST: u32 = 50;
 const LOOKED_MAX: u32 = 1000;

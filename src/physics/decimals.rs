@@ -150,14 +150,14 @@ impl Scene {
                 let thickness = number(Parameter::Layer(index, LayerNumber::Thickness), layer.thickness);
                 sum = sum.zip(thickness).and_then(|(sum, thickness)| sum.plus(thickness));
                 end += layer.thickness;
-                let told = sum.zip(crater).and_then(|(sum, crater)| sum.is_above(crater));
+                let is_behind = sum.zip(crater).and_then(|(sum, crater)| sum.is_above(crater));
                 let depth = concrete.crater_depth();
-                let is_told = match told {
+                let is_decided = match is_behind {
                     Some(is_behind) => is_behind == (end > depth),
                     // Without the decimals, what no rounding changes.
                     None => (end - depth).abs() > 1e-6 * depth,
                 };
-                if !is_told {
+                if !is_decided {
                     return Err(ResolveError::ChosenByRounding("the end of a layer and the crater depth k d"));
                 }
             }

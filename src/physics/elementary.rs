@@ -40,7 +40,7 @@ pub trait Elementary: Copy {
     #[must_use]
     fn powf(self, exponent: Self) -> Self;
 
-    /// `value`, of a function of `self` with this `slope`, which gives the derivatives where the number carries any.
+    /// `value`, of a function of `self` with this `slope`, which gives the derivatives where the number has any.
     #[must_use]
     fn with_slope(self, value: Self, slope: impl FnOnce() -> f64) -> Self;
 }

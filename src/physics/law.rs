@@ -327,9 +327,9 @@ impl<S: Scalar> Law<S> {
         self.range((from, f64::INFINITY), (0.0, f64::INFINITY)).is_some_and(|(_, most)| most <= 0.0)
     }
 
-    /// In how many parts of a way the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
+    /// In how many parts of a path the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
     /// greatest force seen, and enough to count beside the `energy` (J). `place` gives depth (m) and velocity (m/s) at a share
-    /// of the way from 0 to 1.
+    /// of the path from 0 to 1.
     ///
     /// By bounds of the expression over each part. A series sees nothing of what lies far ahead.
     pub(crate) fn shown_in(&self, place: impl Fn(f64) -> (f64, f64), energy: f64) -> Option<usize> {
@@ -403,7 +403,7 @@ impl<S: Scalar> Law<S> {
         (rest.depth / exit - 1.0, 8.0 * (error_bound + f64::EPSILON).powf(1.0 - 0.5 * power))
     }
 
-    /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it on the way.
+    /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it in between.
     pub fn static_work(&self, from: f64, to: f64) -> (f64, f64) {
         let force = |x: f64| self.force_value(x, 0.0);
         let is_of_velocity = match &self.force {
@@ -509,10 +509,10 @@ pub struct OwnParameter {
 /// Largest common denominator of powers of V for which u is taken as variable.
 const BRANCH_MAX: u32 = 12;
 
-/// Parts of a way whose force is bounded.
+/// Parts of a path whose force is bounded.
 const PARTS: usize = 8;
 
-/// Share of the greatest force of a way that may lie hidden in a part of it; share of the energy that is nothing; and share of
+/// Share of the greatest force of a path that may lie hidden in a part of it; share of the energy that is nothing; and share of
 /// the greatest velocity of a part below which its force is not asked.
 const SURPRISE: f64 = 0.5;
 const NOTHING: f64 = 1e-18;

@@ -157,7 +157,7 @@ pub enum ReferenceError {
     Unsupported {
         /// Index of the stage from 0.
         stage: usize,
-        /// What stands in the way.
+        /// What prevents it.
         why: &'static str,
     },
     /// Nothing stops the projectile and there is no far side.
@@ -170,8 +170,8 @@ pub enum ReferenceError {
     #[error("the reference does not read this scene: {0}")]
     Scene(&'static str),
     /// Two precisions never agreed: a tie finer than the numbers resolve.
-    #[error("{0} bits do not settle the answer")]
-    Unsettled(usize),
+    #[error("{0} bits do not decide the answer")]
+    Undecided(usize),
 }
 
 /// Where the exact inputs come from.
@@ -188,7 +188,7 @@ pub enum Source<'a> {
 /// # Errors
 /// [`ReferenceError`].
 pub fn flight(source: Source<'_>) -> Result<ExactFlight, ReferenceError> {
-    settled(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees).map(|(flight, _)| flight)
+    at_enough_bits(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees).map(|(flight, _)| flight)
 }
 
 /// The critical velocity of `source` to 50 digits; its impact speed is not used.
@@ -196,7 +196,7 @@ pub fn flight(source: Source<'_>) -> Result<ExactFlight, ReferenceError> {
 /// # Errors
 /// [`ReferenceError`].
 pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
-    let (critical, _) = settled(
+    let (critical, _) = at_enough_bits(
         |bits| squared_critical(source, bits, None).map(|(mass, squared)| [squared.sqrt(), half(mass * squared)]),
         |a, b| a.iter().zip(b).all(|(a, b)| agree(a, b)),
     )?;
@@ -211,7 +211,7 @@ pub fn critical(source: Source<'_>) -> Result<ExactCritical, ReferenceError> {
 /// # Errors
 /// [`ReferenceError`].
 pub fn conditions(source: Source<'_>) -> Result<Conditions, ReferenceError> {
-    let (base, bits) = settled(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees)?;
+    let (base, bits) = at_enough_bits(|bits| solve(&source.model(bits, None)?), ExactFlight::agrees)?;
     let mut sums = [0.0; 5];
     for input in source.moving_inputs()? {
         let moved = solve(&source.model(bits, Some(input))?)?;
@@ -245,7 +245,7 @@ fn quotients(moved: &ExactFlight, base: &ExactFlight) -> [f64; 5] {
 /// [`ReferenceError`].
 pub fn critical_condition(source: Source<'_>) -> Result<f64, ReferenceError> {
     let velocity = |bits, moved| squared_critical(source, bits, moved).map(|(_, squared)| squared.sqrt());
-    let (base, bits) = settled(|bits| velocity(bits, None), agree)?;
+    let (base, bits) = at_enough_bits(|bits| velocity(bits, None), agree)?;
     let mut sum = 0.0;
     for input in source.moving_inputs()? {
         sum += quotient(velocity(bits, Some(input))? - &base, &base, STEP_BITS);
@@ -265,7 +265,7 @@ fn quotient(difference: Big, scale: &Big, bits: isize) -> f64 {
 }
 
 /// Raises the precision until two attempts agree; also gives the bits of the one returned.
-fn settled<T>(
+fn at_enough_bits<T>(
     attempt: impl Fn(usize) -> Result<T, ReferenceError>,
     agree: impl Fn(&T, &T) -> bool,
 ) -> Result<(T, usize), ReferenceError> {
@@ -279,7 +279,7 @@ fn settled<T>(
         }
         last = next;
     }
-    Err(ReferenceError::Unsettled(bits))
+    Err(ReferenceError::Undecided(bits))
 }
 
 fn agree(a: &Big, b: &Big) -> bool {

@@ -45,7 +45,7 @@ pub trait Scalar:
         self / divisor
     }
 
-    /// Whether it has nothing but its value: all derivatives that it carries are zero.
+    /// Whether it has nothing but its value: all its derivatives are zero.
     #[inline(always)]
     fn is_constant(self) -> bool {
         true
@@ -68,7 +68,7 @@ pub trait Scalar:
         self.value() == 0.0
     }
 
-    /// Whether numbers are known in a range, which rounding may carry beyond zero.
+    /// Whether numbers are known in a range, which rounding may take beyond zero.
     const HAS_RANGE: bool = false;
 
     /// Whether it is known not to be negative.

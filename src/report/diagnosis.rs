@@ -79,7 +79,7 @@ pub fn report(found: &Diagnosis, seed: u64, environment: Environment) -> StudyRe
     let peer = &found.peer;
     let words = [peer.name.as_str(), peer.version.as_str()];
     let title = words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
-    let told = if peer.fixed_step {
+    let takes = if peer.fixed_step {
         "on a ladder of steps".to_owned()
     } else {
         format!("each at relative tolerances of {}", TOLERANCES.map(|rtol| number(rtol, 1)).join(", "))
@@ -90,7 +90,7 @@ pub fn report(found: &Diagnosis, seed: u64, environment: Environment) -> StudyRe
             &peer.command,
             &if peer.method.is_empty() { String::new() } else { format!(" (method {})", peer.method) },
             &count(found.counts.asked, "question"),
-            &told,
+            &takes,
         ],
     );
     let mut sections = vec![
@@ -279,7 +279,7 @@ fn judged(found: &Diagnosis, seed: u64) -> Vec<Element> {
         ("Method", Prose::text(&peer.method)),
         ("Command", Prose::code(&peer.command)),
         ("Reads", Prose::text(if peer.reads == "scene" { "physical scenes" } else { "stages" })),
-        ("Is told", Prose::text(if peer.fixed_step { "its step" } else { "a relative tolerance" })),
+        ("Takes", Prose::text(if peer.fixed_step { "its step" } else { "a relative tolerance" })),
         ("Answers", Prose::new("{0} right, {1} wrong, {2} undecided, {3} not asked", &gaps)),
         ("Seed", Prose::text(seed)),
     ];
@@ -524,8 +524,8 @@ fn uncertainty(found: &Diagnosis) -> Vec<Element> {
         let Some((error, _)) = largest(found, quantity) else { continue };
         let gaps: [&dyn Display; 3] = [name, &number(error, 2), &relative_to(quantity)];
         text = text.then(if quantity > 0 { ",".into() } else { Prose::default() });
-        let told = if peer.fixed_step { " {1} of {2}" } else { " {u_num}({0}) = {1} of {2}" };
-        text = text.then(Prose::new(told, &gaps));
+        let template = if peer.fixed_step { " {1} of {2}" } else { " {u_num}({0}) = {1} of {2}" };
+        text = text.then(Prose::new(template, &gaps));
     }
     if peer.fixed_step {
         text = text.then(" at most".into());

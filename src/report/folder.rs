@@ -158,7 +158,7 @@ pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError>
     interruption::whole(|| {
         let stage = interruption::folder_in(parent).map_err(|cause| FolderError::write(parent, cause))?;
         fill(stage.path(), files, folder)?;
-        stage.settle(|stage| move_into_place(stage, folder)).map_err(|cause| FolderError::write(folder, cause))
+        stage.finish(|stage| move_into_place(stage, folder)).map_err(|cause| FolderError::write(folder, cause))
     })
 }
 
@@ -181,7 +181,7 @@ fn fill(stage: &Path, files: Files, folder: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// What the system said, without the name of a temporary file that `error` may carry: nobody asked for that file.
+/// What the system said, without the name of a temporary file that `error` may name: nobody asked for that file.
 pub fn without_temporary_name(error: io::Error) -> io::Error {
     if error.to_string().contains(interruption::PREFIX) { error.kind().into() } else { error }
 }

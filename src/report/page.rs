@@ -508,7 +508,7 @@ pub(super) fn claims_table<'a>(caption: &str, judged: impl IntoIterator<Item = &
     })
 }
 
-/// One row a claim, whose name is shown by `name`, which is told whether it is the first of its table.
+/// One row a claim, whose name is shown by `name`, which is given whether it is the first of its table.
 fn claims_rows<'a>(
     caption: &str,
     judged: impl IntoIterator<Item = &'a Judged>,

@@ -794,7 +794,7 @@ impl Refinement {
                 &high,
             ],
         );
-        // One rule for all is told once.
+        // One rule for all is said once.
         let rule = stated.first().and_then(|series| series.error_band).map(|band| band.rule);
         let rule =
             rule.filter(|rule| stated.iter().all(|series| series.error_band.is_some_and(|band| band.rule == *rule)));

@@ -458,7 +458,7 @@ mod tests {
         assert_eq!(measured_depths(&[], &[]), None);
     }
 
-    /// Lines that coincide in the drawing of energies are told apart beside it, about the jumps of Eq. 15.
+    /// Lines that coincide in the drawing of energies are shown apart beside it, about the jumps of Eq. 15.
     #[test]
     fn the_jumps_of_eq15_are_drawn_where_the_sweep_reaches_them() {
         let panels = |ratios: &[f64]| {

@@ -92,7 +92,7 @@ impl FromStr for Side {
 
 /// What may become of the projectile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
+pub enum Outcomes {
     /// This, at every point of the box.
     One(Outcome),
     /// It stops at some points, and perforates at others.
@@ -103,7 +103,7 @@ pub enum Fate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ranges {
     /// What becomes of the projectile.
-    pub fate: Fate,
+    pub outcomes: Outcomes,
     /// Depth, time and velocity at the end; no upper end where none is proved.
     pub end: Intervals,
 }
@@ -334,10 +334,10 @@ impl<'a> Region<'a> {
                 return Ok(None);
             };
             let stops = [&slow, &fast].map(|flight| flight.outcome.is_stop());
-            let fate = match stops {
-                [true, false] => Fate::Either,
-                _ if slow.outcome == fast.outcome => Fate::One(slow.outcome),
-                _ => Fate::One(Outcome::Stopped),
+            let outcomes = match stops {
+                [true, false] => Outcomes::Either,
+                _ if slow.outcome == fast.outcome => Outcomes::One(slow.outcome),
+                _ => Outcomes::One(Outcome::Stopped),
             };
             let time = if stops == [false, false] {
                 match (solved(Asked::Time, true)?, solved(Asked::Time, false)?) {
@@ -352,11 +352,11 @@ impl<'a> Region<'a> {
                 time_s: time,
                 velocity_m_s: hull(slow.end.velocity, fast.end.velocity),
             };
-            let of_piece = Ranges { fate, end };
+            let of_piece = Ranges { outcomes, end };
             whole = Some(whole.map_or(of_piece, |whole| whole.and(of_piece)));
         }
         let Some(mut whole) = whole else { return Ok(None) };
-        if whole.end.time_s.1.is_none() && whole.fate != Fate::Either {
+        if whole.end.time_s.1.is_none() && whole.outcomes != Outcomes::Either {
             whole.end.time_s = self.time_in_pieces();
         }
         Ok(Some(whole))
@@ -432,21 +432,21 @@ fn join(a: Interval, b: Interval) -> Interval {
 impl Ranges {
     /// What is proved of two pieces.
     fn and(self, other: Self) -> Self {
-        let is_stop = |fate: Fate| match fate {
-            Fate::One(outcome) => Some(outcome.is_stop()),
-            Fate::Either => None,
+        let is_stop = |outcomes: Outcomes| match outcomes {
+            Outcomes::One(outcome) => Some(outcome.is_stop()),
+            Outcomes::Either => None,
         };
-        let fate = match (self.fate, other.fate) {
+        let outcomes = match (self.outcomes, other.outcomes) {
             (a, b) if a == b => a,
-            (a, b) if is_stop(a) == Some(true) && is_stop(b) == Some(true) => Fate::One(Outcome::Stopped),
-            _ => Fate::Either,
+            (a, b) if is_stop(a) == Some(true) && is_stop(b) == Some(true) => Outcomes::One(Outcome::Stopped),
+            _ => Outcomes::Either,
         };
         let end = Intervals {
             depth_m: join(self.end.depth_m, other.end.depth_m),
             time_s: join(self.end.time_s, other.end.time_s),
             velocity_m_s: join(self.end.velocity_m_s, other.end.velocity_m_s),
         };
-        Self { fate, end }
+        Self { outcomes, end }
     }
 }
 
@@ -496,10 +496,10 @@ mod tests {
                     assert!(low.unwrap() <= value + slack, "{name} {texts:?}: {value} below {low:?}");
                     assert!(high.is_none_or(|high| value <= high + slack), "{name} {texts:?}: {value} above {high:?}");
                 }
-                match ranges.fate {
-                    Fate::One(Outcome::Perforated) => assert_eq!(flight.outcome, Outcome::Perforated),
-                    Fate::One(_) => assert!(flight.outcome.is_stop()),
-                    Fate::Either => {}
+                match ranges.outcomes {
+                    Outcomes::One(Outcome::Perforated) => assert_eq!(flight.outcome, Outcome::Perforated),
+                    Outcomes::One(_) => assert!(flight.outcome.is_stop()),
+                    Outcomes::Either => {}
                 }
                 for i in 0..2 {
                     least[i] = least[i].min(end[i]);

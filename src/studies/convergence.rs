@@ -488,7 +488,7 @@ impl Motion<'_> {
 }
 
 /// Times (s) from one event of `flight` to the next, with the velocity at its end, up to the place of `quantity`.
-fn legs(flight: &Flight, quantity: Quantity) -> impl Iterator<Item = (EventKind, f64, f64)> {
+fn passages(flight: &Flight, quantity: Quantity) -> impl Iterator<Item = (EventKind, f64, f64)> {
     let mut before = 0.0;
     let mut is_past = false;
     flight.events.iter().map_while(move |event| {
@@ -500,10 +500,10 @@ fn legs(flight: &Flight, quantity: Quantity) -> impl Iterator<Item = (EventKind,
     })
 }
 
-/// The longest step (s) that resolves every stage on the way of `exact` to the place of `quantity`.
+/// The longest step (s) that resolves every stage on the path of `exact` to the place of `quantity`.
 fn longest_resolved(exact: &Flight, quantity: Quantity) -> f64 {
-    let whole: f64 = legs(exact, quantity).map(|(_, time, _)| time).sum();
-    let stages = legs(exact, quantity).map(|(_, time, _)| time).filter(|time| *time > 0.0);
+    let whole: f64 = passages(exact, quantity).map(|(_, time, _)| time).sum();
+    let stages = passages(exact, quantity).map(|(_, time, _)| time).filter(|time| *time > 0.0);
     stages.fold(WHOLE_SHARE * whole, |least, time| least.min(STAGE_SHARE * time))
 }
 
@@ -512,8 +512,8 @@ fn longest_resolved(exact: &Flight, quantity: Quantity) -> f64 {
 fn resolves(size: f64, flight: &Flight, exact: &Flight, quantity: Quantity) -> bool {
     let near = |found: f64, exact: f64| (found - exact).abs() <= CHANGE_MAX * exact;
     size <= longest_resolved(exact, quantity)
-        && legs(flight, quantity).count() == legs(exact, quantity).count()
-        && legs(flight, quantity).zip(legs(exact, quantity)).all(|(found, exact)| {
+        && passages(flight, quantity).count() == passages(exact, quantity).count()
+        && passages(flight, quantity).zip(passages(exact, quantity)).all(|(found, exact)| {
             found.0 == exact.0 && (near(found.1, exact.1) || exact.1 <= 0.0) && near(found.2, exact.2)
         })
 }

@@ -85,7 +85,7 @@ pub struct Plan {
     pub seed: u64,
     /// How many.
     pub questions: usize,
-    /// Whether the events at their edges are asked too, of a solver that reads stages and is told a tolerance.
+    /// Whether the events at their edges are asked too, of a solver that reads stages and takes a tolerance.
     pub asks_edges: bool,
 }
 
@@ -274,7 +274,7 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
     }
 }
 
-/// Asks `solver`, which is told a tolerance, what lies at the edges, and `plan.questions` more; each is judged, and no
+/// Asks `solver`, which takes a tolerance, what lies at the edges, and `plan.questions` more; each is judged, and no
 /// cause is looked for. `progress` as in [`diagnose`].
 pub fn at_edges(solver: &mut dyn Solver, plan: Plan, progress: &dyn Fn(usize, usize)) -> Vec<Asked> {
     let mut all = edge_questions();
@@ -400,7 +400,7 @@ fn separation(asked: &[Asked]) -> String {
         .map(|content| (part(&failing, content) - part(&passing, content), content))
         .max_by(|a, b| a.0.total_cmp(&b.0));
     match best {
-        // What all fail is not told apart by what they hold.
+        // What they hold tells nothing of questions that all fail.
         Some((difference, content)) if difference > 0.5 && passing.len() * 10 >= failing.len() => {
             let (with, without) = (part(&failing, content), part(&passing, content));
             let (with, without) = ((100.0 * with).round(), (100.0 * without).round());

@@ -1,7 +1,7 @@
 //! Problems at the edges: grazing, coincident and close events, thin targets, extreme scales.
 //!
 //! The cases are those of `verification/edges.toml`, which put our own methods through them; [`super::diagnosis`] asks
-//! any solver those that a program which is told a tolerance can answer.
+//! any solver those that a program which takes a tolerance can answer.
 
 use super::critical_velocity;
 use crate::physics::{Concrete, CraterStiffness, Problem, Scene, Stage};

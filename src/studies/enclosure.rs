@@ -176,7 +176,7 @@ pub fn sentence(name: &str, value: f64, round_off: f64, proved: (f64, f64), unit
     } else if (high - value).max(value - low) <= round_off {
         Some(format!("{name} is right in every digit: {interval}"))
     } else if miss <= round_off {
-        Some(format!("{name} is not told apart from the exact one: {interval}"))
+        Some(format!("{name} is not distinguished from the exact one: {interval}"))
     } else if value == 0.0 || digit < 2.0 {
         Some(format!("{name} is wrong: {interval}"))
     } else {

@@ -81,8 +81,8 @@ pub struct LawOfValues {
 pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Result<LawOfValues, FitError> {
     let mut table = admissible(grids, STEPS_MIN)?;
     // Of the finest values that differ by their rounding alone one is kept: the others say nothing of the law.
-    let settled = table.iter().take_while(|grid| is_rounding(&table[0], grid)).count();
-    table.drain(..(settled - 1).min(table.len() - STEPS_MIN));
+    let equal = table.iter().take_while(|grid| is_rounding(&table[0], grid)).count();
+    table.drain(..(equal - 1).min(table.len() - STEPS_MIN));
     let table = table;
     let n = table.len() as f64;
     let samples = Samples::new(&table, known);

@@ -132,7 +132,7 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Result<Perforatio
 }
 
 /// The limit of a slab that plugs: bisection over the thickness between the depth X of `problem`, without a far side, and X with the
-/// rest that withstands the largest force of the way.
+/// rest that withstands the largest force of the path.
 ///
 /// The bound is half the width over which the outcome is undecided.
 fn of_plug(

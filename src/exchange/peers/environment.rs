@@ -218,7 +218,7 @@ fn published(
     fill(draft.path())?;
     match fs::rename(draft.path(), &folder) {
         // Renamed: there is nothing left to delete.
-        Ok(()) => drop(draft.settle(TempDir::keep)),
+        Ok(()) => drop(draft.finish(TempDir::keep)),
         Err(error) if !folder.is_dir() => return Err(unwritable(&folder, &error)),
         Err(_) => {}
     }

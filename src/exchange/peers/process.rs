@@ -52,7 +52,7 @@ pub struct PeerIdentity {
     pub version: String,
     /// Its method; empty when it gives none.
     pub method: String,
-    /// Whether it takes fixed steps: it is told the step, and a tolerance means nothing to it.
+    /// Whether it takes fixed steps: it is given the step, and a tolerance means nothing to it.
     pub fixed_step: bool,
     /// Whether it answers from the physical scene in place of the stages.
     pub reads_scene: bool,

@@ -88,7 +88,7 @@ impl PeerScene {
 
 /// Why a peer is not asked for a problem with a law of its own.
 #[cfg(feature = "report")]
-pub(crate) const NO_LAWS: &str = "a peer is told the coefficients of stages, and a stage has a law of its own";
+pub(crate) const NO_LAWS: &str = "a peer is given the coefficients of stages, and a stage has a law of its own";
 
 impl PeerRequest {
     /// Asks for `problem` at relative tolerance `rtol`; absolute tolerances are `rtol` times (first boundary in x, the

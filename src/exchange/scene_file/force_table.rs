@@ -139,14 +139,14 @@ fn parse<T>(
     new: fn(&[Row]) -> Result<T, RowsRefused>,
 ) -> Result<T, Fault> {
     let mut columns: Option<[Column; 2]> = None;
-    let (mut lines, mut told) = (Vec::new(), None);
+    let (mut lines, mut found) = (Vec::new(), None);
     let in_table = |line: u64, column: usize, message: String, allowed: &str, help: String| {
         Fault::new(span_of(text, line, column), message, allowed, help).in_table(file, text)
     };
     let rows = tables::read(file, text.as_bytes(), &FORMAT, |row| {
-        // Ends the reading; the fault itself is told.
+        // Ends the reading; the fault itself is found.
         let mut refuse = |fault: Fault| {
-            told = Some(fault);
+            found = Some(fault);
             TableError::of_row(row.at(), 0, tables::Fault::NoResults)
         };
         let [place, load] = if let Some(columns) = &columns {
@@ -178,7 +178,7 @@ fn parse<T>(
         };
         Ok(Row { at: number(place)?, force: number(load)? })
     });
-    let rows = match (rows, told) {
+    let rows = match (rows, found) {
         (_, Some(fault)) => return Err(fault),
         (Ok(rows), None) => rows,
         (Err(error), None) => {

@@ -274,16 +274,16 @@ impl<'a, S: Scalar> Run<'a, S> {
             step.arrival()
         };
         let is_at_end = self.stepper.options.boundaries != Boundaries::StepEnd;
-        let settled = self.condition().filter(|_| is_at_end).map_or(met, |condition| condition.settled(met));
-        (self.course.stage, self.course.state) = (self.stepper.stage, settled);
-        self.course.sample_until(settled, |time| step.inside(time));
+        let end = self.condition().filter(|_| is_at_end).map_or(met, |condition| condition.at_end(met));
+        (self.course.stage, self.course.state) = (self.stepper.stage, end);
+        self.course.sample_until(end, |time| step.inside(time));
         self.course.pass_condition();
         self.course.pass_ends();
         let stage = self.course.stage;
         let share = self.stepper.mass.over(self.course.mass);
         self.stepper.stage = stage;
         // What lies between the condition and the end of the step.
-        let has_ended = (settled.velocity.value() <= 0.0
+        let has_ended = (end.velocity.value() <= 0.0
             || is_located
             || step.to.depth.value() >= self.course.problem.exit_depth.value())
             && self.push_events(&step, stage);

@@ -83,7 +83,7 @@ impl<S: Scalar> Deceleration<S> for Stage<S> {
 /// Corrections of a velocity: by Newton four are usual, and halvings exhaust the digits of a number.
 const CORRECTIONS_MAX: u32 = 80;
 
-/// A law of its own, the mass, and the sign of the condition of its stage on the way to the end.
+/// A law of its own, the mass, and the sign of the condition of its stage before its end.
 impl<S: Scalar> Deceleration<S> for (&Law<S>, S, f64) {
     const MAY_RISE: bool = true;
 

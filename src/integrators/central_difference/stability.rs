@@ -12,7 +12,7 @@ const STEPS_PER_SHORTEST_SCALE: f64 = 1e3;
 /// is not resolved by 1e11 steps.
 const STEPS_PER_LONGEST_SCALE: f64 = 1e6;
 
-/// Doublings of a way from an epsilon of that of a second.
+/// Doublings of a distance from an epsilon of that of a second.
 const DOUBLINGS: u32 = 200;
 
 /// More stages than this are pieces of a table.
@@ -99,7 +99,7 @@ pub fn default_time_step<S: Scalar>(problem: &Problem<S>, velocity: VelocityAt) 
     if step.is_finite() { step.max(f64::MIN_POSITIVE) } else { 1.0 }
 }
 
-/// Where the time scales of a stage are asked: at its start; of a law of its own also at eight more places on the way to rest,
+/// Where the time scales of a stage are asked: at its start; of a law of its own also at eight more places before rest,
 /// as far as the force at V0 lets it come.
 fn places<S: Scalar>(problem: &Problem<S>, index: usize) -> SmallVec<[State; 9]> {
     let speed = problem.impact_speed.value();
@@ -113,9 +113,9 @@ fn places<S: Scalar>(problem: &Problem<S>, index: usize) -> SmallVec<[State; 9]>
         let force = law.force_value(start + distance, speed);
         work += force.max(0.0) * 0.5 * distance;
         if work >= energy || start + distance >= to {
-            let way = distance.min(to - start);
+            let part = distance.min(to - start);
             let share = |i: u32| f64::from(i) / 8.0;
-            places.extend((1..=8).map(|i| at(share(i) * way, speed * (1.0 - share(i)).sqrt())));
+            places.extend((1..=8).map(|i| at(share(i) * part, speed * (1.0 - share(i)).sqrt())));
             break;
         }
         distance *= 2.0;

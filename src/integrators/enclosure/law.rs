@@ -1,7 +1,7 @@
 //! Steps through a law of one's own, an expression of x and V: docs/enclosures.md, section 5.
 //!
 //! The polynomials are those of any step. Their defect is that of the power series of the expression in balls, and its
-//! rest the coefficient of order K anywhere on the way. Slopes of the force in a tube around the way bound what becomes of an error.
+//! rest the coefficient of order K anywhere on the path. Slopes of the force in a tube around the path bound what becomes of an error.
 
 use smallvec::SmallVec;
 
@@ -25,7 +25,7 @@ pub(super) const SPAN_MIN: f64 = 1.0 / (1_u64 << 30) as f64;
 /// Share of the time of a flight that the box of its rest may leave open.
 const OPEN_AT_REST: f64 = 1.0 / (1_u64 << 56) as f64;
 
-/// Longest way of a box over the unit of time, and how often it is shortened by 16.
+/// Longest path of a box over the unit of time, and how often it is shortened by 16.
 const BOX_MAX: f64 = 1.0 / 256.0;
 const BOXES_MAX: u32 = 22;
 
@@ -240,7 +240,7 @@ impl<'a> Expression<'a> {
         None
     }
 
-    /// A time from 0 to `span` until which the way of `series` keeps to its sides, as far as a box around it shows.
+    /// A time from 0 to `span` until which the path of `series` keeps to its sides, as far as a box around it shows.
     pub(super) fn until_kink(&self, centre: &Centre, series: &Series, span: f64) -> f64 {
         let Defect::Misses(misses) = &series.defect else { return span };
         if misses.sides.is_empty() {

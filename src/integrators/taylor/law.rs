@@ -6,7 +6,7 @@
 //! ```
 //!
 //! **Velocity as variable.** A fractional power of V, as in `(V/v1)^1.5`, has a branch point at V = 0: the series in time
-//! ends there, and steps shrink on the way to rest. With `V = u^m`, m the common denominator of the powers, F is smooth
+//! ends there, and steps shrink towards rest. With `V = u^m`, m the common denominator of the powers, F is smooth
 //! in u, and rest is the fixed end u = 0 (docs/theory.md, section 10). Where V falls fast enough, steps go by u, else by
 //! time.
 //!
@@ -380,7 +380,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let next = match self.end {
             Some((end, _)) if event == Event::Condition => {
                 let depth = if next.depth.value() > limit.value() { limit } else { next.depth };
-                end.settled(State { depth, ..next })
+                end.at_end(State { depth, ..next })
             }
             _ => next,
         };

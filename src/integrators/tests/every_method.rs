@@ -614,7 +614,7 @@ fn a_barrier_of_a_table_decides_and_the_drive_behind_it_does_not() {
     // All that is left is spent at the place where nothing stops it: whether it gets there nobody can say.
     for (name, flight) in flights(&barrier(12.0_f64.sqrt(), 2.0)) {
         if proves(name) {
-            // The root is rounded, and what the rounding leaves is told.
+            // The root is rounded, and what the rounding leaves is said.
             assert!(flight.outcome == Outcome::Stopped && flight.end.depth < 1.5, "{flight:?}");
             continue;
         }

@@ -195,7 +195,7 @@ fn carried(law: &Stage, mass: f64, from: &ExactState, t: &Big) -> (Big, Big) {
 }
 
 /// The flight of `problem`, seen to solve the equation of motion from each event to the next, to 48 digits.
-fn flown(problem: &Problem) -> ExactFlight {
+fn checked(problem: &Problem) -> ExactFlight {
     let flight = solved(problem);
     let zero = Exact(int(0, 256));
     let mut from = ExactState { time: zero.clone(), depth: zero, velocity: flight.impact_speed.clone() };
@@ -210,7 +210,7 @@ fn flown(problem: &Problem) -> ExactFlight {
         let law = problem.stages.iter().find(|law| law.end > middle).unwrap();
         let (depth, velocity) = carried(law, problem.mass, &from, &(&to.time.0 - &from.time.0));
         let off = [(depth, &to.depth, &flight.end.depth), (velocity, &to.velocity, &flight.impact_speed)]
-            .map(|(found, told, scale)| (magnitude(found - &told.0) / &scale.0).to_f64().value());
+            .map(|(found, expected, scale)| (magnitude(found - &expected.0) / &scale.0).to_f64().value());
         assert!(off[0] < 1e-48 && off[1] < 1e-48, "{kind:?}: {off:?}");
         from = to.clone();
     }
@@ -250,7 +250,7 @@ fn flights_solve_the_equation_of_motion_from_event_to_event() {
         (&[stage(0.0, 0.0, 3.0, 0.0, 0.125), stage(3.0, 0.0, 2.0, 0.0, none)], 1.0, none, Outcome::Stopped),
     ];
     for (list, impact_speed, exit_depth, outcome) in cases {
-        let flight = flown(&problem(list, impact_speed, exit_depth));
+        let flight = checked(&problem(list, impact_speed, exit_depth));
         assert_eq!((flight.outcome, flight.stage), (outcome, list.len() - 1));
     }
 }
@@ -432,9 +432,9 @@ fn agreement_is_52_digits_and_more_bits_are_tried_until_it_is_reached() {
     assert!(agree(&Big::ZERO, &Big::ZERO) && !agree(&one, &Big::ZERO));
     // Half of the bits distinguish a difference from zero.
     assert!(vanishes(&(one.clone() >> 128), &one, 256) && !vanishes(&(one >> 127), &int(1, 256), 256));
-    assert_eq!(settled(Ok, |_, _| true), Ok((384, 384)));
-    assert_eq!(settled(Ok, |a, _| *a > 500), Ok((864, 864)));
-    assert_eq!(settled(Ok, |_, _| false), Err(ReferenceError::Unsettled(6561)));
+    assert_eq!(at_enough_bits(Ok, |_, _| true), Ok((384, 384)));
+    assert_eq!(at_enough_bits(Ok, |a, _| *a > 500), Ok((864, 864)));
+    assert_eq!(at_enough_bits(Ok, |_, _| false), Err(ReferenceError::Undecided(6561)));
 }
 
 #[test]

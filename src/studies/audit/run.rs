@@ -13,7 +13,7 @@
 //! # End of a run
 //! Depth is the displacement along the axis, in the direction of the first velocity. The run ends where the depth first
 //! reaches the thickness, if there is one, else where the velocity first is zero. Inside the interval between two lines
-//! V runs linearly, and x along the cubic with the depths and velocities of both. Half-units of the last digits carry
+//! V runs linearly, and x along the cubic with the depths and velocities of both. Half-units of the last digits pass
 //! over to the end: a time inherits those of the depth over the velocity.
 
 use thiserror::Error;

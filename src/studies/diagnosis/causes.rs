@@ -156,13 +156,13 @@ impl Seen<'_> {
     fn is_told_apart(&self, faults: &[Fault<'static>]) -> bool {
         let (Some(found), Some(right)) = (self.predicted(faults), self.predicted(&[])) else { return false };
         let faulty = Seen { answer: found.end, ..self.clone() };
-        let told = faulty.excess(right).iter().filter(|excess| excess.abs() > TELLING).count();
+        let beyond = faulty.excess(right).iter().filter(|excess| excess.abs() > TELLING).count();
         // A number of its own in every answer explains one quantity by itself.
         let is_fitted = |(fault, _): &Fault<'_>| {
             matches!(fault.parameter, Parameter::Delay | Parameter::Lateness | Parameter::Nearness)
         };
         let is_of_one = |(fault, _): &Fault<'_>| is_of_one_number(fault);
-        told > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_of_one))
+        beyond > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_of_one))
     }
 
     /// Numbers of `hypothesis` that explain the answer, together with `others`; `None` where no number changes it.
@@ -532,7 +532,7 @@ fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], o
     let is_certain = is_alone && !first.is_one_number && !is_of_one && !is_rounding && is_enough;
     let certainty = if is_certain { Certainty::Certain } else { Certainty::Likely };
     let mut causes: Vec<Cause> = Vec::new();
-    // Those that cannot be told apart are one cause.
+    // Those that cannot be distinguished are one cause.
     for rival in rivals.iter().take(if is_alone { 1 } else { LISTED }) {
         for fault in &rival.faults {
             let next = cause(*fault, rival, certainty);

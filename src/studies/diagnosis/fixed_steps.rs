@@ -41,7 +41,7 @@ const FLOOR_ORDER: f64 = 0.8;
 /// An order claimed may exceed the one found by this part of it: the steps are not small for every question.
 const ORDER_MARGIN: f64 = 0.15;
 
-/// Diagnosis of a solver that is told its step.
+/// Diagnosis of a solver that takes a fixed step.
 pub(super) fn in_fixed_steps(
     asking: &mut Asking<'_>,
     peer: Subject,

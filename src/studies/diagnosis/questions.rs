@@ -128,7 +128,7 @@ impl Question {
         self.problem.stages.iter().any(|law| law.end != depth && (law.end - depth).abs() <= BORDER * depth)
     }
 
-    /// The scene as a peer is told of it.
+    /// The scene as a peer gets it.
     pub(super) fn peer_scene(&self) -> Option<PeerScene> {
         self.scene.as_ref().and_then(PeerScene::of)
     }
@@ -150,7 +150,7 @@ impl Content {
         Self::Eq14,
     ];
 
-    /// What a flight meets on its way.
+    /// What a flight meets.
     pub const EVENTS: [Self; 10] = [
         Self::StageEnd,
         Self::SeveralStageEnds,

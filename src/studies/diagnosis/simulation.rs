@@ -11,7 +11,7 @@ use crate::physics::{Problem, Stage, State};
 
 /// Columns of the extrapolation: order 16.
 const COLUMNS: usize = 8;
-/// Error allowed in a step, relative to the greatest speed and the way of the step: of the last column but one, and the
+/// Error allowed in a step, relative to the greatest speed and the distance of the step: of the last column but one, and the
 /// last is far better.
 const TOLERANCE: f64 = 1e-12;
 /// Steps of a flight at most, those taken again included.
@@ -68,7 +68,7 @@ impl Default for Rules {
     }
 }
 
-/// Where a simulated flight ends, and what it passed on the way.
+/// Where a simulated flight ends, and what it passed before.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Simulated {
     /// The end.
@@ -137,7 +137,7 @@ fn first_positive(h: f64, at_end: f64, at_start: f64, g: impl Fn(f64) -> f64) ->
 pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
     let Rules { force: (force, number), at_stage_end, rest_speed, end_time } = rules;
     // Times of whoever changes them at ends of stages are not those of the flight.
-    let mut flown = 0.0;
+    let mut elapsed = 0.0;
     let mut state = State::at_impact(problem);
     let mut passed = Vec::new();
     let mut taken = 0;
@@ -148,25 +148,25 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
         let (impact_speed, entry_speed, mass) = (problem.impact_speed, state.velocity, problem.mass);
         while state.depth < limit {
             let State { time, depth: x, velocity: v } = state;
-            if v <= rest_speed || flown >= end_time {
+            if v <= rest_speed || elapsed >= end_time {
                 return Some(Simulated { end: state, stage: index, passed });
             }
-            // By the way since x, not by the depth: a stage may be far shorter than it is deep.
-            let a = |way: f64, velocity| {
-                force(&Place { law, depth: x + way, velocity, entry_speed, impact_speed, mass }, number) / mass
+            // By the distance since x, not by the depth: a stage may be far shorter than it is deep.
+            let a = |distance: f64, velocity| {
+                force(&Place { law, depth: x + distance, velocity, entry_speed, impact_speed, mass }, number) / mass
             };
             let left = limit - x;
-            // No step much longer than the way to the limit, or than the loss of the speed.
+            // No step much longer than the distance to the limit, or than the loss of the speed.
             let crossing = 1.2 * left / v;
             let stopping = 1.2 * v / a(0.0, v).abs();
             // Nor than what the fastest motion of the stage takes, of which the error estimate would see nothing.
             let rate =
                 (law.stiffness.abs() / problem.mass).sqrt() + (law.viscosity + 2.0 * law.drag * v).abs() / problem.mass;
-            h = h.min(crossing).min(stopping).min(PHASE_MAX / rate).min(end_time - flown);
+            h = h.min(crossing).min(stopping).min(PHASE_MAX / rate).min(end_time - elapsed);
             if !h.is_finite() {
                 h = 1.0 / v;
             }
-            let ([way, speed], error) = extrapolated(&a, 0.0, v, h);
+            let ([distance, speed], error) = extrapolated(&a, 0.0, v, h);
             taken += 1;
             if taken > STEPS_MAX {
                 return None;
@@ -181,10 +181,10 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
             let rest = (speed <= rest_speed)
                 .then(|| first_positive(h, rest_speed - speed, rest_speed - v, |part| rest_speed - within(part)[1]));
             let last = rest.unwrap_or(h);
-            let farthest = rest.map_or(way, |part| within(part)[0]);
+            let farthest = rest.map_or(distance, |part| within(part)[0]);
             if farthest >= left {
                 let part = first_positive(last, farthest - left, -left, |part| within(part)[0] - left);
-                flown += part;
+                elapsed += part;
                 state = State { time: time + part, depth: limit, velocity: within(part)[1].max(rest_speed) };
                 break;
             }
@@ -192,8 +192,8 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
                 let end = State { time: time + part, depth: x + farthest, velocity: rest_speed };
                 return Some(Simulated { end, stage: index, passed });
             }
-            flown += h;
-            state = State { time: time + h, depth: x + way, velocity: speed };
+            elapsed += h;
+            state = State { time: time + h, depth: x + distance, velocity: speed };
             h *= (0.8 * off.max(1e-9).powf(-1.0 / 15.0)).clamp(1.0, 3.0);
         }
         if state.depth >= law.end {

@@ -220,7 +220,7 @@ fn a_factor_near_one_is_shown_with_the_digits_that_tell_it_from_one() {
     assert_eq!(drag.says(0.0), "the drag q is left out");
 }
 
-/// Central difference, told its step.
+/// Central difference at the step that is asked for.
 struct Paper(CentralDifference, f64);
 
 impl Solver for Paper {

@@ -1,4 +1,4 @@
-//! Is a solver right that is told a tolerance, and if not, what explains its answers?
+//! Is a solver right that takes a tolerance, and if not, what explains its answers?
 //!
 //! It is asked at three tolerances. An answer may err by [`ALLOWED`] times the tolerance and the condition of the problem.
 //! Causes are looked for while it is asked, from the exact answers to ever greater errors, so that small errors of
@@ -38,7 +38,7 @@ struct Judged {
     is_in_events: bool,
 }
 
-/// Diagnosis of a solver that is told a tolerance.
+/// Diagnosis of a solver that takes a tolerance.
 pub(super) fn at_tolerances(
     asking: &mut Asking<'_>,
     peer: Subject,

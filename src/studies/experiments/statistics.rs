@@ -20,7 +20,7 @@ pub(super) const CHI_SQUARED_95: f64 = 3.841_458_820_694_124;
 /// Modified deviation beyond which a value is an outlier (Iglewicz and Hoaglin 1993).
 const OUTLIER: f64 = 3.5;
 
-/// Values behind which an outlier can be told from scatter.
+/// Values behind which an outlier can be distinguished from scatter.
 const OUTLIER_TESTS_MIN: usize = 5;
 
 /// Mean and scatter of a sample.

@@ -9,7 +9,7 @@ use crate::studies::random::Random;
 
 check! {
     /// Random expressions over random boxes of x and V: values that lie outside of the range that is stated of the box. Where
-    /// an event may hide is told by such ranges.
+    /// an event may hide follows from such ranges.
     Ranges {
         /// How many expressions.
         expressions: usize,

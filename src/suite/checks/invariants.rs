@@ -151,11 +151,11 @@ fn compare(problem: &Problem, plain: &Flight, other: &Flight) -> Found {
     Ok(Measurement::new(worst_of(free.filter_map(change))))
 }
 
-/// A stage of [`joined_masses`]: `p + q V²` over `way`, behind which `added` joins.
+/// A stage of [`joined_masses`]: `p + q V²` over `length`, behind which `added` joins.
 struct Part {
     p: f64,
     q: f64,
-    way: f64,
+    length: f64,
     added: f64,
 }
 
@@ -175,11 +175,11 @@ fn joined_masses(&JoinedMasses { problems }: &JoinedMasses, subject: &Subject<'_
             .map(|stage| Part {
                 p: random.log_uniform(1e4, 1e6),
                 q: drag * random.uniform(0.5, 2.0),
-                way: random.log_uniform(0.05, 0.5),
+                length: random.log_uniform(0.05, 0.5),
                 added: if stage + 1 < count { random.log_uniform(0.05, 2.0) } else { 0.0 },
             })
             .collect();
-        let work: f64 = parts.iter().map(|part| part.p * part.way).sum();
+        let work: f64 = parts.iter().map(|part| part.p * part.length).sum();
         let speed = (2.0 * work / mass * random.log_uniform(0.05, 20.0)).sqrt();
         let (end, margin, slowest) = end_by_hand(&parts, mass, speed);
         // Near a standstill in front of an end, its time is ill-conditioned.
@@ -207,16 +207,16 @@ fn joined_masses(&JoinedMasses { problems }: &JoinedMasses, subject: &Subject<'_
 fn end_by_hand(parts: &[Part], mass: f64, speed: f64) -> (State, f64, f64) {
     let (mut m, mut v, mut end) = (mass, speed, State { time: 0.0, depth: 0.0, velocity: speed });
     let (mut lacking, mut least, mut rests, mut slowest) = (0.0_f64, 0.0_f64, false, speed);
-    for &Part { p, q, way, added } in parts {
+    for &Part { p, q, length, added } in parts {
         let share = m / (m + added);
         if rests {
-            lacking -= 2.0 * p * way / m;
+            lacking -= 2.0 * p * length / m;
         } else {
-            let decay = -(-2.0 * q * way / m).exp_m1();
-            let w = if q == 0.0 { v * v - 2.0 * p * way / m } else { v * v * (1.0 - decay) - p / q * decay };
+            let decay = -(-2.0 * q * length / m).exp_m1();
+            let w = if q == 0.0 { v * v - 2.0 * p * length / m } else { v * v * (1.0 - decay) - p / q * decay };
             rests = w <= 0.0;
             let (passed, after) = match (rests, q == 0.0) {
-                (false, _) => (way, w.sqrt()),
+                (false, _) => (length, w.sqrt()),
                 (true, true) => (m * v * v / (2.0 * p), 0.0),
                 (true, false) => (m / (2.0 * q) * (q * v * v / p).ln_1p(), 0.0),
             };
@@ -229,7 +229,7 @@ fn end_by_hand(parts: &[Part], mass: f64, speed: f64) -> (State, f64, f64) {
             end.depth += passed;
             (v, end.velocity) = (after * share, after);
             slowest = if rests { slowest } else { slowest.min(v) };
-            lacking = if rests { -2.0 * p * (way - passed) / m } else { 0.0 };
+            lacking = if rests { -2.0 * p * (length - passed) / m } else { 0.0 };
         }
         least = least.min(lacking);
         lacking *= share * share;
@@ -241,12 +241,12 @@ fn end_by_hand(parts: &[Part], mass: f64, speed: f64) -> (State, f64, f64) {
 
 /// The same as a scene, from its text.
 fn with_joined_masses(parts: &[Part], mass: f64, speed: f64) -> Found<Problem> {
-    let thickness: f64 = parts.iter().map(|part| part.way).sum();
+    let thickness: f64 = parts.iter().map(|part| part.length).sum();
     let mut text =
         format!("impact.velocity = {speed:e}\nprojectile.mass = {mass:e}\ntarget.thickness = {thickness:e}\n");
     let mut end = 0.0;
-    for &Part { p, q, way, added } in parts {
-        end += way;
+    for &Part { p, q, length, added } in parts {
+        end += length;
         text += &format!("[[stage]]\nstatic_force = {p:e}\ndrag = {q:e}\n");
         if added > 0.0 {
             text += &format!("end = {end:e}\nadd_mass = {added:e}\n");

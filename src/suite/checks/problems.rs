@@ -116,7 +116,7 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// Worst error of `found`, at a boundary or on the way, against `exact` at the same depth.
+    /// Worst error of `found`, at a boundary or inside a stage, against `exact` at the same depth.
     fn passing(&mut self, found: &State, exact: &State<TwoFloat>) -> f64 {
         let (time, depth, velocity) = (exact.time.value(), exact.depth.value(), exact.velocity.value());
         if time == 0.0 || depth == 0.0 {

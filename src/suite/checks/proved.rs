@@ -14,7 +14,7 @@ use crate::physics::units::decimal;
 use crate::physics::{
     Advice, Concrete, CraterStiffness, Event, EventKind, Outcome, Parameter, Problem, Scalar, Scene, State,
 };
-use crate::studies::boxes::{Fate, Region, Side};
+use crate::studies::boxes::{Outcomes, Region, Side};
 use crate::studies::random::Random;
 use crate::studies::random_problems::Kind;
 use crate::studies::random_scenes::Generator;
@@ -121,12 +121,12 @@ fn boxes(&Boxes { boxes }: &Boxes, subject: &Subject<'_>) -> Found {
             };
             if let (Some(ranges), Ok(flight)) = (&found, ClosedForm.solve(&at.problem()?, Detail::End)) {
                 let is_near = flight.outcome == Outcome::Undecided;
-                let is_right = match ranges.fate {
+                let is_right = match ranges.outcomes {
                     // To rest in the crater or behind it is one to a box that holds both.
-                    Fate::One(outcome) => flight.outcome.is_stop() == outcome.is_stop(),
-                    Fate::Either => true,
+                    Outcomes::One(outcome) => flight.outcome.is_stop() == outcome.is_stop(),
+                    Outcomes::Either => true,
                 };
-                see(is_near || is_right, format!("{} and not {:?}", flight.outcome, ranges.fate));
+                see(is_near || is_right, format!("{} and not {:?}", flight.outcome, ranges.outcomes));
                 let end = flight.end;
                 see(is_near || holds(ranges.end.depth_m, end.depth), format!("ends at {} m", end.depth));
                 see(is_near || holds(ranges.end.time_s, end.time), format!("ends at {} s", end.time));

@@ -626,15 +626,15 @@ fn wire(&Wire { problems }: &Wire, subject: &Subject<'_>, seen: &mut Violations)
             concrete.inertia_factor = random.uniform(0.5, 1.5);
             concrete.follows_eq14 = random.chance(0.5);
         }
-        let told =
+        let asked =
             serde_json::to_value(PeerScene::of(&scene)).map_err(|error| NotMeasured::broken(error.to_string()))?;
         let expected = told_of(&scene).ok_or_else(|| NotMeasured::broken("a random scene is one of concrete"))?;
-        seen.expect(told == expected, || format!("scene {index} is told as {told}, and is {expected}"));
+        seen.expect(asked == expected, || format!("scene {index} is asked as {asked}, and is {expected}"));
     }
     Ok(())
 }
 
-/// What a peer is told of `scene`, by the names of docs/reference.md, "Peer protocol".
+/// What a peer gets of `scene`, by the names of docs/reference.md, "Peer protocol".
 fn told_of(scene: &Scene) -> Option<Value> {
     let concrete = scene.concrete()?;
     let stiffness = match concrete.crater_stiffness {

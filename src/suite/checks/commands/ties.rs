@@ -18,7 +18,7 @@ check! {
         options: String,
     } in Commands, "relative", by path_rows, compares (Commands | Itself);
 
-    /// Rows of a trajectory: the force over the time is the change of momentum, the velocity over it the way.
+    /// Rows of a trajectory: the force over the time is the change of momentum, the velocity over it the distance.
     PathMomentum {
         /// Options of the method.
         options: String,
@@ -171,16 +171,16 @@ fn path_momentum(PathMomentum { options }: &PathMomentum, subject: &Subject<'_>)
     let (answer, rows) = path(options, subject)?;
     let (mass, speed) = (answer.number("scene.mass_kg")?, answer.number("scene.velocity_m_s")?);
     let mut worst = Worst::default();
-    let (mut impulse, mut way) = (0.0, 0.0);
+    let (mut impulse, mut distance) = (0.0, 0.0);
     for (i, pair) in rows.windows(2).enumerate() {
         let [from, to] = pair else { continue };
         let law = answer.at(&format!("scene.stages.{}", to.stage));
         let mean = 0.5 * (force(law, from.depth, from.velocity) + force(law, to.depth, to.velocity));
         impulse += mean * (to.time - from.time);
-        way += 0.5 * (from.velocity + to.velocity) * (to.time - from.time);
+        distance += 0.5 * (from.velocity + to.velocity) * (to.time - from.time);
         let lost = speed - to.velocity;
         worst.take((impulse / mass - lost).abs() / speed, || format!("row {}: {lost} m/s lost", i + 1));
-        worst.take((way / to.depth - 1.0).abs(), || format!("row {}: at {} m", i + 1, to.depth));
+        worst.take((distance / to.depth - 1.0).abs(), || format!("row {}: at {} m", i + 1, to.depth));
     }
     Ok(worst.measurement())
 }
