@@ -51,7 +51,7 @@ check! {
     } in Random, "points outside", by boxes, compares (Enclosure | ClosedForm);
 }
 
-/// A box around a scene: two or three of its numbers, each within a tenth or a half.
+/// A box around a scene: its mass and another of its numbers.
 fn random_box(generator: &mut Generator, random: &mut Random, is_near_change: bool) -> (Scene, Vec<Side>) {
     let mut scene = generator.next_scene();
     if let (true, Some(concrete)) = (is_near_change, scene.concrete()) {
@@ -65,7 +65,7 @@ fn random_box(generator: &mut Generator, random: &mut Random, is_near_change: bo
         let thickness = Some(depth * random.uniform(0.3, 1.6));
         scene = Scene { velocity: Some(velocity), thickness, ..Scene::of_concrete(scene.mass, concrete) };
     }
-    let width = if random.chance(0.5) { 0.1 } else { 0.4 };
+    let width = if is_near_change { 0.4 } else { 0.1 };
     let known = [
         Parameter::Mass,
         Parameter::Density,
@@ -75,11 +75,12 @@ fn random_box(generator: &mut Generator, random: &mut Random, is_near_change: bo
         Parameter::Thickness,
     ];
     let mut sides: Vec<Side> = Vec::new();
-    for _ in 0..2 + random.below(2) {
-        let parameter = known[random.below(known.len())];
-        let Ok(value) = parameter.get(&scene) else { continue };
-        let high =
-            if parameter == Parameter::NoseFactor { (value * (1.0 + width)).min(1.0) } else { value * (1.0 + width) };
+    // Mass and drag are what the change depends on.
+    let asked = [0, if is_near_change { 1 + random.below(2) } else { random.below(known.len()) }];
+    for (parameter, value) in asked.map(|index| known[index]).map(|parameter| (parameter, parameter.get(&scene))) {
+        let Ok(value) = value else { continue };
+        let high = value * (1.0 + width);
+        let high = if parameter == Parameter::NoseFactor { high.min(1.0) } else { high };
         if value > 0.0 && value.is_finite() && sides.iter().all(|side| side.parameter != parameter) {
             sides.push(Side { parameter, low: value * (1.0 - width), high });
         }
@@ -97,13 +98,13 @@ fn boxes(&Boxes { boxes }: &Boxes, subject: &Subject<'_>) -> Found {
         let (scene, sides) = random_box(&mut generator, &mut random, index % 2 == 0);
         let Ok(region) = Region::new(&scene, &written, &sides) else { continue };
         asked += 1;
-        let (found, critical) = (region.flight()?, region.critical());
+        let (found, critical) = (region.flight()?, if index % 4 < 2 { region.critical() } else { None });
         proved += usize::from(found.is_some());
         for point in 0..POINTS {
             let mut at = scene.clone();
             for (place, side) in sides.iter().enumerate() {
                 // The corners first.
-                let share = if point < 8 { f64::from((point >> place & 1) as u32) } else { random.unit() };
+                let share = if point < 4 { f64::from((point >> place & 1) as u32) } else { random.unit() };
                 side.parameter.set(&mut at, side.low + share * (side.high - side.low))?;
             }
             let holds = |(low, high): (Option<f64>, Option<f64>), exact: f64| {
