@@ -148,7 +148,7 @@ impl<S: Scalar> Law<S> {
         let ([force, slope, velocity], true) = (&expression.parameters[..], expression.values.tape() == line()) else {
             return None;
         };
-        let end = self.end.as_ref().and_then(Condition::speed).map(|end| end.value());
+        let end = self.end.as_ref().and_then(Condition::speed).map(Scalar::value);
         Some(Line { force: force.value(), slope: slope.value(), velocity: velocity.value(), end })
     }
 

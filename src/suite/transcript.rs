@@ -299,19 +299,16 @@ fn sums(lines: &[String]) -> Vec<String> {
         let (mut count, mut negative, mut sum) = (0, 0, 0.0);
         for line in part {
             for piece in pieces(&plain(line)) {
-                match piece.number {
-                    Some(number) => {
-                        count += 1;
-                        if number.abs() >= Numbers::TINY {
-                            negative += usize::from(number < 0.0);
-                            // By its place, so that two that are exchanged show.
-                            sum += (1.0 + f64::from(count % 101) / 101.0) * (40.0 + number.abs().ln());
-                        }
+                if let Some(number) = piece.number {
+                    count += 1;
+                    if number.abs() >= Numbers::TINY {
+                        negative += usize::from(number < 0.0);
+                        // By its place, so that two that are exchanged show.
+                        sum += (1.0 + f64::from(count % 101) / 101.0) * (40.0 + number.abs().ln());
                     }
-                    None => {
-                        words.update(piece.text.as_bytes());
-                        words.update(b" ");
-                    }
+                } else {
+                    words.update(piece.text.as_bytes());
+                    words.update(b" ");
                 }
             }
         }
@@ -582,8 +579,7 @@ mod tests {
             let lines =
                 (0..1000).map(|i| if i == 444 { line.to_owned() } else { format!("{i} 1.25e-3 word {}", i + 1) });
             let said = lasting("a.csv", &lines.collect::<Vec<_>>().join("\n"), LINES_MAX);
-            let said = said.iter().map(|line| format!("|{line}\n")).collect::<String>();
-            Transcript::read(&format!("$ map\n= 0\n> a.csv\n{said}")).unwrap()
+            Transcript::read(&format!("$ map\n= 0\n> a.csv\n|{}\n", said.join("\n|"))).unwrap()
         };
         let was = text("444 1.25e-3 word 445");
         assert_eq!(was.differences(&text("444 1.25e-3 word 445"), 1e-9).lines, 0);
