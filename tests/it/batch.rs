@@ -206,7 +206,7 @@ fn columns_that_are_not_read_go_with_their_rows() {
     };
     let folder = tempfile::tempdir().unwrap();
     let said = run(folder.path(), &lines(true), "--out results.csv --threads 1").expect(3);
-    assert!(said.words().contains("carried through unread: shot id, note, dx, dy"), "{}", said.words());
+    assert!(said.words().contains("passed on unread: shot id, note, dx, dy"), "{}", said.words());
     let found = fs::read_to_string(folder.path().join("results.csv")).unwrap();
     run(folder.path(), &lines(false), "--out results.csv").expect(3);
     let plain = fs::read_to_string(folder.path().join("results.csv")).unwrap();
@@ -264,5 +264,5 @@ fn columns_that_may_be_meant_for_others_are_refused() {
         run(folder.path(), &varied(name), "--scene tunnel --out results.csv").refused();
     }
     let said = run(folder.path(), &varied("shot"), "--scene tunnel --out results.csv").expect(0);
-    assert!(said.words().contains("carried through unread: shot"), "{}", said.words());
+    assert!(said.words().contains("passed on unread: shot"), "{}", said.words());
 }

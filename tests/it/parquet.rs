@@ -277,7 +277,7 @@ fn columns_that_are_not_read_go_with_their_rows() {
         (0..5).map(|i| GOOD.into_iter().map(Some).chain([(i != 2).then_some(0.1 + f64::from(i))]).collect()).collect();
     write_numbers(&folder.path().join("s.parquet"), &names, &rows, Compression::SNAPPY);
     let said = run_in(folder.path(), "batch s.parquet --out r.parquet").expect(0);
-    assert!(said.words().contains("carried through unread: measured"), "{}", said.words());
+    assert!(said.words().contains("passed on unread: measured"), "{}", said.words());
     let cell = |row: &Vec<Option<f64>>| row[6].map_or(Cell::Absent, |value| Cell::Bits(value.to_bits()));
     assert_eq!(columns(&folder.path().join("r.parquet"))["measured"], rows.iter().map(cell).collect::<Vec<_>>());
     run_in(folder.path(), "batch s.parquet --out r.csv").expect(0);
