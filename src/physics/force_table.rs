@@ -55,6 +55,12 @@ pub enum RowsRefused {
         /// That of the row before.
         before: f64,
     },
+    /// The force changes by more between a row and the one before than a slope can say.
+    #[error("so far from the force of the row before that the slope between them is no 64-bit number")]
+    TooSteep {
+        /// Index of the row, from 0.
+        row: usize,
+    },
     /// A table of velocity does not begin at rest.
     #[error("the first velocity is {} m/s, and the force at rest is not known", Shown(*.0))]
     NotFromRest(f64),
@@ -72,6 +78,9 @@ fn checked(rows: &[Row]) -> Result<Arc<[Row]>, RowsRefused> {
         }
         if *at <= before {
             return Err(RowsRefused::NotRising { row, before });
+        }
+        if row > 0 && !((force - rows[row - 1].force) / (at - before)).is_finite() {
+            return Err(RowsRefused::TooSteep { row });
         }
         before = *at;
     }
@@ -305,6 +314,7 @@ mod tests {
     fn a_table_of_velocity_begins_at_rest_and_holds_the_force_of_its_rows() {
         assert_eq!(over_speed(&[[1.0, 1.0], [2.0, 2.0]]), Err(RowsRefused::NotFromRest(1.0)));
         assert_eq!(over_speed(&[[-1.0, 1.0], [2.0, 2.0]]), Err(RowsRefused::NotFromRest(-1.0)));
+        assert_eq!(over_speed(&[[0.0, 1e300], [1e-300, -1e300]]), Err(RowsRefused::TooSteep { row: 1 }));
         let rows = [[0.0, 3.0], [0.1, 0.7], [0.3, 0.7], [0.7, -0.1], [1.0, 5.0]];
         let table = over_speed(&rows).unwrap();
         for [v, force] in rows {

@@ -826,10 +826,6 @@ impl Scene {
                         }
                         Some(Force::Expression(tape)) => laws.push(Some(Law::new(tape, parameters.clone()))),
                         Some(Force::SpeedTable(table)) => {
-                            for row in 0..table.rows().len() - 1 {
-                                let [_, slope, _] = table.line::<f64>(row);
-                                representable("the slope between two rows of a table [kg/s]", slope, true)?;
-                            }
                             laws.push(Some(Law::of_table(table.clone())));
                         }
                         _ => {}

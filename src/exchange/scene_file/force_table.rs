@@ -215,6 +215,13 @@ fn parse<T>(
         RowsRefused::NotFinite { row } => {
             in_table(lines[row], 0, format!("this row is {refused}"), "finite numbers", "correct the row".to_owned())
         }
+        RowsRefused::TooSteep { row } => in_table(
+            lines[row],
+            0,
+            format!("the force of this row is {refused}"),
+            "forces whose difference over that of the rows is finite",
+            "check the units of both columns".to_owned(),
+        ),
         RowsRefused::TooFew(_) | RowsRefused::TooMany => in_table(
             lines.last().copied().unwrap_or_default(),
             0,
