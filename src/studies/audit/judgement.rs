@@ -169,7 +169,7 @@ pub struct QuantityAudit {
     pub observed_order: Option<f64>,
     /// Its 95 % interval.
     pub interval: Option<[f64; 2]>,
-    /// Its interval at [`AUDIT_LEVEL`], on which the verdict rests.
+    /// Its interval at [`AUDIT_LEVEL`](super::AUDIT_LEVEL), on which the verdict rests.
     pub verdict_band: Option<[f64; 2]>,
     /// Order of each three neighbouring rows, from the finest on; `null` where they change to both sides.
     pub local_orders: Vec<Option<f64>>,
@@ -189,7 +189,7 @@ pub struct QuantityAudit {
     pub rule: &'static str,
     /// Limit for dt -> 0, in the unit of the column.
     pub limit: Option<f64>,
-    /// Interval of the limit at [`AUDIT_LEVEL`].
+    /// Interval of the limit at [`AUDIT_LEVEL`](super::AUDIT_LEVEL).
     pub limit_band: Option<[f64; 2]>,
     /// Exact value, if known.
     pub exact: Option<f64>,
