@@ -285,7 +285,7 @@ fn the_error_bar_of_the_headline_covers_nineteen_tables_of_twenty() {
     // Share of tables whose limit lies within the bar of the finest value, and the median of bar over error.
     let mut noise = Noise(3);
     for (kind, rows) in [("order", 6), ("noise", 6), ("rounded", 6), ("mixture", 6), ("saw-tooth", 8)] {
-        let (count, mut covered, mut widths) = (40, 0, Vec::new());
+        let (count, mut covered, mut widths) = (200, 0, Vec::new());
         for _ in 0..count {
             let (next, share) = (0.2 * noise.normal(), 0.5 + noise.uniform());
             let text = table(rows, |h, _| {
