@@ -24,7 +24,7 @@ use crate::suite::{Check, Evidence, Judged, Verdict, grouped};
 const SCENES_MAX: usize = 2;
 
 /// Height of the strips of one panel at most (px).
-const STRIPS_MAX: f64 = 700.0;
+const STRIPS_MAX: f64 = 420.0;
 
 /// Every figure of `run`, in the order of the report.
 pub fn all(run: &Run<'_>) -> Vec<Figure> {

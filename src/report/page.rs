@@ -156,7 +156,7 @@ impl<'a> Page<'a> {
                                 nav id="contents" aria-label="Contents" {
                                     ol { @for part in parts { li { a href={ "#" (part.id) } { (part.title) } } } }
                                     @if bodies.iter().any(|body| body.contains("<details")) {
-                                        p.unfold { input id="unfold" type="checkbox"; label for="unfold" { " Show all that is folded" } }
+                                        p.unfold { input id="unfold" type="checkbox"; label for="unfold" { " Show all that is folded; the search of the browser then finds it" } }
                                     }
                                 }
                             }
