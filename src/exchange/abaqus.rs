@@ -197,7 +197,7 @@ mod tests {
         let refuse = |problem: &Problem| {
             Export { title: "", problem, area: 1.0, time_step: 1e-6, duration: 1.0 }.files().unwrap_err()
         };
-        assert_eq!(refuse(&shipped("law-petry").problem().unwrap()), ExportError::Law(0));
+        assert_eq!(refuse(&shipped("law-power").problem().unwrap()), ExportError::Law(0));
         assert_eq!(refuse(&shipped("tunnel").resolve(0.0).unwrap()), ExportError::AtRest);
     }
 }

@@ -213,7 +213,7 @@ mod tests {
         }
         assert_eq!(page("fc, V0 +-20, a -> b"), "f<sub>c</sub>, V₀ ±20, a → b");
         assert_eq!(page("fc_mpa, V0x, sfc"), "fc_mpa, V0x, sfc");
-        assert_eq!(page("-23.01 to -2.5e6, x-2, 11-12, 1e-3-1"), "−23.01 to −2.5\u{a0}×\u{a0}10⁶, x-2, 11-12, 1e-3-1");
+        assert_eq!(page("-23.01 to -2.5e6, x-2, 11-12, 1e-3-1"), "−23.01 to −2.5\u{a0}×\u{a0}10⁶, x-2, 11-12, 10⁻³-1");
         assert_eq!(page("h^1.95, h^2. V^-0.5"), "h<sup>1.95</sup>, h². V<sup>−0.5</sup>");
         assert_eq!(page("error 0.0e0, 6.5e0"), "error 0.0, 6.5");
         assert_eq!(page("try --dt 4e-9:4e-7."), "try <code>--dt 4e-9:4e-7</code>.");

@@ -218,8 +218,8 @@ fn a_force_that_is_no_table_is_refused_where_it_stands_in_the_scene() {
         let place = beside(folder.path(), &many, "").err().and_then(|error| error.place);
         assert_eq!(place.map(|place| place.line), line);
     }
-    let steep = beside(folder.path(), &right, "").unwrap().problem();
-    assert!(matches!(steep, Err(ResolveError::OutOfRange { .. })), "{steep:?}");
+    let steep = beside(folder.path(), &right, "").unwrap_err();
+    assert!(steep.file.ends_with("r.csv") && steep.place.is_some_and(|place| place.line == 3));
 }
 
 #[test]

@@ -61,10 +61,10 @@ impl Tape {
     ///
     /// let known = [
     ///     Known { name: "P", value: 800.0, unit: Dimension::Force.into() },
-    ///     Known { name: "v1", value: 20.0, unit: Dimension::Velocity.into() },
+    ///     Known { name: "v1", value: 16.0, unit: Dimension::Velocity.into() },
     /// ];
     /// let of = |text| Tape::read(text, &known, Dimension::Force.into()).map(|tape| tape.coefficients(tape.parameters()));
-    /// assert_eq!(of("P*(1 + V/v1)^2"), Ok(Some([800.0, 0.0, 80.0, 2.0])));
+    /// assert_eq!(of("P*(1 + V/v1)^2"), Ok(Some([800.0, 0.0, 100.0, 3.125])));
     /// assert_eq!(of("P*(V/v1)^1.5"), Ok(None));
     /// ```
     pub fn coefficients<S: Scalar>(&self, parameters: &[S]) -> Option<[S; 4]> {
