@@ -22,6 +22,8 @@ pub use self::causes::{Cause, Certainty};
 use self::fixed_steps::in_fixed_steps;
 #[cfg(feature = "report")]
 pub(crate) use self::hypotheses::changed_by_nothing;
+#[cfg(feature = "report")]
+pub(crate) use self::ladder::{LADDER, Limit};
 pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, questions};
 use self::tolerances::{at_tolerances, row};

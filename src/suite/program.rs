@@ -17,8 +17,8 @@ use crate::exchange::scene_file::SHIPPED;
 /// Longest run of a command that a claim asks for.
 const TIME_MAX: Duration = Duration::from_secs(60);
 
-/// How often a run is asked whether it has ended.
-const POLL: Duration = Duration::from_millis(2);
+/// Waits before a run is asked whether it has ended: most take a few milliseconds.
+const POLLS: [Duration; 2] = [Duration::from_micros(200), Duration::from_millis(5)];
 
 /// The program with a folder of its own, which holds the shipped scenes as `NAME.toml` and what runs leave there.
 #[derive(Debug)]
@@ -103,6 +103,7 @@ impl Program {
             .stderr(File::create(&err)?)
             .spawn()?;
         let started = Instant::now();
+        let [mut wait, longest] = POLLS;
         let status = loop {
             if let Some(status) = child.try_wait()? {
                 break status;
@@ -112,7 +113,8 @@ impl Program {
                 child.wait()?;
                 return Err(io::Error::other(format!("does not end within {} s", TIME_MAX.as_secs())));
             }
-            thread::sleep(POLL);
+            thread::sleep(wait);
+            wait = longest.min(wait.mul_f64(1.25));
         };
         let said =
             Said { code: status.code().unwrap_or(-1), out: fs::read_to_string(&out)?, err: fs::read_to_string(&err)? };

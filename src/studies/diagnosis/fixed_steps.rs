@@ -7,9 +7,7 @@ use std::collections::BTreeMap;
 
 use super::causes::{Cause, Certainty, Effort, Seen, causes};
 use super::hypotheses::How;
-use super::ladder::{
-    FINER, LADDER, Limit, REPRODUCED, Rung, coarsest_step, limit, order, pooled, rung_errors, schemes,
-};
+use super::ladder::{FINER, LADDER, Limit, REPRODUCED, Rung, coarsest_step, order, pooled, rung_errors, schemes};
 use super::numbers::few_digits;
 use super::questions::{Content, Question};
 use super::{
@@ -145,7 +143,11 @@ impl Laddered<'_> {
     }
 
     fn limits(&self) -> [Option<Limit>; 3] {
-        [0, 1, 2].map(|which| limit(self.question, &self.rungs, which))
+        let errors = rung_errors(self.question, &self.rungs);
+        [0, 1, 2].map(|which| {
+            let points: Vec<_> = self.rungs.iter().zip(&errors).map(|(rung, all)| (rung.step, all[which])).collect();
+            Limit::of(&points)
+        })
     }
 
     fn is(&self, of: impl Fn(&Limit, f64) -> bool) -> bool {

@@ -21,7 +21,7 @@ use crate::studies::order::{StepError, fit};
 use crate::studies::scheme_of_table::Scheme;
 
 /// Steps of a ladder over the coarsest one: ratios that no event time is a multiple of.
-pub(super) const LADDER: [f64; 8] = [1.0, 0.7053, 0.4913, 0.3331, 0.2294, 0.1571, 0.1069, 0.0731];
+pub(crate) const LADDER: [f64; 8] = [1.0, 0.7053, 0.4913, 0.3331, 0.2294, 0.1571, 0.1069, 0.0731];
 /// Steps asked in addition where a limit seems wrong.
 pub(super) const FINER: [f64; 4] = [0.0437, 0.0241, 0.0134, 0.0071];
 /// Coarsest step over the duration of the flight.
@@ -77,13 +77,13 @@ pub(super) struct Rung {
 
 /// The limit of one quantity as the step vanishes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limit {
+pub(crate) struct Limit {
     /// Its relative error.
-    pub error: f64,
+    pub(crate) error: f64,
     /// The standard error of that.
-    pub standard_error: f64,
+    pub(crate) standard_error: f64,
     /// Error at the finest step.
-    pub finest: f64,
+    finest: f64,
 }
 
 impl Limit {
@@ -108,33 +108,27 @@ pub(super) fn rung_errors(question: &Question, rungs: &[Rung]) -> Vec<[f64; 3]> 
     rungs.iter().map(|rung| errors(rung.answer, question.exact.end, question.problem.impact_speed)).collect()
 }
 
-/// The limit of quantity `which`; `None` with too few rungs.
-pub(super) fn limit(question: &Question, rungs: &[Rung], which: usize) -> Option<Limit> {
-    let errors = rung_errors(question, rungs);
-    let coarsest = rungs.iter().map(|rung| rung.step).fold(0.0, f64::max);
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    let rows: Vec<(Vector3<f64>, f64)> = rungs
-        .iter()
-        .zip(&errors)
-        .map(|(rung, errors)| {
-            let h = rung.step / coarsest;
-            (Vector3::new(1.0 / h, 1.0, h), errors[which] / h)
+impl Limit {
+    /// The limit of `points`, each a step (s) and the relative error with it; `None` with too few.
+    pub(crate) fn of(points: &[(f64, f64)]) -> Option<Self> {
+        let freedom = points.len().checked_sub(3).filter(|freedom| *freedom > 0)?;
+        let coarsest = points.iter().map(|(step, _)| *step).fold(0.0, f64::max);
+        let row = |step: f64| Vector3::new(coarsest / step, 1.0, step / coarsest);
+        let rows: Vec<_> = points.iter().map(|&(step, error)| (row(step), error * coarsest / step)).collect();
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (row, value) in &rows {
+            normal += row * row.transpose();
+            right += row * *value;
+        }
+        let inverse = normal.try_inverse()?;
+        let solution = inverse * right;
+        let squares: f64 = rows.iter().map(|(row, value)| (value - row.dot(&solution)).powi(2)).sum();
+        Some(Self {
+            error: solution[0],
+            standard_error: (squares / freedom as f64 * inverse[(0, 0)]).sqrt().max(f64::EPSILON),
+            finest: points.iter().min_by(|a, b| a.0.total_cmp(&b.0))?.1,
         })
-        .collect();
-    for (row, value) in &rows {
-        normal += row * row.transpose();
-        right += row * *value;
     }
-    let inverse = normal.try_inverse()?;
-    let solution = inverse * right;
-    let freedom = rows.len().checked_sub(3).filter(|freedom| *freedom > 0)?;
-    let squares: f64 = rows.iter().map(|(row, value)| (value - row.dot(&solution)).powi(2)).sum();
-    let finest = rungs.iter().zip(&errors).min_by(|a, b| a.0.step.total_cmp(&b.0.step))?.1[which];
-    Some(Limit {
-        error: solution[0],
-        standard_error: (squares / freedom as f64 * inverse[(0, 0)]).sqrt().max(f64::EPSILON),
-        finest,
-    })
 }
 
 /// The schemes that reproduce `ladders`, of which one at least is needed.

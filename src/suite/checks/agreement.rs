@@ -91,7 +91,8 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
     let (found, exact) =
         found.zip(value).ok_or_else(|| NotMeasured::broken(format!("no {quantity}, where {value:?} is right")))?;
     let error = signed_error(quantity, found, exact, problem.impact_speed);
-    let conditions = reference::conditions(Source::Problem(problem)).ok();
+    let compute = || reference::conditions(Source::Problem(problem)).ok();
+    let conditions = subject.context.memo.conditions.get(subject.scene_name()?.to_owned(), compute);
     let condition = conditions.map_or(1.0, |conditions| condition_of(&conditions, quantity));
     let mut remark = format!("{found} with {} evaluations, error {:.1e}", flight.cost.force_evaluations, error.abs());
     if condition > 1.0 {

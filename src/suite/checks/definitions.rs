@@ -10,6 +10,7 @@ use crate::physics::expression::{Known, Tape, Unit};
 use crate::physics::units::{Dimension, quantity};
 use crate::studies::batch::SCENES;
 use crate::studies::bench::Timing;
+use crate::studies::diagnosis::{LADDER, Limit};
 use crate::studies::random::Random;
 
 check! {
@@ -32,6 +33,13 @@ check! {
         /// How many samplings.
         samplings: usize,
     } in Commands, "violations", counting quartiles, compares nothing;
+
+    /// Limits of small steps by `diagnose`, of random errors `L + h (C + D h + noise)`: shares of them beyond quantiles of
+    /// Student's t that are not the shares of these.
+    LimitsOfLadders {
+        /// How many ladders of steps.
+        ladders: usize,
+    } in Commands, "violations", counting limits_of_ladders, compares nothing;
 }
 
 /// A sum of products of powers of x and V.
@@ -173,6 +181,40 @@ fn quartiles(&Quartiles { samplings }: &Quartiles, subject: &Subject<'_>, seen: 
         {
             seen.expect((part * parts as f64 / whole - 1.0).abs() < 1e-12, || format!("{part} of {whole} in {parts}"));
         }
+    }
+    Ok(())
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn limits_of_ladders(
+    &LimitsOfLadders { ladders }: &LimitsOfLadders,
+    subject: &Subject<'_>,
+    seen: &mut Violations,
+) -> Found<()> {
+    // Quantiles of Student's t with as many degrees of freedom as a ladder leaves: 8 steps, 3 unknowns.
+    const BEYOND: [(f64, f64); 2] = [(0.5, 0.7267), (0.05, 2.5706)];
+    let mut random = subject.random("limits-of-ladders");
+    let mut beyond = [0_u32; BEYOND.len()];
+    for _ in 0..ladders {
+        let [limit, c, d] = [random.uniform(-1.0, 1.0), random.uniform(-9.0, 9.0), random.uniform(-9.0, 9.0)];
+        let (scale, noise) = (random.log_uniform(1e-9, 1e-3), random.log_uniform(1e-3, 10.0));
+        let points = LADDER.map(|h| {
+            // A sum of twelve shares is normal but in its far tails.
+            let normal = (0..12).map(|_| random.unit()).sum::<f64>() - 6.0;
+            (scale * h, limit + h * (c + d * h + noise * normal))
+        });
+        let found = Limit::of(&points).map(|found| ((found.error - limit) / found.standard_error).abs());
+        seen.expect(found.is_some_and(f64::is_finite), || format!("no limit of {points:?}"));
+        for ((_, quantile), count) in BEYOND.iter().zip(&mut beyond) {
+            *count += u32::from(found.is_some_and(|found| found > *quantile));
+        }
+    }
+    for ((share, quantile), count) in BEYOND.into_iter().zip(beyond) {
+        let count = f64::from(count);
+        let expected = share * ladders as f64;
+        // One seed in a million lies outside of five standard deviations, which leaves room for the tails above.
+        let holds = (count - expected).abs() <= 5.0 * (expected * (1.0 - share)).sqrt();
+        seen.expect(holds, || format!("{count} of {ladders} limits beyond {quantile} standard errors, not {expected}"));
     }
     Ok(())
 }

@@ -102,6 +102,7 @@ use super::roads::Source;
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Detail, Flight};
+use crate::physics::reference::Conditions;
 use crate::physics::{Advice, Problem, Scene};
 use crate::studies::convergence::QuantityStudy;
 use crate::studies::error::Truth;
@@ -156,7 +157,7 @@ macro_rules! every_check {
 }
 
 every_check! {
-    Gradients TablesInMemory Quartiles Boxes MiddleAndBar
+    Gradients TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
@@ -176,17 +177,30 @@ every_check! {
     EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts Refuted
 }
 
-/// Studies that several claims share, computed once: one run of a scheme gives every quantity.
+/// What several claims share, computed once.
 #[derive(Debug, Default)]
-pub struct Memo(Mutex<HashMap<String, Arc<OnceLock<Studied>>>>);
+pub struct Memo {
+    /// One run of a scheme gives every quantity.
+    studies: Shared<Found<Arc<Vec<QuantityStudy>>>>,
+    /// Condition numbers of a scene; `None` where there is no reference.
+    conditions: Shared<Option<Conditions>>,
+}
 
-type Studied = Found<Arc<Vec<QuantityStudy>>>;
+/// Values by their keys. Whoever asks while one is computed waits.
+#[derive(Debug)]
+struct Shared<T>(Mutex<HashMap<String, Arc<OnceLock<T>>>>);
 
-impl Memo {
-    /// The studies under `key`, by `compute` if nobody has asked for them yet; whoever asks meanwhile waits.
-    fn get(&self, key: String, compute: impl FnOnce() -> Found<Vec<QuantityStudy>>) -> Studied {
+impl<T> Default for Shared<T> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<T: Clone> Shared<T> {
+    /// The value of `key`, by `compute` if nobody has asked for it yet.
+    fn get(&self, key: String, compute: impl FnOnce() -> T) -> T {
         let cell = self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(key).or_default().clone();
-        cell.get_or_init(|| compute().map(Arc::new)).clone()
+        cell.get_or_init(compute).clone()
     }
 }
 

@@ -1,5 +1,7 @@
 //! Orders of convergence, with and without an exact answer.
 
+use std::sync::Arc;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -170,7 +172,8 @@ fn shared_study(
     compute: impl FnOnce(&Flight) -> Found<Convergence>,
 ) -> Found<QuantityStudy> {
     let quantity = free_quantity(subject)?;
-    let studies = subject.context.memo.get(key, || Ok(compute(&subject.truth()?.flight)?.quantities))?;
+    let studies =
+        subject.context.memo.studies.get(key, || Ok(Arc::new(compute(&subject.truth()?.flight)?.quantities)))?;
     let study = studies.iter().find(|study| study.quantity == quantity);
     study.cloned().ok_or_else(|| NotMeasured::skip(FIXED))
 }
