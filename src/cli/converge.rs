@@ -255,6 +255,7 @@ impl QuantityJson {
             exact: Some(self.exact),
             agrees: self.class == Class::Converging,
             relative_error: finest.and_then(|point| point.error),
+            is_over_impact_speed: self.quantity.is_over_impact_speed(),
             is_against_exact: true,
             finest: finest.map(|point| (point.size, point.value)),
             error_band: self.error_band,

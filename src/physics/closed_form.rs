@@ -68,6 +68,8 @@ fn rests(entry: State, time: f64, distance: f64) -> StageEnd {
 }
 
 /// One stage from `entry` (V > 0) to `limit` (beyond it, possibly infinite).
+// A state that is given back through memory is stored in halves and loaded whole, which stalls.
+#[inline(always)]
 pub(crate) fn cross(stage: &Stage, mass: f64, entry: State, limit: f64) -> Result<StageEnd, &'static str> {
     match (stage.stiffness > 0.0, stage.viscosity > 0.0, stage.drag > 0.0) {
         (false, false, false) if stage.stiffness < 0.0 => Ok(cross_falling(stage, mass, entry, limit)),
@@ -81,7 +83,7 @@ pub(crate) fn cross(stage: &Stage, mass: f64, entry: State, limit: f64) -> Resul
 }
 
 /// `F = p + q V²`, p of any sign, q >= 0: the tunnel, constant force, drag alone, free flight.
-#[inline]
+#[inline(always)]
 fn cross_drag(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
     let (p, q, v0) = (stage.static_force, stage.drag, entry.velocity);
     let xi = limit - entry.depth;
@@ -159,7 +161,7 @@ impl Decay {
 }
 
 /// `F = p + s x`, s > 0: the crater, and a spring that may be pulled first (p + s x < 0).
-#[inline]
+#[inline(always)]
 fn cross_spring(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd {
     let v0 = entry.velocity;
     let w = (stage.stiffness / mass).sqrt();
@@ -185,7 +187,7 @@ fn cross_spring(stage: &Stage, mass: f64, entry: State, limit: f64) -> StageEnd 
 }
 
 /// A spring of frequency `w` from its slack end, with V² `squared_speed` at `limit`, continued below zero.
-#[inline]
+#[inline(always)]
 fn cross_slack_spring(w: f64, entry: State, limit: f64, squared_speed: f64) -> StageEnd {
     let xi = limit - entry.depth;
     if squared_speed >= 0.0 {

@@ -160,7 +160,7 @@ fn headline(found: &Diagnosis) -> Vec<Headline> {
             label: "Largest error",
             value: number(error, 2),
             note: Prose::new(
-                "of the {0}, over {1}: question {2}{3}",
+                "of the {0}, relative to {1}: question {2}{3}",
                 &[&QUANTITIES[quantity], &relative_to(quantity), &asked.id, &setting(asked)],
             ),
         },
@@ -169,13 +169,13 @@ fn headline(found: &Diagnosis) -> Vec<Headline> {
     let share = asked(found).filter_map(|asked| Some((worst_share(asked)?, asked))).max_by(|a, b| compare(a.0, b.0));
     let share = if let Some((share, asked)) = share {
         Headline {
-            label: "Error over its limit",
+            label: "Largest error over its limit",
             value: number(share, 2),
-            note: Prose::new("the worst answer: question {0}", &[&asked.id]),
+            note: Prose::new("times the limit, of question {0}", &[&asked.id]),
         }
     } else {
         let note = if found.peer.fixed_step { "fixed steps are judged by their limit" } else { "no answer has one" };
-        Headline { label: "Error over its limit", value: "none".to_owned(), note: note.into() }
+        Headline { label: "Largest error over its limit", value: "none".to_owned(), note: note.into() }
     };
     let orders = found.orders.iter().filter_map(|order| Some((order, order.observed_order?)));
     let third = match orders.min_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -223,7 +223,7 @@ fn result(found: &Diagnosis) -> Vec<Element> {
         let header =
             ["cause", "certainty", "factor", "what is wrong", "explains", "largest difference left"].map(Prose::from);
         let caption =
-            if found.verdict == Verdict::Passed { "What lowers the order" } else { "What is wrong, best first" };
+            if found.verdict == Verdict::Passed { "What lowers the order" } else { "What is wrong, likeliest first" };
         let sheet = Sheet::cards("causes", caption.into(), header).rows(&found.causes, |cause| {
             [
                 Cell::code(&cause.id),

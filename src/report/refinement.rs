@@ -165,6 +165,8 @@ pub struct Series {
     pub agrees: bool,
     /// Relative error of the finest value, where an exact one is known.
     pub relative_error: Option<f64>,
+    /// Whether that is relative to the impact velocity, and not to the exact value.
+    pub is_over_impact_speed: bool,
     /// Whether the errors of the points are against the exact value, and not against the limit of the values.
     pub is_against_exact: bool,
     /// The error bar of the value that it belongs to: step and value.
@@ -226,6 +228,7 @@ impl Series {
             exact: audit.exact,
             agrees: audit.agrees_with_exact == Some(true),
             relative_error: audit.relative_error,
+            is_over_impact_speed: audit.quantity.quantity().is_some_and(Quantity::is_over_impact_speed),
             // Where the limit is another than the exact value, the errors are those against the limit.
             is_against_exact: audit.relative_error.is_some()
                 && audit.relative_error == audit.points.first().and_then(|point| point.error),
@@ -408,18 +411,19 @@ impl Refinement {
         let errors = self.series.iter().filter_map(|series| Some((series, error(series)?)));
         let largest = errors.max_by(|a, b| compare(a.1, b.1));
         let finest = |series: &Series| series.finest.map_or_else(Prose::default, |(size, _)| self.size.at(size));
+        let label = "Largest error on the finest step";
+        let label = if self.size == Size::Step { label } else { "Largest error at the tightest tolerance" };
         let error = match largest {
-            Some((series, error)) => Headline {
-                label: "Largest error",
-                value: number(error, 2),
-                note: Prose::new("{0}of {1} at ", &[&if error.is_nan() { "" } else { "relative, " }, &series.name])
-                    .then(finest(series)),
-            },
-            None => Headline {
-                label: "Largest error",
-                value: "not known".to_owned(),
-                note: "no exact value is known".into(),
-            },
+            Some((series, error)) => {
+                let base = if series.is_over_impact_speed { "the impact velocity" } else { "the exact value" };
+                let relative = if error.is_nan() { String::new() } else { format!(", relative to {base}") };
+                Headline {
+                    label,
+                    value: number(error, 2),
+                    note: Prose::new("of {0}{1}, at ", &[&series.name, &relative]).then(finest(series)),
+                }
+            }
+            None => Headline { label, value: "not known".to_owned(), note: "no exact value is known".into() },
         };
         let orders = self.series.iter().filter(free).filter_map(|series| Some((series, series.observed_order?)));
         let order = match orders.clone().min_by(|a, b| a.1.total_cmp(&b.1)) {

@@ -1,7 +1,7 @@
 //! The program and the library as somebody outside sees them: one binary, one module a subject.
 //!
-//! Tests with a main of their own stand beside this folder: whether Python, a browser or a small disk is there is known
-//! at run time only, and `allocations` counts every allocation of its process.
+//! Tests with a main of their own stand beside this folder: whether Python, a browser or a small disk is there (`programs`)
+//! is known at run time only, and `allocations` counts every allocation of its process.
 
 mod batch;
 mod bench;

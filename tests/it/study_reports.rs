@@ -123,7 +123,7 @@ fn the_report_of_a_scheme_shows_its_orders_its_table_and_its_uncertainty() {
     let quantities = report.json["quantities"].as_array().unwrap();
     let errors = quantities.iter().map(|quantity| quantity["points"][0]["error"].as_f64().unwrap());
     let largest = two_digits(errors.fold(0.0, f64::max));
-    assert!(page.contains(&format!("Largest error{largest}relative, of ")), "{largest}: {page:.900}");
+    assert!(page.contains(&format!("Largest error on the finest step{largest}of ")), "{largest}: {page:.900}");
     // The drag acts behind x = k d: what is taken there has not met it.
     let coverage = report.file("tables/coverage.csv");
     let row = |name: &str| {
@@ -181,7 +181,12 @@ fn the_report_of_a_table_names_it_and_what_is_wrong_with_it() {
     let page = bad.page();
     assert!(page.contains("1 of 2 quantities fail"), "{page:.900}");
     // The values approach 135 m/s where the projectile rests: the error is 135.125/300, and not that against their limit.
-    assert!(page.contains("Largest error0.45relative, of velocity at Δt = 500 ns"), "{page:.900}");
+    assert!(
+        page.contains(
+            "Largest error on the finest step0.45of velocity, relative to the impact velocity, at Δt = 500 ns"
+        ),
+        "{page:.900}"
+    );
     assert!(bad.file("tables/coverage.csv").contains("\nrest,0,1,0,1\n"), "{}", bad.file("tables/coverage.csv"));
     let why = "Why velocity is called failed: the values approach 135.";
     assert!(page.contains(why) && bad.file("summary.md").contains("is called failed&#58; the values"), "{page:.900}");

@@ -138,10 +138,13 @@ fn write_the_counts() {
 #[ignore = "200 runs of the suite"]
 fn no_seed_raises_a_false_alarm() {
     let seeds = std::env::var("PENETRODE_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(SEEDS);
+    let mut suite = Suite::embedded().unwrap_or_else(|error| panic!("{error}"));
+    // What is recorded has seeds of its own, and claims about all others want them all.
+    suite.claims.retain(|claim| !claim.id.starts_with("command/recorded/") && !claim.check.is_last());
     let mut alarms = Vec::new();
     let mut tables = std::collections::BTreeMap::<String, (f64, f64, usize)>::new();
     for seed in 1..=seeds {
-        let judged = run(seed);
+        let judged = judged(&suite, seed);
         for line in not_held(&judged) {
             println!("seed {seed}: {line}");
             alarms.push(seed);

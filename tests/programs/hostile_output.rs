@@ -7,16 +7,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use libtest_mimic::{Arguments, Trial};
+use libtest_mimic::Trial;
 
-use self::program::{names, program, run_in, scene};
-
-#[path = "it/program.rs"]
-mod program;
+use crate::program::{names, program, run_in, scene};
 
 /// A folder with a scene, a table of scenes, a table of measured points and one of shots.
 fn workplace() -> tempfile::TempDir {
@@ -190,7 +187,7 @@ fn a_reader_that_goes_away_is_no_error() {
         let mut command = program(folder.path(), line);
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
-        let said = program::Said::from(child.wait_with_output().unwrap()).expect(0);
+        let said = crate::program::Said::from(child.wait_with_output().unwrap()).expect(0);
         assert!(!said.err.contains("error"), "{line}: {said:?}");
     }
 }
@@ -410,7 +407,7 @@ fn texts_of_a_scene_or_a_suite_steer_no_terminal() {
     assert!(answer["scene"]["title"].as_str().unwrap().contains("\u{1b}[31m"));
 }
 
-fn main() -> ExitCode {
+pub(crate) fn trials() -> Vec<Trial> {
     let can_mount = SmallDisk::new().is_some();
     macro_rules! trial {
         ($claim:ident) => {
@@ -439,5 +436,5 @@ fn main() -> ExitCode {
         trial!(an_interrupted_run_leaves_nothing_behind),
         trial!(a_signal_that_is_ignored_stays_so),
     ]);
-    libtest_mimic::run(&Arguments::from_args(), trials).exit_code()
+    trials
 }

@@ -7,13 +7,10 @@ use std::env;
 use std::path::Path;
 use std::process::Command;
 
-use libtest_mimic::{Arguments, Trial};
+use libtest_mimic::Trial;
 use serde_json::Value;
 
-use self::trials::{Check, Failure, ensure, required, trial};
-
-#[path = "it/trials.rs"]
-mod trials;
+use crate::trials::{Check, Failure, ensure, required, trial};
 
 /// Language, name of its file, the program that it needs, and how it is started.
 const PEERS: [(&str, &str, &str, &str); 5] = [
@@ -24,7 +21,7 @@ const PEERS: [(&str, &str, &str, &str); 5] = [
     ("octave", "peer.m", "octave-cli", "octave-cli peer.m"),
 ];
 
-fn main() {
+pub(crate) fn trials() -> Vec<Trial> {
     let peers = PEERS.map(|(language, file, needs, command)| {
         let name = format!("a_peer_in_{language}_runs_as_it_is_written_and_agrees_with_the_suite");
         let is_there = Command::new(needs).arg("--version").output().is_ok();
@@ -47,11 +44,7 @@ fn main() {
     });
     let together = trial("the_suite_of_a_beginner_judges_the_peer_and_warns_of_nothing", judges_without_a_warning);
     let fault = trial("a_fault_put_into_a_beginners_peer_is_pointed_to_and_named", the_fault_is_named);
-    libtest_mimic::run(
-        &Arguments::from_args(),
-        peers.into_iter().chain(subroutines).chain(files).chain([together, fault]).collect::<Vec<Trial>>(),
-    )
-    .exit();
+    peers.into_iter().chain(subroutines).chain(files).chain([together, fault]).collect()
 }
 
 /// What `command` prints in `folder`, where it must end well; `penetrode` is the program under test.

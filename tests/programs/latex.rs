@@ -6,12 +6,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use libtest_mimic::{Arguments, Trial};
+use libtest_mimic::Trial;
 
-use self::trials::{Check, ensure, required, trial};
-
-#[path = "it/trials.rs"]
-mod trials;
+use crate::trials::{Check, Failure, ensure, required, trial};
 
 /// A paper, as somebody would write it.
 const PAPER: &str = "\\documentclass{article}\n\\usepackage{booktabs}\n\\begin{document}\n\\input{table}\n\\input{uncertainty}\n\
@@ -25,7 +22,7 @@ const TABLE: &str = "dt_s,depth_m,time_s,peak_force_kn,mean_force_kn,work_kj,mas
 /// A solver whose name is LaTeX, with letters of other scripts.
 const NAME: &str = "50 % & #1~^_$\\\\input{x} \u{4e2d} Gr\u{f6}\u{df}e -- `q' <a|b>";
 
-fn main() {
+pub(crate) fn trials() -> Vec<Trial> {
     let is_there = ["pdflatex", "bibtex"].iter().all(|program| Command::new(program).arg("--version").output().is_ok());
     if !is_there {
         eprintln!("LaTeX is not tested: pdflatex or bibtex is missing");
@@ -40,7 +37,7 @@ fn main() {
     let trials = trials.map(|(what, line)| {
         trial(&format!("the_report_of_{what}_compiles"), move || compiles(line)).with_ignored_flag(may_be_ignored)
     });
-    libtest_mimic::run(&Arguments::from_args(), Vec::<Trial>::from(trials)).exit();
+    trials.into()
 }
 
 fn compiles(line: &str) -> Check {
@@ -48,7 +45,7 @@ fn compiles(line: &str) -> Check {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/scenes/tunnel.toml");
     fs::copy(scene, folder.path().join("tunnel.toml"))?;
     fs::write(folder.path().join("table.csv"), TABLE)?;
-    let solver = include_str!("../src/cli/templates/peer.py").replace("my solver", NAME);
+    let solver = include_str!("../../src/cli/templates/peer.py").replace("my solver", NAME);
     fs::write(folder.path().join("solver.py"), solver)?;
     let said = Command::new(env!("CARGO_BIN_EXE_penetrode"))
         .args(line.split(' ').map(|word| if word == "solver" { "python3 solver.py" } else { word }))
@@ -59,7 +56,7 @@ fn compiles(line: &str) -> Check {
     ensure!(paper.is_dir(), "{line}: {}", String::from_utf8_lossy(&said.stderr));
     ensure!(fs::read_to_string(paper.join("table.tex"))?.contains("\\toprule"), "{line}: no table");
     fs::write(paper.join("paper.tex"), PAPER)?;
-    let run = |program: &str, arguments: &[&str]| -> Result<String, trials::Failure> {
+    let run = |program: &str, arguments: &[&str]| -> Result<String, Failure> {
         let output = Command::new(program).args(arguments).current_dir(&paper).output()?;
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         ensure!(output.status.success(), "{line}: {program}: {text}");

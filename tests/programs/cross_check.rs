@@ -6,7 +6,7 @@
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use libtest_mimic::Arguments;
+use libtest_mimic::{Arguments, Trial};
 use penetrode::exchange::peers::{
     BundledPeer, Environment, Peer, PeerRequest, PeerSetupError, RecordedFlight, Recording, recordings,
 };
@@ -14,10 +14,7 @@ use penetrode::integrators::{ClosedForm, Detail, Integrator, Taylor};
 use penetrode::physics::{Outcome, Problem, Stage};
 use serde_json::{Value, json};
 
-use self::trials::{Check, Failure, ensure, required, trial};
-
-#[path = "it/trials.rs"]
-mod trials;
+use crate::trials::{Check, Failure, ensure, required, trial};
 
 /// A claim, the program that it needs, and how it is checked.
 type Claim = (&'static str, BundledPeer, fn(BundledPeer, &Environment) -> Check);
@@ -36,8 +33,7 @@ const CLAIMS: [Claim; 11] = [
     ("heyoka_answers_hostile_lines_with_an_error_and_lives", BundledPeer::Heyoka, survives_hostile_lines),
 ];
 
-fn main() {
-    let arguments = Arguments::from_args();
+pub(crate) fn trials(arguments: &Arguments) -> Vec<Trial> {
     let wanted = |name: &str| {
         let hit = |pattern: &String| if arguments.exact { name == pattern } else { name.contains(pattern.as_str()) };
         arguments.filter.as_ref().is_none_or(hit) && !arguments.skip.iter().any(hit)
@@ -65,7 +61,7 @@ fn main() {
     }
     let name = "without_a_network_the_set_up_says_so_in_one_line_and_leaves_nothing";
     trials.push(trial(name, says_that_the_network_is_missing));
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// The same program at the same tolerance: on another machine only its rounding may differ.

@@ -9,12 +9,12 @@ use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use libtest_mimic::Arguments;
+use libtest_mimic::Trial;
 use penetrode::report::stress::files;
 use penetrode::report::{Environment, Run, folder};
 use penetrode::studies::extreme_scenes;
@@ -22,10 +22,7 @@ use penetrode::suite::checks::PeerAnswers;
 use penetrode::suite::{Inputs, Program, Suite};
 use serde_json::Value;
 
-use self::trials::{Check, Failure, ensure};
-
-#[path = "it/trials.rs"]
-mod trials;
+use crate::trials::{Check, Failure, ensure, required, trial};
 
 /// Time that one page may take.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -85,24 +82,23 @@ const CLAIMS: [Claim; 8] = [
     ("it_prints", prints),
 ];
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let stage =
-        if arguments.list { Err("only listed".into()) } else { Stage::new().map_err(|error| error.to_string()) };
-    if let Err(reason) = &stage
-        && !trials::required()
-        && !arguments.list
-    {
-        eprintln!("report in a browser ignored: {reason}");
+pub(crate) fn trials() -> Vec<Trial> {
+    let is_there = browser().is_some();
+    if !is_there {
+        eprintln!("reports are not looked at in a browser: Chromium is missing");
     }
-    let stage = Arc::new(stage);
+    let may_be_ignored = !is_there && !required();
+    // The reports are written for the first that asks; a test that never runs costs nothing.
+    let stage = Arc::new(OnceLock::new());
     let trial = |(name, check): Claim| {
-        let shown = Arc::clone(&stage);
-        // Asked for all the same (`--ignored`), it fails: it cannot pass without having checked.
-        let ignored = stage.is_err() && !trials::required() && !arguments.list;
-        trials::trial(name, move || check(shown.as_ref().as_ref().map_err(String::as_str)?)).with_ignored_flag(ignored)
+        let stage = Arc::clone(&stage);
+        let shown = move || {
+            let stage: &Result<Stage, String> = stage.get_or_init(|| Stage::new().map_err(|error| error.to_string()));
+            check(stage.as_ref().map_err(String::as_str)?)
+        };
+        trial(name, shown).with_ignored_flag(may_be_ignored)
     };
-    libtest_mimic::run(&arguments, CLAIMS.map(trial).into()).exit();
+    CLAIMS.map(trial).into()
 }
 
 /// A report, and the browser that shows it.
@@ -256,7 +252,7 @@ impl Stage {
 
 /// Writes the reports of a user's code to `folder`.
 fn write_studies(folder: &Path) -> Check {
-    let solver = include_str!("../src/cli/templates/peer.py");
+    let solver = include_str!("../../src/cli/templates/peer.py");
     let faulty = solver.replace("(r + q * v) * v)", "(r + 0.5 * q * v) * v)");
     ensure!(faulty != solver, "there is no drag to halve");
     for (name, text) in [("good.csv", GOOD), ("bad.csv", BAD), ("peer.py", solver), ("faulty.py", faulty.as_str())] {
@@ -276,7 +272,7 @@ fn write_studies(folder: &Path) -> Check {
 }
 
 /// Measures the page that it stands in, everything unfolded, and tells its frame.
-const MEASURE: &str = include_str!("browser/measure.html");
+const MEASURE: &str = include_str!("measure.html");
 
 /// Reads a pipe to its end, on a thread of its own.
 fn all_of(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<std::io::Result<Vec<u8>>> {
