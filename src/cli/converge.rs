@@ -17,7 +17,7 @@ use crate::integrators::{MethodName, MethodOptions};
 use crate::physics::{Problem, Shown};
 use crate::report::Environment;
 use crate::report::environment::hash;
-use crate::report::refinement::{PathMet, Refinement, Series, SeriesPoint, Size, words_of};
+use crate::report::refinement::{PathMet, Refinement, Series, SeriesPoint, Size, relative_to, words_of};
 use crate::report::study::Prose;
 use crate::studies::asymptotic::TwoPowers;
 use crate::studies::audit::ErrorBand;
@@ -255,7 +255,7 @@ impl QuantityJson {
             exact: Some(self.exact),
             agrees: self.class == Class::Converging,
             relative_error: finest.and_then(|point| point.error),
-            is_over_impact_speed: self.quantity.is_over_impact_speed(),
+            relative_to: relative_to(self.quantity),
             is_against_exact: true,
             finest: finest.map(|point| (point.size, point.value)),
             error_band: self.error_band,

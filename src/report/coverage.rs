@@ -19,10 +19,14 @@ fn method_of(judged: &Judged) -> Option<MethodName> {
     claim.method.or(is_of_steps.then_some(MethodName::CentralDifference))
 }
 
-/// How many of `judged` passed of those that were measured.
+/// How many of `judged` passed, and of how many that were measured where some did not.
 fn cell<'a>(judged: impl IntoIterator<Item = &'a Judged>) -> Cell {
-    let counts = Counts::of_claims(judged);
-    Cell::Of(counts.passed, counts.passed + counts.failed + counts.undecided)
+    let Counts { passed, failed, undecided, .. } = Counts::of_claims(judged);
+    if passed > 0 && failed + undecided == 0 { whole(passed) } else { Cell::Of(passed, passed + failed + undecided) }
+}
+
+fn whole(number: usize) -> Cell {
+    Cell::Number(Some(number as f64), 7)
 }
 
 /// The tables; nothing where nothing was claimed.
@@ -39,7 +43,7 @@ pub(super) fn tables(run: &Run<'_>) -> Markup {
         .collect();
     let not_claimed = "A dash: nothing is claimed, or all of it was skipped.";
     html! {
-        p { "Each number is how many claims passed of those that were measured; a claim counts once, and its cases are not counted. "
+        p { "Each number is how many claims passed, and of how many where some did not; a claim counts once, and its cases are not counted. "
             (not_claimed) }
         (families(judged, &methods).to_html(&[]))
         @let rows = rows_by_content(run);
@@ -69,17 +73,16 @@ fn families(judged: &[Judged], methods: &[MethodName]) -> Sheet {
     let header = header.into_iter().chain(methods.iter().map(|method| method.name())).map(Prose::text);
     let groups = grouped(judged, |judged| judged.claim.group());
     let sheet = Sheet::grid("families", caption, header);
-    let number = |number: usize| Cell::Number(Some(number as f64), 7);
     let sheet = sheet.rows(&groups, |(name, members)| {
         let counts = Counts::of_claims(members.iter().copied());
         let Counts { failed, undecided, skipped, .. } = counts;
         let of = |method: Option<MethodName>| cell(members.iter().copied().filter(move |j| method_of(j) == method));
-        let heads = [Cell::code(name), number(members.len()), number(skipped), number(failed + undecided), of(None)];
+        let heads = [Cell::code(name), whole(members.len()), whole(skipped), whole(failed + undecided), of(None)];
         heads.into_iter().chain(methods.iter().map(|method| of(Some(*method)))).collect::<Vec<_>>()
     });
     let all = Counts::of_claims(judged);
     let open = judged.iter().filter(|j| matches!(j.verdict, Verdict::Failed | Verdict::Undecided)).count();
-    let heads = [Cell::text("all"), number(judged.len()), number(all.skipped), number(open)];
+    let heads = [Cell::text("all"), whole(judged.len()), whole(all.skipped), whole(open)];
     let of = |method: Option<MethodName>| cell(judged.iter().filter(move |j| method_of(j) == method));
     sheet.row(heads.into_iter().chain([of(None)]).chain(methods.iter().map(|method| of(Some(*method)))))
 }

@@ -165,8 +165,8 @@ pub struct Series {
     pub agrees: bool,
     /// Relative error of the finest value, where an exact one is known.
     pub relative_error: Option<f64>,
-    /// Whether that is relative to the impact velocity, and not to the exact value.
-    pub is_over_impact_speed: bool,
+    /// What that is relative to.
+    pub relative_to: &'static str,
     /// Whether the errors of the points are against the exact value, and not against the limit of the values.
     pub is_against_exact: bool,
     /// The error bar of the value that it belongs to: step and value.
@@ -228,7 +228,7 @@ impl Series {
             exact: audit.exact,
             agrees: audit.agrees_with_exact == Some(true),
             relative_error: audit.relative_error,
-            is_over_impact_speed: audit.quantity.quantity().is_some_and(Quantity::is_over_impact_speed),
+            relative_to: audit.quantity.quantity().map_or("the exact value", relative_to),
             // Where the limit is another than the exact value, the errors are those against the limit.
             is_against_exact: audit.relative_error.is_some()
                 && audit.relative_error == audit.points.first().and_then(|point| point.error),
@@ -273,6 +273,11 @@ impl Series {
     fn drawn(&self) -> impl Iterator<Item = &SeriesPoint> {
         self.points.iter().step_by(self.thinned())
     }
+}
+
+/// What errors of `quantity` are relative to.
+pub fn relative_to(quantity: Quantity) -> &'static str {
+    if quantity.is_over_impact_speed() { "the impact velocity" } else { "the exact value" }
 }
 
 /// `136.5 m/s`.
@@ -415,8 +420,8 @@ impl Refinement {
         let label = if self.size == Size::Step { label } else { "Largest error at the tightest tolerance" };
         let error = match largest {
             Some((series, error)) => {
-                let base = if series.is_over_impact_speed { "the impact velocity" } else { "the exact value" };
-                let relative = if error.is_nan() { String::new() } else { format!(", relative to {base}") };
+                let relative =
+                    if error.is_nan() { String::new() } else { format!(", relative to {}", series.relative_to) };
                 Headline {
                     label,
                     value: number(error, 2),

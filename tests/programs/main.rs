@@ -13,12 +13,16 @@ mod templates;
 #[path = "../it/trials.rs"]
 mod trials;
 
+use std::num::NonZero;
 use std::process::ExitCode;
+use std::thread::available_parallelism;
 
 use libtest_mimic::Arguments;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
+    let mut arguments = Arguments::from_args();
+    // Much of the time is spent waiting for the other programs.
+    arguments.test_threads.get_or_insert(2 * available_parallelism().map_or(1, NonZero::get));
     let trials = [
         cross_check::trials(&arguments),
         hostile_output::trials(),

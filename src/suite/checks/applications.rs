@@ -1,15 +1,17 @@
 //! What the equation is used for: sweeps, the map of Eq. 11-12, measured depths, sensitivities.
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
+use super::edges::Violations;
 use super::{Subject, Worst, formulas, off};
-use crate::integrators::MethodName;
-use crate::physics::Parameter;
+use crate::integrators::outcome::{Events, Solved};
+use crate::integrators::{Cost, Detail, Flight, IntegrationError, Integrator, MethodName};
 use crate::physics::groups::dimensionless_energy;
 use crate::physics::semi_empirical::CRATER_RATIO_OF_EQ15;
 use crate::physics::{Criterion, Scene, semi_empirical};
+use crate::physics::{Outcome, Parameter, Problem, Stage, State};
 use crate::studies::sensitivity;
 use crate::studies::sweep::{Axis, Plan};
-use crate::studies::{applicability, critical_velocity, experiments, perforation_limit};
+use crate::studies::{applicability, critical_velocity, experiments, perforating_velocities, perforation_limit};
 
 check! {
     /// Critical velocity and energies of every point of a sweep of H/d against the closed form of a scene built for that
@@ -40,6 +42,12 @@ check! {
     /// A scene where a soft stage ends at once for fast shots: the ends of the two intervals of impact velocities that
     /// perforate, against those by hand, relative.
     Intervals {} in Slab, "relative", by intervals, compares (Method Search | Itself);
+    /// Outcomes as a function of the impact speed, known exactly: slow shots that never end, and behind them a narrow interval
+    /// of the other outcome. Intervals that are not found, or whose ends lie elsewhere.
+    HiddenIntervals {
+        /// How many functions.
+        functions: usize,
+    } in Slab, "violations", counting hidden_intervals, compares nothing;
 }
 
 fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
@@ -185,4 +193,63 @@ fn intervals(subject: &Subject<'_>) -> Found {
         worst.take(off(end, exact), || format!("{end} m/s, and by hand {exact} m/s"));
     }
     Ok(worst.measurement())
+}
+
+/// Flights that end as a function of the impact speed says: the exit margin, or never.
+struct Pretended<F>(F);
+
+impl<F: Fn(f64) -> Option<f64>> Integrator for Pretended<F> {
+    fn name(&self) -> &'static str {
+        "pretended"
+    }
+
+    fn solve(&self, problem: &Problem, _: Detail) -> Solved {
+        let end = State::at_impact(problem);
+        let margin = (self.0)(problem.impact_speed).ok_or(IntegrationError::NeverEnds { why: "as said", last: end })?;
+        Ok(Flight {
+            outcome: if margin > 0.0 { Outcome::Perforated } else { Outcome::StoppedInTunnel },
+            stage: 0,
+            end,
+            events: Events::new(),
+            exit_margin: Some(margin),
+            exit_margin_error: Some(0.0),
+            cost: Cost::default(),
+            trajectory: Vec::new(),
+            step_limit: None,
+            notes: Vec::new(),
+        })
+    }
+}
+
+fn hidden_intervals(
+    &HiddenIntervals { functions }: &HiddenIntervals,
+    subject: &Subject<'_>,
+    seen: &mut Violations,
+) -> Found<()> {
+    let mut random = subject.random("hidden-intervals");
+    for _ in 0..functions {
+        let middle = random.log_uniform(1.0, 1e3);
+        // Two speeds of the scan are 0.8 % apart.
+        let half = middle * random.log_uniform(1e-4, 2e-3);
+        let slow = middle * random.uniform(0.1, 0.9);
+        let sign = if random.chance(0.5) { 1.0 } else { -1.0 };
+        // Steeper on one side, so that the search has to choose.
+        let skew = random.uniform(-0.5, 0.5);
+        let margin = |speed: f64| {
+            let off = (speed - middle) / half;
+            (speed >= slow).then(|| sign * (off * off - 1.0) * (1.0 + skew * off / (1.0 + off.abs())) / speed.powi(2))
+        };
+        let resolve = |speed| Ok(Problem::of_stages(1.0, speed, [Stage::tunnel(1.0, 0.0)]).with_exit(1.0));
+        let found = perforating_velocities::perforating(resolve, &Pretended(margin), (middle, middle))?.intervals;
+        let ends: Vec<f64> = found
+            .iter()
+            .flat_map(|interval| [Some(interval.low.velocity), interval.high.map(|high| high.velocity)])
+            .flatten()
+            .collect();
+        let exact =
+            if sign > 0.0 { vec![slow, middle - half, middle + half] } else { vec![middle - half, middle + half] };
+        let holds = ends.len() == exact.len() && ends.iter().zip(&exact).all(|(end, exact)| off(*end, *exact) < 1e-12);
+        seen.expect(holds, || format!("{ends:?} and not {exact:?}"));
+    }
+    Ok(())
 }

@@ -20,6 +20,13 @@ check! {
         expressions: usize,
     } in Input, "violations", counting gradients, compares nothing;
 
+    /// Random expressions that put unlike units together, or take a function of one: those that are read, and those with like
+    /// units that are refused.
+    UnlikeUnits {
+        /// How many of each.
+        expressions: usize,
+    } in Input, "violations", counting unlike_units, compares nothing;
+
     /// Tables of scenes in memory, each column in a random unit: numbers that are not those that the same digits with that
     /// unit are in a scene file, and rows that do not have their number.
     TablesInMemory {
@@ -86,6 +93,40 @@ fn gradients(&Gradients { expressions }: &Gradients, subject: &Subject<'_>, seen
             let holds = (found - exact).abs() * at <= 1e-6 * size;
             seen.expect(holds, || format!("d/d{name} of `{text}` at {x}, {v}: {found}, by differences {exact}"));
         }
+    }
+    Ok(())
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn unlike_units(&UnlikeUnits { expressions }: &UnlikeUnits, subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
+    const DIMENSIONS: [Dimension; 6] = [
+        Dimension::Length,
+        Dimension::Velocity,
+        Dimension::Time,
+        Dimension::Force,
+        Dimension::Pressure,
+        Dimension::Mass,
+    ];
+    const FUNCTIONS: [&str; 8] = ["exp", "log", "log10", "tanh", "sin", "cos", "atan", "2^"];
+    let mut random = subject.random("unlike-units");
+    for _ in 0..expressions {
+        let first = random.below(DIMENSIONS.len());
+        let second = (first + 1 + random.below(DIMENSIONS.len() - 1)) % DIMENSIONS.len();
+        let known = [("a", first), ("b", second), ("c", first)];
+        let known = known.map(|(name, dimension)| Known { name, value: 2.0, unit: Unit::from(DIMENSIONS[dimension]) });
+        let (like, unlike) = match random.below(5) {
+            0 => ("(a + c)/a".to_owned(), "(a + b)/a".to_owned()),
+            1 => ("(a - c)/a".to_owned(), "(b - c)/b".to_owned()),
+            2 => ("min(a, c)/a".to_owned(), "min(a, b)/a".to_owned()),
+            3 => ("max(c, a)/c".to_owned(), "max(b, c)/b".to_owned()),
+            _ => {
+                let of = FUNCTIONS[random.below(FUNCTIONS.len())];
+                (format!("{of}(a/c)"), format!("{of}(a/b)"))
+            }
+        };
+        let is_read = |text: &str| Tape::read(text, &known, Unit::NONE).is_ok();
+        seen.expect(is_read(&like), || format!("`{like}` is refused"));
+        seen.expect(!is_read(&unlike), || format!("`{unlike}` is read, of {:?}", known.map(|known| known.unit)));
     }
     Ok(())
 }

@@ -157,7 +157,7 @@ macro_rules! every_check {
 }
 
 every_check! {
-    Gradients TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
+    Gradients UnlikeUnits TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
@@ -167,7 +167,7 @@ every_check! {
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
     EnergyBalance TimeReversal Similarity Split JoinedMasses Ranges Neutral
-    Sweep BoundOfData GapFalls ThicknessLimit Intervals Map MeasuredDepth Sensitivities Peer
+    Sweep BoundOfData GapFalls ThicknessLimit Intervals HiddenIntervals Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop
     Growth StatedStepLimits ClosedFormEverywhere ToleranceSweep SlabRounding LadderRatios OrdersByRule VanishingDrag

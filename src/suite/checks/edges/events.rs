@@ -301,6 +301,17 @@ fn approached_for_ever(subject: &Subject<'_>, seen: &mut Violations) -> Found<()
     seen.expect((found.velocity - critical).abs() <= found.error_bar.unwrap_or(0.0), || {
         format!("V_c {} +- {:?}", found.velocity, found.error_bar)
     });
+    // Behind the spring one of 1 N/m that drives towards 0.75 m, with 10 kg/s: slower than 2.4 m/s it is only approached.
+    let creeping = Stage { static_force: -0.75, stiffness: 1.0, viscosity: 10.0, ..Stage::free() };
+    for entry in [1e-3_f64, 0.1, 0.5, 1.0, 2.0, 2.4] {
+        let problem = Problem::of_stages(1.0, (entry * entry + 250.0_f64).sqrt(), [spring, creeping]).with_exit(1.0);
+        let said = method.integrator().solve(&problem, Detail::Events);
+        let right = match &said {
+            Ok(flight) => flight.outcome == Outcome::Undecided,
+            Err(error) => matches!(error, IntegrationError::NeverEnds { .. }),
+        };
+        seen.expect(right, || format!("creeps from {entry} m/s: {:?}", said.map(|flight| flight.outcome)));
+    }
     Ok(())
 }
 
