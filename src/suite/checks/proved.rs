@@ -202,14 +202,6 @@ fn encloses(Encloses { kinds, count }: &Encloses, subject: &Subject<'_>) -> Foun
                 in_fifty_digits(problem, &flight)?;
             }
             let State { time, depth, velocity } = flight.end;
-            if let (Outcome::Perforated, Some(margin), Some(error)) =
-                (flight.outcome, flight.exit_margin, flight.exit_margin_error)
-            {
-                let share = velocity.lower().max(0.0) / problem.impact_speed;
-                // Four roundings of the square here.
-                let reaches = margin - error <= share * share * (1.0 + 4.0 * f64::EPSILON);
-                holds!(reaches, "the margin {margin} +- {error} leaves out {share}², of {problem:?}");
-            }
             // The velocity is judged by that at impact: at an exit it may be all but lost.
             let speed = problem.impact_speed;
             let of_velocity = (velocity.interval().1 - velocity.interval().0) / (speed.next_up() - speed);
