@@ -100,6 +100,7 @@ fn the_schema_of_scenes_takes_each_that_ships_and_refuses_each_that_is_refused_f
             "ends-until-unknown-name",
             "ends-until-without-equals",
             "ends-velocity-in-last-stage",
+            "table-of-velocity-until",
             // A plug beside the target.
             "plug-angle-of-90",
             "plug-of-layers",
