@@ -228,7 +228,7 @@ pub(super) fn envelope(table: &[GridValue]) -> f64 {
 }
 
 /// Logarithm of the chance, before any value is seen, that all values lie on one side of their limit, over that of both: the larger,
-/// the wider the bars of values on both. With 1/20 the bars of both kinds cover 95 to 97 tables of 100.
+/// the wider the bars of values on both. With 1/20 the bars of both kinds cover 91 to 97 of 100 random tables.
 const ONE_SIDED: f64 = -3.0;
 
 /// Rows of an envelope at most: coarser ones say nothing of the finest.

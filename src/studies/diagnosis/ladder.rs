@@ -87,28 +87,6 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// Whether it may be wrong.
-    pub(super) fn is_suspect(&self, condition: f64) -> bool {
-        self.error.abs() > SUSPECT * self.standard_error && self.is_seen(condition)
-    }
-
-    /// Whether it is.
-    pub(super) fn is_wrong(&self, condition: f64) -> bool {
-        self.error.abs() > WRONG * self.standard_error && self.is_seen(condition)
-    }
-
-    fn is_seen(&self, condition: f64) -> bool {
-        // What still falls at the finest step is no limit.
-        self.error.abs() > FLOOR * condition && self.error.abs() > 0.5 * self.finest.abs()
-    }
-}
-
-/// Relative errors of depth, time and velocity on each rung.
-pub(super) fn rung_errors(question: &Question, rungs: &[Rung]) -> Vec<[f64; 3]> {
-    rungs.iter().map(|rung| errors(rung.answer, question.exact.end, question.problem.impact_speed)).collect()
-}
-
-impl Limit {
     /// The limit of `points`, each a step (s) and the relative error with it; `None` with too few.
     pub(crate) fn of(points: &[(f64, f64)]) -> Option<Self> {
         let freedom = points.len().checked_sub(3).filter(|freedom| *freedom > 0)?;
@@ -129,6 +107,26 @@ impl Limit {
             finest: points.iter().min_by(|a, b| a.0.total_cmp(&b.0))?.1,
         })
     }
+
+    /// Whether it may be wrong.
+    pub(super) fn is_suspect(&self, condition: f64) -> bool {
+        self.error.abs() > SUSPECT * self.standard_error && self.is_seen(condition)
+    }
+
+    /// Whether it is.
+    pub(super) fn is_wrong(&self, condition: f64) -> bool {
+        self.error.abs() > WRONG * self.standard_error && self.is_seen(condition)
+    }
+
+    fn is_seen(&self, condition: f64) -> bool {
+        // What still falls at the finest step is no limit.
+        self.error.abs() > FLOOR * condition && self.error.abs() > 0.5 * self.finest.abs()
+    }
+}
+
+/// Relative errors of depth, time and velocity on each rung.
+pub(super) fn rung_errors(question: &Question, rungs: &[Rung]) -> Vec<[f64; 3]> {
+    rungs.iter().map(|rung| errors(rung.answer, question.exact.end, question.problem.impact_speed)).collect()
 }
 
 /// The schemes that reproduce `ladders`, of which one at least is needed.
