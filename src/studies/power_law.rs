@@ -2,6 +2,7 @@
 //!
 //! For given powers the coefficients follow linearly, so only p is searched for, in ±[`ORDER_MAX`].
 
+use super::grid_convergence::range;
 use super::order::{bisect, student_t};
 
 /// A value at one step.
@@ -255,6 +256,11 @@ impl<'a> Model<'a> {
         let dof = samples.table.len().checked_sub(parameters).filter(|dof| *dof > 0)?;
         let best = Samples::search(|p| samples.likely(terms(p, next)), |a, b| b.likelihood > a.likelihood)?;
         Some(Self { samples, next, best, dof })
+    }
+
+    /// Standard deviation of the values about the law, over their range.
+    pub(super) fn scatter(&self) -> f64 {
+        (self.best.sum / self.dof as f64).sqrt() * self.samples.scale / range(self.samples.table)
     }
 
     pub(super) fn at(&self, p: f64) -> Option<Fit> {

@@ -6,7 +6,7 @@ use super::table::{ResultColumn, StepRow, Table};
 use crate::studies::enclosure;
 use crate::studies::grid_convergence::{Behaviour, GridValue, local_order, range};
 use crate::studies::limit::{
-    LawOfValues, SCATTER_SURE, SecondTerm, is_constant, is_monotone, law_of_values, order_ahead,
+    LawOfValues, SCATTER_SURE, SecondTerm, closest_limits, is_constant, is_monotone, law_of_values, order_ahead,
 };
 use crate::studies::order::{Class, ORDER_RESOLUTION, PowerLaw, ROUND_OFF_ALLOWANCE, StepError, fit_at_level};
 use crate::studies::scheme_of_table::Identification;
@@ -376,7 +376,7 @@ impl<'a> Judge<'a> {
     /// Why the exact value does not bear out what the errors against it show.
     ///
     /// A limit that is missed by little only lowers the order of the errors. So the law of the values themselves must
-    /// reach the exact value, and have the order of the errors.
+    /// reach the exact value, have the order of the errors, and hold the exact value as closely as its parts agree.
     fn missed_by_little(&self, law: &LawOfValues) -> Option<String> {
         let (exact, [low, high]) = (self.judged.exact?, self.judged.interval?);
         if law.behaviour != Behaviour::MonotoneConverging {
@@ -390,8 +390,16 @@ impl<'a> Judge<'a> {
             ));
         }
         let [least, most] = law.law.interval95;
-        let apart = low > most + ORDER_NEAR || high < least - ORDER_NEAR;
-        apart.then(|| format!("the values themselves show the order {:.2}", law.law.order))
+        if low > most + ORDER_NEAR || high < least - ORDER_NEAR {
+            return Some(format!("the values themselves show the order {:.2}", law.law.order));
+        }
+        let [low, high] = closest_limits(&self.grids, AUDIT_LEVEL)?;
+        let rounding = self.finest().round_off + 0.5 * f64::EPSILON * exact.abs();
+        let is_held = (low - rounding..=high + rounding).contains(&exact);
+        (!is_held).then(|| {
+            let off = (0.5 * (low + high) - exact).abs();
+            format!("the values approach {:.9e}, and the exact {exact:.9e} is {off:.1e} beside it", 0.5 * (low + high))
+        })
     }
 
     pub(super) fn rounding(&self) -> f64 {

@@ -1,6 +1,8 @@
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 use std::fmt::Write;
 
+mod random_tables;
+
 use super::*;
 use crate::studies::order::noise::Noise;
 use crate::studies::order::{Class, Exclusion};
@@ -327,6 +329,17 @@ fn a_limit_that_is_missed_by_little_does_not_pass_as_a_lower_order() {
         for order in [None, Some(1.0)] {
             assert_ne!(judge_against(text, order, &exact).verdict, Verdict::Passed, "{order:?}");
         }
+    }
+}
+
+#[test]
+fn a_limit_that_clean_rows_tell_from_the_exact_value_does_not_pass() {
+    // First order towards 1e-5 beside the exact depth: 2 % of the finest error, and 3,000 times the printed digits.
+    let exact = 0.144_826_200_112_217_06;
+    for (beside, verdict) in [(0.0, Verdict::Passed), (1e-5, Verdict::Undecided), (-1e-5, Verdict::Undecided)] {
+        let text = table(6, |h, _| ((exact * (1.0 - beside) + 2.64e-3 * h) * 1e9).round() / 1e9);
+        let audit = judge_text(&text, None, Some(exact));
+        assert_eq!(audit.verdict, verdict, "{beside}: {}", audit.quantities[0].reason);
     }
 }
 
