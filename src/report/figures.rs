@@ -24,7 +24,7 @@ use crate::suite::{Check, Evidence, Judged, Verdict, grouped};
 const SCENES_MAX: usize = 2;
 
 /// Height of the strips of one panel at most (px).
-const STRIPS_MAX: f64 = 420.0;
+const STRIPS_MAX: f64 = 300.0;
 
 /// Every figure of `run`, in the order of the report.
 pub fn all(run: &Run<'_>) -> Vec<Figure> {
@@ -243,8 +243,8 @@ fn strips<'a>(title: impl Into<String>, x: Axis, strips: impl Iterator<Item = &'
                 [(*at, y)],
             );
         }
-        // On top of the dots, which would hide it.
-        let expected = target.iter().flat_map(|x| [(*x, bottom), (*x, top)]);
+        // Through label and gap too: among dots that lie on it, it is not seen.
+        let expected = target.iter().flat_map(|x| [(*x, bottom - Strip::GAP), (*x, top + Strip::LABEL)]);
         panel = panel.unlisted(format!("{label}: expected"), Style::REFERENCE, expected);
         top = bottom - Strip::GAP;
     }
