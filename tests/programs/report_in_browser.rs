@@ -347,7 +347,8 @@ fn catches_a_planted_request(stage: &Stage) -> Check {
 
 fn fits(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
-        for width in [390, 768, 1440] {
+        // From 1121 px on rows are no longer cards.
+        for width in [390, 768, 1121, 1440] {
             let found = stage.measure(folder, width, false)?;
             ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
             for key in ["folded", "unfolded"] {
