@@ -166,6 +166,11 @@ impl Style {
         Self { is_hollow: true, ..self }
     }
 
+    /// One of three, with marks smaller than those of the one before, so that one shows around another where they coincide.
+    pub fn nested(index: usize) -> Self {
+        Self::marks(index).radius([4.8, 3.0, 1.8][index % 3])
+    }
+
     /// With marks of this radius.
     pub fn radius(self, radius: f64) -> Self {
         Self { radius, ..self }

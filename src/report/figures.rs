@@ -184,8 +184,7 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
         for (index, boundaries) in Boundaries::ALL.into_iter().enumerate() {
             let is_this = |j: &Judged| j.claim.velocity == velocity && j.claim.boundaries == boundaries;
             let Some(&(.., fit)) = fits.iter().find(|(j, ..)| is_this(j)) else { continue };
-            // Smaller from series to series, so that one shows around another where they coincide.
-            let style = Style::marks(index).radius([4.8, 3.0, 1.8][index]);
+            let style = Style::nested(index);
             let same = drawn.iter().find(|(_, other)| coincide(other, fit));
             let same = same.map_or_else(String::new, |(other, _)| format!(", as {other}"));
             panel = with_fit(panel, &format!("{boundaries}: {}{same}", slope_of(fit, 2)), fit, style);

@@ -111,7 +111,7 @@ fn step_size(study: &StepStudy) -> Option<Figure> {
             let curves = study.curves.iter().filter(|curve| !curve.adaptive && curve.method == name);
             let points = curves.flat_map(|curve| &curve.points);
             let points = points.filter_map(|point| Some((point.size, point.error?)));
-            panel.series(boundaries.to_string(), Style::marks(index).radius(2.0), points)
+            panel.series(boundaries.to_string(), Style::nested(index), points)
         })
     };
     let of = step_figure_of(study);
