@@ -17,7 +17,7 @@ use crate::exchange::input::is_standard;
     A file that is there is never replaced.")]
 pub struct InitArgs {
     /// What the file is.
-    #[arg(value_enum)]
+    #[arg(value_enum, value_name = "peer|scene|suite|data")]
     pub kind: Kind,
     /// The file, or - for standard output [default: peer.py, scene.toml, suite.toml or data.csv].
     pub path: Option<PathBuf>,

@@ -443,7 +443,7 @@ impl Cli {
         let words = WORDS.get_or_init(|| words.into_iter().collect());
         // What is cut off for `-h` alone would be missing nowhere else.
         let is_brief = words.iter().any(|word| word == "-h");
-        let commands = if is_brief { Self::command().mut_subcommands(brief) } else { Self::command() };
+        let commands = if is_brief { brief(Self::command()).mut_subcommands(brief) } else { Self::command() };
         Self::from_arg_matches(&commands.try_get_matches_from(words)?)
     }
 

@@ -35,8 +35,8 @@ pub struct SweepArgs {
     pub scene: SceneArgs,
     /// What to vary, such as H/d=0.5:18:200; once or twice.
     ///
-    /// N values from A to B, both included; the last of two runs fastest.
-    #[arg(long, value_name = "PATH=A:B:N[:log]", required = true)]
+    /// N values from A to B, both included, with :log behind N in equal ratios; the last of two runs fastest.
+    #[arg(long, value_name = "PATH=A:B:N", required = true)]
     pub vary: Vec<String>,
     /// Measured points for Figure 4.
     ///

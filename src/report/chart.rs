@@ -27,7 +27,7 @@ const SYMBOL: f64 = 22.0;
 /// Width of lines from which they let others be seen through them.
 const WIDE_FROM: f64 = 3.0;
 /// Height from which a panel without a scale at its left has an axis above it too.
-const HIGH: f64 = 300.0;
+const HIGH: f64 = 400.0;
 
 /// A point in the units of the axes.
 pub type Point = (f64, f64);
@@ -164,6 +164,11 @@ impl Style {
     /// Only the outline of the marks.
     pub fn hollow(self) -> Self {
         Self { is_hollow: true, ..self }
+    }
+
+    /// One of three, with marks smaller than those of the one before, so that one shows around another where they coincide.
+    pub fn nested(index: usize) -> Self {
+        Self::marks(index).radius([4.8, 3.0, 1.8][index % 3])
     }
 
     /// With marks of this radius.
@@ -334,6 +339,7 @@ pub struct Panel {
     references: Vec<Reference>,
     uprights: Vec<(String, f64)>,
     labels: Vec<(Point, String, Anchor)>,
+    names: Vec<(Point, String)>,
     height: f64,
 }
 
@@ -377,6 +383,12 @@ impl Panel {
     /// Adds a text.
     pub fn label(mut self, at: Point, text: impl Into<String>, anchor: Anchor) -> Self {
         self.labels.push((at, text.into(), anchor));
+        self
+    }
+
+    /// Adds the name of a point. It stands on the side of it where it hides the fewest others.
+    pub fn name(mut self, of: Point, text: impl Into<String>) -> Self {
+        self.names.push((of, text.into()));
         self
     }
 
@@ -531,6 +543,19 @@ impl Panel {
         names
     }
 
+    /// Where the name of a point begins.
+    fn place_of_name(&self, frame: &Frame, of: Point, name: &str) -> Point {
+        let ((x, y), width) = (frame.at(of), width_of(name));
+        let sides =
+            [(x + 5.0, y + 4.0), (x - 5.0 - width, y + 4.0), (x - 0.5 * width, y - 6.0), (x - 0.5 * width, y + 15.0)];
+        let hidden = |(left, base): &Point| {
+            let holds = |(x, y): Point| x > left - 4.0 && x < left + width + 4.0 && y > base - 13.0 && y < base + 6.0;
+            let is_outside = *left < frame.left || left + width > frame.left + frame.width;
+            self.points().filter(|point| holds(frame.at(*point))).count() + 1000 * usize::from(is_outside)
+        };
+        sides.into_iter().min_by_key(hidden).unwrap_or((x, y))
+    }
+
     /// The panel as SVG elements, the legend in `legend_rows` rows.
     pub(super) fn draw(&self, legend_rows: usize) -> Markup {
         let frame = self.frame(legend_rows);
@@ -557,6 +582,7 @@ impl Panel {
                     @let (x, y) = frame.at(*at);
                     (text((x, y + 4.0), label, Ink::Text, *anchor))
                 }
+                @for (of, name) in &self.names { (text(self.place_of_name(&frame, *of, name), name, Ink::Text, Anchor::Start)) }
                 @for (x, row, series) in self.legend() {
                     @let y = TITLE + LINE * (row as f64 + 0.5);
                     @let key = [(x, y), (x + 8.0, y), (x + 16.0, y)];

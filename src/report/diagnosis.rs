@@ -6,7 +6,7 @@ use super::Environment;
 use super::chart::{Anchor, Axis, Ink, Panel, Style};
 use super::figure::Figure;
 use super::junit::Case;
-use super::study::{Cell, Element, Headline, Prose, Section, Sheet, StudyReport, interval_text, order_text};
+use super::study::{Cell, Element, Headline, PROVED, Prose, Section, Sheet, StudyReport, interval_text, order_text};
 use super::text::{count, number};
 use crate::studies::Verdict;
 use crate::studies::diagnosis::{ALLOWED, Asked, Content, Diagnosis, Each, QUANTITIES, TOLERANCES};
@@ -374,7 +374,11 @@ fn coverage(found: &Diagnosis) -> Vec<Element> {
     let terms: Vec<Content> = Content::TERMS.into_iter().filter(|term| met.contains(term)).collect();
     let events: Vec<Content> = Content::EVENTS.into_iter().filter(|event| met.contains(event)).collect();
     let header = [Prose::default()].into_iter().chain(events.iter().map(|event| Prose::text(event.words())));
-    let sheet = Sheet::grid("coverage", "Terms against events: answers right of those asked".into(), header);
+    let sheet = Sheet::grid(
+        "coverage",
+        "Terms against events: answers right of those asked, a dash where none meets both".into(),
+        header,
+    );
     let sheet = sheet.for_papers(1..=events.len()).rows(terms, |term| {
         let cells = events.iter().map(|event| {
             let (right, all) = passed(with(found, &[term, *event]));
@@ -383,7 +387,6 @@ fn coverage(found: &Diagnosis) -> Vec<Element> {
         [Cell::text(term.words())].into_iter().chain(cells).collect::<Vec<_>>()
     });
     parts.push(Element::Table(sheet));
-    parts.push(Element::Text("A dash: no question meets both.".into()));
     parts
 }
 
@@ -489,10 +492,13 @@ fn failing(found: &Diagnosis) -> Vec<Element> {
             off(asked, 0),
             off(asked, 1),
             off(asked, 2),
-            Cell::text(&asked.reason),
+            Cell::Prose(Prose::said(&asked.reason)),
         ]
     });
     let mut parts = vec![Element::Table(sheet)];
+    if failing.iter().take(FAILING_MAX).any(|asked| asked.reason.contains("proved")) {
+        parts.push(Element::Text(PROVED.into()));
+    }
     if more > 0 {
         parts.push(Element::Text(Prose::new("{0} more are under Every question.", &[&more])));
     }
@@ -565,7 +571,7 @@ fn every_question(found: &Diagnosis) -> Vec<Element> {
             off(asked, 1),
             off(asked, 2),
             Cell::Number(worst_share(asked), 2),
-            Cell::text(&asked.reason),
+            Cell::Prose(Prose::said(&asked.reason)),
         ]
     });
     vec![Element::Folded(sheet)]

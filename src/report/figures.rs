@@ -24,7 +24,7 @@ use crate::suite::{Check, Evidence, Judged, Verdict, grouped};
 const SCENES_MAX: usize = 2;
 
 /// Height of the strips of one panel at most (px).
-const STRIPS_MAX: f64 = 420.0;
+const STRIPS_MAX: f64 = 300.0;
 
 /// Every figure of `run`, in the order of the report.
 pub fn all(run: &Run<'_>) -> Vec<Figure> {
@@ -184,8 +184,7 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
         for (index, boundaries) in Boundaries::ALL.into_iter().enumerate() {
             let is_this = |j: &Judged| j.claim.velocity == velocity && j.claim.boundaries == boundaries;
             let Some(&(.., fit)) = fits.iter().find(|(j, ..)| is_this(j)) else { continue };
-            // Smaller from series to series, so that one shows around another where they coincide.
-            let style = Style::marks(index).radius([4.8, 3.0, 1.8][index]);
+            let style = Style::nested(index);
             let same = drawn.iter().find(|(_, other)| coincide(other, fit));
             let same = same.map_or_else(String::new, |(other, _)| format!(", as {other}"));
             panel = with_fit(panel, &format!("{boundaries}: {}{same}", slope_of(fit, 2)), fit, style);
@@ -243,8 +242,8 @@ fn strips<'a>(title: impl Into<String>, x: Axis, strips: impl Iterator<Item = &'
                 [(*at, y)],
             );
         }
-        // On top of the dots, which would hide it.
-        let expected = target.iter().flat_map(|x| [(*x, bottom), (*x, top)]);
+        // Through label and gap too: among dots that lie on it, it is not seen.
+        let expected = target.iter().flat_map(|x| [(*x, bottom - Strip::GAP), (*x, top + Strip::LABEL)]);
         panel = panel.unlisted(format!("{label}: expected"), Style::REFERENCE, expected);
         top = bottom - Strip::GAP;
     }

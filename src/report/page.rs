@@ -386,7 +386,7 @@ impl Render for Table {
     fn render(&self) -> Markup {
         let table = html! {
             table.(if self.is_grid { "grid" } else { "cards" }).wide[!self.is_grid && self.header.len() > CARDS_MAX] {
-                @if !self.caption.0.is_empty() { caption id=[Some(&self.id).filter(|id| !id.is_empty())] { (self.caption) } }
+                @if !self.caption.0.is_empty() { caption id=[Some(&self.id).filter(|id| !id.is_empty())] { (self.caption) "." } }
                 thead { tr { @for (title, _) in &self.header { th scope="col" { (title) } } } }
                 tbody { @for row in &self.rows { tr {
                     @for (index, cell) in row.iter().enumerate() {

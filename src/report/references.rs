@@ -246,7 +246,7 @@ impl Reference {
                 " " (volume) @if let Some(number) = number { "(" (number) ")" }
             } @else if let Some(number) = number { ", " (number) }
             @if let Some(pages) = self.field("pages") { ", " (pages.replace("--", "–")) }
-            ", " (self.year) "."
+            @if !self.place.is_empty() { ", " } (self.year) "."
             @if let Some(doi) = self.doi { " doi:" a href={ "https://doi.org/" (doi) } { (doi) } "." }
         }
     }

@@ -6,7 +6,7 @@ use super::Environment;
 use super::chart::{Axis, Ink, Panel, Style, extremes};
 use super::figure::{Figure, name_of};
 use super::junit::Case;
-use super::study::{Cell, Element, Headline, Prose, Section, Sheet, StudyReport, interval_text, order_text};
+use super::study::{Cell, Element, Headline, PROVED, Prose, Section, Sheet, StudyReport, interval_text, order_text};
 use super::text::{count, number, prefixed};
 use crate::integrators::Flight;
 use crate::physics::{Problem, Scene};
@@ -373,11 +373,16 @@ impl Refinement {
         }
     }
 
+    /// The first quantity whose verdict is that of the whole.
+    fn decisive(&self) -> Option<&Series> {
+        self.series.iter().find(|series| series.verdict == self.verdict)
+    }
+
     /// Why the verdict is what it is.
     fn meaning(&self) -> Prose {
         let all = self.series.len();
-        let open: Vec<&Series> = self.series.iter().filter(|series| series.verdict == self.verdict).collect();
-        let of_all = if all == 1 { "The quantity".to_owned() } else { format!("{} of {all} quantities", open.len()) };
+        let open = self.series.iter().filter(|series| series.verdict == self.verdict).count();
+        let of_all = if all == 1 { "The quantity".to_owned() } else { format!("{open} of {all} quantities") };
         match self.verdict {
             Verdict::Passed => {
                 // The order of an adaptive method decides nothing: a controller holds the error of a step, not of the flight.
@@ -396,12 +401,13 @@ impl Refinement {
             }
             Verdict::Skipped => Prose::default(),
             Verdict::Failed | Verdict::Undecided => {
-                let verb = match (self.verdict, open.len()) {
+                let verb = match (self.verdict, open) {
                     (Verdict::Failed, 1) => "fails",
                     (Verdict::Failed, _) => "fail",
                     _ => "cannot be decided",
                 };
-                let first = open.first().map_or(String::new(), |series| format!("{}: {}", series.name, series.reason));
+                let first =
+                    self.decisive().map_or(String::new(), |series| format!("{}: {}", series.name, series.reason));
                 Prose::new("{0} {1}. ", &[&of_all, &verb]).then(Prose::said(first + "."))
             }
         }
@@ -508,16 +514,24 @@ impl Refinement {
         })
     }
 
-    /// The table of results, and why what did not pass did not; a pass needs no reason.
+    /// The table of results, and why what did not pass did not: a pass needs no reason, and that of the first stands beside the
+    /// verdict.
     fn result_parts(&self) -> Vec<Element> {
-        let open = self.series.iter().filter(|series| series.verdict != Verdict::Passed);
-        let reasons = open.map(|series| {
-            let advice = series.advice.as_ref().map_or(String::new(), |advice| format!(" To decide it: {advice}."));
-            let gaps: [&dyn Display; 2] = [&series.name, &series.verdict.name()];
-            let why = Prose::said(format!("{}.{advice}", series.reason));
-            Element::Text(Prose::new("Why `{0}` is called {1}: ", &gaps).then(why))
-        });
-        [Element::Table(self.results())].into_iter().chain(reasons).collect()
+        let mut parts = vec![Element::Table(self.results())];
+        if self.series.iter().any(|series| series.proved.is_some()) {
+            parts.push(Element::Text(PROVED.into()));
+        }
+        let first = self.decisive().map(|series| &series.name);
+        for series in self.series.iter().filter(|series| series.verdict != Verdict::Passed) {
+            let reason = (Some(&series.name) != first).then(|| format!("{}.", series.reason));
+            let advice = series.advice.as_ref().map(|advice| format!("To decide it: {advice}."));
+            let said: Vec<String> = [reason, advice].into_iter().flatten().collect();
+            if !said.is_empty() {
+                let gaps: [&dyn Display; 2] = [&series.name, &series.verdict.name()];
+                parts.push(Element::Text(Prose::new("`{0}`, {1}: ", &gaps).then(Prose::said(said.join(" ")))));
+            }
+        }
+        parts
     }
 
     /// The terms of the force and the events that the path meets against the quantities that were asked for.
@@ -775,12 +789,10 @@ impl Refinement {
             parts.push(Element::Table(sheet));
         }
         let unstated = self.series.iter().filter(|series| series.verdict != Verdict::Passed);
-        for series in unstated {
-            let gaps: [&dyn Display; 2] = [&series.name, &series.verdict.name()];
-            parts.push(Element::Text(Prose::new(
-                "For {0} no uncertainty is stated, for its verdict is {1}; section 1 says why.",
-                &gaps,
-            )));
+        let unstated: Vec<_> = unstated.map(|series| format!("{} ({})", series.name, series.verdict.name())).collect();
+        if !unstated.is_empty() {
+            let text = "No uncertainty is stated for {0}; section 1 says why.";
+            parts.push(Element::Text(Prose::new(text, &[&unstated.join(", ")])));
         }
         parts
     }

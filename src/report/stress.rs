@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::folder::{Files, files_of};
 use super::page::{Page, Table, cell, slot};
-use super::{Run, StressJson, cells, figures};
+use super::{Run, StressJson, cells, figures, verify_page};
 use crate::studies::extreme_scenes::{Summary, ULPS_MAX};
 
 /// Every file of the report.
@@ -22,6 +22,7 @@ pub fn files(run: &Run<'_>) -> io::Result<Files> {
     };
     let files = html! { a href="report.json" { "JSON" } };
     let page = Page::of_run(run, purpose, include_str!("pages/stress.txt"), &filled, files);
+    let page = Page { subject: verify_page::subject(run, "case"), ..page };
     files_of(&StressJson::new(run), page.to_html(), &figures)
 }
 

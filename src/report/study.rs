@@ -25,6 +25,10 @@ use super::text::one_line;
 use super::{Environment, latex, summary};
 use crate::studies::Verdict;
 
+/// What a proved interval is, and how it is written.
+pub(super) const PROVED: &str = "Proved: neither rounding nor truncation can put the exact value outside the interval. Brackets hold the digits in \
+                                 which its ends differ: 0.14(57..86) is 0.1457 to 0.1486.";
+
 /// The report of one study.
 #[derive(Clone, Debug)]
 pub struct StudyReport {

@@ -280,9 +280,7 @@ fn ratios(comparisons: &[Comparison]) -> impl Iterator<Item = Panel> {
             panel = panel.series(set, Style::marks(index).radius(2.5), members.iter().map(|c| (over(c), c.ratio)));
         }
         for c in comparisons.iter().filter(|c| c.is_outlier) {
-            let right = over(c) > (ends[0] * ends[1]).sqrt();
-            let (shift, anchor) = if right { (0.95, Anchor::End) } else { (1.05, Anchor::Start) };
-            panel = panel.label((over(c) * shift, c.ratio), format!("line {}", c.experiment.line), anchor);
+            panel = panel.name((over(c), c.ratio), format!("line {}", c.experiment.line));
         }
         panel
     })

@@ -9,7 +9,7 @@
 //! 1e-12, 2.5e6          10⁻¹², 2.5 × 10⁶
 //! `--rtol`, --dt 1e-9   code: an option with its number stays as it is typed
 //! -2.5                  −2.5, where no word and no number stands in front
-//! V0, fc, +-, ->        V₀, as f_c, ±, →
+//! V0, fc, +-, ->, <=    V₀, as f_c, ±, →, ≤
 //! 20 %                  on one line
 //! ```
 
@@ -76,7 +76,9 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
         return Some((vec![Piece::Code(option.to_owned())], after));
     }
     // As a terminal has it.
-    for (typed, printed) in [("+-", "±"), ("->", "→"), ("V0", "V₀"), ("V1", "V₁"), ("fc", "f_c")] {
+    let others =
+        [("+-", "±"), ("->", "→"), ("<=", "≤"), (">=", "≥"), (" - ", " − "), ("V0", "V₀"), ("V1", "V₁"), ("fc", "f_c")];
+    for (typed, printed) in others {
         let Some(after) = rest.strip_prefix(typed) else { continue };
         let is_word = typed.starts_with(char::is_alphabetic);
         if !is_word || is_start && ends_word(after) {

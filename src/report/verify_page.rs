@@ -45,11 +45,11 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
         a href="report.json" { "JSON" } ", " a href="junit.xml" { "JUnit XML" } ", " a href="summary.md" { "Markdown" }
     };
     let page = Page::of_run(run, purpose, include_str!("pages/verify.txt"), &filled, files);
-    Page { subject: subject(run), ..page }.to_html()
+    Page { subject: subject(run, "claim"), ..page }.to_html()
 }
 
-/// What was judged, and how widely.
-fn subject(run: &Run<'_>) -> Markup {
+/// What was judged, and by how many claims, which are called `noun`.
+pub(super) fn subject(run: &Run<'_>, noun: &str) -> Markup {
     let scenes = grouped(run.judged.iter().filter_map(|judged| judged.claim.scene.as_deref()), |scene| *scene).len();
     let methods = grouped(run.judged.iter().filter_map(|judged| judged.claim.method), |method| *method).into_iter();
     let methods: Vec<_> = methods.map(|(method, _)| method.name()).collect();
@@ -57,7 +57,7 @@ fn subject(run: &Run<'_>) -> Markup {
     html! {
         "Judged: penetrode " (run.environment.version)
         @if !methods.is_empty() { ", its " (if methods.len() == 1 { "method " } else { "methods " }) (methods.join(", ")) }
-        ", by " (count(run.judged.len(), "claim")) " on " (count(scenes, "scene"))
+        ", by " (count(run.judged.len(), noun)) @if scenes > 0 { " on " (count(scenes, "scene")) }
         @if programs > 0 { ", and beside " (count(programs, "other program")) } "."
     }
 }
@@ -199,7 +199,7 @@ fn layered_claims(run: &Run<'_>) -> Markup {
         .rows(groups, |(name, claims)| [html! { code { (one_line(name)) } }, counts_cell(Counts::of_claims(claims))]);
     html! {
         @if all == Counts::default() { p { "This suite claims nothing of this kind." } }
-        @else { (folded(html! { "What is claimed of layered scenes, all over this report: " (tally(all)) }, false, table)) }
+        @else { (folded(html! { "What is claimed of layered scenes, all over this report: " (tally(all)) }, true, table)) }
     }
 }
 
@@ -317,7 +317,9 @@ fn sets(run: &Run<'_>) -> Markup {
     let caption = "Predicted over measured depth, set by set; E = S − D is the comparison error after ASME V&V 20";
     let sets = experiments::summaries(comparisons);
     html! {
-        (Table::cards(caption, cells::SETS).numbers(1..10).rows(cells::sets(&sets), |row| row.map(cell)))
+        (Table::cards(caption, cells::SETS).numbers(1..10).rows(cells::sets(&sets), |row| {
+            row.map(|text| if text == "-" { cell("—") } else { typeset::html(&text) })
+        }))
         (facts(cells::uncertainties(comparisons).map(|(name, known)| (name, typeset::html(&known)))))
     }
 }
@@ -326,22 +328,24 @@ fn sets(run: &Run<'_>) -> Markup {
 fn faults(e: &Environment) -> Markup {
     let seeded = seeded_faults().unwrap_or_default();
     let (thin, others): (Vec<_>, Vec<_>) = seeded.iter().partition(|fault| fault.is_thin());
-    let summary = html! { (count(others.len(), "fault")) " with two recorded tables of claims or more" };
     html! { @if !seeded.is_empty() {
         p { "All " (count(seeded.len(), "fault")) " were noticed; of " (others.len()) " more than one table of claims is recorded. The record is that of commit " code { (e.commit) } "." }
-        @if !thin.is_empty() { (faults_table("One table of claims is recorded: without it they may pass", &thin)) }
-        (folded(summary, true, faults_table("", &others)))
+        @for (faults, by) in [(thin, "one recorded table of claims: without it they may pass"), (others, "two recorded tables or more")] {
+            @if !faults.is_empty() { (folded(html! { (count(faults.len(), "fault")) " noticed by " (by) }, true, faults_table(&faults))) }
+        }
     } }
 }
 
-fn faults_table(caption: &str, faults: &[&SeededFault]) -> Table {
+fn faults_table(faults: &[&SeededFault]) -> Table {
     let header = ["fault", "what is wrong", "source file", "noticed by, at most five"];
-    Table::cards(caption, header).rows(faults, |fault| {
+    Table::cards("", header).rows(faults, |fault| {
         let quickest = html! { @for (index, table) in fault.noticed_by.iter().enumerate() {
             @if index > 0 { ", " }
             code { (one_line(table)) }
         } };
-        [html! { code { (one_line(&fault.id)) } }, cell(&fault.what), cell(&fault.file), quickest]
+        // A path breaks between its parts.
+        let file = html! { @for part in fault.file.split_inclusive('/') { (one_line(part)) wbr; } };
+        [html! { code { (one_line(&fault.id)) } }, typeset::html(&fault.what), file, quickest]
     })
 }
 

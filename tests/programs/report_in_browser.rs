@@ -1,4 +1,4 @@
-//! The reports of the suite, of the stress cases and of a user's code in headless Chromium: each loads without a message, asks for nothing, and fits a phone and a desk.
+//! The reports of the suite, of the stress cases, of costs and of a user's code in headless Chromium: each loads without a message, asks for nothing, and fits a phone and a desk.
 //!
 //! Where Chromium is missing, the tests say so in one line and count as ignored; with `CI=true` they fail, so that a
 //! build server cannot quietly check nothing.
@@ -32,11 +32,13 @@ const FLAGS: &str = "--headless --no-sandbox --disable-gpu --disable-background-
                      --disable-default-apps --disable-extensions --disable-sync --no-first-run --no-pings \
                      --hide-scrollbars --virtual-time-budget=10000";
 
-/// Folders of the pages: the report of the suite, that of the stress cases, and those of a user's code.
-const PAGES: [&str; 7] = ["report", "stress", "scheme", "good-table", "bad-table", "good-solver", "faulty-solver"];
+/// Folders of the pages: the report of the suite, that of the stress cases, that of costs, and those of a user's code.
+const PAGES: [&str; 8] =
+    ["report", "stress", "costs", "scheme", "good-table", "bad-table", "good-solver", "faulty-solver"];
 
 /// The commands that write the last of them; `SCENES/` is the folder of the shipped scenes.
-const STUDIES: [(&str, &str); 5] = [
+const STUDIES: [(&str, &str); 6] = [
+    ("costs", "bench SCENES/tunnel.toml --parts work-precision,step-size,scaling --most 10 --repeats 1"),
     ("scheme", "converge SCENES/tunnel.toml --points 30"),
     ("good-table", "audit good.csv --scene SCENES/perforate.toml"),
     ("bad-table", "audit bad.csv --scene SCENES/tunnel.toml"),
@@ -54,13 +56,14 @@ const BAD: &str = "dt_s,depth_m,velocity_m_s,a_column_with_quite_a_long_name\n4e
                    1e-6,0.1461,135.25,4\n5e-7,0.1449,135.125,nan\n";
 
 /// Figures that a report must have, by their names.
-const FIGURES: [(&str, &str); 7] = [
+const FIGURES: [(&str, &str); 8] = [
     (
         "report",
         "flights approach-with-n observed-orders energy-residual peer-differences stability-map rounding-floor \
          critical-energy critical-energy-difference applicability-map measured-depths layers-layered",
     ),
     ("stress", "stability-map rounding-floor stiffness"),
+    ("costs", "cost-tunnel steps-tunnel-depth growth"),
     ("scheme", "error values"),
     ("good-table", "error values"),
     ("bad-table", "error values"),
@@ -344,7 +347,8 @@ fn catches_a_planted_request(stage: &Stage) -> Check {
 
 fn fits(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
-        for width in [390, 768, 1440] {
+        // From 1121 px on rows are no longer cards.
+        for width in [390, 768, 1121, 1440] {
             let found = stage.measure(folder, width, false)?;
             ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
             for key in ["folded", "unfolded"] {

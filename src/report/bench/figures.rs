@@ -90,7 +90,10 @@ fn panel(runs: &[&Run], (title, methods): &(&str, Vec<&str>), (words, unit, cost
             let error = move |run: &Run| if is_right { run.error.unwrap_or(0.0) } else { FAILED_AT };
             mine.filter_map(move |run| Some((cost(run)?, error(run)))).collect::<Vec<Point>>()
         };
-        panel = panel.series(one_line(method), Style::marked_line(series), points(true)).unlisted(
+        let style = Style::marked_line(series);
+        // Around the marks of the method that it chose.
+        let style = if *method == MethodName::Adaptive.name() { style.hollow().radius(5.0) } else { style };
+        panel = panel.series(one_line(method), style, points(true)).unlisted(
             format!("{method}, not right"),
             Style::marks(series).hollow(),
             points(false),
@@ -108,7 +111,7 @@ fn step_size(study: &StepStudy) -> Option<Figure> {
             let curves = study.curves.iter().filter(|curve| !curve.adaptive && curve.method == name);
             let points = curves.flat_map(|curve| &curve.points);
             let points = points.filter_map(|point| Some((point.size, point.error?)));
-            panel.series(boundaries.to_string(), Style::marks(index).radius(2.0), points)
+            panel.series(boundaries.to_string(), Style::nested(index), points)
         })
     };
     let of = step_figure_of(study);

@@ -8,10 +8,11 @@ use crate::report::figure::{Figure, name_of};
 use crate::report::figures::words_for;
 use crate::report::page::{Page, Part, Table, cell, figure, folded, number_cell, reproduction, suite_inputs};
 use crate::report::text::{clipped, count, number, one_line};
-use crate::report::{Environment, cells};
+use crate::report::{Environment, cells, typeset};
 use crate::studies::Quantity;
 use crate::studies::bench::step_size::{Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
 use crate::studies::bench::work_precision::{LEVELS, Run, RunState, by_method, fastest_of, least_error};
+use crate::suite::grouped;
 
 /// The page of `report` with its figures.
 pub(super) fn to_html(report: &BenchJson, figures: &[Figure]) -> String {
@@ -19,7 +20,10 @@ pub(super) fn to_html(report: &BenchJson, figures: &[Figure]) -> String {
     Page {
         title: "What an accuracy costs".into(),
         outcome: "penetrode bench",
-        subject: html! {},
+        subject: html! {
+            @let methods = grouped(&report.runs, |run| run.method.as_str()).len();
+            @if methods > 0 { "Measured: error and cost of " (count(methods, "method")) " on " (count(report.scenes.len(), "scene")) "." }
+        },
         purpose: &format!("On {}, profile {}.", one_line(&e.cpu), e.profile),
         environment: e,
         parts: Part::of_text(include_str!("../pages/bench.txt"), &|name, _| match name {
@@ -74,7 +78,7 @@ fn fastest_row(runs: &[Run]) -> Vec<Markup> {
     let mut cells = vec![cell(&runs[0].method)];
     cells.extend(LEVELS.map(|level| {
         html! {
-            @if let Some((run, ns)) = fastest_of(runs, level) { (micro(ns)) " " span.quiet { "at " (run.setting) } }
+            @if let Some((run, ns)) = fastest_of(runs, level) { (micro(ns)) " " span.quiet { "at " (typeset::html(&run.setting)) } }
             @else { "—" }
         }
     }));
@@ -91,7 +95,7 @@ fn all_runs(report: &BenchJson, scene: &str) -> Markup {
         let quartiles = run.time.map_or_else(dash, |t| format!("{} – {}", micro(t.low_ns), micro(t.high_ns)));
         [
             cell(&run.method),
-            cell(&run.setting),
+            typeset::html(&run.setting),
             state_cell(run),
             number_cell(run.error, 2),
             cell(run.quantity.map_or("", Quantity::name)),
@@ -100,7 +104,7 @@ fn all_runs(report: &BenchJson, scene: &str) -> Markup {
             number_cell(run.force_evaluations, 4),
         ]
     });
-    folded(html! { "Every run of " (one_line(scene)) " (" (runs.len()) ")" }, false, table)
+    folded(html! { "Every run of " (one_line(scene)) " (" (runs.len()) ")" }, true, table)
 }
 
 fn state_cell(run: &Run) -> Markup {

@@ -172,10 +172,9 @@ impl Sheet {
 
     /// The table on a page.
     pub(in crate::report) fn to_html(&self, cited: &[&Reference]) -> Table {
-        let caption = html! { (self.caption.html(cited)) "." };
         let header = self.header.iter().map(|head| (head.html(cited), head.plain()));
         let is_number = |column: &usize| self.rows.iter().any(|row| row.get(*column).is_some_and(Cell::is_number));
-        let table = Table::cards_of(caption, header)
+        let table = Table::cards_of(self.caption.html(cited), header)
             .id(format!("table-{}", self.name))
             .numbers((1..self.header.len()).filter(is_number));
         let table = if self.is_grid { table.into_grid(self.caption.plain()) } else { table };

@@ -166,7 +166,13 @@ impl Content {
 
     /// `static force`.
     pub fn words(self) -> String {
-        if self == Self::Eq14 { "S of Eq. 14".to_owned() } else { self.to_string().replace('-', " ") }
+        match self {
+            Self::Eq14 => "S of Eq. 14".to_owned(),
+            Self::Drive => "driving force".to_owned(),
+            Self::Stiff => "stiff drive".to_owned(),
+            Self::Scene => "physical scene".to_owned(),
+            _ => self.to_string().replace('-', " "),
+        }
     }
 }
 
