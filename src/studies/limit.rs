@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::grid_convergence::{Behaviour, admissible, local_order, range};
 use super::order::{FitError, ORDER_RESOLUTION, PowerLaw, STEPS_MIN, alternates, student_t};
-use super::power_law::{Fit, GridValue, Model, Samples, Weights};
+use super::power_law::{GridValue, Model, Samples, Weights};
 
 /// Least order behind a 95 % interval of a limit. Below it a limit is not bounded by any finite table.
 const ORDER_LEAST: f64 = 0.5;
@@ -273,45 +273,46 @@ pub(super) fn order_ahead(table: &[GridValue]) -> Option<f64> {
 /// The narrowest interval that a table or its finest rows set to the limit, at the level `level`; `None` where the values
 /// scatter about their law, or are too few.
 ///
-/// What a law lacks shows in how far its limit moves when the coarsest rows are left out: an interval holds three limits
-/// in a row. That is an estimate and no bound, unlike [`LawOfValues::limit_band`]: of 1,000 random tables of three powers
-/// of the step the limit of 8 lies outside.
+/// What a law lacks shows in how far its limit moves when the coarsest rows are left out: an interval reaches twice as far.
+/// That is an estimate, and no bound: of 1,000 random tables of three powers of the step the limit of 8 lies outside, and
+/// of none outside [`LawOfValues::limit_band`].
 pub(super) fn closest_limits(grids: &[GridValue], level: f64) -> Option<[f64; 2]> {
     let table = admissible(grids, STEPS_MIN).ok()?;
+    let samples = Samples::new(&table, None);
+    let one = Model::new(&samples, None)?;
+    let whole = two_terms(&samples, &one).unwrap_or(one);
+    if !(whole.scatter() < SCATTER_SURE) {
+        return None;
+    }
+    let band = |model: &Model<'_>, others: &[f64]| {
+        let limit = model.best.limit;
+        let moved = others.iter().map(|other| LIMIT_SPARE * (other - limit).abs()).fold(0.0, f64::max);
+        hull(model.limits(model.orders(level), level), [limit - moved, limit + moved])
+    };
     let rows = table.len();
     let parts = rows.saturating_sub(PART_ROWS).min(6);
-    let mut narrowest: Option<[f64; 2]> = None;
-    let mut before = None;
-    for part in 0..=parts {
-        let size = if part == 0 { rows } else { rows - (rows - PART_ROWS) * part / parts };
-        let samples = Samples::new(&table[..size], None);
+    if parts == 0 {
+        let others = orders_near(&table, whole.best.order).into_iter().filter_map(|order| whole.at(order));
+        return Some(band(&whole, &others.map(|fit| fit.limit).collect::<Vec<_>>()));
+    }
+    let (mut narrowest, mut before): (Option<[f64; 2]>, _) = (None, whole.best.limit);
+    for part in 1..=parts {
+        let samples = Samples::new(&table[..rows - (rows - PART_ROWS) * part / parts], None);
         let Some(one) = Model::new(&samples, None) else { continue };
         let model = two_terms(&samples, &one).unwrap_or(one);
-        let best = model.best;
-        if part == 0 && !(model.scatter() < SCATTER_SURE) {
-            return None;
+        if model.dof > 1 {
+            let band = band(&model, &[before]);
+            narrowest = narrowest.filter(|old| old[1] - old[0] <= band[1] - band[0]).or(Some(band));
         }
-        let nearby = match before {
-            Some(before) => vec![before],
-            None if parts == 0 => neighbours(&table, &model).iter().map(|fit| fit.limit).collect(),
-            None => Vec::new(),
-        };
-        let moved = nearby.iter().map(|other: &f64| LIMIT_SPARE * (other - best.limit).abs()).fold(0.0, f64::max);
-        before = Some(best.limit);
-        if nearby.is_empty() || model.dof < 2 && parts > 0 {
-            continue;
-        }
-        let band = hull(model.limits(model.orders(level), level), [best.limit - moved, best.limit + moved]);
-        narrowest = narrowest.filter(|old| old[1] - old[0] <= band[1] - band[0]).or(Some(band));
+        before = model.best.limit;
     }
     narrowest
 }
 
-/// Fits of five rows or fewer of the order that their finest three have, and of the one that their orders tend to.
-fn neighbours(table: &[GridValue], model: &Model<'_>) -> Vec<Fit> {
-    let order = model.best.order;
+/// The order that the finest three rows have, and the one that the orders tend to, within one of `order`.
+fn orders_near(table: &[GridValue], order: f64) -> Vec<f64> {
     let near = [local_order(&table[..3]), order_ahead(table)].into_iter().flatten();
-    near.filter_map(|near| model.at(near.clamp(order - 1.0, order + 1.0))).collect()
+    near.map(|near| near.clamp(order - 1.0, order + 1.0)).collect()
 }
 
 /// Orders that parts of the table show, where one power is fitted to the whole.
@@ -328,8 +329,7 @@ fn other_orders(table: &[GridValue], known: Option<f64>, order: f64) -> Vec<f64>
         })
         .collect();
     if stages == 0 && known.is_none() {
-        let near = [local_order(&table[..3]), order_ahead(table)];
-        orders.extend(near.into_iter().flatten().map(|near| near.clamp(order - 1.0, order + 1.0)));
+        orders.extend(orders_near(table, order));
     }
     orders
 }
