@@ -93,8 +93,7 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
     let n = table.len() as f64;
     let samples = Samples::new(&table, known);
     let too_alike = FitError::TooFewSteps { found: 1, needed: STEPS_MIN };
-    let one = Model::new(&samples, None).ok_or(too_alike)?;
-    let model = two_terms(&samples, &one).unwrap_or(one);
+    let model = law_of(&samples).ok_or(too_alike)?;
     let best = model.best;
     let (mut interval95, mut verdict_band) = (model.orders(0.05), model.orders(level));
     let others = if model.next.is_some() { Vec::new() } else { other_orders(&table, known, best.order) };
@@ -107,8 +106,7 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
     // An order that the table without its coarsest quarter shows otherwise is not established.
     if let Some(fine) = table.len().checked_sub(table.len().div_ceil(4)).filter(|fine| *fine >= STEPS_MIN) {
         let samples = Samples::new(&table[..fine], known);
-        if let Some(one) = Model::new(&samples, None) {
-            let fine = two_terms(&samples, &one).unwrap_or(one);
+        if let Some(fine) = law_of(&samples) {
             verdict_band = hull(verdict_band, fine.orders(level));
             let [low, high] = fine.orders(0.05);
             if high - low < 1.0 && fine.next.is_some() == model.next.is_some() {
@@ -250,6 +248,12 @@ fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 /// Level of the F test for a second term.
 const SECOND_LEVEL: f64 = 1e-2;
 
+/// The law of one term, or of two where they are better beyond doubt.
+fn law_of<'a>(samples: &'a Samples<'a>) -> Option<Model<'a>> {
+    let one = Model::new(samples, None)?;
+    Some(two_terms(samples, &one).unwrap_or(one))
+}
+
 /// The better law of two terms, if it is better than `one` beyond doubt.
 fn two_terms<'a>(samples: &'a Samples<'a>, one: &Model<'_>) -> Option<Model<'a>> {
     let two = [1.0, 2.0].into_iter().filter_map(|next| Model::new(samples, Some(next)));
@@ -279,8 +283,7 @@ pub(super) fn order_ahead(table: &[GridValue]) -> Option<f64> {
 pub(super) fn closest_limits(grids: &[GridValue], level: f64) -> Option<[f64; 2]> {
     let table = admissible(grids, STEPS_MIN).ok()?;
     let samples = Samples::new(&table, None);
-    let one = Model::new(&samples, None)?;
-    let whole = two_terms(&samples, &one).unwrap_or(one);
+    let whole = law_of(&samples)?;
     if !(whole.scatter() < SCATTER_SURE) {
         return None;
     }
@@ -298,8 +301,7 @@ pub(super) fn closest_limits(grids: &[GridValue], level: f64) -> Option<[f64; 2]
     let (mut narrowest, mut before): (Option<[f64; 2]>, _) = (None, whole.best.limit);
     for part in 1..=parts {
         let samples = Samples::new(&table[..rows - (rows - PART_ROWS) * part / parts], None);
-        let Some(one) = Model::new(&samples, None) else { continue };
-        let model = two_terms(&samples, &one).unwrap_or(one);
+        let Some(model) = law_of(&samples) else { continue };
         if model.dof > 1 {
             let band = band(&model, &[before]);
             narrowest = narrowest.filter(|old| old[1] - old[0] <= band[1] - band[0]).or(Some(band));

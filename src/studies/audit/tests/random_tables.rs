@@ -44,7 +44,7 @@ fn table_of(kind: &str, rows: i32, noise: &mut Noise) -> Truth {
     let (next, third) = (0.3 * noise.normal(), 0.1 * noise.normal());
     let crossover = 10_f64.powf(1.5 * noise.uniform() - 1.0);
     let deviation = 10_f64.powf(-2.0 * noise.uniform() - 1.0);
-    // Of a power between one and two steps are as rare as of neither.
+    // The next powers are p + 1 and p + 2, or p + 2 and p + 4.
     let power = if order == 1.0 || noise.uniform() < 0.5 { 1.0 } else { 2.0 };
     let digits = match kind {
         "rounding" => 4 + (5.0 * noise.uniform()) as i32,
