@@ -556,6 +556,52 @@ mod tests {
         assert_relative_eq!(us / si - 1.0, 8.987_18e-4, max_relative = 1e-4);
     }
 
+    /// What the formula `name` says of `shot`: depth, perforation limit and scabbing limit, each over d.
+    fn ratios(name: &str, shot: &Shot, nose: Nose) -> [Option<f64>; 3] {
+        let formulas = read(SHIPPED).unwrap();
+        let formula = formulas.iter().find(|formula| formula.name == name).unwrap();
+        let said = formula.say(shot, nose, &formulas).unwrap();
+        [said.depth_m, said.perforation_m, said.scabbing_m].map(|length| Some(length? / shot.diameter))
+    }
+
+    /// Published: x/d = 5.11 by modified NDRC for shot 14 of Forrestal et al. (1994), in Li and Chen (2003), Table 2; read in a public
+    /// account of that paper, "Penetration Depth of Concrete Target" (endofwave, engineering-tools, 2026), which quotes the row.
+    #[test]
+    fn ndrc_has_the_published_depth_of_a_shot() {
+        let strength = 35.2e6;
+        let shot = Shot { mass: 0.906, diameter: 0.0269, speed: 277.0, strength, density: 2370.0, aggregate: None };
+        let depth = ratios("modified NDRC", &shot, Nose::Sharp)[0].unwrap();
+        assert!((depth - 5.11).abs() <= 0.005, "{depth}");
+    }
+
+    /// Published: M V0²/(ft d³) = 40 goes with x/d = 0.7 and a scabbing limit h/d = 3.5; J. Leppänen (2002), Chalmers Publ. 02:4, note
+    /// below Table C.1.
+    #[test]
+    fn hughes_has_the_published_depth_and_scabbing_limit_at_an_impact_of_40() {
+        // ft = 0.63 sqrt(36) MPa = 3.78 MPa.
+        let (mass, strength) = (40.0 * 3.78e6 * 1e-3 / 1e4, 36e6);
+        let shot = Shot { mass, diameter: 0.1, speed: 100.0, strength, density: 2400.0, aggregate: None };
+        let [depth, _, scabbing] = ratios("Hughes", &shot, Nose::Flat);
+        assert!((depth.unwrap() - 0.7).abs() < 0.05, "{depth:?}");
+        assert!((scabbing.unwrap() - 3.5).abs() < 0.05, "{scabbing:?}");
+    }
+
+    /// In US units, x = 870/sqrt(fc) (W/d²) (d/a)^0.1 (V/1750)^n with n = 10.7/fc^0.25 for lb, in, psi and ft/s, it differs by
+    /// the rounding of constants. That form stands in J. Leppänen (2002), Chalmers Publ. 02:4, Eq. C.4 and C.5.
+    #[test]
+    fn the_two_forms_of_whiffen_differ_by_the_rounding_of_constants() {
+        let (lb, inch, psi, foot) = (0.453_592_37, 0.0254, 6_894.757_293_168_361, 0.3048);
+        let (strength, diameter): (f64, f64) = (36e6 / psi, 0.06 / inch);
+        let speed: f64 = 200.0 / foot / 1750.0;
+        let us = 870.0 / strength.sqrt() * (20.0 / lb) / diameter.powi(3)
+            * 3.0_f64.powf(0.1)
+            * speed.powf(10.7 / strength.powf(0.25));
+        let aggregate = Some(0.02);
+        let shot = Shot { mass: 20.0, diameter: 0.06, speed: 200.0, strength: 36e6, density: 2400.0, aggregate };
+        let si = ratios("Whiffen", &shot, Nose::Sharp)[0].unwrap();
+        assert_relative_eq!(us / si - 1.0, 4.063_34e-5, max_relative = 1e-4);
+    }
+
     #[test]
     fn outside_its_range_a_formula_has_no_number_and_says_why() {
         let far = said("paper-slab", 400.0, "CEA-EDF");
