@@ -38,6 +38,7 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
         "headline" => headline(run.judged),
         "why-skipped" => why_skipped(run.judged),
         "deviations" => deviations(run.judged),
+        "of-the-paper" => of_the_paper(),
         _ => slot(run, figures, name, words),
     };
     let purpose = "Purpose: to show what the program computes right, how far, and where it was not tried.";
@@ -347,6 +348,20 @@ fn faults_table(faults: &[&SeededFault]) -> Table {
         let file = html! { @for part in fault.file.split_inclusive('/') { (one_line(part)) wbr; } };
         [html! { code { (one_line(&fault.id)) } }, typeset::html(&fault.what), file, quickest]
     })
+}
+
+/// The table of docs/theory.md that says where each part of the paper is, or why it is not.
+fn of_the_paper() -> Markup {
+    let section = include_str!("../../docs/theory.md")
+        .split("\n## ")
+        .find(|section| section.contains("What of the paper is where"));
+    let rows = section
+        .unwrap_or_default()
+        .lines()
+        .filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "));
+    Table::grid("The paper, part by part", ["in the paper", "here"])
+        .rows(rows.skip(1), |(part, here)| [part, here].map(typeset::html))
+        .render()
 }
 
 fn deviations(judged: &[Judged]) -> Markup {
