@@ -231,7 +231,11 @@ impl Axis {
         let [low, high] = match (self.range, extremes(all)) {
             (Some(range), _) => range,
             (None, None) => [0.1, 1.0],
-            (None, Some([low, high])) if self.is_log => [low / 1.5, high * 1.5],
+            (None, Some([low, high])) if self.is_log => {
+                // The wider of a factor and a fortieth of the decades: no mark lies on the edge.
+                let pad = (high.powf(0.025) / low.powf(0.025)).max(1.5);
+                [low / pad, high * pad]
+            }
             (None, Some([low, high])) => {
                 let pad = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
                 [if low >= 0.0 && low < 0.2 * high { 0.0 } else { low - pad }, high + pad]
@@ -290,12 +294,22 @@ impl Span {
             (0..=most.ceil() as u32 + 1).map(|i| (first + f64::from(i)) * step).collect()
         };
         let is_inside = |place: &f64| *place >= self.low - 1e-9 * length && *place <= self.high + 1e-9 * length;
+        let places: Vec<f64> = places.into_iter().filter(is_inside).collect();
+        // All labels of an axis have one form: `5·10⁻⁴` stands above no `0.001`.
+        let has_powers = length >= 2.0 || places.iter().any(|place| !(-3.0..5.0).contains(&(place + 1e-9)));
         let label = |place: f64| match self.is_log {
-            true if length >= 2.0 => power_of_ten(place.round() as i32),
-            true => number(self.value(place), 2).replace("\u{a0}×\u{a0}", "·"),
+            true if has_powers => {
+                let decade = (place + 1e-9).floor();
+                let power = power_of_ten(decade as i32);
+                match 10.0_f64.powf(place - decade).round() as u32 {
+                    1 => power,
+                    mantissa => format!("{mantissa}·{power}"),
+                }
+            }
+            true => number(self.value(place), 2),
             false => number(if place.abs() < 1e-9 * length { 0.0 } else { place }, 3),
         };
-        places.into_iter().filter(is_inside).map(|place| ((place - self.low) / length, label(place))).collect()
+        places.iter().map(|place| ((place - self.low) / length, label(*place))).collect()
     }
 }
 
@@ -494,6 +508,17 @@ impl Panel {
         format!("{axes}.{names}")
     }
 
+    /// What `series` covers (px): its points, and places on its line between them.
+    fn covered(&self, series: &Series, frame: &Frame) -> Vec<Point> {
+        let points: Vec<Point> = self.drawn(series).map(|point| frame.at(point)).collect();
+        let is_line = series.style.dash.is_some() && !series.style.is_area;
+        let lines = points.windows(2).filter(|_| is_line).flat_map(|ends| {
+            let ends = [ends[0], ends[1]];
+            (1..20).map(move |part| along(ends, f64::from(part) / 20.0))
+        });
+        points.iter().copied().chain(lines).collect()
+    }
+
     /// The names of the reference lines and their places: each beside its line, clear of other lines and of what is drawn
     /// where that can be.
     fn reference_names(&self, frame: &Frame) -> Vec<(&str, Point, Anchor)> {
@@ -502,9 +527,7 @@ impl Panel {
             .iter()
             .filter_map(|line| Some((line, line.ends(frame)?.map(|end| frame.inside(end)))))
             .collect();
-        let along =
-            |[from, to]: [Point; 2], share: f64| (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1));
-        let drawn: Vec<Point> = self.series.iter().flat_map(|series| self.drawn(series)).map(|p| frame.at(p)).collect();
+        let drawn: Vec<Point> = self.series.iter().flat_map(|series| self.covered(series, frame)).collect();
         let (mut taken, mut names): (Vec<[f64; 4]>, _) = (Vec::new(), Vec::new());
         for (line, ends) in &lines {
             let width = width_of(&line.name);
@@ -512,16 +535,17 @@ impl Panel {
             // Above a line that rises the name ends at it, below it begins there; it never lies across its own line.
             let is_level = ends[0].1 == ends[1].1;
             let candidates = [(-5.0, rises), (13.0, !rises)].into_iter().flat_map(|(shift, is_before)| {
-                (0..=20).map(move |part| {
-                    let (x, y) = along(*ends, f64::from(part) / 20.0);
+                (0..=40).map(move |part| {
+                    let (x, y) = along(*ends, f64::from(part) / 40.0);
                     let left = if is_before && !is_level { x - 4.0 - width } else { x + 4.0 };
                     (left, y + shift)
                 })
             });
             let hidden = |(left, base): &Point| {
                 let [right, top, bottom] = [left + width, base - 10.0, base + 3.0];
+                // A mark reaches beyond its point.
                 let holds =
-                    |(x, y): &Point| (*left - 3.0..=right + 3.0).contains(x) && (top - 3.0..=bottom + 3.0).contains(y);
+                    |(x, y): &Point| (*left - 4.0..=right + 4.0).contains(x) && (top - 4.0..=bottom + 4.0).contains(y);
                 let others = lines.iter().filter(|(other, _)| *other != *line);
                 let crossed = others.flat_map(|(_, ends)| (0..=100).map(|part| along(*ends, f64::from(part) / 100.0)));
                 let is_taken = taken.iter().any(|[l, r, t, b]| *left < *r && right > *l && top < *b && bottom > *t);
@@ -671,6 +695,11 @@ impl Frame {
     }
 }
 
+/// A place between the ends of a line, by its share of the way.
+fn along([from, to]: [Point; 2], share: f64) -> Point {
+    (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1))
+}
+
 /// Width of `text` in a wide sans-serif font.
 fn width_of(text: &str) -> f64 {
     let width = |c| match c {
@@ -747,6 +776,7 @@ mod tests {
         assert_eq!(labels(&log, [1e-9, 1e-6]), ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]);
         assert_eq!(labels(&log, [1e-15, 1e-2]), ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³"]);
         assert_eq!(labels(&log, [2.0, 40.0]), ["2", "5", "10", "20", "50"]);
+        assert_eq!(labels(&log, [6e-4, 9e-3]), ["5·10⁻⁴", "10⁻³", "2·10⁻³", "5·10⁻³", "10⁻²"]);
         assert_eq!(labels(&Axis::linear("depth", "mm"), [0.0, 100.0]), ["0", "20", "40", "60", "80", "100"]);
         assert_eq!(
             labels(&Axis::linear("depth", "mm").over([-0.1, 0.1]), [0.0; 2]),
@@ -801,6 +831,24 @@ mod tests {
         }
         let [first, second] = [names[0].1, names[1].1];
         assert!((first.0 - second.0).abs() > 40.0 || (first.1 - second.1).abs() > 12.0, "{names:?}");
+    }
+
+    /// A fitted law is drawn through two points alone.
+    #[test]
+    fn names_of_reference_lines_stand_clear_of_lines_between_points() {
+        let law = [(5e-7, 9.2e-4), (4e-6, 7.4e-3)];
+        let panel = Panel::new("", Axis::log("step", "s"), Axis::log("error", ""))
+            .slope("order 1", 1.0, (4e-6, 0.045))
+            .slope("order 2", 2.0, (4e-6, 0.045))
+            .series("fit", Style::line(1).as_line(), law);
+        let frame = panel.frame(1);
+        let ends = law.map(|point| frame.at(point));
+        let names = panel.reference_names(&frame);
+        assert_eq!(names.len(), 2);
+        for (name, (left, base), _) in names {
+            let is_hidden = |(x, y): Point| x > left && x < left + width_of(name) && y > base - 10.0 && y < base + 3.0;
+            assert!((0..=100).all(|part| !is_hidden(along(ends, f64::from(part) / 100.0))), "{name}");
+        }
     }
 
     #[test]

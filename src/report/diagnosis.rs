@@ -411,8 +411,10 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
     rows.sort_by(|a, b| fails(b).total_cmp(&fails(a)));
     let height = rows.len() as f64;
     let most = rows.iter().map(|(.., all)| *all).max().unwrap_or(1) as f64;
-    let y = Axis::linear("", "").over([0.0, height]);
-    let mut panel = Panel::new("", Axis::linear("questions", "").over([0.0, 1.05 * most]), y).tall(ROW * height);
+    // The first text stands clear of the axis above it.
+    let top = height + 0.15;
+    let y = Axis::linear("", "").over([0.0, top]);
+    let mut panel = Panel::new("", Axis::linear("questions", "").over([0.0, 1.05 * most]), y).tall(ROW * top);
     let bar = |row: usize, from: usize, to: usize| {
         let (bottom, top) = (height - row as f64 - 0.94, height - row as f64 - 0.56);
         let (from, to) = (from as f64, to as f64);
@@ -426,7 +428,7 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
         let text = if right < all {
             format!("{}: {} of {all} not right", content.words(), all - right)
         } else {
-            format!("{}: all {all} right", content.words())
+            format!("{}: {all} of {all} right", content.words())
         };
         panel = panel.label((0.0, height - row as f64 - 0.24), text, Anchor::Start);
     }

@@ -356,7 +356,8 @@ fn energy(run: &Run<'_>) -> Option<Figure> {
         scenes.iter().flat_map(|(_, members)| members.iter().map(|(judged, _)| *judged)).collect();
     let panel = |(scene, members): (&str, Vec<&(&Judged, &[Point])>)| {
         let limits = grouped(&members, |(judged, _)| judged.claim.limit);
-        let values = limits.iter().map(|(limit, _)| *limit);
+        // Room for the name of the highest limit above its line.
+        let values = limits.iter().map(|(limit, _)| 10.0 * limit);
         let residuals = Axis::log("|residual| / (M V₀²/2)", "").from(LEAST).including(values.chain([0.0]));
         let panel = Panel::new(format!("scene {scene}"), Axis::linear("depth", "mm").including([0.0]), residuals);
         let panel = limits.into_iter().fold(panel, |panel, (limit, members)| {

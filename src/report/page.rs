@@ -264,7 +264,7 @@ fn linked(line: &str, anchors: &[(String, String)], cited: &mut Vec<&'static Ref
             text += &format!("[{inside}]");
         }
     }
-    text + rest
+    (text + rest).replace("Eq. ", "Eq.\u{a0}")
 }
 
 /// `text` as a string of CSS inside a page, 80 characters at most: whatever could end the string or the sheet is written
@@ -573,7 +573,7 @@ fn every_claim(judged: &[Judged]) -> Markup {
         (folded(
             html! { (name) ": " (tally(Counts::of_claims(claims.iter().copied()))) },
             true,
-            claims_rows(&format!("Claims of {name}"), claims, |claim, is_first| html! {
+            claims_rows(&format!("Claims of `{name}`"), claims, |claim, is_first| html! {
                 @if is_first { span id=(anchor("claims", &claim.table)) {} }
                 code id=(anchor("claim", &claim.id)) { (one_line(&claim.id)) }
             }),
@@ -599,7 +599,7 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
                             a href={ "#" (anchor("claims", id)) } { code { (one_line(id)) } }
                         }
                         @if figure.claims.len() > NAMED { " and " (figure.claims.len() - NAMED) " more" }
-                        "; remade by " code { (one_line(command)) @if is_whole { " --only " (one_line(first)) } } ". "
+                        "; remade by " code { (unbroken(command)) @if is_whole { " " (unbroken(&format!("--only {first}"))) } } ". "
                     }
                     a href={ "tables/" (figure.name) ".csv" } { (count(figure.table().lines().count() - 1, "row")) " as CSV" } ", "
                     a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
@@ -608,6 +608,15 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
             div.panels { @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) } }
         }
     }
+}
+
+/// A command on one line of a text: no option is broken behind its hyphens.
+fn unbroken(command: &str) -> Markup {
+    let command = one_line(command);
+    html! { @for (index, word) in command.split(' ').enumerate() {
+        @if index > 0 { " " }
+        @if word.starts_with("--") { span.num { (word) } } @else { (word) }
+    } }
 }
 
 /// The command that remakes a run, what went into it, and what it ran on.
@@ -631,7 +640,7 @@ pub(super) fn reproduction<'t>(e: &'t Environment, inputs: impl IntoIterator<Ite
         ("Lock file (BLAKE3)", html! { code { (e.lock_file_hash) } }),
     ];
     list.extend(inputs);
-    list.extend(e.peers.iter().map(|(name, text)| (name.as_str(), cell(text))));
+    list.extend(e.peers.iter().map(|(name, text)| (name.as_str(), typeset::html(text))));
     list.push(("Date", html! { time datetime=(e.date) { (e.date) } }));
     html! { pre { code { (one_line(&e.command)) } } (facts(list)) }
 }

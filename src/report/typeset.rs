@@ -10,7 +10,8 @@
 //! `--rtol`, --dt 1e-9   code: an option with its number stays as it is typed
 //! -2.5                  −2.5, where no word and no number stands in front
 //! V0, fc, +-, ->, <=    V₀, as f_c, ±, →, ≤
-//! 20 %                  on one line
+//! w dt                  ω Δt
+//! 20 %, Eq. 15          on one line
 //! ```
 
 use std::fmt::Write as _;
@@ -76,8 +77,17 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
         return Some((vec![Piece::Code(option.to_owned())], after));
     }
     // As a terminal has it.
-    let others =
-        [("+-", "±"), ("->", "→"), ("<=", "≤"), (">=", "≥"), (" - ", " − "), ("V0", "V₀"), ("V1", "V₁"), ("fc", "f_c")];
+    let others = [
+        ("+-", "±"),
+        ("->", "→"),
+        ("<=", "≤"),
+        (">=", "≥"),
+        (" - ", " − "),
+        ("V0", "V₀"),
+        ("V1", "V₁"),
+        ("fc", "f_c"),
+        ("w dt", "ω Δt"),
+    ];
     for (typed, printed) in others {
         let Some(after) = rest.strip_prefix(typed) else { continue };
         let is_word = typed.starts_with(char::is_alphabetic);
@@ -149,7 +159,7 @@ fn option_with_number(text: &str) -> Option<usize> {
 pub(super) fn html(text: &str) -> Markup {
     html! { @for piece in pieces(text) {
         @match piece {
-            Piece::Line(text) => (text),
+            Piece::Line(text) => (text.replace("Eq. ", "Eq.\u{a0}")),
             Piece::Below(text) => sub { (text) },
             Piece::Above(text) => sup { (text) },
             Piece::Code(text) => code { (text) },
@@ -220,7 +230,8 @@ mod tests {
         assert_eq!(page("error 0.0e0, 6.5e0"), "error 0.0, 6.5");
         assert_eq!(page("try --dt 4e-9:4e-7."), "try <code>--dt 4e-9:4e-7</code>.");
         assert_eq!(page("with --peer (10), --"), "with --peer (10), --");
-        assert_eq!(page("20 % of 5"), "20\u{a0}% of 5");
+        assert_eq!(page("20 % of 5, Eq. 15"), "20\u{a0}% of 5, Eq.\u{a0}15");
+        assert_eq!(page("(w dt)²/8 at w dt = 1, raw dt"), "(ω Δt)²/8 at ω Δt = 1, raw dt");
         assert_eq!(page("<b> & V_c"), "&lt;b&gt; &amp; V<sub>c</sub>");
     }
 

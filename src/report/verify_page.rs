@@ -28,7 +28,7 @@ pub(super) fn to_html(run: &Run<'_>, figures: &[Figure]) -> String {
         "formal-orders" => formal_orders(),
         "build" => build(&run.environment),
         "observed-orders" => observed_orders(run),
-        "peers" => facts(run.environment.peers.iter().map(|(name, text)| (name.as_str(), cell(text)))),
+        "peers" => facts(run.environment.peers.iter().map(|(name, text)| (name.as_str(), typeset::html(text)))),
         "why-above-eq-15" => why_above_eq15(run),
         "sets" => sets(run),
         "meaning-of-data" => html! { p { (typeset::html(experiments::MEANING)) } },
