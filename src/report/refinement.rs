@@ -618,12 +618,16 @@ impl Refinement {
             (!figure.panels.is_empty()).then_some(Element::Figure(figure))
         };
         let noun = self.size.noun();
+        let mut points = self.series.iter().flat_map(|series| &series.points);
+        let any_hollow = points.any(|point| !point.used && point.error.is_some());
+        let outside = if any_hollow { "; hollow ones are outside the fit" } else { "" };
         [
             figure(
                 "error",
                 format!("{measured} over the {noun}, quantity by quantity"),
-                "Each point is one solution; hollow ones are outside the fit. Solid: the law that was fitted. Dashed: slopes \
-                 to compare with.",
+                &format!(
+                    "Each point is one solution{outside}. Solid: the law that was fitted. Dashed: slopes to compare with."
+                ),
                 errors,
             ),
             figure(
