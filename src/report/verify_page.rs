@@ -360,6 +360,7 @@ fn of_the_paper() -> Markup {
         .lines()
         .filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "));
     Table::grid("The paper, part by part", ["in the paper", "here"])
+        .numbers([])
         .rows(rows.skip(1), |(part, here)| [part, here].map(typeset::html))
         .render()
 }
