@@ -619,6 +619,8 @@ pub(crate) fn solve<S: Scalar>(
 #[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
+    use crate::integrators::{Integrator, Taylor};
+    use crate::physics::Scene;
 
     /// Mass 2 kg, one stage, impact at 300 m/s.
     fn alone(stage: Stage, exit_depth: f64) -> Problem {
@@ -642,6 +644,127 @@ mod tests {
         {
             assert_eq!(bounded(value, bound).is_decided(), decided, "{value}");
         }
+    }
+
+    /// r/(2M) = 10/s and s/M = 100/s² damp critically: what is no faster than 10/s of the distance to -p/s = 1 m creeps.
+    #[test]
+    fn a_drive_with_critical_damping_traps_what_is_slower_than_its_rate_and_nothing_faster() {
+        let drive = Stage { stiffness: 200.0, ..stage(-200.0, 40.0, 0.0) };
+        let problem = alone(drive, 2.0);
+        for (depth, velocity, is_trapped) in
+            [(0.0, 10.0, true), (0.0, 10.1, false), (0.5, 5.0, true), (0.5, 5.1, false)]
+        {
+            let state = State { time: 0.0, depth, velocity };
+            let course = Course { state, ..Course::new(&problem, Detail::End) };
+            assert_eq!(course.refuse_creep(2.0).is_err(), is_trapped, "{state}");
+        }
+    }
+
+    /// r/M = 0.75/s: `V = V1 e^(-0.75 t)` from 3 m/s, and `x = (V1 - V) M/r` from 0.5 m.
+    #[test]
+    fn an_approach_by_viscosity_alone_has_its_states_at_given_times() {
+        let problem = alone(stage(0.0, 1.5, 0.0), 4.5);
+        let times = [1.25, 2.0, 7.0];
+        let mut course = Course::new(&problem, Detail::Times(&times));
+        course.arrive_in_doubt(State { time: 1.0, depth: 0.5, velocity: 3.0 }, "").unwrap();
+        assert_eq!(course.trajectory.len(), times.len());
+        for (row, time) in course.trajectory.iter().zip(times) {
+            let velocity = 3.0 * (-0.75 * (time - 1.0)).exp();
+            let depth = 0.5 + (3.0 - velocity) / 0.75;
+            let State { depth: x, velocity: v, .. } = row.state;
+            assert!((x / depth - 1.0).abs() < 1e-14 && (v / velocity - 1.0).abs() < 1e-14, "{:?}", row.state);
+        }
+    }
+
+    /// What `Course::pass_condition` makes of an error bound at the first end of a flight, and the flight.
+    fn bound_behind(problem: &Problem, bound: f64) -> (f64, Flight) {
+        let flight = Taylor::default().solve(problem, Detail::Events).unwrap();
+        let end = flight.events.iter().find(|event| !matches!(event.kind, EventKind::Exit | EventKind::Rest)).unwrap();
+        let mut course = Course { error_bound: bound, state: end.state, ..Course::new(problem, Detail::End) };
+        course.pass_condition();
+        (course.error_bound, flight)
+    }
+
+    /// Two flights whose V0² differ a little: a drag Q takes `e^(-2 Q x/M)` of the difference, in front of the condition
+    /// and behind it.
+    #[test]
+    fn an_error_in_front_of_a_condition_grows_as_the_difference_of_two_flights_does() {
+        let plug = "[projectile]\nmass = 20\ndiameter = 0.06\nnose = { shape = 'flat' }\n[resistance]\nS = 12\nk = 0\n\
+                    [target]\nstrength = 36e6\ndensity = 2400\nthickness = 0.3\n\
+                    [perforation]\ncriterion = 'plug'\nhalf_angle = '60 deg'\nshear_strength = 7.2e6\n";
+        let stages = |parameters: &str, end: &str| {
+            format!(
+                "projectile.mass = 2\ntarget.thickness = 0.1\n{parameters}[[stage]]\nstatic_force = 8e5\ndrag = 3\n{end}\n\
+                 [[stage]]\nstatic_force = 1e5\ndrag = 2\n"
+            )
+        };
+        let known = "[parameters]\nQ = '3 kg/m'\na = '1 MN'\nR = '20 MN/m'\nH = '0.1 m'\n";
+        let slowed = stages(known, "until = 'a + Q*V^2 = R*(H - x)'");
+        let joined = stages(known, "until = 'a + Q*V^2 = R*(H - x)'\nadd_mass = 0.5");
+        let at_speed = stages("", "end_velocity = 200\nadd_mass = 0.5");
+        for (text, speed, added) in [
+            (plug, 160.0, None),
+            (&slowed, 290.0, Some(0.0)),
+            (&joined, 290.0, Some(0.5)),
+            (&at_speed, 290.0, Some(0.5)),
+        ] {
+            let scene = Scene::from_toml(text, "bound").unwrap();
+            let of = |energy: f64| scene.resolve(energy.sqrt()).unwrap();
+            let (energy, step) = (speed * speed, 1e-4 * speed * speed);
+            let (factor, flight) = bound_behind(&of(energy), 1.0);
+            let depth = flight.events[0].state.depth;
+            let drag = scene.tunnel().map_or(3.0, |tunnel| tunnel.drag);
+            let behind = added.map_or(0.0, |added| 2.0 * (0.1 - depth) / (scene.mass + added));
+            let left = (-2.0 * (drag * depth / scene.mass + behind)).exp();
+            let [low, high] = [energy - step, energy + step].map(|energy| {
+                let end = Taylor::default().solve(&of(energy), Detail::End).unwrap().end;
+                end.velocity * end.velocity
+            });
+            let exact = ((high - low) / (2.0 * step) / left).abs();
+            assert!((factor / exact - 1.0).abs() < 1e-6, "{text}: {factor} and {exact}");
+        }
+    }
+
+    /// r/M = 0.75/s takes 300 m/s in 400 m.
+    #[test]
+    fn an_exit_that_is_approached_within_the_error_bound_is_an_event_and_not_decided() {
+        let flight = Taylor::default().solve(&alone(stage(0.0, 1.5, 0.0), 400.0), Detail::Events).unwrap();
+        assert_eq!(crate::testing::kinds(&flight.events), [EventKind::Exit, EventKind::Rest]);
+        assert_eq!(flight.outcome, Outcome::Undecided);
+    }
+
+    /// 2 kg and 0.5 kg keep 0.8 of the speed, and 0.64 of what V² is uncertain by.
+    #[test]
+    fn a_mass_that_joins_takes_its_share_of_the_error_bound() {
+        let text = "projectile.mass = 2\n[[stage]]\nstatic_force = 36000\nend = 0.1\nadd_mass = 0.5\n[[stage]]\nstatic_force = 1\n";
+        let problem = Scene::from_toml(text, "bound").unwrap().resolve(100.0).unwrap();
+        let mut course = Course { error_bound: 1.0, ..Course::new(&problem, Detail::End) };
+        course.pass_end();
+        assert!((course.error_bound - 0.64).abs() < 1e-15 && course.mass == 2.5, "{}", course.error_bound);
+    }
+
+    /// Two flights whose conditions differ a little, and the rounding of the condition in place of that.
+    #[test]
+    fn the_rounding_of_the_place_of_a_condition_counts_as_far_as_it_changes_the_energy_behind() {
+        let speed = 290.0;
+        let of = |shift: f64| {
+            let text = format!(
+                "projectile.mass = 2\ntarget.thickness = 0.1\n[parameters]\nQ = '3 kg/m'\na = '{:?} N'\nR = '20 MN/m'\n\
+                 H = '0.1 m'\n[[stage]]\nstatic_force = 8e5\ndrag = 3\nuntil = 'a + Q*V^2 = R*(H - x)'\nadd_mass = 0.5\n\
+                 [[stage]]\nstatic_force = 1e5\n",
+                1e6 + shift
+            );
+            Scene::from_toml(&text, "bound").unwrap().resolve(speed).unwrap()
+        };
+        let (bound, flight) = bound_behind(&of(0.0), 0.0);
+        let [low, high] = [-100.0, 100.0].map(|shift| {
+            let end = Taylor::default().solve(&of(shift), Detail::End).unwrap().end;
+            end.velocity * end.velocity
+        });
+        let met = flight.events[0].state;
+        let noise = of(0.0).laws.of(0).unwrap().end().unwrap().noise(met.depth, met.velocity);
+        let exact = ((high - low) / 200.0 * noise / speed / speed).abs();
+        assert!((bound / exact - 1.0).abs() < 1e-6, "{bound:e} and {exact:e}");
     }
 
     #[test]
@@ -680,6 +803,7 @@ mod tests {
         // r dx/M = 0.75e-9 m/s are missing, and 2 V as much of V²: 4.5e-9 m²/s².
         assert!(arrival(4.5 + 1e-9, 3.0, 4.6e-9 / v0 / v0).is_ok());
         assert!(arrival(4.5 + 1e-9, 3.0, 4.4e-9 / v0 / v0).is_err());
+        assert!(arrival(1.5, 0.75, 0.0).unwrap().time > 1.0, "slower than 1 m/s");
         // At rest 4 m before it, 3 m/s are missing. Speed below zero is the error of a method.
         for velocity in [0.0, -0.1] {
             // Without speed no time passes.

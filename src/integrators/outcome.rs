@@ -387,6 +387,8 @@ mod tests {
         assert_eq!(neither.exit_margin_error, None);
         assert_eq!(kinds(&neither), [EventKind::Exit, EventKind::Rest]);
         assert_eq!(at_once(&problem(&[f64::INFINITY], 3.0, 2.0), Detail::Events), None);
+        let rows = at_once(&problem(&[f64::INFINITY], 0.0, 2.0), Detail::Times(&[0.0, 1.0])).unwrap().trajectory;
+        assert_eq!(rows.iter().map(|row| row.state.time).collect::<Vec<_>>(), [0.0]);
         // A list whose last stage ends breaks an invariant; the stage named is one of the list all the same.
         assert_eq!(flight(&[0.0], 0.0, 2.0).stage, 0);
     }

@@ -632,6 +632,20 @@ mod tests {
     }
 
     #[test]
+    fn the_numbers_of_a_scene_are_those_of_each_layer_and_each_stage_from_the_first() {
+        let of = |name: &str| Parameter::all_of(&shipped(name)).iter().map(ToString::to_string).collect::<Vec<_>>();
+        for (name, path) in
+            [("layered", "target.layer.0.thickness"), ("layered", "target.layer.2.S"), ("viscous", "stage.0.viscosity")]
+        {
+            assert!(of(name).iter().any(|one| one == path), "{path}: {:?}", of(name));
+        }
+        let error = Parameter::Stage(0, StageNumber::EndVelocity).get(&shipped("viscous")).unwrap_err().to_string();
+        assert!(error.contains("ends at no velocity"), "{error}");
+        let error = Parameter::Stage(0, StageNumber::AddMass).get(&shipped("viscous")).unwrap_err().to_string();
+        assert!(error.contains("no mass joins"), "{error}");
+    }
+
+    #[test]
     fn columns_of_a_table_are_the_paths_of_a_plain_target_with_their_units() {
         let columns: Vec<_> = Parameter::PLAIN[..11].iter().map(|parameter| parameter.column()).collect();
         assert_eq!(columns.join(",") + ",criterion,nose,CRH,tip_ratio,R_pa", crate::studies::batch::SCENES.header());
@@ -691,8 +705,11 @@ mod tests {
         Parameter::Strength.set(&mut slab, 36e6).unwrap();
         assert_eq!(Parameter::StaticFactor.get(&slab), Ok(10.0));
         let mut layers = shipped("layered");
-        Parameter::Layer(1, LayerNumber::Strength).set(&mut layers, 36e6).unwrap();
-        assert_eq!(Parameter::Layer(1, LayerNumber::StaticFactor).get(&layers), Ok(12.0));
+        for (strength, factor) in [(64e6, 9.0), (36e6, 12.0)] {
+            Parameter::Layer(1, LayerNumber::Strength).set(&mut layers, strength).unwrap();
+            assert_eq!(Parameter::Layer(1, LayerNumber::StaticFactor).get(&layers), Ok(factor));
+        }
+        assert!(!Parameter::Strength.moves_static_factor(&shipped("viscous")));
         // Stated, and as Eq. 14 would have it.
         let mut tunnel = shipped("tunnel");
         Parameter::Strength.set(&mut tunnel, 64e6).unwrap();
@@ -713,6 +730,16 @@ mod tests {
         assert_eq!(said("jump"), "");
         assert!(said("layered").starts_with("target.layer.*.S follows") && said("layered").ends_with("the layers"));
         assert_eq!(said("viscous"), "");
+        // Of a slab of one medium, and of layers of which one has a stated S.
+        assert!(!said("paper-slab").contains("sum of the layers"), "{}", said("paper-slab"));
+        let mut layers = shipped("layered");
+        Parameter::Layer(1, LayerNumber::StaticFactor).set(&mut layers, 12.0).unwrap();
+        assert!(layers.follows()[0].starts_with("S follows the strength in layer 0, 2 by"), "{:?}", layers.follows());
+        let mut tunnel = shipped("tunnel");
+        for (ratio, has_crater) in [(0.0, false), (0.5, true)] {
+            Parameter::CraterRatio.set(&mut tunnel, ratio).unwrap();
+            assert_eq!(!tunnel.follows().is_empty(), has_crater, "k = {ratio}");
+        }
     }
 
     #[test]

@@ -952,6 +952,8 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
+    use crate::physics::force_table::Row;
+    use crate::physics::parameter::ParameterError;
     use crate::testing::{concrete, scene, stage};
 
     fn scene_of(concrete: Concrete) -> Scene {
@@ -979,6 +981,22 @@ mod tests {
         Scene { thickness, ..scene_of(Concrete { layers, ..concrete() }) }
     }
 
+    /// A slab of 0.3 m that plugs.
+    fn plugging() -> Scene {
+        let plug = Some(Plug { half_angle: 60.0, shear_strength: 7.2e6 });
+        Scene { plug, thickness: Some(0.3), criterion: Criterion::Plug, ..scene() }
+    }
+
+    /// 2 kg, and stages as a scene file has them.
+    fn read(text: &str) -> Scene {
+        Scene::from_toml(&format!("projectile.mass = 2\nimpact.velocity = 100\n{text}"), "stages").unwrap()
+    }
+
+    fn table(rows: &[(f64, f64)]) -> Force {
+        let rows: Vec<_> = rows.iter().map(|&(at, force)| Row { at, force }).collect();
+        Force::Table(ForceTable::new(&rows).unwrap())
+    }
+
     fn layer_force(strength: f64) -> f64 {
         std::f64::consts::FRAC_PI_4 * 0.0269 * 0.0269 * 12.0 * strength
     }
@@ -994,6 +1012,9 @@ mod tests {
             }
             assert!(scene.resolve_from(&probe, f64::NAN).is_err() && scene.resolve_from(&probe, -1.0).is_err());
         }
+        // Its stages have laws, and NaN for coefficients.
+        let probe = plugging().resolve(1.0).unwrap();
+        assert_eq!(plugging().resolve_from(&probe, 277.0).unwrap().laws, plugging().resolve(277.0).unwrap().laws);
     }
 
     #[test]
@@ -1155,6 +1176,8 @@ mod tests {
         assert_eq!(refused(Concrete { diameter: 1e160, ..concrete() }, 1.0), "the static force P [N]");
         assert_eq!(refused(Concrete { density: 1e-306, ..concrete() }, 1.0), "the drag Q [kg/m]");
         assert_eq!(refused(Concrete { crater_ratio: 1e-307, ..concrete() }, 1.0), "the crater depth k d [m]");
+        assert_eq!(refused(Concrete { crater_ratio: 1e-323, ..concrete() }, 1.0), "the crater depth k d [m]");
+        assert!(Concrete::usual_static_factor(-1.0).is_err() && Concrete::usual_static_factor(36e6).is_ok());
     }
 
     #[test]
@@ -1184,6 +1207,137 @@ mod tests {
         let no_speed = Scene { velocity: None, ..scene() };
         assert_eq!(no_speed.problem(), Err(ResolveError::NoImpactSpeed));
         assert_eq!(Scene { velocity: Some(3.0), ..no_speed }.problem().unwrap().impact_speed, 3.0);
+    }
+
+    #[test]
+    fn a_plug_needs_a_thickness_one_medium_and_an_angle_and_a_strength_that_it_may_have() {
+        let open = Scene { thickness: None, ..plugging() };
+        let in_layers = Scene { plug: plugging().plug, criterion: Criterion::Plug, ..layered(&[0.1, 0.2]) };
+        for scene in [open, in_layers, Scene { plug: None, ..plugging() }] {
+            assert_eq!(scene.problem(), Err(ResolveError::NoPlug));
+        }
+        for (parameter, value) in [(Parameter::HalfAngle, 90.0), (Parameter::ShearStrength, 0.0)] {
+            let mut scene = plugging();
+            parameter.set(&mut scene, value).unwrap();
+            assert_eq!(scene.problem(), Err(ResolveError::Inadmissible { parameter, value }));
+        }
+        let mut cylinder = plugging();
+        Parameter::HalfAngle.set(&mut cylinder, 0.0).unwrap();
+        assert!(cylinder.problem().is_ok());
+    }
+
+    #[test]
+    fn the_other_criteria_of_a_plug_end_at_the_thickness_and_that_without_the_static_plug() {
+        let (scene, tunnel) = (plugging(), plugging().tunnel().unwrap());
+        let left = scene.plug.unwrap().static_thickness(tunnel.static_force, 0.0269);
+        let others = scene.other_criteria();
+        let thicknesses: Vec<_> = others.iter().map(|(_, other)| other.thickness.unwrap()).collect();
+        assert!(left > 0.0 && left < 0.3, "{left}");
+        assert_eq!(thicknesses, [0.3, 0.3, 0.3 - left]);
+        // A static plug longer than the slab leaves nothing to go through.
+        let thin = Scene { thickness: Some(0.5 * left), ..plugging() };
+        assert_eq!(thin.other_criteria()[2].1.thickness, Some(0.0));
+    }
+
+    #[test]
+    fn an_expression_of_four_coefficients_is_a_stage_if_it_brings_to_rest_and_else_a_law() {
+        for (force, is_stage) in
+            [("P", true), ("R*x", true), ("P + Q*V^2", true), ("W*V", false), ("Q*V^2", false), ("P - Q*V^2", false)]
+        {
+            let used = [("P", "'1 kN'"), ("R", "'1 kN/m'"), ("W", "'1 kg/s'"), ("Q", "'1 kg/m'")];
+            let used =
+                used.iter().filter(|(name, _)| force.contains(name)).map(|(name, is)| format!("{name} = {is}\n"));
+            let text = format!("[parameters]\n{}[[stage]]\nforce = '{force}'\n", used.collect::<String>());
+            assert_eq!(read(&text).problem().unwrap().laws.is_empty(), is_stage, "{force}");
+        }
+    }
+
+    #[test]
+    fn a_law_stands_at_its_own_stage_behind_one_of_coefficients() {
+        let text = "[parameters]\nP = '1 kN'\nv = '1 m/s'\n[[stage]]\nstatic_force = 5\nend = 0.1\n\
+                    [[stage]]\nforce = 'P*exp(V/v)'\n";
+        let problem = read(text).problem().unwrap();
+        assert!(problem.laws.of(0).is_none() && problem.laws.of(1).is_some());
+        assert_eq!(problem.stages[0].static_force, 5.0);
+        // An end on a condition makes a law of every stage.
+        let ending =
+            read("[[stage]]\nstatic_force = 5\nend_velocity = 9\n[[stage]]\nstatic_force = 6\n").problem().unwrap();
+        for (index, stage) in ending.stages.iter().enumerate() {
+            assert!(ending.laws.of(index).is_some() && stage.static_force.is_nan(), "{stage:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_ends_and_stages_that_are_no_numbers_of_theirs_are_refused() {
+        let text = "[[stage]]\nstatic_force = 5\nend_velocity = 9\nadd_mass = 0.5\n[[stage]]\nstatic_force = 6\n";
+        for (which, given) in [(StageNumber::EndVelocity, 9.0), (StageNumber::AddMass, 0.5)] {
+            let (mut scene, parameter) = (read(text), Parameter::Stage(0, which));
+            assert_eq!(parameter.get(&scene), Ok(given));
+            assert!(Parameter::all_of(&scene).contains(&parameter));
+            assert!(matches!(Parameter::Stage(1, which).get(&scene), Err(ParameterError::Absent { .. })));
+            parameter.set(&mut scene, -1.0).unwrap();
+            assert_eq!(scene.problem(), Err(ResolveError::Inadmissible { parameter, value: -1.0 }));
+        }
+        let last = Scene { resistance: Resistance::Stages(vec![Stage::tunnel(5.0, 0.0)]), ..read(text) };
+        assert_eq!(last.problem(), Err(ResolveError::NothingFollows(0)));
+        let mut falls = read(&format!("{text}end = 0.4\n[[stage]]\nstatic_force = 7\n"));
+        falls.ends = vec![(1, falls.ends[0].1.clone())];
+        let Resistance::Stages(stages) = &mut falls.resistance else { unreachable!() };
+        stages[0].end = 0.5;
+        assert!(matches!(falls.problem(), Err(ResolveError::StageEndsFall { stage: 1, .. })), "{:?}", falls.problem());
+        let subnormal = stages_scene(vec![Stage::tunnel(1e-310, 0.0)]).problem();
+        assert!(matches!(subnormal, Err(ResolveError::OutOfRange { .. })), "{subnormal:?}");
+    }
+
+    /// Stages of 1 N and of a table to 0.2 m, the table's number of pieces, and whose law the mass joins.
+    #[test]
+    fn what_follows_a_table_of_depth_stands_behind_its_pieces() {
+        let rows = [(0.0, 9.0), (0.05, 8.0), (0.1, 7.0), (0.2, 6.0)];
+        let given = |ends: &[f64], at: usize| {
+            let stages = ends.iter().map(|&end| Stage { end, ..Stage::tunnel(1.0, 0.0) }).collect();
+            Scene { forces: vec![(at, table(&rows))], ..stages_scene(stages) }
+        };
+        let open = f64::INFINITY;
+        // The table ends with its stage or behind it, and a stage of no length has none of its pieces.
+        for (ends, at, resolved) in [
+            (&[0.2, open][..], 0, &[0.05, 0.1, 0.2, open][..]),
+            (&[0.1, open], 0, &[0.05, 0.1, open]),
+            (&[0.1, 0.1, open], 1, &[0.1, 0.1, open]),
+        ] {
+            let mut scene = given(ends, at);
+            let problem = scene.problem().unwrap();
+            assert_eq!(problem.stages.iter().map(|stage| stage.end).collect::<Vec<_>>(), resolved);
+            assert_eq!(problem.target, Target::Stages);
+            scene.ends = vec![(at, OwnEnd { condition: None, add_mass: Some(0.5) })];
+            let laws = scene.problem().unwrap().laws;
+            let joins = |index: usize| laws.of(index).is_some_and(|law| law.joining(0.1).is_some());
+            let last = resolved.len() - 1;
+            assert_eq!((0..=last).filter(|index| joins(*index)).collect::<Vec<_>>(), [last], "{ends:?}");
+        }
+        // Another stage's mass, behind a table.
+        let mut scene = given(&[0.2, 0.3, open], 0);
+        scene.ends = vec![(1, OwnEnd { condition: None, add_mass: Some(0.5) })];
+        let laws = scene.problem().unwrap().laws;
+        assert!(laws.of(4).unwrap().joining(0.3).is_some() && laws.of(3).unwrap().joining(0.3).is_none());
+        // A table has to go on where its stage begins; behind a stage without a depth that is the face.
+        assert!(matches!(given(&[0.2, open], 1).problem(), Err(ResolveError::TableElsewhere { stage: 1, .. })));
+        let mut scene = given(&[open, open], 1);
+        scene.ends = vec![(0, OwnEnd { condition: Some(Ending::Velocity(9.0)), add_mass: None })];
+        assert_eq!(scene.problem().unwrap().stages[1].end, 0.05);
+    }
+
+    #[test]
+    fn a_table_whose_pieces_leave_the_range_of_numbers_is_refused() {
+        for (rows, name) in [
+            ([(0.0, 0.0), (1e10, 1e-300)], "the stiffness between two rows of a table [N/m]"),
+            ([(0.0, 1e-310), (1.0, 1e-310)], "the static force of a piece of a table [N]"),
+        ] {
+            let scene = Scene { forces: vec![(0, table(&rows))], ..stages_scene(vec![Stage::free()]) };
+            match scene.problem() {
+                Err(ResolveError::OutOfRange { quantity, .. }) => assert_eq!(quantity, name),
+                other => panic!("{other:?}"),
+            }
+        }
     }
 
     #[test]

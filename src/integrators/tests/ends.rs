@@ -102,6 +102,73 @@ fn a_condition_is_met_where_its_sides_are_equal_and_the_mass_that_joins_keeps_th
     }
 }
 
+/// 36 kN take 100 m/s to 80 over 0.1 m, half a kilogram leaves 64, and 25.6 kN take those in 0.2 m.
+#[test]
+fn a_mass_that_joins_at_a_depth_is_slowed_with_the_projectile() {
+    let text = "[[stage]]\nstatic_force = 36000\nend = 0.1\nadd_mass = 0.5\n[[stage]]\nstatic_force = 25600\n";
+    for (name, method) in methods(1e-10) {
+        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let rows = method.integrator().solve(&problem(text, 100.0), Detail::Trajectory).unwrap().trajectory;
+        let speeds: Vec<_> = rows.iter().filter(|row| row.state.depth == 0.1).map(|row| row.state.velocity).collect();
+        assert!([80.0, 64.0].iter().all(|v| speeds.iter().any(|speed| is_near(*speed, *v, allowed))), "{speeds:?}");
+        // Behind a far side 0.2 m beyond the place of rest, and before it.
+        for (thickness, margin) in [(0.5, -0.4096), (0.15, 0.3072)] {
+            let flight = method.integrator().solve(&problem(&with_thickness(text, thickness), 100.0), Detail::Events);
+            let flight = flight.unwrap();
+            assert!(is_near(flight.exit_margin.unwrap(), margin, allowed), "{name}: {:?}", flight.exit_margin);
+            if thickness == 0.5 {
+                assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest], "{name}");
+                let rest = flight.end;
+                assert!(is_near(rest.depth, 0.3, allowed) && is_near(rest.time, 1.0 / 900.0 + 1.0 / 160.0, allowed));
+            }
+        }
+    }
+}
+
+/// 36 kN down to 80 m/s, and a drive behind that: of 100 m/s, 0.64 of the energy is the least.
+#[test]
+fn the_exit_margin_counts_the_speed_at_a_condition_behind_which_a_force_drives() {
+    let text = "[[stage]]\nstatic_force = 36000\nend_velocity = 80\n[[stage]]\nstatic_force = -36000\n";
+    for (name, method) in methods(1e-10) {
+        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let flight = method.integrator().solve(&problem(&with_thickness(text, 0.15), 100.0), Detail::End).unwrap();
+        assert!(is_near(flight.exit_margin.unwrap(), 0.64, allowed), "{name}: {:?}", flight.exit_margin);
+    }
+}
+
+/// `(x - 0.2 m)² = (0.1 m)²` at 0.1 m and at 0.3 m, and between them a stage that ends at 0.2 m.
+#[test]
+fn an_equation_that_has_ended_a_stage_is_solved_anew_for_a_later_one() {
+    let text = "[parameters]\na = '0.2 m'\nb = '0.1 m'\n[[stage]]\nstatic_force = 1000\nuntil = '(x - a)^2 = b^2'\n\
+                [[stage]]\nstatic_force = 2000\nend = 0.2\n[[stage]]\nstatic_force = 3000\nuntil = '(x - a)^2 = b^2'\n\
+                [[stage]]\nstatic_force = 36000\n";
+    for (name, method) in methods(1e-10) {
+        let flight = method.integrator().solve(&problem(text, 100.0), Detail::Events).unwrap();
+        let ends = [EventKind::StageEnd(0), EventKind::StageEnd(1), EventKind::StageEnd(2), EventKind::Rest];
+        assert_eq!(kinds(&flight.events), ends, "{name}");
+        for (event, depth) in flight.events.iter().zip([0.1, 0.2, 0.3]) {
+            assert!(is_near(event.state.depth, depth, 1e-8), "{name}: {:?}", event.state);
+        }
+    }
+}
+
+/// 36 kN take 100 m/s to 80 over 0.1 m, where the next stage, which ends at 0.05 m, is behind already.
+#[test]
+fn a_stage_that_ends_in_front_of_the_place_of_a_condition_is_passed_there() {
+    let text = "[[stage]]\nstatic_force = 36000\nend_velocity = 80\n[[stage]]\nstatic_force = 1e6\nend = 0.05\n\
+                [[stage]]\nstatic_force = 64000\n";
+    for (name, method) in methods(1e-10) {
+        let flight = method.integrator().solve(&problem(text, 100.0), Detail::Events).unwrap();
+        let ends = [EventKind::StageEnd(0), EventKind::StageEnd(1), EventKind::Rest];
+        assert_eq!((kinds(&flight.events), flight.stage), (ends.to_vec(), 2), "{name}");
+        let allowed = 1000.0 * name.promise_at(1e-10).max(1e-15);
+        assert!(
+            is_near(flight.events[1].state.depth, 0.1, allowed) && is_near(flight.end.depth, 0.2, allowed),
+            "{name}"
+        );
+    }
+}
+
 /// Errors at two steps, one eighth of each other, over many steps: landing alone keeps the second order.
 #[test]
 fn central_difference_keeps_its_order_where_it_lands_on_a_condition() {
@@ -262,6 +329,7 @@ fn a_condition_that_is_touched_is_met_and_one_that_is_missed_by_little_is_not() 
     }
     let flight = Taylor::default().solve(&problem(&text(touched), 100.0), Detail::Events).unwrap();
     assert_eq!(flight.outcome, Outcome::Undecided, "{flight:?}");
+    assert!(flight.notes.iter().any(|note| note.contains("touched")), "{:?}", flight.notes);
 }
 
 /// Thousands of zeros lie in a step of the flight, or two between places that tell nothing of them: x where the first lies.

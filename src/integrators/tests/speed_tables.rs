@@ -166,3 +166,17 @@ fn a_critical_velocity_below_the_last_row_is_found_though_no_force_is_known_abov
     let error = critical_velocity(|speed| Ok(problem(&rows, speed, 1.01 * longest)), &Taylor::default()).unwrap_err();
     assert!(error.to_string().contains("the table of the force ends at V = 300 m/s"), "{error}");
 }
+
+/// 36 kN take 100 m/s to 80 over 0.1 m, and the table has rows on the way.
+#[test]
+fn a_trajectory_has_the_places_where_a_table_goes_on_in_its_next_piece() {
+    let rows = [[0.0, 36.0], [80.0, 36.0], [90.0, 36.0], [100.0, 36.0]];
+    for (name, method) in methods(1e-10) {
+        let flight = method.integrator().solve(&problem(&rows, 100.0, f64::INFINITY), Detail::Trajectory).unwrap();
+        for (velocity, depth) in [(90.0, 19.0 / 360.0), (80.0, 0.1)] {
+            let row = flight.trajectory.iter().find(|row| row.state.velocity == velocity);
+            let error = row.map(|row| (row.state.depth / depth - 1.0).abs());
+            assert!(error.is_some_and(|error| error <= allowed(name)), "{name} at {velocity}: {error:?}");
+        }
+    }
+}
