@@ -28,8 +28,8 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 /// What the package needs to build: `verification` holds scenes and suites that the library embeds.
-const COPIED: [&str; 8] =
-    ["Cargo.toml", "Cargo.lock", "build.rs", "src", "tests", "benches", "examples", "verification"];
+const COPIED: [&str; 9] =
+    ["Cargo.toml", "Cargo.lock", "build.rs", "src", "docs", "tests", "benches", "examples", "verification"];
 
 /// A program with a fault that runs longer than this has no report to give.
 const PATIENCE: Duration = Duration::from_secs(120);

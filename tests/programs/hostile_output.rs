@@ -247,7 +247,10 @@ fn an_interrupted_run_leaves_the_old_results_or_none() {
 fn begun(folder: &Path, line: &str) -> std::process::Child {
     let names_of_both = || (names(folder), names(&folder.join("tmp")));
     let before = names_of_both();
-    let mut command = program(folder, line);
+    let program = program(folder, line);
+    // Whoever runs the tests in the background of a script has interrupts ignored, and so would the program.
+    let mut command = Command::new("env");
+    command.arg("--default-signal").arg(program.get_program()).args(program.get_args()).current_dir(folder);
     command.env("TMPDIR", folder.join("tmp")).stdout(Stdio::null()).stderr(Stdio::null());
     let child = command.spawn().unwrap();
     let started = Instant::now();
