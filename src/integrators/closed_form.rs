@@ -41,27 +41,34 @@ impl Integrator for ClosedForm {
 
     fn solve(&self, problem: &Problem, detail: Detail) -> Solved {
         refuse(problem)?;
-        let is_path = matches!(detail, Detail::Trajectory);
-        let listed = if is_path { Detail::Events } else { detail };
-        let mut flight = flight::solve(problem, listed, &mut Exact { continuous: false })?;
-        if is_path && flight.end.time > 0.0 {
-            flight.trajectory = path(problem, &flight, INTERVALS, |share| share)?;
-            // One sample a place, with the force of the stage ahead.
-            flight.trajectory.dedup_by(|next, last| {
-                let is_same_place = next.state.depth == last.state.depth;
-                if is_same_place {
-                    *last = *next;
-                }
-                is_same_place
-            });
+        if matches!(detail, Detail::Trajectory) {
+            return with_trajectory(problem);
         }
-        Ok(flight)
+        flight::solve(problem, detail, &mut Exact { continuous: false })
     }
 
     fn explain(&self, _problem: &Problem, flight: &Flight) -> Vec<String> {
         // A flight that is over at impact has said so.
         if flight.notes.is_empty() { vec!["no integration: the closed form".to_owned()] } else { Vec::new() }
     }
+}
+
+/// The flight, and its path.
+#[cold]
+fn with_trajectory(problem: &Problem) -> Solved {
+    let mut flight = ClosedForm.solve(problem, Detail::Events)?;
+    if flight.end.time > 0.0 {
+        flight.trajectory = path(problem, &flight, INTERVALS, |share| share)?;
+        // One sample a place, with the force of the stage ahead.
+        flight.trajectory.dedup_by(|next, last| {
+            let is_same_place = next.state.depth == last.state.depth;
+            if is_same_place {
+                *last = *next;
+            }
+            is_same_place
+        });
+    }
+    Ok(flight)
 }
 
 /// Solves crater and tunnel whose crater constant was chosen by `stiffness`.
@@ -104,7 +111,11 @@ fn refuse(problem: &Problem) -> Solved<()> {
         let law = problem.laws.of(index);
         law.is_none_or(|law| law.table().is_some() && law.joining(0.0).is_none())
     };
-    if (0..problem.stages.len()).all(has_form) { Ok(()) } else { refuse_laws(problem, ClosedForm.name()) }
+    if problem.laws.is_empty() || (0..problem.stages.len()).all(has_form) {
+        Ok(())
+    } else {
+        refuse_laws(problem, ClosedForm.name())
+    }
 }
 
 /// The formulas, stage by stage.

@@ -323,7 +323,7 @@ fn length_of(problem: &Problem) -> f64 {
 struct Reduced {
     /// Its coefficients; where it has a law of its own, those of the law made linear at the start.
     law: Stage,
-    own: Option<OwnLaw>,
+    own: Option<Rc<OwnLaw>>,
     /// Unit of depth L (m).
     length: f64,
     /// Unit of speed V0 (m/s).
@@ -353,13 +353,15 @@ impl Reduced {
             return Err(IntegrationError::NotFinite { what: "the force over the mass", last: start });
         }
         course.limit()?;
-        let own = course.law().map(|law| OwnLaw {
-            law: law.clone(),
-            start: start.depth,
-            length,
-            speed,
-            acceleration: length / mass / speed / speed,
-            side: law.end().map_or(1.0, |end| end.side(start)),
+        let own = course.law().map(|law| {
+            Rc::new(OwnLaw {
+                law: law.clone(),
+                start: start.depth,
+                length,
+                speed,
+                acceleration: length / mass / speed / speed,
+                side: law.end().map_or(1.0, |end| end.side(start)),
+            })
         });
         Ok(Self { law, own, length, unit_speed: speed, start, speed: start.velocity / speed })
     }
@@ -400,7 +402,6 @@ impl Reduced {
 }
 
 /// A law of its own in the units of a stage.
-#[derive(Clone)]
 struct OwnLaw {
     law: Law,
     /// Depth (m) at the start of the stage.
@@ -667,8 +668,9 @@ impl Seen {
 
 /// The law that the library's closures read, and what they count.
 struct Force {
-    law: Cell<Stage>,
-    own: RefCell<Option<OwnLaw>>,
+    /// Coefficients; `None` where the stage has a law of its own.
+    law: Cell<Option<Stage>>,
+    own: RefCell<Option<Rc<OwnLaw>>>,
     start: Cell<(f64, f64)>,
     evaluations: Cell<u64>,
 }
@@ -683,19 +685,27 @@ impl Force {
 
     #[inline]
     fn force(&self, y: &[f64]) -> f64 {
-        self.own.borrow().as_ref().map_or_else(|| self.law.get().force(y[0], y[1]), |own| own.force(y))
+        self.law.get().map_or_else(|| self.own_force(y), |law| law.force(y[0], y[1]))
+    }
+
+    #[cold]
+    fn own_force(&self, y: &[f64]) -> f64 {
+        self.own.borrow().as_ref().map_or(f64::NAN, |own| own.force(y))
     }
 
     #[inline]
     fn jacobian_product(&self, y: &[f64], v: &[f64], jv: &mut [f64]) {
         jv[0] = v[1];
-        if let Some(own) = &*self.own.borrow() {
-            let (by_depth, by_velocity) = own.slopes(y);
-            jv[1] = -(by_depth * v[0] + by_velocity * v[1]);
-            return;
-        }
-        let law = self.law.get();
-        jv[1] = -(law.stiffness * v[0] + (law.viscosity + 2.0 * law.drag * y[1]) * v[1]);
+        let (by_depth, by_velocity) = self
+            .law
+            .get()
+            .map_or_else(|| self.own_slopes(y), |law| (law.stiffness, law.viscosity + 2.0 * law.drag * y[1]));
+        jv[1] = -(by_depth * v[0] + by_velocity * v[1]);
+    }
+
+    #[cold]
+    fn own_slopes(&self, y: &[f64]) -> (f64, f64) {
+        self.own.borrow().as_ref().map_or((f64::NAN, f64::NAN), |own| own.slopes(y))
     }
 
     fn start(&self, y: &mut [f64]) {
@@ -724,7 +734,7 @@ impl Solver {
     /// A solver by `scheme`, for tolerance `rtol`.
     fn of(scheme: Scheme, rtol: f64) -> Solved<Self> {
         let force = Rc::new(Force {
-            law: Cell::new(Stage::free()),
+            law: Cell::new(None),
             own: RefCell::default(),
             start: Cell::default(),
             evaluations: Cell::default(),
@@ -860,11 +870,12 @@ where
     fn solve(&mut self, stage: &Reduced, method: &Diffsol, course: &mut Course<'_>) -> Solved<StageEnd> {
         let law = stage.law;
         let &OfScheme { scheme, rtol, ref force, .. } = self.of;
-        force.law.set(law);
+        force.law.set(stage.own.is_none().then_some(law));
         force.own.replace(stage.own.clone());
         force.evaluations.set(0);
         let longest_step = law.longest_step();
         let first_step = scheme.first_step_share(rtol) * law.shortest_time(stage.speed);
+        let margin_error = scheme.margin_error(rtol);
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
         let mut before = Node { time: 0.0, depth: 0.0, velocity: stage.speed };
@@ -931,15 +942,17 @@ where
             cost.steps += 1;
             let scratch = &mut self.scratch;
             let mut interpolant = |t| solver.interpolate_inplace(t, scratch).map(|()| (scratch[0], scratch[1]));
-            let lost = course.error_bound + scheme.margin_error(rtol) * seen.energy_max;
+            let lost = course.error_bound + margin_error * seen.energy_max;
             let end = end_of_step(stage, force, course, lost, [before, after], &mut interpolant);
             let end = end.map_err(|e| failure(e, epoch, before))?;
             let place = end.map_or(after, StageEnd::state);
             if let Some(own) = &stage.own {
                 own.note(&mut seen, [before, place], &mut interpolant).map_err(|e| failure(e, epoch, before))?;
             }
-            let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
-            sampled.map_err(|e| failure(e, epoch, before))?;
+            if matches!(course.detail, Detail::Times(_)) {
+                let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
+                sampled.map_err(|e| failure(e, epoch, before))?;
+            }
             seen.energy_max = seen.energy_max.max(place.velocity * place.velocity);
             if let Some(end) = end {
                 break end;
@@ -962,7 +975,7 @@ where
         }
         course.cost = course.cost + cost;
         seen.widen_bound(course, stage, (scheme, rtol), cost.steps as f64);
-        stage.end_of(course, end, epoch, scheme.margin_error(rtol))
+        stage.end_of(course, end, epoch, margin_error)
     }
 }
 
@@ -986,6 +999,7 @@ fn end_of_step(
 }
 
 /// Adds the states at the times asked for between two nodes, whose times count from `epoch`, by the library's `interpolant`.
+#[cold]
 fn sample_inside(
     stage: &Reduced,
     course: &mut Course<'_>,

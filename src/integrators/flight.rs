@@ -147,10 +147,12 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[inline(always)]
     pub(crate) fn limit(&self) -> Solved<S> {
         let limit = self.problem.limit_of(self.stage);
-        let Stage { static_force, stiffness, .. } = self.problem.stages[self.stage];
         // A static force that is positive far out brings every projectile to rest.
-        let stops_far_out = stiffness.value() > 0.0 || (static_force.value() > 0.0 && stiffness.value() == 0.0);
-        if limit.value() == f64::INFINITY && !stops_far_out { self.limitless() } else { Ok(limit) }
+        let stops_far_out = |law: &Stage<S>| {
+            law.stiffness.value() > 0.0 || (law.static_force.value() > 0.0 && law.stiffness.value() == 0.0)
+        };
+        let is_open = limit.value() == f64::INFINITY && !stops_far_out(&self.problem.stages[self.stage]);
+        if is_open { self.limitless() } else { Ok(limit) }
     }
 
     /// No limit, where the force of the stage is an expression: the flight shows whether it ends.
@@ -225,6 +227,15 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
     }
 
+    /// Adds the states at times that the steps of the method leave of the stage, by a rounding.
+    #[inline(always)]
+    fn sample_rest_of_stage(&mut self) {
+        if let Detail::Times(times) = self.detail {
+            let end = self.state;
+            self.push_until(times, end, |_| end);
+        }
+    }
+
     #[cold]
     #[inline(never)]
     fn push_until(&mut self, times: &[f64], end: State<S>, mut at: impl FnMut(f64) -> State<S>) {
@@ -242,7 +253,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// Lists the event `kind` at the present state, if events are wanted.
     #[inline(always)]
     pub(crate) fn event(&mut self, kind: EventKind) {
-        if self.detail >= Detail::Events {
+        if !matches!(self.detail, Detail::End) {
             self.events.push(Event { kind, state: self.state });
             self.sample(self.state);
         }
@@ -520,12 +531,13 @@ fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is
     course.finish((is_through && moves).then_some(Bounded { value: 1.0, bound: 0.0 }))
 }
 
-/// Solves the present stage, whose force is a table of velocity, piece by piece: V falls or rises from row to row.
+/// Solves the present stage of a problem with laws of its own. A table of velocity is solved piece by piece: V falls or rises
+/// from row to row.
 #[cold]
-fn through_table<S: Scalar>(course: &mut Course<'_, S>, method: &mut impl StageSolver<S>) -> Solved<StageEnd<S>> {
+fn through_own<S: Scalar>(course: &mut Course<'_, S>, method: &mut impl StageSolver<S>) -> Solved<StageEnd<S>> {
     let own = course.problem.laws.of(course.stage);
     let rows = own.and_then(Law::table).map_or(0, |table| table.rows().len());
-    let ends_at = |state| own.and_then(Law::end).is_some_and(|end| end.is_met(state));
+    let ends_at = |state| rows == 0 || own.and_then(Law::end).is_some_and(|end| end.is_met(state));
     for _ in 0..=rows {
         course.refuse_unknown_speed()?;
         course.piece = own.and_then(|law| law.piece(course.state.velocity.value()));
@@ -572,8 +584,9 @@ pub(crate) fn solve<S: Scalar>(
             break;
         }
         course.just_met = None;
-        let is_table = course.law().is_some_and(|law| law.table().is_some());
-        let end = if is_table { through_table(&mut course, method)? } else { method.solve_stage(&mut course)? };
+        let end =
+            if problem.laws.is_empty() { method.solve_stage(&mut course) } else { through_own(&mut course, method) };
+        let end = end?;
         let rests = match end {
             StageEnd::Limit(state) => {
                 course.state = state;
@@ -595,9 +608,7 @@ pub(crate) fn solve<S: Scalar>(
                 false
             }
         };
-        // What the steps of the method leave of the stage, by a rounding.
-        let end = course.state;
-        course.sample_until(end, |_| end);
+        course.sample_rest_of_stage();
         if !rests {
             course.pass_ends();
             course.is_through = course.state.depth.value() >= problem.exit_depth.value();

@@ -887,12 +887,13 @@ impl Scene {
             return self.resolve(impact_speed);
         }
         Parameter::Velocity.admit(impact_speed)?;
-        let mut stages = Stages::from_slice(&problem.stages);
+        let mut problem = Problem { impact_speed, ..problem.clone() };
         let continuous = self.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous);
         if let (Some(crater), true) = (problem.crater, continuous) {
+            let stages = &mut problem.stages;
             stages[crater] = continuous_crater(stages[crater].end, &stages[crater + 1], self.mass, impact_speed)?;
         }
-        Ok(Problem { impact_speed, stages, ..problem.clone() })
+        Ok(problem)
     }
 
     /// The equation of motion at the scene's own impact velocity.
