@@ -11,7 +11,7 @@ use std::f64::consts::LN_2;
 use serde::Serialize;
 
 use super::grid_convergence::{Behaviour, admissible, local_order, range};
-use super::order::{FitError, ORDER_RESOLUTION, PowerLaw, STEPS_MIN, alternates, student_t};
+use super::order::{FitError, ORDER_RESOLUTION, PowerLaw, STEPS_MIN, alternates, regular_slope, student_t};
 use super::power_law::{GridValue, Model, Samples, Weights};
 
 /// Least order behind a 95 % interval of a limit. Below it a limit is not bounded by any finite table.
@@ -350,9 +350,6 @@ fn law_level(rows: usize) -> f64 {
 /// Values as near to a law as this, over their range, need no trend besides: two terms of different signs turn around.
 pub(super) const SCATTER_SURE: f64 = 1e-3;
 
-/// Values alternate as those of a law do when the logarithms of their changes are this near to a line.
-const REGULAR: f64 = 0.25;
-
 /// Level of Kendall's test for a trend in the step.
 pub const TREND_LEVEL: f64 = 2e-3;
 
@@ -405,16 +402,9 @@ pub(super) fn oscillation(table: &[GridValue]) -> Option<Behaviour> {
     if differences.contains(&0.0) || !alternates(&down) {
         return None;
     }
-    let middle = |i: usize| 0.5 * (table[i].step.ln() + table[i + 1].step.ln());
-    let mean = (0..differences.len()).map(middle).sum::<f64>() / differences.len() as f64;
+    let middles: Vec<f64> = table.windows(2).map(|pair| 0.5 * (pair[0].step.ln() + pair[1].step.ln())).collect();
     let changes: Vec<f64> = differences.iter().map(|d| d.abs().ln()).collect();
-    let changes_mean = changes.iter().sum::<f64>() / changes.len() as f64;
-    let spread: f64 = (0..changes.len()).map(|i| (middle(i) - mean).powi(2)).sum();
-    let slope = changes.iter().enumerate().map(|(i, change)| (middle(i) - mean) * change).sum::<f64>() / spread;
-    let off = |i: usize| (changes[i] - changes_mean - slope * (middle(i) - mean)).abs();
-    if (0..changes.len()).any(|i| off(i) > REGULAR) {
-        return None;
-    }
+    let slope = regular_slope(&middles, &changes)?;
     Some(if slope > 0.0 { Behaviour::OscillatingConverging } else { Behaviour::OscillatingDiverging })
 }
 

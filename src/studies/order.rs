@@ -405,7 +405,7 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
             format!("the errors do not fall with the step and are {height:.1e} times the round-off"),
         );
     }
-    if negative.len() >= STEPS_MIN && alternates(negative) {
+    if negative.len() >= STEPS_MIN && alternates(negative) && line.scatter <= REGULAR {
         let n = negative.len();
         return (Class::Oscillating, format!("the error changes sign from step to step, {n} points"));
     }
@@ -422,9 +422,18 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     }
 }
 
+/// Scatter of logarithms about their line up to which the sizes of what alternates follow a power of the step.
+const REGULAR: f64 = 0.15;
+
+/// Slope of the logarithms `y` over `x` where they follow a line as those of an oscillation do.
+pub(super) fn regular_slope(x: &[f64], y: &[f64]) -> Option<f64> {
+    regression(x, y).filter(|line| line.scatter <= REGULAR).map(|line| line.slope)
+}
+
 /// Whether at least nine in ten neighbours differ in sign, at least three signs given.
 ///
-/// Random signs do so in 1 of 8 tables of four points, and in 1 of 10¹⁰ of sixty.
+/// Random signs do so in 1 of 8 tables of four points, and in 1 of 10¹⁰ of sixty: only sizes that are regular besides make
+/// an oscillation.
 pub(super) fn alternates(negative: &[bool]) -> bool {
     let pairs = negative.len().saturating_sub(1);
     let changes = negative.windows(2).filter(|pair| pair[0] != pair[1]).count();
@@ -476,8 +485,13 @@ pub(super) fn line_of(points: &[(f64, f64)], level: f64) -> Option<PowerLaw> {
 
 /// `None` for fewer than [`STEPS_MIN`] points or fewer than two different x.
 fn line(x: &[f64], y: &[f64]) -> Option<Line> {
+    if x.len() < STEPS_MIN { None } else { regression(x, y) }
+}
+
+/// As [`line`], from three points on.
+fn regression(x: &[f64], y: &[f64]) -> Option<Line> {
     let n = x.len();
-    if n < STEPS_MIN {
+    if n < 3 {
         return None;
     }
     let centre = [x.iter().sum::<f64>() / n as f64, y.iter().sum::<f64>() / n as f64];

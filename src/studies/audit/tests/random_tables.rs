@@ -157,6 +157,15 @@ fn smooth_random_tables_pass_and_no_limit_of_theirs_is_refused() {
     }
 }
 
+/// By chance, errors of few rows change their sign from step to step. Only sizes that follow a power make an oscillation.
+#[test]
+fn right_saw_tooth_tables_seldom_fail_beside_their_exact_value() {
+    for kind in ["saw-tooth of order 1", "saw-tooth of order 2"] {
+        let counts = count_all(kind, 200);
+        assert!(counts.exact[1] <= 4, "{kind}: {} of {}", counts.exact[1], counts.tables);
+    }
+}
+
 #[test]
 #[ignore = "prints the figures of every kind: minutes; PENETRODE_CASES tables of each"]
 fn figures_of_random_tables() {
