@@ -24,7 +24,9 @@
 //! refused.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
+use super::law_series::{LawSeries, Variable};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved, refuse_laws};
+use super::taylor::Precision;
 use crate::physics::{Problem, Scalar, Stage, State};
 
 /// Name of the method.
@@ -105,8 +107,10 @@ impl Energy {
     /// - [`IntegrationError::NeverEnds`]: an unbounded last stage does not resist at rest;
     /// - [`IntegrationError::NotFinite`], [`IntegrationError::StepBudgetSpent`]: numbers beyond the range of `S`.
     pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
-        refuse_laws(problem, NAME)?;
         refuse_viscosity(problem)?;
+        if !problem.laws.is_empty() {
+            return flight::solve(problem, detail, &mut Laws { tolerance: self.tolerance::<S>() });
+        }
         let now = State { time: S::zero(), depth: S::zero(), velocity: S::one() };
         let mut stages = Stages { walk: Walk::from_impact(self.tolerance::<S>()), now, clock: Cost::default() };
         flight::solve(problem, detail, &mut stages)
@@ -144,6 +148,10 @@ impl Integrator for Energy {
     }
 
     fn exit_margin(&self, problem: &Problem) -> Solved<Option<Margin>> {
+        if !problem.laws.is_empty() {
+            let flight = self.solve(problem, Detail::End)?;
+            return Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }));
+        }
         let margin = self.exit_margin_in(problem)?;
         Ok(margin.map(|(value, error, cost)| Margin { value, error: Some(error), cost }))
     }
@@ -155,7 +163,7 @@ fn refuse_viscosity<S: Scalar>(problem: &Problem<S>) -> Solved<()> {
         if problem.start_of(index).value() >= problem.exit_depth.value() {
             break;
         }
-        if stage.viscosity.value() != 0.0 {
+        if problem.laws.of(index).is_none() && stage.viscosity.value() != 0.0 {
             return Err(IntegrationError::Refused {
                 method: NAME,
                 why: format!(
@@ -446,6 +454,37 @@ impl<S: Scalar> StageSolver<S> for Stages<S> {
             course.cost = self.walk.cost + self.clock;
         }
         Ok(Bounded { value: self.walk.least.value(), bound: self.walk.least_error })
+    }
+}
+
+/// The method where a stage has a law of its own.
+struct Laws {
+    tolerance: f64,
+}
+
+impl<S: Scalar> StageSolver<S> for Laws {
+    #[cold]
+    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>> {
+        let tolerance = self.tolerance;
+        if let Some(law) = course.law() {
+            let limit = course.limit()?;
+            let series = LawSeries { method: NAME, variable: Variable::Depth, tolerance };
+            return if Precision::<S>::IS_SINGLE {
+                series.solve::<S, 12>(course, law, limit)
+            } else if Precision::<S>::IS_DOUBLE {
+                series.solve::<S, 22>(course, law, limit)
+            } else {
+                series.solve::<S, 40>(course, law, limit)
+            };
+        }
+        // One of coefficients among them, from where the stages before it lead.
+        let State { time, depth, velocity } = course.state;
+        let unit = course.problem.impact_speed;
+        let now = State { time: time * unit, depth, velocity: velocity.over(unit) };
+        let w = now.velocity * now.velocity;
+        let error = course.error_bound + ROUNDINGS_PER_STEP * S::EPSILON * w.value();
+        let walk = Walk { depth, w, error, cost: course.cost, ..Walk::from_impact(tolerance) };
+        Stages { walk, now, clock: Cost::default() }.solve_stage(course)
     }
 }
 

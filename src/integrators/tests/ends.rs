@@ -1,6 +1,6 @@
 //! Contracts of a flight whose stages end at a speed or on a condition, for every method that takes laws.
 
-use super::laws::methods;
+use super::laws::{is_exact, methods};
 use super::*;
 use crate::physics::{Advice, EventKind, Outcome, Problem, Scene};
 use crate::studies::critical_velocity;
@@ -34,7 +34,7 @@ fn is_near(value: f64, exact: f64, allowed: f64) -> bool {
 #[test]
 fn an_end_at_a_speed_is_met_at_its_place_and_time_by_every_method() {
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&problem(SAND, 400.0), Detail::Events).unwrap();
         assert_eq!(
             (flight.outcome, kinds(&flight.events)),
@@ -81,7 +81,7 @@ fn a_stage_that_is_entered_at_its_end_ends_there() {
 #[test]
 fn a_condition_is_met_where_its_sides_are_equal_and_the_mass_that_joins_keeps_the_momentum() {
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 16.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 16.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&problem(&with_thickness(PLUG, 0.1), 260.0), Detail::Events).unwrap();
         let events = [EventKind::StageEnd(0), EventKind::Exit];
         assert_eq!((flight.outcome, kinds(&flight.events)), (Outcome::Perforated, events.to_vec()), "{name}");
@@ -107,7 +107,7 @@ fn a_condition_is_met_where_its_sides_are_equal_and_the_mass_that_joins_keeps_th
 fn a_mass_that_joins_at_a_depth_is_slowed_with_the_projectile() {
     let text = "[[stage]]\nstatic_force = 36000\nend = 0.1\nadd_mass = 0.5\n[[stage]]\nstatic_force = 25600\n";
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let rows = method.integrator().solve(&problem(text, 100.0), Detail::Trajectory).unwrap().trajectory;
         let speeds: Vec<_> = rows.iter().filter(|row| row.state.depth == 0.1).map(|row| row.state.velocity).collect();
         assert!([80.0, 64.0].iter().all(|v| speeds.iter().any(|speed| is_near(*speed, *v, allowed))), "{speeds:?}");
@@ -130,7 +130,7 @@ fn a_mass_that_joins_at_a_depth_is_slowed_with_the_projectile() {
 fn the_exit_margin_counts_the_speed_at_a_condition_behind_which_a_force_drives() {
     let text = "[[stage]]\nstatic_force = 36000\nend_velocity = 80\n[[stage]]\nstatic_force = -36000\n";
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&problem(&with_thickness(text, 0.15), 100.0), Detail::End).unwrap();
         assert!(is_near(flight.exit_margin.unwrap(), 0.64, allowed), "{name}: {:?}", flight.exit_margin);
     }
@@ -205,7 +205,7 @@ fn the_outcome_next_to_the_critical_speed_is_right_or_undecided_where_a_stage_en
                     method.integrator().solve(&problem(&with_thickness(SAND, exit), 400.0), Detail::End).unwrap();
                 let is_right = flight.outcome == Outcome::Undecided || flight.outcome.is_stop() == (side > 0.0);
                 assert!(is_right, "{name}: {} at {exit}", flight.outcome);
-                let resolves = name == MethodName::Taylor && nearness > 1e-11;
+                let resolves = is_exact(name) && nearness > 1e-11;
                 assert!(!resolves || flight.outcome != Outcome::Undecided, "{name}, {nearness}");
             }
         }
@@ -239,7 +239,7 @@ fn a_slab_plugs_where_the_force_is_the_strength_left_and_its_limit_is_the_static
                 [perforation]\ncriterion = 'plug'\nhalf_angle = '60 deg'\nshear_strength = 7.2e6\n";
     let scene = Scene::from_toml(text, "plug").unwrap();
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&scene.problem().unwrap(), Detail::Events).unwrap();
         assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Plug, EventKind::Exit], "{name}");
         let [crater, plug, exit] = [0, 1, 2].map(|index| flight.events[index].state);
@@ -298,7 +298,7 @@ fn speeds_that_perforate_are_intervals_where_a_slower_projectile_misses_a_condit
 
 #[test]
 fn formulas_refuse_ends_that_are_no_depths() {
-    for name in [MethodName::Energy, MethodName::ClosedForm, MethodName::Enclosure] {
+    for name in [MethodName::ClosedForm, MethodName::Enclosure] {
         let method = Method::new(name, &MethodOptions::default()).unwrap();
         let error = method.integrator().solve(&problem(SAND, 300.0), Detail::End).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("end"), "{error}");
@@ -322,7 +322,7 @@ fn a_condition_that_is_touched_is_met_and_one_that_is_missed_by_little_is_not() 
             let is_met = flight.events.iter().any(|event| event.kind == EventKind::StageEnd(0));
             assert!(is_met == meets || flight.outcome == Outcome::Undecided, "{name}, {a}: {flight:?}");
             assert!(
-                name != MethodName::Taylor || is_met == meets && flight.outcome != Outcome::Undecided,
+                !is_exact(name) || is_met == meets && flight.outcome != Outcome::Undecided,
                 "{flight:?}"
             );
         }
@@ -355,7 +355,7 @@ fn the_first_of_many_zeros_and_a_narrow_one_far_ahead_are_not_stepped_over() {
             let met = flight.events.first().map(|event| (event.kind, event.state.depth));
             let is_first = met.is_some_and(|(kind, x)| kind == EventKind::StageEnd(0) && is_near(x, first, 1e-8));
             assert!(is_first || flight.outcome == Outcome::Undecided, "{name}, {condition}: {met:?} and {first}");
-            assert!(name != MethodName::Taylor || is_first && flight.outcome != Outcome::Undecided, "{condition}");
+            assert!(!is_exact(name) || is_first && flight.outcome != Outcome::Undecided, "{condition}");
         }
     }
 }

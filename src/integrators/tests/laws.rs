@@ -140,7 +140,7 @@ const KNOWN: [(&str, f64, f64, f64, f64, f64); 14] = [
 /// Methods that take a law, to round-off or to `rtol`.
 pub(super) fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
     let names = MethodName::built().filter(|name| {
-        !matches!(name, MethodName::Energy | MethodName::ClosedForm | MethodName::Enclosure)
+        !matches!(name, MethodName::ClosedForm | MethodName::Enclosure)
             && name.accuracy() != Accuracy::Step
     });
     names
@@ -152,12 +152,22 @@ pub(super) fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
         .collect()
 }
 
+/// Whether the method works to round-off: `taylor` and `energy`.
+pub(super) fn is_exact(name: MethodName) -> bool {
+    name.accuracy() == Accuracy::RoundOff
+}
+
+/// The methods to round-off: over time, and over depth.
+pub(super) fn exact_methods() -> [Box<dyn Integrator>; 2] {
+    [Box::new(Taylor::default()), Box::new(Energy::new())]
+}
+
 #[test]
 fn every_method_solves_every_law_as_accurately_as_it_promises() {
     for (name, method) in methods(1e-10) {
         // Steps that pass a kink, or a power at rest, lose accuracy that the library does not see.
         for (force, speed, depth, time, exit, velocity) in KNOWN {
-            let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
+            let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
             let flight = method.integrator().solve(&problem(force, speed), Detail::Events).unwrap();
             assert_eq!((flight.outcome, kinds(&flight.events)), (Outcome::Stopped, vec![EventKind::Rest]), "{force}");
             let through = problem(force, speed).with_exit(exit);
@@ -185,7 +195,7 @@ fn a_law_in_code_is_solved_as_the_same_law_in_text() {
     let coded = |speed| Problem::of_stages(2.0, speed, [Stage::free()]).with_law(0, &Law::of_code(Arc::new(Rate)));
     let (_, speed, depth, time, exit, velocity) = KNOWN[2];
     for (name, method) in methods(1e-10) {
-        if name == MethodName::Taylor {
+        if is_exact(name) {
             let error = method.integrator().solve(&coded(speed), Detail::End).unwrap_err();
             assert!(error.is_usage() && error.to_string().contains("a law in code"), "{error}");
             continue;
@@ -222,13 +232,13 @@ fn a_law_in_code_without_a_value_ends_the_flight_with_an_error() {
 }
 
 #[test]
-fn methods_that_are_formulas_refuse_a_law() {
-    for name in [MethodName::Energy, MethodName::ClosedForm] {
-        let method = Method::new(name, &MethodOptions::default()).unwrap();
-        let error = method.integrator().solve(&problem("P + R*(V/v1)^1.5", 300.0), Detail::End).unwrap_err();
-        assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
-    }
-    assert!(reference::flight(Source::Problem(&problem("P + R*(V/v1)^1.5", 300.0))).is_err());
+fn what_is_a_formula_refuses_a_law() {
+    let problem = problem("P + R*(V/v1)^1.5", 300.0);
+    let error = ClosedForm.solve(&problem, Detail::End).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
+    let error = Energy::new().exit_margin_in(&problem).map(drop).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
+    assert!(reference::flight(Source::Problem(&problem)).is_err());
 }
 
 /// The same problem with every stage written as an expression, and solved as one: its coefficients are those that are read.
@@ -394,7 +404,7 @@ fn laws_without_a_series_at_their_start_or_without_bound_at_rest_are_solved() {
     for (force, depth, time) in BRANCHED {
         let problem = problem(force, 300.0);
         for (name, method) in methods(1e-10) {
-            let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 1e4 * name.promise_at(1e-10) };
+            let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 1e4 * name.promise_at(1e-10) };
             let end = method.integrator().solve(&problem, Detail::End).unwrap().end;
             let error = (end.depth / depth - 1.0).abs().max((end.time / time - 1.0).abs());
             assert!(error <= allowed, "{name}, {force}: {error:e}");
@@ -478,7 +488,7 @@ fn the_exit_margin_is_continuous_and_its_bound_holds_next_to_the_critical_speed(
                     let is_past = flight.exit_margin.is_some_and(|margin| margin > 0.0);
                     let agrees = is_past == (flight.outcome == Outcome::Perforated);
                     assert!(flight.outcome == Outcome::Undecided || agrees, "{name}, {force}: {flight:?}");
-                    let resolves = name == MethodName::Taylor && nearness > 1e-11;
+                    let resolves = is_exact(name) && nearness > 1e-11;
                     assert!(!resolves || flight.outcome != Outcome::Undecided, "{name}, {force}, {nearness}");
                 }
             }

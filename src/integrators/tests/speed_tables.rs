@@ -31,7 +31,7 @@ fn everyone() -> Vec<(MethodName, Method)> {
 
 fn allowed(name: MethodName) -> f64 {
     match name {
-        MethodName::Taylor | MethodName::ClosedForm => 16.0 * f64::EPSILON,
+        MethodName::Taylor | MethodName::Energy | MethodName::ClosedForm => 16.0 * f64::EPSILON,
         _ => 300.0 * name.promise_at(1e-10),
     }
 }
