@@ -22,11 +22,13 @@
 //!
 //! A viscous stage (`r > 0`) brings √w into the first equation, which is then neither linear nor smooth at rest; it is
 //! refused.
+//!
+//! A stage with a law of its own is solved by [`super::law_series`], whose steps go over depth, and over velocity near rest. With
+//! `taylor` it shares the series of the expression, and not the variable.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::law_series::{LawSeries, Variable};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved, refuse_laws};
-use super::taylor::Precision;
 use crate::physics::{Problem, Scalar, Stage, State};
 
 /// Name of the method.
@@ -103,7 +105,7 @@ impl Energy {
     /// Only a trajectory allocates.
     ///
     /// # Errors
-    /// - [`IntegrationError::Refused`]: a stage before the exit depth is viscous;
+    /// - [`IntegrationError::Refused`]: a stage of coefficients before the exit depth is viscous, or a law is one in code;
     /// - [`IntegrationError::NeverEnds`]: an unbounded last stage does not resist at rest;
     /// - [`IntegrationError::NotFinite`], [`IntegrationError::StepBudgetSpent`]: numbers beyond the range of `S`.
     pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
@@ -122,7 +124,8 @@ impl Energy {
     /// without an exit depth, or at no impact speed.
     ///
     /// # Errors
-    /// As [`Energy::solve_in`], save that a flight with an exit always ends here.
+    /// As [`Energy::solve_in`], save that a flight with an exit always ends here; [`IntegrationError::Refused`] for a problem with
+    /// laws of its own, whose margin is that of the flight ([`Integrator::exit_margin`]).
     pub fn exit_margin_in<S: Scalar>(&self, problem: &Problem<S>) -> Solved<Option<(S, f64, Cost)>> {
         refuse_laws(problem, NAME)?;
         refuse_viscosity(problem)?;
@@ -150,7 +153,11 @@ impl Integrator for Energy {
     fn exit_margin(&self, problem: &Problem) -> Solved<Option<Margin>> {
         if !problem.laws.is_empty() {
             let flight = self.solve(problem, Detail::End)?;
-            return Ok(flight.exit_margin.map(|value| Margin { value, error: flight.exit_margin_error, cost: flight.cost }));
+            return Ok(flight.exit_margin.map(|value| Margin {
+                value,
+                error: flight.exit_margin_error,
+                cost: flight.cost,
+            }));
         }
         let margin = self.exit_margin_in(problem)?;
         Ok(margin.map(|(value, error, cost)| Margin { value, error: Some(error), cost }))
@@ -469,13 +476,7 @@ impl<S: Scalar> StageSolver<S> for Laws {
         if let Some(law) = course.law() {
             let limit = course.limit()?;
             let series = LawSeries { method: NAME, variable: Variable::Depth, tolerance };
-            return if Precision::<S>::IS_SINGLE {
-                series.solve::<S, 12>(course, law, limit)
-            } else if Precision::<S>::IS_DOUBLE {
-                series.solve::<S, 22>(course, law, limit)
-            } else {
-                series.solve::<S, 40>(course, law, limit)
-            };
+            return series.solve(course, law, limit);
         }
         // One of coefficients among them, from where the stages before it lead.
         let State { time, depth, velocity } = course.state;

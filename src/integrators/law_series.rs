@@ -33,12 +33,12 @@
 
 use std::convert::Infallible;
 
-use super::flight::{Course, SLOW, StageEnd, VANISHES};
+use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES};
 use super::locate;
 use super::outcome::{IntegrationError, Solved};
-use super::taylor::{STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
+use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
 use crate::physics::condition::Sight;
-use crate::physics::expression::{Bound, Jets};
+use crate::physics::expression::{Bound, Jets, product};
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
 
@@ -353,8 +353,26 @@ pub(super) struct LawSeries {
 }
 
 impl LawSeries {
-    /// Solves the present stage, of `law`, up to `limit`, by series of K coefficients.
-    pub(super) fn solve<S: Scalar, const K: usize>(
+    /// Solves the present stage, of `law`, up to `limit`.
+    #[inline(never)]
+    pub(super) fn solve<S: Scalar>(self, course: &mut Course<'_, S>, law: &Law<S>, limit: S) -> Solved<StageEnd<S>> {
+        if Precision::<S>::IS_SINGLE {
+            return self.solve_by::<S, 12>(course, law, limit);
+        }
+        if !Precision::<S>::IS_DOUBLE {
+            return self.solve_by::<S, 40>(course, law, limit);
+        }
+        // As in `taylor`.
+        match self.tolerance {
+            tolerance if tolerance > 1e-5 => self.solve_by::<S, 8>(course, law, limit),
+            tolerance if tolerance > 1e-9 => self.solve_by::<S, 12>(course, law, limit),
+            tolerance if tolerance > 1e-13 => self.solve_by::<S, 16>(course, law, limit),
+            _ => self.solve_by::<S, 22>(course, law, limit),
+        }
+    }
+
+    /// The same by series of K coefficients.
+    fn solve_by<S: Scalar, const K: usize>(
         self,
         course: &mut Course<'_, S>,
         law: &Law<S>,
@@ -398,6 +416,10 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
         if let Some(end) = self.end_of_slow(course, force, limit) {
             return Ok(Some(end));
+        }
+        let is_endless = limit.value() == f64::INFINITY && self.end.is_none();
+        if is_endless && force.value() < 0.0 && self.law.never_slows(start.depth.value()) {
+            return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
         let (path, kink) = match self.path(course, force, limit) {
@@ -516,7 +538,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let (v, x) = (velocity.value(), depth.value());
         let relative = v / course.problem.impact_speed.value();
         let to_rest = 0.5 * self.mass.value() * v * v / force.value().abs();
-        let is_lost = relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
+        // Behind a drive the bound may go beyond all numbers before the velocity does.
+        let is_bounded = course.error_bound < f64::INFINITY;
+        let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
         if is_lost && self.law.force_value(x, 0.0) != 0.0 {
             // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
             return Some(StageEnd::Rest(State { velocity: S::zero(), ..course.state }));
@@ -813,11 +837,10 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             if next < K {
                 let share = reciprocal(next);
                 path.time[next] = S::from_f64(unit) * slowness[k] * share;
-                let (v, p) = (&mut path.velocity, &slowness);
-                let known = (1..next).fold(S::zero(), |sum, i| sum + v[i] * v[next - i]);
+                let v = &mut path.velocity;
+                let known = product(&v[1..next], &v[1..next]);
                 v[next] = -((rate * force * share + known * S::from_f64(0.5)) * inverse);
-                let product = (1..=next).fold(S::zero(), |sum, i| sum + v[i] * p[next - i]);
-                slowness[next] = -(product * inverse);
+                slowness[next] = -(product(&v[1..=next], &slowness[..next]) * inverse);
             }
         }
         path
@@ -846,13 +869,17 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 binomial *= -(f64::from(power) - k as f64) / (k as f64 + 1.0);
             }
         }
-        let inverse = S::one().over(force);
+        // That of the side chosen: at a switch the other one has the same value, and in dual numbers another slope.
+        let mut inverse = S::zero();
         let mut forces = [S::zero(); K];
         // dt/ds.
         let mut pace = [S::zero(); K];
         self.jets.start_falling(self.bound, &self.sides, m);
         for k in 0..K {
             forces[k] = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
+            if k == 0 {
+                inverse = S::one().over(forces[0]);
+            }
             let known = (1..=k).fold(rate[k], |sum, i| sum - forces[i] * pace[k - i]);
             pace[k] = known * inverse;
             if k + 1 < K {

@@ -368,7 +368,7 @@ impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> 
         let limit = course.limit()?;
         if let Some(law) = course.law() {
             let series = LawSeries { method: "taylor", variable: Variable::Time, tolerance: self.0.tolerance };
-            return series.solve::<S, K>(course, law, limit);
+            return series.solve(course, law, limit);
         }
         match Shape::of(law) {
             Shape::Constant => self.0.step_through::<S, 4, false, false, false>(course, limit),
