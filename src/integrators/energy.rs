@@ -102,7 +102,7 @@ impl Energy {
     /// Integrates `problem` in any number type; dual numbers give the sensitivities of every result.
     ///
     /// Depth and margin are good to a few units of round-off of `S`; times likewise, each times its condition number.
-    /// Only a trajectory allocates.
+    /// Of stages of coefficients only a trajectory allocates.
     ///
     /// # Errors
     /// - [`IntegrationError::Refused`]: a stage of coefficients before the exit depth is viscous, or a law is one in code;
