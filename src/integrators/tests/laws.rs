@@ -487,6 +487,9 @@ fn a_law_that_drives_for_ever_behind_a_barrier_never_ends() {
         let error = method.solve(&problem("R*(1 - x/l)", 100.0), Detail::End).unwrap_err();
         let IntegrationError::NeverEnds { why, last } = error else { panic!("{error}") };
         assert!(why.contains("drives") && last.depth >= 0.02 && last.depth < 1.0, "{why}, {last}");
+        // Bounds of the expression do not show it here, and no number is an end.
+        let error = method.solve(&problem("R*sqrt(x/l) + R*(1 - x/l)", 100.0), Detail::End).unwrap_err();
+        assert!(error.last().is_some_and(|last| last.velocity > 1e100), "{error}");
     }
 }
 
