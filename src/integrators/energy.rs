@@ -22,8 +22,12 @@
 //!
 //! A viscous stage (`r > 0`) brings √w into the first equation, which is then neither linear nor smooth at rest; it is
 //! refused.
+//!
+//! A stage with a law of its own is solved by [`super::law_series`], whose steps go over depth, and over velocity near rest. With
+//! `taylor` it shares the series of the expression, and not the variable.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
+use super::law_series::{LawSeries, Variable};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved, refuse_laws};
 use crate::physics::{Problem, Scalar, Stage, State};
 
@@ -98,15 +102,17 @@ impl Energy {
     /// Integrates `problem` in any number type; dual numbers give the sensitivities of every result.
     ///
     /// Depth and margin are good to a few units of round-off of `S`; times likewise, each times its condition number.
-    /// Only a trajectory allocates.
+    /// Of stages of coefficients only a trajectory allocates.
     ///
     /// # Errors
-    /// - [`IntegrationError::Refused`]: a stage before the exit depth is viscous;
+    /// - [`IntegrationError::Refused`]: a stage of coefficients before the exit depth is viscous, or a law is one in code;
     /// - [`IntegrationError::NeverEnds`]: an unbounded last stage does not resist at rest;
     /// - [`IntegrationError::NotFinite`], [`IntegrationError::StepBudgetSpent`]: numbers beyond the range of `S`.
     pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
-        refuse_laws(problem, NAME)?;
         refuse_viscosity(problem)?;
+        if !problem.laws.is_empty() {
+            return flight::solve(problem, detail, &mut Laws { tolerance: self.tolerance::<S>() });
+        }
         let now = State { time: S::zero(), depth: S::zero(), velocity: S::one() };
         let mut stages = Stages { walk: Walk::from_impact(self.tolerance::<S>()), now, clock: Cost::default() };
         flight::solve(problem, detail, &mut stages)
@@ -118,7 +124,8 @@ impl Energy {
     /// without an exit depth, or at no impact speed.
     ///
     /// # Errors
-    /// As [`Energy::solve_in`], save that a flight with an exit always ends here.
+    /// As [`Energy::solve_in`], save that a flight with an exit always ends here; [`IntegrationError::Refused`] for a problem with
+    /// laws of its own, whose margin is that of the flight ([`Integrator::exit_margin`]).
     pub fn exit_margin_in<S: Scalar>(&self, problem: &Problem<S>) -> Solved<Option<(S, f64, Cost)>> {
         refuse_laws(problem, NAME)?;
         refuse_viscosity(problem)?;
@@ -144,6 +151,14 @@ impl Integrator for Energy {
     }
 
     fn exit_margin(&self, problem: &Problem) -> Solved<Option<Margin>> {
+        if !problem.laws.is_empty() {
+            let flight = self.solve(problem, Detail::End)?;
+            return Ok(flight.exit_margin.map(|value| Margin {
+                value,
+                error: flight.exit_margin_error,
+                cost: flight.cost,
+            }));
+        }
         let margin = self.exit_margin_in(problem)?;
         Ok(margin.map(|(value, error, cost)| Margin { value, error: Some(error), cost }))
     }
@@ -155,7 +170,7 @@ fn refuse_viscosity<S: Scalar>(problem: &Problem<S>) -> Solved<()> {
         if problem.start_of(index).value() >= problem.exit_depth.value() {
             break;
         }
-        if stage.viscosity.value() != 0.0 {
+        if problem.laws.of(index).is_none() && stage.viscosity.value() != 0.0 {
             return Err(IntegrationError::Refused {
                 method: NAME,
                 why: format!(
@@ -446,6 +461,31 @@ impl<S: Scalar> StageSolver<S> for Stages<S> {
             course.cost = self.walk.cost + self.clock;
         }
         Ok(Bounded { value: self.walk.least.value(), bound: self.walk.least_error })
+    }
+}
+
+/// The method where a stage has a law of its own.
+struct Laws {
+    tolerance: f64,
+}
+
+impl<S: Scalar> StageSolver<S> for Laws {
+    #[cold]
+    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>> {
+        let tolerance = self.tolerance;
+        if let Some(law) = course.law() {
+            let limit = course.limit()?;
+            let series = LawSeries { method: NAME, variable: Variable::Depth, tolerance };
+            return series.solve(course, law, limit);
+        }
+        // One of coefficients among them, from where the stages before it lead.
+        let State { time, depth, velocity } = course.state;
+        let unit = course.problem.impact_speed;
+        let now = State { time: time * unit, depth, velocity: velocity.over(unit) };
+        let w = now.velocity * now.velocity;
+        let error = course.error_bound + ROUNDINGS_PER_STEP * S::EPSILON * w.value();
+        let walk = Walk { depth, w, error, cost: course.cost, ..Walk::from_impact(tolerance) };
+        Stages { walk, now, clock: Cost::default() }.solve_stage(course)
     }
 }
 

@@ -26,7 +26,7 @@ pub(crate) const SLOW: f64 = 1e-6;
 pub(crate) const VANISHES: &str = "its resistance vanishes with the velocity, so that it is only slowed for ever";
 
 /// Why nothing ends a stage that drives.
-const DRIVES: &str = "the last stage drives the projectile and has no far side";
+pub(crate) const DRIVES: &str = "the last stage drives the projectile and has no far side";
 
 /// Why a table of velocity brings nothing to rest.
 const TERMINAL: &str =

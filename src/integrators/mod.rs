@@ -22,6 +22,7 @@ pub mod energy;
 mod every_method;
 mod flight;
 pub mod lanes;
+mod law_series;
 #[cfg(test)]
 #[path = "tests/laws.rs"]
 #[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]

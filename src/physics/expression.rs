@@ -35,6 +35,7 @@ use thiserror::Error;
 
 pub use bound::Bound;
 pub use jets::Jets;
+pub(crate) use jets::product;
 pub use parse::is_name;
 pub use tape::{DomainError, Reason, Tape};
 pub use unit::Unit;

@@ -18,8 +18,8 @@ use crate::text::Shown;
 
 /// A force F(x, V) in code, for what an expression does not hold: a table of two variables, a model fitted to data.
 ///
-/// Every method takes it but `taylor`, which needs the series of an expression, and the methods that are formulas. What a
-/// step hides between the places at which a method asks for the force is not seen.
+/// Every method takes it but `taylor` and `energy`, which need the series of an expression, and the methods that are formulas.
+/// What a step hides between the places at which a method asks for the force is not seen.
 ///
 /// # Example
 /// ```

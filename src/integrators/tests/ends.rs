@@ -1,6 +1,6 @@
 //! Contracts of a flight whose stages end at a speed or on a condition, for every method that takes laws.
 
-use super::laws::methods;
+use super::laws::{exact_methods, is_exact, methods};
 use super::*;
 use crate::physics::{Advice, EventKind, Outcome, Problem, Scene};
 use crate::studies::critical_velocity;
@@ -34,7 +34,7 @@ fn is_near(value: f64, exact: f64, allowed: f64) -> bool {
 #[test]
 fn an_end_at_a_speed_is_met_at_its_place_and_time_by_every_method() {
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&problem(SAND, 400.0), Detail::Events).unwrap();
         assert_eq!(
             (flight.outcome, kinds(&flight.events)),
@@ -81,7 +81,7 @@ fn a_stage_that_is_entered_at_its_end_ends_there() {
 #[test]
 fn a_condition_is_met_where_its_sides_are_equal_and_the_mass_that_joins_keeps_the_momentum() {
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 16.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 16.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&problem(&with_thickness(PLUG, 0.1), 260.0), Detail::Events).unwrap();
         let events = [EventKind::StageEnd(0), EventKind::Exit];
         assert_eq!((flight.outcome, kinds(&flight.events)), (Outcome::Perforated, events.to_vec()), "{name}");
@@ -107,7 +107,7 @@ fn a_condition_is_met_where_its_sides_are_equal_and_the_mass_that_joins_keeps_th
 fn a_mass_that_joins_at_a_depth_is_slowed_with_the_projectile() {
     let text = "[[stage]]\nstatic_force = 36000\nend = 0.1\nadd_mass = 0.5\n[[stage]]\nstatic_force = 25600\n";
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let rows = method.integrator().solve(&problem(text, 100.0), Detail::Trajectory).unwrap().trajectory;
         let speeds: Vec<_> = rows.iter().filter(|row| row.state.depth == 0.1).map(|row| row.state.velocity).collect();
         assert!([80.0, 64.0].iter().all(|v| speeds.iter().any(|speed| is_near(*speed, *v, allowed))), "{speeds:?}");
@@ -130,7 +130,7 @@ fn a_mass_that_joins_at_a_depth_is_slowed_with_the_projectile() {
 fn the_exit_margin_counts_the_speed_at_a_condition_behind_which_a_force_drives() {
     let text = "[[stage]]\nstatic_force = 36000\nend_velocity = 80\n[[stage]]\nstatic_force = -36000\n";
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&problem(&with_thickness(text, 0.15), 100.0), Detail::End).unwrap();
         assert!(is_near(flight.exit_margin.unwrap(), 0.64, allowed), "{name}: {:?}", flight.exit_margin);
     }
@@ -205,7 +205,7 @@ fn the_outcome_next_to_the_critical_speed_is_right_or_undecided_where_a_stage_en
                     method.integrator().solve(&problem(&with_thickness(SAND, exit), 400.0), Detail::End).unwrap();
                 let is_right = flight.outcome == Outcome::Undecided || flight.outcome.is_stop() == (side > 0.0);
                 assert!(is_right, "{name}: {} at {exit}", flight.outcome);
-                let resolves = name == MethodName::Taylor && nearness > 1e-11;
+                let resolves = is_exact(name) && nearness > 1e-11;
                 assert!(!resolves || flight.outcome != Outcome::Undecided, "{name}, {nearness}");
             }
         }
@@ -225,9 +225,11 @@ fn a_critical_speed_is_found_where_stages_end_at_speeds() {
 /// The slowest that gets through rests where the static force is the shear strength left.
 #[test]
 fn a_critical_speed_is_found_where_a_stage_ends_on_a_condition() {
-    let found = critical_velocity::of_scene(&scene(&with_thickness(PLUG, 0.1)), &Taylor::default()).unwrap();
-    assert!(is_near(found.velocity, 229.327_924_231_836, 1e-12), "{}", found.velocity);
-    assert!(found.error_bar.unwrap() < 1e-9 && !found.note.is_empty(), "{found:?}");
+    for method in exact_methods() {
+        let found = critical_velocity::of_scene(&scene(&with_thickness(PLUG, 0.1)), &*method).unwrap();
+        assert!(is_near(found.velocity, 229.327_924_231_836, 1e-12), "{}", found.velocity);
+        assert!(found.error_bar.unwrap() < 1e-9 && !found.note.is_empty(), "{found:?}");
+    }
 }
 
 /// The slab of the paper, S = 12: crater and tunnel by their closed forms, the plug at the zero of R - F, the critical speed
@@ -239,7 +241,7 @@ fn a_slab_plugs_where_the_force_is_the_strength_left_and_its_limit_is_the_static
                 [perforation]\ncriterion = 'plug'\nhalf_angle = '60 deg'\nshear_strength = 7.2e6\n";
     let scene = Scene::from_toml(text, "plug").unwrap();
     for (name, method) in methods(1e-10) {
-        let allowed = if name == MethodName::Taylor { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let allowed = if is_exact(name) { 32.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
         let flight = method.integrator().solve(&scene.problem().unwrap(), Detail::Events).unwrap();
         assert_eq!(kinds(&flight.events), [EventKind::CraterEnd, EventKind::Plug, EventKind::Exit], "{name}");
         let [crater, plug, exit] = [0, 1, 2].map(|index| flight.events[index].state);
@@ -255,8 +257,10 @@ fn a_slab_plugs_where_the_force_is_the_strength_left_and_its_limit_is_the_static
             assert!(is_near(value, exact, allowed), "{name}: {value} and {exact}");
         }
     }
-    let found = critical_velocity::of_scene(&scene, &Taylor::default()).unwrap();
-    assert!(is_near(found.velocity, 99.377_690_863_332_65, 1e-13), "{found:?}");
+    for method in exact_methods() {
+        let found = critical_velocity::of_scene(&scene, &*method).unwrap();
+        assert!(is_near(found.velocity, 99.377_690_863_332_65, 1e-13), "{found:?}");
+    }
 }
 
 /// R - F grows from the face on, where the slowest that plugs breaks it at once: `P + Q V_c² = R(H)`.
@@ -287,18 +291,20 @@ fn the_residual_velocity_jumps_at_the_ballistic_limit_where_the_force_falls_fast
 fn speeds_that_perforate_are_intervals_where_a_slower_projectile_misses_a_condition() {
     let text = "target.thickness = 0.1\nparameters.v1 = '100 m/s'\n[[stage]]\nstatic_force = 25000\n\
                 until = 'V = v1'\n[[stage]]\nstatic_force = 1e6\n";
-    let (intervals, found) = critical_velocity::speeds(&scene(text), &Taylor::default()).unwrap();
-    let ends: Vec<_> = intervals.iter().map(|one| (one.low.velocity, one.high.map(|high| high.velocity))).collect();
-    let [(first, Some(last)), (second, None)] = ends[..] else { unreachable!("{ends:?}") };
-    assert!(found.is_none() && is_near(first, 50.0, 1e-13) && is_near(last, 100.0, 1e-13), "{ends:?}");
-    assert!(is_near(second, 12_250_f64.sqrt(), 1e-13), "{ends:?}");
+    for method in exact_methods() {
+        let (intervals, found) = critical_velocity::speeds(&scene(text), &*method).unwrap();
+        let ends: Vec<_> = intervals.iter().map(|one| (one.low.velocity, one.high.map(|high| high.velocity))).collect();
+        let [(first, Some(last)), (second, None)] = ends[..] else { unreachable!("{ends:?}") };
+        assert!(found.is_none() && is_near(first, 50.0, 1e-13) && is_near(last, 100.0, 1e-13), "{ends:?}");
+        assert!(is_near(second, 12_250_f64.sqrt(), 1e-13), "{ends:?}");
+    }
     let error = critical_velocity::of_scene(&scene(text), &Taylor::default()).unwrap_err().to_string();
     assert!(error.contains("50 to 99.99") && error.contains("and above"), "{error}");
 }
 
 #[test]
 fn formulas_refuse_ends_that_are_no_depths() {
-    for name in [MethodName::Energy, MethodName::ClosedForm, MethodName::Enclosure] {
+    for name in [MethodName::ClosedForm, MethodName::Enclosure] {
         let method = Method::new(name, &MethodOptions::default()).unwrap();
         let error = method.integrator().solve(&problem(SAND, 300.0), Detail::End).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("end"), "{error}");
@@ -321,10 +327,7 @@ fn a_condition_that_is_touched_is_met_and_one_that_is_missed_by_little_is_not() 
             let flight = method.integrator().solve(&problem(&text(a), 100.0), Detail::Events).unwrap();
             let is_met = flight.events.iter().any(|event| event.kind == EventKind::StageEnd(0));
             assert!(is_met == meets || flight.outcome == Outcome::Undecided, "{name}, {a}: {flight:?}");
-            assert!(
-                name != MethodName::Taylor || is_met == meets && flight.outcome != Outcome::Undecided,
-                "{flight:?}"
-            );
+            assert!(!is_exact(name) || is_met == meets && flight.outcome != Outcome::Undecided, "{flight:?}");
         }
     }
     let flight = Taylor::default().solve(&problem(&text(touched), 100.0), Detail::Events).unwrap();
@@ -355,7 +358,7 @@ fn the_first_of_many_zeros_and_a_narrow_one_far_ahead_are_not_stepped_over() {
             let met = flight.events.first().map(|event| (event.kind, event.state.depth));
             let is_first = met.is_some_and(|(kind, x)| kind == EventKind::StageEnd(0) && is_near(x, first, 1e-8));
             assert!(is_first || flight.outcome == Outcome::Undecided, "{name}, {condition}: {met:?} and {first}");
-            assert!(name != MethodName::Taylor || is_first && flight.outcome != Outcome::Undecided, "{condition}");
+            assert!(!is_exact(name) || is_first && flight.outcome != Outcome::Undecided, "{condition}");
         }
     }
 }

@@ -140,8 +140,7 @@ const KNOWN: [(&str, f64, f64, f64, f64, f64); 14] = [
 /// Methods that take a law, to round-off or to `rtol`.
 pub(super) fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
     let names = MethodName::built().filter(|name| {
-        !matches!(name, MethodName::Energy | MethodName::ClosedForm | MethodName::Enclosure)
-            && name.accuracy() != Accuracy::Step
+        !matches!(name, MethodName::ClosedForm | MethodName::Enclosure) && name.accuracy() != Accuracy::Step
     });
     names
         .map(|name| {
@@ -152,12 +151,22 @@ pub(super) fn methods(rtol: f64) -> Vec<(MethodName, Method)> {
         .collect()
 }
 
+/// Whether the method works to round-off: `taylor` and `energy`.
+pub(super) fn is_exact(name: MethodName) -> bool {
+    name.accuracy() == Accuracy::RoundOff
+}
+
+/// The methods to round-off: over time, and over depth.
+pub(super) fn exact_methods() -> [Box<dyn Integrator>; 2] {
+    [Box::new(Taylor::default()), Box::new(Energy::new())]
+}
+
 #[test]
 fn every_method_solves_every_law_as_accurately_as_it_promises() {
     for (name, method) in methods(1e-10) {
         // Steps that pass a kink, or a power at rest, lose accuracy that the library does not see.
         for (force, speed, depth, time, exit, velocity) in KNOWN {
-            let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
+            let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 300.0 * name.promise_at(1e-10) };
             let flight = method.integrator().solve(&problem(force, speed), Detail::Events).unwrap();
             assert_eq!((flight.outcome, kinds(&flight.events)), (Outcome::Stopped, vec![EventKind::Rest]), "{force}");
             let through = problem(force, speed).with_exit(exit);
@@ -185,7 +194,7 @@ fn a_law_in_code_is_solved_as_the_same_law_in_text() {
     let coded = |speed| Problem::of_stages(2.0, speed, [Stage::free()]).with_law(0, &Law::of_code(Arc::new(Rate)));
     let (_, speed, depth, time, exit, velocity) = KNOWN[2];
     for (name, method) in methods(1e-10) {
-        if name == MethodName::Taylor {
+        if is_exact(name) {
             let error = method.integrator().solve(&coded(speed), Detail::End).unwrap_err();
             assert!(error.is_usage() && error.to_string().contains("a law in code"), "{error}");
             continue;
@@ -222,13 +231,13 @@ fn a_law_in_code_without_a_value_ends_the_flight_with_an_error() {
 }
 
 #[test]
-fn methods_that_are_formulas_refuse_a_law() {
-    for name in [MethodName::Energy, MethodName::ClosedForm] {
-        let method = Method::new(name, &MethodOptions::default()).unwrap();
-        let error = method.integrator().solve(&problem("P + R*(V/v1)^1.5", 300.0), Detail::End).unwrap_err();
-        assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
-    }
-    assert!(reference::flight(Source::Problem(&problem("P + R*(V/v1)^1.5", 300.0))).is_err());
+fn what_is_a_formula_refuses_a_law() {
+    let problem = problem("P + R*(V/v1)^1.5", 300.0);
+    let error = ClosedForm.solve(&problem, Detail::End).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
+    let error = Energy::new().exit_margin_in(&problem).map(drop).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("a law of its own"), "{error}");
+    assert!(reference::flight(Source::Problem(&problem)).is_err());
 }
 
 /// The same problem with every stage written as an expression, and solved as one: its coefficients are those that are read.
@@ -394,7 +403,7 @@ fn laws_without_a_series_at_their_start_or_without_bound_at_rest_are_solved() {
     for (force, depth, time) in BRANCHED {
         let problem = problem(force, 300.0);
         for (name, method) in methods(1e-10) {
-            let allowed = if name == MethodName::Taylor { 8.0 * f64::EPSILON } else { 1e4 * name.promise_at(1e-10) };
+            let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 1e4 * name.promise_at(1e-10) };
             let end = method.integrator().solve(&problem, Detail::End).unwrap().end;
             let error = (end.depth / depth - 1.0).abs().max((end.time / time - 1.0).abs());
             assert!(error <= allowed, "{name}, {force}: {error:e}");
@@ -422,11 +431,13 @@ fn a_wall_far_ahead_is_not_stepped_over() {
             assert!(flight.outcome.is_stop() && inner.contains(&flight.end.depth), "{name}, {force}: {}", flight.end);
         }
         let resolve = |speed| Ok(Problem { impact_speed: speed, ..problem.clone() });
-        let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
         // The work of the wall and of the slab.
         let law = problem.laws.of(0).unwrap();
         let exact = (2.0 * law.static_work(0.0, 0.33).1 / 2.0).sqrt();
-        assert!((critical.velocity / exact - 1.0).abs() < 1e-9, "{force}: {} and {exact}", critical.velocity);
+        for method in exact_methods() {
+            let critical = crate::studies::critical_velocity::critical_velocity(resolve, &*method).unwrap();
+            assert!((critical.velocity / exact - 1.0).abs() < 1e-9, "{force}: {} and {exact}", critical.velocity);
+        }
     }
 }
 
@@ -435,20 +446,24 @@ fn a_wall_far_ahead_is_not_stepped_over() {
 fn a_critical_speed_on_a_barrier_is_found() {
     let problem = problem("P*(1 - x/l)", 100.0).with_exit(0.1);
     let resolve = |speed| Ok(Problem { impact_speed: speed, ..problem.clone() });
-    let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
     let exact = (848e3_f64 * 0.02 / 2.0).sqrt();
-    assert!((critical.velocity / exact - 1.0).abs() < 1e-12, "{} and {exact}", critical.velocity);
-    let on_it = Taylor::default().solve(&resolve(exact).unwrap(), Detail::End).unwrap();
-    assert_eq!(on_it.outcome, Outcome::Undecided);
+    for method in exact_methods() {
+        let critical = crate::studies::critical_velocity::critical_velocity(resolve, &*method).unwrap();
+        assert!((critical.velocity / exact - 1.0).abs() < 1e-12, "{} and {exact}", critical.velocity);
+        let on_it = method.solve(&resolve(exact).unwrap(), Detail::End).unwrap();
+        assert_eq!(on_it.outcome, Outcome::Undecided);
+    }
 }
 
 #[test]
 fn a_force_without_a_value_ends_the_flight_with_its_place_and_the_reason() {
     // The root is of a negative number beyond 20 mm.
-    let error = Taylor::default().solve(&problem("P*sqrt(1 - x/l)", 302.0), Detail::End).unwrap_err();
-    let IntegrationError::NoForce { stage: 0, last, .. } = &error else { panic!("{error}") };
-    assert!((last.depth / 0.02 - 1.0).abs() < 1e-3, "{error}");
-    assert!(error.to_string().contains("sqrt(1 - x/l)"), "{error}");
+    for method in exact_methods() {
+        let error = method.solve(&problem("P*sqrt(1 - x/l)", 302.0), Detail::End).unwrap_err();
+        let IntegrationError::NoForce { stage: 0, last, .. } = &error else { panic!("{error}") };
+        assert!((last.depth / 0.02 - 1.0).abs() < 1e-3, "{error}");
+        assert!(error.to_string().contains("sqrt(1 - x/l)"), "{error}");
+    }
 }
 
 #[test]
@@ -458,8 +473,62 @@ fn a_law_that_never_rests_says_so_and_still_leaves_a_target() {
             let error = method.integrator().solve(&problem(force, 100.0), Detail::End).unwrap_err();
             assert!(matches!(error, IntegrationError::NeverEnds { .. }), "{name}, {force}: {error}");
         }
-        let flight = Taylor::default().solve(&problem(force, 100.0).with_exit(0.1), Detail::End).unwrap();
-        assert_eq!(flight.outcome, Outcome::Perforated);
+        for method in exact_methods() {
+            let flight = method.solve(&problem(force, 100.0).with_exit(0.1), Detail::End).unwrap();
+            assert_eq!(flight.outcome, Outcome::Perforated);
+        }
+    }
+}
+
+/// `R (1 - x/l)` slows up to l, and drives from there to no end.
+#[test]
+fn a_law_that_drives_for_ever_behind_a_barrier_never_ends() {
+    for method in exact_methods() {
+        let error = method.solve(&problem("R*(1 - x/l)", 100.0), Detail::End).unwrap_err();
+        let IntegrationError::NeverEnds { why, last } = error else { panic!("{error}") };
+        assert!(why.contains("drives") && last.depth >= 0.02 && last.depth < 1.0, "{why}, {last}");
+        // Bounds of the expression do not show it here, and no number is an end.
+        let error = method.solve(&problem("R*sqrt(x/l) + R*(1 - x/l)", 100.0), Detail::End).unwrap_err();
+        assert!(error.last().is_some_and(|last| last.velocity > 1e100), "{error}");
+    }
+}
+
+/// A stage of coefficients in front of a law and one behind it, against the series over time in double-double.
+#[test]
+fn stages_of_coefficients_stand_among_laws() {
+    let mixed = "[parameters]\nP = '848 kN'\nR = '50 kN'\nv1 = '100 m/s'\n";
+    let stages = |first: &str, last: &str| {
+        format!(
+            "projectile.mass = 2\n{mixed}[[stage]]\n{first}\nend = 0.01\n[[stage]]\nforce = 'P + R*(V/v1)^1.5'\nend = 0.03\n\
+             [[stage]]\n{last}\n"
+        )
+    };
+    let text = stages("static_force = 2e5\nstiffness = 1e6", "static_force = 9e5\ndrag = 3");
+    let scene = Scene::from_toml(&text, "mixed").unwrap();
+    for (speed, exit) in [(100.0, 0.1), (182.0, f64::INFINITY), (250.0, 0.05), (250.0, 0.07), (90.0, f64::INFINITY)] {
+        let problem = scene.resolve(speed).unwrap().with_exit(exit);
+        let exact = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap().values();
+        for method in exact_methods() {
+            let flight = method.solve(&problem, Detail::Events).unwrap();
+            assert_eq!((flight.outcome, kinds(&flight.events)), (exact.outcome, kinds(&exact.events)), "{problem:?}");
+            for (ours, known) in flight.events.iter().zip(&exact.events) {
+                let errors = [
+                    (ours.state.time - known.state.time) / exact.end.time,
+                    (ours.state.depth - known.state.depth) / exact.end.depth,
+                    (ours.state.velocity - known.state.velocity) / speed,
+                ];
+                assert!(errors.iter().all(|error| error.abs() < 1e-15), "{}: {errors:?}", method.name());
+            }
+            if let Some(margin) = flight.exit_margin {
+                let off = (margin - exact.exit_margin.unwrap()).abs();
+                assert!(off <= flight.exit_margin_error.unwrap(), "{}: {off:e}", method.name());
+                assert_eq!(method.exit_margin(&problem).unwrap().unwrap().value, margin);
+            }
+        }
+        let mut viscous = problem;
+        viscous.stages[0].viscosity = 5.0;
+        let error = Energy::new().solve(&viscous, Detail::End).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("viscosity of 5 kg/s"), "{error}");
     }
 }
 
@@ -478,7 +547,7 @@ fn the_exit_margin_is_continuous_and_its_bound_holds_next_to_the_critical_speed(
                     let is_past = flight.exit_margin.is_some_and(|margin| margin > 0.0);
                     let agrees = is_past == (flight.outcome == Outcome::Perforated);
                     assert!(flight.outcome == Outcome::Undecided || agrees, "{name}, {force}: {flight:?}");
-                    let resolves = name == MethodName::Taylor && nearness > 1e-11;
+                    let resolves = is_exact(name) && nearness > 1e-11;
                     assert!(!resolves || flight.outcome != Outcome::Undecided, "{name}, {force}, {nearness}");
                 }
             }
@@ -533,9 +602,11 @@ fn the_critical_speed_of_a_viscous_barrier_is_found() {
     let resolve = |speed| Ok(Problem { impact_speed: speed, ..problem.clone() });
     let (barrier, viscosity) = (50e3_f64, 50e3 * 0.2 / 100.0);
     let exact = 0.02 * (viscosity + (viscosity * viscosity + 8.0 * barrier / 0.02).sqrt()) / 4.0;
-    let critical = crate::studies::critical_velocity::critical_velocity(resolve, &Taylor::default()).unwrap();
-    let off = (critical.velocity - exact).abs();
-    assert!(off <= critical.error_bar.unwrap() && off < 1e-6 * exact, "{critical:?} and {exact}");
+    for method in exact_methods() {
+        let critical = crate::studies::critical_velocity::critical_velocity(resolve, &*method).unwrap();
+        let off = (critical.velocity - exact).abs();
+        assert!(off <= critical.error_bar.unwrap() && off < 1e-6 * exact, "{critical:?} and {exact}");
+    }
 }
 
 /// Enclosures of a force that vanishes at rest are wide; all others are as narrow as numbers allow.
@@ -693,6 +764,96 @@ fn powers_and_roots_of_what_may_be_negative_prove_nothing_false() {
         match rest {
             Some(rest) => assert!((flight.end.depth.value() - rest).abs() < 1e-12, "{force}: {:?}", flight.end),
             None => assert_eq!(flight.outcome, Outcome::Undecided, "{force}"),
+        }
+    }
+}
+
+/// Series over time and over depth share the expression and no variable: in double-double they agree to 30 digits.
+#[test]
+fn series_over_time_and_over_depth_agree_to_the_digits_of_double_double() {
+    for (force, speed, _, _, exit, _) in KNOWN {
+        for problem in [problem(force, speed), problem(force, speed).with_exit(exit)] {
+            let problem = problem.cast::<TwoFloat>();
+            let over_time = Taylor::default().solve_in(&problem, Detail::Events).unwrap();
+            let over_depth = Energy::new().solve_in(&problem, Detail::Events).unwrap();
+            assert_eq!(kinds(&over_time.values().events), kinds(&over_depth.values().events), "{force}");
+            let (a, b) = (over_time.end, over_depth.end);
+            let pairs = [(a.time, b.time), (a.depth, b.depth), (a.velocity, b.velocity)];
+            let errors = pairs.map(|(a, b)| ((a - b).value() / a.value().max(f64::MIN_POSITIVE)).abs());
+            let worst = errors.into_iter().fold(0.0, f64::max);
+            assert!(worst < 1e-30, "{force}: {worst:e}");
+        }
+    }
+}
+
+/// Against series of double-doubles over time.
+#[test]
+fn random_laws_are_solved_over_time_and_over_depth_within_the_error_bounds() {
+    let (random, mut compared) = (&mut Random::new(33), 0);
+    // Of each method: error of the margin over its bound, of the depth of rest and of its time.
+    let mut worst = [[0.0_f64; 3]; 2];
+    while compared < 300 {
+        let force = random_force(random);
+        let mut problem = problem(&force, random.log_uniform(10.0, 700.0));
+        if random.chance(0.6) {
+            problem = problem.with_exit(random.log_uniform(2e-3, 0.3));
+        }
+        let Ok(exact) = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events) else { continue };
+        let exact = exact.values();
+        if exact.outcome == Outcome::Undecided {
+            continue;
+        }
+        compared += 1;
+        for (method, worst) in exact_methods().into_iter().zip(&mut worst) {
+            let flight = method.solve(&problem, Detail::Events).unwrap();
+            let said = format!("{}, {force}, {problem:?}", method.name());
+            assert_eq!((flight.outcome, kinds(&flight.events)), (exact.outcome, kinds(&exact.events)), "{said}");
+            let mut errors = [0.0; 3];
+            if let (Some(margin), Some(bound)) = (flight.exit_margin, flight.exit_margin_error) {
+                errors[0] = (margin - exact.exit_margin.unwrap()).abs() / bound;
+            }
+            if flight.outcome.is_stop() {
+                errors[1] = (flight.end.depth / exact.end.depth - 1.0).abs();
+                errors[2] = (flight.end.time / exact.end.time - 1.0).abs();
+            }
+            assert!(errors[0] <= 1.0 && errors[1].max(errors[2]) < 2e-14, "{errors:?} {said}");
+            *worst = std::array::from_fn(|place| worst[place].max(errors[place]));
+        }
+    }
+    println!("{worst:?}");
+}
+
+/// In dual numbers, with a switch too: a step begins where both of its sides have one value and two slopes.
+#[test]
+fn derivatives_over_depth_are_those_over_time() {
+    for (force, speed, _, _, exit, _) in KNOWN {
+        for problem in [problem(force, speed), problem(force, speed).with_exit(exit)] {
+            let mut dual = problem.cast::<num_dual::Dual64>();
+            dual.impact_speed.eps = 1.0;
+            dual.mass.eps = -0.3;
+            let a = Taylor::default().solve_in(&dual, Detail::End).unwrap().end;
+            let b = Energy::new().solve_in(&dual, Detail::End).unwrap().end;
+            for (a, b) in [(a.time, b.time), (a.depth, b.depth), (a.velocity, b.velocity)] {
+                let scale = a.re.abs() / speed + a.eps.abs() + f64::MIN_POSITIVE;
+                assert!((a.eps - b.eps).abs() <= 1e-13 * scale, "{force}: {a} and {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn states_at_given_times_are_those_of_the_other_variable() {
+    for (force, speed, depth, time, ..) in KNOWN {
+        let times: Vec<_> = (0..16).map(|i| time * f64::from(i) / 16.0).collect();
+        let [one, other] = exact_methods().map(|method| {
+            let flight = method.solve(&problem(force, speed), Detail::Times(&times)).unwrap();
+            flight.trajectory
+        });
+        assert_eq!((one.len(), other.len()), (16, 16), "{force}");
+        for (a, b) in one.iter().zip(&other) {
+            assert_eq!(a.state.time, b.state.time, "{force}");
+            assert!((a.state.depth - b.state.depth).abs() <= 1e-14 * depth, "{force}: {a:?} {b:?}");
+            assert!((a.state.velocity - b.state.velocity).abs() <= 1e-14 * speed, "{force}: {a:?} {b:?}");
         }
     }
 }

@@ -233,7 +233,7 @@ fn inner_square<S: Scalar>(a: &[S; ORDERS_MAX], k: usize) -> S {
 
 /// The sum over i of `a[i] b[n-1-i]`, of two slices of the length n.
 #[inline(always)]
-fn product<S: Scalar>(a: &[S], b: &[S]) -> S {
+pub(crate) fn product<S: Scalar>(a: &[S], b: &[S]) -> S {
     let (a_fours, a_rest) = a.as_chunks::<4>();
     let (b_rest, b_fours) = b.as_rchunks::<4>();
     // Four sums at once: each waits for its last product, none for another.

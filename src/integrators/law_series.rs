@@ -2,15 +2,19 @@
 //!
 //! ```text
 //! over time      x' = V,  V' = -F(x, V)/M                            s = t
+//! over depth     (V²)' = -2 F(x, V)/M,  t' = 1/V                     s = x - x0
 //! over velocity  t' = m M V0 (1-s)^(m-1)/F(x, V),  x' = V t'         V = V0 (1-s)^m, for F > 0
 //! ```
+//!
+//! **Time or depth.** The method `taylor` goes over time, and `energy` over depth: the exit and the end of a stage are fixed ends of a
+//! step then, and nothing grazes. Rest is a branch point of V over depth.
 //!
 //! **Velocity as variable.** A fractional power of V, as in `(V/v1)^1.5`, has a branch point at V = 0: the series in time
 //! ends there, and steps shrink towards rest. With `V = u^m`, m the common denominator of the powers, F is smooth
 //! in u, and rest is the fixed end u = 0 (docs/theory.md, section 10). Where V falls fast enough, steps go by u, else by
-//! time.
+//! time. In place of depth it is taken for every law: m = 1 where no power has a branch point.
 //!
-//! **Length of a step.** The last two coefficients give it, as in [`super`]. They may vanish by chance, and a force may
+//! **Length of a step.** The last two coefficients give it, as in [`super::taylor`]. They may vanish by chance, and a force may
 //! change where they do not see it. So three places of the step are asked whether the series satisfies the equation there,
 //! and a step on which it does not is shortened. What lies between them is bounded by intervals ([`Law::shown_in`]).
 //!
@@ -29,12 +33,12 @@
 
 use std::convert::Infallible;
 
-use super::{STEPS_MAX, Steps, power_of_two_below, rough_exp2, rough_log2};
-use crate::integrators::flight::{Course, SLOW, StageEnd, VANISHES};
-use crate::integrators::locate;
-use crate::integrators::outcome::{IntegrationError, Solved};
+use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES};
+use super::locate;
+use super::outcome::{IntegrationError, Solved};
+use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
 use crate::physics::condition::Sight;
-use crate::physics::expression::{Bound, Jets};
+use crate::physics::expression::{Bound, Jets, product};
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
 
@@ -68,13 +72,13 @@ const NEAR_TURN: f64 = 0.99999;
 /// Longest step by velocity where the force vanishes at rest: its quotients cancel towards the end.
 const VANISHING_SPAN: f64 = 0.5;
 
-/// Longest step in its unit of time, and times that the unit may be changed, by `2^-20`, where coefficients overflow: a unit of
+/// Longest step in its unit of time or depth, and times that the unit may be changed, by `2^-20`, where coefficients overflow: a unit of
 /// nothing would have the series of a standstill.
 const SPAN_MAX: f64 = 64.0;
 const RESCALED_MAX: u32 = 40;
 
-/// Share of the velocity's root that a step by velocity must take to be taken without asking for one by time; and behind
-/// another such step.
+/// Share of the velocity's root that a step by velocity must take to be taken without asking for one by time or depth; and
+/// behind another such step.
 const ENOUGH: f64 = 0.3;
 const STILL_ENOUGH: f64 = 0.05;
 
@@ -100,6 +104,8 @@ struct Path<S, const K: usize> {
 enum Form {
     /// Time, in a unit of so many seconds.
     Time(f64),
+    /// Depth, in a unit of so many metres.
+    Depth(f64),
     /// `V = V0 (1-s)^m`.
     Velocity(u32),
 }
@@ -212,15 +218,22 @@ impl<S: Scalar, const K: usize> Path<S, K> {
     /// The state at `s`, its time since the start of the step.
     fn at(&self, s: S) -> State<S> {
         let velocity = match self.form {
-            Form::Time(_) => value(&self.velocity, s),
+            Form::Time(_) | Form::Depth(_) => value(&self.velocity, s),
             // By its formula: the series cancels towards rest.
             Form::Velocity(m) => (1..=m).fold(self.velocity[0], |v, _| v * (S::one() - s)),
         };
         let time = match self.form {
             Form::Time(unit) => s * S::from_f64(unit),
-            Form::Velocity(_) => value(&self.time, s),
+            Form::Depth(_) | Form::Velocity(_) => value(&self.time, s),
         };
         State { time, depth: value(&self.depth, s), velocity }
+    }
+
+    /// Where a step over depth meets the limit.
+    fn limit_over_depth(&self, limit: S) -> Option<S> {
+        let Form::Depth(unit) = self.form else { return None };
+        let end = (limit - self.depth[0]).over(S::from_f64(unit));
+        (end.value() <= self.span).then_some(end)
     }
 
     /// What is left of the velocity at its end.
@@ -242,6 +255,7 @@ impl<S: Scalar, const K: usize> Path<S, K> {
         };
         self.span = match self.form {
             Form::Time(_) => of(&self.velocity, self.velocity[0]).min(SPAN_MAX),
+            Form::Depth(_) => of(&self.velocity, self.velocity[0]).min(of(&self.time, self.time[1])).min(SPAN_MAX),
             Form::Velocity(_) => of(&self.depth, self.depth[1]).min(of(&self.time, self.time[1])).min(1.0),
         };
         self
@@ -256,12 +270,18 @@ impl<S: Scalar, const K: usize> Path<S, K> {
     fn defect(&self, s: f64, law: &Law<S>, mass: f64) -> f64 {
         let (velocity, rate) = both(&self.velocity, s);
         let velocity = match self.form {
-            Form::Time(_) => velocity,
+            Form::Time(_) | Form::Depth(_) => velocity,
             Form::Velocity(m) => self.velocity[0].value() * (1.0 - s).powi(m.cast_signed()),
         };
         let force = law.force_value(both(&self.depth, s).0, velocity);
         match self.form {
             Form::Time(unit) => (rate + force / mass * unit).abs() * self.span / self.velocity[0].value(),
+            Form::Depth(unit) => {
+                let start = self.velocity[0].value();
+                let of_energy = (rate * velocity + force / mass * unit).abs() / start / start;
+                let of_time = (both(&self.time, s).1 * velocity / unit - 1.0).abs();
+                of_energy.max(of_time) * self.span
+            }
             Form::Velocity(m) => {
                 let falling = (1.0 - s).powi(m.cast_signed() - 1);
                 let rate = f64::from(m) * mass * self.velocity[0].value() * falling / force;
@@ -277,16 +297,16 @@ impl<S: Scalar, const K: usize> Path<S, K> {
 
     /// Rounding that the defect has by itself: of the force, and of the sum.
     fn noise(&self, force: f64, mass: f64) -> f64 {
+        let of = |series: &[S], first: usize| {
+            let largest = series.iter().enumerate().skip(first).rev();
+            largest.fold(0.0, |sum, (k, c)| sum * self.span + k as f64 * c.value().abs())
+        };
+        let (speed, pace) = (self.velocity[0].value(), self.time[1].value());
+        let lost = |unit: f64| force.abs() / mass * unit * self.span;
         match self.form {
-            Form::Time(unit) => {
-                let largest = self.velocity.iter().enumerate().rev();
-                let sum = largest.fold(0.0, |sum, (k, c)| sum * self.span + k as f64 * c.value().abs());
-                (sum + force.abs() / mass * unit * self.span) / self.velocity[0].value()
-            }
-            Form::Velocity(_) => {
-                let largest = self.time.iter().enumerate().skip(1).rev();
-                largest.fold(0.0, |sum, (k, c)| sum * self.span + k as f64 * c.value().abs()) / self.time[1].value()
-            }
+            Form::Time(unit) => (of(&self.velocity, 0) + lost(unit)) / speed,
+            Form::Depth(unit) => (of(&self.velocity, 0) + lost(unit) / speed) / speed + of(&self.time, 0) / pace,
+            Form::Velocity(_) => of(&self.time, 1) / pace,
         }
     }
 }
@@ -304,6 +324,8 @@ struct Walk<'l, S, const K: usize> {
     kink: Option<usize>,
     /// Whether the step before went by velocity.
     goes_by_velocity: bool,
+    /// What a step goes by that does not go by velocity.
+    variable: Variable,
     tolerance: f64,
     /// The condition that ends the stage, and the sign of g on the way to it.
     end: Option<(&'l Condition<S>, f64)>,
@@ -311,17 +333,54 @@ struct Walk<'l, S, const K: usize> {
     slope: Option<f64>,
 }
 
-impl Steps {
+/// What a step goes by, where it does not go by velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Variable {
+    /// Time.
+    Time,
+    /// Depth.
+    Depth,
+}
+
+/// How a method solves stages with laws of their own.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LawSeries {
+    /// Its name.
+    pub(super) method: &'static str,
+    pub(super) variable: Variable,
+    /// Truncation error of a step, relative to the velocity.
+    pub(super) tolerance: f64,
+}
+
+impl LawSeries {
     /// Solves the present stage, of `law`, up to `limit`.
-    pub(super) fn through_law<S: Scalar, const K: usize>(
-        &self,
+    #[inline(never)]
+    pub(super) fn solve<S: Scalar>(self, course: &mut Course<'_, S>, law: &Law<S>, limit: S) -> Solved<StageEnd<S>> {
+        if Precision::<S>::IS_SINGLE {
+            return self.solve_by::<S, 12>(course, law, limit);
+        }
+        if !Precision::<S>::IS_DOUBLE {
+            return self.solve_by::<S, 40>(course, law, limit);
+        }
+        // As in `taylor`.
+        match self.tolerance {
+            tolerance if tolerance > 1e-5 => self.solve_by::<S, 8>(course, law, limit),
+            tolerance if tolerance > 1e-9 => self.solve_by::<S, 12>(course, law, limit),
+            tolerance if tolerance > 1e-13 => self.solve_by::<S, 16>(course, law, limit),
+            _ => self.solve_by::<S, 22>(course, law, limit),
+        }
+    }
+
+    /// The same by series of K coefficients.
+    fn solve_by<S: Scalar, const K: usize>(
+        self,
         course: &mut Course<'_, S>,
         law: &Law<S>,
         limit: S,
     ) -> Solved<StageEnd<S>> {
         let Some(bound) = law.bound() else {
             let why = "a law in code has no series; take --method adaptive".to_owned();
-            return Err(IntegrationError::Refused { method: "taylor", why });
+            return Err(IntegrationError::Refused { method: self.method, why });
         };
         let mut walk = Walk::<S, K> {
             law,
@@ -332,6 +391,7 @@ impl Steps {
             sides: vec![false; bound.switches().len()],
             kink: None,
             goes_by_velocity: false,
+            variable: self.variable,
             tolerance: self.tolerance,
             slope: law.line().map(|line| line.slope),
         };
@@ -356,6 +416,10 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
         if let Some(end) = self.end_of_slow(course, force, limit) {
             return Ok(Some(end));
+        }
+        let is_endless = limit.value() == f64::INFINITY && self.end.is_none();
+        if is_endless && force.value() < 0.0 && self.law.never_slows(start.depth.value()) {
+            return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
         let (path, kink) = match self.path(course, force, limit) {
@@ -403,7 +467,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             let since = time - start.time.value();
             let s = match path.form {
                 Form::Time(unit) => since / unit,
-                Form::Velocity(_) => {
+                Form::Depth(_) | Form::Velocity(_) => {
                     let passed = |s| {
                         let (time, pace) = both(&path.time, s);
                         (time - since, pace)
@@ -474,7 +538,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let (v, x) = (velocity.value(), depth.value());
         let relative = v / course.problem.impact_speed.value();
         let to_rest = 0.5 * self.mass.value() * v * v / force.value().abs();
-        let is_lost = relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
+        // Behind a drive the bound may go beyond all numbers before the velocity does.
+        let is_bounded = course.error_bound < f64::INFINITY;
+        let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
         if is_lost && self.law.force_value(x, 0.0) != 0.0 {
             // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
             return Some(StageEnd::Rest(State { velocity: S::zero(), ..course.state }));
@@ -532,16 +598,21 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     fn path(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<(Path<S, K>, Option<usize>)> {
         let start = course.state;
         let by_velocity = self.over_velocity(start, force);
+        let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
         let mut path = match by_velocity {
-            Some(path) if path.span >= if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH } => path,
+            Some(path) if path.span >= enough && !self.may_end_over_depth(&path, limit) => path,
             other => {
-                let by_time = self.by_time(course, force, limit)?;
+                let free = self.over_time_or_depth(course, force, limit)?;
                 match other {
                     // Behind a least velocity, steps by velocity would only approach it.
-                    Some(path) if path.speed_left() < by_time.speed_left() && by_time.slows_at_its_end() => {
+                    Some(path)
+                        if path.speed_left() < free.speed_left()
+                            && free.slows_at_its_end()
+                            && free.limit_over_depth(limit).is_none() =>
+                    {
                         self.over_velocity(start, force).unwrap_or(path)
                     }
-                    _ => by_time,
+                    _ => free,
                 }
             }
         };
@@ -702,17 +773,35 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         roots.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The series over time, in a unit in which it has finite coefficients.
-    fn by_time(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Path<S, K>> {
-        let mut unit = time_unit(course.state, force, self.mass, limit);
+    /// Whether a step by velocity gets to the limit, where a step over depth may end on it.
+    fn may_end_over_depth(&self, path: &Path<S, K>, limit: S) -> bool {
+        self.variable == Variable::Depth
+            && limit.value() < f64::INFINITY
+            && both(&path.depth, path.span).0 >= limit.value()
+    }
+
+    /// The series over time or depth, in a unit in which it has finite coefficients.
+    fn over_time_or_depth(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Path<S, K>> {
+        let start = course.state;
+        let mut unit = time_unit(start, force, self.mass, limit);
+        if self.variable == Variable::Depth {
+            unit = power_of_two_below(unit * start.velocity.value());
+        }
         for _ in 0..RESCALED_MAX {
-            let path = self.over_time(course.state, unit, K);
+            let path = match self.variable {
+                Variable::Time => self.over_time(start, unit, K),
+                Variable::Depth => self.over_depth(start, unit),
+            };
             if path.is_finite() {
-                return Ok(path.spanned(self.tolerance));
+                let mut path = path.spanned(self.tolerance);
+                if let Form::Depth(unit) = path.form {
+                    path.span = path.span.min((limit - start.depth).value() / unit);
+                }
+                return Ok(path);
             }
             unit *= 1.0 / 1_048_576.0;
         }
-        Err(self.no_force(course, course.state))
+        Err(self.no_force(course, start))
     }
 
     /// The first `count` coefficients over time in units of `unit` (s).
@@ -732,9 +821,38 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         path
     }
 
-    /// The series over velocity, for a law with a branch point at rest and a force that resists.
+    /// The series over depth in units of `unit` (m).
+    fn over_depth(&mut self, start: State<S>, unit: f64) -> Path<S, K> {
+        let mut path = Path::start(Form::Depth(unit), start);
+        path.depth[1] = S::from_f64(unit);
+        self.jets.start(self.bound, &self.sides);
+        let inverse = S::one().over(start.velocity);
+        let rate = S::from_f64(unit).over(self.mass);
+        // 1/V.
+        let mut slowness = [S::zero(); K];
+        slowness[0] = inverse;
+        for k in 0..K {
+            let force = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
+            let next = k + 1;
+            if next < K {
+                let share = reciprocal(next);
+                path.time[next] = S::from_f64(unit) * slowness[k] * share;
+                let v = &mut path.velocity;
+                let known = product(&v[1..next], &v[1..next]);
+                v[next] = -((rate * force * share + known * S::from_f64(0.5)) * inverse);
+                slowness[next] = -(product(&v[1..=next], &slowness[..next]) * inverse);
+            }
+        }
+        path
+    }
+
+    /// The series over velocity, for a force that resists: over time, of a law with a branch point at rest.
     fn over_velocity(&mut self, start: State<S>, force: S) -> Option<Path<S, K>> {
-        let m = self.law.branch_at_rest().filter(|m| *m > 1)?;
+        let branch = self.law.branch_at_rest();
+        let m = match self.variable {
+            Variable::Time => branch.filter(|m| *m > 1)?,
+            Variable::Depth => branch.unwrap_or(1),
+        };
         if force.value() <= 0.0 {
             return None;
         }
@@ -751,13 +869,17 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 binomial *= -(f64::from(power) - k as f64) / (k as f64 + 1.0);
             }
         }
-        let inverse = S::one().over(force);
+        // That of the side chosen: at a switch the other one has the same value, and in dual numbers another slope.
+        let mut inverse = S::zero();
         let mut forces = [S::zero(); K];
         // dt/ds.
         let mut pace = [S::zero(); K];
         self.jets.start_falling(self.bound, &self.sides, m);
         for k in 0..K {
             forces[k] = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
+            if k == 0 {
+                inverse = S::one().over(forces[0]);
+            }
             let known = (1..=k).fold(rate[k], |sum, i| sum - forces[i] * pace[k - i]);
             pace[k] = known * inverse;
             if k + 1 < K {
@@ -817,13 +939,18 @@ fn time_unit<S: Scalar>(start: State<S>, force: S, mass: S, limit: S) -> f64 {
 /// Where the step ends, and how: at the first rest, at the limit if that comes before, else at its span.
 fn first_event<S: Scalar, const K: usize>(path: &Path<S, K>, limit: S) -> (S, Event) {
     let span = path.span;
+    if let Some(end) = path.limit_over_depth(limit) {
+        return (end, Event::Limit);
+    }
     let rest = match path.form {
         Form::Time(_) => first_rest(&path.velocity, span),
+        Form::Depth(_) => None,
         Form::Velocity(_) => (span >= 1.0).then_some(1.0),
     };
     let end = rest.unwrap_or(span);
     let beyond = |s: S| value(&path.depth, s) - limit;
-    if limit.value() < f64::INFINITY && beyond(S::from_f64(end)).value() >= 0.0 {
+    let is_open = !matches!(path.form, Form::Depth(_)) && limit.value() < f64::INFINITY;
+    if is_open && beyond(S::from_f64(end)).value() >= 0.0 {
         let limit = limit.value();
         let passed = |s| {
             let (depth, speed) = both(&path.depth, s);
@@ -837,7 +964,7 @@ fn first_event<S: Scalar, const K: usize>(path: &Path<S, K>, limit: S) -> (S, Ev
             let at = |s| value(&path.velocity, s);
             (corrected(S::from_f64(rest), span, at, |s| slope(&path.velocity, s)), Event::Rest)
         }
-        (Some(rest), Form::Velocity(_)) => (S::from_f64(rest), Event::Rest),
+        (Some(rest), Form::Depth(_) | Form::Velocity(_)) => (S::from_f64(rest), Event::Rest),
         (None, _) if path.speed_left() <= 0.0 => (S::from_f64(span), Event::Rest),
         (None, _) => (S::from_f64(span), Event::None),
     }
