@@ -149,12 +149,12 @@ impl<'a> Page<'a> {
                     main {
                         @for (index, (part, body)) in parts.iter().zip(&bodies).enumerate() {
                             section aria-labelledby=(part.id) {
-                                h2 id=(part.id) { a.no href="#contents" title="to the contents" { (index + 1) } " " (part.title) }
+                                h2 id=(part.id) { a.no href="#contents" title="to the contents" { (index + 1) } " " (typeset::html(part.title)) }
                                 (PreEscaped(body))
                             }
                             @if index == 0 {
                                 nav id="contents" aria-label="Contents" {
-                                    ol { @for part in parts { li { a href={ "#" (part.id) } { (part.title) } } } }
+                                    ol { @for part in parts { li { a href={ "#" (part.id) } { (typeset::html(part.title)) } } } }
                                     @if bodies.iter().any(|body| body.contains("<details")) {
                                         p.unfold { input id="unfold" type="checkbox"; label for="unfold" { " Show all that is folded; the search of the browser then finds it" } }
                                     }
@@ -264,7 +264,7 @@ fn linked(line: &str, anchors: &[(String, String)], cited: &mut Vec<&'static Ref
             text += &format!("[{inside}]");
         }
     }
-    (text + rest).replace("Eq. ", "Eq.\u{a0}")
+    typeset::equations(&(text + rest))
 }
 
 /// `text` as a string of CSS inside a page, 80 characters at most: whatever could end the string or the sheet is written

@@ -182,7 +182,7 @@ fn why_above_eq15(run: &Run<'_>) -> Markup {
         @if !concluded.is_empty() {
             h3 { "What becomes of the paper's conclusions" }
             (Table::cards("", ["conclusion", "here", "by which numbers, or why not"]).rows(concluded, |found| {
-                [cell(found.statement), cell(found.standing.to_string()), html! { (typeset::html(&found.reason)) }]
+                [typeset::html(found.statement), cell(found.standing.to_string()), typeset::html(&found.reason)]
             }))
         }
     }
