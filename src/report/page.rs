@@ -587,7 +587,7 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
     const NAMED: usize = 3;
     let is_whole = command.starts_with("penetrode verify") && !command.contains("--only");
     html! {
-        figure id={ "figure-" (figure.name) } class={ "panels-" (figure.panels.len()) } {
+        figure id={ "figure-" (figure.name) } {
             figcaption {
                 b { (typeset::html(&figure.message)) }
                 (typeset::html(&figure.reading)) " "
@@ -605,7 +605,7 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
                     a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
                 }
             }
-            div.panels { @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) } }
+            @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) }
         }
     }
 }
@@ -667,14 +667,14 @@ mod tests {
     fn tables_and_figures_are_numbered_in_their_order_and_found_by_their_anchors() {
         let (mut tables, mut figures, mut anchors) = (1, 0, Vec::new());
         let html = format!(
-            "{}: a<caption id=\"table-x\">X</caption><caption>&lt;caption&gt;</caption><figure id=\"figure-y\" class=\"panels-1\"><figcaption><b>Y",
+            "{}: a<caption id=\"table-x\">X</caption><caption>&lt;caption&gt;</caption><figure id=\"figure-y\"><figcaption><b>Y",
             NEXT_TABLE.0
         );
         let numbered = with_numbers(&html, &mut tables, &mut figures, &mut anchors);
         assert_eq!(
             numbered,
             "Table 2: a<caption id=\"table-x\"><b>Table 2.</b> X</caption><caption><b>Table 3.</b> &lt;caption&gt;</caption><figure \
-             id=\"figure-y\" class=\"panels-1\"><figcaption><b>Figure 1. Y"
+             id=\"figure-y\"><figcaption><b>Figure 1. Y"
         );
         assert_eq!((tables, figures), (3, 1));
         let names: Vec<_> = anchors.iter().map(|(id, name)| (id.as_str(), name.as_str())).collect();

@@ -359,8 +359,7 @@ fn of_the_paper() -> Markup {
         .unwrap_or_default()
         .lines()
         .filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "));
-    Table::grid("The paper, part by part", ["in the paper", "here"])
-        .numbers([])
+    Table::cards("The paper, part by part", ["in the paper", "here"])
         .rows(rows.skip(1), |(part, here)| [part, here].map(typeset::html))
         .render()
 }
