@@ -2,7 +2,7 @@
 //!
 //! A panel is written as SVG elements that name their colours by class, so that a page or a file sets them for light,
 //! dark and print. The same colours stand beside the classes for programs without style sheets. Series differ by shape
-//! or dashes as well as by colour. Lengths are pixels of a panel [`WIDTH`] wide: printed 80 mm wide, its text has 7 pt.
+//! or dashes as well as by colour. Lengths are pixels of a panel [`WIDTH`] wide: on paper, two in a row, its text has 8 pt.
 
 use std::fmt::Write as _;
 

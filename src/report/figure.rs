@@ -134,7 +134,9 @@ impl Figure {
 
     /// The figure as an SVG file, light or dark as the viewer asks.
     pub fn file(&self) -> String {
-        let (rows, columns) = (self.legend_rows(), self.panels.len().clamp(1, COLUMNS));
+        // Four panels are two rows of two.
+        let columns = if self.panels.len() == 4 { 2 } else { self.panels.len().clamp(1, COLUMNS) };
+        let rows = self.legend_rows();
         let width = GAP + columns as f64 * (WIDTH + GAP);
         let message = wrapped(&one_line(&self.message), (width - 2.0 * GAP) as usize / 9);
         let mut y = 1.5 * GAP + LINE * message.len() as f64;

@@ -149,12 +149,12 @@ impl<'a> Page<'a> {
                     main {
                         @for (index, (part, body)) in parts.iter().zip(&bodies).enumerate() {
                             section aria-labelledby=(part.id) {
-                                h2 id=(part.id) { a.no href="#contents" title="to the contents" { (index + 1) } " " (part.title) }
+                                h2 id=(part.id) { a.no href="#contents" title="to the contents" { (index + 1) } " " (typeset::html(part.title)) }
                                 (PreEscaped(body))
                             }
                             @if index == 0 {
                                 nav id="contents" aria-label="Contents" {
-                                    ol { @for part in parts { li { a href={ "#" (part.id) } { (part.title) } } } }
+                                    ol { @for part in parts { li { a href={ "#" (part.id) } { (typeset::html(part.title)) } } } }
                                     @if bodies.iter().any(|body| body.contains("<details")) {
                                         p.unfold { input id="unfold" type="checkbox"; label for="unfold" { " Show all that is folded; the search of the browser then finds it" } }
                                     }
@@ -264,7 +264,7 @@ fn linked(line: &str, anchors: &[(String, String)], cited: &mut Vec<&'static Ref
             text += &format!("[{inside}]");
         }
     }
-    (text + rest).replace("Eq. ", "Eq.\u{a0}")
+    typeset::equations(&(text + rest))
 }
 
 /// `text` as a string of CSS inside a page, 80 characters at most: whatever could end the string or the sheet is written
@@ -587,7 +587,7 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
     const NAMED: usize = 3;
     let is_whole = command.starts_with("penetrode verify") && !command.contains("--only");
     html! {
-        figure id={ "figure-" (figure.name) } class={ "panels-" (figure.panels.len()) } {
+        figure id={ "figure-" (figure.name) } {
             figcaption {
                 b { (typeset::html(&figure.message)) }
                 (typeset::html(&figure.reading)) " "
@@ -605,7 +605,7 @@ pub(super) fn figure(figure: &Figure, command: &str) -> Markup {
                     a href={ "figures/" (figure.name) ".svg" } { "figure as SVG" } "."
                 }
             }
-            div.panels { @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) } }
+            @for index in 0..figure.panels.len() { (PreEscaped(figure.inline(index))) }
         }
     }
 }
@@ -667,14 +667,14 @@ mod tests {
     fn tables_and_figures_are_numbered_in_their_order_and_found_by_their_anchors() {
         let (mut tables, mut figures, mut anchors) = (1, 0, Vec::new());
         let html = format!(
-            "{}: a<caption id=\"table-x\">X</caption><caption>&lt;caption&gt;</caption><figure id=\"figure-y\" class=\"panels-1\"><figcaption><b>Y",
+            "{}: a<caption id=\"table-x\">X</caption><caption>&lt;caption&gt;</caption><figure id=\"figure-y\"><figcaption><b>Y",
             NEXT_TABLE.0
         );
         let numbered = with_numbers(&html, &mut tables, &mut figures, &mut anchors);
         assert_eq!(
             numbered,
             "Table 2: a<caption id=\"table-x\"><b>Table 2.</b> X</caption><caption><b>Table 3.</b> &lt;caption&gt;</caption><figure \
-             id=\"figure-y\" class=\"panels-1\"><figcaption><b>Figure 1. Y"
+             id=\"figure-y\"><figcaption><b>Figure 1. Y"
         );
         assert_eq!((tables, figures), (3, 1));
         let names: Vec<_> = anchors.iter().map(|(id, name)| (id.as_str(), name.as_str())).collect();

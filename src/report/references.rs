@@ -147,7 +147,7 @@ pub const REFERENCES: [Reference; 18] = [
         title: "Dimensionless formulae for penetration depth of concrete target impacted by a non-deformable projectile",
         place: &[("journal", IMPACT), ("volume", "28"), ("number", "1"), ("pages", "93--116")],
         year: 2003,
-        doi: None,
+        doi: Some("10.1016/S0734-743X(02)00037-4"),
     },
     Reference {
         key: "tong2003",

@@ -5,13 +5,13 @@
 //!
 //! ```text
 //! E_c, x_p(H), u_val    what stands below the line: of the symbols of [`SYMBOLS`] alone
-//! 10^-j, 2^17           what is raised
+//! 10^-j, V_c^(1/p)      what is raised
 //! 1e-12, 2.5e6          10⁻¹², 2.5 × 10⁶
 //! `--rtol`, --dt 1e-9   code: an option with its number stays as it is typed
 //! -2.5                  −2.5, where no word and no number stands in front
 //! V0, fc, +-, ->, <=    V₀, as f_c, ±, →, ≤
 //! w dt                  ω Δt
-//! 20 %, Eq. 15          on one line
+//! 20 %, Eq. 11-12       on one line
 //! ```
 
 use std::fmt::Write as _;
@@ -39,7 +39,10 @@ fn pieces(text: &str) -> Vec<Piece> {
     let text = one_line(text).replace(" %", "\u{a0}%");
     let (mut pieces, mut line, mut rest) = (Vec::new(), String::new(), text.as_str());
     while let Some(next) = rest.chars().next() {
-        let before = line.chars().last().or_else(|| pieces.last().map(|_| ' '));
+        let before = line.chars().last().or_else(|| match pieces.last()? {
+            Piece::Below(below) => below.chars().last(),
+            _ => Some(' '),
+        });
         if let Some((set, after)) = set(rest, before) {
             if let Some(Piece::Line(start)) = set.first() {
                 line.push_str(start);
@@ -76,7 +79,7 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
         let (option, after) = rest.split_at(length);
         return Some((vec![Piece::Code(option.to_owned())], after));
     }
-    // As a terminal has it.
+    // As a terminal has it; V_bl is explained where it stands.
     let others = [
         ("+-", "±"),
         ("->", "→"),
@@ -86,6 +89,7 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
         ("V0", "V₀"),
         ("V1", "V₁"),
         ("fc", "f_c"),
+        ("V_bl", "V_bl"),
         ("w dt", "ω Δt"),
     ];
     for (typed, printed) in others {
@@ -130,6 +134,9 @@ fn set(rest: &str, before: Option<char>) -> Option<(Vec<Piece>, &str)> {
         }
     }
     let raised = rest.strip_prefix('^').filter(|_| before.is_some_and(|c| c.is_alphanumeric() || c == ')'))?;
+    if let Some((inside, after)) = raised.strip_prefix('(').and_then(|inside| inside.split_once(')')) {
+        return Some((vec![Piece::Above(inside.to_owned())], after));
+    }
     let digits = raised.strip_prefix('-').unwrap_or(raised);
     let whole = digits.find(|c: char| !c.is_alphanumeric()).unwrap_or(digits.len());
     // A point that ends a sentence is no decimal one.
@@ -159,12 +166,29 @@ fn option_with_number(text: &str) -> Option<usize> {
 pub(super) fn html(text: &str) -> Markup {
     html! { @for piece in pieces(text) {
         @match piece {
-            Piece::Line(text) => (text.replace("Eq. ", "Eq.\u{a0}")),
+            Piece::Line(text) => (PreEscaped(equations(&html! { (text) }.into_string()))),
             Piece::Below(text) => sub { (text) },
             Piece::Above(text) => sup { (text) },
             Piece::Code(text) => code { (text) },
         }
     } }
+}
+
+/// A text of HTML with each `Eq. 15` and `Eq. 11-12` on one line.
+pub(super) fn equations(html: &str) -> String {
+    let mut parts = html.split("Eq. ");
+    let mut set = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find(|c: char| !c.is_ascii_digit() && c != '-').unwrap_or(part.len());
+        let (numbers, after) = part.split_at(end);
+        // Browsers break behind a hyphen between digits.
+        set += &if numbers.contains('-') {
+            format!("<span class=\"num\">Eq. {numbers}</span>{after}")
+        } else {
+            format!("Eq.\u{a0}{part}")
+        };
+    }
+    set
 }
 
 /// `text` inside a text of a drawing.
@@ -230,7 +254,9 @@ mod tests {
         assert_eq!(page("error 0.0e0, 6.5e0"), "error 0.0, 6.5");
         assert_eq!(page("try --dt 4e-9:4e-7."), "try <code>--dt 4e-9:4e-7</code>.");
         assert_eq!(page("with --peer (10), --"), "with --peer (10), --");
+        assert_eq!(page("a (V^p − V_bl^p)^(1/p)"), "a (V<sup>p</sup> − V<sub>bl</sub><sup>p</sup>)<sup>1/p</sup>");
         assert_eq!(page("20 % of 5, Eq. 15"), "20\u{a0}% of 5, Eq.\u{a0}15");
+        assert_eq!(page("<Eq. 11-12>"), "&lt;<span class=\"num\">Eq. 11-12</span>&gt;");
         assert_eq!(page("(w dt)²/8 at w dt = 1, raw dt"), "(ω Δt)²/8 at ω Δt = 1, raw dt");
         assert_eq!(page("<b> & V_c"), "&lt;b&gt; &amp; V<sub>c</sub>");
     }

@@ -182,7 +182,7 @@ fn why_above_eq15(run: &Run<'_>) -> Markup {
         @if !concluded.is_empty() {
             h3 { "What becomes of the paper's conclusions" }
             (Table::cards("", ["conclusion", "here", "by which numbers, or why not"]).rows(concluded, |found| {
-                [cell(found.statement), cell(found.standing.to_string()), html! { (typeset::html(&found.reason)) }]
+                [typeset::html(found.statement), cell(found.standing.to_string()), typeset::html(&found.reason)]
             }))
         }
     }
@@ -359,8 +359,7 @@ fn of_the_paper() -> Markup {
         .unwrap_or_default()
         .lines()
         .filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "));
-    Table::grid("The paper, part by part", ["in the paper", "here"])
-        .numbers([])
+    Table::cards("The paper, part by part", ["in the paper", "here"])
         .rows(rows.skip(1), |(part, here)| [part, here].map(typeset::html))
         .render()
 }

@@ -32,6 +32,12 @@ const FLAGS: &str = "--headless --no-sandbox --disable-gpu --disable-background-
                      --disable-default-apps --disable-extensions --disable-sync --no-first-run --no-pings \
                      --hide-scrollbars --virtual-time-budget=10000";
 
+/// Width of what is printed on a page of A4 (px).
+const PAPER: u32 = 680;
+
+/// Height of the letters of drawings, at least (px): 8 pt on paper.
+const LETTERS: f64 = 8.0 / 0.75;
+
 /// Folders of the pages: the report of the suite, that of the stress cases, that of costs, and those of a user's code.
 const PAGES: [&str; 8] =
     ["report", "stress", "costs", "scheme", "good-table", "bad-table", "good-solver", "faulty-solver"];
@@ -229,9 +235,13 @@ impl Stage {
         Ok(asked)
     }
 
-    /// What [`MEASURE`] finds in the page when it is `width` wide.
+    /// What [`MEASURE`] finds in the page when it is `width` wide, that of [`PAPER`] with the rules of print.
     fn measure(&self, folder: &str, width: u32, dark: bool) -> Result<Value, Failure> {
         let inner = self.altered(folder, &format!("measured-{width}-{dark}.html"), MEASURE)?;
+        if width == PAPER {
+            let page = fs::read_to_string(&inner)?;
+            fs::write(&inner, page.replace("@media print", "@media all").replace("@media screen", "@media print"))?;
+        }
         let name = inner.file_name().ok_or("no name")?.to_string_lossy().into_owned();
         // A window cannot be as narrow as a phone; a frame can.
         let outer = self.folder.path().join(folder).join(format!("frame-{width}-{dark}.html"));
@@ -348,10 +358,11 @@ fn catches_a_planted_request(stage: &Stage) -> Check {
 fn fits(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
         // From 1121 px on rows are no longer cards.
-        for width in [390, 768, 1121, 1440] {
+        for width in [390, PAPER, 768, 1121, 1440] {
             let found = stage.measure(folder, width, false)?;
             ensure!(found["width"] == width, "measured at {} and not at {width}", found["width"]);
-            for key in ["folded", "unfolded"] {
+            // What stays folded on paper may be wider; whatever else is would shrink every page.
+            for key in ["folded", "unfolded"].into_iter().take(if width == PAPER { 1 } else { 2 }) {
                 ensure!(
                     found[key].as_u64().is_some_and(|extent| extent <= u64::from(width)),
                     "{folder}, {width} px: {key} the page is {} px wide: {}",
@@ -359,9 +370,11 @@ fn fits(stage: &Stage) -> Check {
                     found["beyond"]
                 );
             }
-            for key in ["beyond", "texts"] {
+            for key in ["beyond", "texts", "gaps"].into_iter().skip(usize::from(width == PAPER)) {
                 ensure!(found[key] == Value::Array(Vec::new()), "{folder}, {width} px: {key}: {}", found[key]);
             }
+            let letters = found["letters"].as_f64().unwrap_or_default();
+            ensure!(letters >= LETTERS, "{folder}, {width} px: the letters of a drawing have {letters} px");
             let enough = found["figures"].as_u64() >= Some(figures.split(' ').count() as u64);
             ensure!(
                 enough && found["svgs"].as_u64() >= found["figures"].as_u64(),
@@ -395,7 +408,7 @@ fn has_its_figures(stage: &Stage) -> Check {
     for (folder, figures) in FIGURES {
         let page = fs::read_to_string(stage.page(folder))?;
         for name in figures.split(' ') {
-            if page.matches(&format!("<figure id=\"figure-{name}\" ")).count() != 1 {
+            if page.matches(&format!("<figure id=\"figure-{name}\">")).count() != 1 {
                 return Err(format!("{folder}: {name} is not there once").into());
             }
         }
