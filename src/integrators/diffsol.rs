@@ -949,10 +949,8 @@ where
             if let Some(own) = &stage.own {
                 own.note(&mut seen, [before, place], &mut interpolant).map_err(|e| failure(e, epoch, before))?;
             }
-            if matches!(course.detail, Detail::Times(_)) {
-                let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
-                sampled.map_err(|e| failure(e, epoch, before))?;
-            }
+            let sampled = sample_inside(stage, course, epoch, [before, place], interpolant);
+            sampled.map_err(|e| failure(e, epoch, before))?;
             seen.energy_max = seen.energy_max.max(place.velocity * place.velocity);
             if let Some(end) = end {
                 break end;
@@ -999,7 +997,7 @@ fn end_of_step(
 }
 
 /// Adds the states at the times asked for between two nodes, whose times count from `epoch`, by the library's `interpolant`.
-#[cold]
+#[inline]
 fn sample_inside(
     stage: &Reduced,
     course: &mut Course<'_>,
@@ -1007,6 +1005,9 @@ fn sample_inside(
     [from, to]: [Node; 2],
     mut interpolant: impl FnMut(f64) -> Result<(f64, f64), DiffsolError>,
 ) -> Result<(), DiffsolError> {
+    if !matches!(course.detail, Detail::Times(_)) {
+        return Ok(());
+    }
     let state = |at: Node| stage.state(Node { time: epoch + at.time, ..at });
     let mut lost = Ok(());
     course.sample_until(state(to), |time| {
