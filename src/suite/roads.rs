@@ -4,7 +4,9 @@
 use super::checks::Check;
 use super::claim::Claim;
 use super::recorded::shipped;
+use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::method::{Accuracy, MethodName};
+use crate::physics::Scene;
 
 /// What a number comes from, besides the scene and its problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display)]
@@ -31,6 +33,9 @@ pub enum Source {
     Taylor,
     /// The energy formulation.
     Energy,
+    /// The series of a law of one's own, and its bounds, which the two before have in common.
+    #[strum(serialize = "series of a law")]
+    LawSeries,
     /// Series with proved errors. They run in the loop over stages, each number a ball.
     Enclosure,
     /// diffsol.
@@ -62,10 +67,10 @@ impl Source {
     fn of(self, claim: &Claim) -> Vec<Self> {
         let method = claim.method.unwrap_or_default();
         match self {
-            Self::Method => Self::of_method(method),
-            Self::MethodItself => Self::of_method(method).into_iter().filter(|of| *of != Self::Loop).collect(),
+            Self::Method => Self::of_method(method, claim),
+            Self::MethodItself => Self::of_method(method, claim).into_iter().filter(|of| *of != Self::Loop).collect(),
             Self::OtherMethod => match &claim.check {
-                Check::Pair(pair) => Self::of_method(pair.with),
+                Check::Pair(pair) => Self::of_method(pair.with, claim),
                 _ => Vec::new(),
             },
             Self::Truth => match &claim.scene {
@@ -76,9 +81,12 @@ impl Source {
         }
     }
 
-    /// What the answers of `method` come from.
-    fn of_method(method: MethodName) -> Vec<Self> {
+    /// What the answers of `method` come from on the scene of `claim`.
+    fn of_method(method: MethodName, claim: &Claim) -> Vec<Self> {
         match method {
+            MethodName::Taylor | MethodName::Energy if claim.scene.as_deref().is_some_and(has_laws) => {
+                vec![Self::LawSeries, Self::Loop]
+            }
             MethodName::Taylor => vec![Self::Taylor, Self::Loop],
             MethodName::Energy => vec![Self::Energy, Self::Loop],
             MethodName::ClosedForm => vec![Self::ClosedForm, Self::Loop],
@@ -87,6 +95,13 @@ impl Source {
             _ => vec![Self::Library, Self::Loop],
         }
     }
+}
+
+/// Whether the problem of the shipped scene `name` has a law of its own.
+fn has_laws(name: &str) -> bool {
+    let text = SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text);
+    let problem = text.and_then(|text| Scene::from_toml(text, name).ok()?.problem().ok());
+    problem.is_some_and(|problem| !problem.laws.is_empty())
 }
 
 /// What the two computations that `claim` compares come from, as its check declares; `None` where it compares none: it

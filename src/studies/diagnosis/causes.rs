@@ -2,7 +2,7 @@
 //!
 //! A cause is *certain* where it explains every failing answer to within the accuracy of the solver, contradicts no
 //! passing one, and no other hypothesis of as little freedom does the same. Where no single one does, two at once are
-//! tried. What only a number of its own in every answer explains is never certain by a single quantity.
+//! tried. What only a number of its own in every answer explains is never certain.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -528,8 +528,8 @@ fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], o
     // One number fitted to one number proves nothing.
     let is_of_one = first.faults.iter().any(|(fault, _)| is_of_one_number(fault));
     let is_enough = first.told_apart >= if evidence.passing.is_empty() { 2 * CERTAIN_FROM } else { CERTAIN_FROM };
-    let is_rounding = first.faults.iter().any(|(fault, _)| matches!(fault.parameter, Parameter::Nearness));
-    let is_certain = is_alone && !first.is_one_number && !is_of_one && !is_rounding && is_enough;
+    // Places of their own in every answer are also those of faults that nobody has thought of.
+    let is_certain = is_alone && !first.is_one_number && !is_of_one && !is_per_answer && is_enough;
     let certainty = if is_certain { Certainty::Certain } else { Certainty::Likely };
     let mut causes: Vec<Cause> = Vec::new();
     // Those that cannot be distinguished are one cause.

@@ -26,6 +26,8 @@ const GRAZING: f64 = 0.02;
 const SHORT: f64 = 1e-2;
 /// Fast rate of a stage, times the duration of the flight, from which it is stiff.
 const STIFF: f64 = 200.0;
+/// Velocity over the impact speed from which an exit is faster.
+const FASTER: f64 = 1.05;
 /// Relative jump of the force at the end of a stage that counts as one.
 const JUMP: f64 = 1e-6;
 
@@ -67,6 +69,8 @@ pub enum Content {
     ExitBeforeLastStage,
     /// The exit, at the very end of a stage.
     ExitAtStageEnd,
+    /// The exit, faster than the impact.
+    FasterExit,
     /// Rest.
     Rest,
     /// Rest just before the exit, or hardly any speed left there.
@@ -151,7 +155,7 @@ impl Content {
     ];
 
     /// What a flight meets.
-    pub const EVENTS: [Self; 10] = [
+    pub const EVENTS: [Self; 11] = [
         Self::StageEnd,
         Self::SeveralStageEnds,
         Self::ForceJump,
@@ -159,6 +163,7 @@ impl Content {
         Self::Exit,
         Self::ExitBeforeLastStage,
         Self::ExitAtStageEnd,
+        Self::FasterExit,
         Self::Rest,
         Self::Grazing,
         Self::NoSpeed,
@@ -208,6 +213,7 @@ pub fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec
         (is_through, Content::Exit),
         (is_through && exact.stage + 1 < problem.stages.len(), Content::ExitBeforeLastStage),
         (is_through && problem.stages.iter().any(|law| law.end == problem.exit_depth), Content::ExitAtStageEnd),
+        (is_through && exact.end.velocity > FASTER * problem.impact_speed, Content::FasterExit),
         (exact.end.velocity <= 0.0, Content::Rest),
         (exact.exit_margin.is_some_and(|margin| margin.abs() < GRAZING), Content::Grazing),
         (problem.impact_speed == 0.0, Content::NoSpeed),
@@ -282,7 +288,7 @@ fn stiff(random: &mut Random) -> Problem {
 }
 
 /// The families in the order in which they are asked: what tells causes apart first.
-const FAMILIES: [Family; 26] = [
+const FAMILIES: [Family; 27] = [
     Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
     Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
     Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
@@ -339,6 +345,18 @@ const FAMILIES: [Family; 26] = [
         },
     },
     Family { name: "driven", draw: |random| Kind::Driven.draw(random) },
+    Family {
+        name: "driven-out",
+        // Left faster than entered.
+        draw: |random| {
+            let scale = Scale::draw(random);
+            let drive = random.uniform(0.5, 3.0);
+            let drag = if random.chance(0.5) { 0.1 * drive } else { 0.0 };
+            let law = scale.stage([-drive, 0.0, 0.0, drag]);
+            let exit = scale.length * random.uniform(0.3, 1.0);
+            Some(Problem::of_stages(scale.mass, scale.speed, [law]).with_exit(exit))
+        },
+    },
     Family { name: "several", draw: |random| Kind::Several.draw(random) },
     Family { name: "spring-and-drag", draw: |random| Kind::SpringAndDrag.draw(random) },
     Family { name: "viscous", draw: |random| Kind::Viscous.draw(random) },

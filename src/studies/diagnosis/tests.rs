@@ -212,6 +212,54 @@ fn a_fault_that_no_hypothesis_knows_is_found_and_not_named_with_certainty() {
     }
 }
 
+/// The exit lies elsewhere in every question, too near or too deep.
+#[test]
+fn places_of_their_own_in_every_answer_are_never_certain() {
+    let faults: [fn(&mut Problem); 2] = [
+        |problem| problem.exit_depth *= 1.0 - 0.2 * problem.impact_speed.sin().abs(),
+        |problem| problem.exit_depth *= 1.0 + 0.2 * problem.impact_speed.sin().abs(),
+    ];
+    for fault in faults {
+        let found = diagnose(&mut Strange(fault), Plan::default(), &|_, _| {});
+        assert_eq!(found.verdict, Verdict::Failed);
+        assert!(!found.causes.iter().any(|cause| cause.certainty == Certainty::Certain), "{:?}", found.causes);
+    }
+}
+
+/// Exact, but that an exit below a thousandth of the impact speed is called a stop, with V = 0.
+struct Stopping;
+
+impl Solver for Stopping {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity { name: "stopping".to_owned(), ..PeerIdentity::default() }
+    }
+
+    fn command(&self) -> String {
+        "stopping".to_owned()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let problem = request.problem(None);
+        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
+        if flight.end.velocity < 1e-3 * problem.impact_speed {
+            return Ok(answer(Outcome::Stopped, State { velocity: 0.0, ..flight.end }));
+        }
+        Ok(answer(flight.outcome, flight.end))
+    }
+
+    fn restart(&mut self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn an_exit_at_little_speed_that_is_called_a_stop_fails() {
+    for seed in 1..=3 {
+        let found = diagnose(&mut Stopping, Plan { seed, ..Plan::default() }, &|_, _| {});
+        assert_eq!((found.verdict, found.counts.undecided), (Verdict::Failed, 0));
+    }
+}
+
 #[test]
 fn a_factor_near_one_is_shown_with_the_digits_that_tell_it_from_one() {
     let drag = hypotheses().find(|hypothesis| hypothesis.id == "term:drag").unwrap();

@@ -37,6 +37,8 @@ check! {
     ExactText {
         /// Which of its numbers.
         numbers: Numbers,
+        /// The texts alone whose problem has a law of its own, or those without; all by default.
+        own_laws: Option<bool>,
     } in Input, "ulp", by exact_text, compares (Method | Elsewhere);
     /// Every number of every recorded text, set to what it is, in another unit: numbers that read back as another, and
     /// problems that are another.
@@ -128,13 +130,17 @@ fn compare(text: &RecordedScene, group: Numbers, said: &BTreeMap<String, f64>, w
 }
 
 /// The largest difference, and how many texts it was sought in.
-fn exact_text(&ExactText { numbers: group }: &ExactText, subject: &Subject<'_>) -> Found {
+fn exact_text(&ExactText { numbers: group, own_laws }: &ExactText, subject: &Subject<'_>) -> Found {
     let method = build(subject.method_name(), &MethodOptions::default())?;
     let (mut worst, mut count, texts) = (Worst::default(), 0, texts()?);
     for text in texts {
         let scene = scene_of(text)?;
         let title = text.words.get("scene.title");
         holds!(scene.title.as_ref() == title, "`{}` is titled {:?}", text.name, scene.title);
+        let has_laws = || scene.problem().is_ok_and(|problem| !problem.laws.is_empty());
+        if own_laws.is_some_and(|wanted| wanted != has_laws()) {
+            continue;
+        }
         let said = match group {
             Numbers::Scene => Some(stated(&scene)),
             Numbers::Stages => scene.velocity.map(|speed| stages(text, &scene, speed)).transpose()?,

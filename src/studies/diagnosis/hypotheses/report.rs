@@ -113,6 +113,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "velocity-misreported",
+        "the velocity reported is never above the impact speed",
+        Parameter::None,
+        &[Change::Report(|p, found, _| found.end.velocity = found.end.velocity.min(p.impact_speed))],
+    ),
+    of(
+        "velocity-misreported",
         "the velocity reported is what was lost: V0 - V",
         Parameter::None,
         &[Change::Report(|p, found, _| found.end.velocity = p.impact_speed - found.end.velocity)],
