@@ -159,7 +159,8 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Option<Figure> {
     let inner = rest.first().map_or(1, |axis| axis.count);
     let shown = inner.min(LINES_MAX);
     let unit = first.parameter.entry().dimension.map_or("", |dimension| dimension.units()[0]);
-    let x = Axis::linear(&first.parameter.to_string(), unit);
+    let axis = if first.logarithmic { Axis::log } else { Axis::linear };
+    let x = axis(&first.parameter.to_string(), unit);
     let mut panel = Panel::new("critical velocity", x, Axis::linear("V_c", "m/s")).tall(TALL);
     for index in 0..shown {
         let column = if shown == 1 { 0 } else { index * (inner - 1) / (shown - 1) };
