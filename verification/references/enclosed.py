@@ -398,7 +398,7 @@ def main():
     capd = parser.parse_args().capd
     assert flint.__version__ == FLINT, f"python-flint {FLINT} is asked for"
     program, scenes = by_capd(str(pathlib.Path(capd).resolve()), 0) if capd else by_flint()
-    recipe = "python3 verification/references/enclosed.py" + (" --capd benches/peers/capd/flight" if capd else "")
+    recipe = "python3 verification/references/enclosed.py" + (" --capd target/flight" if capd else "")
     head = json.dumps({"program": program, "recipe": recipe, "scenes": []})
     body = ",\n".join(json.dumps(scene, ensure_ascii=False, separators=(",", ":")) for scene in scenes)
     (HERE / ("capd.json" if capd else "enclosed.json")).write_text(f"{head[:-2]}\n{body}\n]}}\n")

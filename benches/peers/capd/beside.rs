@@ -1,6 +1,6 @@
 //! Enclosures of CAPD beside penetrode's, of the same `f64` in one run: time of a flight, and widths of its end.
 //!
-//! `cargo run --release --bin capd -- capd/flight [ROUNDS]`, after the build of `README.md`. Each round asks CAPD and then
+//! `cargo run --release --bin capd -- ../../target/flight [ROUNDS]`, after the build of `README.md`. Each round asks CAPD and then
 //! penetrode for every scene of `verification/references/capd.json`; a time is the least of all rounds, since others may use the
 //! machine too. Both answers must have a number in common before they are compared.
 
