@@ -3,8 +3,11 @@
 use rayon::prelude::*;
 
 use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
-use super::*;
+use super::questions::{Question, questions};
+use super::{Cause, Certainty, Diagnosis, Plan, Solver, Verdict, by_questions, diagnose};
+use crate::exchange::peers::{PeerAnswer, PeerFailure, PeerIdentity, PeerRequest};
 use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, VelocityAt};
+use crate::physics::{Outcome, State};
 
 /// A solver with faults, exact but for them.
 pub(super) struct Faulty<'a> {
