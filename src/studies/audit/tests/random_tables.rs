@@ -164,7 +164,7 @@ fn right_saw_tooth_tables_seldom_fail() {
     for kind in ["saw-tooth of order 1", "saw-tooth of order 2"] {
         let counts = count_all(kind, 200);
         let failed = [counts.right[1], counts.exact[1]];
-        assert!(failed.iter().all(|failed| *failed <= 1), "{kind}: {failed:?} of {}", counts.tables);
+        assert!(failed.iter().all(|failed| *failed <= 2), "{kind}: {failed:?} of {}", counts.tables);
     }
 }
 
