@@ -278,7 +278,7 @@ fn fixed_causes(
                 });
             }
         }
-        let causes = causes(&seen, identity.reads_scene, &others, Effort::Singles);
+        let causes = causes(&seen, identity.reads_scene, &others, Effort::Nearly);
         if causes.first().is_some_and(|cause| cause.certainty != Certainty::Possible) {
             return causes;
         }

@@ -100,8 +100,34 @@ pub(super) struct Question {
     pub contains: Vec<Content>,
     /// Condition numbers of depth, time and velocity at the end, at least one.
     pub conditions: [f64; 3],
+    /// What was asked before it.
+    pub earlier: Option<Earlier>,
     /// What single faults make of it.
     pub predicted: Predictions,
+}
+
+/// Questions asked earlier, whose numbers a solver may have kept.
+#[derive(Clone, Debug)]
+pub(super) struct Earlier {
+    /// The first.
+    pub first: Problem,
+    /// The one before.
+    pub previous: Problem,
+    /// The last exit depth (m) that was asked.
+    pub exit: f64,
+}
+
+/// Tells each of `questions` what is asked before it.
+pub(super) fn in_order(questions: &mut [Question]) {
+    let Some(first) = questions.first().map(|first| first.problem.clone()) else { return };
+    let (mut previous, mut exit) = (first.clone(), f64::INFINITY);
+    for question in questions {
+        question.earlier = Some(Earlier { first: first.clone(), previous: previous.clone(), exit });
+        previous = question.problem.clone();
+        if previous.has_exit() {
+            exit = previous.exit_depth;
+        }
+    }
 }
 
 impl Question {
@@ -118,7 +144,7 @@ impl Question {
         };
         let is_usable = exact.outcome != Outcome::Undecided && conditions.iter().all(|condition| *condition <= allowed);
         let predicted = Predictions::default();
-        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, predicted })
+        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, earlier: None, predicted })
     }
 
     /// The largest of the errors of depth, time and velocity over their condition numbers.
@@ -435,6 +461,24 @@ const FAMILIES: [Family; 27] = [
     },
 ];
 
+/// Of so many questions, one is of the scales below.
+const SCALED_EACH: usize = 8;
+/// Decades (powers of ten) of the exit depth (m) and of the time there (s) that are asked in turn: without a common
+/// divisor of their numbers, so that every depth meets every time. Caps on either show only beyond them.
+const DEPTHS: [i32; 6] = [-3, -2, -1, 0, 1, 2];
+const TIMES: [i32; 7] = [-5, -4, -3, -2, -1, 0, 1];
+
+/// An exit at the depth and the time of the scales with the number `round`.
+fn scaled(random: &mut Random, round: usize) -> Problem {
+    let mut of = |decade: i32| 10f64.powi(decade) * random.log_uniform(1.2, 8.0);
+    // The deepest and the longest first: most caps lie there.
+    let length = of(DEPTHS[DEPTHS.len() - 1 - round % DEPTHS.len()]);
+    let time = of(TIMES[TIMES.len() - 1 - round % TIMES.len()]);
+    let scale = Scale { mass: random.log_uniform(1e-2, 1e2), speed: length / time, length };
+    let law = scale.stage([0, 1, 2, 3].map(|_| random.log_uniform(0.02, 0.2)));
+    Problem::of_stages(scale.mass, scale.speed, [law]).with_exit(length)
+}
+
 /// Of so many questions of all families, one is of a physical scene.
 const SCENES_EACH: usize = 4;
 /// One question of so many asks for a projectile without speed.
@@ -457,6 +501,12 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
             asked.extend(Question::new(format!("scene-{}", number + 1), problem, Some(scene)));
             continue;
         }
+        if number % SCALED_EACH == 2 {
+            let round = number / SCALED_EACH;
+            let mut random = Random::for_part(seed, &format!("diagnosis scales {round} {drawn}"));
+            asked.extend(Question::new(format!("scales-{}", round + 1), scaled(&mut random, round), None));
+            continue;
+        }
         let Family { name, draw } = &FAMILIES[family % FAMILIES.len()];
         let round = family / FAMILIES.len();
         family += 1;
@@ -469,6 +519,7 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
         });
         asked.extend(found);
     }
+    in_order(&mut asked);
     asked
 }
 
@@ -509,6 +560,25 @@ mod tests {
     use strum::IntoEnumIterator;
 
     use super::*;
+
+    /// Of the questions whatever they are called: what a cap on depth or on time would change.
+    #[test]
+    fn two_hundred_questions_leave_at_every_decade_of_depth_and_last_as_long() {
+        for seed in 1..=3 {
+            let asked = questions(seed, 200, false);
+            let exits = asked.iter().filter(|question| question.contains.contains(&Content::Exit));
+            let ends: Vec<_> = exits.map(|question| question.exact.end).collect();
+            let within = |decade: i32, of: &dyn Fn(&crate::physics::State) -> f64| {
+                ends.iter().filter(|end| of(end).log10().floor() as i32 == decade).count()
+            };
+            for decade in DEPTHS {
+                assert!(within(decade, &|end| end.depth) >= 4, "{seed}: exits at 1e{decade} m");
+            }
+            for decade in TIMES {
+                assert!(within(decade, &|end| end.time) >= 3, "{seed}: exits at 1e{decade} s");
+            }
+        }
+    }
 
     #[test]
     fn two_hundred_questions_hold_everything_that_a_flight_can_meet() {

@@ -33,6 +33,7 @@ impl<'a> Faulty<'a> {
 fn all_questions(seed: u64) -> Vec<Question> {
     let mut all = questions(seed, Plan::default().questions, false);
     all.extend(edge_questions());
+    in_order(&mut all);
     all
 }
 
@@ -84,7 +85,7 @@ impl Solver for Faulty<'_> {
                 let part = 0.01 * (0.1 + (1e3 * question.exact.end.time / question.exact.end.depth).sin().abs());
                 let number = match fault.parameter {
                     Parameter::Delay => part * question.exact.end.depth,
-                    Parameter::Lateness => part * question.exact.end.time,
+                    Parameter::Lateness | Parameter::Bracket => part * question.exact.end.time,
                     Parameter::Nearness => 1.0 + part,
                     _ => *number,
                 };
@@ -111,7 +112,7 @@ fn number(hypothesis: &Hypothesis) -> f64 {
         Parameter::Speed => 0.5,
         Parameter::Fraction => 0.01,
         Parameter::OneOf(numbers) => numbers[1],
-        Parameter::Value => 0.3,
+        Parameter::Value(usual) | Parameter::Threshold(usual, _) => usual,
         _ => 1.0,
     }
 }
