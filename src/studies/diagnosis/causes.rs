@@ -316,6 +316,11 @@ impl Explanation {
         self.explained.iter().filter(|is| **is == Some(true)).count()
     }
 
+    /// Failing answers of which it says anything.
+    fn concerned(&self) -> usize {
+        self.explained.iter().flatten().count()
+    }
+
     /// Whether it explains every answer that it can, and there is something to explain.
     fn is_full(&self) -> bool {
         self.told_apart > 0 && self.explained.iter().all(|is| *is != Some(false))
@@ -418,12 +423,17 @@ impl Evidence<'_> {
             all.retain(|cut| low < *cut && *cut < high);
             all.sort_by(f64::total_cmp);
             let bounds: Vec<f64> = std::iter::once(low).chain(all).chain([high]).collect();
-            let fits = |pair: &&[f64]| {
+            let fits = |pair: &[f64]| {
                 let faults: Vec<_> = others.iter().copied().chain([(hypothesis, inside(pair[0], pair[1]))]).collect();
                 if seen.fails { seen.explained_by(&faults, mask).is_some() } else { !seen.contradicts(&faults, mask) }
             };
-            match bounds.windows(2).find(fits) {
-                Some(pair) => (low, high) = (pair[0], pair[1]),
+            // What the flight does not meet leaves several intervals open.
+            let open: Vec<bool> = bounds.windows(2).map(fits).collect();
+            match open.iter().position(|is_open| *is_open) {
+                Some(from) => {
+                    let count = open[from..].iter().take_while(|is_open| **is_open).count();
+                    (low, high) = (bounds[from], bounds[from + count]);
+                }
                 None if seen.fails => left += 1,
                 None => return None,
             }
@@ -560,8 +570,9 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
         return named(&rivals, &evidence, seen, others);
     }
     // What explains a few answers by its freedom explains nothing.
-    found.retain(|explanation| 4 * explanation.told_apart >= of);
-    let is_of_nearly_all = |found: &Explanation| found.count() * 10 >= of * 9 && found.count() >= CERTAIN_FROM;
+    found.retain(|explanation| 4 * explanation.told_apart >= explanation.concerned().max(of / 4));
+    let is_of_nearly_all =
+        |found: &Explanation| found.count() * 10 >= found.concerned() * 9 && found.count() >= CERTAIN_FROM;
     // Of those that explain nearly all the one of least freedom says most.
     found.sort_by_key(|found| {
         let nearly_all = is_of_nearly_all(found);

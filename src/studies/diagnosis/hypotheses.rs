@@ -322,7 +322,14 @@ fn between(mut cuts: Vec<f64>) -> Vec<f64> {
 
 /// Every hypothesis.
 pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
-    force::TERMS.iter().flatten().chain(force::FAULTS).chain(events::FAULTS).chain(report::FAULTS).chain(scene::FAULTS)
+    force::TERMS
+        .iter()
+        .flatten()
+        .chain(force::FAULTS)
+        .chain(events::FAULTS)
+        .chain(report::FAULTS)
+        .chain(scene::FAULTS)
+        .chain(force::EARLIER)
 }
 
 impl Hypothesis {

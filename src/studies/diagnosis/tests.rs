@@ -111,6 +111,8 @@ fn number(hypothesis: &Hypothesis) -> f64 {
         Parameter::Exponent(_) => 1.7,
         Parameter::Speed => 0.5,
         Parameter::Fraction => 0.01,
+        // Few digits or stages, or a grain that is seen.
+        Parameter::OneOf(numbers) if numbers[0] < 1.0 => numbers[numbers.len() / 2],
         Parameter::OneOf(numbers) => numbers[1],
         Parameter::Value(usual) | Parameter::Threshold(usual, _) => usual,
         _ => 1.0,
@@ -258,6 +260,24 @@ fn an_exit_at_little_speed_that_is_called_a_stop_fails() {
     for seed in 1..=3 {
         let found = diagnose(&mut Stopping, Plan { seed, ..Plan::default() }, &|_, _| {});
         assert_eq!((found.verdict, found.counts.undecided), (Verdict::Failed, 0));
+    }
+}
+
+/// Exact, but for flights deeper than 10 m or longer than 10 s: few questions are.
+#[test]
+fn a_cap_on_depth_or_on_time_fails_by_every_seed() {
+    let caps: [fn(&mut Problem); 2] = [
+        |problem| problem.exit_depth = problem.exit_depth.min(10.0),
+        |problem| {
+            let time = Taylor::default().solve(problem, Detail::End).unwrap().end.time;
+            problem.mass *= (10.0 / time).min(1.0);
+        },
+    ];
+    for (index, cap) in caps.into_iter().enumerate() {
+        for seed in 1..=4 {
+            let found = diagnose(&mut Strange(cap), Plan { seed, ..Plan::default() }, &|_, _| {});
+            assert_eq!(found.verdict, Verdict::Failed, "{index} by seed {seed}");
+        }
     }
 }
 

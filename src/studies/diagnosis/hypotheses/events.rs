@@ -417,7 +417,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Problem(|p, n| leave_out_thin(p, n, true))],
     ),
     of(
-        "stage-left-out",
+        "stage-end-missed",
         "only the first {} stages are known, and the last of them goes on",
         Parameter::OneOf(COUNTS),
         &[Change::Problem(|p, n| cut_stages(p, n as usize))],
@@ -606,24 +606,6 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Report(|p, found, late| {
             let is_rest = found.end.velocity <= 0.0;
             end_late(p, found, late);
-            if is_rest {
-                found.end.velocity = 0.0;
-            }
-        })],
-    ),
-    of(
-        "event-early",
-        "every event is taken early, in these answers by up to {} s",
-        Parameter::Bracket,
-        &[Change::Report(|p, found, late| end_late(p, found, -late))],
-    ),
-    of(
-        "event-early",
-        "every event is taken early, in these answers by up to {} s, and rest with V = 0",
-        Parameter::Bracket,
-        &[Change::Report(|p, found, late| {
-            let is_rest = found.end.velocity <= 0.0;
-            end_late(p, found, -late);
             if is_rest {
                 found.end.velocity = 0.0;
             }

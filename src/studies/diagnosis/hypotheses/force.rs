@@ -227,7 +227,7 @@ fn add_force(problem: &mut Problem, force: f64) {
 
 /// A term of the force, in all stages and in a part of them.
 macro_rules! term {
-    ($id:literal, $what:literal, $term:ident, $usual:literal) => {
+    ($id:literal, $what:literal, $term:ident, $usual:literal, $clip:literal) => {
         [
             of(
                 $id,
@@ -326,13 +326,13 @@ macro_rules! term {
                 &[Change::Problem(|p, n| alter_term::<$term>(p, |own| if own < n { 0.0 } else { own }))],
             ),
             of(
-                "force-clipped",
+                $clip,
                 concat!($what, " gives at most {} N"),
                 Parameter::Value(1e3),
                 &[Change::Force(|at, n| with_term::<$term>(at, |part| part.min(n)))],
             ),
             of(
-                "force-clipped",
+                $clip,
                 concat!($what, " gives at least {} N"),
                 Parameter::Value(1e3),
                 &[Change::Force(|at, n| with_term::<$term>(at, |part| part.max(n)))],
@@ -343,40 +343,16 @@ macro_rules! term {
                 Parameter::Speed,
                 &[Change::Force(without_term::<$term, true>)],
             ),
-            of(
-                $id,
-                concat!($what, " is left out below {} V0"),
-                Parameter::Fraction,
-                &[Change::Force(|at, n| without_term::<$term, true>(at, n * at.impact_speed))],
-            ),
-            of(
-                $id,
-                concat!($what, " is left out above {} m/s"),
-                Parameter::Speed,
-                &[Change::Force(without_term::<$term, false>)],
-            ),
-            of(
-                $id,
-                concat!($what, " is left out above {} V0"),
-                Parameter::Fraction,
-                &[Change::Force(|at, n| without_term::<$term, false>(at, n * at.impact_speed))],
-            ),
-            of(
-                "input-rounded",
-                concat!($what, " is rounded to single precision"),
-                Parameter::None,
-                &[Change::Problem(|p, _| alter_term::<$term>(p, to_single))],
-            ),
         ]
     };
 }
 
 /// Faults of single terms.
-pub(super) static TERMS: [[Hypothesis; 23]; 4] = [
-    term!("term:static-force", "the static force p", STATIC_FORCE, 1e3),
-    term!("term:stiffness", "the stiffness s", STIFFNESS, 1e4),
-    term!("term:viscosity", "the viscosity r", VISCOSITY, 1e2),
-    term!("term:drag", "the drag q", DRAG, 1.0),
+pub(super) static TERMS: [[Hypothesis; 19]; 4] = [
+    term!("term:static-force", "the static force p", STATIC_FORCE, 1e3, "input-clipped"),
+    term!("term:stiffness", "the stiffness s", STIFFNESS, 1e4, "force-clipped"),
+    term!("term:viscosity", "the viscosity r", VISCOSITY, 1e2, "force-clipped"),
+    term!("term:drag", "the drag q", DRAG, 1.0, "force-clipped"),
 ];
 
 /// Every other fault of the force, the mass and the impact speed.
@@ -824,64 +800,6 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Problem(single_inputs)],
     ),
     of(
-        "input-kept",
-        "the mass is that of the first question",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.mass = earlier.first.mass)],
-    ),
-    of(
-        "input-kept",
-        "the impact speed is that of the first question",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.impact_speed = earlier.first.impact_speed)],
-    ),
-    of(
-        "input-kept",
-        "the exit depth is that of the first question",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.exit_depth = earlier.first.exit_depth)],
-    ),
-    of(
-        "input-kept",
-        "the stages are those of the first question",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.stages.clone_from(&earlier.first.stages))],
-    ),
-    of(
-        "input-kept",
-        "the mass is that of the question before",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.mass = earlier.previous.mass)],
-    ),
-    of(
-        "input-kept",
-        "the impact speed is that of the question before",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.impact_speed = earlier.previous.impact_speed)],
-    ),
-    of(
-        "input-kept",
-        "the exit depth is that of the question before",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.exit_depth = earlier.previous.exit_depth)],
-    ),
-    of(
-        "input-kept",
-        "the stages are those of the question before",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| p.stages.clone_from(&earlier.previous.stages))],
-    ),
-    of(
-        "input-kept",
-        "where no exit is asked for, the last one that was holds",
-        Parameter::None,
-        &[Change::Kept(|p, earlier| {
-            if !p.has_exit() {
-                p.exit_depth = earlier.exit;
-            }
-        })],
-    ),
-    of(
         "force-stale",
         "the drag is q V V0",
         Parameter::None,
@@ -1165,6 +1083,54 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         ],
     ),
     of(
+        "term:static-force",
+        "the static force p is left out below {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<STATIC_FORCE, true>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out below {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<VISCOSITY, true>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out above {} m/s",
+        Parameter::Speed,
+        &[Change::Force(without_term::<VISCOSITY, false>)],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out above {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<VISCOSITY, false>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:drag",
+        "the drag q is left out below {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<DRAG, true>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:drag",
+        "the drag q is left out above {} m/s",
+        Parameter::Speed,
+        &[Change::Force(without_term::<DRAG, false>)],
+    ),
+    of(
+        "term:drag",
+        "the drag q is left out above {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<DRAG, false>(at, n * at.impact_speed))],
+    ),
+    of(
+        "input-rounded",
+        "the coefficients of the force are rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| p.stages.iter_mut().for_each(|law| *law = law.map(to_single).until(law.end)))],
+    ),
+    of(
         "term:drive",
         "a static force that drives (p < 0) is {} times the right one",
         Parameter::Factor,
@@ -1175,5 +1141,67 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "a static force that drives (p < 0) is {} times the right one in every stage but the first",
         Parameter::Factor,
         &[Change::Problem(scale_term::<DRIVE, LATER>)],
+    ),
+];
+
+/// Inputs kept from an earlier question: looked at last, for a question may have none of them.
+pub(super) static EARLIER: &[Hypothesis] = &[
+    of(
+        "input-kept",
+        "the mass is that of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.mass = earlier.first.mass)],
+    ),
+    of(
+        "input-kept",
+        "the impact speed is that of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.impact_speed = earlier.first.impact_speed)],
+    ),
+    of(
+        "input-kept",
+        "the exit depth is that of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.exit_depth = earlier.first.exit_depth)],
+    ),
+    of(
+        "input-kept",
+        "the stages are those of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.stages.clone_from(&earlier.first.stages))],
+    ),
+    of(
+        "input-kept",
+        "the mass is that of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.mass = earlier.previous.mass)],
+    ),
+    of(
+        "input-kept",
+        "the impact speed is that of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.impact_speed = earlier.previous.impact_speed)],
+    ),
+    of(
+        "input-kept",
+        "the exit depth is that of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.exit_depth = earlier.previous.exit_depth)],
+    ),
+    of(
+        "input-kept",
+        "the stages are those of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.stages.clone_from(&earlier.previous.stages))],
+    ),
+    of(
+        "input-kept",
+        "where no exit is asked for, the last one that was holds",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| {
+            if !p.has_exit() {
+                p.exit_depth = earlier.exit;
+            }
+        })],
     ),
 ];
