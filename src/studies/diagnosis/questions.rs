@@ -468,15 +468,22 @@ const SCALED_EACH: usize = 8;
 const DEPTHS: [i32; 6] = [-3, -2, -1, 0, 1, 2];
 const TIMES: [i32; 7] = [-5, -4, -3, -2, -1, 0, 1];
 
-/// An exit at the depth and the time of the scales with the number `round`.
+/// An exit, or every other time through the depths a rest, at the depth and the time of the scales with the number `round`:
+/// of two or three times that depth at most.
 fn scaled(random: &mut Random, round: usize) -> Problem {
     let mut of = |decade: i32| 10f64.powi(decade) * random.log_uniform(1.2, 8.0);
     // The deepest and the longest first: most caps lie there.
     let length = of(DEPTHS[DEPTHS.len() - 1 - round % DEPTHS.len()]);
     let time = of(TIMES[TIMES.len() - 1 - round % TIMES.len()]);
     let scale = Scale { mass: random.log_uniform(1e-2, 1e2), speed: length / time, length };
-    let law = scale.stage([0, 1, 2, 3].map(|_| random.log_uniform(0.02, 0.2)));
-    Problem::of_stages(scale.mass, scale.speed, [law]).with_exit(length)
+    let mut shares = [0, 1, 2, 3].map(|_| random.log_uniform(0.02, 0.2));
+    if (round / DEPTHS.len()) % 2 == 1 {
+        // Their work up to L is less than the energy: it rests beyond.
+        shares = shares.map(|share| 0.5 * share);
+        shares[0] = random.uniform(0.1, 0.2);
+        return Problem::of_stages(scale.mass, scale.speed, [scale.stage(shares)]);
+    }
+    Problem::of_stages(scale.mass, scale.speed, [scale.stage(shares)]).with_exit(length)
 }
 
 /// Of so many questions of all families, one is of a physical scene.
@@ -563,19 +570,24 @@ mod tests {
 
     /// Of the questions whatever they are called: what a cap on depth or on time would change.
     #[test]
-    fn two_hundred_questions_leave_at_every_decade_of_depth_and_last_as_long() {
-        for seed in 1..=3 {
+    fn two_hundred_questions_end_at_every_decade_of_depth_and_of_time() {
+        for seed in 1..=4 {
             let asked = questions(seed, 200, false);
-            let exits = asked.iter().filter(|question| question.contains.contains(&Content::Exit));
-            let ends: Vec<_> = exits.map(|question| question.exact.end).collect();
+            let of = |content| {
+                let with = asked.iter().filter(move |question| question.contains.contains(&content));
+                with.map(|question| question.exact.end).collect::<Vec<_>>()
+            };
+            let (exits, rests) = (of(Content::Exit), of(Content::Rest));
             let within = |decade: i32, of: &dyn Fn(&crate::physics::State) -> f64| {
-                ends.iter().filter(|end| of(end).log10().floor() as i32 == decade).count()
+                exits.iter().filter(|end| of(end).log10().floor() as i32 == decade).count()
             };
             for decade in DEPTHS {
-                assert!(within(decade, &|end| end.depth) >= 4, "{seed}: exits at 1e{decade} m");
+                assert!(within(decade, &|end| end.depth) >= 2, "{seed}: exits at 1e{decade} m");
+                let deeper = rests.iter().filter(|end| end.depth > 10f64.powi(decade)).count();
+                assert!(deeper >= 2, "{seed}: rests beyond 1e{decade} m");
             }
             for decade in TIMES {
-                assert!(within(decade, &|end| end.time) >= 3, "{seed}: exits at 1e{decade} s");
+                assert!(within(decade, &|end| end.time) >= 1, "{seed}: exits at 1e{decade} s");
             }
         }
     }
