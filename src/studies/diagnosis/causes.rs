@@ -323,7 +323,9 @@ impl Explanation {
 
     /// Whether it explains every answer that it can, and there is something to explain.
     fn is_full(&self) -> bool {
-        self.told_apart > 0 && self.explained.iter().all(|is| *is != Some(false))
+        // What says nothing of most answers explains few by its freedom.
+        let says_enough = self.concerned() == self.explained.len() || self.concerned() >= 2 * CERTAIN_FROM;
+        says_enough && self.told_apart > 0 && self.explained.iter().all(|is| *is != Some(false))
     }
 
     /// Whether a factor of it is one to within the accuracy: then nothing is wrong by it.
