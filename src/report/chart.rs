@@ -216,6 +216,15 @@ impl Axis {
         Self { range: Some(range), ..self }
     }
 
+    /// Its label, with the power of ten that its numbers leave to it.
+    fn label(&self, span: Span) -> String {
+        match (span.power(), self.label.rsplit_once(" [")) {
+            (0, _) => self.label.clone(),
+            (power, None) => format!("{} [{}]", self.label, power_of_ten(power)),
+            (power, Some((title, unit))) => format!("{title} [{} {unit}", power_of_ten(power)),
+        }
+    }
+
     fn has(&self, value: f64) -> bool {
         value.is_finite() && (value.max(self.least) > 0.0 || !self.is_log)
     }
@@ -279,6 +288,12 @@ impl Span {
         (self.place(value) - self.low) / self.length()
     }
 
+    /// The power of ten that the numbers of a linear axis leave to its label: zero where they need none.
+    fn power(&self) -> i32 {
+        let power = self.low.abs().max(self.high.abs()).log10().floor();
+        if self.is_log || !power.is_finite() || (-2.0..5.0).contains(&power) { 0 } else { power as i32 }
+    }
+
     /// Grid lines, `most` at most where the axis is longer than two decades: share of the axis and label.
     fn ticks(&self, most: f64) -> Vec<(f64, String)> {
         let length = self.length();
@@ -297,6 +312,7 @@ impl Span {
         let places: Vec<f64> = places.into_iter().filter(is_inside).collect();
         // All labels of an axis have one form: `5·10⁻⁴` stands above no `0.001`.
         let has_powers = length >= 2.0 || places.iter().any(|place| !(-3.0..5.0).contains(&(place + 1e-9)));
+        let scale = 10.0_f64.powi(self.power());
         let label = |place: f64| match self.is_log {
             true if has_powers => {
                 let decade = (place + 1e-9).floor();
@@ -307,7 +323,7 @@ impl Span {
                 }
             }
             true => number(self.value(place), 2),
-            false => number(if place.abs() < 1e-9 * length { 0.0 } else { place }, 3),
+            false => number(if place.abs() < 1e-9 * length { 0.0 } else { place / scale }, 3),
         };
         places.iter().map(|place| ((place - self.low) / length, label(*place))).collect()
     }
@@ -461,7 +477,9 @@ impl Panel {
     fn legend(&self) -> Vec<(f64, usize, &Series)> {
         let mut entries: Vec<(f64, usize, &Series)> = Vec::new();
         let (mut x, mut row) = (2.0, 0);
-        for series in self.series.iter().filter(|series| series.is_listed && !series.name.is_empty()) {
+        let is_shown =
+            |series: &&Series| series.is_listed && !series.name.is_empty() && self.drawn(series).next().is_some();
+        for series in self.series.iter().filter(is_shown) {
             if entries.iter().any(|(.., known)| known.name == series.name) {
                 continue;
             }
@@ -618,9 +636,11 @@ impl Panel {
                     }
                     (text((x + SYMBOL, y + 4.0), &series.name, Ink::Text, Anchor::Start))
                 }
-                g font-size="13" font-weight="bold" { (text((2.0, 14.0), &self.title, Ink::Text, Anchor::Start)) }
-                (text((2.0, frame.top - 10.0), &self.y.label, Ink::Muted, Anchor::Start))
-                (text((WIDTH - RIGHT, frame.top + self.height + 32.0), &self.x.label, Ink::Muted, Anchor::End))
+                g font-size="13" font-weight="bold" { (text((2.0, 14.0), &fitting(&self.title), Ink::Text, Anchor::Start)) }
+                @if !self.y.label.is_empty() {
+                    (text((2.0, frame.top - 10.0), &self.y.label(frame.y), Ink::Muted, Anchor::Start))
+                }
+                (text((WIDTH - RIGHT, frame.top + self.height + 32.0), &self.x.label(frame.x), Ink::Muted, Anchor::End))
             }
         }
     }
@@ -711,6 +731,35 @@ fn width_of(text: &str) -> f64 {
     text.chars().map(width).sum()
 }
 
+/// A title as wide as a panel at most. What is too much is left out of the middle of the name before the last comma: names
+/// differ at either end, and a number stays whole.
+fn fitting(title: &str) -> String {
+    // Widths in a bold font of 13 px.
+    let width = |c: &char| match c {
+        'f' | 'i' | 'j' | 'l' | 't' | ' ' | '\u{a0}' | '.' | ',' | ':' | ';' | '-' | '(' | ')' | '|' => 5.0,
+        'm' | 'w' | 'M' | 'W' | '%' => 13.0,
+        'r' | 's' | 'c' => 7.6,
+        c if c.is_uppercase() || c.is_ascii_digit() => 9.1,
+        '⁰'..='⁾' | '¹' | '²' | '³' => 6.0,
+        _ => 8.9,
+    };
+    let chars: Vec<char> = title.chars().collect();
+    let wide = |chars: &[char]| chars.iter().map(width).sum::<f64>();
+    if wide(&chars) <= WIDTH {
+        return title.to_owned();
+    }
+    let end = title.rfind(", ").map_or(chars.len(), |at| title[..at].chars().count());
+    let (mut left, mut right) = (end / 2, end / 2);
+    while wide(&chars[..left]) + width(&'…') + wide(&chars[right..]) > WIDTH && right < chars.len() {
+        if left > 1 && (right >= end || left >= end - right) {
+            left -= 1;
+        } else {
+            right += 1;
+        }
+    }
+    chars[..left].iter().chain(&['…']).chain(&chars[right..]).collect()
+}
+
 fn text((x, y): Point, text: &str, ink: Ink, anchor: Anchor) -> Markup {
     let [x, y] = [x, y].map(|length| format!("{length:.1}"));
     html! {
@@ -782,6 +831,35 @@ mod tests {
             labels(&Axis::linear("depth", "mm").over([-0.1, 0.1]), [0.0; 2]),
             ["−0.1", "−0.05", "0", "0.05", "0.1"]
         );
+    }
+
+    #[test]
+    fn numbers_beyond_five_digits_leave_their_power_to_the_label() {
+        let strength = Axis::linear("strength", "Pa");
+        assert_eq!(labels(&strength, [2e7, 6e7]), ["2", "3", "4", "5", "6"]);
+        assert_eq!(strength.label(strength.fitted([2e7, 6e7].into_iter(), 0.0)), "strength [10⁷ Pa]");
+        let ratio = Axis::linear("ratio", "");
+        assert_eq!(labels(&ratio, [0.0, 0.002]), ["0", "0.5", "1", "1.5", "2"]);
+        assert_eq!(ratio.label(ratio.fitted([0.0, 0.002].into_iter(), 0.0)), "ratio [10⁻³]");
+        assert_eq!(ratio.label(ratio.fitted([0.0, 20_000.0].into_iter(), 0.0)), "ratio");
+    }
+
+    #[test]
+    fn a_title_that_is_too_wide_loses_its_middle() {
+        let own = "crater end time, less 3.749918414287\u{a0}×\u{a0}10⁻⁴ s";
+        assert_eq!(fitting(own), own);
+        let cut = fitting("peak_deceleration_of_the_projectile_centre_of_mass_m_s2, less 1.234568 × 10⁵");
+        assert!(cut.starts_with("peak_decel…") && cut.ends_with("less 1.234568 × 10⁵"), "{cut}");
+        assert!(cut.chars().count() < 50, "{cut}");
+    }
+
+    #[test]
+    fn a_series_without_a_point_is_not_in_the_legend() {
+        let panel = Panel::new("", Axis::log("x", ""), Axis::log("y", ""))
+            .series("drawn", Style::marks(0), [(1.0, 1.0)])
+            .series("not drawn", Style::marks(1), [(1.0, 0.0)])
+            .series("empty", Style::marks(2), []);
+        assert_eq!(panel.legend().into_iter().map(|(.., series)| series.name.as_str()).collect::<Vec<_>>(), ["drawn"]);
     }
 
     #[test]

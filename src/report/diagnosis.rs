@@ -416,7 +416,7 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
     let y = Axis::linear("", "").over([0.0, top]);
     let mut panel = Panel::new("", Axis::linear("questions", "").over([0.0, 1.05 * most]), y).tall(ROW * top);
     let bar = |row: usize, from: usize, to: usize| {
-        let (bottom, top) = (height - row as f64 - 0.94, height - row as f64 - 0.56);
+        let (bottom, top) = (height - row as f64 - 0.86, height - row as f64 - 0.54);
         let (from, to) = (from as f64, to as f64);
         [(from, bottom), (to, bottom), (to, top), (from, top)]
     };
@@ -435,7 +435,7 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
     let mut all = vec![figure(
         "right-by-content",
         "Answers that fail against answers that pass, by what the flight meets".to_owned(),
-        "Each bar counts the questions whose flight meets the term or event; a question meets several.",
+        "Each bar, below its name, counts the questions whose flight meets the term or event; a question meets several.",
         panel,
     )];
     let of = |verdict: fn(Verdict) -> bool| {
@@ -455,8 +455,8 @@ fn figures(found: &Diagnosis, met: &[Content]) -> Vec<Figure> {
         all.push(figure(
             "errors-by-question",
             "The worst error of each answer, over what is allowed".to_owned(),
-            "At the dashed line the error is the limit. Errors below a billionth of it are drawn there. Answers without numbers \
-             have no point.",
+            "At the dashed line the error is the limit. A wrong answer below it has right numbers and a wrong outcome or \
+             event. Errors below a billionth of the limit are drawn there. Answers without numbers have no point.",
             panel.slope("limit", 0.0, (1.0, 1.0)),
         ));
     }

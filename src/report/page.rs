@@ -17,7 +17,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 use super::chart::Ink;
 use super::figure::{self, Figure};
 use super::references::{self, Reference, reference};
-use super::text::{count, number, one_line};
+use super::text::{clipped, count, number, one_line};
 use super::{Environment, Run, typeset};
 use crate::suite::{Claim, Counts, Judged, Verdict, grouped, of_cases, tables, worst};
 
@@ -89,6 +89,9 @@ impl<'a> Part<'a> {
     }
 }
 
+/// Characters of a title in the head of each page on paper: what follows them stands in the same line.
+const HEAD_MAX: usize = 60;
+
 impl<'a> Page<'a> {
     /// The page of a judged suite.
     pub(super) fn of_run(
@@ -107,7 +110,7 @@ impl<'a> Page<'a> {
     /// The margins of paper: what was judged, what it came to and by which program above, the page below.
     fn margins(&self) -> String {
         let [head, program] = [
-            format!("{}: {}", self.title, self.outcome),
+            format!("{}: {}", clipped(&self.title, HEAD_MAX), self.outcome),
             format!("penetrode {}, {}", self.environment.version, self.environment.commit),
         ]
         .map(|text| css_string(&text));
@@ -161,9 +164,10 @@ impl<'a> Page<'a> {
                                 }
                             }
                         }
+                        // Within what it follows: on paper it then takes the last lines along and stands on no page alone.
+                        footer { "Written by penetrode " (e.version) ". The same numbers: " (self.files)
+                            ", and a CSV file for each figure." }
                     }
-                    footer { "Written by penetrode " (e.version) ". The same numbers: " (self.files)
-                        ", and a CSV file for each figure." }
                 }
             }
         };
@@ -479,7 +483,11 @@ fn verdict(judged: &[Judged], noun: &str) -> Markup {
         }
         @if !open.is_empty() {
             (claims_table(&format!("The {noun} that failed or are undecided"), open.iter().copied().take(FIRST_SCREEN)))
-            @if open.len() > FIRST_SCREEN { p { (open.len() - FIRST_SCREEN) " more are below." } }
+            @match open.len().saturating_sub(FIRST_SCREEN) {
+                0 => {}
+                1 => { p { "1 more is below." } }
+                more => { p { (more) " more are below." } }
+            }
         }
     }
 }

@@ -24,7 +24,7 @@ const DRAWN_MAX: usize = 400;
 /// Reference slopes pass through so many times the error of the coarsest point.
 const SLOPES_ABOVE: f64 = 6.0;
 
-/// Values are drawn up to so many times the finest size, where there are so many of them.
+/// Values are drawn up to so many times the finest size of the fit, where there are so many of them.
 const DECADE: f64 = 10.0;
 const FEW: usize = 4;
 
@@ -633,8 +633,11 @@ impl Refinement {
             figure(
                 "values",
                 format!("Values over the {noun}, each with the error band of the finest"),
-                "Each point is one solution, less the value in the title of its panel, over the finest decade. Shaded: the finest value and its error \
-                 band. Dashed: the exact value where one is known, else the limit; where it lies far outside, it is not drawn.",
+                &format!(
+                    "Each point is one solution{outside}, less the value in the title of its panel, the finest in the fit; up to ten times \
+                     its {noun}. Shaded: that value and its error band. Dashed: the exact value where one is known, else the limit; where it \
+                     lies far outside, it is not drawn."
+                ),
                 values,
             ),
         ]
@@ -683,12 +686,12 @@ impl Refinement {
     }
 
     fn value_panel(&self, series: &Series) -> Option<Panel> {
-        let (_, finest) = series.finest.filter(|(_, value)| value.is_finite())?;
+        let (size, finest) = series.finest.filter(|(_, value)| value.is_finite())?;
         let band = series.error_band.map_or(0.0, |band| band.half_width);
         let all: Vec<_> = series.drawn().filter(|point| point.value.is_finite()).collect();
-        // Beside what the coarsest steps are off by, the error band of the finest could not be seen.
-        let most = DECADE * all.iter().map(|point| point.size).fold(f64::INFINITY, f64::min);
-        let near: Vec<_> = all.iter().copied().filter(|point| point.size <= most).collect();
+        // Beside what the coarsest steps are off by, the error band of the finest could not be seen. It is that of the finest
+        // in the fit: finer ones may lie at the floor of round-off.
+        let near: Vec<_> = all.iter().copied().filter(|point| point.size <= DECADE * size).collect();
         let points = if near.len() >= FEW { near } else { all };
         let [low, high] = extremes(points.iter().map(|point| point.size))?;
         let offsets = points.iter().map(|point| point.value - finest).chain([-band, band]);

@@ -159,7 +159,8 @@ pub fn critical_velocity(plan: &Plan, rows: &[Row]) -> Option<Figure> {
     let inner = rest.first().map_or(1, |axis| axis.count);
     let shown = inner.min(LINES_MAX);
     let unit = first.parameter.entry().dimension.map_or("", |dimension| dimension.units()[0]);
-    let x = Axis::linear(&first.parameter.to_string(), unit);
+    let axis = if first.logarithmic { Axis::log } else { Axis::linear };
+    let x = axis(&first.parameter.to_string(), unit);
     let mut panel = Panel::new("critical velocity", x, Axis::linear("V_c", "m/s")).tall(TALL);
     for index in 0..shown {
         let column = if shown == 1 { 0 } else { index * (inner - 1) / (shown - 1) };
@@ -241,9 +242,18 @@ pub fn measured_depths(comparisons: &[Comparison], judged: &[&Judged]) -> Option
     let [low, high] = extremes(depths)?;
     let ends = [low / 1.5, high * 1.5];
     let axis = |title| Axis::log(title, "m").over(ends);
-    let [lower, upper] = [1.0 - BAND, 1.0 + BAND].map(|factor| ends.map(|depth| (depth, factor * depth)));
+    // Cut at the edges of the diagram: a corner beyond them would be drawn on them, and its side lean.
+    let [from, to] = ends;
+    let band = [
+        (from, from),
+        (from, from * (1.0 + BAND)),
+        (to / (1.0 + BAND), to),
+        (to, to),
+        (to, to * (1.0 - BAND)),
+        (from / (1.0 - BAND), from),
+    ];
     let mut panel = Panel::new("predicted over measured depth", axis("measured depth"), axis("predicted depth"))
-        .series("±20 %", Style::area(Ink::Shade), [lower[0], upper[0], upper[1], lower[1]])
+        .series("±20 %", Style::area(Ink::Shade), band)
         .series("equal", Style::REFERENCE, ends.map(|depth| (depth, depth)))
         .tall(290.0);
     for (index, (set, members)) in grouped(comparisons, |c| c.group()).into_iter().enumerate() {

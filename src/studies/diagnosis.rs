@@ -7,6 +7,8 @@
 //! (`causes`).
 
 mod causes;
+#[cfg(any(test, feature = "report"))]
+mod faulty;
 mod fixed_steps;
 mod hypotheses;
 mod ladder;
@@ -20,6 +22,8 @@ use serde::Serialize;
 use strum::IntoEnumIterator;
 
 pub use self::causes::{Cause, Certainty};
+#[cfg(feature = "report")]
+pub(crate) use self::faulty::{misnamed, misnamed_schemes};
 use self::fixed_steps::in_fixed_steps;
 #[cfg(feature = "report")]
 pub(crate) use self::hypotheses::changed_by_nothing;

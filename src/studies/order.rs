@@ -405,7 +405,7 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
             format!("the errors do not fall with the step and are {height:.1e} times the round-off"),
         );
     }
-    if negative.len() >= STEPS_MIN && alternates(negative) && line.scatter <= REGULAR {
+    if negative.len() >= STEPS_MIN && alternates(negative) && line.is_regular() {
         let n = negative.len();
         return (Class::Oscillating, format!("the error changes sign from step to step, {n} points"));
     }
@@ -422,12 +422,14 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     }
 }
 
-/// Scatter of logarithms about their line up to which the sizes of what alternates follow a power of the step.
+/// Scatter of logarithms about their line up to which the sizes of what alternates follow a power of the step, and that where three
+/// degrees of freedom or fewer are left: few random sizes often lie near a line.
 const REGULAR: f64 = 0.15;
+const FEW_REGULAR: f64 = 0.02;
 
 /// Slope of the logarithms `y` over `x` where they follow a line as those of an oscillation do.
 pub(super) fn regular_slope(x: &[f64], y: &[f64]) -> Option<f64> {
-    regression(x, y).filter(|line| line.scatter <= REGULAR).map(|line| line.slope)
+    regression(x, y).filter(Line::is_regular).map(|line| line.slope)
 }
 
 /// Whether at least nine in ten neighbours differ in sign, at least three signs given.
@@ -454,6 +456,11 @@ struct Line {
 }
 
 impl Line {
+    /// Whether the points follow the line as the sizes of an oscillation do.
+    fn is_regular(&self) -> bool {
+        self.scatter <= if self.dof > 3 { REGULAR } else { FEW_REGULAR }
+    }
+
     fn slope_band(&self, level: f64) -> [f64; 2] {
         let half = (student_t(level, self.dof) * self.scatter / self.spread.sqrt()).max(ORDER_RESOLUTION);
         [self.slope - half, self.slope + half]

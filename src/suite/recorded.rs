@@ -1,5 +1,6 @@
 //! Scenes with numbers computed elsewhere: `verification/references/exact.json`, of those with a law of their own `laws.json`, and
-//! of the one that plugs `plug.json`, each made by the recipe beside it.
+//! of the one that plugs `plug.json`, each made by the recipe beside it; and what other programs prove of scenes, `enclosed.json`
+//! and `capd.json`.
 //!
 //! A recipe reads the texts of the scenes, resolves and solves them in 40 digits and shares nothing with this crate.
 
@@ -55,6 +56,77 @@ pub fn scenes() -> Result<&'static [RecordedScene], String> {
         Ok(scenes)
     });
     SCENES.as_deref().map_err(Clone::clone)
+}
+
+/// Another program that proves its answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prover {
+    /// Integrals in balls of FLINT, of forces of V alone.
+    PythonFlint,
+    /// The validated solver of the CAPD group, of p + s x + r V + q V².
+    Capd,
+}
+
+/// What another program proves, of the decimals of scenes.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Opinion {
+    /// Its name and version.
+    pub program: String,
+    #[expect(dead_code, reason = "for people")]
+    recipe: String,
+    /// What it says.
+    pub scenes: Vec<EnclosedScene>,
+}
+
+/// What another program proves of one scene.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnclosedScene {
+    /// Its name; that of the shipped file where there is no text.
+    pub name: String,
+    /// Its text, whose numbers are `f64` too; `None` for a scene that ships.
+    pub text: Option<String>,
+    /// `stopped`, `perforated`, or `undecided`.
+    pub outcome: String,
+    /// Events in time order, up to what the program refused.
+    pub events: Vec<EnclosedEvent>,
+    /// Why it refused the rest.
+    #[serde(default)]
+    pub refused: Option<String>,
+}
+
+/// An event between two decimals each.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnclosedEvent {
+    /// Its kind, as `solve --json` names it.
+    pub event: String,
+    /// Time (s).
+    pub time_s: [String; 2],
+    /// Depth (m).
+    pub depth_m: [String; 2],
+    /// Velocity (m/s).
+    pub velocity_m_s: [String; 2],
+}
+
+/// What `prover` says.
+///
+/// # Errors
+/// Only if a shipped file is broken, which a claim would see; in words.
+pub fn opinion(prover: Prover) -> Result<&'static Opinion, String> {
+    type Read = LazyLock<Result<Opinion, String>>;
+    fn read(text: &str) -> Result<Opinion, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+    static FLINT: Read = LazyLock::new(|| read(include_str!("../../verification/references/enclosed.json")));
+    static CAPD: Read = LazyLock::new(|| read(include_str!("../../verification/references/capd.json")));
+    let found = match prover {
+        Prover::PythonFlint => &FLINT,
+        Prover::Capd => &CAPD,
+    };
+    found.as_ref().map_err(Clone::clone)
 }
 
 /// What is recorded of the shipped scene `name`.

@@ -32,7 +32,7 @@ macro_rules! recorded {
 /// The transcripts of `verification/transcript`, by file name without its ending.
 pub const TRANSCRIPTS: &[(&str, &str)] = recorded![
     "solve", "methods", "paths", "critical", "sweep", "numbers", "batch", "converge", "audit", "studies", "bench",
-    "report", "suites", "peers", "spelled", "refused", "places", "paper", "options", "unusual", "misread",
+    "report", "suites", "peers", "spelled", "refused", "places", "paper", "options", "unusual", "misread", "laws",
 ];
 
 /// Runs of the program, and what they said.

@@ -117,20 +117,36 @@ fn a_family_of_claims_that_is_lost_or_measured_on_less_fails_the_counts() {
 /// The suites whose claims are counted.
 const SUITES: [&str; 2] = ["verification/suite.toml", "verification/edges.toml"];
 
-/// Writes what the suites count after claims came or went: `cargo test --release --test it write_the_counts -- --ignored`.
+/// What the claims of `judged` measure, a line each.
+fn measurements(judged: &[Judged]) -> String {
+    let judged = judged.iter().filter(|judged| !judged.claim.check.is_last());
+    let measured = judged.filter_map(|judged| Some((judged, judged.measured?)));
+    let line =
+        |(judged, measured): (&Judged, f64)| format!("{:?} = [{measured:.3e}, {}]\n", judged.claim.id, judged.cases);
+    measured.map(line).collect()
+}
+
+/// Writes what the suites count and measure after claims came or went: `cargo test --release --test it write_the_counts -- --ignored`.
 #[test]
 #[ignore = "changes files of the repository"]
 fn write_the_counts() {
     const MARK: &str = "[claim.check.counted.families]\n";
+    let mut measured =
+        "# What each claim measures, and on how many cases, with the seed 1: written with the counts of the suites.\n"
+            .to_owned();
     for (path, suite) in SUITES.iter().zip([Suite::embedded(), Suite::edges()]) {
         let suite = suite.unwrap_or_else(|error| panic!("{error}"));
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
         let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{error}"));
         let (before, rest) = text.split_once(MARK).unwrap_or_else(|| panic!("{} has no counts", path.display()));
         let after: String = rest.split_inclusive('\n').skip_while(|line| !line.trim().is_empty()).collect();
-        let text = format!("{before}{MARK}{}{after}", families(&judged(&suite, 1)));
+        let judged = judged(&suite, 1);
+        let text = format!("{before}{MARK}{}{after}", families(&judged));
         fs::write(&path, text).unwrap_or_else(|error| panic!("{error}"));
+        measured += &measurements(&judged);
     }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("verification/measured.toml");
+    fs::write(path, measured).unwrap_or_else(|error| panic!("{error}"));
 }
 
 /// Ten minutes of one processor: `cargo test --release --test it suite -- --ignored --nocapture`.

@@ -55,7 +55,15 @@ fn work_precision(report: &BenchJson, scene: &str) -> Option<Figure> {
     let mut methods: Vec<&str> = timed.map(|run| run.method.as_str()).collect();
     methods.dedup();
     let groups = groups(&methods);
-    let panels = COSTS.iter().flat_map(|cost| groups.iter().map(|group| panel(&runs, group, cost))).collect();
+    // Other programs may not count their work: a panel needs more than the series that stands in all.
+    let is_known = |group: &[&str], cost: &Cost| {
+        let others = runs.iter().filter(|run| run.method != IN_ALL && group.contains(&run.method.as_str()));
+        others.into_iter().any(|run| cost.2(run).is_some())
+    };
+    let panels = COSTS
+        .iter()
+        .flat_map(|cost| groups.iter().filter(|group| is_known(&group.1, cost)).map(|group| panel(&runs, group, cost)))
+        .collect();
     let failed = runs.iter().filter(|run| run.state != RunState::Right).count();
     Figure::new("cost", scene, &[], &[&one_line(scene), &count(failed, "run")], panels)
 }

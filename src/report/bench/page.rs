@@ -7,7 +7,7 @@ use super::{BenchJson, CaseJson};
 use crate::report::figure::{Figure, name_of};
 use crate::report::figures::words_for;
 use crate::report::page::{Page, Part, Table, cell, figure, folded, number_cell, reproduction, suite_inputs};
-use crate::report::text::{clipped, count, number, one_line};
+use crate::report::text::{clipped, count, number, one_line, power_of_ten};
 use crate::report::{Environment, cells, typeset};
 use crate::studies::Quantity;
 use crate::studies::bench::step_size::{Curve, Held, LEVELS as STEP_LEVELS, StepStudy};
@@ -56,7 +56,7 @@ fn micro(ns: f64) -> String {
 }
 
 fn fastest(report: &BenchJson, case: &CaseJson, figures: &[Figure]) -> Markup {
-    let levels = LEVELS.map(|level| format!("error ≤ {}", number(level, 1)));
+    let levels = LEVELS.map(|level| format!("error ≤ {}", power_of_ten(level.log10().round() as i32)));
     let header = ["method".to_owned()].into_iter().chain(levels);
     let header = header.chain(["least error".to_owned(), "not right".to_owned()]);
     let methods = by_method(&report.runs).filter(|runs| runs[0].scene == case.name);
@@ -78,13 +78,18 @@ fn fastest_row(runs: &[Run]) -> Vec<Markup> {
     let mut cells = vec![cell(&runs[0].method)];
     cells.extend(LEVELS.map(|level| {
         html! {
-            @if let Some((run, ns)) = fastest_of(runs, level) { (micro(ns)) " " span.quiet { "at " (typeset::html(&run.setting)) } }
+            @if let Some((run, ns)) = fastest_of(runs, level) { (micro(ns)) " " span.quiet { "at " (setting(run)) } }
             @else { "—" }
         }
     }));
     cells.push(number_cell(least_error(runs), 2));
     cells.push(html! { @if wrong > 0 { span.failed { (wrong) " of " (runs.len()) } } @else { "none" } });
     cells
+}
+
+/// Its tolerance, or its step with a blank before the unit.
+fn setting(run: &Run) -> Markup {
+    typeset::html(&run.setting.replace("dt", " dt"))
 }
 
 fn all_runs(report: &BenchJson, scene: &str) -> Markup {
@@ -95,7 +100,7 @@ fn all_runs(report: &BenchJson, scene: &str) -> Markup {
         let quartiles = run.time.map_or_else(dash, |t| format!("{} – {}", micro(t.low_ns), micro(t.high_ns)));
         [
             cell(&run.method),
-            typeset::html(&run.setting),
+            setting(run),
             state_cell(run),
             number_cell(run.error, 2),
             cell(run.quantity.map_or("", Quantity::name)),

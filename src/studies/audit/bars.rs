@@ -79,7 +79,8 @@ impl Judge<'_> {
         } else {
             let unconfirmed = three.filter(|three| judged.formal_order.is_none() && three.uncertainty.is_some());
             let unconfirmed = unconfirmed.map(|three| {
-                let order = three.order.map_or(1.0, |order| order.clamp(0.5, 4.0));
+                // Three rows that scatter show orders as high as any: above two, two is the careful one.
+                let order = three.order.map_or(1.0, |order| order.clamp(0.5, 2.0));
                 let [f1, f2, _] = three.values;
                 let half_width = 3.0 * (f2 - f1).abs() / (order * three.ratios[0].ln()).exp_m1();
                 ErrorBand { half_width, rule: "GCI with Fs 3, for nothing confirms the order" }

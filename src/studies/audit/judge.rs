@@ -34,7 +34,7 @@ const NEAR_EXACT: f64 = 0.05;
 const DIGITS_SURE: f64 = 1e-4;
 const DIGITS_LEAST: f64 = 2e-3;
 
-/// How far from the orders of the three finest rows an order may lie.
+/// How far from the orders of the three finest rows an order may lie, and from the formal one before it is missed.
 const ORDER_SPARE: f64 = 0.25;
 
 /// The judgement of a column while it is made.
@@ -296,6 +296,12 @@ impl<'a> Judge<'a> {
                         || law.scatter < FEW_SCATTER && self.contradiction(law, formal).is_some()) =>
             {
                 let missed = format!("{found}, where {formal} is expected");
+                if (order - formal).abs() < ORDER_SPARE {
+                    // Powers beyond those of the law shift an order by so much and its interval by nothing.
+                    self.advise(self.finer_rows());
+                    let why = format!("{missed}: too near to it to tell from a drift");
+                    return self.end(Verdict::Undecided, FindingKind::OrderUnclear, why);
+                }
                 return self.end(Verdict::Failed, FindingKind::OrderMissed, missed);
             }
             // Two terms leave little room: the interval itself must hold the order.
@@ -450,9 +456,11 @@ impl<'a> Judge<'a> {
         let [low, high] = if let Some([low, high]) = judged.limit_band {
             [low - rounding, high + rounding]
         } else {
-            // Without a law three times the bar of the finest value takes its place; printed digits are sure.
+            // Without a law three times the bar of the finest value takes its place; printed digits are sure. Three values that
+            // do not converge may lie close together by chance.
             let bar = judged.error_band.map_or(f64::INFINITY, |band| band.half_width);
-            let half = if is_constant(&self.grids) { bar } else { (3.0 * bar).max(2.0 * range(&self.grids)) };
+            let ranges = if law.is_none() && judged.class != Class::Converging { 5.0 } else { 2.0 };
+            let half = if is_constant(&self.grids) { bar } else { (3.0 * bar).max(ranges * range(&self.grids)) };
             [finest.value - half, finest.value + half]
         };
         let agrees = (low..=high).contains(&exact);

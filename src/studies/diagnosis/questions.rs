@@ -314,7 +314,7 @@ fn stiff(random: &mut Random) -> Problem {
 }
 
 /// The families in the order in which they are asked: what tells causes apart first.
-const FAMILIES: [Family; 27] = [
+const FAMILIES: [Family; 29] = [
     Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
     Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
     Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
@@ -396,6 +396,24 @@ const FAMILIES: [Family; 27] = [
             for (index, count) in [(2, 1.0), (3, 2.0), (4, 3.0)] {
                 problem.stages[index].end = from + count * thin;
             }
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
+        },
+    },
+    Family {
+        name: "many-stages",
+        draw: |random| {
+            let ends = 9 + random.below(8);
+            let problem = layered(random, ends, |random, scale, _| mixed(random, scale));
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.05 })
+        },
+    },
+    Family {
+        name: "no-length",
+        // One stage of several, the first in turn, begins where it ends.
+        draw: |random| {
+            let mut problem = layered(random, 3, |random, scale, _| mixed(random, scale));
+            let stage = random.below(3);
+            problem.stages[stage].end = problem.start_of(stage);
             near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
         },
     },
@@ -521,8 +539,11 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
             continue;
         }
         let mut random = Random::for_part(seed, &format!("diagnosis {name} {round}"));
+        // The first has an exit, which a solver may keep.
+        let is_wanted = |problem: &Problem| !asked.is_empty() || problem.has_exit();
         let found = (0..DRAWS_MAX).find_map(|_| {
-            draw(&mut random).and_then(|problem| Question::new(format!("{name}-{}", round + 1), problem, None))
+            let problem = draw(&mut random).filter(is_wanted)?;
+            Question::new(format!("{name}-{}", round + 1), problem, None)
         });
         asked.extend(found);
     }

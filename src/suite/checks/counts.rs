@@ -17,6 +17,14 @@ check! {
         /// What each family must have.
         families: BTreeMap<String, Family>,
     } in Judge, "families", by counted, compares nothing;
+    /// What every claim measures beside what it measured when a person last looked (`verification/measured.toml`, seed 1): claims
+    /// that measure another number, or on fewer cases. A check that sees less than it did passes everywhere else.
+    Remeasured {
+        /// Factor within which two numbers above round-off are the same.
+        within: f64,
+        /// The same of round-off, which another processor or library of mathematics has otherwise.
+        rounding_within: f64,
+    } in Judge, "differences", by remeasured, compares nothing;
     /// Claims whose two computations share more than the scene ([`crate::suite::roads`]).
     Independent {} in Judge, "claims", by independent, compares nothing;
 }
@@ -64,6 +72,50 @@ fn difference(family: Family, claims: &[&Judged]) -> Option<String> {
         Some(format!("{cases} cases, and the suite counts {}", family.cases))
     } else {
         None
+    }
+}
+
+/// What was measured by the id of the claim: the number, and on how many cases.
+const MEASURED: &str = include_str!("../../../verification/measured.toml");
+
+/// The seed of those measurements.
+const SEED: u64 = 1;
+
+fn remeasured(check: &Remeasured, subject: &Subject<'_>) -> Found {
+    let judged = subject.context.judged.ok_or_else(|| NotMeasured::skip("a part of the suite was run"))?;
+    applies!(subject.context.seed == SEED, "measurements are recorded for the seed {SEED}");
+    let recorded: BTreeMap<String, (f64, usize)> = toml::from_str(MEASURED)?;
+    let of = |judged: &Judged| recorded.get(&judged.claim.id).copied();
+    let known: Vec<_> =
+        judged.iter().filter(|judged| !judged.lacks).filter_map(|judged| Some((judged, of(judged)?))).collect();
+    let different: Vec<_> = known
+        .iter()
+        .filter(|(judged, (was, cases))| {
+            let is_same = judged.measured.is_some_and(|is| check.is_same(judged.claim.unit, *was, is));
+            !is_same || judged.cases * 10 < cases * 9
+        })
+        .map(|(judged, (was, cases))| {
+            let Judged { claim, measured, cases: now, .. } = judged;
+            format!("{}: {measured:?} on {now} cases, and {was:e} on {cases} before", claim.id)
+        })
+        .collect();
+    let remark = if different.is_empty() { format!("{} claims", known.len()) } else { different.join("; ") };
+    Ok(Measurement::count(different.len()).remark(remark).cases(known.len()))
+}
+
+impl Remeasured {
+    /// What is smaller is round-off where it is relative; in units of it, all is.
+    const ROUNDING: f64 = 2e-12;
+    const UNITS_OF_ROUNDING: [&str; 5] =
+        ["ulp", "ulp x condition", "promises x condition", "error bars", "compensated/plain"];
+    /// What is smaller is nothing.
+    const NOTHING: f64 = 1e-15;
+
+    fn is_same(&self, unit: &str, was: f64, is: f64) -> bool {
+        let is_rounding = was.max(is) < Self::ROUNDING || Self::UNITS_OF_ROUNDING.contains(&unit);
+        let within = if is_rounding { self.rounding_within } else { self.within };
+        let [was, is] = [was, is].map(|size| size.max(Self::NOTHING));
+        was <= within * is && is <= within * was
     }
 }
 

@@ -142,7 +142,7 @@ macro_rules! every_check {
 
             /// Whether it is about the other claims, and measured after them.
             pub fn is_last(&self) -> bool {
-                matches!(self, Self::Counted(_) | Self::Independent(_))
+                matches!(self, Self::Counted(_) | Self::Remeasured(_) | Self::Independent(_))
             }
 
             /// Measures a claim.
@@ -161,12 +161,12 @@ every_check! {
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
-    KnownBad Counted Independent
+    KnownBad Counted Remeasured Independent
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
-    EnergyBalance TimeReversal Similarity Split JoinedMasses Ranges Neutral
+    EnergyBalance TimeReversal Similarity Split JoinedMasses Ranges Neutral NamedFaults NamedSchemes
     Sweep BoundOfData GapFalls ThicknessLimit Intervals HiddenIntervals Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop
@@ -174,7 +174,7 @@ every_check! {
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
-    EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts Refuted
+    EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts SecondOpinion Refuted
 }
 
 /// What several claims share, computed once.

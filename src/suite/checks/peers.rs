@@ -23,6 +23,18 @@ check! {
         /// How many questions about stages, and how many about scenes.
         questions: usize,
     } in CrossCode, "faults", by neutral, compares nothing;
+    /// Solvers with one known fault each, exact but for it: those to which `diagnose` does not name it and its number first.
+    NamedFaults {
+        /// How many questions about stages, and how many about scenes.
+        questions: usize,
+        /// One fault of so many is tried.
+        each: usize,
+    } in CrossCode, "faults", by named_faults, compares nothing;
+    /// Schemes of fixed steps, sound and with twice the drag: those to which `diagnose` does not say so.
+    NamedSchemes {
+        /// How many questions.
+        questions: usize,
+    } in CrossCode, "schemes", by named_schemes, compares nothing;
 }
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
@@ -212,4 +224,22 @@ fn neutral(&Neutral { questions }: &Neutral, subject: &Subject<'_>) -> Found {
     // No answer at all shows nothing.
     let value = if answers == 0 { f64::NAN } else { changed.len() as f64 };
     Ok(Measurement::new(value).remark(changed.join("; ")).cases(answers))
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn named_faults(&NamedFaults { questions, each }: &NamedFaults, _: &Subject<'_>) -> Found {
+    Ok(misnamed(diagnosis::misnamed(SEED, questions, each)))
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn named_schemes(&NamedSchemes { questions }: &NamedSchemes, _: &Subject<'_>) -> Found {
+    Ok(misnamed(diagnosis::misnamed_schemes(SEED, questions)))
+}
+
+/// Of the questions whether faults are named: with others, a few faults show in no answer, or as another fault would.
+const SEED: u64 = 1;
+
+/// How many were tried, and those that went without their name.
+fn misnamed((tried, missed): (usize, Vec<String>)) -> Measurement {
+    Measurement::count(missed.len()).remark(missed.join("; ")).cases(tried)
 }

@@ -6,6 +6,7 @@ use super::super::claim::{Found, Measurement, NotMeasured};
 use super::problems::{in_double_double, problems};
 use super::{Subject, Worst, worse, worst_of};
 use crate::exchange::scene_file::SceneFile;
+use crate::integrators::method::MethodName;
 use crate::integrators::{ClosedForm, Detail, Enclosure, Flight, Integrator};
 use crate::physics::ball::Ball;
 use crate::physics::decimals::Written;
@@ -19,7 +20,7 @@ use crate::studies::random::Random;
 use crate::studies::random_problems::Kind;
 use crate::studies::random_scenes::Generator;
 use crate::studies::{critical_velocity, enclosure};
-use crate::suite::recorded::{self, RecordedScene};
+use crate::suite::recorded::{self, EnclosedEvent, EnclosedScene, Prover, RecordedScene};
 
 check! {
     /// `count` random problems of each of `kinds`, enclosed: every event and the end must hold the answer in double-double, and
@@ -34,6 +35,13 @@ check! {
     /// The scenes with numbers computed elsewhere, from their texts: end and V_c must lie in the enclosures of the decimals as
     /// written. The widest of them.
     EnclosesTexts {} in Random, "spacings", by encloses_texts, compares (Enclosure Loop | Elsewhere);
+    /// Scenes of which another program proves its answers, from their texts: numbers of which the enclosure and that of the
+    /// program have nothing in common. Of another method: outcomes that are refuted, and margins that with their error bounds
+    /// miss the program's W at the exit.
+    SecondOpinion {
+        /// The program.
+        prover: Prover,
+    } in Random, "refuted", by second_opinion, compares (Method | Elsewhere);
     /// On `count` random problems of each of `kinds`: how often the method decides another outcome than is proved, or its
     /// margin with its error bound misses the interval of W at the exit.
     Refuted {
@@ -236,17 +244,21 @@ fn in_fifty_digits(problem: &Problem, flight: &Flight<Ball>) -> Found<()> {
     Ok(())
 }
 
+/// The scene of a record: its text, or the shipped file.
+fn file(name: &str, text: Option<&str>) -> Found<SceneFile> {
+    let read = match text {
+        Some(text) => SceneFile::from_toml(text, name, &[]),
+        None => SceneFile::read(std::path::Path::new(name), &[]),
+    };
+    read.map_err(|error| NotMeasured::broken(format!("`{name}` cannot be read: {error}")))
+}
+
 fn encloses_texts(_subject: &Subject<'_>) -> Found {
     let mut worst = Worst::default();
     let mut compared = 0;
     for scene in recorded::scenes().map_err(NotMeasured::broken)? {
         let name = &scene.name;
-        let read = match &scene.text {
-            Some(text) => SceneFile::from_toml(text, name, &[]),
-            None => SceneFile::read(std::path::Path::new(name), &[]),
-        };
-        let unread = |error| NotMeasured::broken(format!("`{name}` cannot be read: {error}"));
-        let SceneFile { scene: read, written } = read.map_err(unread)?;
+        let SceneFile { scene: read, written } = file(name, scene.text.as_deref())?;
         let mut meets = |path: &str, interval: (f64, f64), ball: Option<Ball>| -> Found<()> {
             let Some(exact) = number(scene, path) else { return Ok(()) };
             let is_met = exact.upper() >= interval.0 && exact.lower() <= interval.1;
@@ -309,7 +321,14 @@ fn refuted(Refuted { kinds, count }: &Refuted, subject: &Subject<'_>) -> Found {
                 continue;
             }
             compared += 1;
-            let agrees = flight.outcome == proved.outcome && margin_meets(&problem, &flight, &proved);
+            let passed = || {
+                let passed = proved.events.iter().filter(|event| event.kind != EventKind::Rest);
+                passed.map(|event| (event.state.velocity.lower(), event.state.velocity.upper()))
+            };
+            let perforates = proved.events.iter().any(|event| event.kind == EventKind::Exit);
+            // Four roundings of the squares.
+            let agrees =
+                flight.outcome == proved.outcome && (!perforates || margin_meets(&problem, &flight, passed(), 4.0));
             if !agrees {
                 refuted += 1;
                 if first.is_empty() {
@@ -322,18 +341,114 @@ fn refuted(Refuted { kinds, count }: &Refuted, subject: &Subject<'_>) -> Found {
     Ok(Measurement::count(refuted).remark(format!("{compared} compared{first}")).cases(compared))
 }
 
-/// Whether the margin of `flight`, give or take its error bound, meets W at the exit, where that is the margin.
-fn margin_meets(problem: &Problem, flight: &Flight, proved: &Flight<Ball>) -> bool {
+/// Whether the margin of `flight`, which leaves the target, give or take its error bound and some `roundings`, meets the least W
+/// of the events that are passed, whose velocities lie between two numbers each.
+fn margin_meets(problem: &Problem, flight: &Flight, passed: impl Iterator<Item = (f64, f64)>, roundings: f64) -> bool {
     let Some((margin, error)) = flight.exit_margin.zip(flight.exit_margin_error) else { return true };
-    if !proved.events.iter().any(|event| event.kind == EventKind::Exit) {
-        return true;
-    }
-    let least = |end: fn(Ball) -> f64| {
-        let passed = proved.events.iter().filter(|event| event.kind != EventKind::Rest);
-        passed.map(|event| end(event.state.velocity)).fold(f64::INFINITY, f64::min)
-    };
+    let (low, high) =
+        passed.fold((f64::INFINITY, f64::INFINITY), |least, one| (least.0.min(one.0), least.1.min(one.1)));
     let square = |speed: f64| speed / problem.impact_speed * (speed / problem.impact_speed);
-    let (low, high) = (square(least(Ball::lower).max(0.0)), square(least(Ball::upper)));
-    // Four roundings of the squares here.
-    margin - error <= high * (1.0 + 4.0 * f64::EPSILON) && margin + error >= low * (1.0 - 4.0 * f64::EPSILON)
+    let slack = roundings * f64::EPSILON;
+    margin - error <= square(high) * (1.0 + slack) && margin + error >= square(low.max(0.0)) * (1.0 - slack)
+}
+
+/// An interval of a record: the balls of its two decimals.
+fn recorded_interval([low, high]: &[String; 2]) -> Found<(Ball, Ball)> {
+    let ball = |text: &str| decimal(text).map(|(digits, exponent)| Ball::of_decimal(digits, exponent));
+    ball(low).zip(ball(high)).ok_or_else(|| NotMeasured::broken(format!("[{low}, {high}] is no interval")))
+}
+
+/// Whether a number may lie both in `ball` and between `low` and `high`.
+fn meets(ball: Ball, (low, high): (Ball, Ball)) -> bool {
+    (low - ball).lower() <= 0.0 && (ball - high).lower() <= 0.0
+}
+
+/// The quantities of an event of ours beside those of the record.
+fn pairs<'a>(state: &State<Ball>, event: &'a EnclosedEvent) -> [(&'static str, Ball, &'a [String; 2]); 3] {
+    [
+        ("time", state.time, &event.time_s),
+        ("depth", state.depth, &event.depth_m),
+        ("velocity", state.velocity, &event.velocity_m_s),
+    ]
+}
+
+fn second_opinion(&SecondOpinion { prover }: &SecondOpinion, subject: &Subject<'_>) -> Found {
+    let opinion = recorded::opinion(prover).map_err(NotMeasured::broken)?;
+    let (mut refuted, mut compared, mut scenes, mut first) = (0, 0, 0, String::new());
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    let mut see = |agrees: bool, what: String| {
+        compared += 1;
+        if !agrees {
+            refuted += 1;
+            if first.is_empty() {
+                first = format!("; the first: {what}");
+            }
+        }
+    };
+    for scene in &opinion.scenes {
+        let EnclosedScene { name, text, outcome, events, refused } = scene;
+        let SceneFile { scene: read, written } = file(name, text.as_deref())?;
+        let is_outcome = |found: Outcome| found.is_stop() == (outcome == "stopped");
+        if subject.method_name() != MethodName::Enclosure {
+            let problem = read.problem()?;
+            let flight = match subject.method(None)?.integrator().solve(&problem, Detail::Events) {
+                Ok(flight) => flight,
+                Err(error) if error.is_usage() => continue,
+                Err(error) => return Err(error.into()),
+            };
+            if flight.outcome == Outcome::Undecided || outcome == "undecided" {
+                continue;
+            }
+            scenes += 1;
+            see(is_outcome(flight.outcome), format!("{name} is {outcome} and not {}", flight.outcome));
+            if outcome == "perforated" && refused.is_none() {
+                let mut passed = Vec::new();
+                for event in events {
+                    let (low, high) = recorded_interval(&event.velocity_m_s)?;
+                    passed.push((low.lower(), high.upper()));
+                }
+                // Force, drag and c of a scene that ships are rounded to `f64`, which the bound does not cover.
+                let roundings = if text.is_some() { 4.0 } else { 32.0 };
+                let agrees = margin_meets(&problem, &flight, passed.into_iter(), roundings);
+                see(agrees, format!("the margin {:?} of {name}", flight.exit_margin));
+            }
+            continue;
+        }
+        let flight = match enclosure::flight(&read, &written, Detail::Events)? {
+            Ok(flight) => flight,
+            Err(error) if error.is_usage() => continue,
+            Err(error) => return Err(error.into()),
+        };
+        if flight.outcome == Outcome::Undecided {
+            continue;
+        }
+        scenes += 1;
+        if outcome != "undecided" {
+            see(is_outcome(flight.outcome), format!("{name} is {outcome} and not {}", flight.outcome));
+        }
+        let is_whole = refused.is_some() || events.len() == flight.events.len();
+        holds!(is_whole && events.len() <= flight.events.len(), "`{name}` has {} events", flight.events.len());
+        for (event, recorded) in flight.events.iter().zip(events) {
+            let kind = event.kind.name();
+            holds!(kind == recorded.event, "{kind} of `{name}` is {} in the record", recorded.event);
+            for (quantity, ball, interval) in pairs(&event.state, recorded) {
+                let (low, high) = recorded_interval(interval)?;
+                see(meets(ball, (low, high)), format!("{quantity} of {kind} of {name}: {ball:?}, {interval:?}"));
+                if ball.radius > 0.0 {
+                    ours.push(spacings(ball.interval()));
+                    theirs.push(spacings((low.lower(), high.upper())));
+                }
+            }
+        }
+    }
+    holds!(scenes >= 20, "only {scenes} scenes were compared");
+    let middle = |mut widths: Vec<f64>| {
+        widths.sort_by(f64::total_cmp);
+        widths.get(widths.len() / 2).copied()
+    };
+    let widths = middle(ours).zip(middle(theirs)).map_or_else(String::new, |(ours, theirs)| {
+        format!("; half of ours are no wider than {ours:.1} spacings, of theirs than {theirs:.1}")
+    });
+    let remark = format!("{compared} numbers of {scenes} scenes, {}{widths}{first}", opinion.program);
+    Ok(Measurement::count(refuted).remark(remark).cases(compared))
 }

@@ -150,7 +150,8 @@ fn count_all(kind: &str, tables: usize) -> Counts {
 fn smooth_random_tables_pass_and_no_limit_of_theirs_is_refused() {
     for (kind, off_most) in [("clean", 0.6), ("mixture", 0.3)] {
         let counts = count_all(kind, 60);
-        assert_eq!((counts.exact[1], counts.false_limits, counts.wrong[0]), (0, 0, 0), "{kind}");
+        let wrong = (counts.right[1], counts.exact[1], counts.false_limits, counts.wrong[0]);
+        assert_eq!(wrong, (0, 0, 0, 0), "{kind}");
         assert!(10 * counts.covered >= 9 * counts.tables, "{kind}: {} of {}", counts.covered, counts.tables);
         let [passed, all] = counts.off[2].map(|count| count as f64);
         assert!(passed <= off_most * all, "{kind}: {passed} of {all} tables with another limit pass");
@@ -159,10 +160,11 @@ fn smooth_random_tables_pass_and_no_limit_of_theirs_is_refused() {
 
 /// By chance, errors of few rows change their sign from step to step. Only sizes that follow a power make an oscillation.
 #[test]
-fn right_saw_tooth_tables_seldom_fail_beside_their_exact_value() {
+fn right_saw_tooth_tables_seldom_fail() {
     for kind in ["saw-tooth of order 1", "saw-tooth of order 2"] {
         let counts = count_all(kind, 200);
-        assert!(counts.exact[1] <= 4, "{kind}: {} of {}", counts.exact[1], counts.tables);
+        let failed = [counts.right[1], counts.exact[1]];
+        assert!(failed.iter().all(|failed| *failed <= 1), "{kind}: {failed:?} of {}", counts.tables);
     }
 }
 
