@@ -13,6 +13,7 @@ mod fixed_steps;
 mod hypotheses;
 mod ladder;
 mod numbers;
+mod observations;
 mod questions;
 mod simulation;
 mod tolerances;
@@ -29,7 +30,7 @@ pub(crate) use self::hypotheses::changed_by_nothing;
 #[cfg(feature = "report")]
 pub(crate) use self::ladder::{LADDER, Limit};
 pub use self::questions::{Content, contents};
-use self::questions::{Question, edge_questions, questions};
+use self::questions::{Question, edge_questions, in_order, questions};
 use self::tolerances::{at_tolerances, row};
 use super::verdict::Verdict;
 use crate::exchange::peers::{Peer, PeerAnswer, PeerFailure, PeerFault, PeerIdentity, PeerRequest};
@@ -258,6 +259,7 @@ pub fn diagnose(solver: &mut dyn Solver, plan: Plan, progress: &dyn Fn(usize, us
     if plan.asks_edges && !identity.fixed_step && !identity.reads_scene {
         all.extend(edge_questions());
     }
+    in_order(&mut all);
     by_questions(solver, &all, progress)
 }
 

@@ -12,6 +12,8 @@ use super::questions::{Content, Question};
 use crate::exchange::peers::wire::{conditioning, errors};
 use crate::physics::State;
 
+/// Failing answers that bound a number which matters only in passing those of a question, and that it may leave.
+const BOUNDING: usize = 60;
 /// Failing answers from which the number of a hypothesis is fitted.
 const FITTED: usize = 6;
 /// The same of a second fault.
@@ -159,7 +161,8 @@ impl Seen<'_> {
         let beyond = faulty.excess(right).iter().filter(|excess| excess.abs() > TELLING).count();
         // A number of its own in every answer explains one quantity by itself.
         let is_fitted = |(fault, _): &Fault<'_>| {
-            matches!(fault.parameter, Parameter::Delay | Parameter::Lateness | Parameter::Nearness)
+            use Parameter::{Bracket, Delay, Lateness, Nearness};
+            matches!(fault.parameter, Delay | Lateness | Bracket | Nearness)
         };
         let is_of_one = |(fault, _): &Fault<'_>| is_of_one_number(fault);
         beyond > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_of_one))
@@ -181,7 +184,10 @@ impl Seen<'_> {
             }
         };
         let grid = hypothesis.parameter.grid(self.question);
-        let is_discrete = matches!(hypothesis.parameter, Parameter::None | Parameter::Choice(_) | Parameter::OneOf(_));
+        let is_discrete = matches!(
+            hypothesis.parameter,
+            Parameter::None | Parameter::Choice(_) | Parameter::OneOf(_) | Parameter::Threshold(..)
+        );
         let coarse = if is_discrete { 1 } else { COARSE };
         let ends = || (0..grid.len()).step_by(coarse).chain(std::iter::once(grid.len() - 1));
         let mut values: Vec<Option<Option<[f64; 3]>>> = vec![None; grid.len()];
@@ -300,8 +306,6 @@ struct Explanation {
     explained: Vec<Option<bool>>,
     /// Failing answers explained that differ from the right ones.
     told_apart: usize,
-    /// Passing answers that it would have failed.
-    contradicted: usize,
     largest: f64,
     /// Whether the numbers of all answers, over depth or time, are one number: then it is no matter of steps.
     is_one_number: bool,
@@ -312,9 +316,23 @@ impl Explanation {
         self.explained.iter().filter(|is| **is == Some(true)).count()
     }
 
+    /// Failing answers of which it says anything.
+    fn concerned(&self) -> usize {
+        self.explained.iter().flatten().count()
+    }
+
     /// Whether it explains every answer that it can, and there is something to explain.
     fn is_full(&self) -> bool {
-        self.contradicted == 0 && self.told_apart > 0 && self.explained.iter().all(|is| *is != Some(false))
+        // What says nothing of most answers explains few by its freedom.
+        let says_enough = self.concerned() == self.explained.len() || self.concerned() >= 2 * CERTAIN_FROM;
+        says_enough && self.told_apart > 0 && self.explained.iter().all(|is| *is != Some(false))
+    }
+
+    /// Whether a factor of it is one to within the accuracy: then nothing is wrong by it.
+    fn is_of_nothing(&self, accuracy: f64) -> bool {
+        self.faults.iter().any(|(fault, number)| {
+            matches!(fault.parameter, Parameter::Factor | Parameter::Unit) && (number - 1.0).abs() <= TELLING * accuracy
+        })
     }
 
     fn freedom(&self) -> u32 {
@@ -326,54 +344,106 @@ impl Explanation {
 struct Evidence<'a> {
     failing: Vec<&'a Seen<'a>>,
     passing: Vec<&'a Seen<'a>>,
+    /// Failing answers that an explanation may leave before it is dropped.
+    left: usize,
 }
 
 impl Evidence<'_> {
-    /// How well `hypothesis` with `number`, or a number of its own in every answer, explains all, beside `others`.
+    /// How well `hypothesis` with `number`, or a number of its own in every answer, explains all, beside `others`; `None`
+    /// once it contradicts a passing answer, or leaves too many failing ones.
     fn explain(
         &self,
         hypothesis: &'static Hypothesis,
         number: f64,
         others: &[Fault<'static>],
         mask: Mask,
-    ) -> Explanation {
+    ) -> Option<Explanation> {
         let is_per_answer = hypothesis.parameter.is_per_answer();
-        let mut largest = 0.0_f64;
-        let mut told_apart = 0;
-        let mut explained = Vec::with_capacity(self.failing.len());
+        let with =
+            |number: f64| -> Vec<Fault<'static>> { others.iter().copied().chain([(hypothesis, number)]).collect() };
+        // Where each answer has a number of its own, a passing one has that of no fault.
+        let of_passing = if is_per_answer { others.to_vec() } else { with(number) };
+        if !of_passing.is_empty() && self.passing.iter().any(|seen| seen.contradicts(&of_passing, mask)) {
+            return None;
+        }
+        let mut found = Explanation {
+            faults: with(number),
+            explained: Vec::with_capacity(self.failing.len()),
+            told_apart: 0,
+            largest: 0.0,
+            is_one_number: false,
+        };
+        let mut left = 0;
         let mut shares: Vec<f64> = Vec::new();
+        let mut greatest = 0.0_f64;
         for seen in &self.failing {
+            if matches!(hypothesis.parameter, Parameter::Bracket) && seen.question.exact.events.len() > 1 {
+                found.explained.push(None);
+                continue;
+            }
             let fitted = || seen.fit(hypothesis, others, mask)?.first().copied();
             let number = if is_per_answer { fitted() } else { Some(number) };
             shares.extend(number.and_then(|number| hypothesis.parameter.share(number, seen.question)));
-            let faults: Option<Vec<_>> =
-                number.map(|number| others.iter().copied().chain([(hypothesis, number)]).collect());
-            let found = faults.as_ref().and_then(|faults| Some((seen.explained_by(faults, mask)?, faults)));
+            greatest = greatest.max(number.unwrap_or(0.0));
+            let faults = number.map(with);
+            let difference = faults.as_ref().and_then(|faults| seen.explained_by(faults, mask));
             // A stiff flight may take more steps than a simulation has.
             let is_open = |faults: &Vec<Fault<'static>>| seen.is_stiff() && seen.predicted(faults).is_none();
-            explained.push(if found.is_none() && faults.as_ref().is_some_and(is_open) {
-                None
-            } else {
-                Some(found.is_some())
-            });
-            if let Some((difference, faults)) = found {
-                largest = largest.max(difference);
-                told_apart += usize::from(seen.is_misnamed || seen.is_told_apart(faults));
+            let is_left = difference.is_none() && !faults.as_ref().is_some_and(is_open);
+            found.explained.push(if difference.is_none() && !is_left { None } else { Some(!is_left) });
+            left += usize::from(is_left);
+            if left > self.left {
+                return None;
+            }
+            if let Some((difference, faults)) = difference.zip(faults) {
+                found.largest = found.largest.max(difference);
+                found.told_apart += usize::from(seen.is_misnamed || seen.is_told_apart(&faults));
             }
         }
-        let faults: Vec<_> = others.iter().copied().chain([(hypothesis, number)]).collect();
-        // Where each answer has a number of its own, a passing one has that of no fault.
-        let contradicted = if is_per_answer {
-            let others_alone = |seen: &&&Seen<'_>| !others.is_empty() && seen.contradicts(others, mask);
-            self.passing.iter().filter(others_alone).count()
-        } else {
-            self.passing.iter().filter(|seen| seen.contradicts(&faults, mask)).count()
-        };
+        if matches!(hypothesis.parameter, Parameter::Bracket) {
+            found.faults = with(greatest);
+        }
         shares.sort_by(f64::total_cmp);
         // The middle half alone: an answer may have two fitting numbers.
         let of_part = |part: usize| shares.get(part * shares.len() / 4).copied().unwrap_or(0.0);
-        let is_one_number = shares.len() >= CERTAIN_FROM && of_part(3) <= ONE_NUMBER * of_part(1);
-        Explanation { faults, explained, told_apart, contradicted, largest, is_one_number }
+        found.is_one_number = shares.len() >= CERTAIN_FROM && of_part(3) <= ONE_NUMBER * of_part(1);
+        Some(found).filter(|found| found.count() > 0)
+    }
+
+    /// A number of a hypothesis that matters only in passing the `cuts` of a question: one that all answers leave open.
+    fn between_cuts(
+        &self,
+        hypothesis: &'static Hypothesis,
+        cuts: fn(&Question) -> Vec<f64>,
+        others: &[Fault<'static>],
+        mask: Mask,
+    ) -> Option<f64> {
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut left = 0;
+        for seen in self.failing.iter().take(BOUNDING).chain(&self.passing) {
+            let mut all = cuts(seen.question);
+            all.retain(|cut| low < *cut && *cut < high);
+            all.sort_by(f64::total_cmp);
+            let bounds: Vec<f64> = std::iter::once(low).chain(all).chain([high]).collect();
+            let fits = |pair: &[f64]| {
+                let faults: Vec<_> = others.iter().copied().chain([(hypothesis, inside(pair[0], pair[1]))]).collect();
+                if seen.fails { seen.explained_by(&faults, mask).is_some() } else { !seen.contradicts(&faults, mask) }
+            };
+            // What the flight does not meet leaves several intervals open.
+            let open: Vec<bool> = bounds.windows(2).map(fits).collect();
+            match open.iter().position(|is_open| *is_open) {
+                Some(from) => {
+                    let count = open[from..].iter().take_while(|is_open| **is_open).count();
+                    (low, high) = (bounds[from], bounds[from + count]);
+                }
+                None if seen.fails => left += 1,
+                None => return None,
+            }
+            if left > self.left.min(BOUNDING / 2) {
+                return None;
+            }
+        }
+        (low > 0.0 || high < f64::INFINITY).then(|| inside(low, high))
     }
 
     /// The best explanation by `hypothesis`, if it explains anything.
@@ -394,9 +464,12 @@ impl Evidence<'_> {
             let is_fitted =
                 |index: &&usize| self.failing[**index].fit(hypothesis, others, mask).is_some_and(|all| !all.is_empty());
             let some = sample.iter().take(fitted).filter(is_fitted).count();
-            return (some >= needed.min(fitted / 2))
-                .then(|| self.explain(hypothesis, 1.0, others, mask))
-                .filter(|found| found.count() > 0);
+            let is_tried = matches!(hypothesis.parameter, Parameter::Bracket) || some >= needed.min(fitted / 2);
+            return is_tried.then(|| self.explain(hypothesis, 1.0, others, mask)).flatten();
+        }
+        if let Parameter::Threshold(_, cuts) = hypothesis.parameter {
+            let number = self.between_cuts(hypothesis, cuts, others, mask)?;
+            return self.explain(hypothesis, number, others, mask);
         }
         let mut numbers: Vec<f64> = Vec::new();
         let mut unfitted = 0;
@@ -423,32 +496,58 @@ impl Evidence<'_> {
         if count < needed {
             return None;
         }
-        Some(self.explain(hypothesis, number, others, mask)).filter(|found| found.count() > 0)
+        self.explain(hypothesis, number, others, mask)
     }
+}
+
+/// A number between two: the roundest, as people choose them.
+fn inside(low: f64, high: f64) -> f64 {
+    let (least, most) = (low.max(high.min(1.0) * 1e-6), high.min(low.max(1e-12) * 1e6));
+    let middle = (least * most).sqrt();
+    let decade = 10f64.powf(middle.log10().round());
+    let near = [1.0, 0.1, 10.0].map(|by| by * decade);
+    let round = [1.0, 5.0, 2.0, 3.0, 1.5, 2.5, 4.0, 6.0, 7.0, 8.0, 9.0];
+    let all = round.iter().flat_map(|digit| near.map(|decade| digit * decade));
+    all.into_iter().find(|number| low < *number && *number < high).unwrap_or(middle)
 }
 
 /// How far causes are looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Effort {
-    /// One at a time.
-    Singles,
+    /// What explains all: the others are dropped at the first answer that they do not explain.
+    All,
+    /// What explains nearly all.
+    Nearly,
+    /// What explains some.
+    Some,
     /// Two at once too.
     Pairs,
+}
+
+impl Effort {
+    /// Failing answers of `of` that an explanation may leave.
+    fn may_leave(self, of: usize) -> usize {
+        match self {
+            Self::All => 0,
+            Self::Nearly => of / 10,
+            Self::Some => of - of / 4,
+            Self::Pairs => of - of / 20,
+        }
+    }
 }
 
 /// What explains the failing answers of `seen`, best first; `others` are all questions, asked or not, on which two
 /// causes may differ.
 pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question], effort: Effort) -> Vec<Cause> {
-    let mut evidence = Evidence {
-        failing: seen.iter().filter(|seen| seen.fails).collect(),
-        passing: seen.iter().filter(|seen| !seen.fails).collect(),
-    };
+    let mut failing: Vec<&Seen<'_>> = seen.iter().filter(|seen| seen.fails).collect();
     // What meets least says most; a stiff flight takes the longest.
-    evidence.failing.sort_by_key(|seen| (seen.is_stiff(), seen.question.contains.len()));
-    let of = evidence.failing.len();
+    failing.sort_by_key(|seen| (seen.is_stiff(), seen.question.contains.len()));
+    let of = failing.len();
     if of == 0 {
         return Vec::new();
     }
+    let evidence =
+        Evidence { failing, passing: seen.iter().filter(|seen| !seen.fails).collect(), left: effort.may_leave(of) };
     let usable: Vec<&'static Hypothesis> = hypotheses()
         .filter(|hypothesis| reads_scene || !hypothesis.needs_scene())
         .filter(|hypothesis| hypothesis.id != "outcome-name" || evidence.failing.iter().all(|seen| seen.is_misnamed))
@@ -456,11 +555,14 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
     let everything: Vec<usize> = (0..of).collect();
     let mut found: Vec<Explanation> =
         usable.par_iter().filter_map(|hypothesis| evidence.best(hypothesis, &[], &everything, ALL_THREE)).collect();
-    found.sort_by_key(|explanation| (explanation.contradicted > 0, of - explanation.count(), explanation.freedom()));
-    let is_nearly_full = |found: &Explanation| found.contradicted == 0 && found.told_apart * 10 >= of * 9;
+    let mut accuracies: Vec<f64> = evidence.failing.iter().map(|seen| seen.accuracy).collect();
+    accuracies.sort_by(f64::total_cmp);
+    found.retain(|found| !found.is_of_nothing(accuracies[of / 2]));
+    found.sort_by_key(|explanation| (of - explanation.count(), explanation.freedom()));
+    let is_nearly_full = |found: &Explanation| found.told_apart * 10 >= of * 9;
     if effort == Effort::Pairs && !found.iter().any(|found| found.is_full() || is_nearly_full(found)) {
-        let pairs = pairs(&evidence, &usable, &found);
-        found.extend(pairs);
+        let strict = Evidence { left: 0, failing: evidence.failing.clone(), passing: evidence.passing.clone() };
+        found.extend(pairs(&strict, &usable, &found));
     }
     let mut full: Vec<&Explanation> = found.iter().filter(|explanation| explanation.is_full()).collect();
     full.sort_by_key(|explanation| explanation.freedom());
@@ -470,8 +572,9 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
         return named(&rivals, &evidence, seen, others);
     }
     // What explains a few answers by its freedom explains nothing.
-    found.retain(|explanation| explanation.contradicted == 0 && 4 * explanation.told_apart >= of);
-    let is_of_nearly_all = |found: &Explanation| found.count() * 10 >= of * 9 && found.count() >= CERTAIN_FROM;
+    found.retain(|explanation| 4 * explanation.told_apart >= explanation.concerned().max(of / 4));
+    let is_of_nearly_all =
+        |found: &Explanation| found.count() * 10 >= found.concerned() * 9 && found.count() >= CERTAIN_FROM;
     // Of those that explain nearly all the one of least freedom says most.
     found.sort_by_key(|found| {
         let nearly_all = is_of_nearly_all(found);
@@ -549,7 +652,7 @@ fn pairs(evidence: &Evidence<'_>, usable: &[&'static Hypothesis], singles: &[Exp
     let of = evidence.failing.len();
     let mut firsts: Vec<(Explanation, Mask)> = singles
         .iter()
-        .filter(|single| single.told_apart > 0 && single.contradicted == 0 && 20 * single.count() >= of)
+        .filter(|single| single.told_apart > 0 && 20 * single.count() >= of)
         .map(|single| (single.clone(), ALL_THREE))
         .collect();
     // A fault of the report hides the others in one quantity.
@@ -559,10 +662,7 @@ fn pairs(evidence: &Evidence<'_>, usable: &[&'static Hypothesis], singles: &[Exp
         let masked: Vec<Explanation> =
             usable.par_iter().filter_map(|hypothesis| evidence.best(hypothesis, &[], &everything, mask)).collect();
         firsts.extend(
-            masked
-                .into_iter()
-                .filter(|found| found.count() == of && found.told_apart > 0 && found.contradicted == 0)
-                .map(|found| (found, mask)),
+            masked.into_iter().filter(|found| found.count() == of && found.told_apart > 0).map(|found| (found, mask)),
         );
     }
     firsts.sort_by_key(|(single, _)| (of - single.count(), single.freedom()));

@@ -34,6 +34,9 @@ const FLOOR_STEP: f64 = 0.002;
 /// its order promises.
 const FLOOR_MAX: f64 = 1e-8;
 const FLOOR_EXCESS: f64 = 10.0;
+/// Answers that must end after one number of steps, and the error at a far smaller step from which a flight may be cut short.
+const LEAST_CUTS: usize = 3;
+const CUT: f64 = 1e-2;
 /// Least order with which errors of a sound scheme fall.
 const FLOOR_ORDER: f64 = 0.8;
 /// An order claimed may exceed the one found by this part of it: the steps are not small for every question.
@@ -87,6 +90,10 @@ pub(super) fn in_fixed_steps(
     if counts.failed > 0 && laddered.iter().filter(is_same).count() * 10 >= laddered.len() * 9 {
         let statement = "answers are the same whatever the step: dt_s is ignored".to_owned();
         causes.push(Cause::plain("step-ignored", statement, Certainty::Certain, counts.failed, counts.failed));
+    } else if counts.failed > 0
+        && let Some(cause) = budget(&cut_short(&laddered)).or_else(|| least_step(&laddered, &rows))
+    {
+        causes.push(cause);
     } else if counts.failed > 0 {
         causes.extend(fixed_causes(&laddered, &rows, &reproducing, identity, all));
     }
@@ -278,7 +285,7 @@ fn fixed_causes(
                 });
             }
         }
-        let causes = causes(&seen, identity.reads_scene, &others, Effort::Singles);
+        let causes = causes(&seen, identity.reads_scene, &others, Effort::Nearly);
         if causes.first().is_some_and(|cause| cause.certainty != Certainty::Possible) {
             return causes;
         }
@@ -320,17 +327,52 @@ fn fixed_causes(
     causes(&seen, identity.reads_scene, &others, Effort::Pairs)
 }
 
+/// Steps (s) and times (s) of the answers whose outcome is wrong.
+fn cut_short(laddered: &[Laddered<'_>]) -> Vec<(f64, f64)> {
+    let all = laddered.iter().flat_map(|laddered| &laddered.rungs);
+    all.filter(|rung| !rung.is_outcome_right).map(|rung| (rung.step, rung.answer.time)).collect()
+}
+
+/// Answers that all end after one number of steps, whatever the question, as `cuts` of step and time show.
+fn budget(cuts: &[(f64, f64)]) -> Option<Cause> {
+    let steps = |(step, time): &(f64, f64)| time / step;
+    let first = cuts.first().map(steps)?.round();
+    let is_one = cuts.iter().all(|cut| (steps(cut) - first).abs() < 1e-6 * first);
+    let statement = format!("the flight ends after {first} steps, wherever it is");
+    let of = cuts.len();
+    (of >= LEAST_CUTS && is_one && first > 1.0)
+        .then(|| Cause::plain("flight-cut-short", statement, Certainty::Likely, of, of))
+}
+
+/// Nearly every question that fails has one answer at two steps: a least step, which is not the one asked for.
+fn least_step(laddered: &[Laddered<'_>], rows: &[Asked]) -> Option<Cause> {
+    let failing: Vec<_> = laddered.iter().zip(rows).filter(|(_, row)| row.verdict == Verdict::Failed).collect();
+    let largest = |laddered: &Laddered<'_>| {
+        let same = laddered.rungs.windows(2).filter(|pair| pair[0].answer == pair[1].answer);
+        same.map(|pair| pair[0].step.max(pair[1].step)).max_by(f64::total_cmp)
+    };
+    let steps: Vec<f64> = failing.iter().filter_map(|(laddered, _)| largest(laddered)).collect();
+    let most = steps.iter().copied().max_by(f64::total_cmp)?;
+    let statement = format!("answers at steps below {most:.0e} s are the same: there is a least step");
+    let of = failing.len();
+    (steps.len() * 10 >= of * 9).then(|| Cause::plain("step-ignored", statement, Certainty::Likely, steps.len(), of))
+}
+
 /// The cause of errors that no longer fall with the step, far above the round-off of 64-bit numbers: a few questions are
 /// asked again at a far smaller step.
 fn floor(asking: &mut Asking<'_>, right: &[(&Question, &[Rung])]) -> Option<Cause> {
     let orders = [0, 1, 2].map(|which| order(right, which).map_or(FLOOR_ORDER, |order| (order - 0.2).max(FLOOR_ORDER)));
     let (mut compared, mut stays, mut largest) = (0, [0; 3], [0.0_f64; 3]);
+    let mut cuts = Vec::new();
     for (question, rungs) in right.iter().take(FLOOR_QUESTIONS) {
         let Some(coarsest) = rungs.first() else { continue };
         let asked = PeerRequest { dt_s: Some(FLOOR_STEP * coarsest.step), ..request(question, TOLERANCES[0]) };
         let Ok(answer) = asking.ask(&asked) else { continue };
         let found = errors(end_of(&answer).state, question.exact.end, question.problem.impact_speed);
         compared += 1;
+        if found.iter().any(|error| error.abs() > CUT) {
+            cuts.push((FLOOR_STEP * coarsest.step, answer.time_s));
+        }
         // Of several steps, since one may be right by chance.
         let before = &rung_errors(question, rungs)[LADDER.len() / 2..LADDER.len()];
         let ratio = LADDER[LADDER.len() / 2] / FLOOR_STEP;
@@ -342,6 +384,9 @@ fn floor(asking: &mut Asking<'_>, right: &[(&Question, &[Rung])]) -> Option<Caus
                 largest[which] = largest[which].max(relative);
             }
         }
+    }
+    if let Some(cause) = budget(&cuts) {
+        return Some(cause);
     }
     let which = (0..3).max_by_key(|which| stays[*which]).filter(|which| 2 * stays[*which] > compared)?;
     let statement = format!(

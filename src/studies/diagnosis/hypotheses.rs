@@ -11,14 +11,14 @@ mod scene;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-use super::questions::Question;
 #[cfg(feature = "report")]
 use super::questions::questions;
+use super::questions::{Earlier, Question};
 use super::simulation::{AtStageEnd, Force, Rules, Simulated, simulate, solve};
 use crate::exchange::peers::wire::conditioning;
 #[cfg(feature = "report")]
 use crate::exchange::peers::wire::errors;
-use crate::physics::{Problem, Scene, State};
+use crate::physics::{Concrete, Problem, Scene, State};
 use crate::studies::scheme_of_table::Scheme;
 
 /// A fault, and what it does.
@@ -55,8 +55,12 @@ pub(super) enum Parameter {
     Lateness,
     /// One of a few numbers, the same in every answer.
     OneOf(&'static [f64]),
-    /// A value in place of that of the question, the same in every answer.
-    Value,
+    /// A value in place of that of the question, the same in every answer; here one as it may be.
+    Value(#[cfg_attr(not(test), expect(dead_code, reason = "a test tries it"))] f64),
+    /// A value as well, which matters only in passing one of the numbers that the question has.
+    Threshold(#[cfg_attr(not(test), expect(dead_code, reason = "a test tries it"))] f64, fn(&Question) -> Vec<f64>),
+    /// A time (s), another one in every answer, which flights of one event alone show.
+    Bracket,
     /// A factor near one, another one in every answer.
     Nearness,
     /// One of a few numbers, another one in every answer.
@@ -74,8 +78,16 @@ pub(super) enum Change {
     Force(Force),
     /// The speed (m/s) that counts as rest.
     RestSpeed(fn(&Problem, f64) -> f64),
+    /// The problem, by the end of the right flight.
+    OfRight(fn(&mut Problem, &State, f64)),
+    /// The problem, by the scene.
+    OfScene(fn(&Concrete, &mut Problem, f64)),
+    /// The problem, by what was asked earlier.
+    Kept(fn(&mut Problem, &Earlier)),
     /// The time (s) at which the flight ends wherever it is, from that of the right end.
-    EndTime(fn(f64, f64) -> f64),
+    EndTime(fn(&Problem, f64, f64) -> f64),
+    /// The same (s), since the start of a stage.
+    StageTime(fn(f64) -> f64),
     /// The state behind each end of a stage.
     AtStageEnd(AtStageEnd),
     /// What is reported of a flight through the problem.
@@ -85,7 +97,7 @@ pub(super) enum Change {
 impl Parameter {
     /// Whether each answer has a number of its own.
     pub(super) fn is_per_answer(self) -> bool {
-        matches!(self, Self::Delay | Self::Lateness | Self::Nearness | Self::Choice(_))
+        matches!(self, Self::Delay | Self::Lateness | Self::Bracket | Self::Nearness | Self::Choice(_))
     }
 
     /// A number of its own over the depth or the time of the flight; `None` for one of all answers.
@@ -138,12 +150,15 @@ impl Parameter {
             Self::Factor => both(spread(0.01, 30.0, 36).collect()),
             Self::Unit => both(spread(1e-7, 1e7, 42).collect()),
             Self::OneOf(numbers) => numbers.to_vec(),
-            Self::Value => spread(1e-6, 1e9, 120).collect(),
+            Self::Value(_) => spread(1e-6, 1e9, 120).collect(),
+            Self::Threshold(_, of) => between(of(question)),
             Self::Exponent(_) => (0..=24).map(|i| 0.25 * f64::from(i)).collect(),
             Self::Speed => spread(1e-9, 1e3, 72).collect(),
             Self::Fraction => spread(1e-12, 0.9, 60).collect(),
             Self::Delay => spread(1e-10, 10.0, 44).map(|part| part * question.exact.end.depth).collect(),
-            Self::Lateness => spread(1e-10, 1.0, 40).map(|part| part * question.exact.end.time).collect(),
+            Self::Lateness | Self::Bracket => {
+                spread(1e-10, 1.0, 40).map(|part| part * question.exact.end.time).collect()
+            }
             Self::Nearness => {
                 let off: Vec<f64> = spread(1e-8, 0.05, 28).collect();
                 off.iter().rev().map(|off| 1.0 - off).chain(off.iter().map(|off| 1.0 + off)).collect()
@@ -182,8 +197,12 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
         problem = scene.problem().ok()?;
     }
     for (change, number) in changes() {
-        if let Change::Problem(alter) = change {
-            alter(&mut problem, number);
+        match change {
+            Change::Problem(alter) => alter(&mut problem, number),
+            Change::OfRight(alter) => alter(&mut problem, &question.exact.end, number),
+            Change::Kept(alter) => alter(&mut problem, question.earlier.as_ref()?),
+            Change::OfScene(alter) => alter(question.scene.as_ref()?.concrete()?, &mut problem, number),
+            _ => {}
         }
     }
     let is_ordered = problem.stages.windows(2).all(|pair| pair[0].end <= pair[1].end);
@@ -208,7 +227,8 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
                 rules.force = (*law, number);
             }
             Change::RestSpeed(of) => rules.rest_speed = of(&problem, number),
-            Change::EndTime(of) => rules.end_time = of(question.exact.end.time, number),
+            Change::EndTime(of) => rules.end_time = of(&question.problem, question.exact.end.time, number),
+            Change::StageTime(of) => rules.stage_time = of(number),
             Change::AtStageEnd(alter) => rules.at_stage_end = Some((*alter, number)),
             _ => continue,
         }
@@ -276,22 +296,46 @@ fn to_digits(number: f64, digits: f64) -> f64 {
     format!("{number:.*e}", digits as usize - 1).parse().unwrap_or(number)
 }
 
-/// Numbers of digits that an input may be rounded to, and units that it may be rounded or cut to.
+/// Numbers of digits that a number may be rounded to, of stages that are known, and units that a number may be rounded or cut to.
 const DIGITS: &[f64] = &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-const GRAINS: &[f64] = &[1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e6];
+const COUNTS: &[f64] = &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+const GRAINS: &[f64] = &[1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e6];
 fn to_grain(number: f64, grain: f64) -> f64 {
     (number / grain).round() * grain
 }
 
+/// `number` as one of single precision.
+fn to_single(number: f64) -> f64 {
+    f64::from(number as f32)
+}
+
+/// A number on each side of every one of `cuts`, ascending.
+fn between(mut cuts: Vec<f64>) -> Vec<f64> {
+    cuts.retain(|cut| *cut > 0.0 && cut.is_finite());
+    cuts.sort_by(f64::total_cmp);
+    cuts.dedup();
+    let Some((first, last)) = cuts.first().zip(cuts.last()) else { return vec![1.0] };
+    let (below, above) = (0.5 * first, 2.0 * last);
+    let inner = cuts.windows(2).map(|pair| (pair[0] * pair[1]).sqrt());
+    std::iter::once(below).chain(inner).chain([above]).collect()
+}
+
 /// Every hypothesis.
 pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
-    force::TERMS.iter().flatten().chain(force::FAULTS).chain(events::FAULTS).chain(report::FAULTS).chain(scene::FAULTS)
+    force::TERMS
+        .iter()
+        .flatten()
+        .chain(force::FAULTS)
+        .chain(events::FAULTS)
+        .chain(report::FAULTS)
+        .chain(scene::FAULTS)
+        .chain(force::EARLIER)
 }
 
 impl Hypothesis {
     /// Whether it is about a solver that reads the scene.
     pub(super) fn needs_scene(&self) -> bool {
-        self.changes.iter().any(|change| matches!(change, Change::Scene(_)))
+        self.changes.iter().any(|change| matches!(change, Change::Scene(_) | Change::OfScene(_)))
     }
 
     /// The sentence with the number in it.

@@ -100,8 +100,34 @@ pub(super) struct Question {
     pub contains: Vec<Content>,
     /// Condition numbers of depth, time and velocity at the end, at least one.
     pub conditions: [f64; 3],
+    /// What was asked before it.
+    pub earlier: Option<Earlier>,
     /// What single faults make of it.
     pub predicted: Predictions,
+}
+
+/// Questions asked earlier, whose numbers a solver may have kept.
+#[derive(Clone, Debug)]
+pub(super) struct Earlier {
+    /// The first.
+    pub first: Problem,
+    /// The one before.
+    pub previous: Problem,
+    /// The last exit depth (m) that was asked.
+    pub exit: f64,
+}
+
+/// Tells each of `questions` what is asked before it.
+pub(super) fn in_order(questions: &mut [Question]) {
+    let Some(first) = questions.first().map(|first| first.problem.clone()) else { return };
+    let (mut previous, mut exit) = (first.clone(), f64::INFINITY);
+    for question in questions {
+        question.earlier = Some(Earlier { first: first.clone(), previous: previous.clone(), exit });
+        previous = question.problem.clone();
+        if previous.has_exit() {
+            exit = previous.exit_depth;
+        }
+    }
 }
 
 impl Question {
@@ -118,7 +144,7 @@ impl Question {
         };
         let is_usable = exact.outcome != Outcome::Undecided && conditions.iter().all(|condition| *condition <= allowed);
         let predicted = Predictions::default();
-        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, predicted })
+        is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, earlier: None, predicted })
     }
 
     /// The largest of the errors of depth, time and velocity over their condition numbers.
@@ -288,7 +314,7 @@ fn stiff(random: &mut Random) -> Problem {
 }
 
 /// The families in the order in which they are asked: what tells causes apart first.
-const FAMILIES: [Family; 27] = [
+const FAMILIES: [Family; 29] = [
     Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
     Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
     Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
@@ -374,6 +400,24 @@ const FAMILIES: [Family; 27] = [
         },
     },
     Family {
+        name: "many-stages",
+        draw: |random| {
+            let ends = 9 + random.below(8);
+            let problem = layered(random, ends, |random, scale, _| mixed(random, scale));
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.05 })
+        },
+    },
+    Family {
+        name: "no-length",
+        // One stage of several, the first in turn, begins where it ends.
+        draw: |random| {
+            let mut problem = layered(random, 3, |random, scale, _| mixed(random, scale));
+            let stage = random.below(3);
+            problem.stages[stage].end = problem.start_of(stage);
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
+        },
+    },
+    Family {
         name: "exit-at-stage-end",
         draw: |random| {
             let problem = layered(random, 2, |random, scale, _| mixed(random, scale));
@@ -435,6 +479,31 @@ const FAMILIES: [Family; 27] = [
     },
 ];
 
+/// Of so many questions, one is of the scales below.
+const SCALED_EACH: usize = 8;
+/// Decades (powers of ten) of the exit depth (m) and of the time there (s) that are asked in turn: without a common
+/// divisor of their numbers, so that every depth meets every time. Caps on either show only beyond them.
+const DEPTHS: [i32; 6] = [-3, -2, -1, 0, 1, 2];
+const TIMES: [i32; 7] = [-5, -4, -3, -2, -1, 0, 1];
+
+/// An exit, or every other time through the depths a rest, at the depth and the time of the scales with the number `round`:
+/// of two or three times that depth at most.
+fn scaled(random: &mut Random, round: usize) -> Problem {
+    let mut of = |decade: i32| 10f64.powi(decade) * random.log_uniform(1.2, 8.0);
+    // The deepest and the longest first: most caps lie there.
+    let length = of(DEPTHS[DEPTHS.len() - 1 - round % DEPTHS.len()]);
+    let time = of(TIMES[TIMES.len() - 1 - round % TIMES.len()]);
+    let scale = Scale { mass: random.log_uniform(1e-2, 1e2), speed: length / time, length };
+    let mut shares = [0, 1, 2, 3].map(|_| random.log_uniform(0.02, 0.2));
+    if (round / DEPTHS.len()) % 2 == 1 {
+        // Their work up to L is less than the energy: it rests beyond.
+        shares = shares.map(|share| 0.5 * share);
+        shares[0] = random.uniform(0.1, 0.2);
+        return Problem::of_stages(scale.mass, scale.speed, [scale.stage(shares)]);
+    }
+    Problem::of_stages(scale.mass, scale.speed, [scale.stage(shares)]).with_exit(length)
+}
+
 /// Of so many questions of all families, one is of a physical scene.
 const SCENES_EACH: usize = 4;
 /// One question of so many asks for a projectile without speed.
@@ -457,6 +526,12 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
             asked.extend(Question::new(format!("scene-{}", number + 1), problem, Some(scene)));
             continue;
         }
+        if number % SCALED_EACH == 2 {
+            let round = number / SCALED_EACH;
+            let mut random = Random::for_part(seed, &format!("diagnosis scales {round} {drawn}"));
+            asked.extend(Question::new(format!("scales-{}", round + 1), scaled(&mut random, round), None));
+            continue;
+        }
         let Family { name, draw } = &FAMILIES[family % FAMILIES.len()];
         let round = family / FAMILIES.len();
         family += 1;
@@ -464,11 +539,15 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
             continue;
         }
         let mut random = Random::for_part(seed, &format!("diagnosis {name} {round}"));
+        // The first has an exit, which a solver may keep.
+        let is_wanted = |problem: &Problem| !asked.is_empty() || problem.has_exit();
         let found = (0..DRAWS_MAX).find_map(|_| {
-            draw(&mut random).and_then(|problem| Question::new(format!("{name}-{}", round + 1), problem, None))
+            let problem = draw(&mut random).filter(is_wanted)?;
+            Question::new(format!("{name}-{}", round + 1), problem, None)
         });
         asked.extend(found);
     }
+    in_order(&mut asked);
     asked
 }
 
@@ -509,6 +588,30 @@ mod tests {
     use strum::IntoEnumIterator;
 
     use super::*;
+
+    /// Of the questions whatever they are called: what a cap on depth or on time would change.
+    #[test]
+    fn two_hundred_questions_end_at_every_decade_of_depth_and_of_time() {
+        for seed in 1..=4 {
+            let asked = questions(seed, 200, false);
+            let of = |content| {
+                let with = asked.iter().filter(move |question| question.contains.contains(&content));
+                with.map(|question| question.exact.end).collect::<Vec<_>>()
+            };
+            let (exits, rests) = (of(Content::Exit), of(Content::Rest));
+            let within = |decade: i32, of: &dyn Fn(&crate::physics::State) -> f64| {
+                exits.iter().filter(|end| of(end).log10().floor() as i32 == decade).count()
+            };
+            for decade in DEPTHS {
+                assert!(within(decade, &|end| end.depth) >= 2, "{seed}: exits at 1e{decade} m");
+                let deeper = rests.iter().filter(|end| end.depth > 10f64.powi(decade)).count();
+                assert!(deeper >= 2, "{seed}: rests beyond 1e{decade} m");
+            }
+            for decade in TIMES {
+                assert!(within(decade, &|end| end.time) >= 1, "{seed}: exits at 1e{decade} s");
+            }
+        }
+    }
 
     #[test]
     fn two_hundred_questions_hold_everything_that_a_flight_can_meet() {

@@ -24,6 +24,10 @@ const NARROWED_MAX: usize = 100;
 /// Where a force is asked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place<'a> {
+    /// The problem.
+    pub problem: &'a Problem,
+    /// Which stage.
+    pub index: usize,
     /// Law of the stage.
     pub law: &'a Stage,
     /// Depth (m).
@@ -60,11 +64,14 @@ pub(super) struct Rules {
     pub rest_speed: f64,
     /// It ends at this time (s), wherever it is.
     pub end_time: f64,
+    /// It ends so long (s) after the start of a stage.
+    pub stage_time: f64,
 }
 
 impl Default for Rules {
     fn default() -> Self {
-        Self { force: (right_force, 1.0), at_stage_end: None, rest_speed: 0.0, end_time: f64::INFINITY }
+        let never = f64::INFINITY;
+        Self { force: (right_force, 1.0), at_stage_end: None, rest_speed: 0.0, end_time: never, stage_time: never }
     }
 }
 
@@ -135,7 +142,7 @@ fn first_positive(h: f64, at_end: f64, at_start: f64, g: impl Fn(f64) -> f64) ->
 ///
 /// `None` where it does not end within some thousand steps, or leaves the range of numbers.
 pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
-    let Rules { force: (force, number), at_stage_end, rest_speed, end_time } = rules;
+    let Rules { force: (force, number), at_stage_end, rest_speed, end_time, stage_time } = rules;
     // Times of whoever changes them at ends of stages are not those of the flight.
     let mut elapsed = 0.0;
     let mut state = State::at_impact(problem);
@@ -146,6 +153,7 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
     for (index, law) in problem.stages.iter().enumerate() {
         let limit = problem.limit_of(index);
         let (impact_speed, entry_speed, mass) = (problem.impact_speed, state.velocity, problem.mass);
+        let end_time = end_time.min(elapsed + stage_time);
         while state.depth < limit {
             let State { time, depth: x, velocity: v } = state;
             if v <= rest_speed || elapsed >= end_time {
@@ -153,7 +161,8 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
             }
             // By the distance since x, not by the depth: a stage may be far shorter than it is deep.
             let a = |distance: f64, velocity| {
-                force(&Place { law, depth: x + distance, velocity, entry_speed, impact_speed, mass }, number) / mass
+                let depth = x + distance;
+                force(&Place { problem, index, law, depth, velocity, entry_speed, impact_speed, mass }, number) / mass
             };
             let left = limit - x;
             // No step much longer than the distance to the limit, or than the loss of the speed.

@@ -12,6 +12,7 @@ use crate::physics::Problem;
 fn all_questions(seed: u64) -> Vec<Question> {
     let mut all = questions(seed, Plan::default().questions, false);
     all.extend(edge_questions());
+    in_order(&mut all);
     all
 }
 
@@ -78,7 +79,10 @@ impl Solver for Strange {
 fn a_fault_that_no_hypothesis_knows_is_found_and_not_named_with_certainty() {
     let faults: [fn(&mut Problem); 3] = [
         |problem| problem.stages.iter_mut().filter(|law| law.static_force < 0.0).for_each(|law| law.drag = 0.0),
-        |problem| problem.stages.iter_mut().filter(|law| law.viscosity < 1.0).for_each(|law| law.viscosity = 0.0),
+        |problem| {
+            let mass = problem.mass;
+            problem.stages.iter_mut().filter(|law| law.viscosity < mass).for_each(|law| law.viscosity = 0.0);
+        },
         |problem| problem.stages[0].static_force *= 1.0 + 1e-3 * problem.impact_speed,
     ];
     for fault in faults {
@@ -137,6 +141,30 @@ fn an_exit_at_little_speed_that_is_called_a_stop_fails() {
     for seed in 1..=3 {
         let found = diagnose(&mut Stopping, Plan { seed, ..Plan::default() }, &|_, _| {});
         assert_eq!((found.verdict, found.counts.undecided), (Verdict::Failed, 0));
+    }
+}
+
+/// Exact, but for flights deeper than 10 m or longer than 10 s: few questions are.
+#[test]
+fn a_cap_on_depth_or_on_time_fails_by_every_seed() {
+    let caps: [fn(&mut Problem); 3] = [
+        |problem| problem.exit_depth = problem.exit_depth.min(10.0),
+        // None that is asked for is one there.
+        |problem| {
+            if !problem.has_exit() {
+                problem.exit_depth = 10.0;
+            }
+        },
+        |problem| {
+            let time = Taylor::default().solve(problem, Detail::End).unwrap().end.time;
+            problem.mass *= (10.0 / time).min(1.0);
+        },
+    ];
+    for (index, cap) in caps.into_iter().enumerate() {
+        for seed in 1..=4 {
+            let found = diagnose(&mut Strange(cap), Plan { seed, ..Plan::default() }, &|_, _| {});
+            assert_eq!(found.verdict, Verdict::Failed, "{index} by seed {seed}");
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::super::questions::Question;
 use super::super::simulation::{Simulated, continued};
-use super::force::reorder;
-use super::{Change, Hypothesis, Parameter, of};
+use super::force::{clear_speed, reorder};
+use super::{COUNTS, Change, Hypothesis, Parameter, of};
 use crate::physics::{Problem, State};
 
 /// The ends that a flight may miss: from stage `j`, whose law goes on, up to stage `m`, as `8 j + m`.
@@ -37,16 +37,77 @@ fn exit_at_start_of_last(problem: &mut Problem) {
     problem.exit_depth = problem.exit_depth.max(start);
 }
 
-fn clear_speed(_: &Problem, found: &mut Simulated, speed: f64) {
-    if found.end.velocity <= speed {
-        found.end.velocity = 0.0;
-    }
-}
-
 fn rest_late(problem: &Problem, found: &mut Simulated, late: f64) {
     if found.end.velocity > 0.0 {
         return;
     }
+    let none = State { time: f64::NAN, ..found.end };
+    found.end = continued(problem, found.stage, found.end, late).unwrap_or(none);
+}
+
+/// The stage `index` left out; what follows takes its place, or what is before it goes on.
+fn leave_out(problem: &mut Problem, index: usize, is_before: bool) {
+    if index + 1 < problem.stages.len() {
+        let gone = problem.stages.remove(index);
+        if is_before && index > 0 {
+            problem.stages[index - 1].end = gone.end;
+        }
+    }
+}
+
+/// Stages thinner than `least` (m) left out.
+fn leave_out_thin(problem: &mut Problem, least: f64, is_before: bool) {
+    let thick: Vec<f64> =
+        (0..problem.stages.len()).map(|index| problem.stages[index].end - problem.start_of(index)).collect();
+    for index in (0..thick.len()).rev().filter(|index| thick[*index] < least) {
+        leave_out(problem, index, is_before);
+    }
+}
+
+fn thicknesses(question: &Question) -> Vec<f64> {
+    let problem = &question.problem;
+    (0..problem.stages.len()).map(|index| problem.stages[index].end - problem.start_of(index)).collect()
+}
+
+/// The first stages alone; the last of them goes on.
+fn cut_stages(problem: &mut Problem, count: usize) {
+    problem.stages.truncate(count);
+    if let Some(last) = problem.stages.last_mut() {
+        last.end = f64::INFINITY;
+    }
+}
+
+/// The flight ends at a depth, wherever it is.
+fn end_at(problem: &mut Problem, depth: f64) {
+    problem.exit_depth = problem.exit_depth.min(depth);
+}
+
+/// The exit seen where `is_seen` of its stage, or at the end of that.
+fn exit_in(problem: &mut Problem, is_seen: impl Fn(usize) -> bool, is_late: bool) {
+    let stage = problem.stages.iter().position(|law| problem.exit_depth <= law.end);
+    if let Some(stage) = stage.filter(|stage| problem.has_exit() && !is_seen(*stage)) {
+        problem.exit_depth = if is_late { problem.stages[stage].end } else { f64::INFINITY };
+    }
+}
+
+/// The velocity at the exit, in numbers that a threshold may lie between.
+fn exit_speed(question: &Question) -> Vec<f64> {
+    if question.exact.end.depth >= question.problem.exit_depth { vec![question.exact.end.velocity] } else { Vec::new() }
+}
+
+fn exit_depth(question: &Question) -> Vec<f64> {
+    vec![question.problem.exit_depth]
+}
+
+/// The depth of an exit that lies elsewhere is reported as that of the question.
+fn right_exit(found: &mut Simulated, is_through: bool, depth: f64) {
+    if is_through {
+        found.end.depth = depth;
+    }
+}
+
+/// The end taken a time later, or earlier, whichever it is.
+fn end_late(problem: &Problem, found: &mut Simulated, late: f64) {
     let none = State { time: f64::NAN, ..found.end };
     found.end = continued(problem, found.stage, found.end, late).unwrap_or(none);
 }
@@ -98,13 +159,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "exit-misplaced",
         "the exit lies {} m too near",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Problem(|p, by| p.exit_depth -= by)],
     ),
     of(
         "exit-misplaced",
         "the exit lies {} m too deep",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Problem(|p, by| p.exit_depth += by)],
     ),
     of(
@@ -211,7 +272,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "rest-threshold",
         "the projectile counts as at rest below {} m/s",
         Parameter::Speed,
-        &[Change::RestSpeed(|_, speed| speed), Change::Report(clear_speed)],
+        &[Change::RestSpeed(|_, speed| speed), Change::Report(|_, found, speed| clear_speed(found, speed))],
     ),
     of(
         "rest-threshold",
@@ -225,7 +286,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         Parameter::Fraction,
         &[
             Change::RestSpeed(|p, part| part * p.impact_speed),
-            Change::Report(|p, found, part| clear_speed(p, found, part * p.impact_speed)),
+            Change::Report(|p, found, part| clear_speed(found, part * p.impact_speed)),
         ],
     ),
     of(
@@ -289,29 +350,29 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "rest-threshold",
         "the projectile counts as at rest below a kinetic energy of {} J, and its speed is reported",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::RestSpeed(|p, energy| (2.0 * energy / p.mass).sqrt())],
     ),
     of(
         "rest-threshold",
         "the projectile counts as at rest below a kinetic energy of {} J",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[
             Change::RestSpeed(|p, energy| (2.0 * energy / p.mass).sqrt()),
-            Change::Report(|p, found, energy| clear_speed(p, found, (2.0 * energy / p.mass).sqrt())),
+            Change::Report(|p, found, energy| clear_speed(found, (2.0 * energy / p.mass).sqrt())),
         ],
     ),
     of(
         "flight-cut-short",
         "the flight ends after {} s, wherever it is",
-        Parameter::Value,
-        &[Change::EndTime(|_, time| time)],
+        Parameter::Value(0.3),
+        &[Change::EndTime(|_, _, time| time)],
     ),
     of(
         "flight-cut-short",
         "the flight ends on its way: at a number of steps, or where a step fails",
         Parameter::Lateness,
-        &[Change::EndTime(|end, early| (end - early).max(0.0))],
+        &[Change::EndTime(|_, end, early| (end - early).max(0.0))],
     ),
     of(
         "stage-end-velocity",
@@ -330,5 +391,277 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the time doubles at each end of a stage: the time of its end is added to that of its start",
         Parameter::None,
         &[Change::AtStageEnd(|_, state, _| state.time *= 2.0)],
+    ),
+    of(
+        "stage-left-out",
+        "the stage with the index {} is left out, and the next one begins in its place",
+        Parameter::OneOf(COUNTS),
+        &[Change::Problem(|p, n| leave_out(p, n as usize, false))],
+    ),
+    of(
+        "stage-left-out",
+        "the stage with the index {} is left out, and the one before goes on",
+        Parameter::OneOf(COUNTS),
+        &[Change::Problem(|p, n| leave_out(p, n as usize, true))],
+    ),
+    of(
+        "stage-left-out",
+        "stages thinner than {} m are left out, and the next one begins in their place",
+        Parameter::Threshold(0.01, thicknesses),
+        &[Change::Problem(|p, n| leave_out_thin(p, n, false))],
+    ),
+    of(
+        "stage-left-out",
+        "stages thinner than {} m are left out, and the one before goes on",
+        Parameter::Threshold(0.01, thicknesses),
+        &[Change::Problem(|p, n| leave_out_thin(p, n, true))],
+    ),
+    of(
+        "stage-end-missed",
+        "only the first {} stages are known, and the last of them goes on",
+        Parameter::OneOf(COUNTS),
+        &[Change::Problem(|p, n| cut_stages(p, n as usize))],
+    ),
+    of(
+        "stage-end-misplaced",
+        "a stage is at least {} m thick, and those behind it move",
+        Parameter::Value(0.03),
+        &[Change::Problem(|p, n| {
+            let mut by = 0.0_f64;
+            let starts: Vec<f64> = (0..p.stages.len()).map(|index| p.start_of(index)).collect();
+            for (law, start) in p.stages.iter_mut().zip(starts) {
+                by += (n - (law.end - start)).max(0.0);
+                law.end += by;
+            }
+        })],
+    ),
+    of(
+        "stage-end-misplaced",
+        "a stage is at least {} m thick, at the cost of those behind it",
+        Parameter::Value(0.03),
+        &[Change::Problem(|p, n| {
+            let mut start = 0.0;
+            for law in &mut p.stages {
+                law.end = law.end.max(start + n);
+                start = law.end;
+            }
+        })],
+    ),
+    of(
+        "flight-cut-short",
+        "the flight ends at the end of the first {} stages, wherever it is",
+        Parameter::OneOf(COUNTS),
+        &[Change::Problem(|p, n| {
+            if let Some(end) = p.stages.get(n as usize - 1).map(|law| law.end) {
+                end_at(p, end);
+            }
+        })],
+    ),
+    of(
+        "flight-cut-short",
+        "the last of several stages is never flown through",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            let start = p.start_of(p.stages.len() - 1);
+            if start > 0.0 {
+                end_at(p, start);
+            }
+        })],
+    ),
+    of(
+        "flight-cut-short",
+        "the flight ends at a depth of {} m, wherever it is",
+        Parameter::Value(0.3),
+        &[Change::Problem(|p, n| end_at(p, n))],
+    ),
+    of(
+        "flight-cut-short",
+        "the flight ends {} s after the start of a stage",
+        Parameter::Value(1e-2),
+        &[Change::StageTime(|time| time)],
+    ),
+    of(
+        "flight-cut-short",
+        "where there is an exit, the flight ends after {} times the exit depth over V0",
+        Parameter::Factor,
+        &[Change::EndTime(|p, _, n| n * p.exit_depth / p.impact_speed)],
+    ),
+    of(
+        "exit-invented",
+        "where no exit is asked for, there is one at {} m",
+        Parameter::Value(0.3),
+        &[Change::Problem(|p, n| {
+            if !p.has_exit() {
+                p.exit_depth = n;
+            }
+        })],
+    ),
+    of(
+        "exit-late",
+        "an exit inside a stage is seen at the end of that stage",
+        Parameter::None,
+        &[Change::Problem(|p, _| exit_in(p, |_| false, true))],
+    ),
+    of(
+        "exit-missed",
+        "an exit inside a stage is missed",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            if p.stages.iter().all(|law| law.end != p.exit_depth) {
+                p.exit_depth = f64::INFINITY;
+            }
+        })],
+    ),
+    of(
+        "exit-missed",
+        "an exit behind the first {} stages is missed",
+        Parameter::OneOf(COUNTS),
+        &[Change::Problem(|p, n| exit_in(p, |stage| stage < n as usize, false))],
+    ),
+    of(
+        "exit-missed",
+        "an exit behind the first {} stages is seen at the end of its stage",
+        Parameter::OneOf(COUNTS),
+        &[Change::Problem(|p, n| exit_in(p, |stage| stage < n as usize, true))],
+    ),
+    of(
+        "exit-missed",
+        "an exit at less than {} m/s is missed",
+        Parameter::Threshold(30.0, exit_speed),
+        &[Change::OfRight(|p, right, n| {
+            if right.velocity < n {
+                p.exit_depth = f64::INFINITY;
+            }
+        })],
+    ),
+    of(
+        "exit-missed",
+        "an exit at less than {} V0 is missed",
+        Parameter::Threshold(0.3, |question| {
+            exit_speed(question).iter().map(|speed| speed / question.problem.impact_speed).collect()
+        }),
+        &[Change::OfRight(|p, right, n| {
+            if right.velocity < n * p.impact_speed {
+                p.exit_depth = f64::INFINITY;
+            }
+        })],
+    ),
+    of(
+        "exit-missed",
+        "an exit deeper than {} m is missed",
+        Parameter::Threshold(0.1, exit_depth),
+        &[Change::Problem(|p, n| {
+            if p.exit_depth > n {
+                p.exit_depth = f64::INFINITY;
+            }
+        })],
+    ),
+    of(
+        "exit-missed",
+        "an exit less deep than {} m is missed",
+        Parameter::Threshold(0.1, exit_depth),
+        &[Change::Problem(|p, n| {
+            if p.exit_depth < n {
+                p.exit_depth = f64::INFINITY;
+            }
+        })],
+    ),
+    of(
+        "exit-misplaced",
+        "the exit is looked for at {} times its depth, and its depth is reported right",
+        Parameter::Factor,
+        &[
+            Change::Problem(|p, n| p.exit_depth *= n),
+            Change::Report(|p, found, n| right_exit(found, found.end.depth >= p.exit_depth, p.exit_depth / n)),
+        ],
+    ),
+    of(
+        "exit-misplaced",
+        "the exit is looked for {} m too near, and its depth is reported right",
+        Parameter::Value(1e-3),
+        &[
+            Change::Problem(|p, n| p.exit_depth -= n),
+            Change::Report(|p, found, n| right_exit(found, found.end.depth >= p.exit_depth, p.exit_depth + n)),
+        ],
+    ),
+    of(
+        "exit-misplaced",
+        "the exit is looked for {} m too deep, and its depth is reported right",
+        Parameter::Value(1e-3),
+        &[
+            Change::Problem(|p, n| p.exit_depth += n),
+            Change::Report(|p, found, n| right_exit(found, found.end.depth >= p.exit_depth, p.exit_depth - n)),
+        ],
+    ),
+    of(
+        "event-late",
+        "every event is taken late, in these answers by up to {} s",
+        Parameter::Bracket,
+        &[Change::Report(|p, found, late| end_late(p, found, late))],
+    ),
+    of(
+        "event-late",
+        "every event is taken late, in these answers by up to {} s, and rest with V = 0",
+        Parameter::Bracket,
+        &[Change::Report(|p, found, late| {
+            let is_rest = found.end.velocity <= 0.0;
+            end_late(p, found, late);
+            if is_rest {
+                found.end.velocity = 0.0;
+            }
+        })],
+    ),
+    of(
+        "event-late",
+        "the end of the flight is taken up to {} s late, at the depth of the exit where there is one",
+        Parameter::Bracket,
+        &[Change::Report(|p, found, late| {
+            let depth = found.end.depth;
+            let is_rest = found.end.velocity <= 0.0;
+            end_late(p, found, late);
+            if is_rest {
+                found.end.velocity = 0.0;
+            } else {
+                found.end.depth = depth;
+            }
+        })],
+    ),
+    of(
+        "stage-end-nudged",
+        "behind each end of a stage x is {} m deeper, with the time left as it is",
+        Parameter::Value(1e-4),
+        &[Change::AtStageEnd(|_, state, n| state.depth += n)],
+    ),
+    of(
+        "stage-end-nudged",
+        "behind each end of a stage x is {} m deeper, and the time with it",
+        Parameter::Value(1e-4),
+        &[Change::AtStageEnd(|_, state, n| {
+            let from = state.depth;
+            state.depth += n;
+            state.time += (state.depth - from) / state.velocity;
+        })],
+    ),
+    of(
+        "stage-end-nudged",
+        "behind each end of a stage x is {} times its depth deeper, with the time left as it is",
+        Parameter::Value(1e-4),
+        &[Change::AtStageEnd(|_, state, n| state.depth += n * state.depth)],
+    ),
+    of(
+        "stage-end-nudged",
+        "behind each end of a stage x is {} times its depth deeper, and the time with it",
+        Parameter::Value(1e-4),
+        &[Change::AtStageEnd(|_, state, n| {
+            let from = state.depth;
+            state.depth += n * state.depth;
+            state.time += (state.depth - from) / state.velocity;
+        })],
+    ),
+    of(
+        "stage-end-velocity",
+        "{} m/s of V are lost behind each end of a stage",
+        Parameter::Value(1.0),
+        &[Change::AtStageEnd(|_, state, n| state.velocity = (state.velocity - n).max(0.0))],
     ),
 ];

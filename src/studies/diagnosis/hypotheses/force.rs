@@ -1,14 +1,28 @@
 //! Faults of the force: its terms, which stage they are of, and what is added or left out.
 
-use super::super::simulation::{Place, right_force};
-use super::{Change, DIGITS, GRAINS, Hypothesis, Parameter, of, to_digits, to_grain};
+use super::super::questions::Question;
+use super::super::simulation::{Place, Simulated, right_force};
+use super::{Change, DIGITS, GRAINS, Hypothesis, Parameter, of, to_digits, to_grain, to_single};
 use crate::physics::{Problem, Stage};
 
-/// Stages that a fault concerns: all, the first, all but the first, the last.
+/// Stages that a fault concerns: all, the first, all but the first, those behind the second, the last, all but the last.
 const ALL: u8 = 0;
 const FIRST: u8 = 1;
 const LATER: u8 = 2;
 const LAST: u8 = 3;
+const THIRD: u8 = 4;
+const BUT_LAST: u8 = 5;
+
+fn is_in(part: u8, index: usize, count: usize) -> bool {
+    match part {
+        FIRST => index == 0,
+        LATER => index > 0,
+        THIRD => index > 1,
+        LAST => index + 1 == count,
+        BUT_LAST => index + 1 < count,
+        _ => true,
+    }
+}
 
 /// Terms of the force; a drive is a static force below zero.
 const STATIC_FORCE: u8 = 0;
@@ -21,14 +35,31 @@ const DRIVE: u8 = 4;
 fn scale_term<const TERM: u8, const PART: u8>(problem: &mut Problem, factor: f64) {
     let count = problem.stages.len();
     for (index, law) in problem.stages.iter_mut().enumerate() {
-        let is_meant = match PART {
-            FIRST => index == 0,
-            LATER => index > 0,
-            LAST => index + 1 == count,
-            _ => true,
-        };
-        if is_meant && (TERM != DRIVE || law.static_force < 0.0) {
+        if is_in(PART, index, count) && (TERM != DRIVE || law.static_force < 0.0) {
             *term_of(law, TERM) *= factor;
+        }
+    }
+}
+
+/// The mass times `factor` in a `PART` of the stages: the same as all forces over it.
+fn scale_mass<const PART: u8>(problem: &mut Problem, factor: f64) {
+    if factor <= 0.0 {
+        // No flight has such a mass.
+        problem.mass = factor;
+        return;
+    }
+    let count = problem.stages.len();
+    for (_, law) in problem.stages.iter_mut().enumerate().filter(|(index, _)| is_in(PART, *index, count)) {
+        *law = law.per_mass(factor);
+    }
+}
+
+/// `factor` times the weight added in a `PART` of the stages.
+fn add_weight<const PART: u8>(problem: &mut Problem, factor: f64) {
+    let (count, weight) = (problem.stages.len(), problem.mass * GRAVITY);
+    for (index, law) in problem.stages.iter_mut().enumerate() {
+        if is_in(PART, index, count) {
+            law.static_force += factor * weight;
         }
     }
 }
@@ -40,6 +71,8 @@ const OF_FIRST: u8 = 2;
 const OF_LAST: u8 = 3;
 const MEAN: u8 = 4;
 const KEPT: u8 = 5;
+const PREVIOUS_IN_TURN: u8 = 6;
+const NEXT_IN_TURN: u8 = 7;
 
 fn term_of(law: &mut Stage, term: u8) -> &mut f64 {
     match term {
@@ -65,6 +98,8 @@ fn borrow(problem: &mut Problem, term: u8, from: u8) {
             OF_FIRST => own[0],
             OF_LAST => own[own.len() - 1],
             MEAN => 0.5 * (before + own[index]),
+            PREVIOUS_IN_TURN => own[(index + own.len() - 1) % own.len()],
+            NEXT_IN_TURN => own[(index + 1) % own.len()],
             _ => kept,
         };
     }
@@ -72,6 +107,71 @@ fn borrow(problem: &mut Problem, term: u8, from: u8) {
 
 fn borrow_term<const TERM: u8, const FROM: u8>(problem: &mut Problem, _: f64) {
     borrow(problem, TERM, FROM);
+}
+
+/// The number of `TERM` in every stage as `alter` has it.
+fn alter_term<const TERM: u8>(problem: &mut Problem, alter: impl Fn(f64) -> f64) {
+    for law in &mut problem.stages {
+        let term = term_of(law, TERM);
+        *term = alter(*term);
+    }
+}
+
+/// The numbers of `TERM` that a question has.
+fn numbers_of<const TERM: u8>(question: &Question) -> Vec<f64> {
+    question.problem.stages.iter().map(|law| *term_of(&mut law.clone(), TERM)).collect()
+}
+
+/// One term of the force at a place.
+fn part_of(at: &Place<'_>, term: u8) -> f64 {
+    match term {
+        STIFFNESS => at.law.stiffness * at.depth,
+        VISCOSITY => at.law.viscosity * at.velocity,
+        DRAG => at.law.drag * at.velocity * at.velocity,
+        _ => at.law.static_force,
+    }
+}
+
+/// The force with `TERM` as `alter` has it.
+fn with_term<const TERM: u8>(at: &Place<'_>, alter: impl Fn(f64) -> f64) -> f64 {
+    let part = part_of(at, TERM);
+    right_force(at, 1.0) + (alter(part) - part)
+}
+
+/// The force without `TERM` where the velocity is below, or else above, `speed`.
+fn without_term<const TERM: u8, const IS_BELOW: bool>(at: &Place<'_>, speed: f64) -> f64 {
+    with_term::<TERM>(at, |part| if (at.velocity < speed) == IS_BELOW { 0.0 } else { part })
+}
+
+/// The force as it is at another velocity.
+fn at_velocity(at: &Place<'_>, velocity: f64) -> f64 {
+    right_force(&Place { velocity, ..*at }, 1.0)
+}
+
+/// The stiffness of every stage but an endless one as a static force at a part of its way.
+fn spring_at(problem: &mut Problem, part: f64) {
+    for index in 0..problem.stages.len() {
+        let (start, end) = (problem.start_of(index), problem.stages[index].end);
+        if part == 0.0 || end.is_finite() {
+            let depth = if part == 0.0 { start } else { start + part * (end - start) };
+            problem.stages[index].static_force += problem.stages[index].stiffness * depth;
+            problem.stages[index].stiffness = 0.0;
+        }
+    }
+}
+
+/// The force near the start of a stage as one that goes over from the stage before.
+fn blended(at: &Place<'_>, from: f64, to: f64) -> f64 {
+    let own = right_force(at, 1.0);
+    let share = |border: f64| ((at.depth - border - from) / (to - from)).clamp(0.0, 1.0);
+    let other = |index: usize| at.problem.stages[index].force(at.depth, at.velocity);
+    let last = at.problem.stages.len() - 1;
+    let behind = if at.index > 0 { share(at.problem.start_of(at.index)) } else { 1.0 };
+    let before = if at.index < last { share(at.law.end) } else { 0.0 };
+    if behind < 1.0 {
+        return own * behind + other(at.index - 1) * (1.0 - behind);
+    }
+    if before > 0.0 { own * (1.0 - before) + other(at.index + 1) * before } else { own }
 }
 
 /// Two terms exchanged in every stage from the `first` on.
@@ -105,13 +205,29 @@ pub(super) fn reorder(problem: &mut Problem, law: impl Fn(usize, usize) -> usize
 /// Standard gravity (m/s²).
 const GRAVITY: f64 = 9.80665;
 
+fn single_inputs(problem: &mut Problem, _: f64) {
+    problem.mass = to_single(problem.mass);
+    problem.impact_speed = to_single(problem.impact_speed);
+    problem.exit_depth = to_single(problem.exit_depth);
+    for law in &mut problem.stages {
+        *law = law.map(to_single);
+    }
+}
+
+/// What is slower than `speed` is reported as at rest.
+pub(super) fn clear_speed(found: &mut Simulated, speed: f64) {
+    if found.end.velocity <= speed {
+        found.end.velocity = 0.0;
+    }
+}
+
 fn add_force(problem: &mut Problem, force: f64) {
     problem.stages.iter_mut().for_each(|law| law.static_force += force);
 }
 
 /// A term of the force, in all stages and in a part of them.
 macro_rules! term {
-    ($id:literal, $what:literal, $term:ident) => {
+    ($id:literal, $what:literal, $term:ident, $usual:literal, $clip:literal) => {
         [
             of(
                 $id,
@@ -133,9 +249,21 @@ macro_rules! term {
             ),
             of(
                 $id,
+                concat!($what, " is {} times the right one in every stage behind the second"),
+                Parameter::Factor,
+                &[Change::Problem(scale_term::<$term, THIRD>)],
+            ),
+            of(
+                $id,
                 concat!($what, " is {} times the right one in the last stage alone"),
                 Parameter::Factor,
                 &[Change::Problem(scale_term::<$term, LAST>)],
+            ),
+            of(
+                $id,
+                concat!($what, " is {} times the right one in every stage but the last"),
+                Parameter::Factor,
+                &[Change::Problem(scale_term::<$term, BUT_LAST>)],
             ),
             of(
                 $id,
@@ -148,6 +276,18 @@ macro_rules! term {
                 concat!($what, " of the next stage is used"),
                 Parameter::None,
                 &[Change::Problem(borrow_term::<$term, NEXT>)],
+            ),
+            of(
+                $id,
+                concat!($what, " of the stage before is used, in the first that of the last"),
+                Parameter::None,
+                &[Change::Problem(borrow_term::<$term, PREVIOUS_IN_TURN>)],
+            ),
+            of(
+                $id,
+                concat!($what, " of the next stage is used, in the last that of the first"),
+                Parameter::None,
+                &[Change::Problem(borrow_term::<$term, NEXT_IN_TURN>)],
             ),
             of(
                 $id,
@@ -167,16 +307,52 @@ macro_rules! term {
                 Parameter::None,
                 &[Change::Problem(borrow_term::<$term, MEAN>)],
             ),
+            of(
+                "input-clipped",
+                concat!($what, " is at most {}"),
+                Parameter::Value($usual),
+                &[Change::Problem(|p, n| alter_term::<$term>(p, |own| own.min(n)))],
+            ),
+            of(
+                "input-clipped",
+                concat!($what, " is at least {}"),
+                Parameter::Value($usual),
+                &[Change::Problem(|p, n| alter_term::<$term>(p, |own| own.max(n)))],
+            ),
+            of(
+                "input-clipped",
+                concat!($what, " counts as zero below {}"),
+                Parameter::Threshold($usual, numbers_of::<$term>),
+                &[Change::Problem(|p, n| alter_term::<$term>(p, |own| if own < n { 0.0 } else { own }))],
+            ),
+            of(
+                $clip,
+                concat!($what, " gives at most {} N"),
+                Parameter::Value(1e3),
+                &[Change::Force(|at, n| with_term::<$term>(at, |part| part.min(n)))],
+            ),
+            of(
+                $clip,
+                concat!($what, " gives at least {} N"),
+                Parameter::Value(1e3),
+                &[Change::Force(|at, n| with_term::<$term>(at, |part| part.max(n)))],
+            ),
+            of(
+                $id,
+                concat!($what, " is left out below {} m/s"),
+                Parameter::Speed,
+                &[Change::Force(without_term::<$term, true>)],
+            ),
         ]
     };
 }
 
 /// Faults of single terms.
-pub(super) static TERMS: [[Hypothesis; 9]; 4] = [
-    term!("term:static-force", "the static force p", STATIC_FORCE),
-    term!("term:stiffness", "the stiffness s", STIFFNESS),
-    term!("term:viscosity", "the viscosity r", VISCOSITY),
-    term!("term:drag", "the drag q", DRAG),
+pub(super) static TERMS: [[Hypothesis; 19]; 4] = [
+    term!("term:static-force", "the static force p", STATIC_FORCE, 1e3, "input-clipped"),
+    term!("term:stiffness", "the stiffness s", STIFFNESS, 1e4, "force-clipped"),
+    term!("term:viscosity", "the viscosity r", VISCOSITY, 1e2, "force-clipped"),
+    term!("term:drag", "the drag q", DRAG, 1.0, "force-clipped"),
 ];
 
 /// Every other fault of the force, the mass and the impact speed.
@@ -197,6 +373,24 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 p.stages[0] = Stage { static_force: 0.0, viscosity: 0.0, drag: 0.0, ..p.stages[0] };
             }
         })],
+    ),
+    of(
+        "term:mass",
+        "the mass is {} times the right one in the first stage alone",
+        Parameter::Factor,
+        &[Change::Problem(scale_mass::<FIRST>)],
+    ),
+    of(
+        "term:mass",
+        "the mass is {} times the right one in every stage but the first",
+        Parameter::Factor,
+        &[Change::Problem(scale_mass::<LATER>)],
+    ),
+    of(
+        "term:mass",
+        "the mass is {} times the right one in the last stage alone",
+        Parameter::Factor,
+        &[Change::Problem(scale_mass::<LAST>)],
     ),
     of("term:mass", "the mass is left out: M = 1 kg", Parameter::None, &[Change::Problem(|p, _| p.mass = 1.0)]),
     of(
@@ -219,7 +413,31 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "extra-force",
         "the weight M g is added to the resistance, times {}",
         Parameter::Factor,
-        &[Change::Problem(|p, f| add_force(p, f * p.mass * GRAVITY))],
+        &[Change::Problem(add_weight::<ALL>)],
+    ),
+    of(
+        "extra-force",
+        "the weight M g is added to the resistance in the first stage alone, times {}",
+        Parameter::Factor,
+        &[Change::Problem(add_weight::<FIRST>)],
+    ),
+    of(
+        "extra-force",
+        "the weight M g is added to the resistance in every stage but the first, times {}",
+        Parameter::Factor,
+        &[Change::Problem(add_weight::<LATER>)],
+    ),
+    of(
+        "extra-force",
+        "the weight M g is added to the resistance in the last stage alone, times {}",
+        Parameter::Factor,
+        &[Change::Problem(add_weight::<LAST>)],
+    ),
+    of(
+        "extra-force",
+        "the weight M g is added to the resistance in every stage but the last, times {}",
+        Parameter::Factor,
+        &[Change::Problem(add_weight::<BUT_LAST>)],
     ),
     of(
         "extra-force",
@@ -423,25 +641,25 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "extra-force",
         "a force of {} /s times M V is added to the resistance",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n) + n * at.mass * at.velocity)],
     ),
     of(
         "extra-force",
         "a force of {} kg/s times V is added to the resistance",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n) + n * at.velocity)],
     ),
     of(
         "extra-force",
         "a force of {} kg/m times V² is added to the resistance",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n) + n * at.velocity * at.velocity)],
     ),
     of(
         "extra-force",
         "a force of {} N/m times x is added to the resistance",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n) + n * at.depth)],
     ),
     of(
@@ -453,32 +671,14 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "force-clipped",
         "the force is at most {} N",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n).min(n))],
     ),
     of(
         "force-clipped",
         "the deceleration is at most {} m/s²",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n).min(n * at.mass))],
-    ),
-    of(
-        "term:drag",
-        "the drag q is left out below {} m/s",
-        Parameter::Speed,
-        &[Change::Force(|at, n| with_drag(at, if at.velocity < n { 0.0 } else { at.velocity * at.velocity }))],
-    ),
-    of(
-        "term:drag",
-        "the drag q is left out above {} m/s",
-        Parameter::Speed,
-        &[Change::Force(|at, n| with_drag(at, if at.velocity > n { 0.0 } else { at.velocity * at.velocity }))],
-    ),
-    of(
-        "term:viscosity",
-        "the viscosity r is left out below {} m/s",
-        Parameter::Speed,
-        &[Change::Force(|at, n| with_viscosity(at, if at.velocity < n { 0.0 } else { at.velocity }))],
     ),
     of(
         "force-stale",
@@ -505,6 +705,432 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Force(|at, _| with_viscosity(at, at.entry_speed))],
     ),
     of(
+        "input-clipped",
+        "the mass is at most {} kg",
+        Parameter::Value(1.0),
+        &[Change::Problem(|p, n| p.mass = p.mass.min(n))],
+    ),
+    of(
+        "input-clipped",
+        "the mass is at least {} kg",
+        Parameter::Value(1.0),
+        &[Change::Problem(|p, n| p.mass = p.mass.max(n))],
+    ),
+    of(
+        "input-rounded",
+        "the mass is rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| p.mass = to_single(p.mass))],
+    ),
+    of(
+        "input-clipped",
+        "the impact speed is at most {} m/s",
+        Parameter::Value(30.0),
+        &[Change::Problem(|p, n| p.impact_speed = p.impact_speed.min(n))],
+    ),
+    of(
+        "input-clipped",
+        "the impact speed is at least {} m/s",
+        Parameter::Value(30.0),
+        &[Change::Problem(|p, n| p.impact_speed = p.impact_speed.max(n))],
+    ),
+    of(
+        "input-rounded",
+        "the impact speed is rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| p.impact_speed = to_single(p.impact_speed))],
+    ),
+    of(
+        "input-clipped",
+        "the exit depth is at most {} m",
+        Parameter::Value(0.1),
+        &[Change::Problem(|p, n| {
+            if p.has_exit() {
+                p.exit_depth = p.exit_depth.min(n);
+            }
+        })],
+    ),
+    of(
+        "input-clipped",
+        "the exit depth is at least {} m",
+        Parameter::Value(0.1),
+        &[Change::Problem(|p, n| {
+            if p.has_exit() {
+                p.exit_depth = p.exit_depth.max(n);
+            }
+        })],
+    ),
+    of(
+        "input-rounded",
+        "the exit depth is rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| p.exit_depth = to_single(p.exit_depth))],
+    ),
+    of(
+        "input-rounded",
+        "ends of stages are rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| p.stages.iter_mut().for_each(|law| law.end = to_single(law.end)))],
+    ),
+    of(
+        "input-rounded",
+        "the mass is rounded to a multiple of {} kg",
+        Parameter::OneOf(GRAINS),
+        &[Change::Problem(|p, grain| p.mass = to_grain(p.mass, grain))],
+    ),
+    of(
+        "input-rounded",
+        "the mass is cut to a multiple of {} kg",
+        Parameter::OneOf(GRAINS),
+        &[Change::Problem(|p, grain| p.mass = (p.mass / grain).floor() * grain)],
+    ),
+    of(
+        "input-rounded",
+        "exit and ends of stages are rounded to a multiple of {} m",
+        Parameter::OneOf(GRAINS),
+        &[Change::Problem(|p, grain| {
+            p.exit_depth = to_grain(p.exit_depth, grain);
+            p.stages.iter_mut().for_each(|law| law.end = to_grain(law.end, grain));
+        })],
+    ),
+    of(
+        "input-rounded",
+        "every input is rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(single_inputs)],
+    ),
+    of(
+        "force-stale",
+        "the drag is q V V0",
+        Parameter::None,
+        &[Change::Force(|at, _| with_drag(at, at.velocity * at.impact_speed))],
+    ),
+    of(
+        "force-stale",
+        "the drag is q V0²",
+        Parameter::None,
+        &[Change::Force(|at, _| with_drag(at, at.impact_speed * at.impact_speed))],
+    ),
+    of(
+        "force-stale",
+        "the drag is q times the square of the mean of V and V1, that of the start of the stage",
+        Parameter::None,
+        &[Change::Force(|at, _| with_drag(at, (0.5 * (at.velocity + at.entry_speed)).powi(2)))],
+    ),
+    of(
+        "force-stale",
+        "the drag is q times the square of the mean of V and V0",
+        Parameter::None,
+        &[Change::Force(|at, _| with_drag(at, (0.5 * (at.velocity + at.impact_speed)).powi(2)))],
+    ),
+    of(
+        "force-stale",
+        "the viscous force is r times the mean of V and V1, that of the start of the stage",
+        Parameter::None,
+        &[Change::Force(|at, _| with_viscosity(at, 0.5 * (at.velocity + at.entry_speed)))],
+    ),
+    of(
+        "force-stale",
+        "the viscous force is r times the mean of V and V0",
+        Parameter::None,
+        &[Change::Force(|at, _| with_viscosity(at, 0.5 * (at.velocity + at.impact_speed)))],
+    ),
+    of(
+        "force-stale",
+        "the force that depends on V is that of the start of the stage",
+        Parameter::None,
+        &[Change::Force(|at, _| at_velocity(at, at.entry_speed))],
+    ),
+    of(
+        "force-stale",
+        "the force is that of the mean of V and that of the start of the stage",
+        Parameter::None,
+        &[Change::Force(|at, _| at_velocity(at, 0.5 * (at.velocity + at.entry_speed)))],
+    ),
+    of(
+        "force-stale",
+        "the spring gives the force of the start of the stage throughout",
+        Parameter::None,
+        &[Change::Problem(|p, _| spring_at(p, 0.0))],
+    ),
+    of(
+        "force-stale",
+        "the spring gives the force of the middle of the stage throughout",
+        Parameter::None,
+        &[Change::Problem(|p, _| spring_at(p, 0.5))],
+    ),
+    of(
+        "force-stale",
+        "the spring gives the force of the end of the stage throughout",
+        Parameter::None,
+        &[Change::Problem(|p, _| spring_at(p, 1.0))],
+    ),
+    of(
+        "viscosity-power",
+        "the viscous force is r V0 (V/V0)^{}, not r V",
+        Parameter::Exponent(1.0),
+        &[Change::Force(|at, n| with_viscosity(at, at.impact_speed * (at.velocity.abs() / at.impact_speed).powf(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the drag is q V min(V, {} m/s)",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| with_drag(at, at.velocity * at.velocity.min(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the drag is q V max(V, {} m/s)",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| with_drag(at, at.velocity * at.velocity.max(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the drag is that of at most {} m/s",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| with_drag(at, at.velocity.min(n).powi(2)))],
+    ),
+    of(
+        "force-clipped",
+        "the drag is that of at least {} m/s",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| with_drag(at, at.velocity.max(n).powi(2)))],
+    ),
+    of(
+        "force-clipped",
+        "the viscous force is that of at most {} m/s",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| with_viscosity(at, at.velocity.min(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the viscous force is that of at least {} m/s",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| with_viscosity(at, at.velocity.max(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the force is that of at most {} m/s",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| at_velocity(at, at.velocity.min(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the force is that of at least {} m/s",
+        Parameter::Value(10.0),
+        &[Change::Force(|at, n| at_velocity(at, at.velocity.max(n)))],
+    ),
+    of(
+        "force-clipped",
+        "the force is at least {} N",
+        Parameter::Value(1e3),
+        &[Change::Force(|at, n| right_force(at, n).max(n))],
+    ),
+    of(
+        "force-clipped",
+        "V never exceeds V0: a drive then counts as zero",
+        Parameter::None,
+        &[Change::Force(
+            |at, n| if at.velocity < at.impact_speed { right_force(at, n) } else { right_force(at, n).max(0.0) },
+        )],
+    ),
+    of(
+        "stiffness-origin",
+        "the depth in s x is counted from the end of the first stage, in every other",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            let origin = p.stages[0].end;
+            for law in p.stages.iter_mut().skip(1) {
+                law.static_force -= law.stiffness * origin;
+            }
+        })],
+    ),
+    of(
+        "force-smoothed",
+        "behind each end of a stage the force goes over from that of the stage before within {} m",
+        Parameter::Value(1e-3),
+        &[Change::Force(|at, n| blended(at, 0.0, n))],
+    ),
+    of(
+        "force-smoothed",
+        "the jump of the force at each end of a stage is spread over {} m before and behind it",
+        Parameter::Value(1e-3),
+        &[Change::Force(|at, n| blended(at, -n, n))],
+    ),
+    of(
+        "force-smoothed",
+        "before each end of a stage the force goes over to that of the next stage within {} m",
+        Parameter::Value(1e-3),
+        &[Change::Force(|at, n| blended(at, -n, 0.0))],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p tanh(V/{} m/s), with rest at a hundredth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
+            Change::RestSpeed(|_, n| 1e-2 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-2 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p tanh(V/{} m/s), with rest at a thousandth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
+            Change::RestSpeed(|_, n| 1e-3 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-3 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p tanh(V/{} m/s), with rest at a ten thousandth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
+            Change::RestSpeed(|_, n| 1e-4 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-4 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p tanh(V/{} m/s), with rest at a millionth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
+            Change::RestSpeed(|_, n| 1e-6 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-6 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a hundredth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
+            Change::RestSpeed(|_, n| 1e-2 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-2 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a thousandth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
+            Change::RestSpeed(|_, n| 1e-3 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-3 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a ten thousandth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
+            Change::RestSpeed(|_, n| 1e-4 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-4 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a millionth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
+            Change::RestSpeed(|_, n| 1e-6 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-6 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p min(V/{} m/s, 1), with rest at a hundredth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
+            Change::RestSpeed(|_, n| 1e-2 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-2 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p min(V/{} m/s, 1), with rest at a thousandth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
+            Change::RestSpeed(|_, n| 1e-3 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-3 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p min(V/{} m/s, 1), with rest at a ten thousandth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
+            Change::RestSpeed(|_, n| 1e-4 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-4 * n)),
+        ],
+    ),
+    of(
+        "force-smoothed",
+        "the static force is p min(V/{} m/s, 1), with rest at a millionth of that speed",
+        Parameter::Speed,
+        &[
+            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
+            Change::RestSpeed(|_, n| 1e-6 * n),
+            Change::Report(|_, found, n| clear_speed(found, 1e-6 * n)),
+        ],
+    ),
+    of(
+        "term:static-force",
+        "the static force p is left out below {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<STATIC_FORCE, true>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out below {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<VISCOSITY, true>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out above {} m/s",
+        Parameter::Speed,
+        &[Change::Force(without_term::<VISCOSITY, false>)],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out above {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<VISCOSITY, false>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:drag",
+        "the drag q is left out below {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<DRAG, true>(at, n * at.impact_speed))],
+    ),
+    of(
+        "term:drag",
+        "the drag q is left out above {} m/s",
+        Parameter::Speed,
+        &[Change::Force(without_term::<DRAG, false>)],
+    ),
+    of(
+        "term:drag",
+        "the drag q is left out above {} V0",
+        Parameter::Fraction,
+        &[Change::Force(|at, n| without_term::<DRAG, false>(at, n * at.impact_speed))],
+    ),
+    of(
+        "input-rounded",
+        "the coefficients of the force are rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| p.stages.iter_mut().for_each(|law| *law = law.map(to_single).until(law.end)))],
+    ),
+    of(
         "term:drive",
         "a static force that drives (p < 0) is {} times the right one",
         Parameter::Factor,
@@ -515,5 +1141,67 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "a static force that drives (p < 0) is {} times the right one in every stage but the first",
         Parameter::Factor,
         &[Change::Problem(scale_term::<DRIVE, LATER>)],
+    ),
+];
+
+/// Inputs kept from an earlier question: looked at last, for a question may have none of them.
+pub(super) static EARLIER: &[Hypothesis] = &[
+    of(
+        "input-kept",
+        "the mass is that of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.mass = earlier.first.mass)],
+    ),
+    of(
+        "input-kept",
+        "the impact speed is that of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.impact_speed = earlier.first.impact_speed)],
+    ),
+    of(
+        "input-kept",
+        "the exit depth is that of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.exit_depth = earlier.first.exit_depth)],
+    ),
+    of(
+        "input-kept",
+        "the stages are those of the first question",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.stages.clone_from(&earlier.first.stages))],
+    ),
+    of(
+        "input-kept",
+        "the mass is that of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.mass = earlier.previous.mass)],
+    ),
+    of(
+        "input-kept",
+        "the impact speed is that of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.impact_speed = earlier.previous.impact_speed)],
+    ),
+    of(
+        "input-kept",
+        "the exit depth is that of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.exit_depth = earlier.previous.exit_depth)],
+    ),
+    of(
+        "input-kept",
+        "the stages are those of the question before",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| p.stages.clone_from(&earlier.previous.stages))],
+    ),
+    of(
+        "input-kept",
+        "where no exit is asked for, the last one that was holds",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| {
+            if !p.has_exit() {
+                p.exit_depth = earlier.exit;
+            }
+        })],
     ),
 ];

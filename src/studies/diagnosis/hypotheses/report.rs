@@ -1,8 +1,8 @@
 //! Faults of the report: the flight is right, and a number of its end is not.
 
 use super::super::simulation::{Simulated, continued};
-use super::{Change, Hypothesis, Parameter, of};
-use crate::physics::State;
+use super::{Change, DIGITS, GRAINS, Hypothesis, Parameter, of, to_digits, to_grain, to_single};
+use crate::physics::{Problem, State};
 
 fn shift_time(found: &mut Simulated, by: f64) {
     found.end.time += by;
@@ -11,6 +11,13 @@ fn shift_time(found: &mut Simulated, by: f64) {
 /// The last end of a stage before the stage of the end.
 pub(super) fn last_end(found: &Simulated) -> Option<State> {
     found.passed.iter().rev().find(|(index, _)| *index < found.stage).map(|(_, state)| *state)
+}
+
+/// The start and the end of the flight through each stage.
+fn legs(problem: &Problem, found: &Simulated) -> impl Iterator<Item = [State; 2]> {
+    let ends = found.passed.iter().filter(|(index, _)| *index < found.stage).map(|(_, state)| *state);
+    let all: Vec<State> = std::iter::once(State::at_impact(problem)).chain(ends).chain([found.end]).collect();
+    (1..all.len()).map(move |index| [all[index - 1], all[index]])
 }
 
 /// Faults of the report.
@@ -134,5 +141,183 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the velocity reported is zero",
         Parameter::None,
         &[Change::Report(|_, found, _| found.end.velocity = 0.0)],
+    ),
+    of(
+        "output-rounded",
+        "the depth reported is rounded to a multiple of {} m",
+        Parameter::OneOf(GRAINS),
+        &[Change::Report(|_, found, n| found.end.depth = to_grain(found.end.depth, n))],
+    ),
+    of(
+        "output-rounded",
+        "the depth reported is cut to a multiple of {} m",
+        Parameter::OneOf(GRAINS),
+        &[Change::Report(|_, found, n| found.end.depth = (found.end.depth / n).floor() * n)],
+    ),
+    of(
+        "output-rounded",
+        "the depth reported has {} digits",
+        Parameter::OneOf(DIGITS),
+        &[Change::Report(|_, found, n| found.end.depth = to_digits(found.end.depth, n))],
+    ),
+    of(
+        "output-rounded",
+        "the depth reported is of single precision",
+        Parameter::None,
+        &[Change::Report(|_, found, _| found.end.depth = to_single(found.end.depth))],
+    ),
+    of(
+        "output-clipped",
+        "the depth reported is at most {} m",
+        Parameter::Value(0.1),
+        &[Change::Report(|_, found, n| found.end.depth = found.end.depth.min(n))],
+    ),
+    of(
+        "output-rounded",
+        "the time reported is rounded to a multiple of {} s",
+        Parameter::OneOf(GRAINS),
+        &[Change::Report(|_, found, n| found.end.time = to_grain(found.end.time, n))],
+    ),
+    of(
+        "output-rounded",
+        "the time reported is cut to a multiple of {} s",
+        Parameter::OneOf(GRAINS),
+        &[Change::Report(|_, found, n| found.end.time = (found.end.time / n).floor() * n)],
+    ),
+    of(
+        "output-rounded",
+        "the time reported has {} digits",
+        Parameter::OneOf(DIGITS),
+        &[Change::Report(|_, found, n| found.end.time = to_digits(found.end.time, n))],
+    ),
+    of(
+        "output-rounded",
+        "the time reported is of single precision",
+        Parameter::None,
+        &[Change::Report(|_, found, _| found.end.time = to_single(found.end.time))],
+    ),
+    of(
+        "output-clipped",
+        "the time reported is at most {} s",
+        Parameter::Value(0.01),
+        &[Change::Report(|_, found, n| found.end.time = found.end.time.min(n))],
+    ),
+    of(
+        "output-rounded",
+        "the velocity reported is rounded to a multiple of {} m/s",
+        Parameter::OneOf(GRAINS),
+        &[Change::Report(|_, found, n| found.end.velocity = to_grain(found.end.velocity, n))],
+    ),
+    of(
+        "output-rounded",
+        "the velocity reported is cut to a multiple of {} m/s",
+        Parameter::OneOf(GRAINS),
+        &[Change::Report(|_, found, n| found.end.velocity = (found.end.velocity / n).floor() * n)],
+    ),
+    of(
+        "output-rounded",
+        "the velocity reported has {} digits",
+        Parameter::OneOf(DIGITS),
+        &[Change::Report(|_, found, n| found.end.velocity = to_digits(found.end.velocity, n))],
+    ),
+    of(
+        "output-rounded",
+        "the velocity reported is of single precision",
+        Parameter::None,
+        &[Change::Report(|_, found, _| found.end.velocity = to_single(found.end.velocity))],
+    ),
+    of(
+        "output-clipped",
+        "the velocity reported is at most {} m/s",
+        Parameter::Value(30.0),
+        &[Change::Report(|_, found, n| found.end.velocity = found.end.velocity.min(n))],
+    ),
+    of(
+        "time-formula",
+        "the time of a stage is its length over the mean of V at its two ends",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            found.end.time = legs(p, found).map(|[a, b]| 2.0 * (b.depth - a.depth) / (a.velocity + b.velocity)).sum()
+        })],
+    ),
+    of(
+        "time-formula",
+        "the time of a stage is its length over V at its start",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / a.velocity).sum()
+        })],
+    ),
+    of(
+        "time-formula",
+        "the time of a stage is its length over V at its end",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / b.velocity).sum()
+        })],
+    ),
+    of(
+        "time-left-out",
+        "the time in the first stage is not counted",
+        Parameter::None,
+        &[Change::Report(|_, found, _| {
+            found.end.time -= found
+                .passed
+                .iter()
+                .find(|(index, _)| *index == 0 && found.stage > 0)
+                .map_or(found.end.time, |(_, state)| state.time)
+        })],
+    ),
+    of(
+        "time-left-out",
+        "the clock starts at the end of the first stage",
+        Parameter::None,
+        &[Change::Report(|_, found, _| {
+            found.end.time -= found
+                .passed
+                .iter()
+                .find(|(index, _)| *index == 0 && found.stage > 0)
+                .map_or(0.0, |(_, state)| state.time)
+        })],
+    ),
+    of(
+        "time-left-out",
+        "the time in the last stage is not counted",
+        Parameter::None,
+        &[Change::Report(|_, found, _| found.end.time = last_end(found).map_or(0.0, |state| state.time))],
+    ),
+    of(
+        "time-left-out",
+        "the time in stages without force is not counted",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            let free: f64 = legs(p, found)
+                .enumerate()
+                .filter(|(index, _)| p.stages.get(*index).is_some_and(|law| law.force(1.0, 1.0) == 0.0))
+                .map(|(_, [from, to])| to.time - from.time)
+                .sum();
+            found.end.time -= free;
+        })],
+    ),
+    of(
+        "exit-velocity-stale",
+        "the velocity reported at the exit is that at the start of the stage",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            if found.end.depth >= p.exit_depth {
+                found.end.velocity = last_end(found).map_or(p.impact_speed, |state| state.velocity);
+            }
+        })],
+    ),
+    of(
+        "exit-velocity-stale",
+        "the velocity reported at the exit is the mean of that at the start of the stage and at the exit",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            if found.end.depth >= p.exit_depth {
+                found.end.velocity =
+                    0.5 * (found.end.velocity + last_end(found).map_or(p.impact_speed, |state| state.velocity));
+            }
+        })],
     ),
 ];

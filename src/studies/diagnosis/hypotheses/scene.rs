@@ -38,6 +38,13 @@ fn scale_static_factor(scene: &mut Scene, factor: f64, is_meant: impl Fn(&Concre
         }
     });
 }
+/// S by Eq. 14 of another strength.
+fn set_strength(concrete: &mut Concrete, strength: f64) {
+    if concrete.follows_eq14 {
+        concrete.static_factor = crate::physics::semi_empirical::static_factor(strength);
+    }
+}
+
 /// Faults of parameters.
 pub(super) static FAULTS: &[Hypothesis] = &[
     of(
@@ -180,25 +187,25 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "parameter:S",
         "S is always {}",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Scene(|s, value| concrete(s, |c| c.static_factor = value))],
     ),
     of(
         "parameter:density",
         "the density is always {} kg/m³",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Scene(|s, value| concrete(s, |c| c.density = value))],
     ),
     of(
         "parameter:nose-factor",
         "the nose factor is always {}",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Scene(|s, value| concrete(s, |c| c.nose_factor = value))],
     ),
     of(
         "parameter:k",
         "k is always {}",
-        Parameter::Value,
+        Parameter::Value(0.3),
         &[Change::Scene(|s, value| concrete(s, |c| c.crater_ratio = value))],
     ),
     of(
@@ -287,5 +294,156 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the criterion is always ndrc",
         Parameter::None,
         &[Change::Scene(|s, _| s.criterion = Criterion::Ndrc)],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 is that of at most {} Pa",
+        Parameter::Value(3e7),
+        &[Change::Scene(|s, n| concrete(s, |c| set_strength(c, c.strength.min(n))))],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 is that of at least {} Pa",
+        Parameter::Value(3e7),
+        &[Change::Scene(|s, n| concrete(s, |c| set_strength(c, c.strength.max(n))))],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 is that of {} Pa more",
+        Parameter::Value(8e6),
+        &[Change::Scene(|s, n| concrete(s, |c| set_strength(c, c.strength + n)))],
+    ),
+    of(
+        "parameter:S",
+        "S by Eq. 14 is that of {} Pa less",
+        Parameter::Value(8e6),
+        &[Change::Scene(|s, n| concrete(s, |c| set_strength(c, c.strength - n)))],
+    ),
+    of(
+        "input-rounded",
+        "S is rounded to a multiple of {}",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, n| concrete(s, |c| c.static_factor = to_grain(c.static_factor, n)))],
+    ),
+    of(
+        "input-rounded",
+        "S by Eq. 14 is rounded to a multiple of {}",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, n| {
+            concrete(s, |c| {
+                if c.follows_eq14 {
+                    c.static_factor = to_grain(c.static_factor, n);
+                }
+            })
+        })],
+    ),
+    of(
+        "input-clipped",
+        "the strength is at most {} Pa",
+        Parameter::Value(3e7),
+        &[Change::Scene(|s, n| concrete(s, |c| c.strength = c.strength.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the strength is at least {} Pa",
+        Parameter::Value(3e7),
+        &[Change::Scene(|s, n| concrete(s, |c| c.strength = c.strength.max(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the diameter is at most {} m",
+        Parameter::Value(0.05),
+        &[Change::Scene(|s, n| concrete(s, |c| c.diameter = c.diameter.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the diameter is at least {} m",
+        Parameter::Value(0.05),
+        &[Change::Scene(|s, n| concrete(s, |c| c.diameter = c.diameter.max(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the density is at most {} kg/m³",
+        Parameter::Value(2e3),
+        &[Change::Scene(|s, n| concrete(s, |c| c.density = c.density.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the density is at least {} kg/m³",
+        Parameter::Value(2e3),
+        &[Change::Scene(|s, n| concrete(s, |c| c.density = c.density.max(n)))],
+    ),
+    of(
+        "input-clipped",
+        "S is at most {}",
+        Parameter::Value(9.0),
+        &[Change::Scene(|s, n| concrete(s, |c| c.static_factor = c.static_factor.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "S is at least {}",
+        Parameter::Value(9.0),
+        &[Change::Scene(|s, n| concrete(s, |c| c.static_factor = c.static_factor.max(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the nose factor is at most {}",
+        Parameter::Value(0.3),
+        &[Change::Scene(|s, n| concrete(s, |c| c.nose_factor = c.nose_factor.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "the nose factor is at least {}",
+        Parameter::Value(0.3),
+        &[Change::Scene(|s, n| concrete(s, |c| c.nose_factor = c.nose_factor.max(n)))],
+    ),
+    of(
+        "input-clipped",
+        "B is at most {}",
+        Parameter::Value(1.0),
+        &[Change::Scene(|s, n| concrete(s, |c| c.inertia_factor = c.inertia_factor.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "B is at least {}",
+        Parameter::Value(1.0),
+        &[Change::Scene(|s, n| concrete(s, |c| c.inertia_factor = c.inertia_factor.max(n)))],
+    ),
+    of(
+        "input-clipped",
+        "k is at most {}",
+        Parameter::Value(2.0),
+        &[Change::Scene(|s, n| concrete(s, |c| c.crater_ratio = c.crater_ratio.min(n)))],
+    ),
+    of(
+        "input-clipped",
+        "k is at least {}",
+        Parameter::Value(2.0),
+        &[Change::Scene(|s, n| concrete(s, |c| c.crater_ratio = c.crater_ratio.max(n)))],
+    ),
+    of(
+        "parameter:k",
+        "the crater is no deeper than the target is thick",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            let thickness = s.thickness.unwrap_or(f64::INFINITY);
+            concrete(s, |c| c.crater_ratio = c.crater_ratio.min(thickness / c.diameter));
+        })],
+    ),
+    of(
+        "exit-misplaced",
+        "the exit lies {} diameters too deep",
+        Parameter::Factor,
+        &[Change::OfScene(|concrete, p, n| p.exit_depth += n * concrete.diameter)],
+    ),
+    of(
+        "stage-end-misplaced",
+        "the crater ends {} diameters too deep, with its stiffness as it is",
+        Parameter::Factor,
+        &[Change::OfScene(|concrete, p, n| {
+            if let Some(crater) = p.crater {
+                p.stages[crater].end += n * concrete.diameter;
+            }
+        })],
     ),
 ];
