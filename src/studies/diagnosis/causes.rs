@@ -36,6 +36,8 @@ const ONE_NUMBER: f64 = 1.01;
 const CERTAIN_FROM: usize = 3;
 /// First causes with which a second one is tried.
 const FIRST_OF_TWO: usize = 5;
+/// Two causes at once leave at most one failing answer of so many.
+const LEFT_BY_TWO: usize = 20;
 /// Causes listed at most.
 const LISTED: usize = 5;
 /// Part of the effect of a fault that an explanation may leave, up to so many times the accuracy: a solver with a fault
@@ -290,12 +292,13 @@ fn root(
 fn rounded(number: f64) -> impl Iterator<Item = f64> {
     let zero = (number != 0.0 && number.abs() < 1e-6).then_some(0.0);
     let ratios = [1.0, 2.0, 3.0, 4.0, 8.0, std::f64::consts::PI];
-    let near = ratios.into_iter().flat_map(move |by| {
-        [(number * by).round() / by, (number / by).round() * by]
-            .into_iter()
-            .filter(move |round| *round != number && (round - number).abs() <= 1e-4 * number.abs())
+    let ratios = ratios.into_iter().flat_map(move |by| [(number * by).round() / by, (number / by).round() * by]);
+    let decimals = (0..3).map(move |digits| {
+        let unit = 10f64.powi(digits - number.abs().log10().floor() as i32);
+        (number * unit).round() / unit
     });
-    std::iter::once(number).chain(near).chain(zero)
+    let is_near = move |round: &f64| *round != number && (round - number).abs() <= 1e-4 * number.abs();
+    std::iter::once(number).chain(ratios.chain(decimals).filter(is_near)).chain(zero)
 }
 
 /// How well faults explain what was seen.
@@ -561,7 +564,8 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
     found.sort_by_key(|explanation| (of - explanation.count(), explanation.freedom()));
     let is_nearly_full = |found: &Explanation| found.told_apart * 10 >= of * 9;
     if effort == Effort::Pairs && !found.iter().any(|found| found.is_full() || is_nearly_full(found)) {
-        let strict = Evidence { left: 0, failing: evidence.failing.clone(), passing: evidence.passing.clone() };
+        let strict =
+            Evidence { left: of / LEFT_BY_TWO, failing: evidence.failing.clone(), passing: evidence.passing.clone() };
         found.extend(pairs(&strict, &usable, &found));
     }
     let mut full: Vec<&Explanation> = found.iter().filter(|explanation| explanation.is_full()).collect();
@@ -682,7 +686,7 @@ fn pairs(evidence: &Evidence<'_>, usable: &[&'static Hypothesis], singles: &[Exp
             .filter(|second| !is_free(second))
             .filter(|second| !std::ptr::eq(**second, first.faults[0].0));
         let both = others.filter_map(|second| evidence.best(second, &first.faults, &missing, ALL_THREE));
-        found.extend(both.filter(Explanation::is_full).collect::<Vec<_>>());
+        found.extend(both.collect::<Vec<_>>());
         if !found.is_empty() {
             break;
         }

@@ -56,9 +56,22 @@ pub(super) enum Parameter {
     /// One of a few numbers, the same in every answer.
     OneOf(&'static [f64]),
     /// A value in place of that of the question, the same in every answer; here one as it may be.
-    Value(#[cfg_attr(not(test), expect(dead_code, reason = "a test tries it"))] f64),
+    Value(
+        #[cfg_attr(
+            not(any(test, feature = "report")),
+            expect(dead_code, reason = "solvers that are wrong on purpose have it")
+        )]
+        f64,
+    ),
     /// A value as well, which matters only in passing one of the numbers that the question has.
-    Threshold(#[cfg_attr(not(test), expect(dead_code, reason = "a test tries it"))] f64, fn(&Question) -> Vec<f64>),
+    Threshold(
+        #[cfg_attr(
+            not(any(test, feature = "report")),
+            expect(dead_code, reason = "solvers that are wrong on purpose have it")
+        )]
+        f64,
+        fn(&Question) -> Vec<f64>,
+    ),
     /// A time (s), another one in every answer, which flights of one event alone show.
     Bracket,
     /// A factor near one, another one in every answer.
@@ -209,7 +222,7 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
     let is_closed = problem.stages.last().is_some_and(|last| last.end == f64::INFINITY);
     if !(is_ordered
         && is_closed
-        && problem.stages[0].end > 0.0
+        && problem.stages[0].end >= 0.0
         && problem.mass > 0.0
         && problem.impact_speed > 0.0
         && problem.exit_depth > 0.0)

@@ -403,16 +403,18 @@ const FAMILIES: [Family; 29] = [
         name: "many-stages",
         draw: |random| {
             let ends = 9 + random.below(8);
-            let problem = layered(random, ends, |random, scale, _| mixed(random, scale));
-            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.05 })
+            let mut problem = layered(random, ends, |random, scale, _| mixed(random, scale));
+            problem.impact_speed *= 3.0;
+            let exit = problem.stages[ends - 1].end * random.uniform(1.01, 1.3);
+            Some(problem.with_exit(exit))
         },
     },
     Family {
         name: "no-length",
-        // One stage of several, the first in turn, begins where it ends.
+        // The first or a later one ends where it begins.
         draw: |random| {
             let mut problem = layered(random, 3, |random, scale, _| mixed(random, scale));
-            let stage = random.below(3);
+            let stage = if random.chance(0.5) { 0 } else { 1 + random.below(2) };
             problem.stages[stage].end = problem.start_of(stage);
             near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
         },

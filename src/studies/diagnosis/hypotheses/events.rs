@@ -176,6 +176,16 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "exit-misplaced",
+        "the exit is counted from the start of each stage",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            let seen =
+                |index: usize| Some(p.start_of(index) + p.exit_depth).filter(|exit| *exit <= p.stages[index].end);
+            p.exit_depth = (0..p.stages.len()).find_map(seen).unwrap_or(f64::INFINITY);
+        })],
+    ),
+    of(
+        "exit-misplaced",
         "the exit is that of the last end of a stage",
         Parameter::None,
         &[Change::Problem(|p, _| {

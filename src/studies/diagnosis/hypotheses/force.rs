@@ -73,6 +73,7 @@ const MEAN: u8 = 4;
 const KEPT: u8 = 5;
 const PREVIOUS_IN_TURN: u8 = 6;
 const NEXT_IN_TURN: u8 = 7;
+const SUM: u8 = 8;
 
 fn term_of(law: &mut Stage, term: u8) -> &mut f64 {
     match term {
@@ -100,6 +101,7 @@ fn borrow(problem: &mut Problem, term: u8, from: u8) {
             MEAN => 0.5 * (before + own[index]),
             PREVIOUS_IN_TURN => own[(index + own.len() - 1) % own.len()],
             NEXT_IN_TURN => own[(index + 1) % own.len()],
+            SUM => own[..=index].iter().sum(),
             _ => kept,
         };
     }
@@ -107,6 +109,17 @@ fn borrow(problem: &mut Problem, term: u8, from: u8) {
 
 fn borrow_term<const TERM: u8, const FROM: u8>(problem: &mut Problem, _: f64) {
     borrow(problem, TERM, FROM);
+}
+
+/// `TERM` without any other in the stages that have it.
+fn leave_alone<const TERM: u8>(problem: &mut Problem, _: f64) {
+    for law in &mut problem.stages {
+        let own = *term_of(law, TERM);
+        if own != 0.0 {
+            *law = Stage::free().until(law.end);
+            *term_of(law, TERM) = own;
+        }
+    }
 }
 
 /// The number of `TERM` in every stage as `alter` has it.
@@ -291,6 +304,18 @@ macro_rules! term {
             ),
             of(
                 $id,
+                concat!($what, " adds up from stage to stage"),
+                Parameter::None,
+                &[Change::Problem(borrow_term::<$term, SUM>)],
+            ),
+            of(
+                "term-alone",
+                concat!("no other force acts in a stage that has ", $what),
+                Parameter::None,
+                &[Change::Problem(leave_alone::<$term>)],
+            ),
+            of(
+                $id,
                 concat!($what, " of the first stage is used in all"),
                 Parameter::None,
                 &[Change::Problem(borrow_term::<$term, OF_FIRST>)],
@@ -348,7 +373,7 @@ macro_rules! term {
 }
 
 /// Faults of single terms.
-pub(super) static TERMS: [[Hypothesis; 19]; 4] = [
+pub(super) static TERMS: [[Hypothesis; 21]; 4] = [
     term!("term:static-force", "the static force p", STATIC_FORCE, 1e3, "input-clipped"),
     term!("term:stiffness", "the stiffness s", STIFFNESS, 1e4, "force-clipped"),
     term!("term:viscosity", "the viscosity r", VISCOSITY, 1e2, "force-clipped"),
