@@ -142,7 +142,7 @@ pub fn critical_energy_difference(rows: &[Row], measured: &[MeasuredPoint], judg
         measured.iter().filter_map(point).filter(|(_, y)| y.is_finite()).collect::<Vec<Point>>()
     };
     let figure_5 = (!measured.is_empty()).then(|| {
-        panel("over measured energies: the paper's Figure 5")
+        panel("over measured energies (Figure 5)")
             .series("simulation, x = H", Style::marks(0), over_measured(|point| point.energy_full_depth))
             .series("simulation, x = x_p(H)", Style::marks(2), over_measured(|point| point.energy_ndrc))
             .series("Eq. 15, printed", Style::marks(1), over_measured(|point| point.eq15_printed))

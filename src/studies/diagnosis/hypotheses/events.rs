@@ -493,7 +493,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "flight-cut-short",
         "where there is an exit, the flight ends after {} times the exit depth over V0",
-        Parameter::Factor,
+        Parameter::Value(1.5),
         &[Change::EndTime(|p, _, n| n * p.exit_depth / p.impact_speed)],
     ),
     of(
