@@ -96,7 +96,8 @@ fn remeasured(check: &Remeasured, subject: &Subject<'_>) -> Found {
         })
         .map(|(judged, (was, cases))| {
             let Judged { claim, measured, cases: now, .. } = judged;
-            format!("{}: {measured:?} on {now} cases, and {was:e} on {cases} before", claim.id)
+            let measured = measured.map_or_else(|| "nothing".to_owned(), |measured| format!("{measured:e}"));
+            format!("{}: {measured} on {now} cases, and {was:e} on {cases} before", claim.id)
         })
         .collect();
     let remark = if different.is_empty() { format!("{} claims", known.len()) } else { different.join("; ") };
