@@ -482,7 +482,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "flight-cut-short",
         "the flight ends at a depth of {} m, wherever it is",
         Parameter::Value(0.3),
-        &[Change::Problem(|p, n| end_at(p, n))],
+        &[Change::Problem(end_at)],
     ),
     of(
         "flight-cut-short",
@@ -607,7 +607,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "event-late",
         "every event is taken late, in these answers by up to {} s",
         Parameter::Bracket,
-        &[Change::Report(|p, found, late| end_late(p, found, late))],
+        &[Change::Report(end_late)],
     ),
     of(
         "event-late",

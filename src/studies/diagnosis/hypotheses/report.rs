@@ -237,7 +237,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the time of a stage is its length over the mean of V at its two ends",
         Parameter::None,
         &[Change::Report(|p, found, _| {
-            found.end.time = legs(p, found).map(|[a, b]| 2.0 * (b.depth - a.depth) / (a.velocity + b.velocity)).sum()
+            found.end.time = legs(p, found).map(|[a, b]| 2.0 * (b.depth - a.depth) / (a.velocity + b.velocity)).sum();
         })],
     ),
     of(
@@ -245,7 +245,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the time of a stage is its length over V at its start",
         Parameter::None,
         &[Change::Report(|p, found, _| {
-            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / a.velocity).sum()
+            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / a.velocity).sum();
         })],
     ),
     of(
@@ -253,7 +253,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the time of a stage is its length over V at its end",
         Parameter::None,
         &[Change::Report(|p, found, _| {
-            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / b.velocity).sum()
+            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / b.velocity).sum();
         })],
     ),
     of(
@@ -265,7 +265,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 .passed
                 .iter()
                 .find(|(index, _)| *index == 0 && found.stage > 0)
-                .map_or(found.end.time, |(_, state)| state.time)
+                .map_or(found.end.time, |(_, state)| state.time);
         })],
     ),
     of(
@@ -277,7 +277,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 .passed
                 .iter()
                 .find(|(index, _)| *index == 0 && found.stage > 0)
-                .map_or(0.0, |(_, state)| state.time)
+                .map_or(0.0, |(_, state)| state.time);
         })],
     ),
     of(

@@ -334,7 +334,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 if c.follows_eq14 {
                     c.static_factor = to_grain(c.static_factor, n);
                 }
-            })
+            });
         })],
     ),
     of(
