@@ -422,7 +422,7 @@ fn classify(x: &[f64], y: &[f64], negative: &[bool], height: f64, excluded: &[Op
     }
 }
 
-/// Scatter of logarithms about their line up to which the sizes of what alternates follow a power of the step, and that where three
+/// Scatter of logarithms about their line up to which the sizes of what alternates follow a power of the step, and that where two
 /// degrees of freedom or fewer are left: few random sizes often lie near a line.
 const REGULAR: f64 = 0.15;
 const FEW_REGULAR: f64 = 0.02;
@@ -458,7 +458,7 @@ struct Line {
 impl Line {
     /// Whether the points follow the line as the sizes of an oscillation do.
     fn is_regular(&self) -> bool {
-        self.scatter <= if self.dof > 3 { REGULAR } else { FEW_REGULAR }
+        self.scatter <= if self.dof > 2 { REGULAR } else { FEW_REGULAR }
     }
 
     fn slope_band(&self, level: f64) -> [f64; 2] {

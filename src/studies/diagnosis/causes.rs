@@ -294,7 +294,7 @@ fn rounded(number: f64) -> impl Iterator<Item = f64> {
     let ratios = [1.0, 2.0, 3.0, 4.0, 8.0, std::f64::consts::PI];
     let ratios = ratios.into_iter().flat_map(move |by| [(number * by).round() / by, (number / by).round() * by]);
     let decimals = (0..3).map(move |digits| {
-        let unit = 10f64.powi(digits - number.abs().log10().floor() as i32);
+        let unit = 10f64.powf(f64::from(digits) - number.abs().log10().floor());
         (number * unit).round() / unit
     });
     let is_near = move |round: &f64| *round != number && (round - number).abs() <= 1e-4 * number.abs();

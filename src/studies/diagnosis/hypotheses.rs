@@ -3,6 +3,58 @@
 //! A hypothesis says what a solver with its fault would answer; [`super::causes`] asks which of them explains the answers
 //! that came. The next one is one more entry of the table of its kind: `force`, `events`, `report` or `scene`.
 
+/// A number of the problem or of its end that is rounded: what it is called, its unit, what `Change` reaches it, and where.
+macro_rules! rounded {
+    ($id:literal, $what:literal, $unit:literal, $change:ident($($bound:tt),*; $n:ident) $place:expr) => {
+        [
+            of(
+                $id,
+                concat!($what, " is rounded to a multiple of {} ", $unit),
+                Parameter::OneOf(GRAINS),
+                &[Change::$change(|$($bound),*, $n| $place = to_grain($place, $n))],
+            ),
+            of(
+                $id,
+                concat!($what, " is cut to a multiple of {} ", $unit),
+                Parameter::OneOf(GRAINS),
+                &[Change::$change(|$($bound),*, $n| $place = ($place / $n).floor() * $n)],
+            ),
+            of(
+                $id,
+                concat!($what, " is rounded to {} digits"),
+                Parameter::OneOf(DIGITS),
+                &[Change::$change(|$($bound),*, $n| $place = to_digits($place, $n))],
+            ),
+            of(
+                $id,
+                concat!($what, " is rounded to single precision"),
+                Parameter::None,
+                &[Change::$change(|$($bound),*, _| $place = to_single($place))],
+            ),
+        ]
+    };
+}
+
+/// The same of one that has a bound, here one as it may be.
+macro_rules! bounded {
+    ($id:literal, $what:literal, $unit:literal, $usual:literal, $change:ident($($bound:tt),*; $n:ident) $place:expr) => {
+        [
+            of(
+                $id,
+                concat!($what, " is at most {} ", $unit),
+                Parameter::Value($usual),
+                &[Change::$change(|$($bound),*, $n| $place = $place.min($n))],
+            ),
+            of(
+                $id,
+                concat!($what, " is at least {} ", $unit),
+                Parameter::Value($usual),
+                &[Change::$change(|$($bound),*, $n| $place = $place.max($n))],
+            ),
+        ]
+    };
+}
+
 mod events;
 mod force;
 mod report;
@@ -339,6 +391,9 @@ pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
         .iter()
         .flatten()
         .chain(force::FAULTS)
+        .chain(force::SMOOTHED.iter().flatten())
+        .chain(force::ROUNDED.iter().chain(&report::ROUNDED).flatten())
+        .chain(force::BOUNDED.iter().chain(&report::BOUNDED).flatten())
         .chain(events::FAULTS)
         .chain(report::FAULTS)
         .chain(scene::FAULTS)

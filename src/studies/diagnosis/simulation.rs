@@ -2,7 +2,7 @@
 //!
 //! The law of a stage may be any smooth function of x and V here, such as a spring that pushes, or a drag with another
 //! power: the proofs behind [`Taylor`] do not hold for those, and a number that is only compared needs none. The
-//! integrator is Gragg's midpoint rule, extrapolated; an event is found by shortening the step that passes it.
+//! integrator is Gragg's midpoint rule, extrapolated; an event is found by Newton's method on the step that passes it.
 //!
 //! Source: Hairer, Nørsett, Wanner (1993), Solving Ordinary Differential Equations I, section II.9.
 
@@ -18,8 +18,8 @@ const TOLERANCE: f64 = 1e-12;
 const STEPS_MAX: usize = 500;
 /// Longest step, times the rate of the fastest motion.
 const PHASE_MAX: f64 = 2.0;
-/// Times that the bracket of an event is narrowed at most.
-const NARROWED_MAX: usize = 100;
+/// Iterations for an event at most.
+const ITERATIONS_MAX: usize = 100;
 
 /// Where a force is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -112,30 +112,24 @@ fn extrapolated(a: &impl Fn(f64, f64) -> f64, x: f64, v: f64, h: f64) -> ([f64; 
     (best, std::array::from_fn(|i| (best[i] - good[i]).abs()))
 }
 
-/// The time in `0..=h` at which `g` becomes positive, if it does not do so at 0 and does at `h`.
-fn first_positive(h: f64, at_end: f64, at_start: f64, g: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high, mut g_low, mut g_high) = (0.0, h, at_start, at_end);
-    for round in 0..NARROWED_MAX {
-        let width = high - low;
-        if width <= f64::EPSILON * high {
+/// The time in `0..=h` at which `g`, which gives a value and its slope, becomes positive, looked for from `guess` on: it is not
+/// positive at 0, and is at `h`.
+fn first_positive(h: f64, guess: f64, g: impl Fn(f64) -> [f64; 2]) -> f64 {
+    let (mut low, mut high, mut now) = (0.0, h, guess);
+    for _ in 0..ITERATIONS_MAX {
+        let [value, slope] = g(now);
+        if value.abs() <= f64::EPSILON * now * slope.abs() || high - low <= f64::EPSILON * high {
             break;
         }
-        // Regula falsi as Illinois has it, and every fourth time the middle: no bracket shrinks too slowly.
-        let falsi = low - g_low * width / (g_high - g_low);
-        let next = if round % 4 == 3 || !(low < falsi && falsi < high) { 0.5 * (low + high) } else { falsi };
-        let value = g(next);
         if value > 0.0 {
-            (high, g_high) = (next, value);
-            g_low *= 0.5;
+            high = now;
         } else {
-            (low, g_low) = (next, value);
-            g_high *= 0.5;
+            low = now;
         }
-        if value == 0.0 {
-            return next;
-        }
+        let next = now - value / slope;
+        now = if low < next && next < high { next } else { 0.5 * (low + high) };
     }
-    high
+    now
 }
 
 /// The flight through `problem` by `rules`.
@@ -187,12 +181,19 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
                 continue;
             }
             let within = |part: f64| extrapolated(&a, 0.0, v, part).0;
-            let rest = (speed <= rest_speed)
-                .then(|| first_positive(h, rest_speed - speed, rest_speed - v, |part| rest_speed - within(part)[1]));
+            let rest = (speed <= rest_speed).then(|| {
+                first_positive(h, h * (v - rest_speed) / (v - speed), |part| {
+                    let [distance, speed] = within(part);
+                    [rest_speed - speed, a(distance, speed)]
+                })
+            });
             let last = rest.unwrap_or(h);
             let farthest = rest.map_or(distance, |part| within(part)[0]);
             if farthest >= left {
-                let part = first_positive(last, farthest - left, -left, |part| within(part)[0] - left);
+                let part = first_positive(last, last * left / farthest, |part| {
+                    let [distance, speed] = within(part);
+                    [distance - left, speed]
+                });
                 elapsed += part;
                 state = State { time: time + part, depth: limit, velocity: within(part)[1].max(rest_speed) };
                 break;

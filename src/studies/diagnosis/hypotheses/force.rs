@@ -215,6 +215,15 @@ pub(super) fn reorder(problem: &mut Problem, law: impl Fn(usize, usize) -> usize
     }
 }
 
+/// The problem as it is seen from `depth`: what lies before it is left out.
+fn start_at(problem: &mut Problem, depth: f64) {
+    problem.exit_depth -= depth;
+    for law in &mut problem.stages {
+        law.static_force += law.stiffness * depth;
+        law.end = (law.end - depth).max(0.0);
+    }
+}
+
 /// Standard gravity (m/s²).
 const GRAVITY: f64 = 9.80665;
 
@@ -380,6 +389,50 @@ pub(super) static TERMS: [[Hypothesis; 21]; 4] = [
     term!("term:drag", "the drag q", DRAG, 1.0, "force-clipped"),
 ];
 
+/// A static force that vanishes at rest, by several thresholds of rest.
+macro_rules! smoothed {
+    ($formula:literal, |$at:ident, $speed:ident| $share:expr) => {
+        [
+            smoothed!($formula, "a hundredth", 1e-2, |$at, $speed| $share),
+            smoothed!($formula, "a thousandth", 1e-3, |$at, $speed| $share),
+            smoothed!($formula, "a ten thousandth", 1e-4, |$at, $speed| $share),
+            smoothed!($formula, "a millionth", 1e-6, |$at, $speed| $share),
+        ]
+    };
+    ($formula:literal, $words:literal, $part:literal, |$at:ident, $speed:ident| $share:expr) => {
+        of(
+            "force-smoothed",
+            concat!("the static force is ", $formula, ", with rest at ", $words, " of that speed"),
+            Parameter::Speed,
+            &[
+                Change::Force(|$at, $speed| with_term::<STATIC_FORCE>($at, |part| part * $share)),
+                Change::RestSpeed(|_, speed| $part * speed),
+                Change::Report(|_, found, speed| clear_speed(found, $part * speed)),
+            ],
+        )
+    };
+}
+
+/// Static forces that vanish at rest.
+pub(super) static SMOOTHED: [[Hypothesis; 4]; 3] = [
+    smoothed!("p tanh(V/{} m/s)", |at, n| (at.velocity / n).tanh()),
+    smoothed!("p V/sqrt(V² + v²) with v = {} m/s", |at, n| at.velocity / at.velocity.hypot(n)),
+    smoothed!("p min(V/{} m/s, 1)", |at, n| (at.velocity / n).min(1.0)),
+];
+
+/// Inputs that are rounded.
+pub(super) static ROUNDED: [[Hypothesis; 4]; 3] = [
+    rounded!("input-rounded", "the mass", "kg", Problem(p; n) p.mass),
+    rounded!("input-rounded", "the impact speed", "m/s", Problem(p; n) p.impact_speed),
+    rounded!("input-rounded", "the exit depth", "m", Problem(p; n) p.exit_depth),
+];
+
+/// Inputs that are bounded.
+pub(super) static BOUNDED: [[Hypothesis; 2]; 2] = [
+    bounded!("input-clipped", "the mass", "kg", 1.0, Problem(p; n) p.mass),
+    bounded!("input-clipped", "the impact speed", "m/s", 30.0, Problem(p; n) p.impact_speed),
+];
+
 /// Every other fault of the force, the mass and the impact speed.
 pub(super) static FAULTS: &[Hypothesis] = &[
     of("term:mass", "the mass is {} times the right one", Parameter::Factor, &[Change::Problem(|p, f| p.mass *= f)]),
@@ -388,6 +441,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the impact speed is {} times the right one",
         Parameter::Factor,
         &[Change::Problem(|p, f| p.impact_speed *= f)],
+    ),
+    of(
+        "offset",
+        "the flight starts at x = {} m, and not at the impact face",
+        Parameter::Value(1e-4),
+        &[Change::Problem(start_at), Change::Report(|_, found, at| found.end.depth += at)],
     ),
     of(
         "term:first-stage",
@@ -472,44 +531,10 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "input-rounded",
-        "the mass is rounded to {} digits",
-        Parameter::OneOf(DIGITS),
-        &[Change::Problem(|p, digits| p.mass = to_digits(p.mass, digits))],
-    ),
-    of(
-        "input-rounded",
-        "the impact speed is rounded to {} digits",
-        Parameter::OneOf(DIGITS),
-        &[Change::Problem(|p, digits| p.impact_speed = to_digits(p.impact_speed, digits))],
-    ),
-    of(
-        "input-rounded",
-        "the impact speed is rounded to a multiple of {} m/s",
-        Parameter::OneOf(GRAINS),
-        &[Change::Problem(|p, grain| p.impact_speed = to_grain(p.impact_speed, grain))],
-    ),
-    of(
-        "input-rounded",
-        "the impact speed is cut to a multiple of {} m/s",
-        Parameter::OneOf(GRAINS),
-        &[Change::Problem(|p, grain| p.impact_speed = (p.impact_speed / grain).floor() * grain)],
-    ),
-    of(
-        "input-rounded",
         "ends of stages are rounded to a multiple of {} m",
         Parameter::OneOf(GRAINS),
         &[Change::Problem(|p, grain| {
             p.stages.iter_mut().filter(|law| law.end.is_finite()).for_each(|law| law.end = to_grain(law.end, grain));
-        })],
-    ),
-    of(
-        "input-rounded",
-        "the exit depth is rounded to a multiple of {} m",
-        Parameter::OneOf(GRAINS),
-        &[Change::Problem(|p, grain| {
-            if p.has_exit() {
-                p.exit_depth = to_grain(p.exit_depth, grain);
-            }
         })],
     ),
     of(
@@ -731,42 +756,6 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "input-clipped",
-        "the mass is at most {} kg",
-        Parameter::Value(1.0),
-        &[Change::Problem(|p, n| p.mass = p.mass.min(n))],
-    ),
-    of(
-        "input-clipped",
-        "the mass is at least {} kg",
-        Parameter::Value(1.0),
-        &[Change::Problem(|p, n| p.mass = p.mass.max(n))],
-    ),
-    of(
-        "input-rounded",
-        "the mass is rounded to single precision",
-        Parameter::None,
-        &[Change::Problem(|p, _| p.mass = to_single(p.mass))],
-    ),
-    of(
-        "input-clipped",
-        "the impact speed is at most {} m/s",
-        Parameter::Value(30.0),
-        &[Change::Problem(|p, n| p.impact_speed = p.impact_speed.min(n))],
-    ),
-    of(
-        "input-clipped",
-        "the impact speed is at least {} m/s",
-        Parameter::Value(30.0),
-        &[Change::Problem(|p, n| p.impact_speed = p.impact_speed.max(n))],
-    ),
-    of(
-        "input-rounded",
-        "the impact speed is rounded to single precision",
-        Parameter::None,
-        &[Change::Problem(|p, _| p.impact_speed = to_single(p.impact_speed))],
-    ),
-    of(
-        "input-clipped",
         "the exit depth is at most {} m",
         Parameter::Value(0.1),
         &[Change::Problem(|p, n| {
@@ -787,27 +776,9 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "input-rounded",
-        "the exit depth is rounded to single precision",
-        Parameter::None,
-        &[Change::Problem(|p, _| p.exit_depth = to_single(p.exit_depth))],
-    ),
-    of(
-        "input-rounded",
         "ends of stages are rounded to single precision",
         Parameter::None,
         &[Change::Problem(|p, _| p.stages.iter_mut().for_each(|law| law.end = to_single(law.end)))],
-    ),
-    of(
-        "input-rounded",
-        "the mass is rounded to a multiple of {} kg",
-        Parameter::OneOf(GRAINS),
-        &[Change::Problem(|p, grain| p.mass = to_grain(p.mass, grain))],
-    ),
-    of(
-        "input-rounded",
-        "the mass is cut to a multiple of {} kg",
-        Parameter::OneOf(GRAINS),
-        &[Change::Problem(|p, grain| p.mass = (p.mass / grain).floor() * grain)],
     ),
     of(
         "input-rounded",
@@ -986,126 +957,6 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "before each end of a stage the force goes over to that of the next stage within {} m",
         Parameter::Value(1e-3),
         &[Change::Force(|at, n| blended(at, -n, 0.0))],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p tanh(V/{} m/s), with rest at a hundredth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
-            Change::RestSpeed(|_, n| 1e-2 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-2 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p tanh(V/{} m/s), with rest at a thousandth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
-            Change::RestSpeed(|_, n| 1e-3 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-3 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p tanh(V/{} m/s), with rest at a ten thousandth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
-            Change::RestSpeed(|_, n| 1e-4 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-4 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p tanh(V/{} m/s), with rest at a millionth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).tanh())),
-            Change::RestSpeed(|_, n| 1e-6 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-6 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a hundredth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
-            Change::RestSpeed(|_, n| 1e-2 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-2 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a thousandth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
-            Change::RestSpeed(|_, n| 1e-3 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-3 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a ten thousandth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
-            Change::RestSpeed(|_, n| 1e-4 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-4 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p V/sqrt(V² + v²) with v = {} m/s, with rest at a millionth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * at.velocity / at.velocity.hypot(n))),
-            Change::RestSpeed(|_, n| 1e-6 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-6 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p min(V/{} m/s, 1), with rest at a hundredth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
-            Change::RestSpeed(|_, n| 1e-2 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-2 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p min(V/{} m/s, 1), with rest at a thousandth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
-            Change::RestSpeed(|_, n| 1e-3 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-3 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p min(V/{} m/s, 1), with rest at a ten thousandth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
-            Change::RestSpeed(|_, n| 1e-4 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-4 * n)),
-        ],
-    ),
-    of(
-        "force-smoothed",
-        "the static force is p min(V/{} m/s, 1), with rest at a millionth of that speed",
-        Parameter::Speed,
-        &[
-            Change::Force(|at, n| with_term::<STATIC_FORCE>(at, |part| part * (at.velocity / n).min(1.0))),
-            Change::RestSpeed(|_, n| 1e-6 * n),
-            Change::Report(|_, found, n| clear_speed(found, 1e-6 * n)),
-        ],
     ),
     of(
         "term:static-force",

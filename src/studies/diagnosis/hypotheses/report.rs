@@ -13,12 +13,31 @@ pub(super) fn last_end(found: &Simulated) -> Option<State> {
     found.passed.iter().rev().find(|(index, _)| *index < found.stage).map(|(_, state)| *state)
 }
 
+/// The end of the first stage, where the flight passes it.
+fn first_end(found: &Simulated) -> Option<State> {
+    found.passed.iter().find(|(index, _)| *index == 0 && found.stage > 0).map(|(_, state)| *state)
+}
+
 /// The start and the end of the flight through each stage.
 fn legs(problem: &Problem, found: &Simulated) -> impl Iterator<Item = [State; 2]> {
     let ends = found.passed.iter().filter(|(index, _)| *index < found.stage).map(|(_, state)| *state);
     let all: Vec<State> = std::iter::once(State::at_impact(problem)).chain(ends).chain([found.end]).collect();
     (1..all.len()).map(move |index| [all[index - 1], all[index]])
 }
+
+/// Numbers of the end that are rounded.
+pub(super) static ROUNDED: [[Hypothesis; 4]; 3] = [
+    rounded!("output-rounded", "the depth reported", "m", Report(_, found; n) found.end.depth),
+    rounded!("output-rounded", "the time reported", "s", Report(_, found; n) found.end.time),
+    rounded!("output-rounded", "the velocity reported", "m/s", Report(_, found; n) found.end.velocity),
+];
+
+/// Numbers of the end that are bounded.
+pub(super) static BOUNDED: [[Hypothesis; 2]; 3] = [
+    bounded!("output-clipped", "the depth reported", "m", 0.1, Report(_, found; n) found.end.depth),
+    bounded!("output-clipped", "the time reported", "s", 0.01, Report(_, found; n) found.end.time),
+    bounded!("output-clipped", "the velocity reported", "m/s", 30.0, Report(_, found; n) found.end.velocity),
+];
 
 /// Faults of the report.
 pub(super) static FAULTS: &[Hypothesis] = &[
@@ -61,6 +80,18 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the depth reported is counted from the start of the stage",
         Parameter::None,
         &[Change::Report(|p, found, _| found.end.depth -= p.start_of(found.stage))],
+    ),
+    of(
+        "offset",
+        "the depth reported is {} m too deep",
+        Parameter::Unit,
+        &[Change::Report(|_, found, by| found.end.depth += by)],
+    ),
+    of(
+        "offset",
+        "the time reported is {} s too late",
+        Parameter::Unit,
+        &[Change::Report(|_, found, by| shift_time(found, by))],
     ),
     of(
         "unit:depth",
@@ -143,96 +174,6 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Report(|_, found, _| found.end.velocity = 0.0)],
     ),
     of(
-        "output-rounded",
-        "the depth reported is rounded to a multiple of {} m",
-        Parameter::OneOf(GRAINS),
-        &[Change::Report(|_, found, n| found.end.depth = to_grain(found.end.depth, n))],
-    ),
-    of(
-        "output-rounded",
-        "the depth reported is cut to a multiple of {} m",
-        Parameter::OneOf(GRAINS),
-        &[Change::Report(|_, found, n| found.end.depth = (found.end.depth / n).floor() * n)],
-    ),
-    of(
-        "output-rounded",
-        "the depth reported has {} digits",
-        Parameter::OneOf(DIGITS),
-        &[Change::Report(|_, found, n| found.end.depth = to_digits(found.end.depth, n))],
-    ),
-    of(
-        "output-rounded",
-        "the depth reported is of single precision",
-        Parameter::None,
-        &[Change::Report(|_, found, _| found.end.depth = to_single(found.end.depth))],
-    ),
-    of(
-        "output-clipped",
-        "the depth reported is at most {} m",
-        Parameter::Value(0.1),
-        &[Change::Report(|_, found, n| found.end.depth = found.end.depth.min(n))],
-    ),
-    of(
-        "output-rounded",
-        "the time reported is rounded to a multiple of {} s",
-        Parameter::OneOf(GRAINS),
-        &[Change::Report(|_, found, n| found.end.time = to_grain(found.end.time, n))],
-    ),
-    of(
-        "output-rounded",
-        "the time reported is cut to a multiple of {} s",
-        Parameter::OneOf(GRAINS),
-        &[Change::Report(|_, found, n| found.end.time = (found.end.time / n).floor() * n)],
-    ),
-    of(
-        "output-rounded",
-        "the time reported has {} digits",
-        Parameter::OneOf(DIGITS),
-        &[Change::Report(|_, found, n| found.end.time = to_digits(found.end.time, n))],
-    ),
-    of(
-        "output-rounded",
-        "the time reported is of single precision",
-        Parameter::None,
-        &[Change::Report(|_, found, _| found.end.time = to_single(found.end.time))],
-    ),
-    of(
-        "output-clipped",
-        "the time reported is at most {} s",
-        Parameter::Value(0.01),
-        &[Change::Report(|_, found, n| found.end.time = found.end.time.min(n))],
-    ),
-    of(
-        "output-rounded",
-        "the velocity reported is rounded to a multiple of {} m/s",
-        Parameter::OneOf(GRAINS),
-        &[Change::Report(|_, found, n| found.end.velocity = to_grain(found.end.velocity, n))],
-    ),
-    of(
-        "output-rounded",
-        "the velocity reported is cut to a multiple of {} m/s",
-        Parameter::OneOf(GRAINS),
-        &[Change::Report(|_, found, n| found.end.velocity = (found.end.velocity / n).floor() * n)],
-    ),
-    of(
-        "output-rounded",
-        "the velocity reported has {} digits",
-        Parameter::OneOf(DIGITS),
-        &[Change::Report(|_, found, n| found.end.velocity = to_digits(found.end.velocity, n))],
-    ),
-    of(
-        "output-rounded",
-        "the velocity reported is of single precision",
-        Parameter::None,
-        &[Change::Report(|_, found, _| found.end.velocity = to_single(found.end.velocity))],
-    ),
-    of(
-        "output-clipped",
-        "the velocity reported is at most {} m/s",
-        Parameter::Value(30.0),
-        &[Change::Report(|_, found, n| found.end.velocity = found.end.velocity.min(n))],
-    ),
-    of(
         "time-formula",
         "the time of a stage is its length over the mean of V at its two ends",
         Parameter::None,
@@ -261,11 +202,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the time in the first stage is not counted",
         Parameter::None,
         &[Change::Report(|_, found, _| {
-            found.end.time -= found
-                .passed
-                .iter()
-                .find(|(index, _)| *index == 0 && found.stage > 0)
-                .map_or(found.end.time, |(_, state)| state.time);
+            found.end.time -= first_end(found).unwrap_or(found.end).time;
         })],
     ),
     of(
@@ -273,11 +210,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the clock starts at the end of the first stage",
         Parameter::None,
         &[Change::Report(|_, found, _| {
-            found.end.time -= found
-                .passed
-                .iter()
-                .find(|(index, _)| *index == 0 && found.stage > 0)
-                .map_or(0.0, |(_, state)| state.time);
+            found.end.time -= first_end(found).map_or(0.0, |state| state.time);
         })],
     ),
     of(
