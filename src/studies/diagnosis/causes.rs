@@ -38,6 +38,8 @@ const CERTAIN_FROM: usize = 3;
 const FIRST_OF_TWO: usize = 5;
 /// Two causes at once leave at most one failing answer of so many.
 const LEFT_BY_TWO: usize = 20;
+/// A law of its own may leave one failing answer of so many without a flight that can be computed.
+const OPEN: usize = 5;
 /// Causes listed at most.
 const LISTED: usize = 5;
 /// Part of the effect of a fault that an explanation may leave, up to so many times the accuracy: a solver with a fault
@@ -163,8 +165,8 @@ impl Seen<'_> {
         let beyond = faulty.excess(right).iter().filter(|excess| excess.abs() > TELLING).count();
         // A number of its own in every answer explains one quantity by itself.
         let is_fitted = |(fault, _): &Fault<'_>| {
-            use Parameter::{Bracket, Delay, Lateness, Nearness};
-            matches!(fault.parameter, Delay | Lateness | Bracket | Nearness)
+            use Parameter::{Bracket, Delay, Lateness, Nearness, Overshoot};
+            matches!(fault.parameter, Delay | Lateness | Bracket | Overshoot | Nearness)
         };
         let is_of_one = |(fault, _): &Fault<'_>| is_of_one_number(fault);
         beyond > usize::from(faults.iter().any(is_fitted) && !faults.iter().any(is_of_one))
@@ -240,7 +242,7 @@ impl Seen<'_> {
 
 /// Whether a number of its own in every answer moves one number of that answer alone: that proves little.
 fn is_of_one_number(fault: &Hypothesis) -> bool {
-    fault.id.starts_with("event-time") || fault.id == "velocity-stale"
+    fault.id.starts_with("event-time") || ["velocity-stale", "exit-velocity-late"].contains(&fault.id)
 }
 
 /// A root of the quantity `which` of `excess` between two numbers at which its signs differ.
@@ -376,11 +378,16 @@ impl Evidence<'_> {
             largest: 0.0,
             is_one_number: false,
         };
-        let mut left = 0;
+        let (mut left, mut open, open_max) = (0, 0, self.failing.len() / OPEN);
         let mut shares: Vec<f64> = Vec::new();
         let mut greatest = 0.0_f64;
         for seen in &self.failing {
-            if matches!(hypothesis.parameter, Parameter::Bracket) && seen.question.exact.events.len() > 1 {
+            let is_silent = match hypothesis.parameter {
+                Parameter::Bracket => seen.question.exact.events.len() > 1,
+                Parameter::Overshoot => seen.question.contains.contains(&Content::SeveralStageEnds),
+                _ => false,
+            };
+            if is_silent {
                 found.explained.push(None);
                 continue;
             }
@@ -390,9 +397,13 @@ impl Evidence<'_> {
             greatest = greatest.max(number.unwrap_or(0.0));
             let faults = number.map(with);
             let difference = faults.as_ref().and_then(|faults| seen.explained_by(faults, mask));
-            // A stiff flight may take more steps than a simulation has.
-            let is_open = |faults: &Vec<Fault<'static>>| seen.is_stiff() && seen.predicted(faults).is_none();
+            // A flight that is stiff, or whose force jumps on its way, may take more steps than a simulation has.
+            let is_open = |faults: &Vec<Fault<'static>>| {
+                let has_law = || faults.iter().any(|(fault, _)| fault.has_law());
+                (seen.is_stiff() || (open < open_max && has_law())) && seen.predicted(faults).is_none()
+            };
             let is_left = difference.is_none() && !faults.as_ref().is_some_and(is_open);
+            open += usize::from(difference.is_none() && !is_left);
             found.explained.push(if difference.is_none() && !is_left { None } else { Some(!is_left) });
             left += usize::from(is_left);
             if left > self.left {

@@ -76,7 +76,7 @@ impl Solver for Faulty<'_> {
                 // Where in its step an event falls differs from question to question.
                 let part = 0.01 * (0.1 + (1e3 * question.exact.end.time / question.exact.end.depth).sin().abs());
                 let number = match fault.parameter {
-                    Parameter::Delay => part * question.exact.end.depth,
+                    Parameter::Delay | Parameter::Overshoot => part * question.exact.end.depth,
                     Parameter::Lateness | Parameter::Bracket => part * question.exact.end.time,
                     Parameter::Nearness => 1.0 + part,
                     _ => *number,
@@ -102,7 +102,7 @@ pub(super) fn number(hypothesis: &Hypothesis) -> f64 {
         Parameter::Unit => 1e3,
         Parameter::Exponent(_) => 1.7,
         Parameter::Speed => 0.5,
-        Parameter::Fraction => 0.01,
+        Parameter::Fraction | Parameter::Offset => 0.01,
         // Few digits or stages, or a grain that is seen.
         Parameter::OneOf(numbers) if numbers[0] < 1.0 => numbers[numbers.len() / 2],
         Parameter::OneOf(numbers) => numbers[1],

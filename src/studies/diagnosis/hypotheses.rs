@@ -95,6 +95,8 @@ pub(super) enum Parameter {
     Factor,
     /// A factor as of units: many powers of ten, of either sign.
     Unit,
+    /// What is added, of either sign, the same in every answer.
+    Offset,
     /// An exponent, the same in every answer; here the right one.
     Exponent(#[cfg_attr(not(feature = "report"), expect(dead_code, reason = "a claim asks for it"))] f64),
     /// A speed (m/s), the same in every answer.
@@ -126,6 +128,8 @@ pub(super) enum Parameter {
     ),
     /// A time (s), another one in every answer, which flights of one event alone show.
     Bracket,
+    /// A distance (m), another one in every answer, which flights through one end of a stage show.
+    Overshoot,
     /// A factor near one, another one in every answer.
     Nearness,
     /// One of a few numbers, another one in every answer.
@@ -162,13 +166,16 @@ pub(super) enum Change {
 impl Parameter {
     /// Whether each answer has a number of its own.
     pub(super) fn is_per_answer(self) -> bool {
-        matches!(self, Self::Delay | Self::Lateness | Self::Bracket | Self::Nearness | Self::Choice(_))
+        matches!(
+            self,
+            Self::Delay | Self::Lateness | Self::Bracket | Self::Overshoot | Self::Nearness | Self::Choice(_)
+        )
     }
 
     /// A number of its own over the depth or the time of the flight; `None` for one of all answers.
     pub(super) fn share(self, number: f64, question: &Question) -> Option<f64> {
         match self {
-            Self::Delay => Some(number / question.exact.end.depth),
+            Self::Delay | Self::Overshoot => Some(number / question.exact.end.depth),
             Self::Lateness => Some(number / question.exact.end.time),
             _ => None,
         }
@@ -190,6 +197,7 @@ impl Parameter {
     pub(super) fn neutral(self) -> Vec<f64> {
         match self {
             Self::Factor | Self::Unit => vec![1.0, 0.0],
+            Self::Offset => vec![0.0],
             Self::Nearness => vec![1.0],
             Self::Exponent(right) => vec![right],
             _ => Vec::new(),
@@ -214,13 +222,16 @@ impl Parameter {
             Self::None => vec![1.0],
             Self::Factor => both(spread(0.01, 30.0, 36).collect()),
             Self::Unit => both(spread(1e-7, 1e7, 42).collect()),
+            Self::Offset => both(spread(1e-9, 1e6, 45).collect()),
             Self::OneOf(numbers) => numbers.to_vec(),
             Self::Value(_) => spread(1e-6, 1e9, 120).collect(),
             Self::Threshold(_, of) => between(of(question)),
             Self::Exponent(_) => (0..=24).map(|i| 0.25 * f64::from(i)).collect(),
             Self::Speed => spread(1e-9, 1e3, 72).collect(),
             Self::Fraction => spread(1e-12, 0.9, 60).collect(),
-            Self::Delay => spread(1e-10, 10.0, 44).map(|part| part * question.exact.end.depth).collect(),
+            Self::Delay | Self::Overshoot => {
+                spread(1e-10, 10.0, 44).map(|part| part * question.exact.end.depth).collect()
+            }
             Self::Lateness | Self::Bracket => {
                 spread(1e-10, 1.0, 40).map(|part| part * question.exact.end.time).collect()
             }
@@ -404,6 +415,11 @@ impl Hypothesis {
     /// Whether it is about a solver that reads the scene.
     pub(super) fn needs_scene(&self) -> bool {
         self.changes.iter().any(|change| matches!(change, Change::Scene(_) | Change::OfScene(_)))
+    }
+
+    /// Whether it has a force of its own.
+    pub(super) fn has_law(&self) -> bool {
+        self.changes.iter().any(|change| matches!(change, Change::Force(_)))
     }
 
     /// The sentence with the number in it.

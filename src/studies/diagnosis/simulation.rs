@@ -50,8 +50,19 @@ pub(super) fn right_force(place: &Place<'_>, _: f64) -> f64 {
     place.law.force(place.depth, place.velocity)
 }
 
+/// A stage that a flight has passed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passage<'a> {
+    /// The problem.
+    pub problem: &'a Problem,
+    /// Which stage.
+    pub index: usize,
+    /// The state at its start.
+    pub start: State,
+}
+
 /// What changes at the end of a stage, by one number.
-pub(super) type AtStageEnd = fn(&Problem, &mut State, f64);
+pub(super) type AtStageEnd = fn(&Passage<'_>, &mut State, f64);
 
 /// How a simulated flight differs from the right one.
 #[derive(Clone, Copy, Debug)]
@@ -146,7 +157,8 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
     let mut fastest = problem.impact_speed;
     for (index, law) in problem.stages.iter().enumerate() {
         let limit = problem.limit_of(index);
-        let (impact_speed, entry_speed, mass) = (problem.impact_speed, state.velocity, problem.mass);
+        let start = state;
+        let (impact_speed, entry_speed, mass) = (problem.impact_speed, start.velocity, problem.mass);
         let end_time = end_time.min(elapsed + stage_time);
         while state.depth < limit {
             let State { time, depth: x, velocity: v } = state;
@@ -213,7 +225,7 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
             return Some(Simulated { end: state, stage: index, passed });
         }
         if let Some((alter, number)) = at_stage_end {
-            alter(problem, &mut state, number);
+            alter(&Passage { problem, index, start }, &mut state, number);
         }
         h = f64::INFINITY;
     }

@@ -1,10 +1,10 @@
 //! Faults of events: ends of stages, exit and rest that are late, early, misplaced, missed, or change the state.
 
 use super::super::questions::Question;
-use super::super::simulation::{Simulated, continued};
+use super::super::simulation::{Passage, Simulated, continued};
 use super::force::{clear_speed, reorder};
 use super::{COUNTS, Change, Hypothesis, Parameter, of};
-use crate::physics::{Problem, State};
+use crate::physics::{Problem, Stage, State};
 
 /// The ends that a flight may miss: from stage `j`, whose law goes on, up to stage `m`, as `8 j + m`.
 fn ends_missed(question: &Question) -> Vec<f64> {
@@ -23,13 +23,16 @@ fn miss_ends(problem: &mut Problem, number: f64) {
     }
 }
 
-/// Ends of stages and exit moved by `delay` (m), where the flight passes exactly one end.
-fn delay_end(problem: &mut Problem, delay: f64) {
-    let exit = problem.exit_depth;
-    let inside: Vec<usize> = (0..problem.stages.len()).filter(|index| problem.stages[*index].end < exit).collect();
-    if let [only] = inside[..] {
-        problem.stages[only].end += delay;
-    }
+/// The state a distance (m) behind an end of a stage, where the law before it goes on.
+fn overshot(&Passage { problem, index, .. }: &Passage<'_>, state: State, by: f64) -> State {
+    continued(problem, index, state, by / state.velocity).unwrap_or(State { time: f64::NAN, ..state })
+}
+
+/// The velocity at `depth` in a stage, of its static force and its spring alone.
+fn without_speed_terms(&Passage { problem, index, start }: &Passage<'_>, depth: f64) -> f64 {
+    let Stage { static_force, stiffness, .. } = problem.stages[index];
+    let work = (depth - start.depth) * (static_force + 0.5 * stiffness * (depth + start.depth));
+    (start.velocity * start.velocity - 2.0 * work / problem.mass).max(0.0).sqrt()
 }
 
 fn exit_at_start_of_last(problem: &mut Problem) {
@@ -95,6 +98,11 @@ fn exit_speed(question: &Question) -> Vec<f64> {
     if question.exact.end.depth >= question.problem.exit_depth { vec![question.exact.end.velocity] } else { Vec::new() }
 }
 
+/// The same over the impact speed.
+fn exit_share(question: &Question) -> Vec<f64> {
+    exit_speed(question).iter().map(|speed| speed / question.problem.impact_speed).collect()
+}
+
 fn exit_depth(question: &Question) -> Vec<f64> {
     vec![question.problem.exit_depth]
 }
@@ -149,6 +157,18 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 law.end = sum;
             }
         })],
+    ),
+    of(
+        "stage-end-misplaced",
+        "stages end {} m too early",
+        Parameter::Value(1e-3),
+        &[Change::Problem(|p, by| p.stages.iter_mut().for_each(|law| law.end = (law.end - by).max(0.0)))],
+    ),
+    of(
+        "stage-end-misplaced",
+        "stages end {} m too late",
+        Parameter::Value(1e-3),
+        &[Change::Problem(|p, by| p.stages.iter_mut().for_each(|law| law.end += by))],
     ),
     of(
         "exit-misplaced",
@@ -300,6 +320,18 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         ],
     ),
     of(
+        "rest-threshold",
+        "a velocity below {} m/s is reported as zero at the exit too",
+        Parameter::Threshold(30.0, exit_speed),
+        &[Change::Report(|_, found, speed| clear_speed(found, speed))],
+    ),
+    of(
+        "rest-threshold",
+        "a velocity below {} V0 is reported as zero at the exit too",
+        Parameter::Threshold(0.3, exit_share),
+        &[Change::Report(|p, found, part| clear_speed(found, part * p.impact_speed))],
+    ),
+    of(
         "exit-late",
         "the exit is taken at the end of the step that passes it",
         Parameter::Delay,
@@ -317,6 +349,17 @@ pub(super) static FAULTS: &[Hypothesis] = &[
                 }
             }),
         ],
+    ),
+    of(
+        "exit-velocity-late",
+        "V at the exit is that of the end of the step that passes it, and depth and time are right",
+        Parameter::Lateness,
+        &[Change::Report(|p, found, late| {
+            if found.end.depth >= p.exit_depth {
+                found.end.velocity =
+                    continued(p, found.stage, found.end, late).map_or(f64::NAN, |state| state.velocity);
+            }
+        })],
     ),
     of(
         "rest-late",
@@ -354,8 +397,20 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "stage-end-late",
         "the end of a stage is taken at the end of the step that passes it",
-        Parameter::Delay,
-        &[Change::Problem(delay_end)],
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| *state = overshot(at, *state, by))],
+    ),
+    of(
+        "stage-end-late",
+        "V and time at the end of a stage are those of the end of the step that passes it, and its depth is right",
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| *state = State { depth: state.depth, ..overshot(at, *state, by) })],
+    ),
+    of(
+        "stage-end-late",
+        "V at the end of a stage is that of the end of the step that passes it, and depth and time are right",
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| state.velocity = overshot(at, *state, by).velocity)],
     ),
     of(
         "rest-threshold",
@@ -394,7 +449,19 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "stage-end-velocity",
         "V is the impact speed again behind each end of a stage",
         Parameter::None,
-        &[Change::AtStageEnd(|p, state, _| state.velocity = p.impact_speed)],
+        &[Change::AtStageEnd(|at, state, _| state.velocity = at.problem.impact_speed)],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that of its start",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = at.start.velocity)],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that of its static force and its spring alone",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = without_speed_terms(at, state.depth))],
     ),
     of(
         "time-restarts",
@@ -547,9 +614,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "exit-missed",
         "an exit at less than {} V0 is missed",
-        Parameter::Threshold(0.3, |question| {
-            exit_speed(question).iter().map(|speed| speed / question.problem.impact_speed).collect()
-        }),
+        Parameter::Threshold(0.3, exit_share),
         &[Change::OfRight(|p, right, n| {
             if right.velocity < n * p.impact_speed {
                 p.exit_depth = f64::INFINITY;

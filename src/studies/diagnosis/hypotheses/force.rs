@@ -443,6 +443,25 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Problem(|p, f| p.impact_speed *= f)],
     ),
     of(
+        "impact-speed",
+        "the impact speed is {} m/s too high",
+        Parameter::Offset,
+        &[Change::Problem(|p, by| p.impact_speed += by)],
+    ),
+    of("term:mass", "the mass is {} kg too large", Parameter::Offset, &[Change::Problem(|p, by| p.mass += by)]),
+    of(
+        "mass-changes",
+        "the mass falls with the depth as exp(-{} x/m)",
+        Parameter::Offset,
+        &[Change::Force(|at, n| right_force(at, n) * (n * at.depth).exp())],
+    ),
+    of(
+        "mass-changes",
+        "the mass falls with the depth as 1 - {} x/m",
+        Parameter::Offset,
+        &[Change::Force(|at, n| right_force(at, n) / (1.0 - n * at.depth))],
+    ),
+    of(
         "offset",
         "the flight starts at x = {} m, and not at the impact face",
         Parameter::Value(1e-4),
@@ -937,6 +956,16 @@ pub(super) static FAULTS: &[Hypothesis] = &[
             let origin = p.stages[0].end;
             for law in p.stages.iter_mut().skip(1) {
                 law.static_force -= law.stiffness * origin;
+            }
+        })],
+    ),
+    of(
+        "stiffness-origin",
+        "the depth in s x is counted from the end of the stage, unless it has none",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            for law in p.stages.iter_mut().filter(|law| law.end.is_finite()) {
+                law.static_force -= law.stiffness * law.end;
             }
         })],
     ),

@@ -18,6 +18,13 @@ fn first_end(found: &Simulated) -> Option<State> {
     found.passed.iter().find(|(index, _)| *index == 0 && found.stage > 0).map(|(_, state)| *state)
 }
 
+/// The velocity at the exit altered, by itself and the impact speed.
+fn of_exit(problem: &Problem, found: &mut Simulated, alter: impl Fn(f64, f64) -> f64) {
+    if found.end.depth >= problem.exit_depth {
+        found.end.velocity = alter(found.end.velocity, problem.impact_speed);
+    }
+}
+
 /// The start and the end of the flight through each stage.
 fn legs(problem: &Problem, found: &Simulated) -> impl Iterator<Item = [State; 2]> {
     let ends = found.passed.iter().filter(|(index, _)| *index < found.stage).map(|(_, state)| *state);
@@ -56,13 +63,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "event-time-late",
-        "the time of the end is that of the end of a step, and late",
+        "only the time is wrong, and late, as that of the end of a step",
         Parameter::Lateness,
         &[Change::Report(|_, found, late| shift_time(found, late))],
     ),
     of(
         "event-time-early",
-        "the time of the end is that of the start of a step, and early",
+        "only the time is wrong, and early, as that of the start of a step, or a sum that is not fine enough",
         Parameter::Lateness,
         &[Change::Report(|_, found, late| shift_time(found, -late))],
     ),
@@ -84,13 +91,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     of(
         "offset",
         "the depth reported is {} m too deep",
-        Parameter::Unit,
+        Parameter::Offset,
         &[Change::Report(|_, found, by| found.end.depth += by)],
     ),
     of(
         "offset",
         "the time reported is {} s too late",
-        Parameter::Unit,
+        Parameter::Offset,
         &[Change::Report(|_, found, by| shift_time(found, by))],
     ),
     of(
@@ -123,7 +130,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "velocity-stale",
-        "the velocity reported is that of a step before the end",
+        "only the velocity is wrong, as that of a step before the end",
         Parameter::Lateness,
         &[Change::Report(|p, found, late| {
             found.end.velocity = continued(p, found.stage, found.end, -late).map_or(f64::NAN, |state| state.velocity);
@@ -172,6 +179,40 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the velocity reported is zero",
         Parameter::None,
         &[Change::Report(|_, found, _| found.end.velocity = 0.0)],
+    ),
+    of(
+        "velocity-misreported",
+        "the velocity at the exit is that of {} times the energy lost",
+        Parameter::Factor,
+        &[Change::Report(|p, found, f| {
+            of_exit(p, found, |speed, impact| {
+                (impact * impact - f * (impact * impact - speed * speed)).max(0.0).sqrt()
+            });
+        })],
+    ),
+    of(
+        "velocity-misreported",
+        "the velocity at the exit is that of {} times the velocity lost",
+        Parameter::Factor,
+        &[Change::Report(|p, found, f| of_exit(p, found, |speed, impact| impact - f * (impact - speed)))],
+    ),
+    of(
+        "time-formula",
+        "the time in the first stage is {} times the right one",
+        Parameter::Factor,
+        &[Change::Report(|_, found, f| {
+            let first = first_end(found).unwrap_or(found.end).time;
+            found.end.time += (f - 1.0) * first;
+        })],
+    ),
+    of(
+        "time-formula",
+        "the time in the last stage is {} times the right one",
+        Parameter::Factor,
+        &[Change::Report(|_, found, f| {
+            let last = found.end.time - last_end(found).map_or(0.0, |state| state.time);
+            found.end.time += (f - 1.0) * last;
+        })],
     ),
     of(
         "time-formula",

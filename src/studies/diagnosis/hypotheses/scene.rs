@@ -108,6 +108,24 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         })],
     ),
     of(
+        "parameter:nose-factor",
+        "the nose factor multiplies P too",
+        Parameter::None,
+        &[Change::Scene(|s, _| concrete(s, |c| c.static_factor *= c.nose_factor))],
+    ),
+    of(
+        "parameter:B",
+        "B multiplies P too",
+        Parameter::None,
+        &[Change::Scene(|s, _| concrete(s, |c| c.static_factor *= c.inertia_factor))],
+    ),
+    of(
+        "parameter:B",
+        "N* B multiplies P too",
+        Parameter::None,
+        &[Change::Scene(|s, _| concrete(s, |c| c.static_factor *= c.nose_factor * c.inertia_factor))],
+    ),
+    of(
         "parameter:B",
         "B is left out: B = 1",
         Parameter::None,
