@@ -33,6 +33,7 @@ pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, in_order, questions};
 use self::tolerances::{at_tolerances, row};
 use super::verdict::Verdict;
+use crate::exchange::peers::wire::errors;
 use crate::exchange::peers::{Peer, PeerAnswer, PeerFailure, PeerFault, PeerIdentity, PeerRequest};
 use crate::physics::{Criterion, Outcome, Scene, State};
 
@@ -40,6 +41,9 @@ use crate::physics::{Criterion, Outcome, Scene, State};
 pub const TOLERANCES: [f64; 3] = [1e-6, 1e-9, 1e-12];
 /// Error allowed over the tolerance and the condition number. The worst of sound solvers measured: 135 (BDF).
 pub const ALLOWED: f64 = 1e3;
+/// Failing questions that a solver that has just started is asked again, and the relative difference that makes another answer.
+const ALONE: usize = 5;
+const ANOTHER: f64 = 1e-9;
 /// Times that a solver is started again after it died; one that fell silent is so many times as costly.
 const RESTARTS_MAX: usize = 30;
 const RESTARTS_OF_SILENCE: usize = 30;
@@ -275,11 +279,48 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
         reads: if identity.reads_scene { "scene" } else { "stages" },
     };
     let mut asking = Asking::new(solver);
-    if identity.fixed_step {
+    let mut found = if identity.fixed_step {
         in_fixed_steps(&mut asking, peer, &identity, all, progress)
     } else {
         at_tolerances(&mut asking, peer, &identity, all, progress)
+    };
+    let is_named = found.causes.iter().any(|cause| cause.certainty == Certainty::Certain);
+    if found.verdict == Verdict::Failed
+        && !is_named
+        && let Some(cause) = kept(&mut asking, all, &found)
+    {
+        found.causes.retain(|cause| cause.id != "unknown");
+        found.causes.insert(0, cause);
     }
+    found
+}
+
+/// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones.
+fn kept(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
+    let failing: Vec<&Asked> =
+        found.questions.iter().filter(|row| row.verdict == Verdict::Failed && row.answered.is_some()).collect();
+    let (mut other, mut asked) = (0, 0);
+    for row in failing.iter().step_by((failing.len() / ALONE).max(1)).take(ALONE) {
+        let (Some(question), Some(before)) = (all.iter().find(|question| question.id == row.id), row.answered) else {
+            continue;
+        };
+        if asking.is_gone || !asking.solver.restart() {
+            return None;
+        }
+        let rtol = row.rtol.unwrap_or(TOLERANCES[0]);
+        let Ok(answer) = asking.ask(&PeerRequest { dt_s: row.dt_s, ..request(question, rtol) }) else { continue };
+        let apart = errors(end_of(&answer).state, before.state, question.problem.impact_speed);
+        asked += 1;
+        other += usize::from(apart.iter().any(|apart| apart.abs() > ANOTHER));
+    }
+    (other > 1).then(|| {
+        let statement = format!(
+            "answers depend on what was asked before: {other} of {asked} failing questions are answered otherwise by a \
+             solver that has just started"
+        );
+        let certainty = if other == asked { Certainty::Certain } else { Certainty::Likely };
+        Cause::plain("state-kept", statement, certainty, other, asked)
+    })
 }
 
 /// Asks `solver`, which takes a tolerance, what lies at the edges, and `plan.questions` more; each is judged, and no

@@ -78,8 +78,7 @@ pub(super) fn in_fixed_steps(
     let reproducing = schemes(&right);
     let orders = orders(&right, identity);
     let fails_an_order = orders.iter().any(|order| order.verdict == Verdict::Failed);
-    let floor = floor(asking, &right)
-        .or_else(|| few_digits(&laddered.iter().flat_map(Laddered::numbers).collect::<Vec<_>>(), counts.failed));
+    let floor = floor(asking, &right).or_else(|| few_digits(laddered.iter().flat_map(Laddered::ends), counts.failed));
     let verdict = match () {
         () if counts.failed > 0 || fails_an_order || floor.is_some() => Verdict::Failed,
         () if counts.passed == 0 || counts.undecided > counts.passed => Verdict::Undecided,
@@ -144,9 +143,8 @@ impl Laddered<'_> {
         steps
     }
 
-    fn numbers(&self) -> Vec<f64> {
-        let answers = self.rungs.iter().map(|rung| rung.answer);
-        answers.flat_map(|end| [end.depth, end.time, end.velocity]).filter(|number| *number != 0.0).collect()
+    fn ends(&self) -> impl Iterator<Item = State> {
+        self.rungs.iter().map(|rung| rung.answer)
     }
 
     fn limits(&self) -> [Option<Limit>; 3] {

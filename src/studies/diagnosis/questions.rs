@@ -147,6 +147,26 @@ impl Question {
         is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, earlier: None, predicted })
     }
 
+    /// The same question with one number next to its own: the exit depth, the impact speed, or, every other time, the mass.
+    fn again(&self, takes_mass: bool) -> Option<Self> {
+        let (mut problem, mut scene) = (self.problem.clone(), self.scene.clone());
+        if let Some(scene) = &mut scene {
+            if takes_mass {
+                scene.mass *= NEXT_TO;
+            } else {
+                scene.velocity = scene.velocity.map(|velocity| velocity * NEXT_TO);
+            }
+            problem = scene.problem().ok()?;
+        } else if takes_mass {
+            problem.mass *= NEXT_TO;
+        } else if self.exact.outcome == Outcome::Perforated {
+            problem.exit_depth *= NEXT_TO;
+        } else {
+            problem.impact_speed *= NEXT_TO;
+        }
+        Self::new(format!("{}-again", self.id), problem, scene)
+    }
+
     /// The largest of the errors of depth, time and velocity over their condition numbers.
     pub(super) fn over_condition(&self, errors: [f64; 3]) -> f64 {
         (0..3).map(|i| errors[i].abs() / self.conditions[i]).fold(0.0, f64::max)
@@ -383,6 +403,30 @@ const FAMILIES: [Family; 30] = [
             Some(Problem::of_stages(scale.mass, scale.speed, [law]).with_exit(exit))
         },
     },
+    Family { name: "stiff", draw: |random| Some(stiff(random)) },
+    Family {
+        name: "small-term",
+        // Terms that are next to nothing beside another still count.
+        draw: |random| {
+            let great = if random.chance(0.5) { 0 } else { 1 + random.below(3) };
+            let share = |term| if term == great { 1.0 } else { random.log_uniform(1e-5, 1e-3) };
+            let terms = [0, 1, 2, 3].map(share);
+            single(random, terms)
+        },
+    },
+    Family {
+        name: "exit-at-stage-end",
+        draw: |random| {
+            let problem = layered(random, 2, |random, scale, _| mixed(random, scale));
+            let exit = problem.stages[random.below(2)].end;
+            Some(problem.with_exit(exit))
+        },
+    },
+    Family {
+        name: "hardly-out",
+        // What is left of V is less than thresholds of rest are, and still more than the tightest tolerance allows.
+        draw: |random| grazing(random, [7.8, 8.6]),
+    },
     Family { name: "several", draw: |random| Kind::Several.draw(random) },
     Family { name: "spring-and-drag", draw: |random| Kind::SpringAndDrag.draw(random) },
     Family { name: "viscous", draw: |random| Kind::Viscous.draw(random) },
@@ -420,14 +464,6 @@ const FAMILIES: [Family; 30] = [
             near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
         },
     },
-    Family {
-        name: "exit-at-stage-end",
-        draw: |random| {
-            let problem = layered(random, 2, |random, scale, _| mixed(random, scale));
-            let exit = problem.stages[random.below(2)].end;
-            Some(problem.with_exit(exit))
-        },
-    },
     Family { name: "several-viscous", draw: |random| Kind::SeveralViscous.draw(random) },
     Family {
         name: "driven-later",
@@ -461,28 +497,12 @@ const FAMILIES: [Family; 30] = [
             near_rest(problem, random.uniform(0.1, 1.0))
         },
     },
-    Family { name: "stiff", draw: |random| Some(stiff(random)) },
-    Family {
-        name: "hardly-out",
-        // What is left of V is less than thresholds of rest are, and still more than the tightest tolerance allows.
-        draw: |random| grazing(random, [7.8, 8.6]),
-    },
     Family {
         name: "no-speed",
         draw: |random| {
             let scale = Scale::draw(random);
             let law = mixed(random, &scale);
             Some(Problem::of_stages(scale.mass, 0.0, [law]).with_exit(scale.length))
-        },
-    },
-    Family {
-        name: "small-term",
-        // Terms that are next to nothing beside another still count.
-        draw: |random| {
-            let great = if random.chance(0.5) { 0 } else { 1 + random.below(3) };
-            let share = |term| if term == great { 1.0 } else { random.log_uniform(1e-5, 1e-3) };
-            let terms = [0, 1, 2, 3].map(share);
-            single(random, terms)
         },
     },
 ];
@@ -512,6 +532,11 @@ fn scaled(random: &mut Random, round: usize) -> Problem {
     Problem::of_stages(scale.mass, scale.speed, [scale.stage(shares)]).with_exit(length)
 }
 
+/// Of so many questions, these repeat the one before them, of a scene and of stages: what a solver keeps of it shows.
+const AGAIN_EACH: usize = 24;
+const AGAIN: [usize; 2] = [4, 9];
+/// A number over that of the question before.
+const NEXT_TO: f64 = 1.01;
 /// Of so many questions of all families, one is of a physical scene.
 const SCENES_EACH: usize = 4;
 /// One question of so many asks for a projectile without speed.
@@ -528,6 +553,12 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
     while asked.len() < count && drawn < DRAWS_MAX * count {
         drawn += 1;
         let number = asked.len();
+        if AGAIN.contains(&(number % AGAIN_EACH))
+            && let Some(next) = asked.last().and_then(|before: &Question| before.again(number / AGAIN_EACH % 2 == 1))
+        {
+            asked.push(next);
+            continue;
+        }
         if of_scenes || number % SCENES_EACH == SCENES_EACH - 1 {
             let scene = varied(scenes.next_scene(), &mut choices);
             let Ok(problem) = scene.problem() else { continue };

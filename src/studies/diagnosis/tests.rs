@@ -3,10 +3,10 @@
 use super::faulty::{Faulty, answer, failure, misnamed, misnamed_schemes};
 use super::fixed_steps::is_short_of;
 use super::hypotheses::hypotheses;
-use super::numbers::few_digits;
+use super::numbers::of_numbers;
 use super::*;
 use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Taylor, VelocityAt};
-use crate::physics::Problem;
+use crate::physics::{Problem, Stage};
 
 /// The questions of `seed`, those at the edges among them.
 fn all_questions(seed: u64) -> Vec<Question> {
@@ -43,7 +43,7 @@ fn two_faults_at_once_are_both_named() {
 #[test]
 fn numbers_of_single_precision_and_of_few_digits_are_seen() {
     let exact: Vec<f64> = (1..40).map(|i| f64::from(i).sqrt()).collect();
-    let id = |numbers: Vec<f64>| few_digits(&numbers, 3).map(|cause| cause.id);
+    let id = |numbers: Vec<f64>| of_numbers("number", &numbers, 3).map(|cause| cause.id);
     assert_eq!(id(exact.clone()), None);
     assert_eq!(id(exact.iter().map(|x| f64::from(*x as f32)).collect()).as_deref(), Some("single-precision"));
     let printed = |digits: usize| exact.iter().map(|x| format!("{x:.digits$e}").parse().unwrap()).collect();
@@ -266,4 +266,84 @@ fn an_order_falls_short_only_where_its_whole_interval_and_the_smallest_steps_do(
     assert!(!is_short_of(2.0, [1.5, 1.71], Some(1.6)));
     assert!(!is_short_of(2.0, [1.5, 1.69], Some(1.8)));
     assert!(!is_short_of(2.0, [1.5, 1.69], None));
+}
+
+/// Exact, but that the clock goes on from the last exit until it is started again.
+#[derive(Default)]
+struct Running {
+    time: f64,
+}
+
+impl Solver for Running {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity { name: "running".to_owned(), ..PeerIdentity::default() }
+    }
+
+    fn command(&self) -> String {
+        "running".to_owned()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let problem = request.problem(None);
+        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
+        let end = State { time: self.time + flight.end.time, ..flight.end };
+        self.time = if flight.end.velocity > 0.0 { end.time } else { 0.0 };
+        Ok(answer(flight.outcome, end))
+    }
+
+    fn restart(&mut self) -> bool {
+        *self = Self::default();
+        true
+    }
+}
+
+#[test]
+fn what_a_solver_keeps_of_earlier_questions_is_found_by_starting_it_again() {
+    let found = diagnose(&mut Running::default(), Plan::default(), &|_, _| {});
+    assert_eq!((found.verdict, found.causes[0].id.as_str()), (Verdict::Failed, "state-kept"), "{:?}", found.causes);
+    assert_eq!(found.causes[0].certainty, Certainty::Certain);
+}
+
+/// Exact, but that the continuous crater stiffness of a target is kept from its first scene.
+#[derive(Default)]
+struct Caching {
+    known: Vec<(Vec<Stage>, Stage)>,
+}
+
+impl Solver for Caching {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity { name: "caching".to_owned(), reads_scene: true, ..PeerIdentity::default() }
+    }
+
+    fn command(&self) -> String {
+        "caching".to_owned()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let mut problem = request.problem(None);
+        let target = problem.stages[1..].to_vec();
+        if !target.is_empty() {
+            let first = self.known.iter().find(|(known, _)| *known == target).map(|(_, crater)| *crater);
+            match first {
+                Some(crater) => problem.stages[0] = crater,
+                None => self.known.push((target, problem.stages[0])),
+            }
+        }
+        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
+        Ok(answer(flight.outcome, flight.end))
+    }
+
+    fn restart(&mut self) -> bool {
+        self.known.clear();
+        true
+    }
+}
+
+#[test]
+fn a_number_that_is_kept_of_a_target_with_another_speed_or_mass_fails() {
+    for seed in 1..=4 {
+        let found = diagnose(&mut Caching::default(), Plan { seed, ..Plan::default() }, &|_, _| {});
+        assert_eq!(found.verdict, Verdict::Failed, "seed {seed}");
+        assert!(["input-kept", "state-kept"].contains(&found.causes[0].id.as_str()), "{:?}", found.causes);
+    }
 }

@@ -211,14 +211,9 @@ fn proof(problem: &Problem, index: usize, end: State) -> Option<String> {
     is_proved.then(said).flatten()
 }
 
-/// Numbers of all answers that came, at the tightest tolerance.
-fn numbers(answered: &[Answered<'_>]) -> Vec<f64> {
-    let tightest =
-        |answered: &Answered<'_>| answered.answers.last().and_then(|(_, answer)| answer.as_ref().ok().cloned());
-    let all = answered.iter().filter_map(tightest);
-    all.flat_map(|answer| [answer.depth_m, answer.time_s, answer.velocity_m_s])
-        .filter(|number| *number != 0.0)
-        .collect()
+/// The ends of all answers that came, at the tightest tolerance.
+fn ends(answered: &[Answered<'_>]) -> impl Iterator<Item = State> {
+    answered.iter().filter_map(|one| Some(end_of(one.answers.last()?.1.as_ref().ok()?).state))
 }
 
 /// Causes of the answers of an adaptive solver.
@@ -230,7 +225,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         return Vec::new();
     }
     let others: Vec<&Question> = all.iter().collect();
-    let of_numbers = few_digits(&numbers(answered), failed);
+    let of_numbers = few_digits(ends(answered), failed);
     let at = |accuracy: f64| seen(answered, |_| accuracy);
     let failing = |seen: &[Seen<'_>]| seen.iter().filter(|seen| seen.fails).count();
     let named = |seen: &[Seen<'_>], effort: Effort| {

@@ -1101,6 +1101,21 @@ pub(super) static EARLIER: &[Hypothesis] = &[
     ),
     of(
         "input-kept",
+        "the continuous crater stiffness is that of the question before, on the same target",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| {
+            let before = &earlier.previous;
+            if p.crater == Some(0)
+                && before.crater == Some(0)
+                && p.stages[1..] == before.stages[1..]
+                && p.stages[0].end == before.stages[0].end
+            {
+                p.stages[0] = before.stages[0];
+            }
+        })],
+    ),
+    of(
+        "input-kept",
         "where no exit is asked for, the last one that was holds",
         Parameter::None,
         &[Change::Kept(|p, earlier| {
