@@ -295,32 +295,43 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
     found
 }
 
-/// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones.
+/// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones,
+/// or gives no answer twice.
 fn kept(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
     let failing: Vec<&Asked> =
         found.questions.iter().filter(|row| row.verdict == Verdict::Failed && row.answered.is_some()).collect();
-    let (mut other, mut asked) = (0, 0);
+    let (mut other, mut unlike, mut asked) = (0, 0, 0);
     for row in failing.iter().step_by((failing.len() / ALONE).max(1)).take(ALONE) {
         let (Some(question), Some(before)) = (all.iter().find(|question| question.id == row.id), row.answered) else {
             continue;
         };
-        if asking.is_gone || !asking.solver.restart() {
-            return None;
-        }
-        let rtol = row.rtol.unwrap_or(TOLERANCES[0]);
-        let Ok(answer) = asking.ask(&PeerRequest { dt_s: row.dt_s, ..request(question, rtol) }) else { continue };
-        let apart = errors(end_of(&answer).state, before.state, question.problem.impact_speed);
+        let again = PeerRequest { dt_s: row.dt_s, ..request(question, row.rtol.unwrap_or(TOLERANCES[0])) };
+        let mut of_a_new_one = || {
+            let is_there = !asking.is_gone && asking.solver.restart();
+            is_there.then(|| asking.ask(&again).ok()).flatten().map(|answer| end_of(&answer).state)
+        };
+        let (Some(one), Some(two)) = (of_a_new_one(), of_a_new_one()) else { continue };
+        let differs = |a, b| errors(a, b, question.problem.impact_speed).iter().any(|apart| !(apart.abs() <= ANOTHER));
         asked += 1;
-        other += usize::from(apart.iter().any(|apart| apart.abs() > ANOTHER));
+        other += usize::from(differs(one, before.state));
+        unlike += usize::from(differs(one, two));
     }
-    (other > 1).then(|| {
-        let statement = format!(
-            "answers depend on what was asked before: {other} of {asked} failing questions are answered otherwise by a \
-             solver that has just started"
-        );
-        let certainty = if other == asked { Certainty::Certain } else { Certainty::Likely };
-        Cause::plain("state-kept", statement, certainty, other, asked)
-    })
+    let said = format!("{other} of {asked} failing questions");
+    let certainty = if other == asked { Certainty::Certain } else { Certainty::Likely };
+    match (other, unlike) {
+        (2.., 0) => {
+            let statement = format!(
+                "answers depend on what was asked before: {said} are answered otherwise by a solver that has just started"
+            );
+            Some(Cause::plain("state-kept", statement, certainty, other, asked))
+        }
+        (2.., _) => {
+            let statement =
+                format!("answers are not the same twice: {said} are answered otherwise when they are asked again");
+            Some(Cause::plain("not-repeatable", statement, certainty, other, asked))
+        }
+        _ => None,
+    }
 }
 
 /// Asks `solver`, which takes a tolerance, what lies at the edges, and `plan.questions` more; each is judged, and no

@@ -1,11 +1,13 @@
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use super::faulty::{Faulty, answer, failure, misnamed, misnamed_schemes};
 use super::fixed_steps::is_short_of;
 use super::hypotheses::hypotheses;
 use super::numbers::of_numbers;
 use super::*;
-use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Taylor, VelocityAt};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Integrator, Solved, Taylor, VelocityAt};
 use crate::physics::{Problem, Stage};
 
 /// The questions of `seed`, those at the edges among them.
@@ -51,28 +53,58 @@ fn numbers_of_single_precision_and_of_few_digits_are_seen() {
     assert_eq!(id(printed(14)), None);
 }
 
-/// Exact for another problem than the one asked, in a way that no hypothesis knows.
-struct Strange(fn(&mut Problem));
+/// A solver with a state that it has anew when it is started again.
+struct Made<S> {
+    identity: PeerIdentity,
+    at_start: S,
+    state: S,
+    solve: fn(&mut S, &PeerRequest) -> Solved,
+}
 
-impl Solver for Strange {
+impl<S: Clone> Made<S> {
+    fn new(at_start: S, solve: fn(&mut S, &PeerRequest) -> Solved) -> Self {
+        let identity = PeerIdentity { name: "made".to_owned(), ..PeerIdentity::default() };
+        Self { identity, state: at_start.clone(), at_start, solve }
+    }
+
+    /// What is found of it by the questions of `plan`.
+    fn diagnosed(mut self, plan: Plan) -> Diagnosis {
+        diagnose(&mut self, plan, &|_, _| {})
+    }
+}
+
+impl<S: Clone> Solver for Made<S> {
     fn identity(&self) -> PeerIdentity {
-        PeerIdentity { name: "strange".to_owned(), ..PeerIdentity::default() }
+        self.identity.clone()
     }
 
     fn command(&self) -> String {
-        "strange".to_owned()
+        "made".to_owned()
     }
 
     fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
-        let mut problem = request.problem(None);
-        self.0(&mut problem);
-        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
+        let flight = (self.solve)(&mut self.state, request).map_err(|error| failure(&error.to_string()))?;
         Ok(answer(flight.outcome, flight.end))
     }
 
     fn restart(&mut self) -> bool {
+        self.state = self.at_start.clone();
         true
     }
+}
+
+/// The exact flight through `problem`.
+fn exact(problem: &Problem) -> Solved {
+    Taylor::default().solve(problem, Detail::End)
+}
+
+/// Exact for another problem than the one asked, in a way that no hypothesis knows.
+fn strange(fault: fn(&mut Problem)) -> Made<fn(&mut Problem)> {
+    Made::new(fault, |fault, request| {
+        let mut problem = request.problem(None);
+        fault(&mut problem);
+        exact(&problem)
+    })
 }
 
 #[test]
@@ -87,7 +119,7 @@ fn a_fault_that_no_hypothesis_knows_is_found_and_not_named_with_certainty() {
     ];
     for fault in faults {
         let plan = Plan { asks_edges: false, ..Plan::default() };
-        let found = diagnose(&mut Strange(fault), plan, &|_, _| {});
+        let found = strange(fault).diagnosed(plan);
         assert_eq!(found.verdict, Verdict::Failed);
         let is_certain = |cause: &Cause| cause.certainty == Certainty::Certain;
         assert!(!found.causes.iter().any(is_certain), "{:?}", found.causes);
@@ -104,35 +136,9 @@ fn places_of_their_own_in_every_answer_are_never_certain() {
         |problem| problem.exit_depth *= 1.0 + 0.2 * problem.impact_speed.sin().abs(),
     ];
     for fault in faults {
-        let found = diagnose(&mut Strange(fault), Plan::default(), &|_, _| {});
+        let found = strange(fault).diagnosed(Plan::default());
         assert_eq!(found.verdict, Verdict::Failed);
         assert!(!found.causes.iter().any(|cause| cause.certainty == Certainty::Certain), "{:?}", found.causes);
-    }
-}
-
-/// Exact, but that an exit below this part of the impact speed is called a stop, with V = 0.
-struct Stopping(f64);
-
-impl Solver for Stopping {
-    fn identity(&self) -> PeerIdentity {
-        PeerIdentity { name: "stopping".to_owned(), ..PeerIdentity::default() }
-    }
-
-    fn command(&self) -> String {
-        "stopping".to_owned()
-    }
-
-    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
-        let problem = request.problem(None);
-        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
-        if flight.end.velocity < self.0 * problem.impact_speed {
-            return Ok(answer(Outcome::Stopped, State { velocity: 0.0, ..flight.end }));
-        }
-        Ok(answer(flight.outcome, flight.end))
-    }
-
-    fn restart(&mut self) -> bool {
-        true
     }
 }
 
@@ -140,7 +146,16 @@ impl Solver for Stopping {
 fn an_exit_at_little_speed_that_is_called_a_stop_fails() {
     for part in [1e-3, 1e-4] {
         for seed in 1..=4 {
-            let found = diagnose(&mut Stopping(part), Plan { seed, ..Plan::default() }, &|_, _| {});
+            let stopping = Made::new(part, |part, request| {
+                let problem = request.problem(None);
+                let mut flight = exact(&problem)?;
+                if flight.end.velocity < *part * problem.impact_speed {
+                    flight.outcome = Outcome::Stopped;
+                    flight.end.velocity = 0.0;
+                }
+                Ok(flight)
+            });
+            let found = stopping.diagnosed(Plan { seed, ..Plan::default() });
             assert_eq!((found.verdict, found.counts.undecided), (Verdict::Failed, 0), "{part} by seed {seed}");
         }
     }
@@ -164,7 +179,7 @@ fn a_cap_on_depth_or_on_time_fails_by_every_seed() {
     ];
     for (index, cap) in caps.into_iter().enumerate() {
         for seed in 1..=4 {
-            let found = diagnose(&mut Strange(cap), Plan { seed, ..Plan::default() }, &|_, _| {});
+            let found = strange(cap).diagnosed(Plan { seed, ..Plan::default() });
             assert_eq!(found.verdict, Verdict::Failed, "{index} by seed {seed}");
         }
     }
@@ -206,7 +221,7 @@ fn a_term_that_is_dropped_where_it_is_small_is_found() {
             }
         }
     };
-    let found = diagnose(&mut Strange(drop), Plan { asks_edges: false, ..Plan::default() }, &|_, _| {});
+    let found = strange(drop).diagnosed(Plan { asks_edges: false, ..Plan::default() });
     assert_eq!(found.verdict, Verdict::Failed);
 }
 
@@ -218,44 +233,25 @@ fn a_small_fault_in_few_answers_is_not_taken_for_inaccuracy() {
             law.stiffness *= 1.001;
         }
     };
-    let found = diagnose(&mut Strange(stiffer), Plan { asks_edges: false, ..Plan::default() }, &|_, _| {});
+    let found = strange(stiffer).diagnosed(Plan { asks_edges: false, ..Plan::default() });
     assert_eq!(found.verdict, Verdict::Failed);
     assert!(!found.causes[0].id.starts_with("tolerance"), "{:?}", found.causes);
 }
 
-/// Central difference whose time is a sum in single precision.
-struct Forgetful(CentralDifference);
-
-impl Solver for Forgetful {
-    fn identity(&self) -> PeerIdentity {
-        PeerIdentity { name: "forgetful".to_owned(), fixed_step: true, ..PeerIdentity::default() }
-    }
-
-    fn command(&self) -> String {
-        "forgetful".to_owned()
-    }
-
-    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
-        let step = request.dt_s.unwrap();
-        let scheme = CentralDifference::uniform(step, self.0.velocity, self.0.boundaries);
-        let solved = scheme.solve(&request.problem(None), Detail::End);
-        let mut flight = solved.map_err(|error| failure(&error.to_string()))?;
-        let steps = (flight.end.time / step) as usize;
-        let sum = (0..steps).fold(0.0_f32, |sum, _| sum + step as f32);
-        flight.end.time += f64::from(sum) - steps as f64 * step;
-        Ok(answer(flight.outcome, flight.end))
-    }
-
-    fn restart(&mut self) -> bool {
-        true
-    }
-}
-
 #[test]
 fn a_sum_in_single_precision_is_found_though_every_limit_looks_right() {
-    let scheme = CentralDifference::uniform(1.0, VelocityAt::PredictedHalfStep, Boundaries::Landed);
     for seed in 1..=4 {
-        let found = diagnose(&mut Forgetful(scheme.clone()), Plan { seed, ..Plan::default() }, &|_, _| {});
+        let mut forgetful = Made::new((), |(), request| {
+            let step = request.dt_s.unwrap();
+            let scheme = CentralDifference::uniform(step, VelocityAt::PredictedHalfStep, Boundaries::Landed);
+            let mut flight = scheme.solve(&request.problem(None), Detail::End)?;
+            let steps = (flight.end.time / step) as usize;
+            let sum = (0..steps).fold(0.0_f32, |sum, _| sum + step as f32);
+            flight.end.time += f64::from(sum) - steps as f64 * step;
+            Ok(flight)
+        });
+        forgetful.identity.fixed_step = true;
+        let found = forgetful.diagnosed(Plan { seed, ..Plan::default() });
         assert_eq!(found.verdict, Verdict::Failed, "seed {seed}: {:?} {:?}", found.counts, found.causes);
     }
 }
@@ -268,82 +264,49 @@ fn an_order_falls_short_only_where_its_whole_interval_and_the_smallest_steps_do(
     assert!(!is_short_of(2.0, [1.5, 1.69], None));
 }
 
-/// Exact, but that the clock goes on from the last exit until it is started again.
-#[derive(Default)]
-struct Running {
-    time: f64,
-}
-
-impl Solver for Running {
-    fn identity(&self) -> PeerIdentity {
-        PeerIdentity { name: "running".to_owned(), ..PeerIdentity::default() }
-    }
-
-    fn command(&self) -> String {
-        "running".to_owned()
-    }
-
-    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
-        let problem = request.problem(None);
-        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
-        let end = State { time: self.time + flight.end.time, ..flight.end };
-        self.time = if flight.end.velocity > 0.0 { end.time } else { 0.0 };
-        Ok(answer(flight.outcome, end))
-    }
-
-    fn restart(&mut self) -> bool {
-        *self = Self::default();
-        true
-    }
-}
-
 #[test]
 fn what_a_solver_keeps_of_earlier_questions_is_found_by_starting_it_again() {
-    let found = diagnose(&mut Running::default(), Plan::default(), &|_, _| {});
+    // The clock goes on from the last exit.
+    let running = Made::new(0.0, |clock, request| {
+        let mut flight = exact(&request.problem(None))?;
+        flight.end.time += *clock;
+        *clock = if flight.end.velocity > 0.0 { flight.end.time } else { 0.0 };
+        Ok(flight)
+    });
+    let found = running.diagnosed(Plan::default());
     assert_eq!((found.verdict, found.causes[0].id.as_str()), (Verdict::Failed, "state-kept"), "{:?}", found.causes);
     assert_eq!(found.causes[0].certainty, Certainty::Certain);
-}
-
-/// Exact, but that the continuous crater stiffness of a target is kept from its first scene.
-#[derive(Default)]
-struct Caching {
-    known: Vec<(Vec<Stage>, Stage)>,
-}
-
-impl Solver for Caching {
-    fn identity(&self) -> PeerIdentity {
-        PeerIdentity { name: "caching".to_owned(), reads_scene: true, ..PeerIdentity::default() }
-    }
-
-    fn command(&self) -> String {
-        "caching".to_owned()
-    }
-
-    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
-        let mut problem = request.problem(None);
-        let target = problem.stages[1..].to_vec();
-        if !target.is_empty() {
-            let first = self.known.iter().find(|(known, _)| *known == target).map(|(_, crater)| *crater);
-            match first {
-                Some(crater) => problem.stages[0] = crater,
-                None => self.known.push((target, problem.stages[0])),
-            }
-        }
-        let flight = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
-        Ok(answer(flight.outcome, flight.end))
-    }
-
-    fn restart(&mut self) -> bool {
-        self.known.clear();
-        true
-    }
 }
 
 #[test]
 fn a_number_that_is_kept_of_a_target_with_another_speed_or_mass_fails() {
     for seed in 1..=4 {
-        let found = diagnose(&mut Caching::default(), Plan { seed, ..Plan::default() }, &|_, _| {});
+        // The crater of a target is kept from its first scene.
+        let mut caching = Made::new(Vec::<(Vec<Stage>, Stage)>::new(), |known, request| {
+            let mut problem = request.problem(None);
+            let target = problem.stages[1..].to_vec();
+            match known.iter().find(|(known, _)| *known == target) {
+                _ if target.is_empty() => {}
+                Some((_, crater)) => problem.stages[0] = *crater,
+                None => known.push((target, problem.stages[0])),
+            }
+            exact(&problem)
+        });
+        caching.identity.reads_scene = true;
+        let found = caching.diagnosed(Plan { seed, ..Plan::default() });
         assert_eq!(found.verdict, Verdict::Failed, "seed {seed}");
         assert!(["input-kept", "state-kept"].contains(&found.causes[0].id.as_str()), "{:?}", found.causes);
     }
+}
+
+#[test]
+fn a_solver_that_answers_otherwise_each_time_is_told_so() {
+    static ASKED: AtomicU32 = AtomicU32::new(1);
+    let noisy = Made::new((), |(), request| {
+        let mut flight = exact(&request.problem(None))?;
+        flight.end.time *= 1.0 + 1e-3 * f64::from(ASKED.fetch_add(1, Ordering::Relaxed)).sin();
+        Ok(flight)
+    });
+    let found = noisy.diagnosed(Plan { asks_edges: false, ..Plan::default() });
+    assert_eq!((found.verdict, found.causes[0].id.as_str()), (Verdict::Failed, "not-repeatable"), "{:?}", found.causes);
 }
