@@ -14,7 +14,7 @@ pub(crate) fn stage(static_force: f64, stiffness: f64, viscosity: f64, drag: f64
 }
 
 /// What happened, in order.
-pub(crate) fn kinds(events: &[Event]) -> Vec<EventKind> {
+pub(crate) fn kinds<S>(events: &[Event<S>]) -> Vec<EventKind> {
     events.iter().map(|event| event.kind).collect()
 }
 

@@ -14,16 +14,19 @@
 //!
 //! docs/enclosures.md has the proof, inequality by inequality.
 
+mod ending;
 mod law;
 
 use smallvec::SmallVec;
 
+use ending::Ending;
 use law::{Expression, Misses};
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
-use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved, refuse_laws};
+use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved};
 use super::taylor::power_of_two_below;
 use crate::physics::ball::{Ball, DoubleWord, TINY, UNIT, UP};
+use crate::physics::condition::Condition;
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Outcome, Problem, Scalar, Stage, State};
 
@@ -97,12 +100,12 @@ impl Enclosure {
     /// The outcome is proved, or `Undecided`. Two boundaries of the problem are the same ball or differ as `f64`.
     ///
     /// # Errors
-    /// [`IntegrationError::Refused`] for a law in code or with ends on conditions, or numbers beyond 1e-100 to 1e100;
+    /// [`IntegrationError::Refused`] for a law in code or a table of velocity, or numbers beyond 1e-100 to 1e100;
     /// [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
         let is_text = |index: usize| problem.laws.of(index).is_none_or(|law| law.bound().is_some());
-        if problem.laws.have_conditions() || !(0..problem.stages.len()).all(is_text) {
-            refuse_laws(problem, "enclosure")?;
+        if !(0..problem.stages.len()).all(is_text) {
+            return Err(refuse("nothing is proved of a force in code or by a table of velocity; take --method taylor"));
         }
         let depths = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]);
         if !depths.chain([problem.mass, problem.impact_speed]).all(is_in_range) {
@@ -113,6 +116,9 @@ impl Enclosure {
                 "two of its depths differ, and not as 64-bit numbers: which comes first is not known; make them equal, or \
                  move one by 1e-15 of itself",
             ));
+        }
+        if !conditions_are_apart(problem) {
+            return Err(refuse("two of its conditions differ, and not as 64-bit numbers; make them equal"));
         }
         let mut steps = Steps::default();
         let mut flight = flight::solve(problem, detail, &mut steps)?;
@@ -151,13 +157,25 @@ fn is_before(depth: Ball, limit: Ball) -> bool {
 
 /// Whether any two ends, and the exit, are the same ball or differ as `f64` and as balls.
 fn boundaries_are_apart(problem: &Problem<Ball>) -> bool {
-    let ends: Vec<Ball> = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]).collect();
+    // A stage that ends on a condition may have no end at a depth.
+    let ends = problem.stages.iter().map(|stage| stage.end).filter(|end| end.value() < f64::INFINITY);
+    let ends: Vec<Ball> = ends.chain([problem.exit_depth]).collect();
     let is_told =
         |a: Ball, b: Ball| a == b || (a.value() < b.value() && a.upper() <= b.lower()) || b.value() == f64::INFINITY;
     let [inner @ .., exit] = ends.as_slice() else { return true };
     inner.windows(2).all(|pair| is_told(pair[0], pair[1]))
         && inner.iter().all(|end| is_told(*end, *exit) || is_told(*exit, *end))
         && inner.iter().all(|end| is_told(Ball::zero(), *end))
+}
+
+/// Whether each condition that is taken for the one before it has the same balls.
+fn conditions_are_apart(problem: &Problem<Ball>) -> bool {
+    let end_of = |index: usize| problem.laws.of(index).and_then(|law| law.end());
+    let conditions = (0..problem.stages.len()).filter_map(end_of);
+    conditions.clone().all(|condition| {
+        let next = end_of(condition.next()).filter(|next| next.is_same(condition));
+        next.is_none_or(|next| next.parameters() == condition.parameters())
+    })
 }
 
 impl Integrator for Enclosure {
@@ -198,11 +216,24 @@ enum Law<'a> {
 }
 
 impl<'a> Law<'a> {
-    /// The law of stage `index`, for the `mass` that moves there; `None` where no bound is derived for it.
-    fn new(problem: &'a Problem<Ball>, index: usize, mass: Ball) -> Option<Self> {
-        match problem.laws.of(index) {
-            Some(law) => Some(Self::Expression(Expression::new(law.bound()?, mass))),
-            None => Coefficients::new(&problem.stages[index], mass).map(Self::Coefficients),
+    /// The law of stage `index`, for the `mass` that moves there from a state; `None` where no bound is derived for it, or its
+    /// condition may be met there.
+    fn new(problem: &'a Problem<Ball>, index: usize, mass: Ball, at: State<Ball>) -> Option<Self> {
+        let Some(law) = problem.laws.of(index) else {
+            return Coefficients::new(&problem.stages[index], mass).map(Self::Coefficients);
+        };
+        let ending = match law.end() {
+            Some(condition) => Some(Ending::new(condition, at)?),
+            None => None,
+        };
+        Some(Self::Expression(Expression::new(law.bound()?, mass, ending)))
+    }
+
+    /// Whether no condition ends the stage at any depth in `x` and velocity in `v`.
+    fn is_open(&self, x: Ball, v: Ball) -> bool {
+        match self {
+            Self::Coefficients(_) => true,
+            Self::Expression(law) => law.is_open(x, v),
         }
     }
 
@@ -600,7 +631,9 @@ enum Step {
     Limit(State<Ball>),
     /// To rest before it.
     Rest(State<Ball>),
-    /// To either.
+    /// To a condition that ends the stage before it.
+    Condition(State<Ball>),
+    /// To limit or rest.
     Either(State<Ball>),
     /// No proof was found.
     Unproved,
@@ -698,7 +731,7 @@ impl Centre {
         let box_of = Ball::between(depth.lower(), (depth + Ball::from_f64(reach)).upper());
         let deceleration = law.deceleration(box_of, speeds);
         let distance = (velocities * velocities / deceleration).scaled(0.5);
-        let is_inside = deceleration.lower() > 0.0 && distance.upper() <= reach;
+        let is_inside = deceleration.lower() > 0.0 && distance.upper() <= reach && law.is_open(box_of, speeds);
         let time = self.time + velocities / deceleration;
         is_inside.then(|| State { time, depth: depth + distance, velocity: Ball::zero() })
     }
@@ -720,6 +753,9 @@ impl Centre {
                 return None;
             }
             speeds = velocity.widened(change);
+        }
+        if !law.is_open(box_of, speeds) {
+            return None;
         }
         let time = distance / speeds;
         let velocity = velocity - law.deceleration(box_of, speeds) * time;
@@ -744,6 +780,9 @@ impl Steps {
             if matches!(law, Law::Expression(_)) && span < law::SPAN_MIN {
                 break;
             }
+            if let Some(state) = Self::condition(law, centre, limit, series, span) {
+                return Step::Condition(state);
+            }
             let [v, _, x] = series.near(span);
             if v > 0.0 && x < far {
                 match centre.after(law, series, span) {
@@ -759,6 +798,22 @@ impl Steps {
             span *= 0.5;
         }
         Step::Unproved
+    }
+
+    /// The state in which the condition of the stage is met within `span`, proved to be the first event.
+    fn condition(law: &Law<'_>, centre: &Centre, limit: Ball, series: &Series, span: f64) -> Option<State<Ball>> {
+        let Law::Expression(own) = law else { return None };
+        let ending = own.ending.as_ref()?;
+        let near = ending.root(centre, series, span)?;
+        let mut gap = 16.0 * ROUNDOFF * near + 8.0 * centre.error.velocity / series.velocity;
+        for _ in 0..RETRIES_MAX {
+            let before = centre.after(law, series, (near - gap).max(0.0))?;
+            if let Some(state) = ending.met(own, &before, limit) {
+                return Some(state);
+            }
+            gap *= 16.0;
+        }
+        None
     }
 
     /// The event within `span`, proved to be the first.
@@ -854,8 +909,12 @@ impl Steps {
     fn on_either_side(course: &Course<'_, Ball>, before: State<Ball>, limit: Ball) -> Option<State<Ball>> {
         let stages = &course.problem.stages;
         let next = (course.stage + 1..stages.len()).find(|index| stages[*index].end != limit)?;
-        let law = Law::new(course.problem, next, course.mass)?;
-        let beyond = Centre::new(State { depth: limit, velocity: before.velocity, ..before }, &law);
+        let at = State { depth: limit, ..before };
+        if (course.stage + 1..=next).any(|index| Self::is_joined(course.problem, index)) {
+            return None;
+        }
+        let law = Law::new(course.problem, next, course.mass, at)?;
+        let beyond = Centre::new(at, &law);
         let speeds = Ball::between(0.0, before.velocity.magnitude());
         let furthest = beyond.slowed(&law, speeds)?;
         is_before(furthest.depth, course.problem.limit_of(next)).then(|| State {
@@ -863,6 +922,17 @@ impl Steps {
             depth: before.depth.hull(furthest.depth),
             velocity: Ball::zero(),
         })
+    }
+
+    /// Whether a mass joins at the start of stage `index`.
+    fn is_joined(problem: &Problem<Ball>, index: usize) -> bool {
+        problem.laws.of(index).is_some_and(|law| law.joining(Ball::zero()).is_some())
+    }
+
+    /// Whether `depth` lies on one side of the exit and of the end of each stage from the present one on.
+    fn is_apart(course: &Course<'_, Ball>, depth: Ball) -> bool {
+        let ends = course.problem.stages[course.stage..].iter().map(|stage| stage.end);
+        ends.chain([course.problem.exit_depth]).all(|end| is_before(depth, end) || depth.lower() >= end.upper())
     }
 
     /// No proof: the end that is open.
@@ -934,7 +1004,7 @@ impl StageSolver<Ball> for Steps {
         }
         let limit = course.limit()?;
         let impact = course.problem.impact_speed.value();
-        let Some(law) = Law::new(course.problem, course.stage, course.mass) else {
+        let Some(law) = Law::new(course.problem, course.stage, course.mass, course.state) else {
             let state = Self::anything(course, course.state);
             return Ok(self.give_up(course, state));
         };
@@ -965,7 +1035,7 @@ impl StageSolver<Ball> for Steps {
             }
             let end = match &step {
                 Step::Whole(next) => next.state(),
-                Step::Limit(state) | Step::Rest(state) | Step::Either(state) => *state,
+                Step::Limit(state) | Step::Rest(state) | Step::Condition(state) | Step::Either(state) => *state,
                 Step::Unproved => break,
             };
             let start = centre;
@@ -983,6 +1053,9 @@ impl StageSolver<Ball> for Steps {
                 }
                 Step::Limit(state) => return Ok(StageEnd::Limit(state)),
                 Step::Rest(state) => return Ok(StageEnd::Rest(state)),
+                // What comes next is known where it lies on one side of every boundary.
+                Step::Condition(state) if Self::is_apart(course, state.depth) => return Ok(StageEnd::Condition(state)),
+                Step::Condition(_) => break,
                 Step::Either(state) => {
                     let is_last = limit == course.problem.exit_depth;
                     let beside = || Self::on_either_side(course, state, limit);
@@ -995,6 +1068,11 @@ impl StageSolver<Ball> for Steps {
         }
         let state = Self::anything(course, centre.state());
         Ok(self.give_up(course, state))
+    }
+
+    /// Where it is open, the stage is entered, and given up ([`Law::new`]).
+    fn meets(&mut self, condition: &Condition<Ball>, at: State<Ball>) -> bool {
+        ending::is_met(condition, at) == Some(true)
     }
 
     fn margin(&mut self, course: &mut Course<'_, Ball>) -> Solved<Bounded> {

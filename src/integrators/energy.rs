@@ -21,15 +21,15 @@
 //! fail at opposite ends, and every step takes the one whose singularity is farther away, measured in what is left.
 //!
 //! A viscous stage (`r > 0`) brings √w into the first equation, which is then neither linear nor smooth at rest; it is
-//! refused.
+//! refused where no stage has a law of its own.
 //!
-//! A stage with a law of its own is solved by [`super::law_series`], whose steps go over depth, and over velocity near rest. With
-//! `taylor` it shares the series of the expression, and not the variable.
+//! A stage with a law of its own is solved by [`super::law_series`], whose steps go over depth, and over velocity near rest, and so is a
+//! viscous one beside it. With `taylor` it shares the series of the expression, and not the variable.
 
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::law_series::{LawSeries, Variable};
 use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Margin, Solved, refuse_laws};
-use crate::physics::{Problem, Scalar, Stage, State};
+use crate::physics::{Law, Problem, Scalar, Stage, State};
 
 /// Name of the method.
 const NAME: &str = "energy";
@@ -105,14 +105,14 @@ impl Energy {
     /// Of stages of coefficients only a trajectory allocates.
     ///
     /// # Errors
-    /// - [`IntegrationError::Refused`]: a stage of coefficients before the exit depth is viscous, or a law is one in code;
+    /// - [`IntegrationError::Refused`]: a stage before the exit depth is viscous and none has a law of its own, or a law is one in code;
     /// - [`IntegrationError::NeverEnds`]: an unbounded last stage does not resist at rest;
     /// - [`IntegrationError::NotFinite`], [`IntegrationError::StepBudgetSpent`]: numbers beyond the range of `S`.
     pub fn solve_in<S: Scalar>(&self, problem: &Problem<S>, detail: Detail) -> Solved<Flight<S>> {
-        refuse_viscosity(problem)?;
         if !problem.laws.is_empty() {
             return flight::solve(problem, detail, &mut Laws { tolerance: self.tolerance::<S>() });
         }
+        refuse_viscosity(problem)?;
         let now = State { time: S::zero(), depth: S::zero(), velocity: S::one() };
         let mut stages = Stages { walk: Walk::from_impact(self.tolerance::<S>()), now, clock: Cost::default() };
         flight::solve(problem, detail, &mut stages)
@@ -170,7 +170,7 @@ fn refuse_viscosity<S: Scalar>(problem: &Problem<S>) -> Solved<()> {
         if problem.start_of(index).value() >= problem.exit_depth.value() {
             break;
         }
-        if problem.laws.of(index).is_none() && stage.viscosity.value() != 0.0 {
+        if stage.viscosity.value() != 0.0 {
             return Err(IntegrationError::Refused {
                 method: NAME,
                 why: format!(
@@ -473,7 +473,10 @@ impl<S: Scalar> StageSolver<S> for Laws {
     #[cold]
     fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>> {
         let tolerance = self.tolerance;
-        if let Some(law) = course.law() {
+        let stage = &course.problem.stages[course.stage];
+        let viscous = course.law().is_none() && stage.viscosity.value() != 0.0;
+        let viscous = viscous.then(|| Law::of_coefficients(stage));
+        if let Some(law) = course.law().or(viscous.as_ref()) {
             let limit = course.limit()?;
             let series = LawSeries { method: NAME, variable: Variable::Depth, tolerance };
             return series.solve(course, law, limit);

@@ -42,6 +42,11 @@ pub(crate) trait StageSolver<S: Scalar> {
     /// [`IntegrationError`]: the stage is refused, a budget is spent, or a number is not finite.
     fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>>;
 
+    /// Whether `condition` is met in a state in which its stage begins.
+    fn meets(&mut self, condition: &Condition<S>, at: State<S>) -> bool {
+        condition.is_met(at)
+    }
+
     /// Exit margin of the finished flight with its error bound.
     ///
     /// # Errors
@@ -279,11 +284,11 @@ impl<'a, S: Scalar> Course<'a, S> {
 
     /// Lists every stage end at the present state and enters the stage beyond them.
     #[inline(always)]
-    pub(crate) fn pass_ends(&mut self) {
+    pub(crate) fn pass_ends(&mut self, mut meets: impl FnMut(&Condition<S>, State<S>) -> bool) {
         while let Some(law) = self.problem.stages.get(self.stage) {
             if law.end.value() <= self.state.depth.value() {
                 self.pass_end();
-            } else if self.problem.laws.is_empty() || !self.pass_if_met() {
+            } else if self.problem.laws.is_empty() || !self.pass_if_met(&mut meets) {
                 break;
             }
         }
@@ -308,11 +313,11 @@ impl<'a, S: Scalar> Course<'a, S> {
 
     /// Passes the end of the present stage if its condition is met in the present state, and says whether it is.
     #[cold]
-    fn pass_if_met(&mut self) -> bool {
+    fn pass_if_met(&mut self, mut meets: impl FnMut(&Condition<S>, State<S>) -> bool) -> bool {
         let Some(condition) = self.condition() else { return false };
         // A zero that a method has located is one, whatever rounding leaves of it.
         let met_before = self.just_met.and_then(|stage| self.problem.laws.of(stage)?.end());
-        let is_met = met_before.is_some_and(|before| before.is_same(condition)) || condition.is_met(self.state);
+        let is_met = met_before.is_some_and(|before| before.is_same(condition)) || meets(condition, self.state);
         if is_met {
             self.pass_condition();
         }
@@ -523,7 +528,7 @@ fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is
     let mut course = Course::new(problem, if matches!(detail, Detail::Trajectory) { Detail::Events } else { detail });
     course.sample_until(course.state, |_| State::at_impact(problem));
     // Ends at the face itself (k d = 0 leaves no crater, but a user's stage may end at 0) are reached at once.
-    course.pass_ends();
+    course.pass_ends(Condition::is_met);
     course.stage = course.stage.min(problem.stages.len() - 1);
     course.is_through = is_through;
     course.notes.push("no integration: the flight ends at impact".to_owned());
@@ -576,7 +581,7 @@ pub(crate) fn solve<S: Scalar>(
     let mut course = Course::new(problem, detail);
     course.sample(course.state);
     course.sample_until(course.state, |_| State::at_impact(problem));
-    course.pass_ends();
+    course.pass_ends(|condition, at| method.meets(condition, at));
     // Each round passes a stage, or ends the flight.
     for _ in 0..problem.stages.len() {
         let entered = course.stage;
@@ -610,10 +615,10 @@ pub(crate) fn solve<S: Scalar>(
         };
         course.sample_rest_of_stage();
         if !rests {
-            course.pass_ends();
+            course.pass_ends(|condition, at| method.meets(condition, at));
             course.is_through = course.state.depth.value() >= problem.exit_depth.value();
         } else if !problem.laws.is_empty() {
-            course.pass_if_met();
+            course.pass_if_met(|condition, at| method.meets(condition, at));
         }
         if course.is_through || course.state.velocity.value() <= 0.0 {
             course.stage = entered;

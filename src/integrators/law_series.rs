@@ -434,7 +434,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             other => other?,
         };
         let (s, event) = first_event(&path, limit);
-        let (s, event, closeness) = self.first_zero(s, event);
+        let (s, event, closeness) = self.first_zero(&path, s, event);
         let local = path.at(s);
         let next = State {
             time: start.time + local.time,
@@ -719,8 +719,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
 
     /// `event` at `s`, or the zero of g in front of it. Also where g is nearest to zero, if it is near: a place of the step
     /// and how far g goes beyond zero there, below zero where it does not get there.
-    fn first_zero(&self, s: S, event: Event) -> (S, Event, Option<(f64, f64)>) {
-        let (Some((_, side)), Some(series)) = (self.end, self.condition_series()) else { return (s, event, None) };
+    fn first_zero(&self, path: &Path<S, K>, s: S, event: Event) -> (S, Event, Option<(f64, f64)>) {
+        let (Some((end, side)), Some(series)) = (self.end, self.condition_series()) else { return (s, event, None) };
         let span = s.value();
         let rest = series[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * span);
         if side * series[0].value() > rest {
@@ -733,7 +733,16 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
         let turn = if slopes.iter().all(|c| *c == 0.0) { None } else { locate::first_root(&slopes, span) };
         if let Some(root) = first_root(&series, span) {
-            let corrected = corrected(S::from_f64(root), span, |s| value(&series, s), |s| slope(&series, s));
+            // What the series of g leaves out is little in 64 bits; the path leaves out less, and shows g itself.
+            let own = (S::EPSILON < f64::EPSILON).then(|| end.bound());
+            let g = |s| match &own {
+                Some(own) => {
+                    let at = path.at(s);
+                    own.eval(at.depth, at.velocity)
+                }
+                None => value(&series, s),
+            };
+            let corrected = corrected(S::from_f64(root), span, g, |s| slope(&series, s));
             let (rate, curvature) = both(&slopes, corrected.value());
             let (place, beyond) = match turn {
                 // A double root is known to half of its digits, the value where g turns to all.

@@ -105,6 +105,16 @@ impl<S: Scalar> Condition<S> {
         self.kind == Kind::Plug
     }
 
+    /// Whether g may have either sign before its zero.
+    pub(crate) fn has_two_sides(&self) -> bool {
+        self.kind == Kind::Zero
+    }
+
+    /// g with its parameters in this number type.
+    pub(crate) fn bound(&self) -> Bound<S> {
+        self.values.tape().bind(&self.parameters)
+    }
+
     /// Whether it is a speed.
     pub fn is_speed(&self) -> bool {
         self.kind == Kind::Speed

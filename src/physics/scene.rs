@@ -705,7 +705,8 @@ impl Scene {
         }
         Parameter::HalfAngle.admit(plug.half_angle)?;
         Parameter::ShearStrength.admit(plug.shear_strength)?;
-        let angle = number(Parameter::HalfAngle, plug.half_angle) * S::from_f64(1_f64.to_radians());
+        let degree = S::quarter_pi().over(S::from_f64(45.0));
+        let angle = number(Parameter::HalfAngle, plug.half_angle) * degree;
         let slab = Slab {
             thickness,
             diameter: number(Parameter::Diameter, concrete.diameter),
@@ -742,6 +743,11 @@ impl Scene {
         let full = self.judged_by(Criterion::FullDepth);
         let fixed = Self { thickness: Some((thickness - left).max(0.0)), ..full.clone() };
         vec![("full-depth", full), ("ndrc", self.judged_by(Criterion::Ndrc)), ("static plug", fixed)]
+    }
+
+    /// Whether a stage ends at a speed or on a condition, or a mass joins: a plug among them.
+    pub fn has_conditions(&self) -> bool {
+        !self.ends.is_empty() || self.criterion == Criterion::Plug
     }
 
     /// How stage `index` ends besides at a depth.

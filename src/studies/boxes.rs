@@ -174,6 +174,10 @@ impl<'a> Region<'a> {
         use LayerNumber as L;
         use Parameter as P;
         use StageNumber as S;
+        // More force may bring a condition forward, and the flight behind it may then get farther.
+        if self.scene.has_conditions() {
+            return None;
+        }
         match parameter {
             P::Velocity => Some(Rises::Yes),
             P::Mass if self.resists() => Some(Rises::Yes),

@@ -654,7 +654,11 @@ impl<F: Fn(f64) -> Resolved> Search<'_, F> {
                 if expansion == EXPANSIONS_MAX || !next.is_finite() {
                     return Err(CriticalError::NoBracket { low: first, high });
                 }
-                let (point, farther) = self.at_or_below(next, high.u)?;
+                // Beyond the range of numbers nothing is found either.
+                let (point, farther) = match self.at_or_below(next, high.u) {
+                    Err(CriticalError::Scene { .. }) => return Err(CriticalError::NoBracket { low: first, high }),
+                    found => found?,
+                };
                 high = point;
                 if let (false, Some(error)) = (high.w > 0.0, farther) {
                     return Err(error);

@@ -198,7 +198,8 @@ pub fn refusal(scene: &Scene, written: &Written) -> Result<(), IntegrationError>
 
 /// V_c of `scene` (m/s), of the numbers that were `written`: between two numbers, which for most scenes are neighbours.
 ///
-/// `None` where no proof was found, or there is no V_c.
+/// `None` where no proof was found, or there is no V_c, or stages end at speeds or on conditions of the scene's own: then it is not proved that
+/// one speed parts those that stop from those that perforate.
 pub fn critical(scene: &Scene, written: &Written) -> Option<(f64, f64)> {
     let near = critical_velocity::of_scene(scene, &Taylor::default()).ok()?.velocity;
     between(scene, written, near)
@@ -206,6 +207,9 @@ pub fn critical(scene: &Scene, written: &Written) -> Option<(f64, f64)> {
 
 /// As [`critical`], from a V_c `near` it.
 pub fn between(scene: &Scene, written: &Written, near: f64) -> Option<(f64, f64)> {
+    if !scene.ends.is_empty() {
+        return None;
+    }
     let flights = std::cell::Cell::new(0);
     let perforates = |speed: f64| {
         flights.set(flights.get() + 1);

@@ -196,7 +196,7 @@ impl<'a, S: Scalar> Run<'a, S> {
         let state = self.stepper.state();
         let velocity = state.velocity * self.stepper.mass.over(self.course.mass);
         (self.course.stage, self.course.state) = (self.stepper.stage, State { velocity, ..state });
-        self.course.pass_ends();
+        self.course.pass_ends(Condition::is_met);
         let has_joined = self.course.mass.value() != self.stepper.mass.value();
         if has_joined || self.course.stage != self.stepper.stage {
             self.stepper.enter(self.course.stage, self.course.mass, self.course.state);
@@ -278,7 +278,7 @@ impl<'a, S: Scalar> Run<'a, S> {
         (self.course.stage, self.course.state) = (self.stepper.stage, end);
         self.course.sample_until(end, |time| step.inside(time));
         self.course.pass_condition();
-        self.course.pass_ends();
+        self.course.pass_ends(Condition::is_met);
         let stage = self.course.stage;
         let share = self.stepper.mass.over(self.course.mass);
         self.stepper.stage = stage;

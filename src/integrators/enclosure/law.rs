@@ -5,6 +5,7 @@
 
 use smallvec::SmallVec;
 
+use super::ending::Ending;
 use super::{Centre, Defect, DoubleWord, Error, FINE, MAGNITUDES, ORDER, Series, Step, is_before};
 use crate::physics::State;
 use crate::physics::ball::{Ball, TINY, UP};
@@ -32,14 +33,24 @@ const BOXES_MAX: u32 = 22;
 /// Tubes tried around a step.
 const TUBES_MAX: u32 = 4;
 
-/// A force by expression, and the mass that it slows.
+/// A force by expression, the mass that it slows, and what ends its stage besides a depth.
 pub(super) struct Expression<'a> {
     force: &'a Bound<Ball>,
     mass: Ball,
+    pub(super) ending: Option<Ending<'a>>,
 }
 
 /// The branch of each min, max and abs.
-type Sides = SmallVec<[bool; 4]>;
+pub(super) type Sides = SmallVec<[bool; 4]>;
+
+/// The sides of all switches of `expression`, if each is the same in all of the box.
+pub(super) fn sides_of(expression: &Bound<Ball>, x: Ball, v: Ball) -> Option<Sides> {
+    let side = |switch: &Ball| {
+        let is_above = switch.lower() >= 0.0;
+        (is_above || switch.upper() < 0.0).then_some(is_above)
+    };
+    expression.switch_values(x, v).iter().map(side).collect()
+}
 
 /// What the polynomials of a step miss of the equation of motion, order by order: bounds of the coefficients of dv and dx below
 /// order K, in units of the step.
@@ -64,8 +75,13 @@ impl Misses {
 }
 
 impl<'a> Expression<'a> {
-    pub(super) fn new(force: &'a Bound<Ball>, mass: Ball) -> Self {
-        Self { force, mass }
+    pub(super) fn new(force: &'a Bound<Ball>, mass: Ball, ending: Option<Ending<'a>>) -> Self {
+        Self { force, mass, ending }
+    }
+
+    /// Whether no condition is met at any depth in `x` and velocity in `v`.
+    pub(super) fn is_open(&self, x: Ball, v: Ball) -> bool {
+        self.ending.as_ref().is_none_or(|ending| ending.is_clear(x, v))
     }
 
     /// Deceleration (m/s²) at every depth in `x` and every velocity in `v`, not negative.
@@ -75,11 +91,7 @@ impl<'a> Expression<'a> {
 
     /// The sides of all switches, if each is the same in all of the box.
     fn sides(&self, x: Ball, v: Ball) -> Option<Sides> {
-        let side = |switch: &Ball| {
-            let is_above = switch.lower() >= 0.0;
-            (is_above || switch.upper() < 0.0).then_some(is_above)
-        };
-        self.force.switch_values(x, v).iter().map(side).collect()
+        sides_of(self.force, x, v)
     }
 
     /// Derivatives `F_x/M` (1/s²) and `F_V/M` (1/s) everywhere in the box, which lies on the `sides`.
@@ -233,7 +245,11 @@ impl<'a> Expression<'a> {
                 } else {
                     greatest
                 };
-                return Some((Error { norm: velocity, velocity, depth }, greatest));
+                let is_open = |ending: &Ending<'_>| {
+                    ending.is_clear(all_x, all_v) || ending.stays_open(self, (centre, series), time, (depth, greatest))
+                };
+                let is_open = self.ending.as_ref().is_none_or(is_open);
+                return is_open.then_some((Error { norm: velocity, velocity, depth }, greatest));
             }
             tube *= 16.0;
         }
@@ -307,21 +323,31 @@ impl<'a> Expression<'a> {
         Step::Unproved
     }
 
-    /// The state `time` (s) after `centre`, with the mean force of a box.
-    fn through(&self, centre: &Centre, time: f64) -> Option<Centre> {
+    /// Depths and velocities up to `time` (s) after `centre`, and the deceleration there; `None` where the velocity changes much.
+    pub(super) fn spread(&self, centre: &Centre, time: f64) -> Option<(Ball, Ball, Ball)> {
         let (x, v) = (centre.depth(), centre.velocity());
         let (slowest, fastest) = (v.lower(), v.upper());
         let mut speeds = Ball::between(0.5 * slowest, 2.0 * fastest);
-        let mut slope = Ball::zero();
+        let (mut depths, mut slope) = (x, Ball::zero());
         for _ in 0..2 {
-            let furthest = (x + speeds * Ball::from_f64(time)).upper();
-            slope = self.deceleration(Ball::between(x.lower(), furthest), speeds);
+            depths = Ball::between(x.lower(), (x + speeds * Ball::from_f64(time)).upper());
+            slope = self.deceleration(depths, speeds);
             let change = slope.magnitude() * time * UP;
             if !(slowest > 0.0 && change < 0.5 * slowest) {
                 return None;
             }
             speeds = v.widened(change);
         }
+        Some((depths, speeds, slope))
+    }
+
+    /// The state `time` (s) after `centre`, with the mean force of a box.
+    fn through(&self, centre: &Centre, time: f64) -> Option<Centre> {
+        let (depths, speeds, slope) = self.spread(centre, time)?;
+        if !self.is_open(depths, speeds) {
+            return None;
+        }
+        let (x, v) = (centre.depth(), centre.velocity());
         let duration = Ball::from_f64(time);
         let velocity = v - slope * duration;
         let depth = x + v * duration - (slope * duration * duration).scaled(0.5);

@@ -2,9 +2,12 @@
 
 use super::laws::{exact_methods, is_exact, methods};
 use super::*;
-use crate::physics::{Advice, EventKind, Outcome, Problem, Scene};
+use crate::integrators::Enclosure;
+use crate::physics::ball::Ball;
+use crate::physics::{Advice, EventKind, Outcome, Problem, Scalar, Scene, State};
 use crate::studies::critical_velocity;
-use crate::testing::kinds;
+use crate::testing::{Random, kinds};
+use twofloat::TwoFloat;
 
 fn scene(text: &str) -> Scene {
     Scene::from_toml(&format!("projectile.mass = 2\n{text}"), "ends").unwrap()
@@ -304,11 +307,8 @@ fn speeds_that_perforate_are_intervals_where_a_slower_projectile_misses_a_condit
 
 #[test]
 fn formulas_refuse_ends_that_are_no_depths() {
-    for name in [MethodName::ClosedForm, MethodName::Enclosure] {
-        let method = Method::new(name, &MethodOptions::default()).unwrap();
-        let error = method.integrator().solve(&problem(SAND, 300.0), Detail::End).unwrap_err();
-        assert!(error.is_usage() && error.to_string().contains("end"), "{error}");
-    }
+    let error = ClosedForm.solve(&problem(SAND, 300.0), Detail::End).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("end"), "{error}");
 }
 
 /// `W = V0² - 2 (F/M) x` is a line, and the condition a parabola that touches it.
@@ -361,4 +361,163 @@ fn the_first_of_many_zeros_and_a_narrow_one_far_ahead_are_not_stepped_over() {
             assert!(!is_exact(name) || is_first && flight.outcome != Outcome::Undecided, "{condition}");
         }
     }
+}
+
+/// Whether each number of `exact`, in double-double, lies within a ball, up to 1e-25 of the `scale`.
+fn holds(state: &State<Ball>, exact: &State<TwoFloat>, scale: [f64; 3]) -> bool {
+    let pairs = [(state.time, exact.time), (state.depth, exact.depth), (state.velocity, exact.velocity)];
+    pairs.into_iter().zip(scale).all(|((ball, exact), scale)| {
+        let distance = ((exact.hi() - ball.mid.hi) + (exact.lo() - ball.mid.lo)).abs();
+        distance <= ball.radius + 1e-25 * scale
+    })
+}
+
+/// The numbers of the tests above, of mpmath with 40 digits.
+#[test]
+fn enclosures_hold_the_known_ends_at_a_speed_and_on_a_condition() {
+    let enclosed = |text: &str, speed: f64| Enclosure.enclose(&problem(text, speed).cast(), Detail::Events).unwrap();
+    let sand = enclosed(SAND, 400.0);
+    let plug = enclosed(&with_thickness(PLUG, 0.1), 260.0);
+    let met = [sand.events[0].state, plug.events[0].state];
+    for (ball, exact) in [
+        (met[0].depth, 0.313_335_752_830_490_37_f64),
+        (met[0].time, 0.001),
+        (sand.end.depth, 1.730_401_772_617_134_7),
+        (sand.end.time, 0.015_933_959_053_583_118),
+        (met[1].depth, 0.057_848_339_715_189_06),
+        (met[1].velocity, 119.768_117_204_620_17),
+        (met[1].time, 0.000_307_945_260_059_030_9),
+        (plug.end.velocity, 95.814_493_763_696_13),
+        (plug.end.time, 0.000_747_875_156_143_104_4),
+    ] {
+        let (low, high) = ball.interval();
+        assert!(low <= exact.next_up() && exact.next_down() <= high, "{exact} in {low} .. {high}");
+        assert!(ball.radius <= 1e-15 * exact, "{exact}: {}", ball.radius);
+    }
+    assert_eq!((sand.outcome, plug.outcome), (Outcome::Stopped, Outcome::Perforated));
+    assert_eq!(met[0].velocity, Ball::from_f64(250.0));
+}
+
+/// A random scene, of numbers whose decimals are exact in binary, of up to three stages with ends at speeds, at depths and on conditions, and with masses that join.
+fn random_ends(random: &mut Random) -> String {
+    let mut text = "[parameters]\nP = '90 kN'\nQ = '2 kg/m'\nR = '3 MN/m'\nl = '0.15 m'\nv1 = '90 m/s'\n".to_owned();
+    let forces = [
+        "static_force = 60000\ndrag = 2",
+        "force = 'P + Q*V^2'",
+        "force = 'P*(1 + V/v1)'",
+        "force = 'R*x + Q*V^2'",
+        "static_force = 20000\nviscosity = 300",
+        "force = 'P*(0.5 + x/l)'",
+        "static_force = -3000\ndrag = 1",
+    ];
+    let conditions = [
+        "P + Q*V^2 = R*(l - x)",
+        "V = v1*(1 + x/l)",
+        "(V/v1)^2 = 2 - x/l",
+        "x/l = 0.25 + exp(V/v1)/16",
+        "sin(9*x/l) = V/v1 - 1",
+        "R*x = P*sqrt(V/v1)",
+    ];
+    let stages = 1 + random.below(3);
+    let mut deepest = 0.0;
+    for _ in 0..stages {
+        text += &format!("[[stage]]\n{}\n", forces[random.below(forces.len())]);
+        if random.chance(0.4) {
+            deepest += random.uniform(0.01, 0.1);
+            text += &format!("end = {deepest:?}\n");
+        }
+        text += &match random.below(3) {
+            0 => format!("end_velocity = {:?}\n", random.uniform(20.0, 250.0)),
+            _ => format!("until = '{}'\n", conditions[random.below(conditions.len())]),
+        };
+        if random.chance(0.3) {
+            text += &format!("add_mass = {:?}\n", random.uniform(0.1, 1.0));
+        }
+    }
+    text += "[[stage]]\nstatic_force = 50000\n";
+    if random.chance(0.5) { with_thickness(&text, random.uniform(0.02, 0.4)) } else { text }
+}
+
+#[test]
+fn enclosures_of_random_ends_hold_the_answer_in_double_double() {
+    let random = &mut Random::new(7);
+    let (mut compared, mut undecided, mut met) = (0, 0, 0);
+    let count = std::env::var("PENETRODE_CASES").map_or(80, |cases| cases.parse().unwrap());
+    while compared < count {
+        let text = random_ends(random);
+        let Ok(scene) = Scene::from_toml(&format!("projectile.mass = 2\n{}", used(&text)), "ends") else { continue };
+        let problem = scene.resolve(random.uniform(60.0, 350.0)).unwrap();
+        let Ok(exact) = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events) else { continue };
+        compared += 1;
+        let flight = Enclosure.enclose(&problem.cast(), Detail::Events).unwrap();
+        let scale = [exact.end.time.value(), exact.end.depth.value(), problem.impact_speed];
+        if exact.outcome == Outcome::Undecided {
+            continue;
+        }
+        if flight.outcome == Outcome::Undecided {
+            undecided += 1;
+            assert!(holds(&flight.end, &exact.end, scale), "{text}: {:?} {:?}", flight.end, exact.end);
+            continue;
+        }
+        assert_eq!(
+            (flight.outcome, kinds(&flight.events)),
+            (exact.outcome, kinds(&exact.events)),
+            "{text} at {}",
+            problem.impact_speed
+        );
+        met += flight.events.iter().filter(|event| matches!(event.kind, EventKind::StageEnd(_))).count();
+        for (event, exact) in flight.events.iter().zip(&exact.events) {
+            assert!(
+                holds(&event.state, &exact.state, scale),
+                "{text} at {}: {event:?} {exact:?}",
+                problem.impact_speed
+            );
+        }
+    }
+    println!("{compared} compared, {undecided} undecided, {met} ends met");
+    assert!(undecided * 20 <= compared && met > compared / 2, "{undecided} undecided, {met} met of {compared}");
+}
+
+/// `text` without the parameters that nothing names.
+fn used(text: &str) -> String {
+    let body = &text[text.find("[[stage]]").unwrap()..];
+    let is_named = |name: &str| body.split(|c: char| !c.is_alphanumeric()).any(|word| word == name);
+    let is_kept = |line: &&str| {
+        !["P", "Q", "R", "l", "v1"]
+            .iter()
+            .any(|name| line.strip_prefix(name).is_some_and(|rest| rest.starts_with(" =")) && !is_named(name))
+    };
+    text.lines().filter(is_kept).map(|line| format!("{line}\n")).collect()
+}
+
+/// `(x - 0.1 m)² = c`: two zeros, two that are as good as one, one that is touched, and none.
+#[test]
+fn a_condition_that_may_be_touched_is_not_proved_to_be_met_or_missed() {
+    for (gap, ends) in [(1e-4, Some(1)), (1e-30, None), (0.0, None), (-1e-30, Some(0)), (-1e-4, Some(0))] {
+        let text = format!(
+            "[parameters]\na = '0.1 m'\nc = '{gap:?} m^2'\n[[stage]]\nstatic_force = 36000\nuntil = '(x - a)^2 = c'\n\
+             [[stage]]\nstatic_force = 72000\n"
+        );
+        let flight = Enclosure.enclose(&problem(&text, 100.0).cast(), Detail::Events).unwrap();
+        let met = flight.events.iter().filter(|event| event.kind == EventKind::StageEnd(0)).count();
+        match ends {
+            Some(ends) => assert_eq!((met, flight.outcome), (ends, Outcome::Stopped), "{gap}"),
+            None => assert_eq!(flight.outcome, Outcome::Undecided, "{gap}: {flight:?}"),
+        }
+    }
+}
+
+/// Faster projectiles break a plug no later: V_c lies between two neighbours, and no other condition has one.
+#[test]
+fn the_critical_velocity_of_a_plug_is_enclosed_and_none_of_another_condition() {
+    let enclosed = |text: &str| {
+        let file = crate::exchange::scene_file::SceneFile::from_toml(text, "plug", &[]).unwrap();
+        let found = critical_velocity::of_scene(&file.scene, &Taylor::default()).unwrap().velocity;
+        (found, crate::studies::enclosure::critical(&file.scene, &file.written))
+    };
+    let (found, proved) = enclosed(include_str!("../../../verification/scenes/plug.toml"));
+    let (low, high) = proved.unwrap();
+    assert!((high - low) / high < 1e-14 && (found / low - 1.0).abs() < 1e-12, "{low} .. {high}, {found}");
+    let text = format!("projectile.mass = 2\n{}", with_thickness(PLUG, 0.1));
+    assert_eq!(enclosed(&text).1, None);
 }

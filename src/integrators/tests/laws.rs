@@ -503,33 +503,41 @@ fn stages_of_coefficients_stand_among_laws() {
              [[stage]]\n{last}\n"
         )
     };
-    let text = stages("static_force = 2e5\nstiffness = 1e6", "static_force = 9e5\ndrag = 3");
-    let scene = Scene::from_toml(&text, "mixed").unwrap();
-    for (speed, exit) in [(100.0, 0.1), (182.0, f64::INFINITY), (250.0, 0.05), (250.0, 0.07), (90.0, f64::INFINITY)] {
-        let problem = scene.resolve(speed).unwrap().with_exit(exit);
-        let exact = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap().values();
-        for method in exact_methods() {
-            let flight = method.solve(&problem, Detail::Events).unwrap();
-            assert_eq!((flight.outcome, kinds(&flight.events)), (exact.outcome, kinds(&exact.events)), "{problem:?}");
-            for (ours, known) in flight.events.iter().zip(&exact.events) {
-                let errors = [
-                    (ours.state.time - known.state.time) / exact.end.time,
-                    (ours.state.depth - known.state.depth) / exact.end.depth,
-                    (ours.state.velocity - known.state.velocity) / speed,
-                ];
-                assert!(errors.iter().all(|error| error.abs() < 1e-15), "{}: {errors:?}", method.name());
-            }
-            if let Some(margin) = flight.exit_margin {
-                let off = (margin - exact.exit_margin.unwrap()).abs();
-                assert!(off <= flight.exit_margin_error.unwrap(), "{}: {off:e}", method.name());
-                assert_eq!(method.exit_margin(&problem).unwrap().unwrap().value, margin);
+    for [first, last] in [
+        ["static_force = 2e5\nstiffness = 1e6", "static_force = 9e5\ndrag = 3"],
+        ["static_force = 2e5\nviscosity = 800", "static_force = 7e5\nstiffness = 1e6\nviscosity = 900\ndrag = 2"],
+    ] {
+        let scene = Scene::from_toml(&stages(first, last), "mixed").unwrap();
+        for (speed, exit) in [(100.0, 0.1), (182.0, f64::INFINITY), (250.0, 0.05), (250.0, 0.07), (90.0, f64::INFINITY)]
+        {
+            let problem = scene.resolve(speed).unwrap().with_exit(exit);
+            let exact = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::Events).unwrap().values();
+            for method in exact_methods() {
+                let flight = method.solve(&problem, Detail::Events).unwrap();
+                assert_eq!(
+                    (flight.outcome, kinds(&flight.events)),
+                    (exact.outcome, kinds(&exact.events)),
+                    "{problem:?}"
+                );
+                for (ours, known) in flight.events.iter().zip(&exact.events) {
+                    let errors = [
+                        (ours.state.time - known.state.time) / exact.end.time,
+                        (ours.state.depth - known.state.depth) / exact.end.depth,
+                        (ours.state.velocity - known.state.velocity) / speed,
+                    ];
+                    assert!(errors.iter().all(|error| error.abs() < 1e-15), "{}: {errors:?}", method.name());
+                }
+                if let Some(margin) = flight.exit_margin {
+                    let off = (margin - exact.exit_margin.unwrap()).abs();
+                    assert!(off <= flight.exit_margin_error.unwrap(), "{}: {off:e}", method.name());
+                    assert_eq!(method.exit_margin(&problem).unwrap().unwrap().value, margin);
+                }
             }
         }
-        let mut viscous = problem;
-        viscous.stages[0].viscosity = 5.0;
-        let error = Energy::new().solve(&viscous, Detail::End).unwrap_err();
-        assert!(error.is_usage() && error.to_string().contains("viscosity of 5 kg/s"), "{error}");
     }
+    let alone = Scene::from_toml("projectile.mass = 2\n[[stage]]\nviscosity = 5\nstiffness = 9\n", "viscous").unwrap();
+    let error = Energy::new().solve(&alone.resolve(100.0).unwrap(), Detail::End).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("viscosity of 5 kg/s"), "{error}");
 }
 
 #[test]

@@ -113,6 +113,14 @@ fn a_run_that_fails_costs_its_point_and_not_the_study() {
     let critical = studies.last().unwrap();
     assert!(critical.quantity == Quantity::CriticalVelocity && critical.lost > 0, "{} lost", critical.lost);
     assert!(studies.iter().any(|study| study.verdict == Verdict::Passed));
+    // The search for V_c at a long step ends at speeds whose squares leave the range of numbers.
+    let slab = parsed(
+        "[projectile]\nmass = 46.3326\ndiameter = 0.195399\nnose = { shape = 'flat' }\n\
+         [target]\nstrength = 5.92854e+07\ndensity = 2634\nthickness = 2.66243\n[resistance]\nk = 1.555\n\
+         [impact]\nvelocity = 74.6075",
+    );
+    let studies = studied(&slab, (VelocityAt::LaggedHalfStep, Boundaries::Interpolated), None).quantities;
+    assert!(studies.iter().any(|study| study.quantity == Quantity::CriticalVelocity), "{studies:?}");
 }
 
 #[test]
