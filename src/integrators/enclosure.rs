@@ -223,7 +223,7 @@ impl<'a> Law<'a> {
             return Coefficients::new(&problem.stages[index], mass).map(Self::Coefficients);
         };
         let ending = match law.end() {
-            Some(condition) => Some(Ending::new(condition, at)?),
+            Some(condition) => Some(Box::new(Ending::new(condition, at)?)),
             None => None,
         };
         Some(Self::Expression(Expression::new(law.bound()?, mass, ending)))
@@ -1055,7 +1055,6 @@ impl StageSolver<Ball> for Steps {
                 Step::Rest(state) => return Ok(StageEnd::Rest(state)),
                 // What comes next is known where it lies on one side of every boundary.
                 Step::Condition(state) if Self::is_apart(course, state.depth) => return Ok(StageEnd::Condition(state)),
-                Step::Condition(_) => break,
                 Step::Either(state) => {
                     let is_last = limit == course.problem.exit_depth;
                     let beside = || Self::on_either_side(course, state, limit);
@@ -1063,7 +1062,7 @@ impl StageSolver<Ball> for Steps {
                     let state = state.unwrap_or_else(|| Self::anything(course, centre.state()));
                     return Ok(self.give_up(course, state));
                 }
-                Step::Unproved => break,
+                Step::Condition(_) | Step::Unproved => break,
             }
         }
         let state = Self::anything(course, centre.state());

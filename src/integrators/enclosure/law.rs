@@ -37,7 +37,7 @@ const TUBES_MAX: u32 = 4;
 pub(super) struct Expression<'a> {
     force: &'a Bound<Ball>,
     mass: Ball,
-    pub(super) ending: Option<Ending<'a>>,
+    pub(super) ending: Option<Box<Ending<'a>>>,
 }
 
 /// The branch of each min, max and abs.
@@ -75,7 +75,7 @@ impl Misses {
 }
 
 impl<'a> Expression<'a> {
-    pub(super) fn new(force: &'a Bound<Ball>, mass: Ball, ending: Option<Ending<'a>>) -> Self {
+    pub(super) fn new(force: &'a Bound<Ball>, mass: Ball, ending: Option<Box<Ending<'a>>>) -> Self {
         Self { force, mass, ending }
     }
 
@@ -248,7 +248,7 @@ impl<'a> Expression<'a> {
                 let is_open = |ending: &Ending<'_>| {
                     ending.is_clear(all_x, all_v) || ending.stays_open(self, (centre, series), time, (depth, greatest))
                 };
-                let is_open = self.ending.as_ref().is_none_or(is_open);
+                let is_open = self.ending.as_deref().is_none_or(is_open);
                 return is_open.then_some((Error { norm: velocity, velocity, depth }, greatest));
             }
             tube *= 16.0;

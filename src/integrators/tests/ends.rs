@@ -487,7 +487,7 @@ fn used(text: &str) -> String {
             .iter()
             .any(|name| line.strip_prefix(name).is_some_and(|rest| rest.starts_with(" =")) && !is_named(name))
     };
-    text.lines().filter(is_kept).map(|line| format!("{line}\n")).collect()
+    text.lines().filter(is_kept).flat_map(|line| [line, "\n"]).collect()
 }
 
 /// `(x - 0.1 m)² = c`: two zeros, two that are as good as one, one that is touched, and none.
