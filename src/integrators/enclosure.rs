@@ -168,13 +168,18 @@ fn boundaries_are_apart(problem: &Problem<Ball>) -> bool {
         && inner.iter().all(|end| is_told(Ball::zero(), *end))
 }
 
-/// Whether each condition that is taken for the one before it has the same balls.
+/// Whether each condition that is taken for the one before it has the same numbers: the same balls, no wider than decimals make them.
 fn conditions_are_apart(problem: &Problem<Ball>) -> bool {
     let end_of = |index: usize| problem.laws.of(index).and_then(|law| law.end());
     let conditions = (0..problem.stages.len()).filter_map(end_of);
     conditions.clone().all(|condition| {
         let next = end_of(condition.next()).filter(|next| next.is_same(condition));
-        next.is_none_or(|next| next.parameters() == condition.parameters())
+        let is_decimal = |number: &Ball| number.radius <= UNIT * number.magnitude();
+        next.is_none_or(|next| {
+            // Parameters of an equation are those of the scene, and are the same whatever they are.
+            let is_known = !condition.is_speed() || condition.parameters().iter().all(is_decimal);
+            is_known && next.parameters() == condition.parameters()
+        })
     })
 }
 
@@ -807,9 +812,12 @@ impl Steps {
         let near = ending.root(centre, series, span)?;
         let mut gap = 16.0 * ROUNDOFF * near + 8.0 * centre.error.velocity / series.velocity;
         for _ in 0..RETRIES_MAX {
-            let before = centre.after(law, series, (near - gap).max(0.0))?;
-            if let Some(state) = ending.met(own, &before, limit) {
+            let before = centre.after(law, series, (near - gap).max(0.0));
+            if let Some(state) = before.and_then(|before| ending.met(own, &before, limit)) {
                 return Some(state);
+            }
+            if gap > near {
+                break;
             }
             gap *= 16.0;
         }
@@ -1069,9 +1077,14 @@ impl StageSolver<Ball> for Steps {
         Ok(self.give_up(course, state))
     }
 
-    /// Where it is open, the stage is entered, and given up ([`Law::new`]).
+    /// Where it is open, so is the flight: the stage is entered and given up ([`Law::new`]), or the flight ends with a mass that may
+    /// have joined.
     fn meets(&mut self, condition: &Condition<Ball>, at: State<Ball>) -> bool {
-        ending::is_met(condition, at) == Some(true)
+        let is_met = ending::is_met(condition, at);
+        if is_met.is_none() {
+            self.open = Some(State { velocity: Ball::between(0.0, at.velocity.magnitude()), ..at });
+        }
+        is_met == Some(true)
     }
 
     fn margin(&mut self, course: &mut Course<'_, Ball>) -> Solved<Bounded> {

@@ -377,6 +377,8 @@ impl<'a, S: Scalar> Course<'a, S> {
         self.state.velocity = self.state.velocity * share;
         self.error_bound *= share.value() * share.value();
         self.mass = mass;
+        // With another velocity nothing is met by having been met before.
+        self.just_met = None;
         self.sample(self.state);
     }
 

@@ -638,7 +638,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 let parts = self.law.shown_in(place, energy)?;
                 (1..parts).all(|part| holds(&(part as f64 / parts as f64))).then_some(())
             };
-            let shown = if ASKED.iter().all(holds) && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
+            let shown =
+                if ASKED.iter().all(holds) && shows().is_some() { self.shown_end(&path, limit) } else { SHORTENING };
             if shown >= 1.0 {
                 return Ok((path, kink));
             }
@@ -668,10 +669,18 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         Some(series)
     }
 
-    /// The share of the path on which its series shows where g vanishes: 1 where all of it does.
-    fn shown_end(&self, path: &Path<S, K>) -> f64 {
+    /// The share of the path on which its series shows where g vanishes: 1 where all of it does, up to rest and the limit.
+    ///
+    /// A path of constant force goes on for long behind them, where the series of g may be anything.
+    fn shown_end(&self, path: &Path<S, K>, limit: S) -> f64 {
         let (Some((end, side)), Some(series)) = (self.end, self.condition_series()) else { return 1.0 };
-        if !self.shows_end(path, end, &series) {
+        let within = Path { span: first_event(path, limit).0.value(), ..path.clone() };
+        let share = self.shown_within(&within, end, side, &series);
+        if share < 1.0 { share * within.span / path.span } else { 1.0 }
+    }
+
+    fn shown_within(&self, path: &Path<S, K>, end: &Condition<S>, side: f64, series: &[S; K]) -> f64 {
+        if !self.shows_end(path, end, series) {
             return SHORTENING;
         }
         let place = |share: f64| {
@@ -689,7 +698,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 }
             }
             Sight::Crossed(_, to) => {
-                let is_found = first_root(&series, path.span).is_some_and(|root| root <= to * path.span * (1.0 + 1e-9));
+                let is_found = first_root(series, path.span).is_some_and(|root| root <= to * path.span * (1.0 + 1e-9));
                 if is_found { 1.0 } else { to.min(SHORTENING) }
             }
         }
@@ -705,15 +714,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         ASKED.iter().all(|share| {
             let s = share * path.span;
             let at = path.at(S::from_f64(s)).values();
-            // Behind rest nothing is asked.
-            if at.velocity < 0.0 {
-                return true;
-            }
             let size = series.iter().rev().fold(0.0, |sum, c| sum * s + c.value().abs());
             let allowed = (DEFECT_MAX * self.tolerance + 64.0 * f64::EPSILON) * size;
-            let noise = end.noise(at.depth, at.velocity);
+            let noise = end.noise(at.depth, at.velocity.max(0.0));
             allowed <= CANCELLED * largest + noise
-                && (both(series, s).0 - end.value(at.depth, at.velocity)).abs() <= allowed + noise
+                && (both(series, s).0 - end.value(at.depth, at.velocity.max(0.0))).abs() <= allowed + noise
         })
     }
 

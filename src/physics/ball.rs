@@ -485,6 +485,11 @@ impl Elementary for Ball {
     }
 
     fn tanh(self) -> Self {
+        // It rises with z: a wide ball has the values at its ends.
+        if self.radius > 0.25 && self.radius.is_finite() {
+            let (low, high) = self.interval();
+            return Self::from_f64(low).tanh().hull(Self::from_f64(high).tanh());
+        }
         let twice = Elementary::exp(self.scaled(-2.0 * self.mid.hi.signum()));
         let tanh = (Self::one() - twice) / (Self::one() + twice);
         if self.mid.hi < 0.0 { -tanh } else { tanh }

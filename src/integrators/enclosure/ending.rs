@@ -3,6 +3,8 @@
 //! g keeps its sign through a panel of a step if its values over a box around the panel have it; or if g changes in one direction
 //! there and has the sign at the end that is nearer to a zero. The first zero is a mean value over a tiny box.
 
+use std::cell::Cell;
+
 use smallvec::SmallVec;
 
 use super::law::{Expression, sides_of};
@@ -22,7 +24,12 @@ pub(super) struct Ending<'a> {
     g: Bound<Ball>,
     /// The sign of g where the stage begins.
     side: f64,
+    /// Panels that may still be looked at in the stage.
+    left: Cell<u32>,
 }
+
+/// Panels that are looked at in a stage.
+const LOOKS_MAX: u32 = 20_000;
 
 /// Whether `condition` is met in a state at which its stage begins; `None` where that is open.
 pub(super) fn is_met(condition: &Condition<Ball>, at: State<Ball>) -> Option<bool> {
@@ -41,7 +48,7 @@ impl<'a> Ending<'a> {
     pub(super) fn new(condition: &'a Condition<Ball>, at: State<Ball>) -> Option<Self> {
         let g = condition.bound();
         let side = if g.eval(at.depth, at.velocity).lower() > 0.0 { 1.0 } else { -1.0 };
-        (is_met(condition, at) == Some(false)).then_some(Self { condition, g, side })
+        (is_met(condition, at) == Some(false)).then(|| Self { condition, g, side, left: Cell::new(LOOKS_MAX) })
     }
 
     /// g at all depths in `x` and velocities in `v`, above zero where the stage begins.
@@ -101,7 +108,8 @@ impl<'a> Ending<'a> {
             if nearest.is_some_and(|(x, v)| self.is_clear(x, v)) {
                 continue;
             }
-            if count > PANELS_MAX || middle <= from || middle >= to {
+            self.left.set(self.left.get().saturating_sub(1));
+            if count > PANELS_MAX || self.left.get() == 0 || middle <= from || middle >= to {
                 return false;
             }
             waiting.extend([(middle, to), (from, middle)]);

@@ -521,3 +521,44 @@ fn the_critical_velocity_of_a_plug_is_enclosed_and_none_of_another_condition() {
     let text = format!("projectile.mass = 2\n{}", with_thickness(PLUG, 0.1));
     assert_eq!(enclosed(&text).1, None);
 }
+
+/// `(V/v1)² = sqrt((x + c2)/c1)`, whose series of the way ends at -c2, on the parabola of a constant force; mpmath with 30 digits.
+#[test]
+fn a_condition_whose_series_ends_before_the_path_does_is_met_at_its_place() {
+    let text = "[parameters]\nv1 = '192.5 m/s'\nc1 = '0.8125 m'\nc2 = '0.234375 m'\n[[stage]]\nstatic_force = 65792\n\
+                until = '(V/v1)^2 = sqrt((x + c2)/c1)'\n[[stage]]\nstatic_force = 80000\n";
+    for (name, method) in methods(1e-10) {
+        let flight = method.integrator().solve(&problem(&with_thickness(text, 1.1), 219.4), Detail::Events).unwrap();
+        let allowed = if is_exact(name) { 8.0 * f64::EPSILON } else { 1000.0 * name.promise_at(1e-10) };
+        let met = flight.events[0].state;
+        assert!(is_near(met.depth, 0.282_439_944_680_750_8, allowed), "{name}: {met}");
+        assert!(is_near(met.velocity, 171.912_975_541_592_1, allowed), "{name}: {met}");
+    }
+}
+
+/// 64 N slow 2 kg from 16 m/s to 12 m/s in 1.75 m; with two more kilograms 6 m/s are left, below the end of the next stage.
+#[test]
+fn a_speed_that_was_met_before_a_mass_joined_is_not_met_by_that() {
+    let text = "[parameters]\nv1 = '12 m/s'\n[[stage]]\nstatic_force = 64\nuntil = 'V = v1'\nadd_mass = 2\n\
+                [[stage]]\nstatic_force = 32\nuntil = 'V = v1'\n[[stage]]\nstatic_force = 1024\n";
+    for (name, method) in methods(1e-10) {
+        let flight = method.integrator().solve(&problem(&with_thickness(text, 8.0), 16.0), Detail::Events).unwrap();
+        let allowed = 1000.0 * name.promise_at(1e-10).max(1e-15);
+        assert!(is_near(flight.end.depth, 4.0, allowed), "{name}: {}", flight.end);
+        assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest], "{name}");
+    }
+    let flight = Enclosure.enclose(&problem(&with_thickness(text, 8.0), 16.0).cast(), Detail::Events).unwrap();
+    assert!(flight.outcome == Outcome::Stopped && (flight.end.depth - Ball::from_f64(4.0)).magnitude() < 1e-14);
+}
+
+/// `x = 3 x1` at the exit, x1 a third of it as decimals: the mass behind it joins there or not, by less than can be told.
+#[test]
+fn a_condition_that_is_open_at_the_exit_leaves_an_enclosure_undecided() {
+    let text = "projectile.mass = 2\nimpact.velocity = 200\ntarget.thickness = 0.3\n[parameters]\nx1 = '0.1 m'\n\
+                [[stage]]\nstatic_force = 64000\nend = 0.3\n[[stage]]\nstatic_force = 64000\nuntil = 'x = 3*x1'\n\
+                add_mass = 1\n[[stage]]\nstatic_force = 64000\n";
+    let file = crate::exchange::scene_file::SceneFile::from_toml(text, "open", &[]).unwrap();
+    let flight = crate::studies::enclosure::flight(&file.scene, &file.written, Detail::Events).unwrap().unwrap();
+    let (low, high) = flight.end.velocity.interval();
+    assert!(flight.outcome == Outcome::Undecided && low <= 96.148_03 && high >= 144.222, "{flight:?}");
+}
