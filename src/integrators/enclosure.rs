@@ -811,6 +811,7 @@ impl Steps {
         let ending = own.ending.as_ref()?;
         let near = ending.root(centre, series, span)?;
         let mut gap = 16.0 * ROUNDOFF * near + 8.0 * centre.error.velocity / series.velocity;
+        gap += ending.uncertainty(centre, series, near);
         for _ in 0..RETRIES_MAX {
             let before = centre.after(law, series, (near - gap).max(0.0));
             if let Some(state) = before.and_then(|before| ending.met(own, &before, limit)) {
@@ -1081,7 +1082,7 @@ impl StageSolver<Ball> for Steps {
     /// have joined.
     fn meets(&mut self, condition: &Condition<Ball>, at: State<Ball>) -> bool {
         let is_met = ending::is_met(condition, at);
-        if is_met.is_none() {
+        if is_met.is_none() && self.open.is_none() {
             self.open = Some(State { velocity: Ball::between(0.0, at.velocity.magnitude()), ..at });
         }
         is_met == Some(true)

@@ -18,6 +18,9 @@ use crate::physics::{Scalar, State};
 const PARTS: i32 = 16;
 const HALVINGS: u32 = 60;
 
+/// Share of a time over which the slope of g is guessed.
+const NEAR: f64 = 1e-6;
+
 /// The condition that ends a stage.
 pub(super) struct Ending<'a> {
     condition: &'a Condition<Ball>,
@@ -115,6 +118,18 @@ impl<'a> Ending<'a> {
             waiting.extend([(middle, to), (from, middle)]);
         }
         true
+    }
+
+    /// About how long before and behind `time`, near which g vanishes, its numbers leave its sign open.
+    pub(super) fn uncertainty(&self, centre: &Centre, series: &Series, time: f64) -> f64 {
+        let place = |time: f64| {
+            let [v, _, x] = series.near(time);
+            (centre.x.hi + x * series.velocity * series.time, v * series.velocity)
+        };
+        let ((x, v), (x_before, v_before)) = (place(time), place(time * (1.0 - NEAR)));
+        let falls = self.side * (self.condition.value(x_before, v_before) - self.condition.value(x, v));
+        let open = 2.0 * self.value(Ball::from_f64(x), Ball::from_f64(v)).radius * NEAR * time / falls;
+        if open.is_finite() && open > 0.0 { open } else { 0.0 }
     }
 
     /// A time near which g first changes its sign on the polynomials, if it is seen to do so until `span`.

@@ -417,6 +417,8 @@ fn random_ends(random: &mut Random) -> String {
         "x/l = 0.25 + exp(V/v1)/16",
         "sin(9*x/l) = V/v1 - 1",
         "R*x = P*sqrt(V/v1)",
+        "(V/v1)^2 = sqrt(0.25 + x/l)",
+        "min(V/v1, x/l) = 0.5",
     ];
     let stages = 1 + random.below(3);
     let mut deepest = 0.0;
