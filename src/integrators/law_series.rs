@@ -69,6 +69,9 @@ const CANCELLED: f64 = 1e-3;
 /// Share of a root behind which a turn counts as beyond it: a double root is known to half of its digits.
 const NEAR_TURN: f64 = 0.99999;
 
+/// How far behind a turn before zero a step goes on, over the way to it.
+const BEHIND_TURN: f64 = 1e-3;
+
 /// Longest step by velocity where the force vanishes at rest: its quotients cancel towards the end.
 const VANISHING_SPAN: f64 = 0.5;
 
@@ -480,7 +483,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         });
         Ok(match event {
             Event::None => {
-                self.kink = kink;
+                self.kink = kink.filter(|_| s.value() >= path.span);
                 course.state = next;
                 course.sample(next);
                 None
@@ -747,14 +750,33 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 }
                 None => value(&series, s),
             };
-            let corrected = corrected(S::from_f64(root), span, g, |s| slope(&series, s));
+            let refined = |root: f64| corrected(S::from_f64(root), span, &g, |s| slope(&series, s));
+            let finer = |root: f64| if S::EPSILON < f64::EPSILON { refined(root) } else { S::from_f64(root) };
+            // A double root is known to half of its digits, the value where g turns to all.
+            if let Some(turn) = turn.filter(|turn| *turn >= NEAR_TURN * root) {
+                let beyond = -side * both(&series, turn).0;
+                let rounding =
+                    16.0 * f64::EPSILON * series.iter().rev().fold(0.0, |sum, c| sum * turn + c.value().abs());
+                if beyond < -rounding {
+                    // It turns before zero: the step goes on to a place where that is plain.
+                    let (cut, nearest) = (turn * (1.0 + BEHIND_TURN), Some((turn, beyond)));
+                    return if cut < span { (S::from_f64(cut), Event::None, nearest) } else { (s, event, nearest) };
+                }
+                // g itself, whose terms cancel less than those of its series.
+                let passed = |s: f64| {
+                    let at = path.at(S::from_f64(s)).values();
+                    (-side * end.value(at.depth, at.velocity.max(0.0)), -side * both(&series, s).1)
+                };
+                let root = if beyond > rounding { finer(root_before(passed, turn)) } else { S::from_f64(turn) };
+                return (root, Event::Condition, Some((turn, beyond)));
+            }
+            let corrected = refined(root);
             let (rate, curvature) = both(&slopes, corrected.value());
-            let (place, beyond) = match turn {
-                // A double root is known to half of its digits, the value where g turns to all.
-                Some(turn) if turn >= NEAR_TURN * root => (turn, -side * both(&series, turn).0),
+            let (place, beyond) = if side * curvature > 0.0 {
                 // The parabola through the root goes so far beyond it.
-                _ if side * curvature > 0.0 => (corrected.value(), 0.5 * rate * rate / curvature.abs()),
-                _ => (corrected.value(), f64::INFINITY),
+                (corrected.value(), 0.5 * rate * rate / curvature.abs())
+            } else {
+                (corrected.value(), f64::INFINITY)
             };
             return (corrected, Event::Condition, Some((place, beyond)));
         }

@@ -564,3 +564,29 @@ fn a_condition_that_is_open_at_the_exit_leaves_an_enclosure_undecided() {
     let (low, high) = flight.end.velocity.interval();
     assert!(flight.outcome == Outcome::Undecided && low <= 96.148_03 && high >= 144.222, "{flight:?}");
 }
+
+/// `(x - a)² = c` on the parabola of a constant force: missed by 1e-14 m², crossed by as much, and missed and then met by another term.
+#[test]
+fn a_condition_that_turns_just_before_zero_is_not_met_and_just_behind_it_is() {
+    let text = |condition: &str| {
+        format!(
+            "[parameters]\na = '0.25 m'\nw = '1e-7 m'\nb = '0.375 m'\n[[stage]]\nstatic_force = 40000\nuntil = '{condition}'\n\
+             add_mass = 1\n[[stage]]\nstatic_force = 90000\n"
+        )
+    };
+    for method in exact_methods() {
+        let solved = |condition: &str| {
+            let condition =
+                format!("{condition} + 0*(a^2 + w^2){}", if condition.contains('b') { "" } else { " + 0*b^2" });
+            method.solve(&problem(&with_thickness(&text(&condition), 0.5), 200.0), Detail::Events).unwrap()
+        };
+        let missed = solved("(x - a)^2 = -w^2");
+        assert_eq!((missed.outcome, kinds(&missed.events)), (Outcome::Perforated, vec![EventKind::Exit]), "{missed:?}");
+        assert!(is_near(missed.exit_margin.unwrap(), 0.5, 1e-12), "{}", method.name());
+        let crossed = solved("(x - a)^2 = w^2");
+        assert!((crossed.events[0].state.depth - (0.25 - 1e-7)).abs() < 1e-11, "{}: {crossed:?}", method.name());
+        // ((x - a)² + w²) (b - x) vanishes at b alone.
+        let later = solved("(x - a)^2*(b - x) = -w^2*(b - x)");
+        assert!(is_near(later.events[0].state.depth, 0.375, 1e-13), "{}: {later:?}", method.name());
+    }
+}
