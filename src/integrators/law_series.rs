@@ -750,7 +750,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 }
                 None => value(&series, s),
             };
-            let refined = |root: f64| corrected(S::from_f64(root), span, &g, |s| slope(&series, s));
+            let refined = |root: f64| corrected(S::from_f64(root), span, g, |s| slope(&series, s));
             let finer = |root: f64| if S::EPSILON < f64::EPSILON { refined(root) } else { S::from_f64(root) };
             // A double root is known to half of its digits, the value where g turns to all.
             if let Some(turn) = turn.filter(|turn| *turn >= NEAR_TURN * root) {
