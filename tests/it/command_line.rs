@@ -141,8 +141,8 @@ fn one_end_of_an_enclosed_critical_velocity_stops_and_the_other_perforates() {
 #[test]
 fn what_cannot_be_enclosed_is_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let words = run_in(folder.path(), "solve law-allen --method enclosure").refused();
-    assert!(words.contains("ends at a speed or on a condition"), "{words}");
+    let words = run_in(folder.path(), "solve law-speed-table --method enclosure").refused();
+    assert!(words.contains("a table of velocity"), "{words}");
 }
 
 #[test]
