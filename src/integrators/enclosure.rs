@@ -100,8 +100,8 @@ impl Enclosure {
     /// The outcome is proved, or `Undecided`. Two boundaries of the problem are the same ball or differ as `f64`.
     ///
     /// # Errors
-    /// [`IntegrationError::Refused`] for a law in code or a table of velocity, or numbers beyond 1e-100 to 1e100;
-    /// [`IntegrationError::NeverEnds`].
+    /// [`IntegrationError::Refused`] for a law in code or a table of velocity, numbers beyond 1e-100 to 1e100, or depths or
+    /// conditions that differ, and not as `f64`; [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
         let is_text = |index: usize| problem.laws.of(index).is_none_or(|law| law.bound().is_some());
         if !(0..problem.stages.len()).all(is_text) {

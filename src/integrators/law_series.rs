@@ -741,17 +741,15 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
         let turn = if slopes.iter().all(|c| *c == 0.0) { None } else { locate::first_root(&slopes, span) };
         if let Some(root) = first_root(&series, span) {
-            // What the series of g leaves out is little in 64 bits; the path leaves out less, and shows g itself.
-            let own = (S::EPSILON < f64::EPSILON).then(|| end.bound());
-            let g = |s| match &own {
-                Some(own) => {
+            // g itself along the path: its terms cancel less than those of its series, which leaves out more than the path does.
+            let by_path = |root: f64| {
+                let own = end.bound();
+                let g = |s| {
                     let at = path.at(s);
                     own.eval(at.depth, at.velocity)
-                }
-                None => value(&series, s),
+                };
+                corrected(S::from_f64(root), span, g, |s| slope(&series, s))
             };
-            let refined = |root: f64| corrected(S::from_f64(root), span, g, |s| slope(&series, s));
-            let finer = |root: f64| if S::EPSILON < f64::EPSILON { refined(root) } else { S::from_f64(root) };
             // A double root is known to half of its digits, the value where g turns to all.
             if let Some(turn) = turn.filter(|turn| *turn >= NEAR_TURN * root) {
                 let beyond = -side * both(&series, turn).0;
@@ -762,15 +760,19 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                     let (cut, nearest) = (turn * (1.0 + BEHIND_TURN), Some((turn, beyond)));
                     return if cut < span { (S::from_f64(cut), Event::None, nearest) } else { (s, event, nearest) };
                 }
-                // g itself, whose terms cancel less than those of its series.
                 let passed = |s: f64| {
                     let at = path.at(S::from_f64(s)).values();
                     (-side * end.value(at.depth, at.velocity.max(0.0)), -side * both(&series, s).1)
                 };
-                let root = if beyond > rounding { finer(root_before(passed, turn)) } else { S::from_f64(turn) };
+                let root = if beyond > rounding { by_path(root_before(passed, turn)) } else { S::from_f64(turn) };
                 return (root, Event::Condition, Some((turn, beyond)));
             }
-            let corrected = refined(root);
+            // In 64 bits what the series of g leaves out is nothing.
+            let corrected = if S::EPSILON < f64::EPSILON {
+                by_path(root)
+            } else {
+                corrected(S::from_f64(root), span, |s| value(&series, s), |s| slope(&series, s))
+            };
             let (rate, curvature) = both(&slopes, corrected.value());
             let (place, beyond) = if side * curvature > 0.0 {
                 // The parabola through the root goes so far beyond it.

@@ -532,6 +532,34 @@ mod tests {
         assert!(least <= 77.459_666_924_148_34, "{least}");
     }
 
+    /// 2 kg from 16 m/s to 12 m/s in 112/F, and driven by 64 N from there to 3 m: `V² = 144 + 64 (3 - 112/F)`.
+    #[test]
+    fn more_force_that_brings_a_condition_forward_may_leave_more_speed() {
+        let text = "projectile.mass = 2\nimpact.velocity = 16\ntarget.thickness = 3\n[[stage]]\nstatic_force = 64\n\
+                    end_velocity = 12\n[[stage]]\nstatic_force = -64\n";
+        let SceneFile { scene, written } = SceneFile::from_toml(text, "forward.toml", &[]).unwrap();
+        let of = Region::new(&scene, &written, &sides(&["stage.0.static_force=64:96"])).unwrap();
+        let (low, high) = of.flight().unwrap().unwrap().end.velocity_m_s;
+        for force in [64.0, 80.0, 96.0_f64] {
+            let exact = (144.0 + 64.0 * (3.0 - 112.0 / force)).sqrt();
+            assert!(low.unwrap() <= exact && exact <= high.unwrap(), "{force}: {exact} in {low:?} .. {high:?}");
+        }
+    }
+
+    /// Two speeds of one range are two numbers: behind the one the projectile may be faster than the other, or slower.
+    #[test]
+    fn two_end_velocities_of_one_range_are_not_taken_for_one() {
+        let text = "projectile.mass = 2\nimpact.velocity = 16\n[[stage]]\nstatic_force = 64\nend_velocity = 12\n\
+                    [[stage]]\nstatic_force = 1e-4\nend_velocity = 12\n[[stage]]\nstatic_force = 1024\n";
+        let SceneFile { scene, written } = SceneFile::from_toml(text, "two.toml", &[]).unwrap();
+        let ranges = sides(&["stage.0.end_velocity=11.999:12", "stage.1.end_velocity=11.999:12"]);
+        let ball = |side: &Side| (side.parameter, Ball::decimal(side.low).hull(Ball::decimal(side.high)));
+        let wide = Written { ranges: ranges.iter().map(ball).collect(), ..written.clone() };
+        let refused = enclosure::flight(&scene, &wide, Detail::End).unwrap().unwrap_err();
+        assert!(refused.is_usage() && refused.to_string().contains("conditions differ"), "{refused}");
+        assert!(enclosure::flight(&scene, &written, Detail::End).unwrap().is_ok());
+    }
+
     #[test]
     fn below_the_least_critical_velocity_nothing_in_the_box_perforates() {
         let SceneFile { scene, written } = file("paper-slab");

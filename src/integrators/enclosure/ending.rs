@@ -18,6 +18,9 @@ use crate::physics::{Scalar, State};
 const PARTS: i32 = 16;
 const HALVINGS: u32 = 60;
 
+/// Panels that are looked at in a stage.
+const LOOKS_MAX: u32 = 20_000;
+
 /// Share of a time over which the slope of g is guessed.
 const NEAR: f64 = 1e-6;
 
@@ -31,12 +34,13 @@ pub(super) struct Ending<'a> {
     left: Cell<u32>,
 }
 
-/// Panels that are looked at in a stage.
-const LOOKS_MAX: u32 = 20_000;
-
 /// Whether `condition` is met in a state at which its stage begins; `None` where that is open.
 pub(super) fn is_met(condition: &Condition<Ball>, at: State<Ball>) -> Option<bool> {
-    let g = condition.bound().eval(at.depth, at.velocity);
+    is_met_by(condition, condition.bound().eval(at.depth, at.velocity))
+}
+
+/// The same where the value is `g`.
+fn is_met_by(condition: &Condition<Ball>, g: Ball) -> Option<bool> {
     if g.lower() > 0.0 {
         Some(false)
     } else if condition.has_two_sides() {
@@ -50,8 +54,10 @@ impl<'a> Ending<'a> {
     /// The `condition` of a stage that begins in a state; `None` where it is not proved to be open there.
     pub(super) fn new(condition: &'a Condition<Ball>, at: State<Ball>) -> Option<Self> {
         let g = condition.bound();
-        let side = if g.eval(at.depth, at.velocity).lower() > 0.0 { 1.0 } else { -1.0 };
-        (is_met(condition, at) == Some(false)).then(|| Self { condition, g, side, left: Cell::new(LOOKS_MAX) })
+        let first = g.eval(at.depth, at.velocity);
+        let side = if first.lower() > 0.0 { 1.0 } else { -1.0 };
+        let is_ahead = is_met_by(condition, first) == Some(false);
+        is_ahead.then(|| Self { condition, g, side, left: Cell::new(LOOKS_MAX) })
     }
 
     /// g at all depths in `x` and velocities in `v`, above zero where the stage begins.

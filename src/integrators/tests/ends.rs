@@ -589,3 +589,39 @@ fn a_condition_that_turns_just_before_zero_is_not_met_and_just_behind_it_is() {
         assert!(is_near(later.events[0].state.depth, 0.375, 1e-12), "{}: {later:?}", method.name());
     }
 }
+
+/// Where two events lie at one place, neither is proved to come first: 36 kN take 2 kg from 100 m/s to 80 at 0.1 m.
+#[test]
+fn an_enclosure_is_undecided_where_a_condition_lies_at_an_end_or_at_the_next() {
+    for (first, second) in [("end_velocity = 80\nend = 0.1", ""), ("end_velocity = 80", "end = 0.1\n")] {
+        let text = format!(
+            "projectile.mass = 2\nimpact.velocity = 100\n[[stage]]\nstatic_force = 36000\n{first}\nadd_mass = 1\n\
+             [[stage]]\nstatic_force = 1e6\n{second}[[stage]]\nstatic_force = 64000\n"
+        );
+        let text = if second.is_empty() {
+            text.replace("static_force = 1e6\n", "static_force = 1e6\nend = 0.5\n")
+        } else {
+            text
+        };
+        let file = crate::exchange::scene_file::SceneFile::from_toml(&text, "one place", &[]).unwrap();
+        let flight = crate::studies::enclosure::flight(&file.scene, &file.written, Detail::Events).unwrap().unwrap();
+        assert_eq!(flight.outcome, Outcome::Undecided, "{text}: {flight:?}");
+    }
+}
+
+/// The place of `(x - a)² = w²` does not depend on V0, and its time does: `V0 t - F t²/(2M) = a - w`, so `dt/dV0 = -t/V`.
+#[test]
+fn derivatives_at_a_condition_that_is_passed_by_little_are_those_of_its_place() {
+    use num_dual::Dual64;
+    let text = "[parameters]\na = '0.25 m'\nw = '1e-7 m'\n[[stage]]\nstatic_force = 40000\nuntil = '(x - a)^2 = w^2'\n\
+                [[stage]]\nstatic_force = 90000\n";
+    let mut dual = problem(text, 200.0).cast::<Dual64>();
+    dual.impact_speed = Dual64::new(200.0, 1.0);
+    let flights = [Taylor::default().solve_in(&dual, Detail::Events), Energy::new().solve_in(&dual, Detail::Events)];
+    for flight in flights {
+        let met = flight.unwrap().events[0].state;
+        let slope = -met.time.re / met.velocity.re;
+        assert!((met.depth.re - 0.249_999_9).abs() < 1e-11 && met.depth.eps.abs() < 1e-6 * met.time.re, "{met:?}");
+        assert!(is_near(met.time.eps, slope, 1e-5), "{met:?}: {slope}");
+    }
+}
