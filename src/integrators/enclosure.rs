@@ -915,13 +915,11 @@ impl Steps {
     }
 
     /// The end of a flight that comes to rest next to the end of a stage, on either side of it, if the next stage resists.
+    /// A mass that joins there makes neither distance nor time longer: momentum is kept, and energy falls.
     fn on_either_side(course: &Course<'_, Ball>, before: State<Ball>, limit: Ball) -> Option<State<Ball>> {
         let stages = &course.problem.stages;
         let next = (course.stage + 1..stages.len()).find(|index| stages[*index].end != limit)?;
         let at = State { depth: limit, ..before };
-        if (course.stage + 1..=next).any(|index| Self::is_joined(course.problem, index)) {
-            return None;
-        }
         let law = Law::new(course.problem, next, course.mass, at)?;
         let beyond = Centre::new(at, &law);
         let speeds = Ball::between(0.0, before.velocity.magnitude());
@@ -931,11 +929,6 @@ impl Steps {
             depth: before.depth.hull(furthest.depth),
             velocity: Ball::zero(),
         })
-    }
-
-    /// Whether a mass joins at the start of stage `index`.
-    fn is_joined(problem: &Problem<Ball>, index: usize) -> bool {
-        problem.laws.of(index).is_some_and(|law| law.joining(Ball::zero()).is_some())
     }
 
     /// Whether `depth` lies on one side of the exit and of the end of each stage from the present one on.

@@ -615,6 +615,14 @@ mod tests {
         }
     }
 
+    /// Between its values at the ends: tanh 3 = 0.9950547536867305.
+    #[test]
+    fn tanh_of_a_wide_ball_lies_between_those_of_its_ends() {
+        let (low, high) = Elementary::tanh(Ball::between(-40.0, 3.0)).interval();
+        assert!((-1.0 - 1e-11..=-1.0).contains(&low), "{low}");
+        assert!((0.995_054_753_686_730_4..0.995_054_753_7).contains(&high), "{high}");
+    }
+
     #[test]
     fn what_is_not_known_is_everything() {
         let zero = Ball::between(-1.0, 1.0);

@@ -532,18 +532,26 @@ mod tests {
         assert!(least <= 77.459_666_924_148_34, "{least}");
     }
 
-    /// 2 kg from 16 m/s to 12 m/s in 112/F, and driven by 64 N from there to 3 m: `V² = 144 + 64 (3 - 112/F)`.
+    /// 2 kg from 16 m/s to 12 m/s in 112/F, and driven by 64 N from there to 3 m: `V² = 144 + 64 (3 - 112/F)`, and `256 - 3 F` where
+    /// F is too little for that. Least at F = 112/3.
     #[test]
     fn more_force_that_brings_a_condition_forward_may_leave_more_speed() {
         let text = "projectile.mass = 2\nimpact.velocity = 16\ntarget.thickness = 3\n[[stage]]\nstatic_force = 64\n\
                     end_velocity = 12\n[[stage]]\nstatic_force = -64\n";
         let SceneFile { scene, written } = SceneFile::from_toml(text, "forward.toml", &[]).unwrap();
-        let of = Region::new(&scene, &written, &sides(&["stage.0.static_force=64:96"])).unwrap();
-        let (low, high) = of.flight().unwrap().unwrap().end.velocity_m_s;
+        let of = |texts: &[&str]| Region::new(&scene, &written, &sides(texts)).unwrap().flight().unwrap();
+        let (low, high) = of(&["stage.0.static_force=64:96"]).unwrap().end.velocity_m_s;
         for force in [64.0, 80.0, 96.0_f64] {
             let exact = (144.0 + 64.0 * (3.0 - 112.0 / force)).sqrt();
             assert!(low.unwrap() <= exact && exact <= high.unwrap(), "{force}: {exact} in {low:?} .. {high:?}");
         }
+        let least = of(&["stage.0.static_force=20:96"]).map_or(0.0, |ranges| ranges.end.velocity_m_s.0.unwrap());
+        assert!(least <= 12.0, "{least}");
+        // Wide numbers of a condition leave its time open by as much.
+        let ranges = of(&["stage.0.end_velocity=11.9:12"]).unwrap();
+        let (low, high) = ranges.end.velocity_m_s;
+        assert!((14.806..=219.22_f64.sqrt()).contains(&low.unwrap()), "{ranges:?}");
+        assert!((224.0_f64.sqrt()..14.967).contains(&high.unwrap()), "{ranges:?}");
     }
 
     /// Two speeds of one range are two numbers: behind the one the projectile may be faster than the other, or slower.

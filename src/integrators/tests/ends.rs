@@ -582,6 +582,20 @@ fn a_condition_that_turns_just_before_zero_is_not_met_and_just_behind_it_is() {
         let missed = solved("(x - a)^2 = -w^2");
         assert_eq!((missed.outcome, kinds(&missed.events)), (Outcome::Perforated, vec![EventKind::Exit]), "{missed:?}");
         assert!(is_near(missed.exit_margin.unwrap(), 0.5, 1e-12), "{}", method.name());
+        // A kink behind the turn is no kink at the place where the step is cut.
+        let kinked = |end: &str| {
+            let text = format!(
+                "[parameters]\na = '0.25 m'\nw = '1e-9 m'\nb = '0.375 m'\nP = '10 kN'\n[[stage]]\n\
+                 force = 'P*(1 + x/b)*max(1, x/b)'\nuntil = '{end}'\n[[stage]]\nstatic_force = 90000\n"
+            );
+            method.solve(&problem(&with_thickness(&text, 1.0), 150.0), Detail::Events).unwrap().end
+        };
+        let (turned, free) = (kinked("cos(x/a - 1) = 1 + (w/a)^2"), kinked("a - x = w + b"));
+        assert!(
+            is_near(turned.depth, free.depth, 1e-13) && is_near(turned.time, free.time, 1e-13),
+            "{}: {turned} {free}",
+            method.name()
+        );
         let crossed = solved("(x - a)^2 = w^2");
         assert!((crossed.events[0].state.depth - (0.25 - 1e-7)).abs() < 1e-11, "{}: {crossed:?}", method.name());
         // ((x - a)² + 25 w²) (b - x) vanishes at b alone.
