@@ -3,11 +3,11 @@
 default:
     just --list
 
-# What a change must pass: format, clippy, docs, tests
+# What a change must pass: format, clippy, docs, tests, the Python package
 ci:
     .ci/run
 
-# Every test
+# Every test but those that take minutes
 test:
     cargo test --release
 
@@ -47,15 +47,15 @@ mutants:
 
 # The suite under 200 seeds
 seeds:
-    PENETRODE_SEEDS=200 cargo test --release --test it suite -- --ignored --nocapture
+    PENETRODE_SEEDS=200 cargo test --release --test it no_seed_raises_a_false_alarm -- --ignored --nocapture
 
 # A million random scenes
 stress:
-    penetrode stress --cases 1000000 --seed 7
+    cargo run --release -- stress --cases 1000000 --seed 7
 
 # Error against time and work, beside other programs
 peers:
-    taskset -c 0 penetrode bench --peers --out bench
+    taskset -c 0 cargo run --release -- bench --peers --out target/bench
 
 # Other Rust solvers beside ours
 rust-peers:

@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_those_of_the_contract_and_read_back() {
+    fn every_method_has_its_name_and_reads_it_back() {
         let names: Vec<_> = MethodName::ALL.iter().map(ToString::to_string).collect();
         assert_eq!(names.join(", "), NAMES);
         for &name in MethodName::ALL {

@@ -10,6 +10,7 @@
 //!
 //! How an integrator finds an event is described in [`crate::integrators::locate`].
 
+use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use smallvec::SmallVec;
 
@@ -401,7 +402,7 @@ impl<S> StageEnd<S> {
 }
 
 /// What happened at a place. The order of the variants is the order of events at one place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::IntoStaticStr)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 #[serde(tag = "event", content = "stage", rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -416,6 +417,34 @@ pub enum EventKind {
     Exit,
     /// Velocity zero.
     Rest,
+}
+
+/// A solver may say of every event in which stage it happened, and must of a `stage-end`.
+impl<'de> Deserialize<'de> for EventKind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        enum Name {
+            StageEnd,
+            CraterEnd,
+            Plug,
+            Exit,
+            Rest,
+        }
+        #[derive(Deserialize)]
+        struct Named {
+            event: Name,
+            stage: Option<usize>,
+        }
+        let Named { event, stage } = Named::deserialize(deserializer)?;
+        Ok(match event {
+            Name::StageEnd => Self::StageEnd(stage.ok_or_else(|| D::Error::missing_field("stage"))?),
+            Name::CraterEnd => Self::CraterEnd,
+            Name::Plug => Self::Plug,
+            Name::Exit => Self::Exit,
+            Name::Rest => Self::Rest,
+        })
+    }
 }
 
 impl EventKind {

@@ -130,12 +130,13 @@ fn meaning(found: &Diagnosis) -> Prose {
     let cause = cause.unwrap_or_default();
     match found.verdict {
         Verdict::Passed => {
-            let lowers = if cause.is_empty() {
+            let limits = if cause.is_empty() {
                 String::new()
             } else {
-                format!(" What lowers its order:{}", cause.replacen(" Cause:", "", 1))
+                let what = if found.orders.is_empty() { "What limits its accuracy" } else { "What lowers its order" };
+                cause.replacen("Cause", what, 1)
             };
-            Prose::new("Sound: every answer is right within what the solver claims.{0}", &[&lowers])
+            Prose::new("Sound: every answer is right within what the solver claims.{0}", &[&limits])
         }
         Verdict::Failed if counts.failed == 0 => {
             Prose::new("Wrong, though every answer is near the right one.{0}", &[&cause])

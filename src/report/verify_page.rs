@@ -231,12 +231,14 @@ fn scenes(run: &Run<'_>) -> Markup {
     html! { @if !resolved.is_empty() { (folded(summary, false, table)) } }
 }
 
+const SMOOTH: Stretch =
+    Stretch { velocity_dependent: false, force_jumps: false, of_sharp_end: None, of_sharp_place: None };
 /// The kinds of path that decide an order, in the order of the table.
 const PATHS: [(&str, bool, Stretch); 4] = [
-    ("rest in the crater", false, Stretch { velocity_dependent: false, force_jumps: false }),
-    ("tunnel without drag", true, Stretch { velocity_dependent: false, force_jumps: false }),
-    ("tunnel with drag", true, Stretch { velocity_dependent: true, force_jumps: false }),
-    ("tunnel with drag, force jumps at k d", true, Stretch { velocity_dependent: true, force_jumps: true }),
+    ("rest in the crater", false, SMOOTH),
+    ("tunnel without drag", true, SMOOTH),
+    ("tunnel with drag", true, Stretch { velocity_dependent: true, ..SMOOTH }),
+    ("tunnel with drag, force jumps at k d", true, Stretch { velocity_dependent: true, force_jumps: true, ..SMOOTH }),
 ];
 
 fn formal_orders() -> Markup {

@@ -33,6 +33,7 @@ macro_rules! recorded {
 pub const TRANSCRIPTS: &[(&str, &str)] = recorded![
     "solve", "methods", "paths", "critical", "sweep", "numbers", "batch", "converge", "audit", "studies", "bench",
     "report", "suites", "peers", "spelled", "refused", "places", "paper", "options", "unusual", "misread", "laws",
+    "rare",
 ];
 
 /// Runs of the program, and what they said.
@@ -240,8 +241,9 @@ impl Text {
 
 /// Where a line names what differs between two runs: the time, the machine, the build, the name of the program's file. What stands from the first mark up
 /// to the second is left out; without a second one, the rest of the line.
-const PASSING: [(&str, &str); 8] = [
+const PASSING: [(&str, &str); 9] = [
     ("\"wall_ns\": ", ","),
+    ("\"time_ns\": ", ","),
     ("\"wall_ms\": ", ","),
     ("\"median_ns\": ", ","),
     ("\"low_ns\": ", ","),
@@ -251,8 +253,8 @@ const PASSING: [(&str, &str); 8] = [
     ("Usage: ", " "),
 ];
 
-/// Where what lasts of a JSON ends: behind it, what is fastest, or the environment of the run.
-const END_OF_LASTING: [&str; 2] = ["\n  \"fastest\": [", "\n  \"environment\": {"];
+/// Where what lasts of a JSON ends: behind it, what is fastest, if anything, or the environment of the run.
+const END_OF_LASTING: [&str; 2] = ["\n  \"fastest\": [\n", "\n  \"environment\": {"];
 
 /// Lines of a text that are kept at most, evenly.
 const LINES_MAX: usize = 150;

@@ -41,7 +41,7 @@ fn run(folder: &Path, line: &str) -> Said {
 }
 
 /// A folder with a scene in it, for what its command needs besides.
-fn workplace() -> tempfile::TempDir {
+fn folder_with_a_scene() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::copy(scene("paper-slab"), folder.path().join("slab.toml")).unwrap();
     folder
@@ -49,7 +49,7 @@ fn workplace() -> tempfile::TempDir {
 
 /// What the program says of `bytes` in a file `name`, `{}` in `line` being the file; nothing else happens.
 fn refusal_of(name: &str, bytes: &[u8], line: &str) -> String {
-    let folder = workplace();
+    let folder = folder_with_a_scene();
     fs::write(folder.path().join(name), bytes).unwrap();
     let before = names(folder.path());
     let said = run(folder.path(), &line.replace("{}", name));
@@ -103,7 +103,7 @@ fn refusals_of_force(kind: &str, over: &str) -> String {
     let folder = corpus().join(kind);
     let mut all = String::new();
     for name in names(&folder) {
-        let place = workplace();
+        let place = folder_with_a_scene();
         let text = format!(
             "[projectile]\nmass = \"2 kg\"\n[impact]\nvelocity = \"300 m/s\"\n[[stage]]\n\
              force = {{ table = \"r.csv\", {over}, force = \"force_kN\" }}\n"
@@ -177,7 +177,7 @@ fn a_hundred_megabytes_are_refused_and_not_read() {
 
 #[test]
 fn what_is_no_file_is_refused() {
-    let folder = workplace();
+    let folder = folder_with_a_scene();
     fs::create_dir(folder.path().join("folder")).unwrap();
     let mut all = String::new();
     let points = "sweep slab.toml --vary H/d=1:5:3 --data";

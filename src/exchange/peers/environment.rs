@@ -297,6 +297,8 @@ fn with_one_output(mut command: Command) -> io::Result<(io::PipeReader, Child)> 
 mod tests {
     use super::*;
 
+    // Its paths are those of Unix.
+    #[cfg(unix)]
     #[test]
     fn the_cache_folder_is_the_first_that_the_system_names() {
         let folder = |given: &'static [(&str, &str)]| {
@@ -376,6 +378,7 @@ mod tests {
         assert_eq!(done, Err("not done after 0 s".into()));
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_command_survives_spaces_in_its_paths() {
         let environment = Environment { python: "/a b/python".into(), scripts: "/c'd".into() };

@@ -359,6 +359,8 @@ mod tests {
         assert_eq!(left_out("[]".to_owned()), None);
         let as_stage_end = crater_end.replace("crater-end\"", "stage-end\", \"stage\": 0");
         assert_eq!(left_out(format!("[{as_stage_end}, {rest}]")), None);
+        let with_stage = crater_end.replace("crater-end\"", "crater-end\", \"stage\": 0");
+        assert_eq!(left_out(format!("[{with_stage}, {rest}]")), None);
     }
 
     #[test]

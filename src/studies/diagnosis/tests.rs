@@ -256,6 +256,23 @@ fn a_sum_in_single_precision_is_found_though_every_limit_looks_right() {
     }
 }
 
+/// Errors of 3e-10 at every tolerance below 1e-8 are allowed at 1e-12, and no tolerance of that solver lessens them.
+#[test]
+fn a_tolerance_that_is_kept_to_a_floor_alone_is_sound_and_told() {
+    let floored = Made::new((), |(), request| {
+        let mut flight = exact(&request.problem(None))?;
+        flight.end.time *= 1.0 + 0.03 * request.rtol.max(1e-8);
+        Ok(flight)
+    });
+    let found = floored.diagnosed(Plan { asks_edges: false, ..Plan::default() });
+    assert_eq!((found.verdict, found.causes.len()), (Verdict::Passed, 1), "{:?}", found.causes);
+    let cause = &found.causes[0];
+    assert!(
+        cause.id == "tolerance-ignored" && cause.statement.contains("the same, with errors up to 3e-10"),
+        "{cause:?}"
+    );
+}
+
 #[test]
 fn an_order_falls_short_only_where_its_whole_interval_and_the_smallest_steps_do() {
     assert!(is_short_of(2.0, [1.5, 1.69], Some(1.6)));

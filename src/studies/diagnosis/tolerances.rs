@@ -74,7 +74,7 @@ pub(super) fn at_tolerances(
         found = causes_of(&answered, identity, all, Effort::Pairs);
     }
     if verdict != Verdict::Failed {
-        found.clear();
+        found = floor(&answered).filter(|_| verdict == Verdict::Passed).into_iter().collect();
     }
     finish(Diagnosis {
         verdict,
@@ -309,6 +309,22 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     });
     found.extend(no_answer);
     found
+}
+
+/// Right answers that are the same at the two tightest tolerances, with errors that the tightest would lessen.
+fn floor(answered: &[Answered<'_>]) -> Option<Cause> {
+    let tight = TOLERANCES[TOLERANCES.len() - 1];
+    let improvable = answered.iter().filter_map(|Answered { question, answers }| {
+        let [.., (_, Ok(middle)), (_, Ok(last))] = &answers[..] else { return None };
+        let error = question.over_condition(judge(question, tight, last).errors);
+        (error > 10.0 * tight).then_some((error, end_of(middle).state == end_of(last).state))
+    });
+    let improvable: Vec<(f64, bool)> = improvable.collect();
+    let same = improvable.iter().filter(|(_, is_same)| *is_same).count();
+    let worst = improvable.iter().map(|(error, _)| *error).fold(0.0, f64::max);
+    let statement = format!("answers at tolerances of 1e-9 and 1e-12 are the same, with errors up to {worst:.0e}");
+    let is_floor = same >= 10 && same * 10 >= improvable.len() * 9;
+    is_floor.then(|| Cause::plain("tolerance-ignored", statement, Certainty::Likely, same, answered.len()))
 }
 
 /// Every end is right, and the events listed are not.
