@@ -69,6 +69,9 @@ const CANCELLED: f64 = 1e-3;
 /// Share of a root behind which a turn counts as beyond it: a double root is known to half of its digits.
 const NEAR_TURN: f64 = 0.99999;
 
+/// Part of the way to a root that its roundings may hide.
+const FLAT: f64 = 1e-9;
+
 /// How far behind a turn before zero a step goes on, over the way to it.
 const BEHIND_TURN: f64 = 1e-3;
 
@@ -139,6 +142,11 @@ fn value<S: Scalar>(coefficients: &[S], s: S) -> S {
 fn slope<S: Scalar>(coefficients: &[S], s: S) -> S {
     let terms = coefficients.iter().enumerate().skip(1).rev();
     terms.fold(S::zero(), |sum, (k, c)| sum * s + *c * S::from_f64(k as f64))
+}
+
+/// What the roundings of the series at `s` may come to.
+fn rounding_of<S: Scalar>(series: &[S], s: f64) -> f64 {
+    16.0 * f64::EPSILON * series.iter().rev().fold(0.0, |sum, c| sum * s + c.value().abs())
 }
 
 /// First root of the series on `(0, span]`.
@@ -753,8 +761,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             // A double root is known to half of its digits, the value where g turns to all.
             if let Some(turn) = turn.filter(|turn| *turn >= NEAR_TURN * root) {
                 let beyond = -side * both(&series, turn).0;
-                let rounding =
-                    16.0 * f64::EPSILON * series.iter().rev().fold(0.0, |sum, c| sum * turn + c.value().abs());
+                let rounding = rounding_of(&series, turn);
                 if beyond < -rounding {
                     // It turns before zero: the step goes on to a place where that is plain.
                     let (cut, nearest) = (turn * (1.0 + BEHIND_TURN), Some((turn, beyond)));
@@ -774,6 +781,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 corrected(S::from_f64(root), span, |s| value(&series, s), |s| slope(&series, s))
             };
             let (rate, curvature) = both(&slopes, corrected.value());
+            // Where g is flat its roundings hide the place: it may be the end of the stage, and may not.
+            let rounding = rounding_of(&series, corrected.value());
+            if S::EPSILON >= f64::EPSILON && rounding > FLAT * rate.abs() * corrected.value() {
+                return (corrected, Event::Condition, Some((corrected.value(), 0.0)));
+            }
             let (place, beyond) = if side * curvature > 0.0 {
                 // The parabola through the root goes so far beyond it.
                 (corrected.value(), 0.5 * rate * rate / curvature.abs())

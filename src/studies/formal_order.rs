@@ -21,7 +21,7 @@ pub struct Stretch {
     pub velocity_dependent: bool,
     /// The force jumps at a stage end on the path. A stage end at the place itself does not count.
     pub force_jumps: bool,
-    /// The order to which a law limits all quantities, where its force has no slope in x at an end of its stage.
+    /// The order to which a law limits all quantities, where its force has no slope at an end of its stage or at a kink.
     pub of_sharp_end: Option<f64>,
     /// The same of the place itself, where the last step alone is wrong: the order of the velocity there.
     pub of_sharp_place: Option<f64>,
@@ -50,18 +50,58 @@ fn time_of_rest(law: &Law, depth: f64, speed: f64) -> Option<f64> {
     Some(if at_rest == 0.0 { 1.0 } else { 1.0 + power })
 }
 
-/// The order, below 2, to which a force limits the velocity that has no slope in x at an end of its stage; `length` from there, with
-/// a sign, lies the other end.
-///
-/// `F = F0 + a x^n`, n < 1, is passed at a velocity: it grows as `t^n`, of which sums over steps are wrong by `h^(1+n)`. Where the
-/// projectile comes to rest x is flat, and no more is lost than in a smooth force.
-fn of_sharp_end(law: &Law, at: State, length: f64, speed: f64) -> Option<f64> {
-    let force = law.force_value(at.depth, at.velocity);
-    let excess = |x: f64| law.force_value(at.depth + x, at.velocity) - force;
-    let power = sharp_power(excess, NEAR * length)?;
-    // A slope that is lost in the roundings of the force is none.
-    let is_seen = excess(NEAR * length).abs() > CONTINUOUS * force.abs();
-    (is_seen && at.velocity > NEAR * speed).then_some(1.0 + power)
+/// A law on the way through its stage, where V² is taken to fall evenly from one place to the other.
+struct Way<'a> {
+    law: &'a Law,
+    from: State,
+    to: State,
+}
+
+impl Way<'_> {
+    fn length(&self) -> f64 {
+        self.to.depth - self.from.depth
+    }
+
+    fn velocity(&self, depth: f64) -> f64 {
+        let [from, to] = [self.from, self.to].map(|state| state.velocity * state.velocity);
+        (from + (to - from) * (depth - self.from.depth) / self.length()).max(0.0).sqrt()
+    }
+
+    fn force(&self, depth: f64) -> f64 {
+        self.law.force_value(depth, self.velocity(depth))
+    }
+
+    /// The order, below 2, to which the law limits the velocity behind `depth`, where its force has no slope on one `side` of it.
+    ///
+    /// `F = F0 + a x^n`, n < 1, is passed at a velocity: it grows as `t^n`, of which sums over steps are wrong by `h^(1+n)`. Where
+    /// the projectile comes to rest x is flat, and no more is lost than in a smooth force.
+    fn order_beside(&self, depth: f64, side: f64, speed: f64) -> Option<f64> {
+        let (force, near) = (self.force(depth), NEAR * side * self.length());
+        let excess = |x: f64| self.force(depth + x) - force;
+        let power = sharp_power(excess, near)?;
+        // A slope that is lost in the roundings of the force is none.
+        let is_seen = excess(near).abs() > CONTINUOUS * force.abs();
+        (is_seen && self.velocity(depth) > NEAR * speed).then_some(1.0 + power)
+    }
+
+    /// Depths inside at which `min`, `max` or `abs` in the law change sides.
+    fn kinks(&self) -> Vec<f64> {
+        let Some(bound) = self.law.bound().filter(|bound| !bound.switches().is_empty()) else { return Vec::new() };
+        let sides = |depth: f64| bound.sides(depth, self.velocity(depth));
+        let place = |part: usize| self.from.depth + self.length() * part as f64 / PARTS as f64;
+        let parts = (0..PARTS).map(|part| (place(part), place(part + 1)));
+        parts
+            .filter(|(low, high)| sides(*low) != sides(*high))
+            .map(|(mut low, mut high)| {
+                for _ in 0..f64::MANTISSA_DIGITS {
+                    let middle = 0.5 * (low + high);
+                    *(if sides(middle) == sides(low) { &mut low } else { &mut high }) = middle;
+                }
+                high
+            })
+            .filter(|depth| *depth < self.to.depth)
+            .collect()
+    }
 }
 
 /// The power to which `excess` grows from zero, below 1 and so that it has no slope there; as much of it as `near` shows.
@@ -72,6 +112,9 @@ fn sharp_power(excess: impl Fn(f64) -> f64, near: f64) -> Option<f64> {
 
 /// Share of the impact speed, or of the length of a stage, at which the power of a force is taken.
 const NEAR: f64 = 1e-4;
+
+/// Parts of a stage in which kinks of its force are looked for.
+const PARTS: usize = 512;
 
 impl Path {
     /// The facts about `flight`, an accurate flight (closed form, Taylor) through `problem` with its events.
@@ -110,14 +153,16 @@ impl Path {
                 let end_of = |index: usize| ends.iter().find(|(end, _)| *end == index).map(|(_, state)| *state);
                 let entry = turn.checked_sub(1).map(|before| end_of(crossed[before]));
                 if let Some(law) = own {
-                    let start = entry.flatten().unwrap_or(State::at_impact(problem));
-                    let leaves = end_of(index).or((flight.outcome == Outcome::Perforated).then_some(flight.end));
-                    let length = leaves.unwrap_or(flight.end).depth - start.depth;
-                    let speed = problem.impact_speed;
-                    let behind = leaves.and_then(|end| of_sharp_end(law, end, -length, speed));
+                    let from = entry.flatten().unwrap_or(State::at_impact(problem));
+                    let end = end_of(index).or((flight.outcome == Outcome::Perforated).then_some(flight.end));
+                    let way = Way { law, from, to: end.unwrap_or(flight.end) };
+                    let beside = |depth: f64, side: f64| way.order_beside(depth, side, problem.impact_speed);
+                    let behind = end.and_then(|end| beside(end.depth, -1.0));
                     let (inside, place) = if index == last { (None, behind) } else { (behind, None) };
-                    let sharp = of_sharp_end(law, start, length, speed).into_iter().chain(inside);
-                    stretch.of_sharp_end = sharp.chain(stretch.of_sharp_end).min_by(f64::total_cmp);
+                    let kinks = way.kinks().into_iter().flat_map(|depth| [-1.0, 1.0].map(|side| beside(depth, side)));
+                    let sharp =
+                        kinks.flatten().chain(beside(from.depth, 1.0)).chain(inside).chain(stretch.of_sharp_end);
+                    stretch.of_sharp_end = sharp.min_by(f64::total_cmp);
                     stretch.of_sharp_place = place;
                 }
                 if let Some(Some(state)) = entry {
@@ -156,7 +201,7 @@ impl Path {
 /// | `step-end`: the depth at rest, which is flat there | 2 |
 /// | not landed, force jumps at x = k d: the velocity there is interpolated over the jump | 1, its time 2 |
 /// | the force goes as `V^n`, n < 1, towards rest: its time | 1, beside a force at rest 1 + n |
-/// | the force goes as `x^n`, n < 1, from an end of its stage that is passed | 1 + n; if that is the place itself, its velocity alone |
+/// | the force goes as `x^n`, n < 1, from an end of its stage or a kink that is passed | 1 + n; if that is the place itself, its velocity alone |
 ///
 /// The critical velocity has the order of the depth at rest. `path` is then that of the critical flight, whatever it
 /// says about leaving the target.
@@ -341,7 +386,7 @@ mod tests {
                 assert_eq!(formal_order(VelocityAt::Centred, Boundaries::StepEnd, &path, Quantity::Time), Some(1.0));
                 formal_order(VelocityAt::Centred, Boundaries::Landed, &path, quantity).unwrap()
             };
-            if force.contains('-') {
+            if force == "sqrt(max(0, 1 - x/H))" {
                 assert_eq!(order(300.0, Quantity::Time), 2.0);
             }
             [order(300.0, Quantity::Velocity), order(100.0, Quantity::Depth)]
@@ -353,6 +398,8 @@ mod tests {
         is("sqrt(x/H)", [1.5, 1.5]);
         is("(x/H)^0.3", [1.3, 1.3]);
         is("sqrt(max(0, 1 - x/H))", [1.5, 2.0]);
+        is("sqrt(max(0, 1 - 2*x/H))", [1.5, 1.5]);
+        is("(1 + max(0, 0.37*H - x)/H)", [2.0, 2.0]);
         is("(x/H)^1.5", [2.0, 2.0]);
         is("x/H*H/H", [2.0, 2.0]);
     }

@@ -604,6 +604,19 @@ fn a_condition_that_turns_just_before_zero_is_not_met_and_just_behind_it_is() {
     }
 }
 
+/// `(x/a - 1)³ = 0` at a = 0.25 m, where 2 kg at 30000^(1/2) m/s take up 1 kg; 0.25 m of 90 kN lie behind it.
+#[test]
+fn a_condition_that_is_flat_where_it_is_met_leaves_the_outcome_open_or_its_bound_holds() {
+    let text = "[parameters]\na = '0.25 m'\n[[stage]]\nstatic_force = 40000\nuntil = '(x/a - 1)^3 = 0*a/a'\nadd_mass = 1\n\
+                [[stage]]\nstatic_force = 90000\n";
+    for method in exact_methods() {
+        let flight = method.solve(&problem(&with_thickness(text, 0.5), 200.0), Detail::Events).unwrap();
+        let margin = (30000.0 * 4.0 / 9.0 - 15000.0) / 40000.0;
+        let is_held = (flight.exit_margin.unwrap() - margin).abs() <= flight.exit_margin_error.unwrap();
+        assert!(flight.outcome == Outcome::Undecided || is_held, "{}: {flight:?}", method.name());
+    }
+}
+
 /// Where two events lie at one place, neither is proved to come first: 36 kN take 2 kg from 100 m/s to 80 at 0.1 m.
 #[test]
 fn an_enclosure_is_undecided_where_a_condition_lies_at_an_end_or_at_the_next() {
