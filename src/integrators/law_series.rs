@@ -771,7 +771,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                     let at = path.at(S::from_f64(s)).values();
                     (-side * end.value(at.depth, at.velocity.max(0.0)), -side * both(&series, s).1)
                 };
-                let root = if beyond > rounding { by_path(root_before(passed, turn)) } else { S::from_f64(turn) };
+                let is_hidden = beyond <= rounding;
+                let root = if is_hidden { S::from_f64(turn) } else { by_path(root_before(passed, turn)) };
+                let beyond = if is_hidden && S::EPSILON >= f64::EPSILON { 0.0 } else { beyond };
                 return (root, Event::Condition, Some((turn, beyond)));
             }
             // In 64 bits what the series of g leaves out is nothing.
