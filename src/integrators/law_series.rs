@@ -776,12 +776,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 let beyond = if is_hidden && S::EPSILON >= f64::EPSILON { 0.0 } else { beyond };
                 return (root, Event::Condition, Some((turn, beyond)));
             }
-            // In 64 bits what the series of g leaves out is nothing.
-            let corrected = if S::EPSILON < f64::EPSILON {
-                by_path(root)
-            } else {
-                corrected(S::from_f64(root), span, |s| value(&series, s), |s| slope(&series, s))
-            };
+            let corrected = by_path(root);
             let (rate, curvature) = both(&slopes, corrected.value());
             // Where g is flat its roundings hide the place: it may be the end of the stage, and may not.
             let rounding = rounding_of(&series, corrected.value());

@@ -10,7 +10,6 @@
 //!
 //! How an integrator finds an event is described in [`crate::integrators::locate`].
 
-use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use smallvec::SmallVec;
 
@@ -423,26 +422,20 @@ pub enum EventKind {
 impl<'de> Deserialize<'de> for EventKind {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         #[derive(Deserialize)]
-        #[serde(rename_all = "kebab-case")]
-        enum Name {
-            StageEnd,
+        #[serde(tag = "event", rename_all = "kebab-case")]
+        enum Named {
+            StageEnd { stage: usize },
             CraterEnd,
             Plug,
             Exit,
             Rest,
         }
-        #[derive(Deserialize)]
-        struct Named {
-            event: Name,
-            stage: Option<usize>,
-        }
-        let Named { event, stage } = Named::deserialize(deserializer)?;
-        Ok(match event {
-            Name::StageEnd => Self::StageEnd(stage.ok_or_else(|| D::Error::missing_field("stage"))?),
-            Name::CraterEnd => Self::CraterEnd,
-            Name::Plug => Self::Plug,
-            Name::Exit => Self::Exit,
-            Name::Rest => Self::Rest,
+        Ok(match Named::deserialize(deserializer)? {
+            Named::StageEnd { stage } => Self::StageEnd(stage),
+            Named::CraterEnd => Self::CraterEnd,
+            Named::Plug => Self::Plug,
+            Named::Exit => Self::Exit,
+            Named::Rest => Self::Rest,
         })
     }
 }

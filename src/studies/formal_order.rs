@@ -81,7 +81,7 @@ impl Way<'_> {
         let power = sharp_power(excess, near)?;
         // A slope that is lost in the roundings of the force is none.
         let is_seen = excess(near).abs() > CONTINUOUS * force.abs();
-        (is_seen && self.velocity(depth) > NEAR * speed).then_some(1.0 + power)
+        (is_seen && self.velocity(depth) > SLOW * speed).then_some(1.0 + power)
     }
 
     /// Depths inside at which `min`, `max` or `abs` in the law change sides.
@@ -107,11 +107,18 @@ impl Way<'_> {
 /// The power to which `excess` grows from zero, below 1 and so that it has no slope there; as much of it as `near` shows.
 fn sharp_power(excess: impl Fn(f64) -> f64, near: f64) -> Option<f64> {
     let power = (excess(near) / excess(0.5 * near)).log2();
-    (power > 0.0 && power < 1.0 - NEAR).then_some(power)
+    (power > 0.0 && power < SMOOTH).then_some(power)
 }
 
-/// Share of the impact speed, or of the length of a stage, at which the power of a force is taken.
-const NEAR: f64 = 1e-4;
+/// Share of the impact speed, or of the length of a stage, at which the power of a force is taken: what is steep and smooth has a
+/// slope there.
+const NEAR: f64 = 1e-7;
+
+/// The power from which on a force has a slope.
+const SMOOTH: f64 = 0.9999;
+
+/// Share of the impact speed below which a place is no longer passed.
+const SLOW: f64 = 1e-4;
 
 /// Parts of a stage in which kinks of its force are looked for.
 const PARTS: usize = 512;
@@ -151,9 +158,9 @@ impl Path {
                 stretch.velocity_dependent |=
                     own.map_or(law.viscosity > 0.0 || law.drag > 0.0, Law::depends_on_velocity);
                 let end_of = |index: usize| ends.iter().find(|(end, _)| *end == index).map(|(_, state)| *state);
-                let entry = turn.checked_sub(1).map(|before| end_of(crossed[before]));
+                let entry = turn.checked_sub(1).and_then(|before| end_of(crossed[before]));
                 if let Some(law) = own {
-                    let from = entry.flatten().unwrap_or(State::at_impact(problem));
+                    let from = entry.unwrap_or(State::at_impact(problem));
                     let end = end_of(index).or((flight.outcome == Outcome::Perforated).then_some(flight.end));
                     let way = Way { law, from, to: end.unwrap_or(flight.end) };
                     let beside = |depth: f64, side: f64| way.order_beside(depth, side, problem.impact_speed);
@@ -165,7 +172,7 @@ impl Path {
                     stretch.of_sharp_end = sharp.min_by(f64::total_cmp);
                     stretch.of_sharp_place = place;
                 }
-                if let Some(Some(state)) = entry {
+                if let Some(state) = entry {
                     let behind = crossed[turn - 1];
                     let left = problem.force(behind, state.depth, state.velocity);
                     let right = problem.force(index, state.depth, state.velocity);
@@ -400,6 +407,7 @@ mod tests {
         is("sqrt(max(0, 1 - x/H))", [1.5, 2.0]);
         is("sqrt(max(0, 1 - 4*x/H))", [1.5, 1.5]);
         is("(1 + max(0, 0.37*H - x)/H)", [2.0, 2.0]);
+        is("tanh(1e4*x/H)", [2.0, 2.0]);
         is("(x/H)^1.5", [2.0, 2.0]);
         is("x/H*H/H", [2.0, 2.0]);
     }

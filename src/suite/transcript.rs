@@ -241,9 +241,8 @@ impl Text {
 
 /// Where a line names what differs between two runs: the time, the machine, the build, the name of the program's file. What stands from the first mark up
 /// to the second is left out; without a second one, the rest of the line.
-const PASSING: [(&str, &str); 9] = [
+const PASSING: [(&str, &str); 8] = [
     ("\"wall_ns\": ", ","),
-    ("\"time_ns\": ", ","),
     ("\"wall_ms\": ", ","),
     ("\"median_ns\": ", ","),
     ("\"low_ns\": ", ","),
@@ -253,8 +252,8 @@ const PASSING: [(&str, &str); 9] = [
     ("Usage: ", " "),
 ];
 
-/// Where what lasts of a JSON ends: behind it, what is fastest, if anything, or the environment of the run.
-const END_OF_LASTING: [&str; 2] = ["\n  \"fastest\": [\n", "\n  \"environment\": {"];
+/// Where what lasts of a JSON ends: behind it, what is fastest, or the environment of the run.
+const END_OF_LASTING: [&str; 2] = ["\n  \"fastest\": [", "\n  \"environment\": {"];
 
 /// Lines of a text that are kept at most, evenly.
 const LINES_MAX: usize = 150;

@@ -182,7 +182,8 @@ impl<'a> Judge<'a> {
             let kind = if at_exact { FindingKind::ZeroError } else { FindingKind::Constant };
             self.judged.agrees_with_exact = exact.map(|_| at_exact);
             self.judged.limit = Some(self.finest().value);
-            self.advise("give --scene, which may fix it, or leave the column out".to_owned());
+            let what = if exact.is_some() { "print more digits" } else { "give --scene, which may fix it" };
+            self.advise(format!("{what}, or leave the column out"));
             let reason = "the values agree within two units of their last digit".to_owned();
             return self.end(Verdict::Undecided, kind, reason);
         }
