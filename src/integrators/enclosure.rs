@@ -27,6 +27,8 @@ use super::outcome::{Cost, Detail, Flight, IntegrationError, Integrator, Solved}
 use super::taylor::power_of_two_below;
 use crate::physics::ball::{Ball, DoubleWord, TINY, UNIT, UP};
 use crate::physics::condition::Condition;
+use crate::physics::force_table::{Piece, SpeedTable};
+use crate::physics::law::Law as OwnLaw;
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Outcome, Problem, Scalar, Stage, State};
 
@@ -100,12 +102,12 @@ impl Enclosure {
     /// The outcome is proved, or `Undecided`. Two boundaries of the problem are the same ball or differ as `f64`.
     ///
     /// # Errors
-    /// [`IntegrationError::Refused`] for a law in code or a table of velocity, numbers beyond 1e-100 to 1e100, or depths or
-    /// conditions that differ, and not as `f64`; [`IntegrationError::NeverEnds`].
+    /// [`IntegrationError::Refused`] for a law in code, numbers beyond 1e-100 to 1e100, or depths, conditions or velocities of a
+    /// table that differ, and not as `f64`; [`IntegrationError::NeverEnds`].
     pub fn enclose(&self, problem: &Problem<Ball>, detail: Detail) -> Solved<Flight<Ball>> {
-        let is_text = |index: usize| problem.laws.of(index).is_none_or(|law| law.bound().is_some());
-        if !(0..problem.stages.len()).all(is_text) {
-            return Err(refuse("nothing is proved of a force in code or by a table of velocity; take --method taylor"));
+        let is_known = |law: &OwnLaw<Ball>| law.bound().is_some() || law.table().is_some();
+        if !(0..problem.stages.len()).all(|index| problem.laws.of(index).is_none_or(is_known)) {
+            return Err(refuse("nothing is proved of a force in code; take --method taylor"));
         }
         let depths = problem.stages.iter().map(|stage| stage.end).chain([problem.exit_depth]);
         if !depths.chain([problem.mass, problem.impact_speed]).all(is_in_range) {
@@ -119,6 +121,11 @@ impl Enclosure {
         }
         if !conditions_are_apart(problem) {
             return Err(refuse("two of its conditions differ, and not as 64-bit numbers; make them equal"));
+        }
+        if !ends_are_apart_from_rows(problem) {
+            return Err(refuse(
+                "the velocity at which a stage ends and one of its table differ, and not as 64-bit numbers; make them equal",
+            ));
         }
         let mut steps = Steps::default();
         let mut flight = flight::solve(problem, detail, &mut steps)?;
@@ -168,19 +175,42 @@ fn boundaries_are_apart(problem: &Problem<Ball>) -> bool {
         && inner.iter().all(|end| is_told(Ball::zero(), *end))
 }
 
+/// Whether a ball is no wider than a decimal makes it, which is a quotient of two whole numbers.
+fn is_decimal(number: Ball) -> bool {
+    number.radius <= 8.0 * UNIT * number.magnitude()
+}
+
 /// Whether each condition that is taken for the one before it has the same numbers: the same balls, no wider than decimals make them.
 fn conditions_are_apart(problem: &Problem<Ball>) -> bool {
     let end_of = |index: usize| problem.laws.of(index).and_then(|law| law.end());
     let conditions = (0..problem.stages.len()).filter_map(end_of);
     conditions.clone().all(|condition| {
         let next = end_of(condition.next()).filter(|next| next.is_same(condition));
-        let is_decimal = |number: &Ball| number.radius <= UNIT * number.magnitude();
         next.is_none_or(|next| {
             // Parameters of an equation are those of the scene, and are the same whatever they are.
-            let is_known = !condition.is_speed() || condition.parameters().iter().all(is_decimal);
+            let is_known = !condition.is_speed() || condition.parameters().iter().copied().all(is_decimal);
             is_known && next.parameters() == condition.parameters()
         })
     })
+}
+
+/// Whether each speed that ends a stage with a table of velocity is the same ball as the velocity of a row, or differs as `f64`.
+fn ends_are_apart_from_rows(problem: &Problem<Ball>) -> bool {
+    (0..problem.stages.len()).filter_map(|index| problem.laws.of(index)).all(|law| {
+        let (Some(table), Some(end)) = (law.table(), law.end().and_then(Condition::speed)) else { return true };
+        table.rows().iter().map(|row| Ball::decimal(row.at)).all(|row| row == end || row.value() != end.value())
+    })
+}
+
+/// Whether `velocity` is proved to lie on the piece of `table` that its middle lies on, and to change as it does there.
+fn is_on_piece(table: &SpeedTable, velocity: Ball) -> bool {
+    let Some(Piece { index, rises }) = table.piece(velocity.value()) else { return false };
+    let [low, high] = [index, index + 1].map(|row| Ball::decimal(table.rows()[row].at));
+    let [force, slope, start] = table.line::<Ball>(index);
+    let force = force + slope * (velocity - start);
+    let is = |row: Ball| velocity == row && is_decimal(velocity);
+    let is_within = (is(low) || velocity.lower() >= low.upper()) && (is(high) || velocity.upper() <= high.lower());
+    is_within && if rises { force.upper() < 0.0 } else { force.lower() >= 0.0 }
 }
 
 impl Integrator for Enclosure {
@@ -221,12 +251,10 @@ enum Law<'a> {
 }
 
 impl<'a> Law<'a> {
-    /// The law of stage `index`, for the `mass` that moves there from a state; `None` where no bound is derived for it, or its
-    /// condition may be met there.
-    fn new(problem: &'a Problem<Ball>, index: usize, mass: Ball, at: State<Ball>) -> Option<Self> {
-        let Some(law) = problem.laws.of(index) else {
-            return Coefficients::new(&problem.stages[index], mass).map(Self::Coefficients);
-        };
+    /// The `own` law of a `stage`, or that of its coefficients, for the `mass` that moves there from a state; `None` where no bound is
+    /// derived for it, or its condition may be met there.
+    fn new(stage: &Stage<Ball>, own: Option<&'a OwnLaw<Ball>>, mass: Ball, at: State<Ball>) -> Option<Self> {
+        let Some(law) = own else { return Coefficients::new(stage, mass).map(Self::Coefficients) };
         let ending = match law.end() {
             Some(condition) => Some(Box::new(Ending::new(condition, at)?)),
             None => None,
@@ -920,7 +948,7 @@ impl Steps {
         let stages = &course.problem.stages;
         let next = (course.stage + 1..stages.len()).find(|index| stages[*index].end != limit)?;
         let at = State { depth: limit, ..before };
-        let law = Law::new(course.problem, next, course.mass, at)?;
+        let law = Law::new(&stages[next], course.problem.laws.of(next), course.mass, at)?;
         let beyond = Centre::new(at, &law);
         let speeds = Ball::between(0.0, before.velocity.magnitude());
         let furthest = beyond.slowed(&law, speeds)?;
@@ -1006,7 +1034,10 @@ impl StageSolver<Ball> for Steps {
         }
         let limit = course.limit()?;
         let impact = course.problem.impact_speed.value();
-        let Some(law) = Law::new(course.problem, course.stage, course.mass, course.state) else {
+        let table = course.problem.laws.of(course.stage).and_then(OwnLaw::table);
+        let is_known = table.is_none_or(|table| is_on_piece(table, course.state.velocity));
+        let law = is_known.then(|| Law::new(stage, course.law(), course.mass, course.state)).flatten();
+        let Some(law) = law else {
             let state = Self::anything(course, course.state);
             return Ok(self.give_up(course, state));
         };

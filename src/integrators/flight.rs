@@ -544,15 +544,18 @@ fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is
 fn through_own<S: Scalar>(course: &mut Course<'_, S>, method: &mut impl StageSolver<S>) -> Solved<StageEnd<S>> {
     let own = course.problem.laws.of(course.stage);
     let rows = own.and_then(Law::table).map_or(0, |table| table.rows().len());
-    let ends_at = |state| rows == 0 || own.and_then(Law::end).is_some_and(|end| end.is_met(state));
+    let own_end = own.and_then(Law::end);
     for _ in 0..=rows {
         course.refuse_unknown_speed()?;
         course.piece = own.and_then(|law| law.piece(course.state.velocity.value()));
+        let end_of_piece = course.piece.and_then(Law::end);
+        let is_own = |piece| own_end.is_some_and(|own| own.is_same(piece));
+        let goes_on = end_of_piece.is_some_and(|piece| !is_own(piece));
         let was_in_doubt = course.is_in_doubt;
         let end = method.solve_stage(course);
         course.piece = None;
         match end? {
-            StageEnd::Condition(state) if !ends_at(state) => {
+            StageEnd::Condition(state) if goes_on => {
                 // The force is the same on both sides of a row: whether one that is touched is passed changes nothing.
                 course.is_in_doubt = was_in_doubt;
                 course.state = state;

@@ -63,6 +63,9 @@ const NEAR_REST: f64 = 1e-11;
 const BRANCH_TRIALS: i32 = 40;
 const BRANCH_SHARE: f64 = 1e-9;
 
+/// First parts of a step on which V may only fall: the series of a long step shows it nowhere near its end.
+const FIRST_PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+
 /// What the terms of a series may leave of g by cancelling, over g.
 const CANCELLED: f64 = 1e-3;
 
@@ -149,14 +152,6 @@ fn rounding_of<S: Scalar>(series: &[S], s: f64) -> f64 {
     16.0 * f64::EPSILON * series.iter().rev().fold(0.0, |sum, c| sum * s + c.value().abs())
 }
 
-/// First root of the series on `(0, span]`.
-fn first_root<S: Scalar, const K: usize>(series: &[S; K], span: f64) -> Option<f64> {
-    let values = series.map(Scalar::value);
-    let rest = values[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * span);
-    // A switch may have no series where the force has one.
-    if values[0].abs() > rest || !rest.is_finite() { None } else { locate::first_root(&values, span) }
-}
-
 /// The place before `end` where a function, which rises there from below zero to above it, vanishes: by Newton's method, by
 /// halving where that leaves the bracket. `function` gives value and slope.
 fn root_before(function: impl Fn(f64) -> (f64, f64), end: f64) -> f64 {
@@ -195,27 +190,33 @@ fn both<S: Scalar>(series: &[S], s: f64) -> (f64, f64) {
     (value, sums[1] + s * (2.0 * sums[2] + 3.0 * s * sums[3]) + 4.0 * s2 * s * inner)
 }
 
-/// First root of the velocity on `(0, span]`.
+/// First root on `(0, span]` of a series that is above zero on `side` before it, and whether it only falls until there, or until the
+/// end.
 ///
-/// Where V only falls, the sign at the end decides.
-fn first_rest<S: Scalar, const K: usize>(velocity: &[S; K], span: f64) -> Option<f64> {
-    let (at_end, _) = both(velocity, span);
-    let rest = velocity[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * span);
-    if velocity[0].value() > rest {
-        return None;
+/// Where it only falls, the sign at the end decides: on all of the step, or on a first part of it that ends behind the root.
+fn first_fall<S: Scalar, const K: usize>(series: &[S; K], side: f64, span: f64) -> (Option<f64>, bool) {
+    let values = series.map(Scalar::value);
+    let rest = values[1..].iter().rev().fold(0.0, |sum, c| (sum + c.abs()) * span);
+    // A switch may have no series where the force has one.
+    if values[0].abs() > rest || !rest.is_finite() {
+        return (None, false);
     }
-    let mut slope = [0.0; K];
+    let mut slopes = [0.0; K];
     for k in 1..K {
-        slope[k - 1] = k as f64 * velocity[k].value();
+        slopes[k - 1] = side * k as f64 * values[k];
     }
-    if locate::is_negative(&slope[..K - 1], span) {
-        let risen = |s| {
-            let (value, slope) = both(velocity, s);
-            (-value, -slope)
-        };
-        return (at_end <= 0.0).then(|| root_before(risen, span));
+    let fallen = |s: f64| {
+        let (value, slope) = both(series, s);
+        (-side * value, -side * slope)
+    };
+    let is_above = side * values[0] > 0.0;
+    let first_part =
+        FIRST_PARTS.into_iter().find(|part| is_above && locate::is_negative(&slopes[..K - 1], part * span));
+    match first_part.map(|part| part * span) {
+        Some(end) if fallen(end).0 >= 0.0 => (Some(root_before(fallen, end)), true),
+        Some(end) if end == span => (None, true),
+        _ => (locate::first_root(&values, span), false),
     }
-    first_root(velocity, span)
 }
 
 impl<S: Scalar, const K: usize> Path<S, K> {
@@ -273,8 +274,9 @@ impl<S: Scalar, const K: usize> Path<S, K> {
     }
 
     fn is_finite(&self) -> bool {
-        let all = self.depth.iter().chain(&self.velocity).chain(&self.time);
-        all.copied().all(|c| c.value().is_finite())
+        // No early end: three series at once have none to wait for.
+        let are = |series: &[S; K]| series.iter().fold(true, |are, c| are & c.value().is_finite());
+        are(&self.depth) & are(&self.velocity) & are(&self.time)
     }
 
     /// What the equation lacks at `s`, over the span and over the quantity that it changes.
@@ -709,7 +711,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 }
             }
             Sight::Crossed(_, to) => {
-                let is_found = first_root(series, path.span).is_some_and(|root| root <= to * path.span * (1.0 + 1e-9));
+                let (root, _) = first_fall(series, side, path.span);
+                let is_found = root.is_some_and(|root| root <= to * path.span * (1.0 + 1e-9));
                 if is_found { 1.0 } else { to.min(SHORTENING) }
             }
         }
@@ -747,8 +750,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         for k in 1..K {
             slopes[k - 1] = k as f64 * series[k].value();
         }
-        let turn = if slopes.iter().all(|c| *c == 0.0) { None } else { locate::first_root(&slopes, span) };
-        if let Some(root) = first_root(&series, span) {
+        let (root, falls) = first_fall(&series, side, span);
+        let turn = if falls || slopes.iter().all(|c| *c == 0.0) { None } else { locate::first_root(&slopes, span) };
+        if let Some(root) = root {
             // g itself along the path: its terms cancel less than those of its series, which leaves out more than the path does.
             let by_path = |root: f64| {
                 let own = end.bound();
@@ -809,13 +813,13 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// The first root of a switch on a step of `span`.
     fn first_kink(&self, span: f64) -> Option<(usize, f64)> {
         let roots = self.bound.switches().iter().enumerate().filter_map(|(side, register)| {
+            // At its root, what is left of it over s.
+            let first = usize::from(self.kink == Some(side));
             let mut series = [S::zero(); K];
-            series.copy_from_slice(&self.jets.register(*register)[..K]);
-            if self.kink == Some(side) {
-                series[0] = S::zero();
-            }
+            series[..K - first].copy_from_slice(&self.jets.register(*register)[first..K]);
             // A root at the end of the step is passed by the next.
-            first_root(&series, span).filter(|root| *root < span).map(|root| (side, root))
+            let (root, _) = first_fall(&series, series[0].value().signum(), span);
+            root.filter(|root| *root < span).map(|root| (side, root))
         });
         roots.min_by(|a, b| a.1.total_cmp(&b.1))
     }
@@ -927,8 +931,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             if k == 0 {
                 inverse = S::one().over(forces[0]);
             }
-            let known = (1..=k).fold(rate[k], |sum, i| sum - forces[i] * pace[k - i]);
-            pace[k] = known * inverse;
+            pace[k] = (rate[k] - product(&forces[1..=k], &pace[..k])) * inverse;
             if k + 1 < K {
                 let share = reciprocal(k + 1);
                 let advance = (0..=k.min(m as usize)).fold(S::zero(), |sum, i| sum + path.velocity[i] * pace[k - i]);
@@ -957,7 +960,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     fn widen_bound(&self, course: &mut Course<'_, S>, force: f64, start: State<S>, next: State<S>) {
         let (a, b) = (start.values(), next.values());
         let (time, distance) = (b.time - a.time, b.depth - a.depth);
-        let falls = [a, b].map(|at| self.law.slopes(at.depth, at.velocity).1).into_iter().fold(0.0, f64::min).abs();
+        let rises = [a, b].map(|at| self.law.slope_over_velocity(at.depth, at.velocity));
+        let falls = rises.into_iter().fold(0.0, f64::min).abs();
         let mass = self.mass.value();
         let growth = match self.slope {
             Some(slope) => -time * slope / mass,
@@ -990,7 +994,7 @@ fn first_event<S: Scalar, const K: usize>(path: &Path<S, K>, limit: S) -> (S, Ev
         return (end, Event::Limit);
     }
     let rest = match path.form {
-        Form::Time(_) => first_rest(&path.velocity, span),
+        Form::Time(_) => first_fall(&path.velocity, 1.0, span).0,
         Form::Depth(_) => None,
         Form::Velocity(_) => (span >= 1.0).then_some(1.0),
     };

@@ -75,7 +75,7 @@ impl<S: Scalar> Condition<S> {
     }
 
     /// The speed (m/s) at which it ends a stage.
-    pub(super) fn speed(&self) -> Option<S> {
+    pub(crate) fn speed(&self) -> Option<S> {
         if self.kind == Kind::Speed { self.parameters.first().copied() } else { None }
     }
 

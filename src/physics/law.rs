@@ -161,7 +161,7 @@ impl<S: Scalar> Law<S> {
         Some(law.get_or_init(|| {
             let law = Self::new(line(), pieces.table.line(index).into());
             let rows = pieces.table.rows();
-            let own_end = self.end.as_ref().and_then(Condition::speed).filter(|end| end.value() > rows[index].at);
+            let own_end = self.end.as_ref().and_then(Condition::speed).filter(|end| end.value() >= rows[index].at);
             match (rises, own_end) {
                 (true, _) => law.ending(Condition::of_rise(S::decimal(rows[index + 1].at))),
                 (false, Some(end)) => law.ending(Condition::of_speed(end, 0)),
@@ -297,11 +297,18 @@ impl<S: Scalar> Law<S> {
     pub fn slopes(&self, x: f64, v: f64) -> (f64, f64) {
         match &self.force {
             Form::Expression(expression) => {
-                let (_, by_depth, by_velocity) = expression.values.gradient(x, v);
-                (by_depth, by_velocity)
+                (expression.values.slope((x, 1.0), (v, 0.0)), self.slope_over_velocity(x, v))
             }
             Form::Table(pieces) => (0.0, pieces.table.slope(v)),
             Form::Code(code) => code.slopes(x, v),
+        }
+    }
+
+    /// The second of [`Law::slopes`].
+    pub(crate) fn slope_over_velocity(&self, x: f64, v: f64) -> f64 {
+        match &self.force {
+            Form::Expression(expression) => expression.values.slope((x, 0.0), (v, 1.0)),
+            Form::Table(_) | Form::Code(_) => self.slopes(x, v).1,
         }
     }
 

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use tempfile::TempDir;
 
 use super::claim::{Found, NotMeasured};
@@ -20,12 +21,16 @@ const TIME_MAX: Duration = Duration::from_secs(60);
 /// Waits before a run is asked whether it has ended: most take a few milliseconds.
 const POLLS: [Duration; 2] = [Duration::from_micros(200), Duration::from_millis(5)];
 
+/// Threads that wait for a run, for each that computes.
+const WAITING: usize = 2;
+
 /// The program with a folder of its own, which holds the shipped scenes as `NAME.toml` and what runs leave there.
 #[derive(Debug)]
 pub struct Program {
     path: PathBuf,
     folder: Temporary<TempDir>,
     runs: AtomicUsize,
+    waiting: ThreadPool,
 }
 
 /// What a run said.
@@ -49,7 +54,14 @@ impl Program {
         for (name, text) in SHIPPED {
             fs::write(folder.path().join(format!("{name}.toml")), text)?;
         }
-        Ok(Self { path: path.to_owned(), folder, runs: AtomicUsize::new(0) })
+        let threads = WAITING * rayon::current_num_threads();
+        let waiting = ThreadPoolBuilder::new().num_threads(threads).build().map_err(io::Error::other)?;
+        Ok(Self { path: path.to_owned(), folder, runs: AtomicUsize::new(0), waiting })
+    }
+
+    /// What `runs` gives, in threads that wait for the program: more of them than there are processors.
+    pub fn waiting<T: Send>(&self, runs: impl FnOnce() -> T + Send) -> T {
+        self.waiting.install(runs)
     }
 
     /// The folder in which it runs.

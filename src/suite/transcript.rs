@@ -122,7 +122,7 @@ impl Transcript {
             let given: Vec<_> = run.given.iter().map(|text| given(i, text)).collect();
             run.again(&given, program)
         };
-        self.0.par_iter().enumerate().map(again).collect::<Found<_>>().map(Self)
+        program.waiting(|| self.0.par_iter().enumerate().map(again).collect::<Found<_>>()).map(Self)
     }
 
     /// The runs that this build can make: those that use no method that it leaves out, and `bench` uses each. Solvers that

@@ -121,7 +121,7 @@ impl<S: Scalar> Deceleration<S> for (&Law<S>, S, f64) {
             } else {
                 high = v.value();
             }
-            let (_, by_velocity) = self.0.slopes(x.value(), v.value());
+            let by_velocity = self.0.slope_over_velocity(x.value(), v.value());
             let correction = lack.over(S::one() + half * S::from_f64(by_velocity / self.1.value()));
             v -= correction;
             if !(correction.value().abs() > 4.0 * S::EPSILON * v.value().abs()) || high <= low.next_up() {

@@ -8,7 +8,7 @@ use std::cell::Cell;
 use smallvec::SmallVec;
 
 use super::law::{Expression, sides_of};
-use super::{Centre, PANELS_MAX, Series, is_before};
+use super::{Centre, PANELS_MAX, Series, is_before, is_decimal};
 use crate::physics::ball::{Ball, UP};
 use crate::physics::condition::Condition;
 use crate::physics::expression::{Bound, Jets};
@@ -36,7 +36,9 @@ pub(super) struct Ending<'a> {
 
 /// Whether `condition` is met in a state at which its stage begins; `None` where that is open.
 pub(super) fn is_met(condition: &Condition<Ball>, at: State<Ball>) -> Option<bool> {
-    is_met_by(condition, condition.bound().eval(at.depth, at.velocity))
+    // Two decimals that are one number leave their difference open.
+    let is_its_speed = condition.speed() == Some(at.velocity) && is_decimal(at.velocity);
+    if is_its_speed { Some(true) } else { is_met_by(condition, condition.bound().eval(at.depth, at.velocity)) }
 }
 
 /// The same where the value is `g`.
@@ -56,7 +58,7 @@ impl<'a> Ending<'a> {
         let g = condition.bound();
         let first = g.eval(at.depth, at.velocity);
         let side = if first.lower() > 0.0 { 1.0 } else { -1.0 };
-        let is_ahead = is_met_by(condition, first) == Some(false);
+        let is_ahead = is_met(condition, at) == Some(false);
         is_ahead.then(|| Self { condition, g, side, left: Cell::new(LOOKS_MAX) })
     }
 

@@ -364,7 +364,7 @@ fn the_first_of_many_zeros_and_a_narrow_one_far_ahead_are_not_stepped_over() {
 }
 
 /// Whether each number of `exact`, in double-double, lies within a ball, up to 1e-25 of the `scale`.
-fn holds(state: &State<Ball>, exact: &State<TwoFloat>, scale: [f64; 3]) -> bool {
+pub(super) fn holds(state: &State<Ball>, exact: &State<TwoFloat>, scale: [f64; 3]) -> bool {
     let pairs = [(state.time, exact.time), (state.depth, exact.depth), (state.velocity, exact.velocity)];
     pairs.into_iter().zip(scale).all(|((ball, exact), scale)| {
         let distance = ((exact.hi() - ball.mid.hi) + (exact.lo() - ball.mid.lo)).abs();
@@ -490,6 +490,18 @@ fn used(text: &str) -> String {
             .any(|name| line.strip_prefix(name).is_some_and(|rest| rest.starts_with(" =")) && !is_named(name))
     };
     text.lines().filter(is_kept).flat_map(|line| [line, "\n"]).collect()
+}
+
+/// 61.3 m/s is no `f64`, and one number wherever it is written.
+#[test]
+fn a_stage_that_ends_at_the_impact_velocity_is_passed_at_the_face() {
+    let text = "projectile.mass = 2\nimpact.velocity = '61.3 m/s'\n[[stage]]\ndrag = 3\nend_velocity = '61.3 m/s'\n\
+                [[stage]]\nstatic_force = 20000\n";
+    let file = crate::exchange::scene_file::SceneFile::from_toml(text, "end", &[]).unwrap();
+    let enclosed = crate::studies::enclosure::flight(&file.scene, &file.written, Detail::Events).unwrap().unwrap();
+    let flight = Taylor::default().solve(&file.scene.problem().unwrap(), Detail::Events).unwrap();
+    assert_eq!((kinds(&enclosed.events), enclosed.outcome), (kinds(&flight.events), Outcome::Stopped));
+    assert_eq!(kinds(&flight.events), [EventKind::StageEnd(0), EventKind::Rest]);
 }
 
 /// `(x - 0.1 m)² = c`: two zeros, two that are as good as one, one that is touched, and none.

@@ -159,10 +159,18 @@ impl<S> Step<S> {
 }
 
 impl<S: Scalar> Step<S> {
-    /// Values of its registers, the second one only where it has two; a constant enters by `lift`.
+    /// Values of its registers, the second one only where it has two; a constant enters by `lift`. A quotient that only series need
+    /// is left out unless they are asked `FOR_SERIES`.
     #[inline(always)]
-    pub(super) fn values<T: Scalar>(&self, at: impl Fn(usize) -> T, lift: impl Fn(S) -> T) -> (T, T) {
+    pub(super) fn values<T: Scalar, const FOR_SERIES: bool>(
+        &self,
+        at: impl Fn(usize) -> T,
+        lift: impl Fn(S) -> T,
+    ) -> (T, T) {
         let zero = T::zero();
+        let inverse = |numerator: f64, divisor: T| {
+            if FOR_SERIES { T::from_f64(numerator).over(divisor) } else { zero }
+        };
         match *self {
             Self::Constant { value } => (lift(value), zero),
             Self::Affine { a, factor, shift } => (at(a) * lift(factor) + lift(shift), zero),
@@ -170,27 +178,27 @@ impl<S: Scalar> Step<S> {
             Self::Share { a, divisor, .. } => (at(a).over(lift(divisor)), zero),
             Self::Multiply { a, b } => (at(a) * at(b), zero),
             Self::Square { a } => (at(a) * at(a), zero),
-            Self::Divide { a, b } => (at(a).over(at(b)), T::one().over(at(b))),
-            Self::Ratio { dividend, b } => (lift(dividend).over(at(b)), T::one().over(at(b))),
+            Self::Divide { a, b } => (at(a).over(at(b)), inverse(1.0, at(b))),
+            Self::Ratio { dividend, b } => (lift(dividend).over(at(b)), inverse(1.0, at(b))),
             Self::Slope { .. } => (zero, zero),
             Self::Select { switch, above, below, .. } => (at(switch).select(at(above), at(below)), zero),
             Self::Sqrt { a } => {
                 let root = at(a).sqrt();
-                (root, T::from_f64(0.5).over(root))
+                (root, inverse(0.5, root))
             }
             Self::HalfPower { a, whole, root, exponent } => {
                 // Not by the rule of products, which gives no slope at zero.
                 let slope = || exponent * at(a).value().powf(exponent - 1.0);
                 (at(a).with_slope(at(whole) * at(root), slope), zero)
             }
-            Self::Power { a, exponent, .. } => (at(a).powf(lift(exponent)), T::one().over(at(a))),
+            Self::Power { a, exponent, .. } => (at(a).powf(lift(exponent)), inverse(1.0, at(a))),
             Self::Exp { a, .. } => (at(a).exp(), zero),
             Self::SinCos { a, .. } => (at(a).sin(), at(a).cos()),
             Self::Tanh { a, .. } => {
                 let value = at(a).tanh();
                 (value, T::one() - value * value)
             }
-            Self::Integral { function, a, divisor, .. } => (tape::call(function, at(a)), T::one().over(at(divisor))),
+            Self::Integral { function, a, divisor, .. } => (tape::call(function, at(a)), inverse(1.0, at(divisor))),
         }
     }
 }
@@ -332,7 +340,7 @@ impl<S: Scalar> Bound<S> {
         registers[..2].copy_from_slice(&[self.signed(0, x), self.signed(1, v)]);
         let mut place = 2;
         for step in &self.steps {
-            let (first, second) = step.values(|register| registers[register], lift);
+            let (first, second) = step.values::<_, false>(|register| registers[register], lift);
             registers[place] = self.signed(place, first);
             place += 1;
             if step.width() == 2 {
@@ -442,10 +450,14 @@ impl Bound {
 
     /// F, dF/dx and dF/dV at depth `x` (m) and velocity `v` (m/s), the derivatives exact as far as f64 rounds.
     pub fn gradient(&self, x: f64, v: f64) -> (f64, f64, f64) {
-        let along = |dx, dv| self.eval_in(Dual64::new(x, dx), Dual64::new(v, dv), Dual64::from_f64);
-        let (by_x, by_v) = (along(1.0, 0.0), along(0.0, 1.0));
         // Dual numbers divide with another rounding.
-        (self.eval(x, v), by_x.eps, by_v.eps)
+        (self.eval(x, v), self.slope((x, 1.0), (v, 0.0)), self.slope((x, 0.0), (v, 1.0)))
+    }
+
+    /// The derivative at depth `x` (m) and velocity `v` (m/s), each with how it changes.
+    #[inline]
+    pub(crate) fn slope(&self, x: (f64, f64), v: (f64, f64)) -> f64 {
+        self.eval_in(Dual64::new(x.0, x.1), Dual64::new(v.0, v.1), Dual64::from_f64).eps
     }
 }
 

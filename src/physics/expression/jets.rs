@@ -108,7 +108,7 @@ impl<S: Scalar> Jets<S> {
                     (if is_lost { done[switch][0] } else { chosen }, S::zero())
                 }
                 _ if k == 0 => {
-                    let (first, second) = step.values(|register| done[register][0], |constant| constant);
+                    let (first, second) = step.values::<_, true>(|register| done[register][0], |constant| constant);
                     let behind = place + step.width() - 1;
                     (bound.signed(place, first), bound.signed(behind, second))
                 }

@@ -6,6 +6,8 @@
 //!
 //! Source: Hairer, Nørsett, Wanner (1993), Solving Ordinary Differential Equations I, section II.9.
 
+use std::cell::Cell;
+
 use crate::integrators::{Detail, Integrator, Taylor};
 use crate::physics::{Problem, Stage, State};
 
@@ -14,6 +16,8 @@ const COLUMNS: usize = 8;
 /// Error allowed in a step, relative to the greatest speed and the distance of the step: of the last column but one, and the
 /// last is far better.
 const TOLERANCE: f64 = 1e-12;
+/// Difference of two columns, relatively, behind which more of them change nothing.
+const ROUNDING: f64 = f64::EPSILON / 4.0;
 /// Steps of a flight at most, those taken again included.
 const STEPS_MAX: usize = 500;
 /// Longest step, times the rate of the fastest motion.
@@ -100,6 +104,7 @@ pub(super) struct Simulated {
 /// x and V after a time `h`, and the estimated errors of both, under the deceleration `a`.
 fn extrapolated(a: &impl Fn(f64, f64) -> f64, x: f64, v: f64, h: f64) -> ([f64; 2], [f64; 2]) {
     let mut row = [[0.0; 2]; COLUMNS];
+    let (mut best, mut error) = ([x, v], [f64::INFINITY; 2]);
     for column in 0..COLUMNS {
         let steps = 2 * (column + 1);
         let part = h / steps as f64;
@@ -118,9 +123,14 @@ fn extrapolated(a: &impl Fn(f64, f64) -> f64, x: f64, v: f64, h: f64) -> ([f64; 
                 finer = std::array::from_fn(|i| finer[i] + (finer[i] - coarser[i]) / (ratio * ratio - 1.0));
             }
         }
+        error = std::array::from_fn(|i| (finer[i] - best[i]).abs());
+        best = finer;
+        // A short step needs few columns.
+        if column > 0 && error[0] <= ROUNDING * (h * v).abs() && error[1] <= ROUNDING * v.abs() {
+            break;
+        }
     }
-    let [.., good, best] = row;
-    (best, std::array::from_fn(|i| (best[i] - good[i]).abs()))
+    (best, error)
 }
 
 /// The time in `0..=h` at which `g`, which gives a value and its slope, becomes positive, looked for from `guess` on: it is not
@@ -192,7 +202,16 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
                 h *= if off.is_finite() { (0.8 * off.powf(-1.0 / 15.0)).clamp(0.1, 0.7) } else { 0.1 };
                 continue;
             }
-            let within = |part: f64| extrapolated(&a, 0.0, v, part).0;
+            // From the last place that was asked for, if it is nearer than the start: Newton's method comes ever closer.
+            let asked = Cell::new((0.0, [0.0, v]));
+            let within = |part: f64| {
+                let (at, [distance, speed]) = asked.get();
+                let [at, distance, speed] =
+                    if (part - at).abs() < part { [at, distance, speed] } else { [0.0, 0.0, v] };
+                let (place, _) = extrapolated(&a, distance, speed, part - at);
+                asked.set((part, place));
+                place
+            };
             let rest = (speed <= rest_speed).then(|| {
                 first_positive(h, h * (v - rest_speed) / (v - speed), |part| {
                     let [distance, speed] = within(part);
