@@ -191,6 +191,17 @@ fn the_end_of_a_stage_at_the_velocity_of_a_row_is_that_of_the_row() {
     assert!(ends_at(beside).unwrap_err().to_string().contains("one of its table differ"));
 }
 
+/// The force vanishes at 50 m/s: from beside it V falls on its piece, or rises beyond its end.
+#[test]
+fn nothing_is_proved_of_a_flight_that_a_table_may_slow_or_drive() {
+    let problem = problem(&[[0.0, 100.0], [100.0, -100.0], [200.0, 100.0]], 50.0, 0.01).cast::<Ball>();
+    let from = |impact_speed: Ball| {
+        Enclosure.enclose(&Problem { impact_speed, ..problem.clone() }, Detail::Events).unwrap().outcome
+    };
+    assert_eq!(from(Ball::between(49.9, 50.1)), Outcome::Undecided);
+    assert_eq!([Ball::between(50.1, 50.2), Ball::between(49.8, 49.9)].map(from), [Outcome::Perforated; 2]);
+}
+
 /// Random tables whose force resists at rest: the closed form, the series and a library method, and the margins with their bounds.
 #[test]
 fn closed_form_and_series_agree_on_random_tables_within_their_bounds() {
