@@ -65,6 +65,9 @@ const STEPS_MAX: u64 = 100_000;
 /// Steps allowed for a stage with an expression, which take longer: a force may vanish with the velocity.
 const OWN_STEPS_MAX: u64 = 5_000;
 
+/// Velocity over that at impact at which nothing more is proved of a stage with an expression: its steps only grow shorter.
+const STILL: f64 = 1e-20;
+
 /// Velocity over that at the start of a step, below which a passage is sought in double words.
 const SLOW: f64 = 1e-3;
 
@@ -1054,7 +1057,8 @@ impl StageSolver<Ball> for Steps {
             }
         }
         let steps_max = course.cost.steps + if is_own { OWN_STEPS_MAX } else { STEPS_MAX };
-        while course.cost.steps < steps_max.min(STEPS_MAX) {
+        let slowest = if is_own { STILL * impact } else { 0.0 };
+        while course.cost.steps < steps_max.min(STEPS_MAX) && centre.v.hi >= slowest {
             if Self::creeps(&law, &centre, limit) {
                 let why = "viscosity lets it only creep towards the depth where the spring balances the drive";
                 return Err(IntegrationError::NeverEnds { why, last: centre.state().values() });

@@ -248,7 +248,7 @@ fn rounding_floor(&RoundingFloor { from, to }: &RoundingFloor, subject: &Subject
 /// second order. Beyond 2^`to` steps only the error is followed, up to where rounding outweighs it.
 pub(super) fn rounding_of(problem: &Problem, from: u32, to: u32) -> Found {
     /// Steps at which the truncation of second order has sunk to the rounding of f64.
-    const FLOOR: u32 = 22;
+    const FLOOR: u32 = 21;
     let all = rounding::floor(problem, from, to, to.max(FLOOR))?;
     let errors =
         |row: &rounding::Floor| Some((row.steps, [row.truncation?, row.plain.rounding?, row.compensated.rounding?]));
