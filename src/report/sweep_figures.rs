@@ -395,7 +395,9 @@ pub fn residual_velocities(perforations: &Perforations) -> Option<Figure> {
     let panels: Vec<Panel> = fitted
         .map(|(group, fit)| {
             let of_group = || {
-                let in_group = |test: &&PerforationTest| test.set == group.set && test.thickness_m == group.thickness_m;
+                let in_group = |test: &&PerforationTest| {
+                    test.set == group.set && test.thickness_m == group.thickness_m && group.lines.contains(&test.line)
+                };
                 perforations.shots.iter().filter(in_group)
             };
             let measured = of_group().filter_map(|test| Some((test.velocity_m_s, test.measured_velocity_m_s?)));
@@ -408,7 +410,8 @@ pub fn residual_velocities(perforations: &Perforations) -> Option<Figure> {
                 let speed = least + (fastest - least) * (f64::from(part) / f64::from(POINTS)).powi(2);
                 (speed, fit.at(speed))
             });
-            let title = format!("{}, H {} mm", one_line(&group.set), number(1e3 * group.thickness_m, 4));
+            let [d, h] = [group.diameter_m, group.thickness_m].map(|length| number(1e3 * length, 4));
+            let title = format!("{}, d {d} mm, H {h} mm", one_line(&group.set));
             Panel::new(
                 title,
                 Axis::linear("impact velocity", "m/s"),
@@ -436,6 +439,7 @@ pub fn residual_velocities(perforations: &Perforations) -> Option<Figure> {
 #[expect(clippy::unwrap_used, reason = "a missing value is a failed test")]
 mod tests {
     use super::*;
+    use crate::integrators::Taylor;
     use crate::studies::{applicability, experiments};
 
     fn row(ratio: f64, energy: f64) -> Row {
@@ -489,6 +493,25 @@ mod tests {
         assert!(figure.message.contains("+100 to +100 % off Eq. 15"), "{}", figure.message);
         let figure = critical_energy_difference(&[row(1.0, 2.0), row(2.0, 9.0)], &[], &[]).unwrap();
         assert!(figure.message.contains("+100 % at the least"), "{}", figure.message);
+    }
+
+    /// Two projectiles of one set at targets of one thickness.
+    #[test]
+    fn a_panel_of_residual_velocities_shows_the_shots_of_its_group_alone() {
+        let shot = |d_mm: u32, speed: f64, residual: f64| format!("1,{d_mm},flat,40,2300,100,{speed},{residual}\n");
+        let shots: String = [20, 40]
+            .map(|d| {
+                [1.1, 1.3, 1.6, 2.0].map(|over: f64| shot(d, 200.0 * over, 190.0 * (over * over - 1.0).sqrt())).concat()
+            })
+            .concat();
+        let table = format!("M_kg,d_mm,nose,fc_MPa,rho_kg_m3,H_mm,V0_m_s,Vr_m_s\n{shots}");
+        let shots = experiments::shot::read("own.csv", table.as_bytes(), "own").unwrap().shots;
+        let perforations = Perforations::of(&shots, None, &[], &Taylor::default()).unwrap();
+        let figure = residual_velocities(&perforations).unwrap();
+        let table = figure.table();
+        let measured =
+            |panel: &str| table.lines().filter(|line| line.contains(panel) && line.contains("measured")).count();
+        assert_eq!([measured("d 20 mm"), measured("d 40 mm")], [4, 4], "{table}");
     }
 
     #[test]

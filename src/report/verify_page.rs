@@ -253,7 +253,7 @@ fn formal_orders() -> Markup {
             let orders = |velocity: &VelocityAt| {
                 Quantity::ALL.map(|quantity| {
                     let perforates = matches!(quantity, Quantity::Velocity | Quantity::CriticalVelocity);
-                    let path = Path { perforates, to_crater_end, to_end, time_of_rest: None };
+                    let path = Path { perforates, to_crater_end, to_end, ..Path::default() };
                     (leaves_crater || !perforates)
                         .then(|| formal_order(*velocity, boundaries, &path, quantity))
                         .flatten()

@@ -17,7 +17,7 @@ use super::perforating_velocities;
 use super::quantity::Quantity;
 use super::random::Random;
 use super::verdict::Verdict;
-use crate::integrators::central_difference::MAX_STEPS;
+use crate::integrators::central_difference::{MAX_STEPS, Steps};
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{CentralDifference, Detail, Flight, IntegrationError, Integrator, Solved};
 use crate::physics::{Advice, EventKind, Problem, Scene};
@@ -407,10 +407,13 @@ impl Motion<'_> {
         let base = Ladder { from, to, points: study.points, seed: study.seed };
         let mut samples = vec![Samples::default(); self.quantities.len()];
         let work = self.take(&base, &mut samples, runs)?;
-        let CentralDifference { velocity, boundaries, .. } = (study.scheme)(to);
+        let CentralDifference { velocity, boundaries, steps, .. } = (study.scheme)(to);
         let judged = |samples: &[Samples]| -> Vec<QuantityStudy> {
             let of = |(&quantity, samples)| {
-                let formal = formal_order(velocity, boundaries, &self.path, quantity);
+                let formal = formal_order(velocity, boundaries, &self.path, quantity).map(|order| match steps {
+                    Steps::Automatic(_) => self.path.in_automatic_steps(order, boundaries, quantity),
+                    _ => order,
+                });
                 QuantityStudy::of_steps(quantity, (self.against)(quantity), formal, samples)
             };
             self.quantities.iter().zip(samples).map(of).collect()

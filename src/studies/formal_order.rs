@@ -5,6 +5,8 @@
 //! as soon as a lagged drag acts. A measured order is judged against this function, degraded orders included.
 
 use super::quantity::Quantity;
+#[cfg(doc)]
+use crate::integrators::central_difference::Steps;
 use crate::integrators::{Boundaries, Flight, VelocityAt};
 use crate::physics::{EventKind, Law, Outcome, Problem, State};
 
@@ -38,6 +40,9 @@ pub struct Path {
     pub to_end: Stretch,
     /// The order to which the law of the last stage limits the time of rest, where its force is not smooth in V there.
     pub time_of_rest: Option<f64>,
+    /// The power n of V with which the force of the last stage grows from that at rest, where [`Steps::Automatic`] grow as
+    /// `1/V^(n-1)` towards rest: no spring and no viscosity limits them there.
+    pub growing_steps: Option<f64>,
 }
 
 /// The order of the time of rest under a law that is not smooth in V there, below 2.
@@ -48,6 +53,21 @@ fn time_of_rest(law: &Law, depth: f64, speed: f64) -> Option<f64> {
     let at_rest = law.force_value(depth, 0.0);
     let power = sharp_power(|v| law.force_value(depth, v) - at_rest, NEAR * speed)?;
     Some(if at_rest == 0.0 { 1.0 } else { 1.0 + power })
+}
+
+/// [`Path::growing_steps`] where stage `stage` ends at rest at `depth`.
+fn growing_steps(problem: &Problem, stage: usize, depth: f64) -> Option<f64> {
+    let linear = problem.linear(stage, State { time: 0.0, depth, velocity: 0.0 });
+    let at_rest = problem.force(stage, depth, 0.0);
+    if linear.stiffness > 0.0 || linear.viscosity > 0.0 || at_rest <= 0.0 {
+        return None;
+    }
+    let Some(law) = problem.laws.of(stage) else { return (linear.drag > 0.0).then_some(2.0) };
+    let excess = |v: f64| law.force_value(depth, v) - at_rest;
+    // Near enough for the leading power, and far enough for it to stand above the rounding of the force at rest.
+    let near = GROWING * problem.impact_speed;
+    let power = (excess(near) / excess(0.5 * near)).log2();
+    (power > 1.0 / SMOOTH).then_some(power)
 }
 
 /// A law on the way through its stage, where V² is taken to fall evenly from one place to the other.
@@ -113,6 +133,9 @@ fn sharp_power(excess: impl Fn(f64) -> f64, near: f64) -> Option<f64> {
 /// Share of the impact speed, or of the length of a stage, at which the power of a force is taken: what is steep and smooth has a
 /// slope there.
 const NEAR: f64 = 1e-7;
+
+/// Share of the impact speed at which the power of a force is taken above that at rest.
+const GROWING: f64 = 1e-3;
 
 /// The power from which on a force has a slope.
 const SMOOTH: f64 = 0.9999;
@@ -192,7 +215,28 @@ impl Path {
                 .of(flight.stage)
                 .filter(|_| flight.outcome.is_stop())
                 .and_then(|law| time_of_rest(law, flight.end.depth, problem.impact_speed)),
+            growing_steps: flight
+                .events
+                .last()
+                .filter(|event| event.kind == EventKind::Rest)
+                .and_then(|rest| growing_steps(problem, flight.stage, rest.state.depth)),
         }
+    }
+
+    /// The order over the safety factor S of [`Steps::Automatic`] of a quantity whose order in equal steps is `order`.
+    ///
+    /// Where the force at rest is F0 and grows by `a V^n`, n > 1, the steps are as `S/V^(n-1)`, and the last one, which takes V
+    /// to rest, has `V ~ dt ~ S^(1/n)`. It has the force wrong by `V^n` and so the time by `S^(1 + 1/n)`; a time that is not
+    /// interpolated is off by dt, and the depth then by V dt. An interpolated depth is of second order but for a logarithm.
+    pub fn in_automatic_steps(&self, order: f64, boundaries: Boundaries, quantity: Quantity) -> f64 {
+        let Some(n) = self.growing_steps else { return order };
+        let is_late = boundaries == Boundaries::StepEnd;
+        order.min(match quantity {
+            Quantity::Time if is_late => 1.0 / n,
+            Quantity::Time => 1.0 + 1.0 / n,
+            Quantity::Depth | Quantity::CriticalVelocity if is_late => 2.0 / n,
+            _ => order,
+        })
     }
 }
 
@@ -255,7 +299,8 @@ mod tests {
     const PLAIN: Stretch =
         Stretch { velocity_dependent: false, force_jumps: false, of_sharp_end: None, of_sharp_place: None };
     const DRAGGED: Stretch = Stretch { velocity_dependent: true, ..PLAIN };
-    const CRATER: Path = Path { perforates: false, to_crater_end: None, to_end: PLAIN, time_of_rest: None };
+    const CRATER: Path =
+        Path { perforates: false, to_crater_end: None, to_end: PLAIN, time_of_rest: None, growing_steps: None };
     const TUNNEL: Path = Path { to_crater_end: Some(PLAIN), ..CRATER };
     const DRAG: Path = Path { to_end: DRAGGED, ..TUNNEL };
 
@@ -327,8 +372,9 @@ mod tests {
         use EventKind::{CraterEnd, Exit, Rest};
         // c k d = 6 = P + Q V1² with Q = 1, V1 = 2: continuous.
         let stop = flight(Outcome::StoppedInTunnel, 1, &[(CraterEnd, 0.5, 2.0), (Rest, 1.0, 0.0)]);
-        assert_eq!(Path::of(&small(12.0, 1.0), &stop), DRAG);
-        assert_eq!(Path::of(&small(12.1, 1.0), &stop), with_jump(DRAG));
+        let to_rest = Path { growing_steps: Some(2.0), ..DRAG };
+        assert_eq!(Path::of(&small(12.0, 1.0), &stop), to_rest);
+        assert_eq!(Path::of(&small(12.1, 1.0), &stop), with_jump(to_rest));
         assert_eq!(Path::of(&small(4.0, 0.0), &stop), TUNNEL);
         let through = flight(Outcome::Perforated, 1, &[(CraterEnd, 0.5, 2.0), (Exit, 0.6, 1.0)]);
         assert_eq!(Path::of(&small(12.0, 1.0), &through), Path { perforates: true, ..DRAG });

@@ -32,7 +32,7 @@ const STEPS_MAX: f64 = 2e6;
 const STEPS_TOTAL: f64 = 5e7;
 
 /// Steps of a simulated flight at most.
-const SIMULATED_MAX: u64 = 200_000;
+const SIMULATED_MAX: u64 = 20_000;
 
 /// Units of round-off that a value may be off by, besides one a step: the sums of another code run in another sequence.
 const ULPS: f64 = 32.0;

@@ -336,6 +336,11 @@ impl NotMeasured {
         Self { lacks: true, ..Self::skip(reason) }
     }
 
+    /// Whether the claim does not apply.
+    pub(super) fn is_skipped(&self) -> bool {
+        self.verdict == Verdict::Skipped
+    }
+
     /// The measurement cannot decide.
     pub fn undecided(reason: impl Into<String>) -> Self {
         Self { verdict: Verdict::Undecided, reason: reason.into(), lacks: false }

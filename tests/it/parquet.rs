@@ -168,6 +168,39 @@ fn integers_and_text_are_read_as_what_they_say() {
     assert!(lines[2].starts_with("3,stopped-in-crater,"), "{text}");
 }
 
+/// Behind 2^53 an `f64` is another integer: a label that is kept would name another row.
+#[test]
+fn a_kept_integer_that_no_number_holds_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (labels, is_right) in [([1_i64 << 53, 3], true), ([(1 << 53) + 1, 3], false)] {
+        let kept = |name: &str| format!("required int64 {name}; ");
+        let numbers: String = NEEDED.iter().map(|name| format!("required double {name}; ")).collect();
+        let schema = format!("message scenes {{ {numbers}{}{} }}", kept("label"), kept("other"));
+        let schema = Arc::new(parse_message_type(&schema).unwrap());
+        let file = File::create(folder.path().join("s.parquet")).unwrap();
+        let mut writer = SerializedFileWriter::new(file, schema, Arc::default()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        let row = &good_rows(1)[0];
+        for index in 0..NEEDED.len() + 2 {
+            let mut column = group.next_column().unwrap().unwrap();
+            if index < NEEDED.len() {
+                column.typed::<DoubleType>().write_batch(&[row[index].unwrap(); 2], None, None).unwrap();
+            } else {
+                column.typed::<Int64Type>().write_batch(&labels, None, None).unwrap();
+            }
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        writer.close().unwrap();
+        if is_right {
+            run_in(folder.path(), "batch s.parquet --out r.csv").expect(0);
+        } else {
+            let refused = run_in(folder.path(), "batch s.parquet --out other.csv").refused();
+            assert!(refused.contains("`label` holds integers beyond 2^53"), "{refused}");
+        }
+    }
+}
+
 #[test]
 fn a_bad_row_says_what_is_wrong_and_the_others_are_answered() {
     let folder = tempfile::tempdir().unwrap();

@@ -152,3 +152,39 @@ fn a_scheme_of_a_lower_order_than_the_formal_one_fails() {
         }
     }
 }
+
+/// The last steps of an explicit code grow as V falls, and lower the orders at rest; orders measured in all variants.
+#[test]
+fn steps_that_grow_towards_rest_have_the_orders_that_theory_gives_them() {
+    let power = "projectile.mass = 2\nimpact.velocity = 300\n[parameters]\nP = '100 kN'\nA = '200 kN'\nv1 = '100 m/s'\n\
+                 [[stage]]\nforce = 'P + A*(V/v1)^1.5'\n";
+    for (scene, n) in [(shipped("tunnel"), 2.0), (parsed(power), 1.5)] {
+        let problem = scene.problem().unwrap();
+        let exact = Truth::of(&problem).unwrap().flight;
+        for boundaries in Boundaries::ALL {
+            let automatic = |safety| CentralDifference {
+                steps: Steps::Automatic(safety),
+                ..CentralDifference::uniform(1.0, VelocityAt::Centred, boundaries)
+            };
+            let whole = automatic(1.0).time_step(&problem);
+            let scheme = |size| automatic(size / whole);
+            let (range, points) = (None, 60);
+            let study =
+                FixedSteps { scheme: &scheme, range, points, seed: 1, with_critical: false, progress: &|_, _| {} };
+            let study = of_fixed_steps(&scene, &problem, &exact, &study).unwrap();
+            let [depth, time] = [Quantity::Depth, Quantity::Time]
+                .map(|wanted| study.quantities.iter().find(|study| study.quantity == wanted).unwrap());
+            let late = boundaries == Boundaries::StepEnd;
+            let of_depth = if late { 2.0 / n } else { 2.0 };
+            assert!((depth.formal.unwrap() - of_depth).abs() < 1e-3, "{:?}", depth.formal);
+            let expected = if late { 1.0 / n } else { 1.0 + 1.0 / n };
+            assert!((time.formal.unwrap() - expected).abs() < 1e-3, "{:?}", time.formal);
+            for study in [depth, time] {
+                assert_ne!(study.verdict, Verdict::Failed, "{n} {boundaries} {}: {}", study.quantity, study.reason);
+                let line = study.fit.as_ref().unwrap().line.unwrap();
+                let off = (line.order - study.formal.unwrap()).abs();
+                assert!(off < 0.25, "{n} {boundaries} {}: {}", study.quantity, line.order);
+            }
+        }
+    }
+}

@@ -141,10 +141,10 @@ pub(super) fn schemes(ladders: &[(&Question, &[Rung])]) -> Vec<(Scheme, f64)> {
                     reproduced += 1;
                     largest = largest.max(difference);
                 }
-            }
-            // Most schemes are out after the first question.
-            if f64::from(reproduced) < REPRODUCED_PART * f64::from(all) - 2.0 {
-                break 'ladders;
+                // Most schemes are out before the fine steps of the first question, which take the time.
+                if f64::from(reproduced) < REPRODUCED_PART * f64::from(all) - 2.0 {
+                    break 'ladders;
+                }
             }
         }
         if all > 0 && f64::from(reproduced) >= REPRODUCED_PART * f64::from(all) {

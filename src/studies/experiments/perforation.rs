@@ -74,7 +74,7 @@ pub struct LimitTest {
     pub within_interval: Option<bool>,
 }
 
-/// Shots of one set, projectile and thickness.
+/// Shots of one set, diameter, nose and thickness.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(feature = "report", derive(schemars::JsonSchema))]
 pub struct Group {
@@ -90,6 +90,8 @@ pub struct Group {
     pub strength_pa: [f64; 2],
     /// Shots.
     pub shots: usize,
+    /// Lines of the shots in their file, from 1.
+    pub lines: Vec<u64>,
     /// Mean of V_c of the model over the shots (m/s).
     pub predicted_limit_m_s: f64,
     /// Curve through the residual velocities with p = 2.
@@ -294,6 +296,7 @@ fn group(
         mass_kg: range(|shot| shot.scene.mass),
         strength_pa: range(|shot| shot.scene.concrete().map_or(f64::NAN, |concrete| concrete.strength)),
         shots: members.len(),
+        lines: members.iter().map(|shot| shot.line).collect(),
         predicted_limit_m_s: limits.iter().sum::<f64>() / limits.len() as f64,
         recht_ipson,
         lambert_jonas,

@@ -83,6 +83,7 @@ mod known_bad;
 mod lanes;
 mod manufactured;
 mod orders;
+mod own_laws;
 mod peers;
 mod problems;
 mod proved;
@@ -112,7 +113,7 @@ use crate::studies::random::Random;
 pub use self::{
     agreement::*, applications::*, by_hand::*, commands::*, conclusions::*, counts::*, definitions::*, edges::*,
     expressions::*, formulas::*, generators::*, invariants::*, known_bad::*, lanes::*, manufactured::*, orders::*,
-    peers::*, problems::*, proved::*, scheme::*, texts::*,
+    own_laws::*, peers::*, problems::*, proved::*, scheme::*, texts::*,
 };
 
 macro_rules! every_check {
@@ -160,13 +161,13 @@ every_check! {
     Gradients UnlikeUnits TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
-    BatchRows SweepRows MapLines SetsOfTests StepErrors ThreeGridRule Report
+    BatchRows SweepRows MapLines SetsOfTests StepErrors BenchLevels ThreeGridRule Report
     KnownBad Counted Remeasured Independent
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
-    EnergyBalance TimeReversal Similarity Split JoinedMasses Ranges Neutral NamedFaults NamedSchemes
+    EnergyBalance TimeReversal Similarity Split JoinedMasses GeneratedLaws Ranges Neutral NamedFaults NamedSchemes
     Sweep BoundOfData GapFalls ThicknessLimit Intervals HiddenIntervals Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop

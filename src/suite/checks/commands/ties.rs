@@ -54,6 +54,9 @@ check! {
         spreads: Vec<String>,
     } in Commands, "standard errors", by spread_samples, compares (Commands | Itself);
 
+    /// `bench`: of the text, the least error of each method and the setting that reaches each level, by the runs in JSON.
+    BenchLevels {} in Commands, "relative", by bench_levels, compares (Commands | Itself);
+
     /// Each column of `batch` on random rows against `solve` and `critical` on the same numbers.
     BatchRows {
         /// Rows.
@@ -799,6 +802,41 @@ fn step_errors(StepErrors { options }: &StepErrors, subject: &Subject<'_>) -> Fo
     for of in quantities.par_iter().map(of_quantity).collect::<Found<Vec<_>>>()? {
         worst.take(of.value, || of.place);
     }
+    Ok(worst.measurement())
+}
+
+fn bench_levels(subject: &Subject<'_>) -> Found {
+    let line = format!("bench {} --parts work-precision --repeats 1", subject.scene_name()?);
+    let answer = Answer::of(subject.program()?, &line, &[])?;
+    let (said, _) = run(subject.program()?, &line, &[])?;
+    let (mut worst, mut rows) = (Worst::default(), 0);
+    let mut levels: Vec<f64> = Vec::new();
+    for row in said.out.lines() {
+        let words: Vec<&str> = row.split_whitespace().collect();
+        let [name, cells @ .., least] = &words[..] else { continue };
+        if *name == "method" {
+            levels = cells.iter().map(|level| level.parse()).collect::<Result<_, _>>()?;
+        }
+        let is_right = |run: &&Value| run["method"] == *name && run["state"] == "right";
+        let runs: Vec<&Value> = answer.list("runs").iter().filter(is_right).collect();
+        if runs.is_empty() {
+            continue;
+        }
+        rows += 1;
+        let exact = runs.iter().map(|run| of(run, "error")).fold(f64::INFINITY, f64::min);
+        worst.take(apart(least.parse()?, exact), || format!("{name}: least {least} and not {exact}"));
+        let mut cells = cells.iter();
+        for level in &levels {
+            // A time and its setting, or a stroke where no setting reaches the level.
+            let setting = cells.next().filter(|word| **word != "-").and_then(|_| cells.next());
+            let holds = match setting {
+                Some(setting) => runs.iter().any(|run| run["setting"] == **setting && of(run, "error") <= *level),
+                None => exact > *level,
+            };
+            worst.take(must(holds), || format!("{name} at {level}: {setting:?}, least {exact}"));
+        }
+    }
+    holds!(rows > 8, "{rows} methods in the text");
     Ok(worst.measurement())
 }
 

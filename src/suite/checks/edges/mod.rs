@@ -20,7 +20,7 @@ pub use self::{critical::*, events::*, steps::*};
 
 impl Subject<'_> {
     /// Solution of `problem` at the method's default tolerance.
-    fn flight(&self, problem: &Problem) -> Found<Flight> {
+    pub(super) fn flight(&self, problem: &Problem) -> Found<Flight> {
         solve(&self.method(None)?, problem, Detail::Events)
     }
 

@@ -88,6 +88,21 @@ fn stated_step_limits(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
         let found = limit(&tunnel, part, VelocityAt::LaggedHalfStep)?;
         seen.expect(is_right(found, part), || format!("lagged drag at {part}: {found:?}"));
     }
+    // Springs, viscosities and drags together: the limit is where the linear recurrence of the scheme begins to grow.
+    for (stiffness, viscosity, drag) in
+        [(4.0, 1.5, 0.0), (4.0, 0.0, 0.01), (0.0, 1.5, 0.0), (0.0, 0.0, 0.01), (9.0, 5.0, 0.03)]
+    {
+        let stage = Stage { static_force: 50.0, stiffness, viscosity, drag, end: f64::INFINITY };
+        let g = viscosity + 2.0 * drag * 100.0;
+        for velocity in VelocityAt::ALL {
+            let expected = first_growth(stiffness, g, velocity);
+            let found = limit(&Problem::of_stages(1.0, 100.0, [stage]), 1e-3, velocity)?;
+            let near = |found: StepLimit| (found.limit / expected - 1.0).abs() < 1e-6 || found.limit == expected;
+            seen.expect(found.is_some_and(near), || {
+                format!("{stage:?}, {velocity}: {found:?}, growth from {expected} s on")
+            });
+        }
+    }
     // A picometre allows steps of 1 ns, 2/w, and a millionth of the kilosecond behind it is a millisecond.
     let stiff = Problem::of_stages(1.0, 1.0, [Stage::crater(4e18, 1e-12), Stage::tunnel(1e-3, 0.0)]);
     for velocity in VelocityAt::ALL {
@@ -108,6 +123,36 @@ fn stated_step_limits(_: &Subject<'_>, seen: &mut Violations) -> Found<()> {
         }
     }
     Ok(())
+}
+
+/// The least step (s) at which `V' = -(w² x + g V)`, `x' = V` grows in the recurrence of the scheme; infinite without one.
+fn first_growth(w_squared: f64, g: f64, velocity: VelocityAt) -> f64 {
+    let grows = |h: f64| {
+        // x and u = V half a step before, after a step: both from (1, 0) and from (0, 1).
+        let step = |(x, u): (f64, f64)| {
+            let lagged = w_squared * x + g * u;
+            let d = match velocity {
+                VelocityAt::LaggedHalfStep => lagged,
+                VelocityAt::Centred => w_squared * x + g * (u - 0.5 * h * w_squared * x) / (1.0 + 0.5 * h * g),
+                VelocityAt::PredictedHalfStep => w_squared * x + g * (u - 0.5 * h * lagged),
+            };
+            (x + h * (u - h * d), u - h * d)
+        };
+        let ((a, c), (b, d)) = (step((1.0, 0.0)), step((0.0, 1.0)));
+        let (mean, product) = (0.5 * (a + d), a * d - b * c);
+        let apart = mean * mean - product;
+        let radius = if apart > 0.0 { mean.abs() + apart.sqrt() } else { product.sqrt() };
+        // A motion without a spring keeps x, and one without friction its swing.
+        radius > 1.0 + 1e-9
+    };
+    let mut steps = (0..4000).map(|count| 1e-3 * 1.005_f64.powi(count)).take_while(|step| *step < 1e4);
+    let Some(growing) = steps.find(|step| grows(*step)) else { return f64::INFINITY };
+    let (mut low, mut high) = (growing / 1.005, growing);
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let middle = 0.5 * (low + high);
+        *(if grows(middle) { &mut high } else { &mut low }) = middle;
+    }
+    high
 }
 
 fn closed_form_everywhere(subject: &Subject<'_>) -> Found {
