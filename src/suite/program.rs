@@ -4,7 +4,6 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -29,7 +28,6 @@ const WAITING: usize = 2;
 pub struct Program {
     path: PathBuf,
     folder: Temporary<TempDir>,
-    runs: AtomicUsize,
     waiting: ThreadPool,
 }
 
@@ -56,7 +54,7 @@ impl Program {
         }
         let threads = WAITING * rayon::current_num_threads();
         let waiting = ThreadPoolBuilder::new().num_threads(threads).build().map_err(io::Error::other)?;
-        Ok(Self { path: path.to_owned(), folder, runs: AtomicUsize::new(0), waiting })
+        Ok(Self { path: path.to_owned(), folder, waiting })
     }
 
     /// What `runs` gives, in threads that wait for the program: more of them than there are processors.
@@ -104,8 +102,9 @@ impl Program {
     }
 
     fn run_words(&self, words: &[String], folder: &Path) -> io::Result<Said> {
-        let number = self.runs.fetch_add(1, Ordering::Relaxed);
-        let [out, err] = ["out", "err"].map(|name| self.folder.path().join(format!(".{number}.{name}")));
+        // Two files for each thread, written anew: to make and to remove files takes a good part of a short run.
+        let thread = thread::current().id();
+        let [out, err] = ["out", "err"].map(|name| self.folder.path().join(format!(".{thread:?}.{name}")));
         let mut child = Command::new(&self.path)
             .args(words)
             .current_dir(folder)
@@ -128,11 +127,7 @@ impl Program {
             thread::sleep(wait);
             wait = longest.min(wait.mul_f64(1.25));
         };
-        let said =
-            Said { code: status.code().unwrap_or(-1), out: fs::read_to_string(&out)?, err: fs::read_to_string(&err)? };
-        fs::remove_file(out)?;
-        fs::remove_file(err)?;
-        Ok(said)
+        Ok(Said { code: status.code().unwrap_or(-1), out: fs::read_to_string(&out)?, err: fs::read_to_string(&err)? })
     }
 }
 

@@ -15,6 +15,7 @@
 //!
 //! All from `=` on is made by a run; a person writes the rest.
 
+use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 
 use rayon::prelude::*;
@@ -276,7 +277,8 @@ fn lasting(name: &str, text: &str, most: usize) -> Vec<String> {
         !is_left_out
     });
     let lines: Vec<String> = timeless.map(lasting_line).collect();
-    let kept: Vec<String> = rows.as_deref().map_or(lines.clone(), |rows| rows.lines().map(lasting_line).collect());
+    let kept_rows: Option<Vec<String>> = rows.as_deref().map(|rows| rows.lines().map(lasting_line).collect());
+    let kept = kept_rows.as_ref().unwrap_or(&lines);
     let count = kept.len();
     // An odd number, so that each key of the objects of a list comes up.
     let each = if count > most { count.div_ceil(most.max(1)) | 1 } else { 1 };
@@ -287,7 +289,7 @@ fn lasting(name: &str, text: &str, most: usize) -> Vec<String> {
     if each > 1 && most > 0 {
         lasting.push(format!("{count} lines, one of {each} kept"));
     }
-    lasting.extend(kept.into_iter().step_by(each).take(most));
+    lasting.extend(kept.iter().step_by(each).take(most).cloned());
     lasting
 }
 
@@ -465,10 +467,13 @@ impl Piece<'_> {
 }
 
 /// `line` with `5.4 × 10⁻¹⁶` written as `5.4e-16`.
-fn plain(line: &str) -> String {
+fn plain(line: &str) -> Cow<'_, str> {
+    if line.is_ascii() {
+        return line.into();
+    }
     let digit = |c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|raised| raised == c);
     let raised = |c| if c == '⁻' { '-' } else { digit(c).and_then(|d| char::from_digit(d as u32, 10)).unwrap_or(c) };
-    line.replace("\u{a0}×\u{a0}10", "e").chars().map(raised).collect()
+    line.replace("\u{a0}×\u{a0}10", "e").chars().map(raised).collect::<String>().into()
 }
 
 /// The numbers of `line` and the words between them.
