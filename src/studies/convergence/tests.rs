@@ -183,7 +183,9 @@ fn steps_that_grow_towards_rest_have_the_orders_that_theory_gives_them() {
                 assert_ne!(study.verdict, Verdict::Failed, "{n} {boundaries} {}: {}", study.quantity, study.reason);
                 let line = study.fit.as_ref().unwrap().line.unwrap();
                 let off = (line.order - study.formal.unwrap()).abs();
-                assert!(off < 0.25, "{n} {boundaries} {}: {}", study.quantity, line.order);
+                // Where the last step ends is a noise.
+                let band = if late { 0.4 } else { 0.25 };
+                assert!(off < band, "{n} {boundaries} {}: {}", study.quantity, line.order);
             }
         }
     }
