@@ -173,21 +173,18 @@ fn integers_and_text_are_read_as_what_they_say() {
 fn a_kept_integer_that_no_number_holds_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (labels, is_right) in [([1_i64 << 53, 3], true), ([(1 << 53) + 1, 3], false)] {
-        let kept = |name: &str| format!("required int64 {name}; ");
-        let numbers: String = NEEDED.iter().map(|name| format!("required double {name}; ")).collect();
-        let schema = format!("message scenes {{ {numbers}{}{} }}", kept("label"), kept("other"));
+        let numbers = NEEDED.map(|name| format!("required double {name}; ")).concat();
+        let schema = format!("message scenes {{ {numbers}required int64 label; required int64 other; }}");
         let schema = Arc::new(parse_message_type(&schema).unwrap());
         let file = File::create(folder.path().join("s.parquet")).unwrap();
         let mut writer = SerializedFileWriter::new(file, schema, Arc::default()).unwrap();
         let mut group = writer.next_row_group().unwrap();
-        let row = &good_rows(1)[0];
-        for index in 0..NEEDED.len() + 2 {
+        for value in good_rows(1)[0].iter().copied().chain([None, None]) {
             let mut column = group.next_column().unwrap().unwrap();
-            if index < NEEDED.len() {
-                column.typed::<DoubleType>().write_batch(&[row[index].unwrap(); 2], None, None).unwrap();
-            } else {
-                column.typed::<Int64Type>().write_batch(&labels, None, None).unwrap();
-            }
+            match value {
+                Some(number) => column.typed::<DoubleType>().write_batch(&[number; 2], None, None).unwrap(),
+                None => column.typed::<Int64Type>().write_batch(&labels, None, None).unwrap(),
+            };
             column.close().unwrap();
         }
         group.close().unwrap();
