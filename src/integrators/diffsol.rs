@@ -91,10 +91,10 @@ impl Scheme {
     /// An error of energy never grows with depth, since resistance never falls with speed (`r, q >= 0`); so the bound
     /// grows with the number of steps, which a method of order k needs in proportion to `rtol^(-1/(k+1))`. In front
     /// stands a factor that is measured, on 1,200 random scenes for each of the tolerances 1e-3, 1e-6, 1e-8, 1e-10 and
-    /// 1e-12; the worst of them came to 0.31 of the bound.
+    /// 1e-12; the worst of them came to 0.31 of the bound. Of 35,000 more at 1e-10 one came to 0.61 with `tsit45`.
     fn margin_error(self, rtol: f64) -> f64 {
         match self {
-            Self::Tsit45 => 6.0 * rtol,
+            Self::Tsit45 => 12.0 * rtol,
             Self::Bdf => 6.0 * rtol.powf(5.0 / 6.0),
             Self::Esdirk34 => 4.0 * self.library_rtol(rtol).powf(3.0 / 4.0),
             Self::TrBdf2 => 3.0 * self.library_rtol(rtol).powf(2.0 / 3.0),

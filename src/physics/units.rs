@@ -97,17 +97,7 @@ impl Dimension {
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
-        let unit = canonical(unit);
-        let is_a_part = |text: &str| [", ", " | "].iter().any(|mark| text.starts_with(mark));
-        let lines = UNITS.match_indices(&unit).filter_map(|(at, unit)| {
-            let (before, behind) = (&UNITS[..at], &UNITS[at + unit.len()..]);
-            let begins = before.ends_with(", ") || before.ends_with(" | ");
-            (begins && is_a_part(behind)).then(|| before.rsplit('\n').next().unwrap_or_default())
-        });
-        let names = lines.filter_map(|line| line.split(" | ").next());
-        let dimensions = names.filter_map(|name| Self::VARIANTS.iter().find(|known| <&str>::from(**known) == name));
-        // A few have two, as uncia, which is a mass and a length.
-        dimensions.copied().min_by_key(|dimension| *dimension as usize).filter(|_| !unit.contains([',', '|']))
+        Self::VARIANTS.iter().copied().find(|dimension| dimension.coefficient(unit).is_some())
     }
 }
 
