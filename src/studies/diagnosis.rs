@@ -4,7 +4,7 @@
 //! tolerances and may err by [`ALLOWED`] times the tolerance and the condition of the problem (`tolerances`); one of fixed
 //! steps is asked on a ladder of steps, and its limit judged (`fixed_steps`, `ladder`). Where answers fail, each cause that is known
 //! computes what it would have answered (`hypotheses`, `simulation`), and the one that explains them is named
-//! (`causes`).
+//! (`causes`). Where none is certain, questions of another kind measure what the solver does (`measurements`).
 
 mod causes;
 #[cfg(any(test, feature = "report"))]
@@ -12,6 +12,7 @@ mod faulty;
 mod fixed_steps;
 mod hypotheses;
 mod ladder;
+mod measurements;
 mod numbers;
 mod observations;
 mod questions;
@@ -29,11 +30,11 @@ use self::fixed_steps::in_fixed_steps;
 pub(crate) use self::hypotheses::changed_by_nothing;
 #[cfg(feature = "report")]
 pub(crate) use self::ladder::{LADDER, Limit};
+use self::measurements::measured;
 pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, in_order, questions};
 use self::tolerances::{at_tolerances, row};
 use super::verdict::Verdict;
-use crate::exchange::peers::wire::errors;
 use crate::exchange::peers::{Peer, PeerAnswer, PeerFailure, PeerFault, PeerIdentity, PeerRequest};
 use crate::physics::{Criterion, Outcome, Scene, State};
 
@@ -41,9 +42,8 @@ use crate::physics::{Criterion, Outcome, Scene, State};
 pub const TOLERANCES: [f64; 3] = [1e-6, 1e-9, 1e-12];
 /// Error allowed over the tolerance and the condition number. The worst of sound solvers measured: 135 (BDF).
 pub const ALLOWED: f64 = 1e3;
-/// Failing questions that a solver that has just started is asked again, and the relative difference that makes another answer.
-const ALONE: usize = 5;
-const ANOTHER: f64 = 1e-9;
+/// Ids of causes that say how large errors are, and not what is wrong.
+const SYMPTOMS: [&str; 3] = ["tolerance-missed", "tolerance-ignored", "single-precision"];
 /// Times that a solver is started again after it died; one that fell silent is so many times as costly.
 const RESTARTS_MAX: usize = 30;
 const RESTARTS_OF_SILENCE: usize = 30;
@@ -285,53 +285,18 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
         at_tolerances(&mut asking, peer, &identity, all, progress)
     };
     let is_named = found.causes.iter().any(|cause| cause.certainty == Certainty::Certain);
-    if found.verdict == Verdict::Failed
+    let is_of_low_order = found.causes.first().is_some_and(|cause| cause.id == "first-order-scheme");
+    if (found.verdict == Verdict::Failed || is_of_low_order)
         && !is_named
-        && let Some(cause) = kept(&mut asking, all, &found)
+        && let Some(cause) = measured(&mut asking, all, &found)
     {
-        found.causes.retain(|cause| cause.id != "unknown");
-        found.causes.insert(0, cause);
+        found.causes.retain(|cause| !["unknown", "first-order-scheme"].contains(&cause.id.as_str()));
+        // What is likely, and is no symptom alone, stays first beside what is no more.
+        let stays = |known: &Cause| known.certainty <= cause.certainty && !SYMPTOMS.contains(&known.id.as_str());
+        let place = usize::from(found.causes.first().is_some_and(stays));
+        found.causes.insert(if cause.certainty == Certainty::Certain { 0 } else { place }, cause);
     }
     found
-}
-
-/// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones,
-/// or gives no answer twice.
-fn kept(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
-    let failing: Vec<&Asked> =
-        found.questions.iter().filter(|row| row.verdict == Verdict::Failed && row.answered.is_some()).collect();
-    let (mut other, mut unlike, mut asked) = (0, 0, 0);
-    for row in failing.iter().step_by((failing.len() / ALONE).max(1)).take(ALONE) {
-        let (Some(question), Some(before)) = (all.iter().find(|question| question.id == row.id), row.answered) else {
-            continue;
-        };
-        let again = PeerRequest { dt_s: row.dt_s, ..request(question, row.rtol.unwrap_or(TOLERANCES[0])) };
-        let mut of_a_new_one = || {
-            let is_there = !asking.is_gone && asking.solver.restart();
-            is_there.then(|| asking.ask(&again).ok()).flatten().map(|answer| end_of(&answer).state)
-        };
-        let (Some(one), Some(two)) = (of_a_new_one(), of_a_new_one()) else { continue };
-        let differs = |a, b| errors(a, b, question.problem.impact_speed).iter().any(|apart| !(apart.abs() <= ANOTHER));
-        asked += 1;
-        other += usize::from(differs(one, before.state));
-        unlike += usize::from(differs(one, two));
-    }
-    let said = format!("{other} of {asked} failing questions");
-    let certainty = if other == asked { Certainty::Certain } else { Certainty::Likely };
-    match (other, unlike) {
-        (2.., 0) => {
-            let statement = format!(
-                "answers depend on what was asked before: {said} are answered otherwise by a solver that has just started"
-            );
-            Some(Cause::plain("state-kept", statement, certainty, other, asked))
-        }
-        (2.., _) => {
-            let statement =
-                format!("answers are not the same twice: {said} are answered otherwise when they are asked again");
-            Some(Cause::plain("not-repeatable", statement, certainty, other, asked))
-        }
-        _ => None,
-    }
 }
 
 /// Asks `solver`, which takes a tolerance, what lies at the edges, and `plan.questions` more; each is judged, and no

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::hypotheses::{Fault, How, Hypothesis, Parameter, Predicted, hypotheses, predicted};
 use super::questions::{Content, Question};
-use crate::exchange::peers::wire::{conditioning, errors};
+use crate::exchange::peers::wire::conditioning;
 use crate::physics::State;
 
 /// Failing answers that bound a number which matters only in passing those of a question, and that it may leave.
@@ -48,6 +48,8 @@ const LEFT: f64 = 1e-4;
 const LEFT_MAX: f64 = 100.0;
 /// Largest relative difference that an explanation may leave, whatever the condition.
 const EXPLAINED_MAX: f64 = 0.02;
+/// Part of the right answer that is next to nothing: of a flight that a fault ends at once.
+const LEAST: f64 = 1e-9;
 /// An error that is so many times the allowed one tells a fault from the accuracy of a solver.
 const TELLING: f64 = 10.0;
 
@@ -122,9 +124,17 @@ impl Seen<'_> {
         predicted(self.question, faults, self.how)
     }
 
+    /// Relative errors of the answer against `end`: those of depth and time over a part of the right ones where `end` is next to nothing.
+    fn errors(&self, end: State) -> [f64; 3] {
+        let (right, impact_speed) = (self.question.exact.end, self.question.problem.impact_speed);
+        let over = |found: f64, value: f64, scale: f64| if found == value { 0.0 } else { (found - value) / scale };
+        let of = |part: fn(State) -> f64| over(part(self.answer), part(end), part(end).abs().max(LEAST * part(right)));
+        [of(|state| state.depth), of(|state| state.time), over(self.answer.velocity, end.velocity, impact_speed)]
+    }
+
     /// Errors of the answer against what is predicted, each over what is allowed.
     fn excess(&self, Predicted { end, conditions }: Predicted) -> [f64; 3] {
-        let errors = errors(self.answer, end, self.question.problem.impact_speed);
+        let errors = self.errors(end);
         std::array::from_fn(|i| {
             let condition = conditions[i].max(self.question.conditions[i]);
             errors[i] / (self.accuracy * condition)
@@ -148,7 +158,7 @@ impl Seen<'_> {
     /// The same of what is `predicted`.
     fn explained(&self, predicted: Predicted, mask: Mask) -> Option<f64> {
         let is_near = self.is_near(self.excess(predicted), mask);
-        let errors = errors(self.answer, predicted.end, self.question.problem.impact_speed);
+        let errors = self.errors(predicted.end);
         let largest = (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max);
         (is_near && largest <= EXPLAINED_MAX).then_some(largest)
     }

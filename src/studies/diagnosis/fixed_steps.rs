@@ -415,8 +415,20 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
     }
     let is_first = |which: usize| order(right, which).map(|order| order < 1.5);
     if is_first(1) == Some(true) && [0, 2].iter().all(|which| is_first(*which) != Some(true)) {
-        let statement = "the time alone has order 1: it is that of the end of a step".to_owned();
-        return vec![Cause::plain("event-time-late", statement, Certainty::Likely, of, of)];
+        let errors = right.iter().flat_map(|(question, rungs)| rung_errors(question, rungs));
+        let (id, statement) = if errors.map(|[_, time, _]| time).sum::<f64>() > 0.0 {
+            ("event-time-late", "the time alone has order 1: it is that of the end of a step")
+        } else {
+            (
+                "event-time-early",
+                "the time alone has order 1, and is too small: that of a shortened step is not counted",
+            )
+        };
+        return vec![Cause::plain(id, statement.to_owned(), Certainty::Likely, of, of)];
+    }
+    if right.iter().flat_map(|(_, rungs)| *rungs).all(Rung::is_of_whole_steps) {
+        let statement = "every flight ends at the end of a step: exit and rest are not located, order 1".to_owned();
+        return vec![Cause::plain("exit-late", statement, Certainty::Certain, of, of)];
     }
     let mut causes = Vec::new();
     for (id, contents, statement) in LOWERS {

@@ -39,6 +39,8 @@ const WRONG: f64 = 12.0;
 const FLOOR: f64 = 1e-8;
 /// Relative difference, before the condition, of an answer and a scheme that reproduces it.
 pub(super) const REPRODUCED: f64 = 1e-10;
+/// Steps that a time may lie off the end of one.
+const WHOLE: f64 = 1e-6;
 /// Part of the answers that a scheme must reproduce: whether a node falls on an event, round-off decides.
 const REPRODUCED_PART: f64 = 0.97;
 
@@ -73,6 +75,14 @@ pub(super) struct Rung {
     pub answer: State,
     /// Whether its outcome is the right one.
     pub is_outcome_right: bool,
+}
+
+impl Rung {
+    /// Whether the flight ends where a step does.
+    pub(super) fn is_of_whole_steps(&self) -> bool {
+        let steps = self.answer.time / self.step;
+        (steps - steps.round()).abs() <= WHOLE
+    }
 }
 
 /// The limit of one quantity as the step vanishes.

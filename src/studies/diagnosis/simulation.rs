@@ -172,15 +172,17 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
         let end_time = end_time.min(elapsed + stage_time);
         while state.depth < limit {
             let State { time, depth: x, velocity: v } = state;
-            if v <= rest_speed || elapsed >= end_time {
-                return Some(Simulated { end: state, stage: index, passed });
-            }
             // By the distance since x, not by the depth: a stage may be far shorter than it is deep.
             let a = |distance: f64, velocity| {
                 let depth = x + distance;
                 force(&Place { problem, index, law, depth, velocity, entry_speed, impact_speed, mass }, number) / mass
             };
             let left = limit - x;
+            // Below a speed of rest, and driven, it moves on.
+            let is_at_rest = v <= rest_speed && (v <= 0.0 || a(0.0, v) >= 0.0);
+            if is_at_rest || elapsed >= end_time {
+                return Some(Simulated { end: state, stage: index, passed });
+            }
             // No step much longer than the distance to the limit, or than the loss of the speed.
             let crossing = 1.2 * left / v;
             let stopping = 1.2 * v / a(0.0, v).abs();

@@ -266,6 +266,18 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
             }
         })];
     }
+    let is_small = |seen: &[Seen<'_>]| 10 * failing(seen) <= failing(&exactly);
+    if found.is_none()
+        && !is_of_few
+        && silent == 0
+        && is_small(&at(ACCURACIES[3]))
+        && answered.iter().zip(&rows).filter(|(one, row)| row.verdict == Verdict::Failed && is_one_error(one)).count()
+            * 10
+            >= failed * 9
+    {
+        let statement = "answers are nearly the same at every tolerance, and err by more than it allows".to_owned();
+        return vec![Cause::plain("tolerance-ignored", statement, Certainty::Likely, failed, failed)];
+    }
     if found.is_none() && converges(answered) {
         return vec![inaccurate(answered, failed)];
     }
@@ -459,7 +471,7 @@ fn inaccurate(answered: &[Answered<'_>], failed: usize) -> Cause {
     // Where the two tightest tolerances give nearly one answer, no noise of few digits is in it.
     let stays = errors[2] > 0.3 * errors[0] && (errors[2] > 1e-6 || 2 * alike > answered.len())
         || errors[2] > 0.3 * errors[1] && are_sure(answered);
-    let rises = errors[2] > 0.1 * errors[1] && (1e-8..1e-4).contains(&errors[2]);
+    let rises = errors[2] > 0.3 * errors[1] && (1e-8..1e-4).contains(&errors[2]);
     let [loose, middle, tight] = errors.map(|error| format!("{error:.0e}"));
     let alone = alone_wrong(answered).map_or_else(String::new, |quantity| format!(" in the {quantity} alone,"));
     let found = format!("errors of {loose}, {middle} and {tight},{alone} at tolerances of 1e-6, 1e-9 and 1e-12");

@@ -1,0 +1,295 @@
+//! What does a solver do, as questions made for it measure? Asked where no known fault explains its answers with certainty.
+//!
+//! - Asked anew: whether a solver that has just started gives other answers.
+//! - The drag, speed by speed: a short flight through drag alone loses `ln(V0/V) = Q H / M` whatever the speed, so that
+//!   the ratio of the loss to that is the ratio of the force.
+//! - Exits that lie close to each other, within one step: where the step is replaced by a straight line, so are the time
+//!   and the velocity as functions of the depth, and their second differences vanish.
+//! - The same flight with other units of length and speed: the relative error of a solver whose tolerance is relative
+//!   stays, and that of one with an absolute tolerance of its own falls as the numbers grow.
+//! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`).
+
+mod one_step;
+
+use super::causes::{Cause, Certainty};
+use super::questions::Question;
+use super::{ALLOWED, Asked, Asking, Diagnosis, TOLERANCES, end_of, request};
+use crate::exchange::peers::PeerRequest;
+use crate::exchange::peers::wire::errors;
+use crate::integrators::{Detail, Integrator, Taylor};
+use crate::physics::{Problem, Stage, State};
+use crate::studies::verdict::Verdict;
+
+/// Failing questions that a solver that has just started is asked again, and the relative difference that makes another answer.
+const ALONE: usize = 5;
+const ANOTHER: f64 = 1e-9;
+
+/// Exits in a row, and the distance between two over the depth.
+const EXITS: usize = 24;
+const BETWEEN_EXITS: f64 = 2e-3;
+/// Second differences over the right ones that are none, and the part of them that must be none.
+const STRAIGHT: f64 = 1e-3;
+const STRAIGHT_PART: f64 = 0.75;
+
+/// Speeds at which the drag is measured: powers of ten, and how many in each decade.
+const DECADES: [i32; 2] = [-1, 3];
+const IN_A_DECADE: i32 = 4;
+/// `ln(V0/V)` of the flights that measure it.
+const LOSS: f64 = 0.01;
+/// Ratios that differ by less are one.
+const ONE_RATIO: f64 = 1e-5;
+/// Part of its distance from one by which the factor of coasting may differ under drag.
+const BRAKED_PART: f64 = 0.25;
+/// Halvings of a bracket in which the ratio changes.
+const HALVINGS: usize = 24;
+
+/// Speeds and constant forces of flights to rest.
+const RESTS: [(f64, f64); 6] =
+    [(10.0, 50.0), (25.0, 70.0), (40.0, 3000.0), (90.0, 200.0), (150.0, 1e4), (300.0, 700.0)];
+
+/// Factors of length and speed, powers of two.
+const SIZES: [f64; 4] = [1.0 / 1024.0, 1.0 / 32.0, 1.0, 32.0];
+/// By how much the error falls at least from one size to the next, and from the first to the last.
+const FALLS: f64 = 3.0;
+const FALLS_IN_ALL: f64 = 1e3;
+
+/// What questions made for it show of the solver of `found`.
+pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
+    let anew = kept(asking, all, found);
+    if anew.is_some() || asking.reads_scene {
+        return anew;
+    }
+    if found.peer.fixed_step {
+        // Where the limit is wrong, so is the force, and the step tells nothing of the scheme.
+        if found.counts.failed > 0 {
+            return None;
+        }
+        let claimed = found.orders.iter().filter_map(|order| order.formal_order).fold(2.0, f64::max);
+        return one_step::measured(asking, claimed);
+    }
+    coasting(asking)
+        .or_else(|| drag_by_speed(asking))
+        .or_else(|| straight_steps(asking))
+        .or_else(|| straight_to_rest(asking))
+        .or_else(|| absolute_tolerance(asking))
+}
+
+/// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones,
+/// or gives no answer twice.
+fn kept(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
+    let failing: Vec<&Asked> =
+        found.questions.iter().filter(|row| row.verdict == Verdict::Failed && row.answered.is_some()).collect();
+    let (mut other, mut unlike, mut asked) = (0, 0, 0);
+    for row in failing.iter().step_by((failing.len() / ALONE).max(1)).take(ALONE) {
+        let (Some(question), Some(before)) = (all.iter().find(|question| question.id == row.id), row.answered) else {
+            continue;
+        };
+        let again = PeerRequest { dt_s: row.dt_s, ..request(question, row.rtol.unwrap_or(TOLERANCES[0])) };
+        let mut of_a_new_one = || {
+            let is_there = !asking.is_gone && asking.solver.restart();
+            is_there.then(|| asking.ask(&again).ok()).flatten().map(|answer| end_of(&answer).state)
+        };
+        let (Some(one), Some(two)) = (of_a_new_one(), of_a_new_one()) else { continue };
+        let differs = |a, b| errors(a, b, question.problem.impact_speed).iter().any(|apart| !(apart.abs() <= ANOTHER));
+        asked += 1;
+        other += usize::from(differs(one, before.state));
+        unlike += usize::from(differs(one, two));
+    }
+    let said = format!("{other} of {asked} failing questions");
+    let certainty = if other == asked { Certainty::Certain } else { Certainty::Likely };
+    match (other, unlike) {
+        (2.., 0) => {
+            let statement = format!(
+                "answers depend on what was asked before: {said} are answered otherwise by a solver that has just started"
+            );
+            Some(Cause::plain("state-kept", statement, certainty, other, asked))
+        }
+        (2.., _) => {
+            let statement =
+                format!("answers are not the same twice: {said} are answered otherwise when they are asked again");
+            Some(Cause::plain("not-repeatable", statement, certainty, other, asked))
+        }
+        _ => None,
+    }
+}
+
+/// The end of the flight through `problem` as the solver has it, asked by `request`, and the exact one.
+fn ends(asking: &mut Asking<'_>, problem: &Problem, request: &PeerRequest) -> Option<[State; 2]> {
+    if asking.is_gone {
+        return None;
+    }
+    let exact = Taylor::default().solve(problem, Detail::End).ok()?;
+    let answer = asking.ask(request).ok()?;
+    answer.outcome.agrees_with(exact.outcome).then(|| [end_of(&answer).state, exact.end])
+}
+
+/// Whether depth grows by `V t` where there is no force: else the weights of the scheme do not add up to one.
+fn coasting(asking: &mut Asking<'_>) -> Option<Cause> {
+    // Right times over those of the answers, and whether the velocity is right.
+    let mut ratio = |speed: f64, depth: f64, drag: f64, rtol: f64| {
+        let problem = Problem::of_stages(1.0, speed, [Stage::tunnel(0.0, drag)]).with_exit(depth);
+        let [found, exact] = ends(asking, &problem, &PeerRequest::from_problem(&problem, rtol))?;
+        Some((exact.time / found.time, found.velocity == exact.velocity))
+    };
+    let mut without = |(speed, depth), rtol| ratio(speed, depth, 0.0, rtol).filter(|(_, is_right)| *is_right);
+    let flights = [(1.0, 1.0), (30.0, 2.0), (700.0, 0.1)];
+    let all = TOLERANCES.into_iter().flat_map(|rtol| flights.map(|flight| (flight, rtol)));
+    let ratios: Vec<(f64, bool)> = all.map(|(flight, rtol)| without(flight, rtol)).collect::<Option<_>>()?;
+    let factor = ratios[0].0;
+    // A step under drag is as short as the tolerance has it, and one wrong step does not count there.
+    let (braked, _) = ratio(1.0, 1.0, 1.0, TOLERANCES[2])?;
+    let is_one = |ratio: f64, part: f64| (ratio - factor).abs() <= part * (factor - 1.0).abs();
+    let is_of_all = ratios.iter().all(|(ratio, _)| is_one(*ratio, ONE_RATIO)) && is_one(braked, BRAKED_PART);
+    let statement = format!(
+        "without a force x grows by {factor:.6} V t: dx/dt = V has a factor, or the weights of the scheme add up to that"
+    );
+    let cause = Cause::plain("weights", statement, Certainty::Likely, ratios.len(), ratios.len());
+    ((factor - 1.0).abs() > ONE_RATIO && is_of_all).then_some(Cause { factor: Some(factor), ..cause })
+}
+
+/// The largest relative error of `found`.
+fn off(found: State, exact: State, impact_speed: f64) -> f64 {
+    errors(found, exact, impact_speed).iter().fold(0.0, |worst, error| worst.max(error.abs()))
+}
+
+/// Whether the drag is a factor times the right one that depends on the speed.
+fn drag_by_speed(asking: &mut Asking<'_>) -> Option<Cause> {
+    // The ratio at a speed, if answers at two tolerances agree on it.
+    let mut ratio = |speed: f64| {
+        let problem = Problem::of_stages(1.0, speed, [Stage::tunnel(0.0, LOSS)]).with_exit(1.0);
+        let mut at = |rtol| {
+            let [found, exact] = ends(asking, &problem, &PeerRequest::from_problem(&problem, rtol))?;
+            Some((speed / found.velocity).ln() / (speed / exact.velocity).ln())
+        };
+        let (looser, tighter) = (at(TOLERANCES[1])?, at(TOLERANCES[2])?);
+        ((looser - tighter).abs() <= 0.1 * (tighter - 1.0).abs() + ONE_RATIO).then_some(tighter)
+    };
+    let speeds = (DECADES[0] * IN_A_DECADE..=DECADES[1] * IN_A_DECADE)
+        .map(|power| 10f64.powf(f64::from(power) / f64::from(IN_A_DECADE)));
+    let count = speeds.clone().count();
+    let ratios: Vec<(f64, f64)> = speeds.filter_map(|speed| Some((speed, ratio(speed)?))).collect();
+    if 4 * ratios.len() < 3 * count {
+        return None;
+    }
+    let is_one = |a: f64, b: f64| (a - b).abs() <= ONE_RATIO * a.abs().max(b.abs()).max(1.0);
+    if ratios.iter().all(|(_, ratio)| is_one(*ratio, 1.0)) {
+        return None;
+    }
+    let off = ratios.iter().filter(|(_, ratio)| !is_one(*ratio, 1.0)).count();
+    let of = ratios.len();
+    let likely =
+        |factor, statement| Some(Cause { factor, ..Cause::plain("term:drag", statement, Certainty::Likely, off, of) });
+    let [(_, low), .., (_, high)] = ratios[..] else { return None };
+    let below = ratios.iter().take_while(|(_, ratio)| is_one(*ratio, low)).count();
+    let above = ratios.iter().rev().take_while(|(_, ratio)| is_one(*ratio, high)).count();
+    let said =
+        |ratio: f64| if is_one(ratio, 1.0) { "right".to_owned() } else { format!("{ratio:.6} times the right one") };
+    // All these flights are one but for their unit of time: one ratio for all is that of any error.
+    if below == ratios.len() {
+        return None;
+    }
+    // One flight may pass the change on its way.
+    if below + above + 1 >= ratios.len() {
+        let (mut slow, mut fast) = (ratios[below - 1].0, ratios[below].0);
+        for _ in 0..HALVINGS {
+            let middle = (slow * fast).sqrt();
+            // A step over the change may err at one tolerance and not at the other.
+            if ratio(middle).is_some_and(|ratio| is_one(ratio, low)) { slow = middle } else { fast = middle }
+        }
+        let factor = if is_one(low, 1.0) { high } else { low };
+        let statement = format!("the drag is {} above {fast:.4} m/s, and {} below", said(high), said(low));
+        return likely(Some(factor), statement);
+    }
+    let worst = ratios.iter().copied().max_by(|a, b| (a.1 - 1.0).abs().total_cmp(&(b.1 - 1.0).abs()))?;
+    let listed = [ratios[0], ratios[ratios.len() / 2], ratios[ratios.len() - 1], worst];
+    let [a, b, c, worst] = listed.map(|(speed, ratio)| format!("{ratio:.6} at {speed:.4} m/s"));
+    likely(None, format!("the drag is not q V²: over the right one it is {a}, {b} and {c}; most off is {worst}"))
+}
+
+/// Whether time and velocity run along a straight line within a step.
+fn straight_steps(asking: &mut Asking<'_>) -> Option<Cause> {
+    let of_depth = |depth| Problem::of_stages(1.0, 100.0, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
+    // One absolute tolerance, or else each flight has steps of its own.
+    let atol = PeerRequest::from_problem(&of_depth(1.0), TOLERANCES[0]).atol;
+    let flights: Vec<[State; 2]> = (0..EXITS)
+        .map(|index| {
+            let problem = of_depth(1.0 + BETWEEN_EXITS * index as f64);
+            let request = PeerRequest { atol, ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
+            ends(asking, &problem, &request)
+        })
+        .collect::<Option<_>>()?;
+    let part = |holds: &dyn Fn(&[[State; 2]]) -> bool| {
+        flights.windows(3).filter(|three| holds(three)).count() as f64 >= STRAIGHT_PART * (EXITS - 2) as f64
+    };
+    let rise = |three: &[[State; 2]], of: fn(&State) -> f64, which: usize| of(&three[2][which]) - of(&three[0][which]);
+    let velocity: fn(&State) -> f64 = |state| state.velocity;
+    if part(&|three| rise(three, velocity, 0).abs() <= STRAIGHT * rise(three, velocity, 1).abs()) {
+        let [found, exact] = flights[EXITS / 2];
+        let (id, end) =
+            if found.velocity > exact.velocity { ("velocity-stale", "start") } else { ("exit-velocity-late", "end") };
+        let statement = format!("V is the same at every exit within a step: that of the {end} of the step");
+        return Some(Cause::plain(id, statement, Certainty::Certain, EXITS, EXITS));
+    }
+    let is_straight = |of: fn(&State) -> f64| {
+        part(&|three| {
+            let bend = |which: usize| of(&three[0][which]) - 2.0 * of(&three[1][which]) + of(&three[2][which]);
+            let goes_along = 2.0 * rise(three, of, 0).abs() >= rise(three, of, 1).abs();
+            goes_along && bend(0).abs() <= STRAIGHT * bend(1).abs()
+        })
+    };
+    let what = match (is_straight(|state| state.time), is_straight(|state| state.velocity)) {
+        (true, true) => "time and velocity at the exit are",
+        (true, false) => "the time at the exit is",
+        (false, true) => "the velocity at the exit is",
+        (false, false) => return None,
+    };
+    let statement = format!("{what} taken from a straight line between the ends of a step");
+    Some(Cause::plain("event-straight", statement, Certainty::Certain, EXITS, EXITS))
+}
+
+/// Whether the depth at rest lies on a chord: under a constant force V is a straight line itself, so that the time of rest is right.
+fn straight_to_rest(asking: &mut Asking<'_>) -> Option<Cause> {
+    let flights = RESTS.map(|(speed, force)| {
+        let problem = Problem::of_stages(1.0, speed, [Stage::tunnel(force, 0.0)]);
+        let [found, exact] = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[0]))?;
+        Some(errors(found, exact, speed))
+    });
+    let all: Vec<[f64; 3]> = flights.into_iter().collect::<Option<_>>()?;
+    let is_right = |[_, time, velocity]: &[f64; 3]| time.abs() <= TOLERANCES[1] && *velocity == 0.0;
+    let is_short = |[depth, ..]: &[f64; 3]| *depth < -ALLOWED * TOLERANCES[1];
+    let short = all.iter().filter(|errors| is_short(errors)).count();
+    let statement = "the depth at rest is taken from a straight line between the ends of a step: under a constant force its time \
+                     is right and it is too small";
+    (all.iter().all(is_right) && 4 * short >= 3 * all.len())
+        .then(|| Cause::plain("event-straight", statement.to_owned(), Certainty::Likely, short, all.len()))
+}
+
+/// Whether the error falls as lengths and speeds grow, at one relative tolerance.
+fn absolute_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
+    let flights = [(500.0, 0.5), (50.0, 2.0), (2000.0, 0.1)];
+    let mut error_of = |size: f64| {
+        let errors = flights.map(|(static_force, drag)| {
+            let stage = Stage::tunnel(static_force * size, drag / size);
+            let problem = Problem::of_stages(1.0, 100.0 * size, [stage]).with_exit(size);
+            // An exit that is not reached is as wrong as can be.
+            let ends = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[1]));
+            ends.map_or(1.0, |[found, exact]| off(found, exact, problem.impact_speed))
+        });
+        errors.into_iter().fold(f64::EPSILON, f64::max)
+    };
+    let found = SIZES.map(&mut error_of);
+    let [smallest, .., largest] = found[..] else { return None };
+    let falls = found.windows(2).all(|pair| pair[0] >= FALLS * pair[1]);
+    let statement = format!(
+        "at one relative tolerance the error falls from {smallest:.0e} to {largest:.0e} as the same flight grows {:.0} times \
+         in length and speed: the tolerance is an absolute one, whatever is asked for",
+        SIZES[SIZES.len() - 1] / SIZES[0]
+    );
+    let asked = SIZES.len() * flights.len();
+    (falls && smallest >= FALLS_IN_ALL * largest)
+        .then(|| Cause::plain("absolute-tolerance", statement, Certainty::Likely, asked, asked))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests;

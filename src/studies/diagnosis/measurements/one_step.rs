@@ -1,0 +1,175 @@
+//! What does a scheme of fixed steps make of one step? An exit within the first step shows it, where the step is shortened
+//! to land there: the answer is the step `h`, the velocity behind it and, as the exit depth, its distance.
+//!
+//! Under `V' = -r V` every explicit scheme of one step gives `V1 = V0 (1 + c1 z + c2 z² + ...)`, `z = -r h`, with
+//! `ck = 1/k!` up to its order. The coefficients follow from a few steps, and a scheme of Runge and Kutta with one number
+//! changed is known by them. Under a constant deceleration `a`, `V1 = V0 - a h` and `x1 = V0 h - a h²/2`, in the first step
+//! as in that behind the end of a stage.
+//!
+//! Source: Hairer, Nørsett, Wanner (1993), Solving Ordinary Differential Equations I, section II.1.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::super::causes::{Cause, Certainty};
+use super::super::{Asking, TOLERANCES, end_of};
+use crate::exchange::peers::PeerRequest;
+use crate::physics::{Problem, Stage, State};
+
+/// Steps asked for, each beyond the exit: the answer must not depend on it.
+const STEPS: [f64; 2] = [0.8, 1.1];
+/// Sizes `-z` of the steps from which the coefficients follow.
+const SIZES: [f64; COEFFICIENTS] = [0.06, 0.12, 0.2, 0.3, 0.4, 0.5];
+const COEFFICIENTS: usize = 6;
+/// Size of the step that they must foretell.
+const FORETOLD: f64 = 0.25;
+/// Difference of coefficients that are the same.
+const SAME: f64 = 1e-6;
+/// Highest order whose coefficient is compared.
+const ORDER_MAX: usize = 4;
+
+/// What one step shows of a scheme whose order is at least `claimed`.
+pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
+    let certain = |id: &str, factor, statement| {
+        let asked = STEPS.len() * SIZES.len();
+        Some(Cause { factor, ..Cause::plain(id, statement, Certainty::Certain, asked, asked) })
+    };
+    let first = constant_force(asking, 0.0)?;
+    let coefficients = coefficients(asking);
+    let tableau =
+        || coefficients.as_ref().and_then(changed_number).map_or_else(String::new, |said| format!(": {said}"));
+    if let Some((what, [found, right])) = first.first_wrong(claimed) {
+        let half = if first.is_half() { ", as of a velocity of half a step" } else { "" };
+        let statement = format!(
+            "one step under a constant deceleration a has {what} with a factor {found:.6}, not {right}{half}{}",
+            tableau()
+        );
+        return certain("scheme-coefficient", Some(found / right), statement);
+    }
+    let (near, far) = (constant_force(asking, 0.1)?, constant_force(asking, 0.25)?);
+    if let Some((what, [found, right])) = near.first_wrong(claimed) {
+        return if near.is_same_as(&far) {
+            let statement = format!(
+                "the first step behind the end of a stage has {what} with a factor {found:.6}, not {right}: part of its \
+                 force is that of the stage before"
+            );
+            certain("force-stale", None, statement)
+        } else {
+            let statement = "steps do not land on the ends of stages: where the force jumps the order falls to 1";
+            certain("stage-end-late", None, statement.to_owned())
+        };
+    }
+    let order = (claimed.round() as usize).min(ORDER_MAX);
+    let mut right = 1.0;
+    for (index, found) in coefficients.as_ref()?.iter().enumerate().take(order) {
+        right /= (index + 1) as f64;
+        if (found - right).abs() > SAME {
+            let tableau = tableau();
+            let id = if index == 1 && tableau.is_empty() { "drag-lagged" } else { "scheme-coefficient" };
+            let lagged = if id == "drag-lagged" { ": the V in the force is that of another time" } else { "" };
+            let statement = format!(
+                "one step under V' = z V/h gives V the term {found:.6} z^{power}, not {right:.6} z^{power}{lagged}{tableau}",
+                power = index + 1
+            );
+            return certain(id, Some(found / right).filter(|_| id != "drag-lagged"), statement);
+        }
+    }
+    None
+}
+
+/// The end of a flight within one step, which is the same whatever the step asked for.
+fn landed(asking: &mut Asking<'_>, problem: &Problem) -> Option<State> {
+    let ends = STEPS.map(|step| {
+        let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(problem, TOLERANCES[0]) };
+        let end = end_of(&asking.ask(&request).ok()?).state;
+        let is_one_step = end.time > 0.0 && end.time < step && end.depth == problem.exit_depth;
+        is_one_step.then_some(end)
+    });
+    let [Some(one), Some(other)] = ends else { return None };
+    let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs();
+    (is_same(one.time, other.time) && is_same(one.velocity, other.velocity)).then_some(one)
+}
+
+/// What a step under a constant deceleration makes of `a h` in V and of `a h²` in x.
+struct Constant {
+    velocity: f64,
+    depth: f64,
+}
+
+impl Constant {
+    fn is_half(&self) -> bool {
+        (self.velocity - 0.5).abs() <= SAME && (self.depth - 0.5).abs() <= SAME
+    }
+
+    fn is_same_as(&self, other: &Self) -> bool {
+        (self.velocity - other.velocity).abs() <= SAME && (self.depth - other.depth).abs() <= SAME
+    }
+
+    /// The first factor that a scheme of this order cannot have: what it belongs to, and beside the right one.
+    fn first_wrong(&self, claimed: f64) -> Option<(&'static str, [f64; 2])> {
+        let is_wrong = |found: f64, right: f64| (found - right).abs() > SAME;
+        match () {
+            () if is_wrong(self.velocity, 1.0) => Some(("a h in V", [self.velocity, 1.0])),
+            () if claimed > 1.0 && is_wrong(self.depth, 0.5) => Some(("a h² in x", [self.depth, 0.5])),
+            () => None,
+        }
+    }
+}
+
+/// The step at impact, or the one behind a first stage without force that ends at `before` (m).
+fn constant_force(asking: &mut Asking<'_>, before: f64) -> Option<Constant> {
+    const DECELERATION: f64 = 0.5;
+    let braked = Stage::tunnel(DECELERATION, 0.0);
+    let stages = if before > 0.0 { vec![Stage { end: before, ..Stage::free() }, braked] } else { vec![braked] };
+    let exit = 0.4;
+    let end = landed(asking, &Problem::of_stages(1.0, 1.0, stages).with_exit(before + exit))?;
+    let h = end.time - before;
+    (h > 0.0).then(|| Constant {
+        velocity: (1.0 - end.velocity) / (DECELERATION * h),
+        depth: (h - exit) / (DECELERATION * h * h),
+    })
+}
+
+/// c1, c2 ... of a step under `V' = -r V`, if a polynomial it is.
+fn coefficients(asking: &mut Asking<'_>) -> Option<SVector<f64, COEFFICIENTS>> {
+    let mut step = |size: f64| {
+        // With r = M/s the step is as long as the exit is deep, nearly.
+        let depth = 1.0 - (-size).exp();
+        let viscous = Stage { viscosity: 1.0, ..Stage::free() };
+        let end = landed(asking, &Problem::of_stages(1.0, 1.0, [viscous]).with_exit(depth))?;
+        Some((-end.time, (end.velocity - 1.0) / -end.time))
+    };
+    let points: Vec<(f64, f64)> = SIZES.into_iter().map(&mut step).collect::<Option<_>>()?;
+    let powers = SMatrix::<f64, COEFFICIENTS, COEFFICIENTS>::from_fn(|row, column| points[row].0.powi(column as i32));
+    let values = SVector::<f64, COEFFICIENTS>::from_fn(|row, _| points[row].1);
+    let found = powers.lu().solve(&values)?;
+    let (z, value) = step(FORETOLD)?;
+    let foretold: f64 = found.iter().rev().fold(0.0, |sum, coefficient| sum * z + coefficient);
+    ((foretold - value).abs() <= SAME * SAME.sqrt()).then_some(found)
+}
+
+/// Which number of the classical scheme of Runge and Kutta, changed alone, gives these coefficients; two may.
+fn changed_number(found: &SVector<f64, COEFFICIENTS>) -> Option<String> {
+    let right = [0.5, 0.5, 1.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+    let of = |[a2, a3, a4, b1, b2, b3, b4]: [f64; 7]| {
+        [b1 + b2 + b3 + b4, b2 * a2 + b3 * a3 + b4 * a4, b3 * a3 * a2 + b4 * a4 * a3, b4 * a4 * a3 * a2]
+    };
+    let base = of(right);
+    let fitting = (0..right.len()).filter_map(|which| {
+        let with = |number: f64| {
+            let mut numbers = right;
+            numbers[which] = number;
+            of(numbers)
+        };
+        // Each coefficient is linear in each number.
+        let slope = with(right[which] + 1.0);
+        let moved = (0..base.len()).find(|k| (slope[*k] - base[*k]).abs() > SAME)?;
+        let number = right[which] + (found[moved] - base[moved]) / (slope[moved] - base[moved]);
+        let fits = with(number).iter().zip(found.iter()).all(|(a, b)| (a - b).abs() <= SAME);
+        fits.then(|| match which {
+            0..3 => format!("slope {} taken at {number:.6} h, not {}", which + 2, right[which]),
+            _ => format!("a weight of {number:.6} for slope {}, not {:.6}", which - 2, right[which]),
+        })
+    });
+    let all: Vec<String> = fitting.collect();
+    (!all.is_empty()).then(|| format!("as of Runge-Kutta 4 with {}", all.join(", or ")))
+}

@@ -1,0 +1,249 @@
+use super::super::faulty::{answer, failure};
+use super::super::simulation::{Place, Rules, simulate};
+use super::super::{Counts, Solver, Subject};
+use super::*;
+use crate::exchange::peers::{PeerAnswer, PeerFailure, PeerIdentity};
+use crate::physics::Outcome;
+
+/// The slopes and weights of the classical scheme of Runge and Kutta.
+const CLASSICAL: ([f64; 3], [f64; 4]) = ([0.5, 0.5, 1.0], [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]);
+
+/// How an end within a step is placed.
+#[derive(Clone, Copy, PartialEq)]
+enum Placed {
+    /// By a part of the step.
+    ByStep,
+    /// On the chord of the step.
+    OnChord,
+    /// Rest on the chord, all else by a part of the step.
+    RestOnChord,
+    /// With the velocity of the start of the step.
+    WithVelocityOfStart,
+}
+
+/// A scheme of four slopes.
+#[derive(Clone, Copy)]
+struct Stepping {
+    numbers: ([f64; 3], [f64; 4]),
+    placed: Placed,
+    /// Steps of a flight without `dt_s`, from tolerance and impact speed.
+    steps: fn(f64, f64) -> f64,
+    /// Part of the force of the stage before in the first slope behind its end.
+    stale: f64,
+    is_fixed: bool,
+}
+
+const RIGHT: Stepping =
+    Stepping { numbers: CLASSICAL, placed: Placed::ByStep, steps: |_, _| 200.0, stale: 0.0, is_fixed: false };
+
+impl Stepping {
+    fn end(self, problem: &Problem, step: f64) -> State {
+        let ([a2, a3, a4], [b1, b2, b3, b4]) = self.numbers;
+        let mut now = State::at_impact(problem);
+        let mut before: Option<Stage> = None;
+        for law in &problem.stages {
+            let limit = law.end.min(problem.exit_depth);
+            let mut left_over = before.take();
+            loop {
+                let ahead = |h: f64| {
+                    let a = |x: f64, v: f64| -law.force(x, v) / problem.mass;
+                    let (x, v) = (now.depth, now.velocity);
+                    let of_before = left_over.map_or(0.0, |law| -law.force(x, v) / problem.mass - a(x, v));
+                    let k1 = [v, a(x, v) + self.stale * of_before];
+                    let k2 = [v + a2 * h * k1[1], a(x + a2 * h * k1[0], v + a2 * h * k1[1])];
+                    let k3 = [v + a3 * h * k2[1], a(x + a3 * h * k2[0], v + a3 * h * k2[1])];
+                    let k4 = [v + a4 * h * k3[1], a(x + a4 * h * k3[0], v + a4 * h * k3[1])];
+                    let sum = |i: usize| h * (b1 * k1[i] + b2 * k2[i] + b3 * k3[i] + b4 * k4[i]);
+                    State { time: now.time + h, depth: x + sum(0), velocity: v + sum(1) }
+                };
+                let next = ahead(step);
+                if next.depth < limit && next.velocity > 0.0 {
+                    (now, left_over) = (next, None);
+                    continue;
+                }
+                let first = |is_past: &dyn Fn(State) -> bool| {
+                    let (mut low, mut high) = (0.0, step);
+                    for _ in 0..100 {
+                        let middle = 0.5 * (low + high);
+                        if is_past(ahead(middle)) { high = middle } else { low = middle }
+                    }
+                    ahead(high)
+                };
+                let rests = next.velocity <= 0.0 && first(&|state| state.velocity <= 0.0).depth < limit;
+                let on_chord = self.placed == Placed::OnChord || (rests && self.placed == Placed::RestOnChord);
+                let end = if on_chord {
+                    let part = if rests {
+                        now.velocity / (now.velocity - next.velocity)
+                    } else {
+                        (limit - now.depth) / (next.depth - now.depth)
+                    };
+                    let between = |from: f64, to: f64| from + part * (to - from);
+                    State {
+                        time: between(now.time, next.time),
+                        depth: between(now.depth, next.depth),
+                        velocity: between(now.velocity, next.velocity),
+                    }
+                } else if rests {
+                    first(&|state| state.velocity <= 0.0)
+                } else {
+                    first(&|state| state.depth >= limit)
+                };
+                let of_start = self.placed == Placed::WithVelocityOfStart && limit == problem.exit_depth;
+                let velocity = if of_start { now.velocity } else { end.velocity };
+                now = State {
+                    depth: if rests { end.depth } else { limit },
+                    velocity: if rests { 0.0 } else { velocity },
+                    ..end
+                };
+                if rests || limit == problem.exit_depth {
+                    return now;
+                }
+                before = Some(*law);
+                break;
+            }
+        }
+        now
+    }
+}
+
+impl Solver for Stepping {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity { fixed_step: self.is_fixed, ..PeerIdentity::default() }
+    }
+
+    fn command(&self) -> String {
+        String::new()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let problem = request.problem(None);
+        let exact = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
+        // One step for all exits that are asked with one absolute tolerance.
+        let duration = request.atol[0] / (request.rtol * problem.impact_speed);
+        let steps = (self.steps)(request.rtol, problem.impact_speed) + 0.37;
+        let step = request.dt_s.unwrap_or(duration / steps);
+        Ok(answer(exact.outcome, self.end(&problem, step)))
+    }
+
+    fn restart(&mut self) -> bool {
+        true
+    }
+}
+
+/// A solver that is exact for another force.
+struct OfForce(fn(&Place<'_>, f64) -> f64);
+
+impl Solver for OfForce {
+    fn identity(&self) -> PeerIdentity {
+        PeerIdentity::default()
+    }
+
+    fn command(&self) -> String {
+        String::new()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        let problem = request.problem(None);
+        let rules = Rules { force: (self.0, 1.0), ..Rules::default() };
+        let end = simulate(&problem, rules).ok_or_else(|| failure("it never ends"))?.end;
+        let is_through = problem.has_exit() && end.depth >= problem.exit_depth;
+        Ok(answer(if is_through { Outcome::Perforated } else { Outcome::Stopped }, end))
+    }
+
+    fn restart(&mut self) -> bool {
+        true
+    }
+}
+
+/// The force with `factor` times the drag.
+fn with_drag(place: &Place<'_>, factor: f64) -> f64 {
+    let &Place { law, depth, velocity, .. } = place;
+    law.force(depth, velocity) + (factor - 1.0) * law.drag * velocity * velocity
+}
+
+/// What is measured of `solver`, of which nothing is known.
+fn measured_of(mut solver: impl Solver) -> Option<Cause> {
+    let PeerIdentity { name, version, method, fixed_step, .. } = solver.identity();
+    let peer = Subject { name, version, method, command: String::new(), fixed_step, reads: "stages" };
+    let found = Diagnosis {
+        verdict: Verdict::Failed,
+        peer,
+        counts: Counts::default(),
+        causes: Vec::new(),
+        scheme: None,
+        orders: Vec::new(),
+        separation: None,
+        questions: Vec::new(),
+    };
+    measured(&mut Asking::new(&mut solver), &[], &found)
+}
+
+fn id_and_statement(cause: Option<Cause>) -> (String, String) {
+    cause.map_or_else(Default::default, |cause| (cause.id, cause.statement))
+}
+
+#[test]
+fn nothing_is_measured_of_a_right_solver() {
+    assert_eq!(measured_of(OfForce(|place, _| place.law.force(place.depth, place.velocity))), None);
+    for is_fixed in [false, true] {
+        assert_eq!(measured_of(Stepping { is_fixed, ..RIGHT }), None);
+    }
+}
+
+#[test]
+fn a_drag_that_changes_at_a_speed_is_measured() {
+    let found =
+        measured_of(OfForce(|place, _| with_drag(place, if place.velocity > 300.0 { 1.2 } else { 1.0 }))).unwrap();
+    assert_eq!(found.id, "term:drag");
+    assert!((found.factor.unwrap() - 1.2).abs() < 1e-4, "{found:?}");
+    assert!(found.statement.contains("above 300.0") && found.statement.ends_with("right below"), "{found:?}");
+    // No two values: as measured, and no factor.
+    let found = measured_of(OfForce(|place, _| with_drag(place, 1.0 + 1.0 / place.velocity))).unwrap();
+    assert!(found.id == "term:drag" && found.factor.is_none(), "{found:?}");
+    assert!(found.statement.contains("1.1") && found.certainty == Certainty::Likely, "{found:?}");
+}
+
+#[test]
+fn ends_on_a_chord_and_velocities_of_another_place_are_measured() {
+    let of = |placed| id_and_statement(measured_of(Stepping { placed, steps: |_, _| 7.0, ..RIGHT }));
+    let (id, statement) = of(Placed::OnChord);
+    assert!(id == "event-straight" && statement.starts_with("time and velocity at the exit are"), "{statement}");
+    let (id, statement) = of(Placed::RestOnChord);
+    assert!(id == "event-straight" && statement.starts_with("the depth at rest is"), "{statement}");
+    let (id, statement) = of(Placed::WithVelocityOfStart);
+    assert!(id == "velocity-stale" && statement.ends_with("that of the start of the step"), "{statement}");
+}
+
+#[test]
+fn a_tolerance_of_its_own_unit_is_measured() {
+    // Twice the steps where everything is sixteen times as large.
+    let steps = |_, speed: f64| (speed * 32.0).powf(0.6).max(1.0);
+    let (id, _) = id_and_statement(measured_of(Stepping { steps, ..RIGHT }));
+    assert_eq!(id, "absolute-tolerance");
+}
+
+#[test]
+fn weights_that_do_not_add_up_are_measured() {
+    let (slopes, [b1, b2, b3, b4]) = CLASSICAL;
+    let found = measured_of(Stepping { numbers: (slopes, [b1, b2 + 0.02, b3, b4]), ..RIGHT }).unwrap();
+    assert!(found.id == "weights" && (found.factor.unwrap() - 1.02).abs() < 1e-9, "{found:?}");
+}
+
+#[test]
+fn a_wrong_number_of_a_scheme_is_measured_by_one_step() {
+    let (slopes, weights) = CLASSICAL;
+    let of = |numbers| id_and_statement(measured_of(Stepping { numbers, is_fixed: true, ..RIGHT }));
+    let (id, statement) = of(([0.5, 0.5, 0.5], weights));
+    assert_eq!(id, "scheme-coefficient");
+    assert!(statement.contains("slope 4 taken at 0.500000 h, not 1"), "{statement}");
+    let (id, statement) = of((slopes, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]));
+    assert_eq!(id, "scheme-coefficient");
+    assert!(statement.contains("a weight of 0.333333 for slope 1, not 0.166667"), "{statement}");
+}
+
+#[test]
+fn a_force_kept_over_the_end_of_a_stage_is_measured_by_one_step() {
+    let (id, statement) = id_and_statement(measured_of(Stepping { stale: 1.0, is_fixed: true, ..RIGHT }));
+    assert_eq!(id, "force-stale");
+    assert!(statement.contains("a h in V with a factor 0.833333"), "{statement}");
+}
