@@ -52,6 +52,8 @@ const SIZES: [f64; 4] = [1.0 / 1024.0, 1.0 / 32.0, 1.0, 32.0];
 /// By how much the error falls at least from one size to the next, and from the first to the last.
 const FALLS: f64 = 3.0;
 const FALLS_IN_ALL: f64 = 1e3;
+/// Part by which a fall of the error with the size differs from the ratio of sizes.
+const SAME_FALL: f64 = 0.05;
 
 /// What questions made for it show of the solver of `found`.
 pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
@@ -280,6 +282,12 @@ fn absolute_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
     let found = SIZES.map(&mut error_of);
     let [smallest, .., largest] = found[..] else { return None };
     let falls = found.windows(2).all(|pair| pair[0] >= FALLS * pair[1]);
+    // What is added to the equation, and has a unit, falls as the size does: that is no tolerance.
+    let by_size =
+        |(errors, sizes): (&[f64], &[f64])| (errors[0] * sizes[0] / (errors[1] * sizes[1]) - 1.0).abs() < SAME_FALL;
+    if found.windows(2).zip(SIZES.windows(2)).skip(1).all(by_size) {
+        return None;
+    }
     let statement = format!(
         "at one relative tolerance the error falls from {smallest:.0e} to {largest:.0e} as the same flight grows {:.0} times \
          in length and speed: the tolerance is an absolute one, whatever is asked for",

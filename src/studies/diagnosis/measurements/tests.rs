@@ -220,6 +220,11 @@ fn a_tolerance_of_its_own_unit_is_measured() {
     let steps = |_, speed: f64| (speed * 32.0).powf(0.6).max(1.0);
     let (id, _) = id_and_statement(measured_of(Stepping { steps, ..RIGHT }));
     assert_eq!(id, "absolute-tolerance");
+    // A force that is added falls with the size too, in proportion to it.
+    let added = OfForce(|place, _| {
+        place.law.force(place.depth, place.velocity) + if place.law.static_force > 0.0 { 0.01 } else { 0.0 }
+    });
+    assert_eq!(measured_of(added), None);
 }
 
 #[test]
