@@ -309,6 +309,18 @@ mod tests {
     }
 
     #[test]
+    fn a_flight_below_the_speed_of_rest_ends_unless_it_is_driven() {
+        let rules = Rules { rest_speed: 0.1, ..Rules::default() };
+        let end = |force| {
+            let problem = Problem::of_stages(1.0, 0.05, [Stage::tunnel(force, 0.0)]).with_exit(1.0);
+            simulate(&problem, rules).unwrap().end
+        };
+        assert_eq!(end(2.0), State { time: 0.0, depth: 0.0, velocity: 0.05 });
+        let driven = end(-2.0);
+        assert!((driven.velocity - 4.0025_f64.sqrt()).abs() < 1e-12 && driven.depth == 1.0, "{driven}");
+    }
+
+    #[test]
     fn a_flight_goes_on_after_its_rest_as_its_law_has_it() {
         let problem = Problem::of_stages(2.0, 30.0, [Stage::tunnel(1000.0, 0.0)]);
         let rest = solve(&problem).unwrap();

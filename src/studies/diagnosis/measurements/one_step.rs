@@ -18,16 +18,20 @@ use crate::physics::{Problem, Stage, State};
 /// Steps asked for, each beyond the exit: the answer must not depend on it.
 const STEPS: [f64; 2] = [0.8, 1.1];
 /// Sizes `-z` of the steps from which the coefficients follow.
-const SIZES: [f64; COEFFICIENTS] = [0.06, 0.12, 0.2, 0.3, 0.4, 0.5];
+const SIZES: [f64; COEFFICIENTS] = [0.015, 0.03, 0.05, 0.075, 0.1, 0.125];
 const COEFFICIENTS: usize = 6;
 /// Size of the step that they must foretell.
-const FORETOLD: f64 = 0.25;
+const FORETOLD: f64 = 0.06;
+/// Relative difference of two ends that are the same.
+const LANDED: f64 = 1e-12;
 /// Difference of coefficients that are the same.
 const SAME: f64 = 1e-6;
+/// Part of a coefficient by which it is another one. Of a scheme that is no polynomial the fourth is found to some 1e-5.
+const ANOTHER: f64 = 1e-3;
 /// Highest order whose coefficient is compared.
 const ORDER_MAX: usize = 4;
 
-/// What one step shows of a scheme whose order is at least `claimed`.
+/// What one step shows of a scheme that should have the order `claimed`.
 pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     let certain = |id: &str, factor, statement| {
         let asked = STEPS.len() * SIZES.len();
@@ -40,7 +44,9 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     if let Some((what, [found, right])) = first.first_wrong(claimed) {
         let half = if first.is_half() { ", as of a velocity of half a step" } else { "" };
         let statement = format!(
-            "one step under a constant deceleration a has {what} with a factor {found:.6}, not {right}{half}{}",
+            "the first step under a constant deceleration a has {what} with a factor {found:.6}, where order {} has \
+             {right}{half}{}",
+            if right < 1.0 { 2 } else { 1 },
             tableau()
         );
         return certain("scheme-coefficient", Some(found / right), statement);
@@ -58,16 +64,18 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
             certain("stage-end-late", None, statement.to_owned())
         };
     }
+    // A scheme of Runge and Kutta that takes x rightly takes V so too: one that does not has another V in its force.
     let order = (claimed.round() as usize).min(ORDER_MAX);
     let mut right = 1.0;
     for (index, found) in coefficients.as_ref()?.iter().enumerate().take(order) {
         right /= (index + 1) as f64;
-        if (found - right).abs() > SAME {
+        if (found - right).abs() > ANOTHER * right {
             let tableau = tableau();
             let id = if index == 1 && tableau.is_empty() { "drag-lagged" } else { "scheme-coefficient" };
             let lagged = if id == "drag-lagged" { ": the V in the force is that of another time" } else { "" };
             let statement = format!(
-                "one step under V' = z V/h gives V the term {found:.6} z^{power}, not {right:.6} z^{power}{lagged}{tableau}",
+                "the first step under V' = z V/h gives V the term {found:.6} z^{power}, where order {power} has {right:.6} \
+                 z^{power}{lagged}{tableau}",
                 power = index + 1
             );
             return certain(id, Some(found / right).filter(|_| id != "drag-lagged"), statement);
@@ -78,14 +86,14 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
 
 /// The end of a flight within one step, which is the same whatever the step asked for.
 fn landed(asking: &mut Asking<'_>, problem: &Problem) -> Option<State> {
+    let is_same = |a: f64, b: f64| (a - b).abs() <= LANDED * a.abs();
     let ends = STEPS.map(|step| {
         let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(problem, TOLERANCES[0]) };
         let end = end_of(&asking.ask(&request).ok()?).state;
-        let is_one_step = end.time > 0.0 && end.time < step && end.depth == problem.exit_depth;
+        let is_one_step = end.time > 0.0 && end.time < step && is_same(end.depth, problem.exit_depth);
         is_one_step.then_some(end)
     });
     let [Some(one), Some(other)] = ends else { return None };
-    let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs();
     (is_same(one.time, other.time) && is_same(one.velocity, other.velocity)).then_some(one)
 }
 

@@ -1,9 +1,10 @@
 use super::super::faulty::{answer, failure};
 use super::super::simulation::{Place, Rules, simulate};
-use super::super::{Counts, Solver, Subject};
+use super::super::{Counts, Plan, QuantityOrder, Solver, Subject, diagnose};
 use super::*;
 use crate::exchange::peers::{PeerAnswer, PeerFailure, PeerIdentity};
 use crate::physics::Outcome;
+use crate::studies::order::Class;
 
 /// The slopes and weights of the classical scheme of Runge and Kutta.
 const CLASSICAL: ([f64; 3], [f64; 4]) = ([0.5, 0.5, 1.0], [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]);
@@ -19,6 +20,8 @@ enum Placed {
     RestOnChord,
     /// With the velocity of the start of the step.
     WithVelocityOfStart,
+    /// At the end of the step.
+    AtStepEnd,
 }
 
 /// A scheme of four slopes.
@@ -28,13 +31,21 @@ struct Stepping {
     placed: Placed,
     /// Steps of a flight without `dt_s`, from tolerance and impact speed.
     steps: fn(f64, f64) -> f64,
+    /// Time that a shortened step takes, from its length and that of a whole one.
+    clock: fn(f64, f64) -> f64,
     /// Part of the force of the stage before in the first slope behind its end.
     stale: f64,
     is_fixed: bool,
 }
 
-const RIGHT: Stepping =
-    Stepping { numbers: CLASSICAL, placed: Placed::ByStep, steps: |_, _| 200.0, stale: 0.0, is_fixed: false };
+const RIGHT: Stepping = Stepping {
+    numbers: CLASSICAL,
+    placed: Placed::ByStep,
+    steps: |_, _| 200.0,
+    clock: |part, _| part,
+    stale: 0.0,
+    is_fixed: false,
+};
 
 impl Stepping {
     fn end(self, problem: &Problem, step: f64) -> State {
@@ -69,6 +80,13 @@ impl Stepping {
                     }
                     ahead(high)
                 };
+                if self.placed == Placed::AtStepEnd {
+                    now = State { velocity: next.velocity.max(0.0), ..next };
+                    if next.velocity <= 0.0 || limit == problem.exit_depth {
+                        return now;
+                    }
+                    break;
+                }
                 let rests = next.velocity <= 0.0 && first(&|state| state.velocity <= 0.0).depth < limit;
                 let on_chord = self.placed == Placed::OnChord || (rests && self.placed == Placed::RestOnChord);
                 let end = if on_chord {
@@ -91,9 +109,9 @@ impl Stepping {
                 let of_start = self.placed == Placed::WithVelocityOfStart && limit == problem.exit_depth;
                 let velocity = if of_start { now.velocity } else { end.velocity };
                 now = State {
+                    time: now.time + (self.clock)(end.time - now.time, step),
                     depth: if rests { end.depth } else { limit },
                     velocity: if rests { 0.0 } else { velocity },
-                    ..end
                 };
                 if rests || limit == problem.exit_depth {
                     return now;
@@ -106,7 +124,13 @@ impl Stepping {
     }
 }
 
-impl Solver for Stepping {
+/// A solver made of what it answers.
+struct Answering<F> {
+    is_fixed: bool,
+    answer: F,
+}
+
+impl<F: FnMut(&PeerRequest) -> Option<PeerAnswer>> Solver for Answering<F> {
     fn identity(&self) -> PeerIdentity {
         PeerIdentity { fixed_step: self.is_fixed, ..PeerIdentity::default() }
     }
@@ -116,13 +140,7 @@ impl Solver for Stepping {
     }
 
     fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
-        let problem = request.problem(None);
-        let exact = Taylor::default().solve(&problem, Detail::End).map_err(|error| failure(&error.to_string()))?;
-        // One step for all exits that are asked with one absolute tolerance.
-        let duration = request.atol[0] / (request.rtol * problem.impact_speed);
-        let steps = (self.steps)(request.rtol, problem.impact_speed) + 0.37;
-        let step = request.dt_s.unwrap_or(duration / steps);
-        Ok(answer(exact.outcome, self.end(&problem, step)))
+        (self.answer)(request).ok_or_else(|| failure("it never ends"))
     }
 
     fn restart(&mut self) -> bool {
@@ -130,29 +148,51 @@ impl Solver for Stepping {
     }
 }
 
-/// A solver that is exact for another force.
-struct OfForce(fn(&Place<'_>, f64) -> f64);
-
-impl Solver for OfForce {
-    fn identity(&self) -> PeerIdentity {
-        PeerIdentity::default()
+impl Stepping {
+    fn solver(self) -> impl Solver {
+        let answer = move |request: &PeerRequest| {
+            let problem = request.problem(None);
+            let exact = Taylor::default().solve(&problem, Detail::End).ok()?;
+            // One step for all exits that are asked with one absolute tolerance.
+            let duration = request.atol[0] / (request.rtol * problem.impact_speed);
+            let steps = (self.steps)(request.rtol, problem.impact_speed) + 0.37;
+            let step = request.dt_s.unwrap_or(duration / steps);
+            Some(answer(exact.outcome, self.end(&problem, step)))
+        };
+        Answering { is_fixed: self.is_fixed, answer }
     }
+}
 
-    fn command(&self) -> String {
-        String::new()
-    }
-
-    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+/// A solver that is exact by other `rules`, and does `report` to the end of a flight that stops.
+fn by_rules(rules: Rules, report: fn(&mut State)) -> impl Solver {
+    let answer = move |request: &PeerRequest| {
         let problem = request.problem(None);
-        let rules = Rules { force: (self.0, 1.0), ..Rules::default() };
-        let end = simulate(&problem, rules).ok_or_else(|| failure("it never ends"))?.end;
-        let is_through = problem.has_exit() && end.depth >= problem.exit_depth;
-        Ok(answer(if is_through { Outcome::Perforated } else { Outcome::Stopped }, end))
-    }
+        let mut end = simulate(&problem, rules)?.end;
+        if problem.has_exit() && end.depth >= problem.exit_depth {
+            return Some(answer(Outcome::Perforated, end));
+        }
+        report(&mut end);
+        Some(answer(Outcome::Stopped, end))
+    };
+    Answering { is_fixed: false, answer }
+}
 
-    fn restart(&mut self) -> bool {
-        true
-    }
+/// A solver that is exact for another force.
+fn of_force(force: fn(&Place<'_>, f64) -> f64) -> impl Solver {
+    by_rules(Rules { force: (force, 1.0), ..Rules::default() }, |_| ())
+}
+
+/// A solver that is right but for what is done to the problem and to the end.
+fn altered(read: fn(&mut Problem), report: fn(&Problem, &mut State)) -> impl Solver {
+    let answer = move |request: &PeerRequest| {
+        let mut problem = request.problem(None);
+        read(&mut problem);
+        let flight = Taylor::default().solve(&problem, Detail::End).ok()?;
+        let mut end = flight.end;
+        report(&problem, &mut end);
+        Some(answer(flight.outcome, end))
+    };
+    Answering { is_fixed: false, answer }
 }
 
 /// The force with `factor` times the drag.
@@ -162,7 +202,12 @@ fn with_drag(place: &Place<'_>, factor: f64) -> f64 {
 }
 
 /// What is measured of `solver`, of which nothing is known.
-fn measured_of(mut solver: impl Solver) -> Option<Cause> {
+fn measured_of(solver: impl Solver) -> Option<Cause> {
+    measured_with_claim(solver, None)
+}
+
+/// The same of one that claims an order.
+fn measured_with_claim(mut solver: impl Solver, formal_order: Option<f64>) -> Option<Cause> {
     let PeerIdentity { name, version, method, fixed_step, .. } = solver.identity();
     let peer = Subject { name, version, method, command: String::new(), fixed_step, reads: "stages" };
     let found = Diagnosis {
@@ -171,7 +216,14 @@ fn measured_of(mut solver: impl Solver) -> Option<Cause> {
         counts: Counts::default(),
         causes: Vec::new(),
         scheme: None,
-        orders: Vec::new(),
+        orders: vec![QuantityOrder {
+            quantity: "depth",
+            formal_order,
+            observed_order: None,
+            interval: None,
+            class: Class::AtFloor,
+            verdict: Verdict::Skipped,
+        }],
         separation: None,
         questions: Vec::new(),
     };
@@ -184,28 +236,34 @@ fn id_and_statement(cause: Option<Cause>) -> (String, String) {
 
 #[test]
 fn nothing_is_measured_of_a_right_solver() {
-    assert_eq!(measured_of(OfForce(|place, _| place.law.force(place.depth, place.velocity))), None);
+    assert_eq!(measured_of(of_force(|place, _| place.law.force(place.depth, place.velocity))), None);
     for is_fixed in [false, true] {
-        assert_eq!(measured_of(Stepping { is_fixed, ..RIGHT }), None);
+        assert_eq!(measured_with_claim(Stepping { is_fixed, ..RIGHT }.solver(), Some(4.0)), None);
     }
+    // An implicit scheme is no polynomial of the step, as little as the exact flight.
+    let exact = |request: &PeerRequest| {
+        let flight = Taylor::default().solve(&request.problem(None), Detail::End).ok()?;
+        Some(answer(flight.outcome, flight.end))
+    };
+    assert_eq!(measured_with_claim(Answering { is_fixed: true, answer: exact }, Some(4.0)), None);
 }
 
 #[test]
 fn a_drag_that_changes_at_a_speed_is_measured() {
     let found =
-        measured_of(OfForce(|place, _| with_drag(place, if place.velocity > 300.0 { 1.2 } else { 1.0 }))).unwrap();
+        measured_of(of_force(|place, _| with_drag(place, if place.velocity > 300.0 { 1.2 } else { 1.0 }))).unwrap();
     assert_eq!(found.id, "term:drag");
     assert!((found.factor.unwrap() - 1.2).abs() < 1e-4, "{found:?}");
     assert!(found.statement.contains("above 300.0") && found.statement.ends_with("right below"), "{found:?}");
     // No two values: as measured, and no factor.
-    let found = measured_of(OfForce(|place, _| with_drag(place, 1.0 + 1.0 / place.velocity))).unwrap();
+    let found = measured_of(of_force(|place, _| with_drag(place, 1.0 + 1.0 / place.velocity))).unwrap();
     assert!(found.id == "term:drag" && found.factor.is_none(), "{found:?}");
     assert!(found.statement.contains("1.1") && found.certainty == Certainty::Likely, "{found:?}");
 }
 
 #[test]
 fn ends_on_a_chord_and_velocities_of_another_place_are_measured() {
-    let of = |placed| id_and_statement(measured_of(Stepping { placed, steps: |_, _| 7.0, ..RIGHT }));
+    let of = |placed| id_and_statement(measured_of(Stepping { placed, steps: |_, _| 7.0, ..RIGHT }.solver()));
     let (id, statement) = of(Placed::OnChord);
     assert!(id == "event-straight" && statement.starts_with("time and velocity at the exit are"), "{statement}");
     let (id, statement) = of(Placed::RestOnChord);
@@ -218,10 +276,10 @@ fn ends_on_a_chord_and_velocities_of_another_place_are_measured() {
 fn a_tolerance_of_its_own_unit_is_measured() {
     // Twice the steps where everything is sixteen times as large.
     let steps = |_, speed: f64| (speed * 32.0).powf(0.6).max(1.0);
-    let (id, _) = id_and_statement(measured_of(Stepping { steps, ..RIGHT }));
+    let (id, _) = id_and_statement(measured_of(Stepping { steps, ..RIGHT }.solver()));
     assert_eq!(id, "absolute-tolerance");
     // A force that is added falls with the size too, in proportion to it.
-    let added = OfForce(|place, _| {
+    let added = of_force(|place, _| {
         place.law.force(place.depth, place.velocity) + if place.law.static_force > 0.0 { 0.01 } else { 0.0 }
     });
     assert_eq!(measured_of(added), None);
@@ -230,14 +288,14 @@ fn a_tolerance_of_its_own_unit_is_measured() {
 #[test]
 fn weights_that_do_not_add_up_are_measured() {
     let (slopes, [b1, b2, b3, b4]) = CLASSICAL;
-    let found = measured_of(Stepping { numbers: (slopes, [b1, b2 + 0.02, b3, b4]), ..RIGHT }).unwrap();
+    let found = measured_of(Stepping { numbers: (slopes, [b1, b2 + 0.02, b3, b4]), ..RIGHT }.solver()).unwrap();
     assert!(found.id == "weights" && (found.factor.unwrap() - 1.02).abs() < 1e-9, "{found:?}");
 }
 
 #[test]
 fn a_wrong_number_of_a_scheme_is_measured_by_one_step() {
     let (slopes, weights) = CLASSICAL;
-    let of = |numbers| id_and_statement(measured_of(Stepping { numbers, is_fixed: true, ..RIGHT }));
+    let of = |numbers| id_and_statement(measured_of(Stepping { numbers, is_fixed: true, ..RIGHT }.solver()));
     let (id, statement) = of(([0.5, 0.5, 0.5], weights));
     assert_eq!(id, "scheme-coefficient");
     assert!(statement.contains("slope 4 taken at 0.500000 h, not 1"), "{statement}");
@@ -248,7 +306,66 @@ fn a_wrong_number_of_a_scheme_is_measured_by_one_step() {
 
 #[test]
 fn a_force_kept_over_the_end_of_a_stage_is_measured_by_one_step() {
-    let (id, statement) = id_and_statement(measured_of(Stepping { stale: 1.0, is_fixed: true, ..RIGHT }));
+    let (id, statement) = id_and_statement(measured_of(Stepping { stale: 1.0, is_fixed: true, ..RIGHT }.solver()));
     assert_eq!(id, "force-stale");
     assert!(statement.contains("a h in V with a factor 0.833333"), "{statement}");
+}
+
+#[test]
+fn a_speed_that_is_read_or_reported_wrongly_is_no_drag() {
+    let cut = altered(|problem| problem.impact_speed = problem.impact_speed.floor().max(1.0), |_, _| ());
+    let rounded = altered(|_| (), |_, end| end.velocity = (end.velocity / 3.0).round() * 3.0);
+    for found in [measured_of(cut), measured_of(rounded)] {
+        let is_told =
+            found.as_ref().is_some_and(|cause| cause.id == "term:drag" || cause.certainty == Certainty::Certain);
+        assert!(!is_told, "{found:?}");
+    }
+}
+
+#[test]
+fn a_wrong_time_of_coasting_alone_is_no_wrong_weight() {
+    let late = altered(
+        |_| (),
+        |problem, end| {
+            if problem.stages[0].drag == 0.0 && problem.stages[0].static_force == 0.0 {
+                end.time *= 1.2;
+            }
+        },
+    );
+    assert_ne!(id_and_statement(measured_of(late)).0, "weights");
+}
+
+/// The first cause of a scheme of fixed steps.
+fn first_cause(stepping: Stepping) -> (String, Certainty) {
+    let plan = Plan { seed: 1, questions: 200, asks_edges: false };
+    let cause = diagnose(&mut stepping.solver(), plan, &|_, _| {}).causes.swap_remove(0);
+    (cause.id, cause.certainty)
+}
+
+#[test]
+fn times_of_shortened_steps_and_flights_of_whole_steps_are_told() {
+    let fixed = Stepping { is_fixed: true, ..RIGHT };
+    let late = Stepping { clock: |_, whole| whole, ..fixed };
+    assert_eq!(first_cause(late), ("event-time-late".to_owned(), Certainty::Likely));
+    let early = Stepping { clock: |_, _| 0.0, ..fixed };
+    // What one step takes says nothing where it depends on the step that was asked for.
+    assert_eq!(measured_of(Stepping { clock: |_, whole| 0.5 * whole, ..fixed }.solver()), None);
+    assert_eq!(first_cause(early), ("event-time-early".to_owned(), Certainty::Likely));
+    // Of a scheme that is none of those known, since it is of order three.
+    let kutta = ([0.5, 0.5, 1.0], [1.0 / 6.0, 2.0 / 3.0, 0.0, 1.0 / 6.0]);
+    let at_steps = Stepping { placed: Placed::AtStepEnd, numbers: kutta, ..fixed };
+    assert_eq!(first_cause(at_steps), ("exit-late".to_owned(), Certainty::Certain));
+}
+
+#[test]
+fn a_speed_of_rest_is_named_where_flights_begin_below_it() {
+    // It leaves round-off of a flight that begins below.
+    let mut early = by_rules(Rules { rest_speed: 0.1, ..Rules::default() }, |end| {
+        let State { time, depth, .. } = *end;
+        *end = State { time: time.max(1e-31), depth: depth.max(1e-33), velocity: 0.0 };
+    });
+    let found = diagnose(&mut early, Plan::default(), &|_, _| {});
+    let first = &found.causes[0];
+    assert!(first.id == "rest-threshold" && first.certainty == Certainty::Certain, "{first:?}");
+    assert!((first.factor.unwrap() - 0.1).abs() < 1e-9, "{first:?}");
 }
