@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, error_text, escape_terminal, new_progress, say_line, show_progress, wrapped};
 use super::verify::report_line;
-use super::{Answer, Ask, CliError, Exit, Settings, command_typed, end_peers_with_program, program};
+use super::{Answer, Ask, CliError, Exit, Settings, command_typed, program};
 use crate::exchange::peers::{Environment as PeerEnvironment, Peer};
 use crate::exchange::scene_file::shipped;
 use crate::physics::Scene;
@@ -125,9 +125,6 @@ impl BenchArgs {
     /// The peers by the names of the tables. None is asked in vain: they take part in work-precision alone.
     fn start_peers(&self) -> Result<Vec<(String, Peer)>, CliError> {
         let mut peers = Vec::new();
-        if self.peers || !self.peer.is_empty() {
-            end_peers_with_program()?;
-        }
         if self.peers {
             for (name, bundled, options) in peers::BUNDLED {
                 let environment = PeerEnvironment::ensure(bundled, &mut |line| say_line(line))?;

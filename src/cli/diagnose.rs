@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::output::{Text, escape_terminal};
 use super::report_args::ReportArgs;
 use super::verify::progress_bar;
-use super::{Answer, Ask, CliError, end_peers_with_program};
+use super::{Answer, Ask, CliError};
 use crate::exchange::peers::Peer;
 use crate::report::diagnosis::report;
 use crate::studies::Verdict;
@@ -48,7 +48,6 @@ impl Ask for DiagnoseArgs {
 
     fn ask(&self) -> Result<Answer<DiagnoseJson>, CliError> {
         self.report.check("diagnose", &[])?;
-        end_peers_with_program()?;
         self.of(&mut Peer::start(&self.command)?)
     }
 }

@@ -452,8 +452,7 @@ impl Cli {
         if self.quiet {
             output::be_quiet();
         }
-        // Without it an interrupt leaves a temporary file behind, and no more; for a peer it is required.
-        let _ = clean_up_when_interrupted();
+        clean_up_when_interrupted();
         let (name, command) = self.command.entry();
         command.run().unwrap_or_else(|error| {
             if matches!(error.exit(), Exit::Failed | Exit::Undecided) && command.wants_json() {
@@ -541,15 +540,6 @@ pub fn let_program_be(path: PathBuf) {
 /// The program that claims about commands run.
 fn program() -> io::Result<PathBuf> {
     PROGRAM.get().cloned().map_or_else(std::env::current_exe, Ok)
-}
-
-/// Lets the peers of this run end with it, however it ends. A program that calls a command keeps its signals.
-fn end_peers_with_program() -> Result<(), CliError> {
-    if WORDS.get().is_none() {
-        return Ok(());
-    }
-    let failed = |cause| CliError::failed(format!("signals cannot be received: {cause}"), "run without a peer");
-    clean_up_when_interrupted().map_err(failed)
 }
 
 /// The command of this run as it was typed, its words quoted as for a shell.

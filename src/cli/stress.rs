@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::output::{Text, error_text, escape_terminal};
 use super::verify::{add_not_passed, counts_text, diagnose_line, judge_all, list, progress_bar, report_line};
-use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program};
+use super::{Answer, Ask, CliError, Exit, command_typed};
 use crate::exchange::peers::Peer;
 use crate::report::{self, Environment, Run, StressJson, cells, folder};
 use crate::studies::diagnosis::{self, Plan};
@@ -97,7 +97,6 @@ impl StressArgs {
 
     /// Who the program of `command` says it is, and how it fares.
     fn run_peer(&self, command: &str, suite: &Suite) -> Result<(String, Vec<Judged>), CliError> {
-        end_peers_with_program()?;
         let mut peer = Peer::start_adaptive(command)?;
         let identity = format!("{}, asked by `{command}`", peer.identity());
         let bar = progress_bar(0, "problems");

@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::output::{Text, escape_terminal, new_progress, say, say_line, show_progress};
 use super::sweep::read_data;
-use super::{Answer, Ask, CliError, Exit, command_typed, end_peers_with_program, program};
+use super::{Answer, Ask, CliError, Exit, command_typed, program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
@@ -135,9 +135,6 @@ impl VerifyArgs {
             }
             started => started,
         };
-        if self.live_peers || self.peer.is_some() {
-            end_peers_with_program()?;
-        }
         if self.live_peers {
             for (name, peer) in [
                 ("sundae-adams", BundledPeer::SundaeAdams),

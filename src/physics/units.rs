@@ -10,6 +10,9 @@
 //!   1 in = 25.4 mm, g = 9.80665 m/s²); `uom` rounds them to seven digits;
 //! - a power of ten is one: some prefixes of `uom` are quotients of rounded powers, and 1 µg gives 9.999999999999999e-10 kg.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use strum::VariantArray;
 use thiserror::Error;
 
@@ -43,6 +46,23 @@ pub enum Dimension {
 
 /// The units, one a line: dimension, spellings, SI value.
 const UNITS: &str = include_str!("units.txt");
+
+/// The SI value of each spelling. An uncia is a mass and a length.
+static KNOWN: LazyLock<HashMap<(Dimension, &str), &str>> =
+    LazyLock::new(|| listed().map(|(dimension, unit, value)| ((dimension, unit), value)).collect());
+
+/// Every spelling of every unit, with its dimension and its SI value.
+fn listed() -> impl Iterator<Item = (Dimension, &'static str, &'static str)> {
+    UNITS
+        .lines()
+        .filter_map(|line| {
+            let (name, rest) = line.split_once(" | ")?;
+            let (units, value) = rest.split_once(" | ")?;
+            let dimension = Dimension::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name)?;
+            Some(units.split(", ").map(move |unit| (dimension, unit, value)))
+        })
+        .flatten()
+}
 
 impl Dimension {
     /// Name for messages, and common units, the SI unit first.
@@ -80,24 +100,19 @@ impl Dimension {
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
     pub fn coefficient(self, unit: &str) -> Option<f64> {
         let unit = canonical(unit);
-        UNITS.lines().find_map(|line| {
-            let (names, value) = line.strip_prefix(<&str>::from(self))?.strip_prefix(" | ")?.split_once(" | ")?;
-            if names.split(", ").any(|name| name == unit) { value.parse().ok() } else { None }
-        })
+        let value = KNOWN.get(&(self, unit.as_str()))?;
+        value.parse().ok()
     }
 
     /// Every spelling of every unit, with its dimension.
     pub fn spellings() -> impl Iterator<Item = (Self, &'static str)> {
-        UNITS.lines().filter_map(|line| line.split_once(" | ")).flat_map(|(name, rest)| {
-            let dimension = Self::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name);
-            let names = rest.split(" | ").next().unwrap_or_default();
-            dimension.into_iter().flat_map(move |dimension| names.split(", ").map(move |unit| (dimension, unit)))
-        })
+        listed().map(|(dimension, unit, _)| (dimension, unit))
     }
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
-        Self::VARIANTS.iter().copied().find(|dimension| dimension.coefficient(unit).is_some())
+        let unit = canonical(unit);
+        Self::VARIANTS.iter().copied().find(|dimension| KNOWN.contains_key(&(*dimension, unit.as_str())))
     }
 }
 

@@ -98,3 +98,24 @@ pub fn growth(growth: &[Growth]) -> impl Iterator<Item = [String; 6]> {
         ]
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::studies::bench::growth::Source;
+
+    #[test]
+    fn growth_is_shown_in_seconds_microseconds_and_megabytes() {
+        let row = Growth {
+            scenes: 1000,
+            threads: 2,
+            source: Source::File,
+            seconds: 0.0055,
+            ns_a_scene: 5500.0,
+            peak_bytes: Some(11_200_000),
+            runs: 3,
+        };
+        let shown = growth(&[row]).collect::<Vec<_>>();
+        assert_eq!(shown, [["1000", "file", "2", "0.0055", "5.5", "11.2"].map(str::to_owned)]);
+    }
+}

@@ -17,8 +17,8 @@ use crate::exchange::scene_file::SHIPPED;
 /// Longest run of a command that a claim asks for.
 const TIME_MAX: Duration = Duration::from_secs(60);
 
-/// Waits before a run is asked whether it has ended: most take a few milliseconds.
-const POLLS: [Duration; 2] = [Duration::from_micros(200), Duration::from_millis(5)];
+/// Waits before a run is asked whether it has ended, the first and the longest: most take a few milliseconds.
+const POLLS: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(5)];
 
 /// Threads that wait for a run, for each that computes.
 const WAITING: usize = 2;
@@ -90,7 +90,9 @@ impl Program {
             let given = given.iter().map(|(name, text)| (name.clone(), text.as_str()));
             let there: Vec<_> = shipped.filter(|(name, _)| words.contains(name)).chain(given).collect();
             for (name, text) in &there {
-                fs::write(folder.path().join(name), text)?;
+                let path = folder.path().join(name);
+                fs::create_dir_all(path.parent().unwrap_or(folder.path()))?;
+                fs::write(path, text)?;
             }
             let said = self.run_words(&words, folder.path())?;
             let mut written = Vec::new();

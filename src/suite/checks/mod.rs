@@ -175,7 +175,7 @@ every_check! {
     OrderCrossover RandomScenes DigitsLost ViscousResisting ViscousDriven
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
-    EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts SecondOpinion Refuted
+    EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts SecondOpinion Refuted RefutedLaws
 }
 
 /// What several claims share, computed once.

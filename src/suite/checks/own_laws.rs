@@ -101,11 +101,12 @@ impl Law {
         (x + h / 6.0 * (a.0 + 2.0 * (b.0 + c.0) + d.0), v + h / 6.0 * (a.1 + 2.0 * (b.1 + c.1) + d.1))
     }
 
-    /// Time, depth and velocity of the end, and the least V² on the way to it; `None` where the steps do not get there.
+    /// Time, depth and velocity of the end, and the least V² behind the impact: where it ends to fall, or at the end. `None`
+    /// where the steps do not get there.
     fn flight(&self, speed: f64, exit: f64) -> Option<([f64; 3], f64)> {
         const STEPS: u32 = 20_000;
         let h = 2.0 * MASS * speed / P / f64::from(STEPS);
-        let (mut at, mut least) = ((0.0, speed), speed * speed);
+        let (mut at, mut least) = ((0.0, speed), f64::INFINITY);
         for count in 0..4 * STEPS {
             let next = self.step(at, h);
             if next.1 <= 0.0 || next.0 >= exit {
@@ -120,8 +121,11 @@ impl Law {
                 let v = if next.1 <= 0.0 { 0.0 } else { v };
                 return Some(([h * (f64::from(count) + part), x, v], least.min(v * v)));
             }
+            // From a start that drives it rises: the impact itself is no place where it nearly stops.
+            if next.1 < at.1 {
+                least = least.min(next.1 * next.1);
+            }
             at = next;
-            least = least.min(at.1 * at.1);
         }
         None
     }

@@ -107,25 +107,41 @@ fn confirm(problem: &Problem, exact: &Flight<TwoFloat>) -> Found<()> {
     Ok(())
 }
 
-/// How errors of a path are judged: relative to the greatest speed on it, and to what a loss of speed makes of times.
+/// How errors of a path are judged: by what an error of the energy, relative to its greatest value, makes of each number.
 struct Judge<'a> {
     problem: &'a Problem,
+    /// The greatest speed at impact or an event.
     fastest: f64,
-    /// Least `V t/x` so far: an error of the speed counts so many times less in itself than in the time.
-    slowest: f64,
+    /// Time and speed at impact and at each event.
+    passed: Vec<(f64, f64)>,
 }
 
-impl Judge<'_> {
+impl<'a> Judge<'a> {
+    fn new(problem: &'a Problem, exact: &Flight<TwoFloat>) -> Self {
+        let events = exact.events.iter().map(|event| (event.state.time.value(), event.state.velocity.value()));
+        let passed: Vec<_> = std::iter::once((0.0, problem.impact_speed)).chain(events).collect();
+        let fastest = passed.iter().fold(0.0, |most: f64, (_, speed)| most.max(*speed));
+        Self { problem, fastest, passed }
+    }
+
+    /// By how much an error `e` of the energy, over the greatest one, moves the time: by `e` times this, as the sum of
+    /// `fastest² Δt / (2 V_1 V_2)` between neighbouring events, which is exact under a constant force.
+    fn lateness(&self, time: f64, velocity: f64) -> f64 {
+        let before = self.passed.iter().copied().filter(|(passed, _)| *passed < time);
+        let path: Vec<_> = before.chain([(time, velocity)]).collect();
+        let late = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0) / (2.0 * pair[0].1 * pair[1].1);
+        self.fastest * self.fastest * path.windows(2).map(late).sum::<f64>()
+    }
+
     /// Worst error of `found`, at a boundary or inside a stage, against `exact` at the same depth.
-    fn passing(&mut self, found: &State, exact: &State<TwoFloat>) -> f64 {
+    fn passing(&self, found: &State, exact: &State<TwoFloat>) -> f64 {
         let (time, depth, velocity) = (exact.time.value(), exact.depth.value(), exact.velocity.value());
         if time == 0.0 || depth == 0.0 {
             return if found.time == 0.0 { 0.0 } else { f64::INFINITY };
         }
-        self.slowest = self.slowest.min(velocity * time / depth);
         let (v, t) = (TwoFloat::from(found.velocity), TwoFloat::from(found.time));
         let energy = ((v - exact.velocity) * (v + exact.velocity)).value() / self.fastest / self.fastest;
-        let late = (t - exact.time).value() / time * self.slowest;
+        let late = (t - exact.time).value() / self.lateness(time, velocity).max(time);
         worse(energy.abs(), late.abs())
     }
 
@@ -134,16 +150,15 @@ impl Judge<'_> {
         let (time, depth) = (exact.time.value(), exact.depth.value());
         let brake = self.problem.stages[stage].force(depth, 0.0) / self.problem.mass;
         let far = (TwoFloat::from(found.depth) - exact.depth).value() / depth;
-        let late = (TwoFloat::from(found.time) - exact.time).value() / time;
+        let late = (TwoFloat::from(found.time) - exact.time).value();
         let in_depth = (2.0 * brake * depth / self.fastest / self.fastest).min(1.0);
-        let in_time = (brake * time / self.fastest).min(self.slowest);
-        if found.velocity == 0.0 { worse((far * in_depth).abs(), (late * in_time).abs()) } else { f64::NAN }
+        // Rest lies behind the other events, and its own speed is none.
+        let before = self.passed.iter().copied().rfind(|(passed, speed)| *passed < time && *speed > 0.0);
+        let (passed, speed) = before.unwrap_or((0.0, self.fastest));
+        let lateness = self.lateness(passed, speed) + self.fastest * self.fastest / (2.0 * speed * brake);
+        let late = late / lateness.max(time);
+        if found.velocity == 0.0 { worse((far * in_depth).abs(), late.abs()) } else { f64::NAN }
     }
-}
-
-/// The greatest speed of a flight, at impact or an event.
-fn fastest(problem: &Problem, exact: &Flight<TwoFloat>) -> f64 {
-    exact.events.iter().map(|event| event.state.velocity.value()).fold(problem.impact_speed, f64::max)
 }
 
 /// Worst error of the events and of the end of `flight`; what is missing, or in another order, breaks the claim.
@@ -155,7 +170,7 @@ fn error_of_events(problem: &Problem, flight: &Flight, exact: &Flight<TwoFloat>)
     holds!(flight.stage == exact.stage, "ends in stage {}, not {}, of {problem:?}", flight.stage, exact.stage);
     let last = flight.events.last().map(|event| event.state);
     holds!(last == Some(flight.end), "the last event is not the end of {problem:?}");
-    let mut judge = Judge { problem, fastest: fastest(problem, exact), slowest: 1.0 };
+    let judge = Judge::new(problem, exact);
     let mut worst = 0.0;
     for (event, Event { kind, state }) in flight.events.iter().zip(&exact.events) {
         let error = if *kind == EventKind::Rest {
@@ -177,7 +192,7 @@ fn error_of_rows(problem: &Problem, flight: &Flight, exact_end: &Flight<TwoFloat
     holds!(last.state == flight.end, "the path ends at {}, the flight at {}", last.state, flight.end);
     holds!(rows.windows(2).all(|pair| pair[0].state.time <= pair[1].state.time), "times fall in {problem:?}");
     let mut worst = 0.0;
-    let mut judge = Judge { problem, fastest: fastest(problem, exact_end), slowest: 1.0 };
+    let judge = Judge::new(problem, exact_end);
     let apart = (rows.len() / 4).max(2);
     for (index, row) in rows.iter().enumerate() {
         let State { depth: x, velocity: v, .. } = row.state;
@@ -342,10 +357,10 @@ fn critical_share(method: &Method, problem: &Problem) -> Found<Option<(f64, f64)
     let (mut low, mut high) = (found.velocity - bar - spacing, found.velocity + bar + spacing);
     let is_inside = !perforates(low)? && perforates(high)?;
     holds!(is_inside, "V_c is not in {} ± {bar:e} m/s, of {problem:?}", found.velocity);
-    // To a five-hundredth of the bar, or to neighbouring numbers.
+    // To a ten-thousandth of the bar, or to neighbouring numbers.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if high - low <= 0.004 * bar || middle <= low || middle >= high {
+        if high - low <= 2e-4 * bar || middle <= low || middle >= high {
             break;
         }
         if perforates(middle)? {

@@ -50,6 +50,11 @@ check! {
         /// How many of each.
         count: usize,
     } in Random, "refuted", by refuted, compares (MethodItself | Enclosure);
+    /// The same on random laws `P exp(-V/v1)`, which fall so steeply that an error grows by up to e^12.
+    RefutedLaws {
+        /// How many.
+        laws: usize,
+    } in Random, "refuted", by refuted_laws, compares (MethodItself | Enclosure);
     /// Random boxes around random scenes, half of them where the crater's share of the energy changes what more drag does:
     /// points of the box, corners among them, whose end or V_c by the closed form lies outside of what is proved of the box.
     /// At least two in three boxes must have a proof.
@@ -305,40 +310,80 @@ fn number(scene: &RecordedScene, path: &str) -> Option<Ball> {
     Some(exact.widened(5e-19 * exact.magnitude()))
 }
 
-fn refuted(Refuted { kinds, count }: &Refuted, subject: &Subject<'_>) -> Found {
-    let method = subject.method(None)?;
-    let (mut refuted, mut compared) = (0, 0);
-    let mut first = String::new();
-    for &kind in kinds {
-        for problem in problems(subject, kind, *count)? {
-            let proved = enclosed(&problem)?;
-            let flight = match method.integrator().solve(&problem, Detail::Events) {
-                Ok(flight) => flight,
-                Err(error) if error.is_usage() => continue,
-                Err(error) => return Err(error.into()),
-            };
-            if [proved.outcome, flight.outcome].contains(&Outcome::Undecided) {
-                continue;
-            }
-            compared += 1;
-            let passed = || {
-                let passed = proved.events.iter().filter(|event| event.kind != EventKind::Rest);
-                passed.map(|event| (event.state.velocity.lower(), event.state.velocity.upper()))
-            };
-            let perforates = proved.events.iter().any(|event| event.kind == EventKind::Exit);
-            // Four roundings of the squares.
-            let agrees =
-                flight.outcome == proved.outcome && (!perforates || margin_meets(&problem, &flight, passed(), 4.0));
-            if !agrees {
-                refuted += 1;
-                if first.is_empty() {
-                    first =
-                        format!("; the first: {} where {} is proved, of {problem:?}", flight.outcome, proved.outcome);
-                }
+/// What of a method is refuted.
+#[derive(Default)]
+struct Refutations {
+    refuted: usize,
+    compared: usize,
+    first: String,
+}
+
+impl Refutations {
+    fn look(&mut self, method: &dyn Integrator, problem: &Problem) -> Found<()> {
+        let proved = enclosed(problem)?;
+        let flight = match method.solve(problem, Detail::Events) {
+            Ok(flight) => flight,
+            Err(error) if error.is_usage() => return Ok(()),
+            Err(error) => return Err(error.into()),
+        };
+        if [proved.outcome, flight.outcome].contains(&Outcome::Undecided) {
+            return Ok(());
+        }
+        self.compared += 1;
+        let passed = || {
+            let passed = proved.events.iter().filter(|event| event.kind != EventKind::Rest);
+            passed.map(|event| (event.state.velocity.lower(), event.state.velocity.upper()))
+        };
+        let perforates = proved.events.iter().any(|event| event.kind == EventKind::Exit);
+        // Four roundings of the squares.
+        let agrees = flight.outcome == proved.outcome && (!perforates || margin_meets(problem, &flight, passed(), 4.0));
+        if !agrees {
+            self.refuted += 1;
+            if self.first.is_empty() {
+                self.first =
+                    format!("; the first: {} where {} is proved, of {problem:?}", flight.outcome, proved.outcome);
             }
         }
+        Ok(())
     }
-    Ok(Measurement::count(refuted).remark(format!("{compared} compared{first}")).cases(compared))
+
+    fn measurement(self) -> Measurement {
+        let Self { refuted, compared, first } = self;
+        Measurement::count(refuted).remark(format!("{compared} compared{first}")).cases(compared)
+    }
+}
+
+fn refuted(Refuted { kinds, count }: &Refuted, subject: &Subject<'_>) -> Found {
+    let method = subject.method(None)?;
+    let mut seen = Refutations::default();
+    for &kind in kinds {
+        for problem in problems(subject, kind, *count)? {
+            seen.look(method.integrator(), &problem)?;
+        }
+    }
+    Ok(seen.measurement())
+}
+
+fn refuted_laws(&RefutedLaws { laws }: &RefutedLaws, subject: &Subject<'_>) -> Found {
+    let method = subject.method(None)?;
+    let mut random = subject.random("falling laws");
+    let mut seen = Refutations::default();
+    for _ in 0..laws {
+        let (mass, speed) = (random.uniform(0.5, 5.0), random.uniform(100.0, 400.0));
+        let (steepness, left) = (random.uniform(2.0, 12.0), random.log_uniform(0.02, 0.6));
+        let (force, v1) = (random.log_uniform(1e4, 1e6) * steepness.exp(), speed / steepness);
+        // The distance from V0 to `left` V0, u = V/v1: M v1²/P times the difference of (u - 1) exp(u).
+        let antiderivative = |u: f64| (u - 1.0) * u.exp();
+        let exit = mass * v1 * v1 / force * (antiderivative(steepness) - antiderivative(left * steepness));
+        let text = format!(
+            "projectile.mass = {mass:?}\nimpact.velocity = {speed:?}\ntarget.thickness = {exit:?}\n[parameters]\n\
+             P = \"{force:?} N\"\nv1 = \"{v1:?} m/s\"\n[[stage]]\nforce = \"P*exp(-V/v1)\"\n"
+        );
+        let scene = Scene::from_toml(&text, "a falling law").map_err(|error| NotMeasured::broken(error.to_string()))?;
+        seen.look(method.integrator(), &scene.problem()?)?;
+    }
+    holds!(2 * seen.compared > laws, "{} of {laws} laws are compared", seen.compared);
+    Ok(seen.measurement())
 }
 
 /// Whether the margin of `flight`, which leaves the target, give or take its error bound and some `roundings`, meets the least W

@@ -13,6 +13,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[cfg(unix)]
 use rustix::process::{Pid, Signal, kill_process_group};
 
+#[cfg(unix)]
+use crate::exchange::interruption::receive_signals;
+
 /// The groups that run.
 #[cfg(unix)]
 static RUNNING: Mutex<Vec<Pid>> = Mutex::new(Vec::new());
@@ -43,6 +46,8 @@ impl Group {
     /// Starts `command` as the leader of a group.
     pub(super) fn spawn(command: &mut Command) -> io::Result<(Child, Self)> {
         use std::os::unix::process::CommandExt;
+        // A peer that outlives its program computes on for nobody.
+        receive_signals()?;
         // Held while it starts, so that no interrupt falls between the start and the entry.
         let mut running = running();
         let child = command.process_group(0).spawn()?;
