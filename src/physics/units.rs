@@ -10,7 +10,6 @@
 //!   1 in = 25.4 mm, g = 9.80665 m/s²); `uom` rounds them to seven digits;
 //! - a power of ten is one: some prefixes of `uom` are quotients of rounded powers, and 1 µg gives 9.999999999999999e-10 kg.
 
-use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use strum::VariantArray;
@@ -47,22 +46,16 @@ pub enum Dimension {
 /// The units, one a line: dimension, spellings, SI value.
 const UNITS: &str = include_str!("units.txt");
 
-/// The SI value of each spelling. An uncia is a mass and a length.
-static KNOWN: LazyLock<HashMap<(Dimension, &str), &str>> =
-    LazyLock::new(|| listed().map(|(dimension, unit, value)| ((dimension, unit), value)).collect());
-
-/// Every spelling of every unit, with its dimension and its SI value.
-fn listed() -> impl Iterator<Item = (Dimension, &'static str, &'static str)> {
-    UNITS
-        .lines()
-        .filter_map(|line| {
-            let (name, rest) = line.split_once(" | ")?;
-            let (units, value) = rest.split_once(" | ")?;
-            let dimension = Dimension::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name)?;
-            Some(units.split(", ").map(move |unit| (dimension, unit, value)))
-        })
-        .flatten()
-}
+/// Every spelling of every unit, with its dimension and its SI value, in the order of [`UNITS`]. An uncia is a mass and a length.
+static KNOWN: LazyLock<Vec<(Dimension, &str, &str)>> = LazyLock::new(|| {
+    let units_of = |line: &'static str| {
+        let (name, rest) = line.split_once(" | ")?;
+        let (units, value) = rest.split_once(" | ")?;
+        let dimension = Dimension::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name)?;
+        Some(units.split(", ").map(move |unit| (dimension, unit, value)))
+    };
+    UNITS.lines().filter_map(units_of).flatten().collect()
+});
 
 impl Dimension {
     /// Name for messages, and common units, the SI unit first.
@@ -100,19 +93,19 @@ impl Dimension {
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
     pub fn coefficient(self, unit: &str) -> Option<f64> {
         let unit = canonical(unit);
-        let value = KNOWN.get(&(self, unit.as_str()))?;
+        let (_, _, value) = KNOWN.iter().find(|(dimension, name, _)| *dimension == self && *name == unit)?;
         value.parse().ok()
     }
 
     /// Every spelling of every unit, with its dimension.
     pub fn spellings() -> impl Iterator<Item = (Self, &'static str)> {
-        listed().map(|(dimension, unit, _)| (dimension, unit))
+        KNOWN.iter().map(|(dimension, unit, _)| (*dimension, *unit))
     }
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
         let unit = canonical(unit);
-        Self::VARIANTS.iter().copied().find(|dimension| KNOWN.contains_key(&(*dimension, unit.as_str())))
+        KNOWN.iter().find(|(_, name, _)| *name == unit).map(|(dimension, ..)| *dimension)
     }
 }
 

@@ -5,10 +5,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use tempfile::TempDir;
+use wait_timeout::ChildExt;
 
 use super::claim::{Found, NotMeasured};
 use crate::exchange::interruption::{self, Temporary};
@@ -16,9 +17,6 @@ use crate::exchange::scene_file::SHIPPED;
 
 /// Longest run of a command that a claim asks for.
 const TIME_MAX: Duration = Duration::from_secs(60);
-
-/// Waits before a run is asked whether it has ended, the first and the longest: most take a few milliseconds.
-const POLLS: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(5)];
 
 /// Threads that wait for a run, for each that computes.
 const WAITING: usize = 2;
@@ -115,19 +113,10 @@ impl Program {
             .stdout(File::create(&out)?)
             .stderr(File::create(&err)?)
             .spawn()?;
-        let started = Instant::now();
-        let [mut wait, longest] = POLLS;
-        let status = loop {
-            if let Some(status) = child.try_wait()? {
-                break status;
-            }
-            if started.elapsed() > TIME_MAX {
-                child.kill()?;
-                child.wait()?;
-                return Err(io::Error::other(format!("does not end within {} s", TIME_MAX.as_secs())));
-            }
-            thread::sleep(wait);
-            wait = longest.min(wait.mul_f64(1.25));
+        let Some(status) = child.wait_timeout(TIME_MAX)? else {
+            child.kill()?;
+            child.wait()?;
+            return Err(io::Error::other(format!("does not end within {} s", TIME_MAX.as_secs())));
         };
         Ok(Said { code: status.code().unwrap_or(-1), out: fs::read_to_string(&out)?, err: fs::read_to_string(&err)? })
     }

@@ -282,6 +282,19 @@ fn a_tolerance_that_is_kept_to_a_floor_alone_is_sound_and_told() {
 }
 
 #[test]
+fn an_error_at_the_loose_tolerances_alone_fails() {
+    let loose = Made::new((), |(), request| {
+        let mut problem = request.problem(None);
+        problem.stages.iter_mut().filter(|_| request.rtol > 1e-7).for_each(|law| law.drag *= 0.9);
+        exact(&problem)
+    });
+    let found = loose.diagnosed(Plan { asks_edges: false, ..Plan::default() });
+    let failing: Vec<_> = found.questions.iter().filter(|asked| asked.verdict == Verdict::Failed).collect();
+    assert_eq!(found.verdict, Verdict::Failed);
+    assert!(!failing.is_empty() && failing.iter().all(|asked| asked.rtol > Some(1e-7)));
+}
+
+#[test]
 fn an_order_falls_short_only_where_its_whole_interval_and_the_smallest_steps_do() {
     assert!(is_short_of(2.0, [1.5, 1.69], Some(1.6)));
     assert!(!is_short_of(2.0, [1.5, 1.71], Some(1.6)));
