@@ -554,7 +554,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         // Behind a drive the bound may go beyond all numbers before the velocity does.
         let is_bounded = course.error_bound < f64::INFINITY;
         let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
-        if is_lost && self.law.force_value(x, 0.0) != 0.0 {
+        // What drives it, however uncertain its speed, brings it to no rest.
+        if is_lost && force.value() > 0.0 && self.law.force_value(x, 0.0) != 0.0 {
             // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
             return Some(StageEnd::Rest(State { velocity: S::zero(), ..course.state }));
         }

@@ -493,6 +493,17 @@ fn a_law_that_drives_for_ever_behind_a_barrier_never_ends() {
     }
 }
 
+/// Its error bound outgrows its energy on the way, and that is no rest.
+#[test]
+fn a_force_that_drives_the_more_the_faster_it_is_brings_nothing_to_rest() {
+    for method in exact_methods() {
+        for force in ["P*(1.3 - 0.11*(V/v1)^2)", "P*(1.3 - 0.15*(V/v1)^2 - 0.1*V/v1)"] {
+            let error = method.solve(&problem(force, 400.0), Detail::End).unwrap_err();
+            assert!(error.last().is_some_and(|last| last.velocity > 1e10), "{force}: {error}");
+        }
+    }
+}
+
 /// A stage of coefficients in front of a law and one behind it, against the series over time in double-double.
 #[test]
 fn stages_of_coefficients_stand_among_laws() {

@@ -74,7 +74,7 @@ fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subjec
     let study = shared_study(subject, key, |exact| {
         let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
         // The shortest steps take most of the time, and narrow no interval much.
-        let from = 6.0 * from;
+        let from = 3.0 * from;
         let scheme = |size| CentralDifference {
             steps: steps(pattern, size, seed),
             ..CentralDifference::uniform(size, claim.velocity, claim.boundaries)
