@@ -117,7 +117,7 @@ pub fn whole<R>(step: impl FnOnce() -> R) -> R {
 /// Lets an interrupt, a hang-up or a request to terminate remove what is temporary and end every peer before this program
 /// ends.
 ///
-/// For a program to call before it makes any; a library leaves signals to its program. A signal that this program was told
+/// For a program to call when it begins; a library leaves signals to its program. A signal that this program was told
 /// to ignore, as by `nohup`, is ignored. Elsewhere than on Unix nothing happens.
 pub fn clean_up_when_interrupted() {
     CLEANS_UP.store(true, Ordering::Relaxed);

@@ -549,32 +549,34 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     fn end_of_slow(&self, course: &Course<'_, S>, force: S, limit: S) -> Option<StageEnd<S>> {
         let State { time, depth, velocity } = course.state;
         let (v, x) = (velocity.value(), depth.value());
+        // A bound may outgrow the energy of a flight that is fast: it goes on.
         let relative = v / course.problem.impact_speed.value();
-        let to_rest = 0.5 * self.mass.value() * v * v / force.value().abs();
-        // Behind a drive the bound may go beyond all numbers before the velocity does.
-        let is_bounded = course.error_bound < f64::INFINITY;
-        let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
-        // What drives it, however uncertain its speed, brings it to no rest.
-        if is_lost && force.value() > 0.0 && self.law.force_value(x, 0.0) != 0.0 {
-            // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
-            return Some(StageEnd::Rest(State { velocity: S::zero(), ..course.state }));
-        }
-        if v > SLOW * course.problem.impact_speed.value() {
+        if relative > SLOW {
             return None;
         }
         let at_rest = self.law.force(depth, S::zero()).value();
         let deceleration = force.over(self.mass);
-        if at_rest > 0.0 && force.value() > 0.0 {
-            let to_rest = State {
-                time: time + velocity.over(deceleration),
-                depth: depth + velocity * velocity.over(deceleration) * S::from_f64(0.5),
-                velocity: S::zero(),
-            };
+        let rest = State {
+            time: time + velocity.over(deceleration),
+            depth: depth + velocity * velocity.over(deceleration) * S::from_f64(0.5),
+            velocity: S::zero(),
+        };
+        let resists = at_rest > 0.0 && force.value() > 0.0;
+        let is_before = rest.depth.value() < limit.value();
+        let to_rest = 0.5 * self.mass.value() * v * v / force.value().abs();
+        // Behind a drive the bound may go beyond all numbers before the velocity does.
+        let is_bounded = course.error_bound < f64::INFINITY;
+        let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
+        if is_lost && self.law.force_value(x, 0.0) != 0.0 {
+            // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
+            let present = State { velocity: S::zero(), ..course.state };
+            return Some(StageEnd::Rest(if resists && is_before { rest } else { present }));
+        }
+        if resists {
             let change = (at_rest / force.value() - 1.0).abs().max(0.01);
-            let is_over = (to_rest.depth.value() - x) * change <= 0.25 * f64::EPSILON * x
-                && (to_rest.time - time).value() * change <= f64::EPSILON * time.value();
-            let is_before = to_rest.depth.value() < limit.value();
-            return (is_over && is_before).then_some(StageEnd::Rest(to_rest));
+            let is_over = (rest.depth.value() - x) * change <= 0.25 * f64::EPSILON * x
+                && (rest.time - time).value() * change <= f64::EPSILON * time.value();
+            return (is_over && is_before).then_some(StageEnd::Rest(rest));
         }
         if at_rest == 0.0 && v <= VANISHING * course.problem.impact_speed.value() && self.law.stops(x, v) {
             // F = a V^n, n < 1.

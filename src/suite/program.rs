@@ -113,6 +113,7 @@ impl Program {
             .stdout(File::create(&out)?)
             .stderr(File::create(&err)?)
             .spawn()?;
+        // On Unix this takes SIGCHLD, and calls the handler that stood before.
         let Some(status) = child.wait_timeout(TIME_MAX)? else {
             child.kill()?;
             child.wait()?;

@@ -504,6 +504,20 @@ fn a_force_that_drives_the_more_the_faster_it_is_brings_nothing_to_rest() {
     }
 }
 
+/// `P exp(-V/v1)` stops it at `M v1²/P ((u - 1) exp(u) + 1)`, `u = V0/v1`. Its error bound grows by exp(u).
+#[test]
+fn a_flight_goes_on_to_its_rest_though_its_error_bound_outgrows_its_energy() {
+    for u in [12.0_f64, 20.0, 35.0, 50.0] {
+        for method in exact_methods() {
+            let problem = problem("P*exp(-V/v1)", 100.0 * u);
+            let p = problem.force(0, 0.0, 0.0);
+            let exact = problem.mass * 1e4 / p * ((u - 1.0) * u.exp() + 1.0);
+            let depth = method.solve(&problem, Detail::End).unwrap().end.depth;
+            assert!((depth / exact - 1.0).abs() <= 1e-13, "{}, u = {u}: {depth} and {exact}", method.name());
+        }
+    }
+}
+
 /// A stage of coefficients in front of a law and one behind it, against the series over time in double-double.
 #[test]
 fn stages_of_coefficients_stand_among_laws() {

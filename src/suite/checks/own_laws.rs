@@ -102,8 +102,8 @@ impl Law {
         (x + h / 6.0 * (a.0 + 2.0 * (b.0 + c.0) + d.0), v + h / 6.0 * (a.1 + 2.0 * (b.1 + c.1) + d.1))
     }
 
-    /// Time, depth and velocity of the end, and the least V² behind the impact: where it ends to fall, or at the end: infinite
-    /// where it runs away. `None` where the steps do not get there.
+    /// Time, depth and velocity of the end, and the least V² behind the impact: that where V stops falling, or that of the end.
+    /// All are infinite where V grows beyond all numbers; `None` where the steps do not get to an end.
     fn flight(&self, speed: f64, exit: f64) -> Option<([f64; 3], f64)> {
         const STEPS: u32 = 20_000;
         let h = 2.0 * MASS * speed / P / f64::from(STEPS);
@@ -126,7 +126,7 @@ impl Law {
                 let v = if next.1 <= 0.0 { 0.0 } else { v };
                 return Some(([h * (f64::from(count) + part), x, v], least.min(v * v)));
             }
-            // Least where it ends to fall: the impact itself is no place where it nearly stops.
+            // The impact itself is no place where it nearly stops.
             if falls(at) && !falls(next) {
                 let (mut low, mut high) = (0.0, 1.0);
                 for _ in 0..40 {
