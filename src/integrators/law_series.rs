@@ -337,6 +337,8 @@ struct Walk<'l, S, const K: usize> {
     kink: Option<usize>,
     /// Whether the step before went by velocity.
     goes_by_velocity: bool,
+    /// The force where the step before ended.
+    reached: Option<Local<S>>,
     /// What a step goes by that does not go by velocity.
     variable: Variable,
     tolerance: f64,
@@ -344,6 +346,13 @@ struct Walk<'l, S, const K: usize> {
     end: Option<(&'l Condition<S>, f64)>,
     /// `F_V` (kg/s) of a piece of a table of velocity.
     slope: Option<f64>,
+}
+
+/// The force at a state, and `F_V` (kg/s).
+#[derive(Clone, Copy)]
+struct Local<S> {
+    force: S,
+    by_velocity: f64,
 }
 
 /// What a step goes by, where it does not go by velocity.
@@ -404,6 +413,7 @@ impl LawSeries {
             sides: vec![false; bound.switches().len()],
             kink: None,
             goes_by_velocity: false,
+            reached: None,
             variable: self.variable,
             tolerance: self.tolerance,
             slope: law.line().map(|line| line.slope),
@@ -422,7 +432,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// One step from the state of `course`; how the stage ends, if it does.
     fn step(&mut self, course: &mut Course<'_, S>, limit: S) -> Solved<Option<StageEnd<S>>> {
         let start = course.state;
-        let force = self.law.force(start.depth, start.velocity);
+        let here = self.reached.take().unwrap_or_else(|| self.local(start));
+        let force = here.force;
         course.cost.force_evaluations += K as u64;
         if !force.value().is_finite() {
             return Err(self.no_force(course, start));
@@ -435,11 +446,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
-        let (path, kink) = match self.path(course, force, limit) {
+        let (path, kink) = match self.path(course, here, limit) {
             Err(IntegrationError::NoForce { last, .. }) if last == start.values() => {
                 let next = self.leave_branch_point(start, force, limit).ok_or_else(|| self.no_force(course, start))?;
                 course.cost.steps += 1;
-                self.widen_bound(course, force.value(), start, next);
+                self.reached = Some(self.widen_bound(course, here, start, next));
                 course.sample_until(next, |time| State { time: S::from_f64(time), ..start });
                 (self.kink, course.state) = (None, next);
                 return Ok(None);
@@ -465,10 +476,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NotFinite { what: "the state", last: start.values() });
         }
         course.cost.steps += 1;
-        self.widen_bound(course, force.value(), start, next);
+        let reached = self.widen_bound(course, here, start, next);
         // A step by velocity can only end at the least one.
-        let drives = || self.law.force_value(next.depth.value(), next.velocity.value()) < 0.0;
-        let is_at_least = matches!(path.form, Form::Velocity(_)) && drives();
+        let is_at_least = matches!(path.form, Form::Velocity(_)) && reached.force.value() < 0.0;
         let least = if is_at_least { Some(next.velocity.value()) } else { least_inside(&path, s.value()) };
         if let Some(least) = least {
             course.pass_least(least);
@@ -494,6 +504,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         Ok(match event {
             Event::None => {
                 self.kink = kink.filter(|_| s.value() >= path.span);
+                self.reached = Some(reached);
                 course.state = next;
                 course.sample(next);
                 None
@@ -502,6 +513,12 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             Event::Condition => Some(StageEnd::Condition(next)),
             Event::Rest => Some(StageEnd::Rest(next)),
         })
+    }
+
+    fn local(&self, at: State<S>) -> Local<S> {
+        let State { depth, velocity, .. } = at.values();
+        let by_velocity = self.law.slope_over_velocity(depth, velocity);
+        Local { force: self.law.force(at.depth, at.velocity), by_velocity }
     }
 
     /// The error where the force has no value.
@@ -611,7 +628,12 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     }
 
     /// A step on which the equation holds, and the switch at whose root it ends.
-    fn path(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<(Path<S, K>, Option<usize>)> {
+    fn path(
+        &mut self,
+        course: &Course<'_, S>,
+        Local { force, by_velocity: slope }: Local<S>,
+        limit: S,
+    ) -> Solved<(Path<S, K>, Option<usize>)> {
         let start = course.state;
         let by_velocity = self.over_velocity(start, force);
         let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
@@ -634,8 +656,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         };
         self.goes_by_velocity = matches!(path.form, Form::Velocity(_));
         // What the force is rounded to: its terms may cancel.
-        let (by_depth, by_velocity) = self.law.slopes(start.depth.value(), start.velocity.value());
-        let terms = (by_depth * start.depth.value()).abs() + (by_velocity * start.velocity.value()).abs();
+        let by_depth = self.law.slope_over_depth(start.depth.value(), start.velocity.value());
+        let terms = (by_depth * start.depth.value()).abs() + (slope * start.velocity.value()).abs();
         let size = force.value().abs() + if terms.is_finite() { terms } else { 0.0 };
         let mut kink = None;
         for _ in 0..SHORTENED_MAX {
@@ -959,25 +981,26 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// ```
     ///
     /// so that only a force that falls with V lets an error grow; on a piece of a table of velocity F_V is one number, and an error
-    /// falls by it too. What a step adds is that of [`super`].
-    fn widen_bound(&self, course: &mut Course<'_, S>, force: f64, start: State<S>, next: State<S>) {
+    /// falls by it too. What a step adds is that of [`super`]. The force at its end is what comes back.
+    fn widen_bound(&self, course: &mut Course<'_, S>, here: Local<S>, start: State<S>, next: State<S>) -> Local<S> {
         let (a, b) = (start.values(), next.values());
         let (time, distance) = (b.time - a.time, b.depth - a.depth);
-        let rises = [a, b].map(|at| self.law.slope_over_velocity(at.depth, at.velocity));
-        let falls = rises.into_iter().fold(0.0, f64::min).abs();
+        let reached = self.local(next);
+        let falls = here.by_velocity.min(reached.by_velocity).min(0.0).abs();
         let mass = self.mass.value();
         let growth = match self.slope {
             Some(slope) => -time * slope / mass,
             None => time * falls / mass,
         };
         let fastest = a.velocity.max(b.velocity);
-        let end_force = self.law.force(next.depth, next.velocity).value().abs();
-        let largest = force.abs().max(if end_force.is_finite() { end_force } else { 0.0 }) / mass;
+        let end_force = reached.force.value().abs();
+        let largest = here.force.value().abs().max(if end_force.is_finite() { end_force } else { 0.0 }) / mass;
         let relative = 1.0 / course.problem.impact_speed.value();
         let rounding = 6.0 * fastest * fastest + 3.0 * largest * (b.depth + 2.0 * distance);
         let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * fastest * fastest;
         let grown = if growth.is_finite() { growth.exp() } else { 1.0 };
         course.error_bound = course.error_bound * grown + relative * relative * added;
+        reached
     }
 }
 

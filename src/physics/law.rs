@@ -296,11 +296,17 @@ impl<S: Scalar> Law<S> {
     /// Derivatives `F_x` (N/m) and `F_V` (N s/m).
     pub fn slopes(&self, x: f64, v: f64) -> (f64, f64) {
         match &self.force {
-            Form::Expression(expression) => {
-                (expression.values.slope((x, 1.0), (v, 0.0)), self.slope_over_velocity(x, v))
-            }
-            Form::Table(pieces) => (0.0, pieces.table.slope(v)),
             Form::Code(code) => code.slopes(x, v),
+            Form::Expression(_) | Form::Table(_) => (self.slope_over_depth(x, v), self.slope_over_velocity(x, v)),
+        }
+    }
+
+    /// The first of [`Law::slopes`].
+    pub(crate) fn slope_over_depth(&self, x: f64, v: f64) -> f64 {
+        match &self.force {
+            Form::Expression(expression) => expression.values.slope((x, 1.0), (v, 0.0)),
+            Form::Table(_) => 0.0,
+            Form::Code(code) => code.slopes(x, v).0,
         }
     }
 
@@ -308,7 +314,8 @@ impl<S: Scalar> Law<S> {
     pub(crate) fn slope_over_velocity(&self, x: f64, v: f64) -> f64 {
         match &self.force {
             Form::Expression(expression) => expression.values.slope((x, 0.0), (v, 1.0)),
-            Form::Table(_) | Form::Code(_) => self.slopes(x, v).1,
+            Form::Table(pieces) => pieces.table.slope(v),
+            Form::Code(code) => code.slopes(x, v).1,
         }
     }
 

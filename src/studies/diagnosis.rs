@@ -290,7 +290,9 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
         && !is_named
         && let Some(cause) = measured(&mut asking, all, &found)
     {
-        found.causes.retain(|cause| !["unknown", "first-order-scheme"].contains(&cause.id.as_str()));
+        // A clock is found where events under a constant force are on time.
+        let is_refuted = |known: &str| known == "event-time-late" && cause.id == "clock";
+        found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
         // What is likely, and is no symptom alone, stays first beside what is no more.
         let stays = |known: &Cause| known.certainty <= cause.certainty && !SYMPTOMS.contains(&known.id.as_str());
         let place = usize::from(found.causes.first().is_some_and(stays));

@@ -178,10 +178,17 @@ pub struct Difference {
 impl PeerAnswer {
     /// The answer as a flight through `problem`, with the events that the peer lists.
     pub fn flight(&self, problem: &Problem) -> Flight {
-        // A peer does not know which stage is the crater: its `stage-end` there is the same event as `crater-end`.
-        let event = |event: &Event| match event.kind {
-            EventKind::StageEnd(index) => Event { kind: EventKind::boundary(problem, index), ..*event },
-            _ => *event,
+        // A peer does not know which stage is the crater: its `stage-end` there is the same event as `crater-end`, and its
+        // `crater-end` may be that of the first stage, whatever that is.
+        let is_listed = |stage| self.events.iter().any(|event| event.kind == EventKind::StageEnd(stage));
+        let crater = problem.crater.filter(|crater| !is_listed(*crater)).unwrap_or(0);
+        let event = |event: &Event| {
+            let kind = match event.kind {
+                EventKind::StageEnd(index) => EventKind::boundary(problem, index),
+                EventKind::CraterEnd => EventKind::boundary(problem, crater),
+                kind => kind,
+            };
+            Event { kind, ..*event }
         };
         Flight {
             outcome: self.outcome,
@@ -361,6 +368,12 @@ mod tests {
         assert_eq!(left_out(format!("[{as_stage_end}, {rest}]")), None);
         let with_stage = crater_end.replace("crater-end\"", "crater-end\", \"stage\": 0");
         assert_eq!(left_out(format!("[{with_stage}, {rest}]")), None);
+        // Not told which stage is the crater, a peer may call the first one so.
+        let layered = Problem { crater: None, ..problem() };
+        let named = of(&format!("[{crater_end}, {rest}]"));
+        let as_listed = of(&format!("[{as_stage_end}, {rest}]")).flight(&layered);
+        assert_eq!(named.left_out(&as_listed, &layered), None);
+        assert_eq!(named.flight(&layered).events, as_listed.events);
     }
 
     #[test]

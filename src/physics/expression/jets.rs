@@ -112,13 +112,14 @@ impl<S: Scalar> Jets<S> {
                     let behind = place + step.width() - 1;
                     (bound.signed(place, first), bound.signed(behind, second))
                 }
-                Step::Power { .. } | Step::Sqrt { .. }
-                    if self.falling > 0
-                        && let Some(power) = bound.power(place) =>
+                _ if self.falling > 0
+                    && let Some(power) = bound.power(place) =>
                 {
                     let exponent = power * f64::from(self.falling);
-                    let first = rest[0][k - 1] * S::from_f64(k as f64 - 1.0 - exponent) * reciprocal(k);
-                    (first, first * S::from_f64(k as f64))
+                    // As a quotient: a factor of one is one.
+                    let order = S::from_f64(k as f64);
+                    let first = rest[0][k - 1] * S::from_f64(k as f64 - 1.0 - exponent).over(order);
+                    (first, first * order)
                 }
                 _ => step.coefficients(k, done, rest),
             };

@@ -465,6 +465,11 @@ const LOWERS: &[(&str, &[Content], &str)] = &[
     ("stage-end-late", &[Content::ForceJump], "the order falls to 1 where the force jumps at the end of a stage"),
     ("stage-end-late", &[Content::StageEnd], "the order falls to 1 where the end of a stage is passed"),
     ("exit-late", &[Content::Exit], "the order falls to 1 at the exit"),
+    (
+        "stage-end-late",
+        &[Content::StageEnd, Content::Exit],
+        "the order falls to 1 at ends of stages and at the exit: a step that passes one is taken whole",
+    ),
     ("rest-late", &[Content::Rest], "the order falls to 1 at rest: it is taken at a step"),
     (
         "start-kick",

@@ -13,7 +13,7 @@ mod one_step;
 
 use super::causes::{Cause, Certainty};
 use super::questions::Question;
-use super::{ALLOWED, Asked, Asking, Diagnosis, TOLERANCES, end_of, request};
+use super::{ALLOWED, Asked, Asking, Diagnosis, Each, TOLERANCES, end_of, request};
 use crate::exchange::peers::PeerRequest;
 use crate::exchange::peers::wire::errors;
 use crate::integrators::{Detail, Integrator, Taylor};
@@ -74,7 +74,8 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         let claimed = found.orders.iter().filter_map(|order| order.formal_order).reduce(f64::max);
         return one_step::measured(asking, claimed.unwrap_or(LEAST_ORDER));
     }
-    coasting(asking)
+    clock(asking, found)
+        .or_else(|| coasting(asking))
         .or_else(|| drag_by_speed(asking))
         .or_else(|| straight_steps(asking))
         .or_else(|| straight_to_rest(asking))
@@ -128,6 +129,31 @@ fn ends(asking: &mut Asking<'_>, problem: &Problem, request: &PeerRequest) -> Op
     let exact = Taylor::default().solve(problem, Detail::End).ok()?;
     let answer = asking.ask(request).ok()?;
     answer.outcome.agrees_with(exact.outcome).then(|| [end_of(&answer).state, exact.end])
+}
+
+/// Whether the time alone is wrong, and late, and right under constant forces, where no step is rejected.
+fn clock(asking: &mut Asking<'_>, found: &Diagnosis) -> Option<Cause> {
+    let failing = found.questions.iter().filter(|row| row.verdict == Verdict::Failed);
+    let errors_of: Vec<[Each; 2]> = failing.filter_map(|row| Some([row.relative_error?, row.limit?])).collect();
+    let is_late = |[error, limit]: &&[Each; 2]| {
+        error.depth.abs() <= limit.depth && error.velocity.abs() <= limit.velocity && error.time > limit.time
+    };
+    let late = errors_of.iter().filter(is_late).count();
+    let of = found.counts.failed;
+    if late == 0 || 10 * late < 9 * of {
+        return None;
+    }
+    let are_right = RESTS.iter().all(|(speed, force)| {
+        let problem = Problem::of_stages(1.0, *speed, [Stage::tunnel(*force, 0.0)]);
+        let to_rest = 0.5 * speed * speed / force;
+        [problem.clone(), problem.with_exit(0.7 * to_rest)].iter().all(|problem| {
+            ends(asking, problem, &PeerRequest::from_problem(problem, TOLERANCES[0]))
+                .is_some_and(|[found, exact]| off(found, exact, *speed) <= TOLERANCES[1])
+        })
+    });
+    let statement = "the time alone is wrong, and late, and under a constant force it is right: the clock goes on in steps that are \
+                     rejected";
+    are_right.then(|| Cause::plain("clock", statement.to_owned(), Certainty::Likely, late, of))
 }
 
 /// Whether depth grows by `V t` where there is no force: else the weights of the scheme do not add up to one.

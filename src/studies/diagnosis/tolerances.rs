@@ -4,11 +4,13 @@
 //! Causes are looked for while it is asked, from the exact answers to ever greater errors, so that small errors of
 //! everything do not hide a great one of something.
 
+use strum::IntoEnumIterator;
+
 use super::causes::{Cause, Certainty, Effort, Seen, causes};
 use super::hypotheses::How;
 use super::numbers::few_digits;
 use super::observations::{is_one_error, is_same, shown};
-use super::questions::Question;
+use super::questions::{Content, Question};
 use super::{
     ALLOWED, Answered, Asked, Asking, Diagnosis, Each, QUANTITIES, Subject, TOLERANCES, count, end_of, expected,
     finish, request,
@@ -26,6 +28,9 @@ const LOOKED_FROM: usize = 80;
 const LOOKED_EACH: usize = 40;
 /// Accuracies (relative error over the condition) of a solver that does not do what it is asked for.
 const ACCURACIES: [f64; 4] = [1e-9, 1e-7, 1e-5, 1e-3];
+
+/// Part of its error by which an answer changes at most where the tolerance is not kept.
+const FLOOR_SPREAD: f64 = 0.1;
 
 /// How an answer of an adaptive solver fares.
 struct Judged {
@@ -110,6 +115,8 @@ pub(super) fn row(answered: &Answered<'_>) -> Asked {
                 if asked.reason.is_empty() {
                     asked.reason.clone_from(why);
                     asked.rtol = Some(*rtol);
+                    // Those at other tolerances are right.
+                    (asked.answered, asked.relative_error, asked.limit) = (None, None, None);
                 }
             }
             Ok(answer) => {
@@ -235,8 +242,9 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     let no_answer = (silent > 0).then(|| {
         let words = rows.iter().find(|row| row.answered.is_none()).map_or("", |row| row.reason.as_str());
         let statement = format!(
-            "{} no answer: {words}",
-            if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") }
+            "{} no answer: {words}{}",
+            if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") },
+            of_silent(&rows).map_or_else(String::new, |content| format!("; all of them hold `{content}`"))
         );
         let certainty = if silent == failed { Certainty::Likely } else { Certainty::Possible };
         Cause::plain("no-answer", statement, certainty, silent, failed)
@@ -323,20 +331,36 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     found
 }
 
-/// Right answers that are the same at the two tightest tolerances, with errors that the tightest would lessen.
+/// Right answers that are nearly the same at the two tightest tolerances, with errors that the tightest would lessen.
 fn floor(answered: &[Answered<'_>]) -> Option<Cause> {
     let tight = TOLERANCES[TOLERANCES.len() - 1];
-    let improvable = answered.iter().filter_map(|Answered { question, answers }| {
-        let [.., (_, Ok(middle)), (_, Ok(last))] = &answers[..] else { return None };
-        let error = question.over_condition(judge(question, tight, last).errors);
-        (error > 10.0 * tight).then_some((error, end_of(middle).state == end_of(last).state))
+    // The absolute tolerance of each may leave a little between them.
+    let improvable = answered.iter().filter_map(|one| {
+        let [.., (_, Ok(_)), (_, Ok(last))] = &one.answers[..] else { return None };
+        let error = one.question.over_condition(judge(one.question, tight, last).errors);
+        (error > 10.0 * tight).then_some((error, spread(one) < FLOOR_SPREAD * error))
     });
     let improvable: Vec<(f64, bool)> = improvable.collect();
     let same = improvable.iter().filter(|(_, is_same)| *is_same).count();
     let worst = improvable.iter().map(|(error, _)| *error).fold(0.0, f64::max);
-    let statement = format!("answers at tolerances of 1e-9 and 1e-12 are the same, with errors up to {worst:.0e}");
+    let statement =
+        format!("answers at tolerances of 1e-9 and 1e-12 are as good as the same, with errors up to {worst:.0e}");
     let is_floor = same >= 10 && same * 10 >= improvable.len() * 9;
     is_floor.then(|| Cause::plain("tolerance-ignored", statement, Certainty::Likely, same, answered.len()))
+}
+
+/// What every question without an answer holds, and few others do.
+fn of_silent(rows: &[Asked]) -> Option<Content> {
+    let (silent, others): (Vec<&Asked>, Vec<&Asked>) =
+        rows.iter().partition(|row| row.verdict == Verdict::Failed && row.answered.is_none());
+    let count = |rows: &[&Asked], content| rows.iter().filter(|row| row.contains.contains(&content)).count();
+    let stands_in_all = |content: &Content| count(&silent, *content) == silent.len();
+    Content::iter()
+        .filter(stands_in_all)
+        .map(|content| (count(&others, content), content))
+        .min_by_key(|(count, _)| *count)
+        .filter(|(count, _)| 2 * count <= others.len())
+        .map(|(_, content)| content)
 }
 
 /// Every end is right, and the events listed are not.

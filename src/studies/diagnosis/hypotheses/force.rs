@@ -236,6 +236,10 @@ fn single_inputs(problem: &mut Problem, _: f64) {
     }
 }
 
+fn single_coefficients(problem: &mut Problem) {
+    problem.stages.iter_mut().for_each(|law| *law = law.map(to_single).until(law.end));
+}
+
 /// What is slower than `speed` is reported as at rest.
 pub(super) fn clear_speed(found: &mut Simulated, speed: f64) {
     if found.end.velocity <= speed {
@@ -1033,7 +1037,16 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "input-rounded",
         "the coefficients of the force are rounded to single precision",
         Parameter::None,
-        &[Change::Problem(|p, _| p.stages.iter_mut().for_each(|law| *law = law.map(to_single).until(law.end)))],
+        &[Change::Problem(|p, _| single_coefficients(p))],
+    ),
+    of(
+        "input-rounded",
+        "the mass and the coefficients of the force are rounded to single precision",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            p.mass = to_single(p.mass);
+            single_coefficients(p);
+        })],
     ),
     of(
         "term:drive",

@@ -37,7 +37,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
         let asked = STEPS.len() * SIZES.len();
         Some(Cause { factor, ..Cause::plain(id, statement, Certainty::Certain, asked, asked) })
     };
-    let first = constant_force(asking, 0.0)?;
+    let Some(first) = constant_force(asking, 0.0) else { return start_kick(asking) };
     let coefficients = coefficients(asking);
     let tableau =
         || coefficients.as_ref().and_then(changed_number).map_or_else(String::new, |said| format!(": {said}"));
@@ -135,6 +135,28 @@ fn constant_force(asking: &mut Asking<'_>, before: f64) -> Option<Constant> {
         velocity: (1.0 - end.velocity) / (DECELERATION * h),
         depth: (h - exit) / (DECELERATION * h * h),
     })
+}
+
+/// A velocity that is off from the start on by a part of what a step takes: `V + a t` stays `V0 - k a h` under a constant
+/// deceleration. A central difference that takes V0 for the velocity half a step before has k = 1/2.
+fn start_kick(asking: &mut Asking<'_>) -> Option<Cause> {
+    const DECELERATION: f64 = 0.5;
+    const STEPS: [f64; 4] = [0.1, 0.043, 0.021, 0.0097];
+    let problem = Problem::of_stages(1.0, 1.0, [Stage::tunnel(DECELERATION, 0.0)]).with_exit(0.4);
+    let lost = STEPS.map(|step| {
+        let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
+        let end = end_of(&asking.ask(&request).ok()?).state;
+        let by_depth = (end.velocity * end.velocity + 2.0 * DECELERATION * end.depth).sqrt();
+        let by_time = end.velocity + DECELERATION * end.time;
+        ((by_depth - by_time).abs() <= SAME).then_some((1.0 - by_depth) / (DECELERATION * step))
+    });
+    let all: Vec<f64> = lost.into_iter().collect::<Option<_>>()?;
+    let part = all[0];
+    let is_one = all.iter().all(|lost| (lost - part).abs() <= ANOTHER * part.abs());
+    let of_half = if (part - 0.5).abs() <= ANOTHER { ": V half a step back is V0 itself" } else { "" };
+    let statement = format!("the start takes {part:.6} of the first step's force from V, at whatever step{of_half}");
+    (part.abs() > ANOTHER && is_one)
+        .then(|| Cause::plain("start-kick", statement, Certainty::Certain, STEPS.len(), STEPS.len()))
 }
 
 /// c1, c2 ... of a step under `V' = -r V`, if a polynomial it is.

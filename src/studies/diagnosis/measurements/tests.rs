@@ -22,6 +22,8 @@ enum Placed {
     WithVelocityOfStart,
     /// At the end of the step.
     AtStepEnd,
+    /// Rest by a part of the step, all else at the end of the step, with the depth that it should have.
+    PassedAtStepEnd,
 }
 
 /// A scheme of four slopes.
@@ -83,6 +85,13 @@ impl Stepping {
                 if self.placed == Placed::AtStepEnd {
                     now = State { velocity: next.velocity.max(0.0), ..next };
                     if next.velocity <= 0.0 || limit == problem.exit_depth {
+                        return now;
+                    }
+                    break;
+                }
+                if self.placed == Placed::PassedAtStepEnd && next.velocity > 0.0 {
+                    now = State { depth: limit, ..next };
+                    if limit == problem.exit_depth {
                         return now;
                     }
                     break;
@@ -355,6 +364,60 @@ fn times_of_shortened_steps_and_flights_of_whole_steps_are_told() {
     let kutta = ([0.5, 0.5, 1.0], [1.0 / 6.0, 2.0 / 3.0, 0.0, 1.0 / 6.0]);
     let at_steps = Stepping { placed: Placed::AtStepEnd, numbers: kutta, ..fixed };
     assert_eq!(first_cause(at_steps), ("exit-late".to_owned(), Certainty::Certain));
+}
+
+#[test]
+fn boundaries_taken_at_the_end_of_a_step_are_told_from_a_scheme_of_order_one() {
+    let passed = Stepping { placed: Placed::PassedAtStepEnd, is_fixed: true, ..RIGHT };
+    assert_eq!(first_cause(passed), ("stage-end-late".to_owned(), Certainty::Likely));
+}
+
+#[test]
+fn a_start_without_its_half_step_is_measured() {
+    let start = |part: f64| {
+        let answer = move |request: &PeerRequest| {
+            let mut problem = request.problem(None);
+            let deceleration = problem.stages[0].force(0.0, problem.impact_speed) / problem.mass;
+            problem.impact_speed -= part * request.dt_s? * deceleration;
+            let flight = Taylor::default().solve(&problem, Detail::End).ok()?;
+            Some(answer(flight.outcome, flight.end))
+        };
+        id_and_statement(measured_of(Answering { is_fixed: true, answer }))
+    };
+    let (id, statement) = start(0.5);
+    assert!(id == "start-kick" && statement.ends_with("V half a step back is V0 itself"), "{statement}");
+    assert!(start(0.1).1.contains("takes 0.100000 of"));
+    assert_eq!(start(0.0).0, "");
+}
+
+#[test]
+fn a_clock_that_goes_on_in_rejected_steps_is_told_from_late_events() {
+    let first = |mut solver: Box<dyn Solver>| diagnose(&mut *solver, Plan::default(), &|_, _| {}).causes.swap_remove(0);
+    // Behind a force that changes, by another part of the time in every flight.
+    let rejected = |problem: &Problem, end: &mut State| {
+        let is_constant = |stage: &Stage| stage.stiffness == 0.0 && stage.viscosity == 0.0 && stage.drag == 0.0;
+        if !problem.stages.iter().all(is_constant) {
+            end.time *= 1.0 + 0.1 * (1e3 * end.time / (1.0 + end.time)).fract();
+        }
+    };
+    let cause = first(Box::new(altered(|_| (), rejected)));
+    assert!(cause.id == "clock" && cause.certainty == Certainty::Likely, "{cause:?}");
+    let late = |_: &Problem, end: &mut State| end.time *= 1.0 + 0.1 * (1e3 * end.time / (1.0 + end.time)).fract();
+    assert_ne!(first(Box::new(altered(|_| (), late))).id, "clock");
+}
+
+#[test]
+fn what_questions_without_an_answer_share_is_told() {
+    let answer = |request: &PeerRequest| {
+        let problem = request.problem(None);
+        let has_gap = problem.stages.iter().any(|stage| *stage == Stage { end: stage.end, ..Stage::free() });
+        let flight = Taylor::default().solve(&problem, Detail::End).ok()?;
+        // At the tightest tolerance alone.
+        (!has_gap || request.rtol > TOLERANCES[2]).then(|| answer(flight.outcome, flight.end))
+    };
+    let found = diagnose(&mut Answering { is_fixed: false, answer }, Plan::default(), &|_, _| {});
+    let first = &found.causes[0];
+    assert!(first.id == "no-answer" && first.statement.ends_with("all of them hold `air-gap`"), "{first:?}");
 }
 
 #[test]
