@@ -337,6 +337,38 @@ fn a_number_that_is_kept_of_a_target_with_another_speed_or_mass_fails() {
     }
 }
 
+/// Of its own numbers, since the table of hypotheses is measured by itself elsewhere.
+#[test]
+fn an_s_of_another_formula_is_named_of_a_reader_of_scenes() {
+    let mut other = Made::new((), |(), request| {
+        let scene = request.scene.as_ref().unwrap();
+        let s = scene.static_factor.unwrap_or_else(|| 82.6 * (scene.strength_pa * 1e-6).powf(-0.544));
+        let thickness = scene.thickness_m.map_or_else(String::new, |h| format!("target.thickness = {h:?}"));
+        let stiffness =
+            scene.crater_stiffness_n_m.map_or_else(String::new, |c| format!("resistance.crater_stiffness = {c:?}"));
+        let text = format!(
+            "projectile.mass = {:?}\nprojectile.diameter = {:?}\nprojectile.nose.factor = {:?}\ntarget.strength = {:?}\n\
+             target.density = {:?}\nresistance.S = {s:?}\nresistance.B = {:?}\nresistance.k = {:?}\n\
+             impact.velocity = {:?}\nperforation.criterion = \"{}\"\n{thickness}\n{stiffness}\n",
+            scene.mass_kg,
+            scene.diameter_m,
+            scene.nose_factor,
+            scene.strength_pa,
+            scene.density_kg_m3,
+            scene.inertia_factor,
+            scene.crater_ratio,
+            scene.velocity_m_s,
+            scene.criterion,
+        );
+        exact(&Scene::from_toml(&text, "asked").unwrap().problem().unwrap())
+    });
+    other.identity.reads_scene = true;
+    let found = other.diagnosed(Plan::default());
+    let first = &found.causes[0];
+    let is_named = first.id == "parameter:S" && first.certainty == Certainty::Certain;
+    assert!(is_named && first.statement.contains("82.6 (fc/MPa)^-0.544"), "{first:?}");
+}
+
 #[test]
 fn a_solver_that_answers_otherwise_each_time_is_told_so() {
     static ASKED: AtomicU32 = AtomicU32::new(1);

@@ -153,8 +153,10 @@ fn start_kick(asking: &mut Asking<'_>) -> Option<Cause> {
     let all: Vec<f64> = lost.into_iter().collect::<Option<_>>()?;
     let part = all[0];
     let is_one = all.iter().all(|lost| (lost - part).abs() <= ANOTHER * part.abs());
-    let of_half = if (part - 0.5).abs() <= ANOTHER { ": V half a step back is V0 itself" } else { "" };
-    let statement = format!("the start takes {part:.6} of the first step's force from V, at whatever step{of_half}");
+    let of_half = if (part - 0.5).abs() <= ANOTHER { ": V0 is taken for V half a step before the impact" } else { "" };
+    let statement = format!(
+        "under a constant deceleration a, V is {part:.6} a h too small from the start on, whatever the step h{of_half}"
+    );
     (part.abs() > ANOTHER && is_one)
         .then(|| Cause::plain("start-kick", statement, Certainty::Certain, STEPS.len(), STEPS.len()))
 }

@@ -385,8 +385,11 @@ fn a_start_without_its_half_step_is_measured() {
         id_and_statement(measured_of(Answering { is_fixed: true, answer }))
     };
     let (id, statement) = start(0.5);
-    assert!(id == "start-kick" && statement.ends_with("V half a step back is V0 itself"), "{statement}");
-    assert!(start(0.1).1.contains("takes 0.100000 of"));
+    assert!(
+        id == "start-kick" && statement.ends_with("V0 is taken for V half a step before the impact"),
+        "{statement}"
+    );
+    assert!(start(0.1).1.contains("V is 0.100000 a h too small"));
     assert_eq!(start(0.0).0, "");
 }
 
