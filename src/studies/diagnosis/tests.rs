@@ -282,6 +282,17 @@ fn a_tolerance_that_is_kept_to_a_floor_alone_is_sound_and_told() {
 }
 
 #[test]
+fn errors_of_many_tolerances_that_fall_with_them_are_no_floor() {
+    let coarse = Made::new((), |(), request| {
+        let mut flight = exact(&request.problem(None))?;
+        flight.end.time *= 1.0 + 100.0 * request.rtol;
+        Ok(flight)
+    });
+    let found = coarse.diagnosed(Plan { asks_edges: false, ..Plan::default() });
+    assert!(found.verdict == Verdict::Passed && found.causes.is_empty(), "{:?}", found.causes);
+}
+
+#[test]
 fn an_error_at_the_loose_tolerances_alone_fails() {
     let loose = Made::new((), |(), request| {
         let mut problem = request.problem(None);

@@ -391,6 +391,16 @@ fn a_start_without_its_half_step_is_measured() {
     );
     assert!(start(0.1).1.contains("V is 0.100000 a h too small"));
     assert_eq!(start(0.0).0, "");
+    // A velocity that is reported so is none of the flight: its time is right.
+    let answer = |request: &PeerRequest| {
+        let problem = request.problem(None);
+        let deceleration = problem.stages[0].force(0.0, problem.impact_speed) / problem.mass;
+        let flight = Taylor::default().solve(&problem, Detail::End).ok()?;
+        let start = problem.impact_speed - 0.5 * request.dt_s? * deceleration;
+        let velocity = (start * start - 2.0 * deceleration * flight.end.depth).max(0.0).sqrt();
+        Some(answer(flight.outcome, State { velocity, ..flight.end }))
+    };
+    assert_eq!(measured_of(Answering { is_fixed: true, answer }), None);
 }
 
 #[test]
