@@ -584,10 +584,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         // Behind a drive the bound may go beyond all numbers before the velocity does.
         let is_bounded = course.error_bound < f64::INFINITY;
         let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
-        if is_lost && self.law.force_value(x, 0.0) != 0.0 {
+        // What drives it, however uncertain its speed, brings it to no rest.
+        if is_lost && resists {
             // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
             let present = State { velocity: S::zero(), ..course.state };
-            return Some(StageEnd::Rest(if resists && is_before { rest } else { present }));
+            return Some(StageEnd::Rest(if is_before { rest } else { present }));
         }
         if resists {
             let change = (at_rest / force.value() - 1.0).abs().max(0.01);

@@ -180,12 +180,14 @@ impl PeerAnswer {
     pub fn flight(&self, problem: &Problem) -> Flight {
         // A peer does not know which stage is the crater: its `stage-end` there is the same event as `crater-end`, and its
         // `crater-end` may be that of the first stage, whatever that is.
-        let is_listed = |stage| self.events.iter().any(|event| event.kind == EventKind::StageEnd(stage));
-        let crater = problem.crater.filter(|crater| !is_listed(*crater)).unwrap_or(0);
+        let crater = |depth: f64| {
+            let distance = |stage: &usize| (problem.stages[*stage].end - depth).abs();
+            problem.crater.into_iter().chain([0]).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+        };
         let event = |event: &Event| {
             let kind = match event.kind {
                 EventKind::StageEnd(index) => EventKind::boundary(problem, index),
-                EventKind::CraterEnd => EventKind::boundary(problem, crater),
+                EventKind::CraterEnd => EventKind::boundary(problem, crater(event.state.depth)),
                 kind => kind,
             };
             Event { kind, ..*event }
@@ -374,6 +376,19 @@ mod tests {
         let as_listed = of(&format!("[{as_stage_end}, {rest}]")).flight(&layered);
         assert_eq!(named.left_out(&as_listed, &layered), None);
         assert_eq!(named.flight(&layered).events, as_listed.events);
+        // Also where the crater is a later stage, whether the flight gets there or not.
+        let thin = Stage { end: 0.04, ..problem().stages[0] };
+        let stages = [thin, problem().stages[0], problem().stages[1]].into_iter().collect();
+        let behind = Problem { stages, crater: Some(1), ..problem() };
+        let first = crater_end.replace("0.1", "0.04");
+        let kinds = |events: &str| of(events).flight(&behind).events.iter().map(|event| event.kind).collect::<Vec<_>>();
+        assert_eq!(kinds(&format!("[{first}, {rest}]")), [EventKind::StageEnd(0), EventKind::Rest]);
+        assert_eq!(kinds(&format!("[{crater_end}, {rest}]")), [EventKind::CraterEnd, EventKind::Rest]);
+        let second = as_stage_end.replace("\"stage\": 0", "\"stage\": 1");
+        assert_eq!(
+            kinds(&format!("[{first}, {second}, {rest}]")),
+            [EventKind::StageEnd(0), EventKind::CraterEnd, EventKind::Rest]
+        );
     }
 
     #[test]

@@ -518,6 +518,23 @@ fn a_flight_goes_on_to_its_rest_though_its_error_bound_outgrows_its_energy() {
     }
 }
 
+/// Behind a stage in which its error bound outgrew its energy: `-R (1 + V/v1)` drives from rest to V over `M v1²/R (u - ln(1 + u))`,
+/// u = V/v1, and 3 MN stop it.
+#[test]
+fn a_slow_flight_that_is_driven_comes_to_no_rest() {
+    let text = "projectile.mass = 2\nimpact.velocity = 3000\n[parameters]\nP = '8e17 N'\nR = '10 kN'\nv1 = '100 m/s'\n\
+                [[stage]]\nforce = 'P*exp(-V/v1)'\nend_velocity = 0.0003\n[[stage]]\nforce = '-R*(1 + V/v1)'\nend = 20\n\
+                [[stage]]\nstatic_force = 3e6\n";
+    let problem = Scene::from_toml(text, "driven").unwrap().problem().unwrap();
+    for method in exact_methods() {
+        let flight = method.solve(&problem, Detail::Events).unwrap();
+        let from = flight.events[0].state.depth;
+        let u = (3e6 * (flight.end.depth - 20.0)).sqrt() / 100.0;
+        let driven = 2.0 * (u - u.ln_1p());
+        assert!((driven / (20.0 - from) - 1.0).abs() < 1e-12, "{}: {}", method.name(), flight.end);
+    }
+}
+
 /// A stage of coefficients in front of a law and one behind it, against the series over time in double-double.
 #[test]
 fn stages_of_coefficients_stand_among_laws() {
