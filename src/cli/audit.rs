@@ -130,8 +130,15 @@ fn text(file: &str, judged: &Audit) -> String {
         quantity_text(&mut text, q);
     }
     text.gap();
-    for finding in judged.findings.iter().filter(|finding| finding.quantity.is_none()) {
-        text.wrapped("  note: ", &escape_terminal(&finding.message));
+    for finding in &judged.findings {
+        match &finding.quantity {
+            None => text.wrapped("  note: ", &escape_terminal(&finding.message)),
+            // A column that is left out has no part of its own.
+            Some(column) if judged.quantities.iter().all(|q| q.quantity != *column) => {
+                text.wrapped("  note: ", &escape_terminal(&format!("{}: {}", column.name(), finding.message)));
+            }
+            Some(_) => {}
+        }
     }
     if let Some(scheme) = &judged.scheme {
         text.wrapped("  scheme     ", &scheme.sentence());

@@ -188,7 +188,10 @@ fn part(text: &str) -> Result<Part, String> {
 
 fn summary(tally: &Tally, part: Option<Part>) -> String {
     if let (0, Some(Part { index, of })) = (tally.rows, part) {
-        return format!("0 rows: part {index} of {of} is empty, for there are fewer scenes than parts");
+        return format!(
+            "0 rows: part {index} of {of} is empty: a part of CSV has whole lines, and one of random scenes or Parquet whole \
+             blocks of {PART} rows"
+        );
     }
     if tally.rows == 0 {
         return "0 rows: the table has a first line with names and no scene below it".to_owned();

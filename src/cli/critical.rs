@@ -211,7 +211,7 @@ impl Ask for CriticalArgs {
         for warning in scene.exit_depth_warning().into_iter().chain(warnings) {
             say("warning: ", &warning);
         }
-        let is_zero = exact == Some(0.0) || shown == 0.0;
+        let is_zero = exact == Some(0.0) || (found.is_some() && shown == 0.0);
         let uncertainty = match spreads.as_slice() {
             [_, ..] if !is_zero && found.is_some() => {
                 let samples = self.samples.unwrap_or(if scene.plug.is_some() { SAMPLES_OF_PLUG } else { SAMPLES });

@@ -17,7 +17,7 @@ use super::diagnostic::{
 };
 use super::input;
 use crate::physics::decimals::Written;
-use crate::physics::expression::{ExpressionError, Known, RESERVED, Tape, Unit, is_name};
+use crate::physics::expression::{ExpressionError, Known, Tape, Unit, is_name, is_reserved};
 use crate::physics::law::{Name, OwnParameter};
 use crate::physics::nose::NoseShape;
 use crate::physics::parameter::{Absence, LayerNumber, Parameter, StageNumber};
@@ -773,7 +773,7 @@ impl<'t> Reader<'t> {
         let mut given = Vec::new();
         for (key, number) in table.get_ref().as_table().into_iter().flatten() {
             let name = key.get_ref();
-            let (Some(name), false) = (Name::new(name), RESERVED.contains(&&**name)) else {
+            let (Some(name), false) = (Name::new(name), is_reserved(name)) else {
                 let allowed = "a letter, then letters, digits and _, and none of x, V, pi, e or a function";
                 let message = format!("no parameter can have the name {}", quoted(name));
                 return Err(Fault::new(key.span(), message, allowed, "give it another name"));

@@ -581,9 +581,10 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let resists = at_rest > 0.0 && force.value() > 0.0;
         let is_before = rest.depth.value() < limit.value();
         let to_rest = 0.5 * self.mass.value() * v * v / force.value().abs();
-        // Behind a drive the bound may go beyond all numbers before the velocity does.
-        let is_bounded = course.error_bound < f64::INFINITY;
-        let is_lost = is_bounded && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
+        // Behind a drive the bound may go beyond all numbers before the velocity does. Without a far side no margin says what is
+        // undecided: the flight goes on, to its rest or for ever.
+        let has_margin = course.problem.has_exit() && course.error_bound < f64::INFINITY;
+        let is_lost = has_margin && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
         // What drives it, however uncertain its speed, brings it to no rest.
         if is_lost && resists {
             // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
@@ -591,7 +592,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Some(StageEnd::Rest(if is_before { rest } else { present }));
         }
         if resists {
-            let change = (at_rest / force.value() - 1.0).abs().max(0.01);
+            // A force without bound at rest ends it before the present one would.
+            let rises = (at_rest / force.value() - 1.0).abs().max(0.01);
+            let change = if at_rest == f64::INFINITY { 1.0 } else { rises };
             let is_over = (rest.depth.value() - x) * change <= 0.25 * f64::EPSILON * x
                 && (rest.time - time).value() * change <= f64::EPSILON * time.value();
             return (is_over && is_before).then_some(StageEnd::Rest(rest));

@@ -46,8 +46,13 @@ pub const LENGTH_MAX: usize = 4096;
 /// Most brackets, signs and exponents that may be open at one place.
 pub const NESTING_MAX: usize = 64;
 
-/// Names that every expression knows, and no quantity may have.
+/// Names that every expression knows, and no quantity may have; nor that of a function.
 pub const RESERVED: [&str; 4] = ["x", "V", "pi", "e"];
+
+/// Whether `name` stands for something in every expression, so that no quantity may have it.
+pub fn is_reserved(name: &str) -> bool {
+    RESERVED.contains(&name) || parse::is_function(name)
+}
 
 /// A quantity that expressions use by name.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -24,7 +24,7 @@ use strum::IntoEnumIterator;
 
 pub use self::causes::{Cause, Certainty};
 #[cfg(feature = "report")]
-pub(crate) use self::faulty::{misnamed, misnamed_schemes};
+pub(crate) use self::faulty::{misnamed, misnamed_schemes, mistold};
 use self::fixed_steps::in_fixed_steps;
 #[cfg(feature = "report")]
 pub(crate) use self::hypotheses::changed_by_nothing;

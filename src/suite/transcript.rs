@@ -34,7 +34,7 @@ macro_rules! recorded {
 pub const TRANSCRIPTS: &[(&str, &str)] = recorded![
     "solve", "methods", "paths", "critical", "sweep", "numbers", "batch", "converge", "audit", "studies", "bench",
     "report", "suites", "peers", "spelled", "refused", "places", "paper", "options", "unusual", "misread", "laws",
-    "rare",
+    "branches", "mistakes", "rare",
 ];
 
 /// Runs of the program, and what they said.

@@ -518,6 +518,33 @@ fn a_flight_goes_on_to_its_rest_though_its_error_bound_outgrows_its_energy() {
     }
 }
 
+/// `V² = exp(-2 Q x/M) (V0² - D (1 - exp(-c x)))`, `c = 1/a - 2 Q/M`, `D = 2 P/(M c)`, under `P exp(-x/a) + Q V²`: with D < V0² it is
+/// only slowed.
+#[test]
+fn a_flight_that_is_slowed_for_ever_comes_to_no_rest_however_slow() {
+    let text = "projectile.mass = 2\nimpact.velocity = 33\n[parameters]\nP = '2 kN'\na = '70 mm'\nQ = '4 kg/m'\n\
+                [[stage]]\nforce = 'P*exp(-x/a) + Q*V^2'\n";
+    let problem = Scene::from_toml(text, "slowed").unwrap().problem().unwrap();
+    for method in exact_methods() {
+        let found = method.solve(&problem, Detail::Events);
+        assert!(matches!(found, Err(IntegrationError::NeverEnds { .. })), "{}: {found:?}", method.name());
+    }
+}
+
+/// `P (V/v1)^-n` stops it at `M v1²/(P (2 + n)) (V0/v1)^(2 + n)`.
+#[test]
+fn a_force_without_bound_at_rest_brings_it_to_rest() {
+    for n in [0.3, 0.5, 1.5] {
+        for method in exact_methods() {
+            let problem = problem(&format!("P*(V/v1)^-{n}"), 100.0);
+            let p = problem.force(0, 0.0, 100.0);
+            let exact = problem.mass * 1e4 / (p * (2.0 + n));
+            let depth = method.solve(&problem, Detail::End).unwrap().end.depth;
+            assert!((depth / exact - 1.0).abs() <= 1e-13, "{}, n = {n}: {depth} and {exact}", method.name());
+        }
+    }
+}
+
 /// Behind a stage in which its error bound outgrew its energy: `-R (1 + V/v1)` drives from rest to V over `M v1²/R (u - ln(1 + u))`,
 /// u = V/v1, and 3 MN stop it.
 #[test]

@@ -116,6 +116,11 @@ const FUNCTIONS: [(&str, Callee); 11] = [
     ("max", Callee::Two(Binary::Max)),
 ];
 
+/// Whether `name` is that of a function.
+pub(super) fn is_function(name: &str) -> bool {
+    FUNCTIONS.iter().any(|(function, _)| *function == name)
+}
+
 impl Function {
     pub(super) fn name(self) -> &'static str {
         let is_it = |callee: Callee| matches!(callee, Callee::One(function) if function == self);
@@ -335,7 +340,7 @@ fn name(input: &mut Input<'_>) -> Result<usize, Fault> {
 fn unknown_name(known: &[Known<'_>], name: &str, span: Range<usize>) -> Fault {
     /// Longest list of names in one line (bytes).
     const KNOWN_MAX: usize = 160;
-    if FUNCTIONS.iter().any(|(function, _)| *function == name) {
+    if is_function(name) {
         let help = format!("write `{name}(...)`");
         return cut(span, format!("the function {} has no brackets", quoted(name)), "brackets behind it", help);
     }

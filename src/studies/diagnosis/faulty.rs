@@ -1,7 +1,13 @@
 //! Solvers that are wrong on purpose: does a diagnosis say of each what is wrong with it?
 
+mod stepping;
+mod told;
+
 use rayon::prelude::*;
 
+pub(crate) use self::told::mistold;
+#[cfg(test)]
+pub(super) use self::told::{Answering, altered, exact};
 use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
 use super::questions::{Question, questions};
 use super::{Cause, Certainty, Diagnosis, Plan, Solver, Verdict, by_questions, diagnose};

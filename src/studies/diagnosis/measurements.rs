@@ -338,7 +338,3 @@ fn absolute_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
     (falls && smallest >= FALLS_IN_ALL * largest)
         .then(|| Cause::plain("absolute-tolerance", statement, Certainty::Likely, asked, asked))
 }
-
-#[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-mod tests;

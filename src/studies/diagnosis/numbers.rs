@@ -3,6 +3,7 @@
 use super::QUANTITIES;
 use super::causes::{Cause, Certainty};
 use crate::physics::State;
+use crate::text::count;
 
 /// Digits up to which an answer has few.
 const FEW_DIGITS: usize = 9;
@@ -35,9 +36,9 @@ pub(super) fn of_numbers(kind: &str, numbers: &[f64], failed: usize) -> Option<C
     let most = all.iter().map(|(significant, _)| *significant).max().unwrap_or(0);
     let decimals = all.iter().map(|(_, decimals)| *decimals).max().unwrap_or(0);
     let statement = if most <= FEW_DIGITS {
-        format!("every {kind} is printed with at most {most} digits: print 17")
+        format!("every {kind} is printed with at most {}: print 17", count(most, "digit"))
     } else if decimals <= FEW_DECIMALS {
-        format!("every {kind} is printed with at most {decimals} decimals: print 17 digits")
+        format!("every {kind} is printed with at most {}: print 17 digits", count(decimals, "decimal"))
     } else {
         return None;
     };

@@ -167,7 +167,7 @@ every_check! {
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion
     Order Proportionality WorkOrder SelfConvergence GridConvergence Manufactured
     DiscreteSolution Clock CraterConstant CraterBand LaggedConstant StabilityLimit StabilityMap RoundingFloor
-    EnergyBalance TimeReversal Similarity Split JoinedMasses GeneratedLaws Ranges Neutral NamedFaults NamedSchemes
+    EnergyBalance TimeReversal Similarity Split JoinedMasses GeneratedLaws Ranges Neutral NamedFaults NamedSchemes ToldSolvers
     Sweep BoundOfData GapFalls ThicknessLimit Intervals HiddenIntervals Map MeasuredDepth Sensitivities Peer
     GrazingLadder Scan BothCrossings ExactlyCritical TripleCoincidence ThinTargets StageEnds ScaledForces Plateau AtAStepEnd SmallTimesAndFarStarts VanishingSpeed LawsOutsideTheirRange
     ForceJump BackAgain AcrossTheCraterEnd ApproachedForEver MarginOfAStop

@@ -35,6 +35,11 @@ check! {
         /// How many questions.
         questions: usize,
     } in CrossCode, "schemes", by named_schemes, compares nothing;
+    /// Solvers with faults that no hypothesis computes, and right ones: those that are told anything but what stands beside them.
+    ToldSolvers {
+        /// Those are tried that are asked at most so many questions.
+        questions: usize,
+    } in CrossCode, "solvers", by told_solvers, compares nothing;
 }
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
@@ -234,6 +239,11 @@ fn named_faults(&NamedFaults { questions, each }: &NamedFaults, _: &Subject<'_>)
 #[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
 fn named_schemes(&NamedSchemes { questions }: &NamedSchemes, _: &Subject<'_>) -> Found {
     Ok(misnamed(diagnosis::misnamed_schemes(SEED, questions)))
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "every check has one signature")]
+fn told_solvers(&ToldSolvers { questions }: &ToldSolvers, _: &Subject<'_>) -> Found {
+    Ok(misnamed(diagnosis::mistold(questions)))
 }
 
 /// Of the questions whether faults are named: with others, a few faults show in no answer, or as another fault would.

@@ -1,0 +1,156 @@
+//! A scheme of Runge and Kutta with four slopes, and what people get wrong in one.
+
+use crate::physics::{Problem, Stage, State};
+
+/// How an event within a step is placed.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Placed {
+    /// By a part of the step.
+    ByPart,
+    /// On the chord of the step.
+    OnChord,
+    /// At the end of the step.
+    AtStepEnd,
+    /// At the end of the step, with the depth of the boundary.
+    AtStepEndByDepth,
+}
+
+/// A scheme.
+#[derive(Clone, Copy)]
+pub(super) struct Stepping {
+    /// Parts of the step at which slopes two to four are taken, and the weights of all.
+    pub numbers: ([f64; 3], [f64; 4]),
+    pub exit: Placed,
+    pub rest: Placed,
+    pub stage_end: Placed,
+    /// Velocity at an exit, from those at the start of the step, at the exit and at the end of the step.
+    pub exit_speed: fn([f64; 3]) -> f64,
+    /// Steps of a flight without `dt_s`, from tolerance and impact speed.
+    pub steps: fn(f64, f64) -> f64,
+    /// The step that is taken for the one asked for.
+    pub step: fn(f64) -> f64,
+    /// Time that a shortened step takes, from its length and that of a whole one.
+    pub clock: fn(f64, f64) -> f64,
+    /// Part of the force of the stage before in the first slope behind its end.
+    pub stale: f64,
+    /// Parts by which depth and velocity in the force stay behind, at those of the start of the step.
+    pub lag: [f64; 2],
+    /// Steps by which V0 is taken for an earlier velocity.
+    pub kick: f64,
+    /// Whether it takes `dt_s`.
+    pub is_fixed: bool,
+}
+
+/// The slopes and weights of the classical scheme.
+pub(super) const CLASSICAL: ([f64; 3], [f64; 4]) = ([0.5, 0.5, 1.0], [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]);
+
+/// The classical scheme, right.
+pub(super) const RIGHT: Stepping = Stepping {
+    numbers: CLASSICAL,
+    exit: Placed::ByPart,
+    rest: Placed::ByPart,
+    stage_end: Placed::ByPart,
+    exit_speed: |[_, here, _]| here,
+    steps: |_, _| 200.0,
+    step: |step| step,
+    clock: |part, _| part,
+    stale: 0.0,
+    lag: [0.0; 2],
+    kick: 0.0,
+    is_fixed: false,
+};
+
+/// Halvings of a step, in which an event is located.
+const HALVINGS: usize = 100;
+/// Steps of a flight at most.
+const STEPS_MAX: usize = 1_000_000;
+
+impl Stepping {
+    /// The end of the flight through `problem` by steps of `step` (s); `None` where it takes too many.
+    pub(super) fn end(self, problem: &Problem, step: f64) -> Option<State> {
+        let step = (self.step)(step);
+        let mut now = State::at_impact(problem);
+        now.velocity -= self.kick * step * problem.stages[0].force(0.0, now.velocity) / problem.mass;
+        let mut before: Option<Stage> = None;
+        let mut steps = 0;
+        for law in &problem.stages {
+            let limit = law.end.min(problem.exit_depth);
+            let mut left_over = before.take();
+            loop {
+                steps += 1;
+                if steps > STEPS_MAX {
+                    return None;
+                }
+                let ahead = |part: f64| self.ahead(law, left_over, problem.mass, now, part);
+                let next = ahead(step);
+                if next.depth < limit && next.velocity > 0.0 {
+                    (now, left_over) = (next, None);
+                    continue;
+                }
+                let first = |is_past: &dyn Fn(State) -> bool| {
+                    let (mut low, mut high) = (0.0, step);
+                    for _ in 0..HALVINGS {
+                        let middle = 0.5 * (low + high);
+                        if is_past(ahead(middle)) { high = middle } else { low = middle }
+                    }
+                    ahead(high)
+                };
+                let rests = next.velocity <= 0.0 && first(&|state| state.velocity <= 0.0).depth < limit;
+                let is_exit = !rests && limit == problem.exit_depth;
+                let placed = if rests {
+                    self.rest
+                } else if is_exit {
+                    self.exit
+                } else {
+                    self.stage_end
+                };
+                let end = match placed {
+                    Placed::ByPart if rests => first(&|state| state.velocity <= 0.0),
+                    Placed::ByPart => first(&|state| state.depth >= limit),
+                    Placed::OnChord if rests => on_chord(now, next, |state| -state.velocity, 0.0),
+                    Placed::OnChord => on_chord(now, next, |state| state.depth, limit),
+                    Placed::AtStepEnd | Placed::AtStepEndByDepth => next,
+                };
+                let velocity =
+                    if is_exit { (self.exit_speed)([now.velocity, end.velocity, next.velocity]) } else { end.velocity };
+                now = State {
+                    time: now.time + (self.clock)(end.time - now.time, step),
+                    depth: if rests || placed == Placed::AtStepEnd { end.depth } else { limit },
+                    velocity: if rests { 0.0 } else { velocity.max(0.0) },
+                };
+                if rests || is_exit || now.velocity == 0.0 {
+                    return Some(now);
+                }
+                before = Some(*law);
+                break;
+            }
+        }
+        Some(now)
+    }
+
+    /// The state a time `h` behind `now` (s).
+    fn ahead(self, law: &Stage, left_over: Option<Stage>, mass: f64, now: State, h: f64) -> State {
+        let ([a2, a3, a4], [b1, b2, b3, b4]) = self.numbers;
+        let (x, v) = (now.depth, now.velocity);
+        let a = |dx: f64, dv: f64| -law.force(x + (1.0 - self.lag[0]) * dx, v + (1.0 - self.lag[1]) * dv) / mass;
+        let of_before = left_over.map_or(0.0, |law| -law.force(x, v) / mass - a(0.0, 0.0));
+        let k1 = [v, a(0.0, 0.0) + self.stale * of_before];
+        let behind = |part: f64, [dx, dv]: [f64; 2]| [v + part * h * dv, a(part * h * dx, part * h * dv)];
+        let k2 = behind(a2, k1);
+        let k3 = behind(a3, k2);
+        let k4 = behind(a4, k3);
+        let sum = |i: usize| h * (b1 * k1[i] + b2 * k2[i] + b3 * k3[i] + b4 * k4[i]);
+        State { time: now.time + h, depth: x + sum(0), velocity: v + sum(1) }
+    }
+}
+
+/// The state between `from` and `to` at which `of` reaches `limit`, on a straight line.
+fn on_chord(from: State, to: State, of: fn(State) -> f64, limit: f64) -> State {
+    let part = (limit - of(from)) / (of(to) - of(from));
+    let between = |from: f64, to: f64| from + part * (to - from);
+    State {
+        time: between(from.time, to.time),
+        depth: between(from.depth, to.depth),
+        velocity: between(from.velocity, to.velocity),
+    }
+}

@@ -1,0 +1,924 @@
+//! Solvers with faults that no hypothesis computes, and right ones: what is each told?
+//!
+//! What is told is written out, and stands beside each. A wrong number in it is a wrong answer to a person.
+
+use std::cell::Cell;
+
+use rayon::prelude::*;
+
+use super::super::simulation::{Place, Rules, simulate};
+use super::super::{
+    Asking, Cause, Counts, Diagnosis, Plan, QuantityOrder, Solver, Subject, Verdict, diagnose, measured,
+};
+use super::stepping::{CLASSICAL, Placed, RIGHT, Stepping};
+use super::{answer, failure};
+use crate::exchange::peers::{ORDER_OF_ALL, PeerAnswer, PeerFailure, PeerIdentity, PeerRequest};
+use crate::integrators::{Boundaries, CentralDifference, Detail, Flight, Integrator, Taylor, VelocityAt};
+use crate::physics::{Event, EventKind, Outcome, Problem, Scene, Stage, State};
+use crate::studies::order::Class;
+
+/// What gives an answer to a question, or none.
+type Answers = Box<dyn FnMut(&PeerRequest) -> Option<PeerAnswer>>;
+
+/// A solver made of what it answers, which it begins anew when it is started again.
+pub(in super::super) struct Answering {
+    pub identity: PeerIdentity,
+    start: Box<dyn Fn() -> Answers>,
+    answers: Answers,
+}
+
+impl Answering {
+    pub(in super::super) fn new<F: FnMut(&PeerRequest) -> Option<PeerAnswer> + 'static>(
+        start: impl Fn() -> F + 'static,
+    ) -> Self {
+        let start = move || -> Answers { Box::new(start()) };
+        Self {
+            identity: PeerIdentity { name: "made".to_owned(), ..PeerIdentity::default() },
+            answers: start(),
+            start: Box::new(start),
+        }
+    }
+
+    /// One that keeps nothing.
+    pub(in super::super) fn plain(answers: impl Fn(&PeerRequest) -> Option<PeerAnswer> + Clone + 'static) -> Self {
+        Self::new(move || answers.clone())
+    }
+
+    pub(in super::super) fn in_fixed_steps(mut self) -> Self {
+        self.identity.fixed_step = true;
+        self
+    }
+
+    /// One that claims the order `order` of every quantity.
+    fn claiming(mut self, order: f64) -> Self {
+        self.identity.claimed_orders.insert(ORDER_OF_ALL.to_owned(), order);
+        self
+    }
+
+    pub(in super::super) fn of_scenes(mut self) -> Self {
+        self.identity.reads_scene = true;
+        self
+    }
+}
+
+impl Solver for Answering {
+    fn identity(&self) -> PeerIdentity {
+        self.identity.clone()
+    }
+
+    fn command(&self) -> String {
+        "made".to_owned()
+    }
+
+    fn ask(&mut self, request: &PeerRequest) -> Result<PeerAnswer, PeerFailure> {
+        (self.answers)(request).ok_or_else(|| failure("it never ends"))
+    }
+
+    fn restart(&mut self) -> bool {
+        self.answers = (self.start)();
+        true
+    }
+}
+
+/// The exact flight through `problem`.
+pub(in super::super) fn exact(problem: &Problem) -> Option<Flight> {
+    Taylor::default().solve(problem, Detail::Events).ok()
+}
+
+/// A solver that is right but for what is done to the problem and to the end.
+pub(in super::super) fn altered(read: fn(&mut Problem), report: fn(&Problem, &mut State)) -> Answering {
+    by_request(move |_, problem| read(problem), move |_, problem, end| report(problem, end))
+}
+
+/// The same of one to which the question matters too.
+fn by_request(
+    read: impl Fn(&PeerRequest, &mut Problem) + Clone + 'static,
+    report: impl Fn(&PeerRequest, &Problem, &mut State) + Clone + 'static,
+) -> Answering {
+    Answering::plain(move |request| {
+        let mut problem = request.problem(None);
+        read(request, &mut problem);
+        let flight = exact(&problem)?;
+        let mut end = flight.end;
+        report(request, &problem, &mut end);
+        Some(answer(flight.outcome, end))
+    })
+}
+
+/// A solver that is exact by other `rules`, and does `report` to the end of a flight that stops.
+fn by_rules(rules: Rules, report: fn(&mut State)) -> Answering {
+    Answering::plain(move |request| {
+        let problem = request.problem(None);
+        let mut end = simulate(&problem, rules)?.end;
+        if problem.has_exit() && end.depth >= problem.exit_depth {
+            return Some(answer(Outcome::Perforated, end));
+        }
+        report(&mut end);
+        Some(answer(Outcome::Stopped, end))
+    })
+}
+
+/// A solver that is exact for another force.
+fn of_force(force: fn(&Place<'_>, f64) -> f64) -> Answering {
+    by_rules(Rules { force: (force, 1.0), ..Rules::default() }, |_| ())
+}
+
+/// The force with `factor` times the drag.
+fn with_drag(place: &Place<'_>, factor: f64) -> f64 {
+    let &Place { law, depth, velocity, .. } = place;
+    law.force(depth, velocity) + (factor - 1.0) * law.drag * velocity * velocity
+}
+
+/// A solver that lists events too, and does `report` to the answer.
+fn listing(report: fn(&Problem, &mut PeerAnswer)) -> Answering {
+    Answering::plain(move |request| {
+        let problem = request.problem(None);
+        let flight = exact(&problem)?;
+        let mut said = answer(flight.outcome, flight.end);
+        said.events = flight.events.iter().copied().collect();
+        report(&problem, &mut said);
+        Some(said)
+    })
+}
+
+impl Stepping {
+    fn solver(self) -> Answering {
+        let solver = Answering::plain(move |request| {
+            let problem = request.problem(None);
+            let flight = exact(&problem)?;
+            // One step for all exits that are asked with one absolute tolerance.
+            let duration = request.atol[0] / (request.rtol * problem.impact_speed);
+            let steps = (self.steps)(request.rtol, problem.impact_speed) + 0.37;
+            let step = request.dt_s.unwrap_or(duration / steps);
+            Some(answer(flight.outcome, self.end(&problem, step)?))
+        });
+        if self.is_fixed { solver.in_fixed_steps() } else { solver }
+    }
+}
+
+/// Central difference, with something done to each answer.
+fn central(report: fn(f64, &Problem, &mut Flight)) -> Answering {
+    let solver = Answering::plain(move |request| {
+        let (problem, step) = (request.problem(None), request.dt_s?);
+        let scheme = CentralDifference::uniform(step, VelocityAt::PredictedHalfStep, Boundaries::Landed);
+        let mut flight = scheme.solve(&problem, Detail::End).ok()?;
+        report(step, &problem, &mut flight);
+        Some(answer(flight.outcome, flight.end))
+    });
+    solver.in_fixed_steps()
+}
+
+/// How a solver is asked.
+#[derive(Clone, Copy)]
+enum Asked {
+    /// By questions that measure it alone.
+    Measured,
+    /// The same, of one that claims this order.
+    Claiming(f64),
+    /// By so many questions.
+    Questions(usize),
+    /// By so many, and those at their edges.
+    AtEdges(usize),
+}
+
+impl Asked {
+    fn questions(self) -> usize {
+        match self {
+            Measured | Claiming(_) => 0,
+            Questions(count) | AtEdges(count) => count,
+        }
+    }
+}
+
+use Asked::{AtEdges, Claiming, Measured, Questions};
+
+/// A solver, and what it is told.
+struct Told {
+    /// What is wrong with it.
+    what: &'static str,
+    solver: fn() -> Answering,
+    asked: Asked,
+    /// The first cause in words, the verdict before it where all of a diagnosis was asked for.
+    says: &'static str,
+}
+
+/// How many solvers are tried, those that are asked at most `questions`, and which are told anything but what stands beside them.
+pub(crate) fn mistold(questions: usize) -> (usize, Vec<String>) {
+    let tried: Vec<&Told> = TOLD.iter().filter(|told| told.asked.questions() <= questions).collect();
+    let wrong = tried.par_iter().filter_map(|Told { what, solver, asked, says }| {
+        let said = said(solver(), *asked);
+        (said != *says).then(|| format!("{what}: \"{said}\" in place of \"{says}\""))
+    });
+    (tried.len(), wrong.collect())
+}
+
+/// What `solver` is told.
+fn said(mut solver: Answering, asked: Asked) -> String {
+    let words = |cause: Option<&Cause>| {
+        cause.map_or_else(String::new, |Cause { id, factor, certainty, statement, .. }| {
+            let factor = factor.map_or_else(String::new, |factor| format!(", {factor:.6}"));
+            format!("{id}, {certainty:?}{factor}: {statement}").to_lowercase()
+        })
+    };
+    let diagnosed = |mut solver: Answering, questions, asks_edges| {
+        let found = diagnose(&mut solver, Plan { seed: 1, questions, asks_edges }, &|_, _| {});
+        format!("{} | {}", found.verdict.name(), words(found.causes.first()))
+    };
+    match asked {
+        Measured => words(measured_of(&mut solver, None).as_ref()),
+        Claiming(order) => words(measured_of(&mut solver, Some(order)).as_ref()),
+        Questions(count) => diagnosed(solver, count, false),
+        AtEdges(count) => diagnosed(solver, count, true),
+    }
+}
+
+/// What is measured of `solver`, of which nothing is known but the order that it claims.
+pub(in super::super) fn measured_of(solver: &mut Answering, formal_order: Option<f64>) -> Option<Cause> {
+    let PeerIdentity { name, version, method, fixed_step, .. } = solver.identity();
+    let peer = Subject { name, version, method, command: String::new(), fixed_step, reads: "stages" };
+    let order = QuantityOrder {
+        quantity: "depth",
+        formal_order,
+        observed_order: None,
+        interval: None,
+        class: Class::AtFloor,
+        verdict: Verdict::Skipped,
+    };
+    let found = Diagnosis {
+        verdict: Verdict::Failed,
+        peer,
+        counts: Counts::default(),
+        causes: Vec::new(),
+        scheme: None,
+        orders: vec![order],
+        separation: None,
+        questions: Vec::new(),
+    };
+    measured(&mut Asking::new(solver), &[], &found)
+}
+
+const FIXED: Stepping = Stepping { is_fixed: true, ..RIGHT };
+/// Kutta's scheme of order three.
+const KUTTA: Stepping = Stepping { numbers: ([0.5, 0.5, 1.0], [1.0 / 6.0, 2.0 / 3.0, 0.0, 1.0 / 6.0]), ..FIXED };
+const HEUN: ([f64; 3], [f64; 4]) = ([1.0, 1.0, 1.0], [0.5, 0.5, 0.0, 0.0]);
+
+fn with_weights(weights: [f64; 4]) -> Stepping {
+    Stepping { numbers: (CLASSICAL.0, weights), ..RIGHT }
+}
+
+/// A time that is late by another part in every flight.
+fn delay(end: &mut State) {
+    end.time *= 1.0 + 0.1 * (1e3 * end.time / (1.0 + end.time)).fract();
+}
+
+/// Whether nothing but constant forces acts.
+fn is_steady(problem: &Problem) -> bool {
+    problem.stages.iter().all(|stage| stage.stiffness == 0.0 && stage.viscosity == 0.0 && stage.drag == 0.0)
+}
+
+/// V0 taken for the velocity `part` of a step before the impact.
+fn started(part: f64) -> Answering {
+    let read = move |request: &PeerRequest, problem: &mut Problem| {
+        let deceleration = problem.stages[0].force(0.0, problem.impact_speed) / problem.mass;
+        problem.impact_speed -= part * request.dt_s.unwrap_or(0.0) * deceleration;
+    };
+    by_request(read, |_, _, _| ()).in_fixed_steps()
+}
+
+/// A reader of scenes whose S, where none is given, follows another formula.
+fn with_s(factor: f64, exponent: f64) -> Answering {
+    let answers = move |request: &PeerRequest| {
+        let scene = request.scene.as_ref()?;
+        let s = scene.static_factor.unwrap_or_else(|| factor * (scene.strength_pa * 1e-6).powf(exponent));
+        let thickness = scene.thickness_m.map_or_else(String::new, |h| format!("target.thickness = {h:?}"));
+        let stiffness =
+            scene.crater_stiffness_n_m.map_or_else(String::new, |c| format!("resistance.crater_stiffness = {c:?}"));
+        let text = format!(
+            "projectile.mass = {:?}\nprojectile.diameter = {:?}\nprojectile.nose.factor = {:?}\ntarget.strength = {:?}\n\
+             target.density = {:?}\nresistance.S = {s:?}\nresistance.B = {:?}\nresistance.k = {:?}\n\
+             impact.velocity = {:?}\nperforation.criterion = \"{}\"\n{thickness}\n{stiffness}\n",
+            scene.mass_kg,
+            scene.diameter_m,
+            scene.nose_factor,
+            scene.strength_pa,
+            scene.density_kg_m3,
+            scene.inertia_factor,
+            scene.crater_ratio,
+            scene.velocity_m_s,
+            scene.criterion,
+        );
+        let flight = exact(&Scene::from_toml(&text, "asked").ok()?.problem().ok()?)?;
+        Some(answer(flight.outcome, flight.end))
+    };
+    Answering::plain(answers).of_scenes()
+}
+
+/// `number` with `digits` digits behind the first.
+fn rounded(number: f64, digits: usize) -> f64 {
+    format!("{number:.digits$e}").parse().unwrap_or(f64::NAN)
+}
+
+const TOLD: &[Told] = &[
+    Told {
+        what: "nothing, by a law in code",
+        solver: || of_force(|place, _| place.law.force(place.depth, place.velocity)),
+        asked: Measured,
+        says: "",
+    },
+    Told { what: "nothing, by the classical scheme", solver: || RIGHT.solver(), asked: Measured, says: "" },
+    Told { what: "nothing, in fixed steps", solver: || FIXED.solver(), asked: Claiming(4.0), says: "" },
+    Told {
+        what: "nothing, as of an implicit scheme, which is no polynomial of the step",
+        solver: || altered(|_| (), |_, _| ()).in_fixed_steps(),
+        asked: Claiming(4.0),
+        says: "",
+    },
+    Told {
+        what: "a force that is added falls with the size too, in proportion to it",
+        solver: || {
+            of_force(|place, _| {
+                place.law.force(place.depth, place.velocity) + if place.law.static_force > 0.0 { 0.01 } else { 0.0 }
+            })
+        },
+        asked: Measured,
+        says: "",
+    },
+    Told {
+        what: "the velocity is read in whole m/s",
+        solver: || altered(|problem| problem.impact_speed = problem.impact_speed.floor().max(1.0), |_, _| ()),
+        asked: Measured,
+        says: "",
+    },
+    Told {
+        what: "the velocity is reported in steps of 3 m/s",
+        solver: || altered(|_| (), |_, end| end.velocity = (end.velocity / 3.0).round() * 3.0),
+        asked: Measured,
+        says: "exit-velocity-late, likely: v is the same at every exit within a step: that of the end of the step",
+    },
+    Told {
+        what: "the time is late where there is no force",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    if problem.stages[0].drag == 0.0 && problem.stages[0].static_force == 0.0 {
+                        end.time *= 1.2;
+                    }
+                },
+            )
+        },
+        asked: Measured,
+        says: "",
+    },
+    Told {
+        what: "more drag above 300 m/s",
+        solver: || of_force(|place, _| with_drag(place, if place.velocity > 300.0 { 1.2 } else { 1.0 })),
+        asked: Measured,
+        says: "term:drag, likely, 1.200000: the drag is 1.200000 times the right one above 300.0002 m/s, and right below",
+    },
+    Told {
+        what: "more drag below 300 m/s",
+        solver: || of_force(|place, _| with_drag(place, if place.velocity > 300.0 { 1.0 } else { 0.75 })),
+        asked: Measured,
+        says: "term:drag, likely, 0.750000: the drag is right above 300.0001 m/s, and 0.750000 times the right one below",
+    },
+    Told {
+        what: "drag of another law",
+        solver: || of_force(|place, _| with_drag(place, 1.0 + 1.0 / place.velocity)),
+        asked: Measured,
+        says: "term:drag, likely: the drag is not q v²: over the right one it is 11.591808 at 0.1000 m/s, 1.100552 at 10.0000 m/s and 1.001005 at 1000.0000 m/s; most off is 11.591808 at 0.1000 m/s",
+    },
+    Told {
+        what: "the exit is placed on the chord",
+        solver: || Stepping { exit: Placed::OnChord, steps: |_, _| 7.0, ..RIGHT }.solver(),
+        asked: Measured,
+        says: "event-straight, certain: time and velocity at the exit are taken from a straight line between the ends of a step",
+    },
+    Told {
+        what: "rest is placed on the chord",
+        solver: || Stepping { rest: Placed::OnChord, steps: |_, _| 7.0, ..RIGHT }.solver(),
+        asked: Measured,
+        says: "event-straight, likely: the depth at rest is taken from a straight line between the ends of a step: under a constant force its time is right and it is too small",
+    },
+    Told {
+        what: "the velocity at the exit is that of the start of the step",
+        solver: || Stepping { exit_speed: |[start, _, _]| start, steps: |_, _| 7.0, ..RIGHT }.solver(),
+        asked: Measured,
+        says: "velocity-stale, likely: v is the same at every exit within a step: that of the start of the step",
+    },
+    Told {
+        what: "the velocity at the exit is that of the end of the step",
+        solver: || Stepping { exit_speed: |[_, _, end]| end, steps: |_, _| 7.0, ..RIGHT }.solver(),
+        asked: Measured,
+        says: "exit-velocity-late, likely: v is the same at every exit within a step: that of the end of the step",
+    },
+    Told {
+        what: "twice the steps where all is sixteen times as large",
+        solver: || Stepping { steps: |_, speed| (speed * 32.0).powf(0.6).max(1.0), ..RIGHT }.solver(),
+        asked: Measured,
+        says: "absolute-tolerance, likely: at one relative tolerance the error falls from 3e-2 to 1e-13 as the same flight grows 32768 times in length and speed: the tolerance is an absolute one, whatever is asked for",
+    },
+    Told {
+        what: "weights that add up to 1.02",
+        solver: || {
+            let [b1, b2, b3, b4] = CLASSICAL.1;
+            with_weights([b1, b2 + 0.02, b3, b4]).solver()
+        },
+        asked: Measured,
+        says: "weights, likely, 1.020000: without a force x grows by 1.020000 v t: dx/dt = v has a factor, or the weights of the scheme add up to that",
+    },
+    Told {
+        what: "the last slope is taken at half a step",
+        solver: || Stepping { numbers: ([0.5, 0.5, 0.5], CLASSICAL.1), ..FIXED }.solver(),
+        asked: Measured,
+        says: "scheme-coefficient, certain, 0.833333: the first step under a constant deceleration a has a h² in x with a factor 0.416667, where order 2 has 0.5: as of runge-kutta 4 with slope 2 taken at 0.250000 h, not 0.5, or slope 4 taken at 0.500000 h, not 1",
+    },
+    Told {
+        what: "the weight of the first slope is 1/3",
+        solver: || Stepping { is_fixed: true, ..with_weights([1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]) }.solver(),
+        asked: Measured,
+        says: "scheme-coefficient, certain, 1.166667: the first step under a constant deceleration a has a h in v with a factor 1.166667, where order 1 has 1: as of runge-kutta 4 with a weight of 0.333333 for slope 1, not 0.166667",
+    },
+    Told {
+        what: "the second slope is taken at 0.4 of the step",
+        solver: || Stepping { numbers: ([0.4, 0.5, 1.0], CLASSICAL.1), ..FIXED }.solver(),
+        asked: Claiming(4.0),
+        says: "scheme-coefficient, certain, 0.933333: the first step under a constant deceleration a has a h² in x with a factor 0.466667, where order 2 has 0.5: as of runge-kutta 4 with slope 2 taken at 0.400000 h, not 0.5, or slope 4 taken at 0.800000 h, not 1",
+    },
+    Told {
+        what: "the force of the stage before in the first slope",
+        solver: || Stepping { stale: 1.0, ..FIXED }.solver(),
+        asked: Measured,
+        says: "force-stale, certain: the first step behind the end of a stage has a h in v with a factor 0.833333, not 1: part of its force is that of the stage before",
+    },
+    Told {
+        what: "half of the velocity in the force is that of the start of the step",
+        solver: || Stepping { lag: [0.0, 0.5], ..FIXED }.solver(),
+        asked: Claiming(4.0),
+        says: "drag-lagged, certain: the first step under v' = z v/h gives v the term 0.250000 z^2, where order 2 has 0.500000 z^2: the v in the force is that of another time",
+    },
+    Told {
+        what: "steps go over the ends of stages",
+        solver: || Stepping { stage_end: Placed::AtStepEnd, ..FIXED }.solver(),
+        asked: Claiming(4.0),
+        says: "",
+    },
+    Told {
+        what: "V0 is taken for V half a step before the impact",
+        solver: || started(0.5),
+        asked: Measured,
+        says: "start-kick, certain: under a constant deceleration a, v is 0.500000 a h too small from the start on, whatever the step h: v0 is taken for v half a step before the impact",
+    },
+    Told {
+        what: "V0 is taken for V a tenth of a step before the impact",
+        solver: || started(0.1),
+        asked: Measured,
+        says: "start-kick, certain: under a constant deceleration a, v is 0.100000 a h too small from the start on, whatever the step h",
+    },
+    Told { what: "V0 is what it is", solver: || started(0.0), asked: Measured, says: "" },
+    Told {
+        what: "a velocity that is reported so is none of the flight: its time is right",
+        solver: || {
+            by_request(
+                |_, _| (),
+                |request, problem, end| {
+                    let deceleration = problem.stages[0].force(0.0, problem.impact_speed) / problem.mass;
+                    let start = problem.impact_speed - 0.5 * request.dt_s.unwrap_or(0.0) * deceleration;
+                    end.velocity = (start * start - 2.0 * deceleration * end.depth).max(0.0).sqrt();
+                },
+            )
+            .in_fixed_steps()
+        },
+        asked: Measured,
+        says: "",
+    },
+    Told {
+        what: "a shortened step takes half the time of a whole one: what one step takes says nothing there",
+        solver: || Stepping { clock: |_, whole| 0.5 * whole, ..FIXED }.solver(),
+        asked: Measured,
+        says: "",
+    },
+    Told {
+        what: "nothing, in fixed steps, by questions",
+        solver: || FIXED.solver(),
+        asked: Questions(40),
+        says: "passed | ",
+    },
+    Told {
+        what: "a shortened step counts as a whole one",
+        solver: || Stepping { clock: |_, whole| whole, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | event-time-late, likely: the time alone has order 1: it is that of the end of a step",
+    },
+    Told {
+        what: "a shortened step takes no time",
+        solver: || Stepping { clock: |_, _| 0.0, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | event-time-early, likely: the time alone has order 1, and is too small: that of a shortened step is not counted",
+    },
+    Told {
+        what: "a scheme of order three whose flights end with a step",
+        solver: || {
+            Stepping { exit: Placed::AtStepEnd, rest: Placed::AtStepEnd, stage_end: Placed::AtStepEnd, ..KUTTA }
+                .solver()
+        },
+        asked: Questions(40),
+        says: "passed | exit-late, certain: every flight ends at the end of a step: exit and rest are not located, order 1",
+    },
+    Told {
+        what: "boundaries are passed at the end of a step",
+        solver: || Stepping { exit: Placed::AtStepEndByDepth, stage_end: Placed::AtStepEndByDepth, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | stage-end-late, likely: the order falls to 1 at ends of stages and at the exit: a step that passes one is taken whole",
+    },
+    Told {
+        what: "the exit is passed at the end of a step",
+        solver: || Stepping { exit: Placed::AtStepEndByDepth, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | exit-late, likely: the order falls to 1 at the exit",
+    },
+    Told {
+        what: "the ends of stages are passed at the end of a step",
+        solver: || Stepping { stage_end: Placed::AtStepEnd, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | stage-end-late, likely: the order falls to 1 where the force jumps at the end of a stage",
+    },
+    Told {
+        what: "rest is taken at the end of a step",
+        solver: || Stepping { rest: Placed::AtStepEnd, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | event-time-late, likely: the time alone has order 1: it is that of the end of a step",
+    },
+    Told {
+        what: "the velocity in the force is that of the start of the step",
+        solver: || Stepping { lag: [0.0, 1.0], ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | drag-lagged, likely: the order falls to 1 where the force depends on v",
+    },
+    Told {
+        what: "the depth in the force is that of the start of the step",
+        solver: || Stepping { lag: [1.0, 0.0], ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | force-stale, likely: the order falls to 1 where the force depends on x: its depth is that of another time",
+    },
+    Told {
+        what: "both are",
+        solver: || Stepping { lag: [1.0, 1.0], ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | drag-lagged, certain: the first step under v' = z v/h gives v the term 0.000000 z^2, where order 2 has 0.500000 z^2: the v in the force is that of another time",
+    },
+    Told {
+        what: "V0 is taken for V half a step before the impact, by the classical scheme",
+        solver: || Stepping { kick: 0.5, ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | start-kick, likely: the order falls to 1 where there is a force at impact: v half a step back is v0 itself",
+    },
+    Told {
+        what: "Heun's scheme claims order four",
+        solver: || Stepping { numbers: HEUN, ..FIXED }.solver().claiming(4.0),
+        asked: Questions(40),
+        says: "failed | scheme-coefficient, certain, 0.000000: the first step under v' = z v/h gives v the term 0.000000 z^3, where order 3 has 0.166667 z^3",
+    },
+    Told {
+        what: "Heun's scheme claims order two",
+        solver: || Stepping { numbers: HEUN, ..FIXED }.solver().claiming(2.0),
+        asked: Questions(40),
+        says: "passed | ",
+    },
+    Told {
+        what: "forward Euler",
+        solver: || Stepping { numbers: (CLASSICAL.0, [1.0, 0.0, 0.0, 0.0]), ..FIXED }.solver(),
+        asked: Questions(40),
+        says: "passed | first-order-scheme, certain: the scheme is forward euler, of order 1",
+    },
+    Told {
+        what: "weights of a quarter each, of order two",
+        solver: || Stepping { is_fixed: true, ..with_weights([0.25, 0.25, 0.25, 0.25]) }.solver(),
+        asked: Questions(40),
+        says: "passed | ",
+    },
+    Told {
+        what: "the step is 0.1 ms whatever is asked for",
+        solver: || Stepping { step: |_| 1e-4, ..KUTTA }.solver(),
+        asked: Questions(24),
+        says: "failed | step-ignored, certain: answers are the same whatever the step: dt_s is ignored",
+    },
+    Told {
+        what: "no step is below a millisecond",
+        solver: || Stepping { step: |step| step.max(1e-3), ..KUTTA }.solver(),
+        asked: Questions(40),
+        says: "failed | step-ignored, likely: answers at steps below 1e-3 s are the same: there is a least step",
+    },
+    Told {
+        what: "the flight ends after 100 steps",
+        solver: || {
+            central(|step, problem, flight| {
+                if let Ok(whole) = Taylor::default().solve(&problem.clone().with_exit(f64::INFINITY), Detail::End)
+                    && whole.end.time > 100.0 * step
+                {
+                    flight.end.time = 100.0 * step;
+                    flight.end.depth *= 0.5;
+                    flight.outcome = Outcome::Stopped;
+                }
+            })
+        },
+        asked: Questions(40),
+        says: "failed | flight-cut-short, likely: the flight ends after 100 steps, wherever it is",
+    },
+    Told {
+        what: "a sum in single precision",
+        solver: || {
+            central(|step, _, flight| {
+                let steps = (flight.end.time / step) as usize;
+                let sum = (0..steps).fold(0.0_f32, |sum, _| sum + step as f32);
+                flight.end.time += f64::from(sum) - steps as f64 * step;
+            })
+        },
+        asked: Questions(40),
+        says: "failed | round-off, likely: the error of the time does not fall below 2e-4 with the step: round-off far above that of 64-bit numbers, as of a sum in single precision",
+    },
+    Told {
+        what: "central difference with twice the drag",
+        solver: || {
+            let solver = Answering::plain(|request| {
+                let mut problem = request.problem(None);
+                problem.stages.iter_mut().for_each(|law| law.drag *= 2.0);
+                let flight = CentralDifference::uniform(request.dt_s?, VelocityAt::LaggedHalfStep, Boundaries::StepEnd)
+                    .solve(&problem, Detail::End)
+                    .ok()?;
+                Some(answer(flight.outcome, flight.end))
+            });
+            solver.in_fixed_steps()
+        },
+        asked: Questions(24),
+        says: "failed | term:drag, certain, 2.000000: the drag q is 2 times the right one",
+    },
+    Told {
+        what: "the clock goes on in steps that are rejected",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    if !is_steady(problem) {
+                        delay(end);
+                    }
+                },
+            )
+        },
+        asked: Questions(12),
+        says: "failed | clock, likely: the time alone is wrong, and late, and under a constant force it is right: the clock goes on in steps that are rejected",
+    },
+    Told {
+        what: "events are late",
+        solver: || altered(|_| (), |_, end| delay(end)),
+        asked: Questions(60),
+        says: "failed | event-time-late, likely: only the time is wrong, and late, as that of the end of a step",
+    },
+    Told {
+        what: "no answer at the tightest tolerance where there is a gap",
+        solver: || {
+            Answering::plain(|request| {
+                let problem = request.problem(None);
+                let has_gap = problem.stages.iter().any(|stage| *stage == Stage { end: stage.end, ..Stage::free() });
+                let flight = exact(&problem)?;
+                (!has_gap || request.rtol > super::super::TOLERANCES[2]).then(|| answer(flight.outcome, flight.end))
+            })
+        },
+        asked: AtEdges(24),
+        says: "failed | no-answer, likely: 3 questions have no answer: reports an error: it never ends; all of them hold `air-gap`",
+    },
+    Told {
+        what: "rest below 0.1 m/s, with round-off left where the flight begins so slow",
+        solver: || {
+            by_rules(Rules { rest_speed: 0.1, ..Rules::default() }, |end| {
+                let State { time, depth, .. } = *end;
+                *end = State { time: time.max(1e-31), depth: depth.max(1e-33), velocity: 0.0 };
+            })
+        },
+        asked: AtEdges(12),
+        says: "failed | rest-threshold, certain, 0.100000: the projectile counts as at rest below 0.100000 m/s",
+    },
+    Told {
+        what: "S by another formula",
+        solver: || with_s(82.6, -0.544),
+        asked: Questions(60),
+        says: "failed | parameter:s, certain: s by eq. 14 is that of another formula: 82.6 (fc/mpa)^-0.544",
+    },
+    Told {
+        what: "S by a formula that nobody knows",
+        solver: || with_s(60.0, -0.3),
+        asked: Questions(60),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is scene-1 (stiffness, rest, scene, eq14); `eq14` stands in 100 % of the failing and 17 % of the passing questions",
+    },
+    Told {
+        what: "the clock goes on from the last exit",
+        solver: || {
+            Answering::new(|| {
+                let clock = Cell::new(0.0);
+                move |request: &PeerRequest| {
+                    let mut flight = exact(&request.problem(None))?;
+                    flight.end.time += clock.get();
+                    clock.set(if flight.end.velocity > 0.0 { flight.end.time } else { 0.0 });
+                    Some(answer(flight.outcome, flight.end))
+                }
+            })
+        },
+        asked: AtEdges(60),
+        says: "failed | state-kept, certain: answers depend on what was asked before: 5 of 5 failing questions are answered otherwise by a solver that has just started",
+    },
+    Told {
+        what: "another answer each time",
+        solver: || {
+            let asked = std::rc::Rc::new(Cell::new(0_u32));
+            Answering::new(move || {
+                let asked = asked.clone();
+                move |request: &PeerRequest| {
+                    asked.set(asked.get() + 1);
+                    let mut flight = exact(&request.problem(None))?;
+                    flight.end.time *= 1.0 + 1e-3 * f64::from(asked.get()).sin();
+                    Some(answer(flight.outcome, flight.end))
+                }
+            })
+        },
+        asked: Questions(60),
+        says: "failed | not-repeatable, certain: answers are not the same twice: 5 of 5 failing questions are answered otherwise when they are asked again",
+    },
+    Told {
+        what: "no tolerance below 1e-8",
+        solver: || by_request(|_, _| (), |request, _, end| end.time *= 1.0 + 0.03 * request.rtol.max(1e-8)),
+        asked: Questions(40),
+        says: "passed | tolerance-ignored, likely: answers at tolerances of 1e-9 and 1e-12 are as good as the same, with errors up to 3e-10",
+    },
+    Told {
+        what: "nothing: errors of many tolerances fall with them",
+        solver: || by_request(|_, _| (), |request, _, end| end.time *= 1.0 + 100.0 * request.rtol),
+        asked: Questions(40),
+        says: "passed | ",
+    },
+    Told {
+        what: "a time that is off by up to 1e-5 at every tolerance",
+        solver: || by_request(|_, _| (), |_, _, end| end.time *= 1.0 + 1e-5 * (1e3 * end.depth).sin()),
+        asked: Questions(60),
+        says: "failed | tolerance-ignored, likely: answers are the same at every tolerance, and err by more than it allows",
+    },
+    Told {
+        what: "errors of the tolerance to the power of 0.6",
+        solver: || {
+            by_request(|_, _| (), |request, _, end| end.time *= 1.0 + request.rtol.powf(0.6) * (1e3 * end.depth).sin())
+        },
+        asked: Questions(12),
+        says: "failed | tolerance-missed, likely: errors of 1e-4, 2e-6 and 3e-8, in the time alone, at tolerances of 1e-6, 1e-9 and 1e-12: they fall as the tolerance to the power of 0.6, as with a wrong coefficient of the scheme, or events that are located less accurately than steps are taken",
+    },
+    Told {
+        what: "errors of a thousand tolerances, and no more",
+        solver: || {
+            by_request(|_, _| (), |request, _, end| end.time *= 1.0 + 1e4 * request.rtol * (1e3 * end.depth).sin())
+        },
+        asked: Questions(60),
+        says: "failed | tolerance-missed, likely: errors of 5e-3, 5e-6 and 5e-9, in the time alone, at tolerances of 1e-6, 1e-9 and 1e-12: the error is not what the tolerance asks for",
+    },
+    Told {
+        what: "arithmetic in single precision",
+        solver: || {
+            by_request(
+                |_, _| (),
+                |request, _, end| end.time *= 1.0 + 1e-7 * (1e5 * end.depth + request.rtol.ln()).sin(),
+            )
+        },
+        asked: Questions(12),
+        says: "failed | single-precision, likely: errors of 5e-8, 4e-8 and 8e-8, in the time alone, at tolerances of 1e-6, 1e-9 and 1e-12: they stop falling far above the round-off of 64-bit numbers",
+    },
+    Told {
+        what: "numbers of single precision",
+        solver: || {
+            altered(
+                |_| (),
+                |_, end| {
+                    *end = State {
+                        time: f64::from(end.time as f32),
+                        depth: f64::from(end.depth as f32),
+                        velocity: f64::from(end.velocity as f32),
+                    }
+                },
+            )
+        },
+        asked: Questions(60),
+        says: "failed | single-precision, certain: every number is one of single precision (f32)",
+    },
+    Told {
+        what: "times of six digits",
+        solver: || altered(|_| (), |_, end| end.time = rounded(end.time, 5)),
+        asked: Questions(60),
+        says: "failed | output-rounded, certain: the time reported is rounded to 6 digits",
+    },
+    Told {
+        what: "depths of six decimals",
+        solver: || altered(|_| (), |_, end| end.depth = (1e6 * end.depth).round() / 1e6),
+        asked: Questions(60),
+        says: "failed | output-rounded, certain: the depth reported is rounded to a multiple of 1.00000e-6 m",
+    },
+    Told {
+        what: "drag is a tenth less at loose tolerances",
+        solver: || {
+            by_request(
+                |request, problem| {
+                    problem.stages.iter_mut().filter(|_| request.rtol > 1e-7).for_each(|law| law.drag *= 0.9)
+                },
+                |_, _, _| (),
+            )
+        },
+        asked: Questions(60),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is drag-1 (drag, exit); `drag` stands in 100 % of the failing and 18 % of the passing questions",
+    },
+    Told {
+        what: "half the drag, and times in ms",
+        solver: || {
+            altered(|problem| problem.stages.iter_mut().for_each(|law| law.drag *= 0.5), |_, end| end.time *= 1e3)
+        },
+        asked: Questions(60),
+        says: "failed | term:drag, certain, 0.500000: the drag q is 0.500000 times the right one",
+    },
+    Told {
+        what: "no drag in stages that drive",
+        solver: || {
+            altered(
+                |problem| problem.stages.iter_mut().filter(|law| law.static_force < 0.0).for_each(|law| law.drag = 0.0),
+                |_, _| (),
+            )
+        },
+        asked: Questions(60),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is driven-1 (static-force, drive, drag, stage-end, force-jump, exit); `drive` stands in 100 % of the failing and 5 % of the passing questions",
+    },
+    Told {
+        what: "P grows with the impact speed",
+        solver: || altered(|problem| problem.stages[0].static_force *= 1.0 + 1e-3 * problem.impact_speed, |_, _| ()),
+        asked: Questions(60),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is static-force-1 (static-force, exit); `static-force` stands in 94 % of the failing and 18 % of the passing questions",
+    },
+    Told {
+        what: "viscosity of 1 Ns/m is left out",
+        solver: || {
+            altered(
+                |problem| {
+                    let mass = problem.mass;
+                    problem.stages.iter_mut().filter(|law| law.viscosity < mass).for_each(|law| law.viscosity = 0.0);
+                },
+                |_, _| (),
+            )
+        },
+        asked: Questions(60),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is scales-1 (static-force, stiffness, viscosity, drag, exit); `viscosity` stands in 100 % of the failing and 36 % of the passing questions",
+    },
+    Told {
+        what: "the last event is another end than the one reported",
+        solver: || {
+            listing(|_, said| {
+                said.time_s *= 1.0 + 0.1 * (1e3 * said.depth_m).sin();
+            })
+        },
+        asked: Questions(60),
+        says: "failed | report-differs, likely: the last event listed is not the end reported: a time of 0.00269358732120313 in the list, 0.002500072033469616 beside it",
+    },
+    Told {
+        what: "ends of stages are left out of the events",
+        solver: || {
+            listing(|_, said| said.events.retain(|event| matches!(event.kind, EventKind::Exit | EventKind::Rest)))
+        },
+        asked: Questions(12),
+        says: "failed | event-list, certain: every end is right, and the events listed are not: lists events, and not the crater-end at x = 0.038040821 m",
+    },
+    Told {
+        what: "times of the events are those of the stage",
+        solver: || {
+            listing(|_, said| {
+                let mut before = 0.0;
+                for Event { state, .. } in &mut said.events {
+                    let now = state.time;
+                    state.time -= before;
+                    before = now;
+                }
+            })
+        },
+        asked: Questions(12),
+        says: "failed | event-list, certain: every end is right, and the events listed are not: the events listed are not of the stages, each once, in the order of time",
+    },
+    Told { what: "nothing, with events", solver: || listing(|_, _| ()), asked: AtEdges(60), says: "passed | " },
+    Told {
+        what: "a flight is cut short in the middle",
+        solver: || {
+            Answering::plain(|request| {
+                let problem = request.problem(None);
+                let flight = exact(&problem)?;
+                let part = 0.3 + 0.2 * (1e3 * flight.end.depth).sin();
+                let end = State {
+                    time: part * flight.end.time,
+                    depth: part * flight.end.depth,
+                    velocity: 0.5 * problem.impact_speed,
+                };
+                Some(answer(Outcome::Stopped, end))
+            })
+        },
+        asked: Questions(12),
+        says: "failed | flight-cut-short, likely: the flight is said to stop, with v > 0 and no exit reached",
+    },
+];
