@@ -25,4 +25,4 @@ pub use process::{ORDER_OF_ALL, ORDER_QUANTITIES, Peer, PeerFailure, PeerFault, 
 pub use references::{RecordedFlight, Recording, recordings};
 #[cfg(feature = "report")]
 pub(crate) use wire::NO_LAWS;
-pub use wire::{Difference, PeerAnswer, PeerRequest};
+pub use wire::{Difference, PeerAnswer, PeerRequest, PeerScene};

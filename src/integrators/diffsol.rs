@@ -837,6 +837,19 @@ const AT_AN_END: f64 = 1e-7;
 /// How often a step that ended in NaN is tried again, each time ten times shorter.
 const RETRIES_MAX: u32 = 60;
 
+/// The `error` of a step that was lost at `last`, or that the force of `law` has no value close ahead.
+fn lost(law: Option<&Law<f64>>, stage: usize, error: IntegrationError, last: State) -> IntegrationError {
+    let ahead = (10..=45).rev().map(|power| f64::exp2(-f64::from(power))).flat_map(|part| {
+        let deeper = State { depth: last.depth * (1.0 + part), ..last };
+        [deeper, State { velocity: last.velocity * (1.0 - part), ..last }]
+    });
+    let place = |law: &Law<f64>| {
+        let mut open = ahead.filter(|at| !law.force_value(at.depth, at.velocity).is_finite());
+        open.next().map(|last| IntegrationError::NoForce { stage, why: law.explain(last.depth, last.velocity), last })
+    };
+    law.and_then(place).unwrap_or(error)
+}
+
 /// Solves stages with solvers that `make` makes.
 struct SolverOf<'p, Eqn: OdeEquations, S, Make> {
     of: &'p OfScheme<Eqn>,
@@ -879,16 +892,14 @@ where
 
         // Times of nodes count from the start of the present solver, which is at `epoch`.
         let mut before = Node { time: 0.0, depth: 0.0, velocity: stage.speed };
-        let mut epoch = 0.0;
-        let mut h = first_step;
-        let mut retries = 0;
+        let (mut epoch, mut h, mut retries) = (0.0, first_step, 0);
         let mut seen = Seen::from(stage);
         let mut cost = Cost::default();
         let state_at = |epoch: f64, at: Node| stage.state(Node { time: epoch + at.time, ..at });
-        let failure = |cause: DiffsolError, epoch: f64, at: Node| IntegrationError::SolverFailed {
-            method: method.name(),
-            cause: cause.to_string(),
-            last: state_at(epoch, at),
+        let (index, own) = (course.stage, course.law());
+        let failure = |cause: DiffsolError, epoch: f64, at: Node| {
+            let (cause, last) = (cause.to_string(), state_at(epoch, at));
+            lost(own, index, IntegrationError::SolverFailed { method: method.name(), cause, last }, last)
         };
         let mut solver = self.solver_at(0.0, stage.speed, h).map_err(|e| failure(e, epoch, before))?;
         let mut rejected_before = rejected_by(&solver);
@@ -918,7 +929,8 @@ where
             let shorter = if is_lost_step {
                 retries += 1;
                 if retries > RETRIES_MAX {
-                    return Err(IntegrationError::NotFinite { what: "the state", last: state_at(epoch, before) });
+                    let last = state_at(epoch, before);
+                    return Err(lost(own, index, IntegrationError::NotFinite { what: "the state", last }, last));
                 }
                 Some(0.1 * h)
             } else if let Some(own) = &stage.own {

@@ -1121,7 +1121,8 @@ impl StageSolver<Ball> for Steps {
         if self.open.is_some() {
             return Ok(Bounded { bound: margin.value.abs(), ..margin });
         }
-        if course.problem.laws.of(course.stage.min(course.problem.stages.len() - 1)).is_some() {
+        let is_of_law = course.problem.laws.of(course.stage.min(course.problem.stages.len() - 1)).is_some();
+        if is_of_law && !course.is_through {
             return Ok(margin);
         }
         let energy = course.problem.mass * course.problem.impact_speed * course.problem.impact_speed;

@@ -256,7 +256,8 @@ impl Advice for IntegrationError {
             }
             Self::SpeedTableEnds { .. } => "add rows to the table, up to the velocities that a projectile has there",
             Self::NoForce { .. } | Self::NoEnd { .. } => {
-                "bound the argument with max or min, end the stage before that place, or try --method tsit45"
+                "bound the argument with max or min, or end the stage before that place; where it has a value and no \
+                 derivatives, --method tsit45 goes on"
             }
             Self::SolverFailed { .. } => "loosen --rtol, or take --method taylor",
             _ => "",

@@ -531,6 +531,19 @@ fn a_flight_that_is_slowed_for_ever_comes_to_no_rest_however_slow() {
     }
 }
 
+#[cfg(feature = "diffsol")]
+#[test]
+fn a_force_without_a_value_ahead_is_named_where_steps_are_lost() {
+    use crate::integrators::method::{Method, MethodName, MethodOptions};
+
+    let problem = problem("P*sqrt(1 - x/l)", 200.0);
+    for name in [MethodName::Tsit45, MethodName::Bdf, MethodName::Adaptive] {
+        let found = Method::new(name, &MethodOptions::default()).unwrap().integrator().solve(&problem, Detail::End);
+        let why = found.unwrap_err().to_string();
+        assert!(why.contains("in `sqrt(1 - x/l)`, the square root of -"), "{name}: {why}");
+    }
+}
+
 /// `P (V/v1)^-n` stops it at `M v1²/(P (2 + n)) (V0/v1)^(2 + n)`.
 #[test]
 fn a_force_without_bound_at_rest_brings_it_to_rest() {

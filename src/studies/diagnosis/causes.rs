@@ -46,6 +46,8 @@ const LISTED: usize = 5;
 /// may err more than a sound one does on the same question.
 const LEFT: f64 = 1e-4;
 const LEFT_MAX: f64 = 100.0;
+/// Part of the error that an explanation may leave, whatever the condition.
+const LEFT_MOST: f64 = 0.5;
 /// Largest relative difference that an explanation may leave, whatever the condition.
 const EXPLAINED_MAX: f64 = 0.02;
 /// Part of the right answer that is next to nothing: of a flight that a fault ends at once.
@@ -158,9 +160,13 @@ impl Seen<'_> {
     /// The same of what is `predicted`.
     fn explained(&self, predicted: Predicted, mask: Mask) -> Option<f64> {
         let is_near = self.is_near(self.excess(predicted), mask);
-        let errors = self.errors(predicted.end);
-        let largest = (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max);
-        (is_near && largest <= EXPLAINED_MAX).then_some(largest)
+        let largest = |errors: [f64; 3]| (0..3).filter(|i| mask[*i]).map(|i| errors[i].abs()).fold(0.0, f64::max);
+        let left = largest(self.errors(predicted.end));
+        // A fault under which the flight ends otherwise may magnify errors: what it leaves must be less than what it explains.
+        let right = Predicted { end: self.question.exact.end, conditions: self.question.conditions };
+        let is_wrong = self.fails && largest(self.excess(right)) > 1.0;
+        let leaves_less = !is_wrong || left <= LEFT_MOST * largest(self.errors(right.end));
+        (is_near && leaves_less && left <= EXPLAINED_MAX).then_some(left)
     }
 
     /// Whether `faults` give another answer. Where none can be computed, nothing is contradicted.

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::exchange::peers::process::ORDER_OF_ALL;
 use crate::exchange::peers::wire::errors;
-use crate::exchange::peers::{PeerIdentity, PeerRequest};
+use crate::exchange::peers::{Difference, PeerIdentity, PeerRequest};
 use crate::integrators::{Boundaries, VelocityAt};
 use crate::physics::{Outcome, State};
 use crate::studies::order::{Class, OrderFit, StepError, fit};
@@ -55,7 +55,7 @@ pub(super) fn in_fixed_steps(
     let mut steps = 0.0;
     let mut laddered: Vec<Laddered<'_>> = Vec::new();
     for (index, (question, coarsest)) in usable.iter().enumerate() {
-        let mut next = Laddered { question, coarsest: *coarsest, rungs: Vec::new(), failure: None };
+        let mut next = Laddered { question, coarsest: *coarsest, rungs: Vec::new(), listed: Vec::new(), failure: None };
         steps += next.climb(asking, &LADDER);
         // A limit that seems wrong is looked at again.
         if next.failure.is_none() && next.is(Limit::is_suspect) {
@@ -90,6 +90,10 @@ pub(super) fn in_fixed_steps(
         let statement = "answers are the same whatever the step: dt_s is ignored".to_owned();
         causes.push(Cause::plain("step-ignored", statement, Certainty::Certain, counts.failed, counts.failed));
     } else if counts.failed > 0
+        && let Some(cause) = of_events(&laddered, &rows, counts.failed)
+    {
+        causes.push(cause);
+    } else if counts.failed > 0
         && let Some(cause) = budget(&cut_short(&laddered)).or_else(|| least_step(&laddered, &rows))
     {
         causes.push(cause);
@@ -117,6 +121,8 @@ struct Laddered<'a> {
     question: &'a Question,
     coarsest: f64,
     rungs: Vec<Rung>,
+    /// How far the events listed differ from the right ones, rung by rung.
+    listed: Vec<Vec<Difference>>,
     failure: Option<String>,
 }
 
@@ -129,11 +135,16 @@ impl Laddered<'_> {
             steps += self.question.exact.end.time / step;
             let asked = PeerRequest { dt_s: Some(step), ..request(self.question, TOLERANCES[0]) };
             match asking.ask(&asked) {
-                Ok(answer) => self.rungs.push(Rung {
-                    step,
-                    answer: end_of(&answer).state,
-                    is_outcome_right: answer.outcome.agrees_with(self.question.exact.outcome),
-                }),
+                Ok(answer) => {
+                    self.rungs.push(Rung {
+                        step,
+                        answer: end_of(&answer).state,
+                        is_outcome_right: answer.outcome.agrees_with(self.question.exact.outcome),
+                    });
+                    let of_end = |difference: &Difference| !QUANTITIES.contains(&difference.quantity.as_str());
+                    let all = answer.differences_from(&self.question.exact, &self.question.problem);
+                    self.listed.push(all.unwrap_or_default().into_iter().filter(of_end).collect());
+                }
                 Err(why) => {
                     self.failure = (!asking.may_decline(self.question)).then_some(why);
                     break;
@@ -160,6 +171,24 @@ impl Laddered<'_> {
         wrong_outcome || (0..3).any(|i| self.limits()[i].is_some_and(|limit| of(&limit, self.question.conditions[i])))
     }
 
+    /// The first quantity of the events listed that goes to a wrong limit, and how far off that is.
+    fn wrong_event(&self) -> Option<(&str, f64)> {
+        self.listed.first()?.iter().find_map(|Difference { quantity, conditioning, .. }| {
+            let of_rung = |(rung, all): (&Rung, &Vec<Difference>)| {
+                Some((rung.step, all.iter().find(|other| other.quantity == *quantity)?.signed))
+            };
+            let points: Vec<_> = self.rungs.iter().zip(&self.listed).filter_map(of_rung).collect();
+            let limit = Limit::of(&points).filter(|_| points.len() == self.rungs.len())?;
+            limit.is_wrong(*conditioning).then_some((quantity.as_str(), limit.error))
+        })
+    }
+
+    /// The same where the end is right.
+    fn wrong_in_events(&self) -> Option<(&str, f64)> {
+        let is_right = self.failure.is_none() && !self.is(Limit::is_wrong);
+        is_right.then(|| self.wrong_event()).flatten()
+    }
+
     fn row(&self) -> Asked {
         let question = self.question;
         let last = self.rungs.iter().min_by(|a, b| a.step.total_cmp(&b.step));
@@ -177,6 +206,11 @@ impl Laddered<'_> {
         } else if let Some(i) = wrong {
             let error = limits[i].map_or(f64::NAN, |limit| limit.error);
             (Verdict::Failed, format!("{} goes to a limit that is off by {error:+.2e}", QUANTITIES[i]))
+        } else if let Some((quantity, error)) = self.wrong_in_events() {
+            (
+                Verdict::Failed,
+                format!("the event listed is off: {quantity} goes to a limit that is off by {error:+.2e}"),
+            )
         } else if suspect.is_some() || finest.iter().any(|rung| !rung.is_outcome_right) {
             (Verdict::Undecided, "the steps are too large to tell the limit".to_owned())
         } else {
@@ -329,6 +363,14 @@ fn fixed_causes(
 fn cut_short(laddered: &[Laddered<'_>]) -> Vec<(f64, f64)> {
     let all = laddered.iter().flat_map(|laddered| &laddered.rungs);
     all.filter(|rung| !rung.is_outcome_right).map(|rung| (rung.step, rung.answer.time)).collect()
+}
+
+/// Every end is right, and the events listed are not.
+fn of_events(laddered: &[Laddered<'_>], rows: &[Asked], failed: usize) -> Option<Cause> {
+    let all = laddered.iter().filter(|one| one.wrong_in_events().is_some()).count() == failed;
+    let first = rows.iter().find(|row| row.verdict == Verdict::Failed)?;
+    let statement = format!("every end is right, and the events listed are not: {}", first.reason);
+    all.then(|| Cause::plain("event-list", statement, Certainty::Certain, failed, failed))
 }
 
 /// Answers that all end after one number of steps, whatever the question, as `cuts` of step and time show.

@@ -20,6 +20,8 @@ pub(super) enum Placed {
 pub(super) struct Stepping {
     /// Parts of the step at which slopes two to four are taken, and the weights of all.
     pub numbers: ([f64; 3], [f64; 4]),
+    /// What is done to the problem before.
+    pub read: fn(&mut Problem),
     pub exit: Placed,
     pub rest: Placed,
     pub stage_end: Placed,
@@ -47,6 +49,7 @@ pub(super) const CLASSICAL: ([f64; 3], [f64; 4]) = ([0.5, 0.5, 1.0], [1.0 / 6.0,
 /// The classical scheme, right.
 pub(super) const RIGHT: Stepping = Stepping {
     numbers: CLASSICAL,
+    read: |_| (),
     exit: Placed::ByPart,
     rest: Placed::ByPart,
     stage_end: Placed::ByPart,

@@ -233,6 +233,36 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Scene(|s, f| concrete(s, |c| c.crater_ratio *= f))],
     ),
     of(
+        "parameter:k",
+        "k is {} too great",
+        Parameter::Offset,
+        &[Change::Scene(|s, more| concrete(s, |c| c.crater_ratio += more))],
+    ),
+    of(
+        "parameter:thickness",
+        "the thickness is {} times the right one",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| s.thickness = s.thickness.map(|thickness| f * thickness))],
+    ),
+    of(
+        "input-rounded",
+        "the thickness is rounded to a multiple of {} m",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, grain| s.thickness = s.thickness.map(|thickness| to_grain(thickness, grain)))],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "c is {} times the right one where it is stated",
+        Parameter::Factor,
+        &[Change::Scene(|s, f| {
+            concrete(s, |c| {
+                if let CraterStiffness::Given(stiffness) = &mut c.crater_stiffness {
+                    *stiffness *= f;
+                }
+            });
+        })],
+    ),
+    of(
         "parameter:crater-stiffness",
         "the crater stiffness c is {} times the right one",
         Parameter::Factor,
