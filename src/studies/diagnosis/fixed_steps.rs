@@ -10,6 +10,7 @@ use super::hypotheses::How;
 use super::ladder::{FINER, LADDER, Limit, REPRODUCED, Rung, coarsest_step, order, pooled, rung_errors, schemes};
 use super::numbers::few_digits;
 use super::questions::{Content, Question};
+use super::tolerances::wrong_list;
 use super::{
     Asked, Asking, Diagnosis, Each, End, QUANTITIES, QuantityOrder, Reproduced, Subject, TOLERANCES, count, end_of,
     expected, finish, request,
@@ -18,7 +19,7 @@ use crate::exchange::peers::process::ORDER_OF_ALL;
 use crate::exchange::peers::wire::errors;
 use crate::exchange::peers::{Difference, PeerIdentity, PeerRequest};
 use crate::integrators::{Boundaries, VelocityAt};
-use crate::physics::{Outcome, State};
+use crate::physics::{Event, Outcome, State};
 use crate::studies::order::{Class, OrderFit, StepError, fit};
 use crate::studies::scheme_of_table::Scheme;
 use crate::studies::verdict::Verdict;
@@ -39,6 +40,8 @@ const LEAST_CUTS: usize = 3;
 const CUT: f64 = 1e-2;
 /// Least order with which errors of a sound scheme fall.
 const FLOOR_ORDER: f64 = 0.8;
+/// Part of V0 below which an end of a stage may be missed: rest is near.
+const OPEN_SPEED: f64 = 0.1;
 /// An order claimed may exceed the one found by this part of it: the steps are not small for every question.
 const ORDER_MARGIN: f64 = 0.15;
 
@@ -55,10 +58,17 @@ pub(super) fn in_fixed_steps(
     let mut steps = 0.0;
     let mut laddered: Vec<Laddered<'_>> = Vec::new();
     for (index, (question, coarsest)) in usable.iter().enumerate() {
-        let mut next = Laddered { question, coarsest: *coarsest, rungs: Vec::new(), listed: Vec::new(), failure: None };
+        let mut next = Laddered {
+            question,
+            coarsest: *coarsest,
+            rungs: Vec::new(),
+            listed: Vec::new(),
+            list: None,
+            failure: None,
+        };
         steps += next.climb(asking, &LADDER);
         // A limit that seems wrong is looked at again.
-        if next.failure.is_none() && next.is(Limit::is_suspect) {
+        if next.failure.is_none() && (next.is(Limit::is_suspect) || next.wrong_event().is_some()) {
             steps += next.climb(asking, &FINER);
         }
         laddered.push(next);
@@ -123,6 +133,8 @@ struct Laddered<'a> {
     rungs: Vec<Rung>,
     /// How far the events listed differ from the right ones, rung by rung.
     listed: Vec<Vec<Difference>>,
+    /// What is wrong with the list of the smallest step, whatever its numbers.
+    list: Option<String>,
     failure: Option<String>,
 }
 
@@ -141,6 +153,10 @@ impl Laddered<'_> {
                         answer: end_of(&answer).state,
                         is_outcome_right: answer.outcome.agrees_with(self.question.exact.outcome),
                     });
+                    // What is left with little speed is near its rest, and reached or not.
+                    let is_open =
+                        |event: &Event| event.state.velocity < OPEN_SPEED * self.question.problem.impact_speed;
+                    self.list = wrong_list(self.question, &asked, &answer, is_open);
                     let of_end = |difference: &Difference| !QUANTITIES.contains(&difference.quantity.as_str());
                     let all = answer.differences_from(&self.question.exact, &self.question.problem);
                     self.listed.push(all.unwrap_or_default().into_iter().filter(of_end).collect());
@@ -171,21 +187,27 @@ impl Laddered<'_> {
         wrong_outcome || (0..3).any(|i| self.limits()[i].is_some_and(|limit| of(&limit, self.question.conditions[i])))
     }
 
-    /// The first quantity of the events listed that goes to a wrong limit, and how far off that is.
-    fn wrong_event(&self) -> Option<(&str, f64)> {
-        self.listed.first()?.iter().find_map(|Difference { quantity, conditioning, .. }| {
-            let of_rung = |(rung, all): (&Rung, &Vec<Difference>)| {
-                Some((rung.step, all.iter().find(|other| other.quantity == *quantity)?.signed))
-            };
-            let points: Vec<_> = self.rungs.iter().zip(&self.listed).filter_map(of_rung).collect();
-            let limit = Limit::of(&points).filter(|_| points.len() == self.rungs.len())?;
-            limit.is_wrong(*conditioning).then_some((quantity.as_str(), limit.error))
-        })
+    /// What is wrong with the events listed: their list, or the limit of a number.
+    fn wrong_event(&self) -> Option<String> {
+        let limit = || {
+            self.listed.first()?.iter().find_map(|Difference { quantity, conditioning, .. }| {
+                let of_rung = |(rung, all): (&Rung, &Vec<Difference>)| {
+                    Some((rung.step, all.iter().find(|other| other.quantity == *quantity)?.signed))
+                };
+                let points: Vec<_> = self.rungs.iter().zip(&self.listed).filter_map(of_rung).collect();
+                let limit = Limit::of(&points).filter(|_| points.len() == self.rungs.len())?;
+                let said = || {
+                    format!("the event listed is off: {quantity} goes to a limit that is off by {:+.2e}", limit.error)
+                };
+                limit.is_wrong(*conditioning).then(said)
+            })
+        };
+        self.list.clone().or_else(limit)
     }
 
     /// The same where the end is right.
-    fn wrong_in_events(&self) -> Option<(&str, f64)> {
-        let is_right = self.failure.is_none() && !self.is(Limit::is_wrong);
+    fn wrong_in_events(&self) -> Option<String> {
+        let is_right = self.failure.is_none() && !self.is(Limit::is_suspect);
         is_right.then(|| self.wrong_event()).flatten()
     }
 
@@ -206,11 +228,8 @@ impl Laddered<'_> {
         } else if let Some(i) = wrong {
             let error = limits[i].map_or(f64::NAN, |limit| limit.error);
             (Verdict::Failed, format!("{} goes to a limit that is off by {error:+.2e}", QUANTITIES[i]))
-        } else if let Some((quantity, error)) = self.wrong_in_events() {
-            (
-                Verdict::Failed,
-                format!("the event listed is off: {quantity} goes to a limit that is off by {error:+.2e}"),
-            )
+        } else if let Some(said) = self.wrong_in_events() {
+            (Verdict::Failed, said)
         } else if suspect.is_some() || finest.iter().any(|rung| !rung.is_outcome_right) {
             (Verdict::Undecided, "the steps are too large to tell the limit".to_owned())
         } else {

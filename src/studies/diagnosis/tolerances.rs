@@ -16,7 +16,7 @@ use super::{
     finish, request,
 };
 use crate::exchange::peers::wire::{conditioning, errors};
-use crate::exchange::peers::{PeerAnswer, PeerIdentity};
+use crate::exchange::peers::{PeerAnswer, PeerIdentity, PeerRequest};
 use crate::integrators::{Detail, Enclosure};
 use crate::physics::{Event, Outcome, Problem, Shown, State};
 use crate::studies::enclosure;
@@ -182,14 +182,10 @@ fn judge(question: &Question, rtol: f64, answer: &PeerAnswer) -> Judged {
         let proof = proof(problem, worst, end).map_or_else(String::new, |proof| format!("; {proof}"));
         return judged(Verdict::Failed, said + &proof, false);
     }
-    if !answer.has_events_in_order(&asked) {
-        return in_events("the events listed are not of the stages, each once, in the order of time".to_owned());
-    }
     // An end that is reached with next to no speed is reached or not within the tolerance.
     let worst_limit = limits.iter().copied().fold(0.0, f64::max);
     let is_open = |event: &Event| (event.state.velocity / problem.impact_speed).powi(2) <= worst_limit;
-    if let Some(event) = answer.left_out(exact, problem).filter(|event| !is_open(event)) {
-        let said = format!("lists events, and not the {} at x = {:.9} m", event.kind.name(), event.state.depth);
+    if let Some(said) = wrong_list(question, &asked, answer, is_open) {
         return in_events(said);
     }
     // The time at which next to no speed is left is known to the root of the tolerance.
@@ -202,6 +198,20 @@ fn judge(question: &Question, rtol: f64, answer: &PeerAnswer) -> Judged {
         return in_events(said);
     }
     judged(Verdict::Passed, String::new(), false)
+}
+
+/// What is wrong with the list of events of `answer`, whatever their numbers; events that are open may be left out.
+pub(super) fn wrong_list(
+    question: &Question,
+    asked: &PeerRequest,
+    answer: &PeerAnswer,
+    is_open: impl Fn(&Event) -> bool,
+) -> Option<String> {
+    if !answer.has_events_in_order(asked) {
+        return Some("the events listed are not of the stages, each once, in the order of time".to_owned());
+    }
+    let event = answer.left_out(&question.exact, &question.problem).filter(|event| !is_open(event))?;
+    Some(format!("lists events, and not the {} at x = {:.9} m", event.kind.name(), event.state.depth))
 }
 
 /// What is proved of the answer's quantity `index` of [`QUANTITIES`]; the numbers of a question are exact.

@@ -69,7 +69,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     let mut right = 1.0;
     for (index, found) in coefficients.as_ref()?.iter().enumerate().take(order) {
         right /= (index + 1) as f64;
-        // Known to fewer digits; and no -0.
+        // Known to no more digits; adding zero makes 0 of -0.
         let found = (1e9 * found).round() / 1e9 + 0.0;
         if (found - right).abs() > ANOTHER * right {
             let tableau = tableau();
