@@ -258,13 +258,18 @@ struct Answered<'a> {
 
 /// Diagnoses `solver`; `progress` is called after each question with the number of questions asked and to be asked.
 pub fn diagnose(solver: &mut dyn Solver, plan: Plan, progress: &dyn Fn(usize, usize)) -> Diagnosis {
-    let identity = solver.identity();
+    let all = questions_to(&solver.identity(), plan);
+    by_questions(solver, &all, progress)
+}
+
+/// The questions of `plan` that a solver of this `identity` is asked, in their order.
+fn questions_to(identity: &PeerIdentity, plan: Plan) -> Vec<Question> {
     let mut all = questions(plan.seed, plan.questions, identity.reads_scene);
     if plan.asks_edges && !identity.fixed_step && !identity.reads_scene {
         all.extend(edge_questions());
     }
     in_order(&mut all);
-    by_questions(solver, &all, progress)
+    all
 }
 
 /// Diagnoses `solver` by `all` questions.

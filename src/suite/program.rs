@@ -83,18 +83,19 @@ impl Program {
     pub fn run_apart(&self, line: &str, given: &[(String, String)]) -> Found<(Said, Vec<(String, String)>)> {
         let words = shlex::split(line).ok_or_else(|| NotMeasured::broken(format!("no command line: {line}")))?;
         let apart = || {
-            let folder = TempDir::new_in(self.folder())?;
+            // Kept up to the end of all: some file systems are slow to make files where others were just removed.
+            let folder = TempDir::new_in(self.folder())?.keep();
             let shipped = SHIPPED.iter().map(|(name, text)| (format!("{name}.toml"), *text));
             let given = given.iter().map(|(name, text)| (name.clone(), text.as_str()));
             let there: Vec<_> = shipped.filter(|(name, _)| words.contains(name)).chain(given).collect();
             for (name, text) in &there {
-                let path = folder.path().join(name);
-                fs::create_dir_all(path.parent().unwrap_or(folder.path()))?;
+                let path = folder.join(name);
+                fs::create_dir_all(path.parent().unwrap_or(&folder))?;
                 fs::write(path, text)?;
             }
-            let said = self.run_words(&words, folder.path())?;
+            let said = self.run_words(&words, &folder)?;
             let mut written = Vec::new();
-            add_files(folder.path(), "", &mut written)?;
+            add_files(&folder, "", &mut written)?;
             written.retain(|(name, _)| !there.iter().any(|(given, _)| given == name));
             Ok((said, written))
         };

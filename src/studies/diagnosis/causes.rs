@@ -506,8 +506,8 @@ impl Evidence<'_> {
         for index in unexplained.iter().take(fitted) {
             let Some(fitting) = self.failing[*index].fit(hypothesis, others, mask) else { continue };
             unfitted += usize::from(fitting.is_empty());
-            // What changes three answers and explains none explains few.
-            if unfitted > 2 && numbers.is_empty() {
+            // What changes three answers and explains none explains few; it may leave fewer where all must be explained.
+            if unfitted > self.left.min(2) && numbers.is_empty() {
                 return None;
             }
             for number in fitting {

@@ -204,12 +204,13 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
                 h *= if off.is_finite() { (0.8 * off.powf(-1.0 / 15.0)).clamp(0.1, 0.7) } else { 0.1 };
                 continue;
             }
-            // From the last place that was asked for, if it is nearer than the start: Newton's method comes ever closer.
+            // From the nearest place that is known: Newton's method comes ever closer to the last one.
             let asked = Cell::new((0.0, [0.0, v]));
             let within = |part: f64| {
-                let (at, [distance, speed]) = asked.get();
-                let [at, distance, speed] =
-                    if (part - at).abs() < part { [at, distance, speed] } else { [0.0, 0.0, v] };
+                let known = [(0.0, [0.0, v]), (h, [distance, speed]), asked.get()];
+                let off = |(at, _): &(f64, [f64; 2])| (part - at).abs();
+                let nearest = known.into_iter().min_by(|one, other| off(one).total_cmp(&off(other)));
+                let (at, [distance, speed]) = nearest.unwrap_or(known[0]);
                 let (place, _) = extrapolated(&a, distance, speed, part - at);
                 asked.set((part, place));
                 place

@@ -3,12 +3,15 @@
 //! What is told is written out, and stands beside each. A wrong number in it is a wrong answer to a person.
 
 use std::cell::Cell;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::super::simulation::{Place, Rules, simulate};
 use super::super::{
-    Asking, Cause, Counts, Diagnosis, Plan, QuantityOrder, Solver, Subject, Verdict, diagnose, measured,
+    Asking, Cause, Counts, Diagnosis, Plan, QuantityOrder, Question, Solver, Subject, Verdict, by_questions, measured,
+    questions_to,
 };
 use super::stepping::{CLASSICAL, Placed, RIGHT, Stepping};
 use super::{answer, failure};
@@ -224,15 +227,34 @@ struct Told {
 /// How many solvers are tried, those that are asked at most `questions`, and which are told anything but what stands beside them.
 pub(crate) fn mistold(questions: usize) -> (usize, Vec<String>) {
     let tried: Vec<&Told> = TOLD.iter().filter(|told| told.asked.questions() <= questions).collect();
+    let shared = Shared::default();
     let wrong = tried.par_iter().filter_map(|Told { what, solver, asked, says }| {
-        let said = said(solver(), *asked);
+        let said = said(solver(), *asked, &shared);
         (said != *says).then(|| format!("{what}: \"{said}\" in place of \"{says}\""))
     });
     (tried.len(), wrong.collect())
 }
 
+/// Questions by their number, whether those at edges are among them, and whether they are of scenes and of fixed steps: what a
+/// fault makes of a question is computed once, and not for each solver.
+#[derive(Default)]
+struct Shared(Mutex<HashMap<(usize, [bool; 3]), Arc<Vec<Question>>>>);
+
+impl Shared {
+    fn questions(&self, identity: &PeerIdentity, plan: Plan) -> Arc<Vec<Question>> {
+        let key = (plan.questions, [plan.asks_edges, identity.reads_scene, identity.fixed_step]);
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let there = known().get(&key).map(Arc::clone);
+        // The lock is not held meanwhile, and the first one made stays.
+        there.unwrap_or_else(|| {
+            let made = Arc::new(questions_to(identity, plan));
+            Arc::clone(known().entry(key).or_insert(made))
+        })
+    }
+}
+
 /// What `solver` is told.
-fn said(mut solver: Answering, asked: Asked) -> String {
+fn said(mut solver: Answering, asked: Asked, shared: &Shared) -> String {
     let words = |cause: Option<&Cause>| {
         cause.map_or_else(String::new, |Cause { id, factor, certainty, statement, .. }| {
             let factor = factor.map_or_else(String::new, |factor| format!(", {factor:.6}"));
@@ -240,7 +262,8 @@ fn said(mut solver: Answering, asked: Asked) -> String {
         })
     };
     let diagnosed = |mut solver: Answering, questions, asks_edges| {
-        let found = diagnose(&mut solver, Plan { seed: 1, questions, asks_edges }, &|_, _| {});
+        let all = shared.questions(&solver.identity(), Plan { seed: 1, questions, asks_edges });
+        let found = by_questions(&mut solver, &all, &|_, _| {});
         format!("{} | {}", found.verdict.name(), words(found.causes.first()))
     };
     match asked {
