@@ -3,6 +3,7 @@
 pub mod audit;
 pub mod batch;
 pub mod bench;
+pub mod causes;
 pub mod completions;
 pub mod converge;
 pub mod critical;
@@ -399,6 +400,8 @@ commands! {
     Audit = "audit": Printing<audit::AuditArgs>,
     /// Is a solver right, and if not, what is wrong with it?
     Diagnose = "diagnose": Printing<diagnose::DiagnoseArgs>,
+    /// The causes that a diagnosis may find, and what each does.
+    Causes = "causes": Printing<causes::CausesArgs>,
     /// The verification suite and its report.
     Verify = "verify": Printing<verify::VerifyArgs>,
     /// Cases at the edges of numbers and events, and random scenes.

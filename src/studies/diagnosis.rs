@@ -29,6 +29,8 @@ use self::fixed_steps::in_fixed_steps;
 #[cfg(feature = "report")]
 pub(crate) use self::hypotheses::changed_by_nothing;
 #[cfg(feature = "report")]
+pub use self::hypotheses::{Effect, KnownCause, known_causes};
+#[cfg(feature = "report")]
 pub(crate) use self::ladder::{LADDER, Limit};
 use self::measurements::measured;
 pub use self::questions::{Content, contents};

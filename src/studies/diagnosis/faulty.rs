@@ -78,17 +78,7 @@ impl Solver for Faulty<'_> {
         let faults: Vec<Fault<'_>> = self
             .faults
             .iter()
-            .map(|(fault, number)| {
-                // Where in its step an event falls differs from question to question.
-                let part = 0.01 * (0.1 + (1e3 * question.exact.end.time / question.exact.end.depth).sin().abs());
-                let number = match fault.parameter {
-                    Parameter::Delay | Parameter::Overshoot => part * question.exact.end.depth,
-                    Parameter::Lateness | Parameter::Bracket => part * question.exact.end.time,
-                    Parameter::Nearness => 1.0 + part,
-                    _ => *number,
-                };
-                (*fault, number)
-            })
+            .map(|(fault, number)| (*fault, fault.parameter.own_example(question).unwrap_or(*number)))
             .collect();
         let (problem, found) = predict(question, &faults, How::Exact).ok_or_else(|| failure("it never ends"))?;
         let is_through = found.end.depth >= question.problem.exit_depth * (1.0 - 1e-12) && problem.has_exit();
@@ -98,22 +88,6 @@ impl Solver for Faulty<'_> {
 
     fn restart(&mut self) -> bool {
         true
-    }
-}
-
-/// The number with which a hypothesis is tried.
-pub(super) fn number(hypothesis: &Hypothesis) -> f64 {
-    match hypothesis.parameter {
-        Parameter::Factor => 1.25,
-        Parameter::Unit => 1e3,
-        Parameter::Exponent(_) => 1.7,
-        Parameter::Speed => 0.5,
-        Parameter::Fraction | Parameter::Offset => 0.01,
-        // Few digits or stages, or a grain that is seen.
-        Parameter::OneOf(numbers) if numbers[0] < 1.0 => numbers[numbers.len() / 2],
-        Parameter::OneOf(numbers) => numbers[1],
-        Parameter::Value(usual) | Parameter::Threshold(usual, _) => usual,
-        _ => 1.0,
     }
 }
 
@@ -153,7 +127,7 @@ pub(crate) fn misnamed(seed: u64, count: usize, each: usize) -> (usize, Vec<Stri
     };
     let all: Vec<&'static Hypothesis> = hypotheses().filter(is_tried).step_by(each.max(1)).collect();
     let missed = all.par_iter().filter_map(|hypothesis| {
-        let number = number(hypothesis);
+        let number = hypothesis.parameter.example();
         let questions = &of_stages_and_of_scenes[usize::from(hypothesis.needs_scene())];
         let found = Faulty::new(vec![(hypothesis, number)], questions).diagnosed();
         let first = found.causes.first();

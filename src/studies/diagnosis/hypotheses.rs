@@ -64,7 +64,14 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 #[cfg(feature = "report")]
-use super::questions::questions;
+use rayon::prelude::*;
+#[cfg(feature = "report")]
+use serde::Serialize;
+
+#[cfg(feature = "report")]
+use super::Each;
+#[cfg(feature = "report")]
+use super::questions::{Content, questions};
 use super::questions::{Earlier, Question};
 use super::simulation::{AtStageEnd, Force, Rules, Simulated, simulate, solve};
 use crate::exchange::peers::wire::conditioning;
@@ -201,6 +208,38 @@ impl Parameter {
             Self::Nearness => vec![1.0],
             Self::Exponent(right) => vec![right],
             _ => Vec::new(),
+        }
+    }
+
+    /// A number as it may be.
+    #[cfg(any(test, feature = "report"))]
+    pub(super) fn example(self) -> f64 {
+        match self {
+            Self::Factor => 1.25,
+            Self::Unit => 1e3,
+            Self::Exponent(_) => 1.7,
+            Self::Speed => 0.5,
+            Self::Fraction | Self::Offset => 0.01,
+            // Few digits or stages, or a grain that is seen.
+            Self::OneOf(numbers) if numbers[0] < 1.0 => numbers[numbers.len() / 2],
+            Self::OneOf(numbers) => numbers[1],
+            Self::Value(usual) | Self::Threshold(usual, _) => usual,
+            _ => 1.0,
+        }
+    }
+
+    /// A number as the answer to `question` may have it, where each answer has its own; `None` for one of all answers.
+    #[cfg(any(test, feature = "report"))]
+    pub(super) fn own_example(self, question: &Question) -> Option<f64> {
+        let end = question.exact.end;
+        // Where in its step an event falls differs from question to question.
+        let part = 0.01 * (0.1 + (1e3 * end.time / end.depth).sin().abs());
+        match self {
+            Self::Delay | Self::Overshoot => Some(part * end.depth),
+            Self::Lateness | Self::Bracket => Some(part * end.time),
+            Self::Nearness => Some(1.0 + part),
+            Self::Choice(of) => of(question).into_iter().find(|number| *number != 1.0),
+            _ => None,
         }
     }
 
@@ -438,6 +477,74 @@ impl Hypothesis {
         self.statement.replacen("{}", &shown, 1)
     }
 }
+
+/// A cause that is known by what it would answer.
+#[cfg(feature = "report")]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+pub struct KnownCause {
+    /// Id (`docs/reference.md`, "Diagnosis").
+    pub id: &'static str,
+    /// What is wrong, with a number as it may be.
+    pub statement: String,
+    /// What a solver with it reads: `stages`, which every solver may, or `scene`.
+    pub reads: &'static str,
+    /// What a solver that is right but for it answers.
+    pub effects: Vec<Effect>,
+}
+
+/// What a fault makes of one question.
+#[cfg(feature = "report")]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+pub struct Effect {
+    /// Name of the question.
+    pub question: String,
+    /// What its flight meets.
+    pub contains: Vec<Content>,
+    /// The right end.
+    pub right: State,
+    /// The end with the fault.
+    pub answer: State,
+    /// Relative differences, of the velocity over V0.
+    pub relative_error: Each,
+}
+
+/// Every cause that is known by what it would answer, with what it makes of the first `effects` of `count` questions from `seed`
+/// that it concerns. One that no flight shows has none.
+#[cfg(feature = "report")]
+pub fn known_causes(seed: u64, count: usize, effects: usize) -> Vec<KnownCause> {
+    let of_stages_and_of_scenes = [false, true].map(|of_scenes| questions(seed, count, of_scenes));
+    let known = |fault: &'static Hypothesis| {
+        let number = fault.parameter.example();
+        let effect = |question: &Question| {
+            let number = fault.parameter.own_example(question).unwrap_or(number);
+            let (_, Simulated { end: answer, .. }) = predict(question, &[(fault, number)], How::Exact)?;
+            let right = question.exact.end;
+            let off = errors(answer, right, question.problem.impact_speed);
+            let is_concerned =
+                off.iter().zip(question.conditions).any(|(off, condition)| off.abs() > SHOWN * condition);
+            is_concerned.then(|| Effect {
+                question: question.id.clone(),
+                contains: question.contains.clone(),
+                right,
+                answer,
+                relative_error: Each::of(off),
+            })
+        };
+        let asked = of_stages_and_of_scenes[usize::from(fault.needs_scene())].iter();
+        let usable = asked.filter(|question| question.problem.impact_speed > 0.0 && !question.is_on_a_border());
+        KnownCause {
+            id: fault.id,
+            statement: fault.says(number),
+            reads: if fault.needs_scene() { "scene" } else { "stages" },
+            effects: usable.filter_map(effect).take(effects).collect(),
+        }
+    };
+    hypotheses().collect::<Vec<_>>().into_par_iter().map(known).collect()
+}
+
+/// A difference over its condition that is no rounding.
+#[cfg(feature = "report")]
+const SHOWN: f64 = 1e-9;
 
 /// Faults that change an answer at the very number at which nothing is wrong, as sentences, and how many answers were looked at:
 /// to `count` questions about stages and as many about scenes. A fault with another number would be named with a wrong one.

@@ -8,7 +8,7 @@ mod ties;
 pub use self::{printed::*, report::*, ties::*};
 use super::Subject;
 use crate::suite::claim::{Found, Measurement, NotMeasured};
-use crate::suite::transcript::{TRANSCRIPTS, Transcript};
+use crate::suite::transcript::{TRANSCRIPTS, Transcript, misjudged};
 
 check! {
     /// A run of the program: exit codes other than the stated one.
@@ -26,6 +26,9 @@ check! {
         /// Relative tolerance of the numbers.
         tolerance: f64,
     } in Commands, "lines that differ", by recorded, compares nothing;
+
+    /// A recorded run beside itself with a change: changes that are not seen, and round-off that is called a difference.
+    ChangedRecord {} in Commands, "changes", by changed_record, compares nothing;
 }
 
 fn exits(Exits { run, code }: &Exits, subject: &Subject<'_>) -> Found {
@@ -34,6 +37,12 @@ fn exits(Exits { run, code }: &Exits, subject: &Subject<'_>) -> Found {
     let cause = if is_right { "" } else { said.err.trim() };
     let remark = format!("`penetrode {run}` exits {} {cause}", said.code);
     Ok(Measurement::count(usize::from(!is_right)).remark(remark.trim()))
+}
+
+fn changed_record(_: &Subject<'_>) -> Found {
+    let (tried, wrong) = misjudged()?;
+    let remark = wrong.first().map_or_else(|| format!("{tried} changes"), |change| format!("misjudged: {change}"));
+    Ok(Measurement::count(wrong.len()).remark(remark).cases(tried))
 }
 
 fn recorded(Recorded { runs, tolerance }: &Recorded, subject: &Subject<'_>) -> Found {

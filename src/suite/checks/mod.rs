@@ -160,7 +160,7 @@ macro_rules! every_check {
 every_check! {
     Gradients UnlikeUnits TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
-    Exits Recorded Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
+    Exits Recorded ChangedRecord Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
     BatchRows SweepRows MapLines SetsOfTests StepErrors BenchLevels ThreeGridRule Report
     KnownBad Counted Remeasured Independent
     Reference Agreement Stated Margin Outcome Pair EventOrder

@@ -773,6 +773,13 @@ fn wire_answer(&WireAnswer { problems }: &WireAnswer, subject: &Subject<'_>, see
                 near(found.relative, *relative) && near(found.conditioning, *conditioning)
             });
         seen.expect(is_all, || format!("answer {index} differs by {differences:?} for {expected:?}"));
+        // What names no outcome has that of its depth.
+        let request = PeerRequest { exit_depth_m: Some(end.depth), ..PeerRequest::from_problem(&problem, 1e-9) };
+        for (share, perforates) in [(0.5, false), (1.0 - 1e-6, false), (1.0 - 1e-10, true), (1.0, true), (1.2, true)] {
+            let named = request.outcome_at(share * end.depth);
+            let is_named = (named == Outcome::Perforated) == perforates;
+            seen.expect(is_named, || format!("answer {index} at {share} of the exit depth is named {named:?}"));
+        }
         let contrary = Flight { outcome: if rests { Outcome::Perforated } else { Outcome::Stopped }, ..flight };
         let is_refused = read.differences_from(&contrary, &problem).is_none();
         seen.expect(is_refused, || format!("answer {index} is compared with a contrary one"));

@@ -238,7 +238,9 @@ pub(crate) fn mistold(questions: usize) -> (usize, Vec<String>) {
 /// Questions by their number, whether those at edges are among them, and whether they are of scenes and of fixed steps: what a
 /// fault makes of a question is computed once, and not for each solver.
 #[derive(Default)]
-struct Shared(Mutex<HashMap<(usize, [bool; 3]), Arc<Vec<Question>>>>);
+struct Shared(Mutex<HashMap<Kind, Arc<Vec<Question>>>>);
+
+type Kind = (usize, [bool; 3]);
 
 impl Shared {
     fn questions(&self, identity: &PeerIdentity, plan: Plan) -> Arc<Vec<Question>> {
