@@ -737,6 +737,18 @@ const TOLD: &[Told] = &[
         says: "failed | stiffness-origin, likely: the depth in s x is counted from the start of the stage, not from the impact face",
     },
     Told {
+        what: "the velocity at exits is a hundredth too great, in fixed steps",
+        solver: || {
+            central(|_, _, flight| {
+                if flight.outcome == Outcome::Perforated {
+                    flight.end.velocity *= 1.01;
+                }
+            })
+        },
+        asked: Questions(24),
+        says: "failed | unit:velocity, certain, 1.010000: the velocity reported is 1.010000 times the right one",
+    },
+    Told {
         what: "the velocity listed at the end of a stage is that at its start",
         solver: || {
             listing_in_steps(VelocityAt::PredictedHalfStep, Boundaries::Landed, |problem, events| {
