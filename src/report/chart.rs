@@ -834,6 +834,19 @@ mod tests {
     }
 
     #[test]
+    fn shared_axes_hold_the_points_of_every_panel_and_nothing_else() {
+        let panel = |point| {
+            let (x, y) = (Axis::linear("velocity", "m/s"), Axis::linear("depth", "m"));
+            Panel::new("a panel", x, y).series("a series", Style::nested(0), [point])
+        };
+        let mut panels = [panel((800.0, 1.0)), panel((300.0, 2.0))];
+        Panel::share_axes(&mut panels);
+        for panel in &panels {
+            assert_eq!((&panel.x.included[..], &panel.y.included[..]), (&[800.0, 300.0][..], &[1.0, 2.0][..]));
+        }
+    }
+
+    #[test]
     fn numbers_beyond_five_digits_leave_their_power_to_the_label() {
         let strength = Axis::linear("strength", "Pa");
         assert_eq!(labels(&strength, [2e7, 6e7]), ["2", "3", "4", "5", "6"]);

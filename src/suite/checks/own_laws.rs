@@ -29,16 +29,20 @@ const V1: f64 = 200.0;
 type Term = (&'static str, fn(f64, f64) -> f64);
 
 /// What coefficients of a stage can say.
-const POLYNOMIALS: [Term; 5] = [
+const POLYNOMIALS: [Term; 9] = [
     ("x/l", |x, _| x),
     ("V/v1", |_, v| v),
     ("(V/v1)^2", |_, v| v * v),
     ("V*V/v1^2", |_, v| v * v),
     ("(x/l - 0.5)", |x, _| x - 0.5),
+    ("(0.5 + V/v1)*(1 + 0.7*V/v1)", |_, v| (0.5 + v) * (1.0 + 0.7 * v)),
+    ("(0.3 + V/v1)^2", |_, v| (0.3 + v) * (0.3 + v)),
+    ("(V/v1 - (0.2 + x/l))/0.8", |x, v| (v - (0.2 + x)) / 0.8),
+    ("((1 + x/l)*(1 - x/l) + x/l*x/l)", |_, _| 1.0),
 ];
 
 /// What they cannot.
-const OTHERS: [Term; 14] = [
+const OTHERS: [Term; 16] = [
     ("(V/v1)^1.5", |_, v| v.powf(1.5)),
     ("tanh(3*x/l)", |x, _| (3.0 * x).tanh()),
     ("exp(-V/v1)", |_, v| (-v).exp()),
@@ -53,6 +57,8 @@ const OTHERS: [Term; 14] = [
     ("atan(2*V/v1)", |_, v| (2.0 * v).atan()),
     ("(1 + V/v1)^-0.75", |_, v| (1.0 + v).powf(-0.75)),
     ("x*V/(l*v1)", |x, v| x * v),
+    ("(1 + 0.4*x/l)*(0.5 + V/v1)", |x, v| (1.0 + 0.4 * x) * (0.5 + v)),
+    ("(0.6 + x/l)*(1 - 0.5*x/l)", |x, _| (0.6 + x) * (1.0 - 0.5 * x)),
 ];
 
 /// A narrow place, which resists or drives.
