@@ -46,15 +46,20 @@ impl Ask for CausesArgs {
     }
 }
 
-/// Each cause with the first question that shows it.
+/// The causes by id, each with the first question that shows it.
 fn text(causes: &[KnownCause]) -> String {
     let mut text = Text::default();
+    let mut before = "";
     for KnownCause { id, statement, effects, .. } in causes {
-        text.wrapped("", &format!("{id}: {statement}"));
+        if *id != before {
+            text.line((*id).to_owned());
+            before = id;
+        }
+        text.wrapped("  ", statement);
         if let Some(Effect { question, relative_error: Each { depth, time, velocity }, .. }) = effects.first() {
             let off = |value: f64| if value == 0.0 { "0".to_owned() } else { format!("{value:+.2e}") };
             let (depth, time, velocity) = (off(*depth), off(*time), off(*velocity));
-            text.wrapped("  ", &format!("{question}: depth {depth}, time {time}, V {velocity}"));
+            text.wrapped("    ", &format!("{question}: depth {depth}, time {time}, V {velocity}"));
         }
     }
     text.finish()

@@ -619,9 +619,12 @@ impl OwnLaw {
         Ok((Some(found), beyond <= error(found)))
     }
 
+    /// The force; below rest, where a step may look for it, along its tangent at rest. A kink there would spoil the interpolant
+    /// on which rest is located.
     fn force(&self, y: &[f64]) -> f64 {
         let (depth, velocity) = self.place(y);
-        self.law.force(depth, velocity) * self.acceleration
+        let force = self.law.force(depth, velocity) * self.acceleration;
+        if y[1] < 0.0 { force + self.slopes(y).1 * y[1] } else { force }
     }
 
     /// Derivatives of the force by depth and velocity; zero where it has none, as a power below one at rest.

@@ -93,8 +93,8 @@ pub fn growth(growth: &[Growth]) -> impl Iterator<Item = [String; 6]> {
             format!("{:?}", g.source).to_lowercase(),
             g.threads.to_string(),
             number(g.seconds, 3),
-            number(1e-3 * g.ns_a_scene, 3),
-            or_dash(g.peak_bytes.map(|bytes| 1e-6 * bytes as f64), |megabytes| number(megabytes, 3)),
+            number(g.microseconds_a_scene(), 3),
+            or_dash(g.peak_megabytes(), |megabytes| number(megabytes, 3)),
         ]
     })
 }

@@ -425,7 +425,7 @@ impl<'a, S: Scalar> Run<'a, S> {
     /// The solution, whose last event is its end.
     fn finish(mut self) -> Flight<S> {
         let problem = self.stepper.problem;
-        self.stepper.leave_stage();
+        self.stepper.judge_steps();
         // A place at a stage end belongs to the stage that ends there.
         let place = if self.course.is_through { problem.exit_depth } else { self.course.state.depth };
         if self.course.is_through {

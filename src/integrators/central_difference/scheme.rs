@@ -396,7 +396,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub(super) fn enter_stage_at(&mut self, x: S) {
         let stage = stage_at(self.problem, self.stage, x);
         if stage != self.stage {
-            self.leave_stage();
+            self.judge_steps();
             self.stage = stage;
             self.law = Rule::of(self.problem, stage, self.mass, State { depth: x, ..self.state() });
         }
@@ -404,14 +404,15 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Enters `stage` at a state with `mass` moving, and starts afresh.
     pub(super) fn enter(&mut self, stage: usize, mass: S, state: State<S>) {
-        self.leave_stage();
+        self.judge_steps();
         (self.stage, self.mass) = (stage, mass);
         self.law = Rule::of(self.problem, stage, mass, state);
         self.start(state);
     }
 
-    /// Adds the stability limit of the present stage to that of the stages before, if a step was taken in it.
-    pub(super) fn leave_stage(&mut self) {
+    /// Compares the longest step since the last call with the stability limit at the greatest speed since. Called where a
+    /// stage ends, and behind each step of a clock that changes its steps.
+    pub(super) fn judge_steps(&mut self) {
         if self.step_max > 0.0 {
             let at = State { velocity: S::from_f64(self.speed_max), ..self.state() };
             let law = &self.problem.linear(self.stage, at);
@@ -483,6 +484,11 @@ impl<'a, S: Scalar> Stepper<'a, S> {
                 break Pause::Condition(next);
             }
             here = next;
+            if !matches!(clock, Clock::Equal { .. }) {
+                (self.node, self.speed_max, self.step_max) = (here, speed_max, step_max);
+                self.judge_steps();
+                (speed_max, step_max) = (0.0, 0.0);
+            }
             clock.tick();
             taken += 1;
             speed_max = speed_max.max(here.v.value());

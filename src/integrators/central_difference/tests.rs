@@ -860,3 +860,17 @@ fn where_a_stage_has_no_longest_step_the_last_one_is_kept() {
     let scheme = CentralDifference { steps: Steps::Automatic(0.5), ..CentralDifference::default() };
     assert_eq!(scheme.time_step(&endless), default_time_step(&endless, scheme.velocity));
 }
+
+/// Steps that grow as the drag falls lie within its limit for S < 1. The shorter of the limits of a spring and a drag is
+/// beyond that of both.
+#[test]
+fn each_automatic_step_is_compared_with_the_limit_at_its_own_speed() {
+    let spring = MASS * (DRAG * SPEED / MASS).powi(2);
+    for (stiffness, safety, stable) in [(0.0, 0.1, true), (0.0, 0.99, true), (spring, 0.6, true), (spring, 0.9, false)]
+    {
+        let scheme = CentralDifference { steps: Steps::Automatic(safety), ..CentralDifference::default() };
+        let problem = endless(&[stage(STRENGTH, stiffness, 0.0, DRAG, INF)]);
+        let flight = scheme.solve(&problem, Detail::Events).unwrap();
+        assert_eq!(flight.step_limit.map(|limit| limit.stable), Some(stable), "s = {stiffness}, S = {safety}");
+    }
+}

@@ -544,6 +544,27 @@ fn a_force_without_a_value_ahead_is_named_where_steps_are_lost() {
     }
 }
 
+/// The step that finds rest looks behind it, where the force goes on without a kink.
+#[test]
+fn rest_behind_a_narrow_place_is_located_to_the_tolerance() {
+    for speed in (200..240).step_by(2) {
+        let text = format!(
+            "projectile.mass = 2\nimpact.velocity = {speed}\ntarget.thickness = 0.2627\n[parameters]\nP = '300 kN'\n\
+             l = '0.2 m'\nv1 = '200 m/s'\n[[stage]]\nforce = 'P*(0.94 + 0.41*log(1 + V/v1) - 0.4*sin(4*x/l) \
+             + 0.065*cos(3*V/v1) - 0.35*(0.6 + x/l)*(1 - 0.5*x/l) + 4.82*exp(-((x/l - 0.35)/0.04)^2))'\n"
+        );
+        let problem = Scene::from_toml(&text, "narrow").unwrap().problem().unwrap();
+        let exact = Energy::new().solve(&problem, Detail::End).unwrap();
+        for (name, method) in methods(1e-10) {
+            let found = method.integrator().solve(&problem, Detail::End).unwrap();
+            let error = (found.end.time / exact.end.time - 1.0).abs();
+            let allowed = if is_exact(name) { 1e-14 } else { 10.0 * name.promise_at(1e-10) };
+            assert_eq!(found.outcome, Outcome::Stopped, "{name}, {speed} m/s");
+            assert!(error <= allowed, "{name}, {speed} m/s: {error:e}");
+        }
+    }
+}
+
 /// `P (V/v1)^-n` stops it at `M v1²/(P (2 + n)) (V0/v1)^(2 + n)`.
 #[test]
 fn a_force_without_bound_at_rest_brings_it_to_rest() {

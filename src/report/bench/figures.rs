@@ -143,9 +143,7 @@ fn growth(growth: &[Growth]) -> Option<Figure> {
     };
     let time = Axis::log("time for each scene", "µs");
     let memory = Axis::linear("peak memory", "MB").including([0.0]);
-    let panels = vec![
-        panel("time", time, |g| Some(1e-3 * g.ns_a_scene)),
-        panel("memory", memory, |g| g.peak_bytes.map(|bytes| 1e-6 * bytes as f64)),
-    ];
+    let panels =
+        vec![panel("time", time, |g| Some(g.microseconds_a_scene())), panel("memory", memory, Growth::peak_megabytes)];
     Figure::new("growth", "", &[], &[], panels)
 }

@@ -42,6 +42,18 @@ pub struct Growth {
     pub runs: usize,
 }
 
+impl Growth {
+    /// Time over the scenes (µs).
+    pub fn microseconds_a_scene(&self) -> f64 {
+        1e-3 * self.ns_a_scene
+    }
+
+    /// Peak memory (MB).
+    pub fn peak_megabytes(&self) -> Option<f64> {
+        self.peak_bytes.map(|bytes| 1e-6 * bytes as f64)
+    }
+}
+
 /// Where scenes come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

@@ -161,7 +161,7 @@ every_check! {
     Gradients UnlikeUnits TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded ChangedRecord Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
-    BatchRows SweepRows MapLines SetsOfTests StepErrors BenchLevels ThreeGridRule Report
+    BatchRows SweepRows MapLines SetsOfTests StepErrors BenchFigures BenchLevels ThreeGridRule Report
     KnownBad Counted Remeasured Independent
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion

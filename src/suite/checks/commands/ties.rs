@@ -9,6 +9,7 @@ use super::answer::{Answer, Table, apart, of, run};
 use crate::integrators::MethodName;
 use crate::suite::checks::{Subject, Worst};
 use crate::suite::claim::{Found, NotMeasured};
+use crate::suite::program::Said;
 
 check! {
     /// Rows of a trajectory: the force is the law of its stage there, the first row the start, the last the end, and each
@@ -56,6 +57,10 @@ check! {
 
     /// `bench`: of the text, the least error of each method and the setting that reaches each level, by the runs in JSON.
     BenchLevels {} in Commands, "relative", by bench_levels, compares (Commands | Itself);
+
+    /// `bench`: each point of the figures of cost and growth is a run in JSON, and each run a point; times of scenes are those of
+    /// the runs over the scenes, and memory is in whole pages.
+    BenchFigures {} in Commands, "relative", by bench_figures, compares (Commands | Itself);
 
     /// Each column of `batch` on random rows against `solve` and `critical` on the same numbers.
     BatchRows {
@@ -805,10 +810,69 @@ fn step_errors(StepErrors { options }: &StepErrors, subject: &Subject<'_>) -> Fo
     Ok(worst.measurement())
 }
 
+/// A point of a figure: the figure, words on its axis, series, and both numbers.
+type Drawn = (String, String, String, [f64; 2]);
+
+/// Adds to `worst` how far each of `points` is from the nearest of `others`.
+fn not_among(points: &[Drawn], others: &[Drawn], worst: &mut Worst) {
+    for (figure, words, series, at) in points {
+        let alike = others.iter().filter(|other| (&other.0, &other.1, &other.2) == (figure, words, series));
+        let off = |other: &Drawn| apart(other.3[0], at[0]).max(apart(other.3[1], at[1]));
+        let off = alike.map(off).fold(f64::INFINITY, f64::min);
+        worst.take(off, || format!("{figure}, {words}, {series}: {at:?}"));
+    }
+}
+
+fn bench_figures(subject: &Subject<'_>) -> Found {
+    const PAGE: f64 = 4096.0;
+    let scene = subject.scene_name()?;
+    let line = format!("bench {scene} --parts work-precision,scaling --most 10 --repeats 1 --out r");
+    let (answer, files) = Answer::and_files(subject.program()?, &line, &[])?;
+    let [cost, growth] = [format!("cost-{scene}"), "growth".to_owned()];
+    let (mut worst, mut stated) = (Worst::default(), Vec::<Drawn>::new());
+    for run in answer.list("runs").iter().filter(|run| run["state"] == "right") {
+        let costs = [
+            ("time of a solution [µs]", 1e-3 * of(&run["time"], "median_ns")),
+            ("force evaluations of a solution", of(run, "force_evaluations")),
+        ];
+        let name = run["method"].as_str().unwrap_or_default();
+        let points = costs.map(|(words, x)| (cost.clone(), words.to_owned(), name.to_owned(), [x, of(run, "error")]));
+        stated.extend(points.into_iter().filter(|point| point.3[0] > 0.0));
+    }
+    for row in answer.list("growth") {
+        let [scenes, seconds, threads, bytes] =
+            ["scenes", "seconds", "threads", "peak_bytes"].map(|name| of(row, name));
+        let (time, series) =
+            (1e6 * seconds / scenes, format!("{threads} thread{}", if threads > 1.0 { "s" } else { "" }));
+        worst.take(apart(of(row, "ns_a_scene"), 1e3 * time), || format!("time of one of {scenes} scenes"));
+        stated.push((growth.clone(), "time for each scene [µs]".to_owned(), series.clone(), [scenes, time]));
+        // No system need count the memory; one that does counts pages.
+        if bytes.is_finite() {
+            worst.take(must(bytes % PAGE == 0.0), || format!("{bytes} bytes"));
+            stated.push((growth.clone(), "peak memory [MB]".to_owned(), series, [scenes, 1e-6 * bytes]));
+        }
+    }
+    holds!(stated.len() > 100, "{} points", stated.len());
+    let mut drawn = Vec::<Drawn>::new();
+    for (figure, axis) in [(cost, "x_axis"), (growth, "y_axis")] {
+        let path = format!("r/tables/{figure}.csv");
+        let file = files.iter().find(|(name, _)| *name == path);
+        let table = Table::read(&file.ok_or_else(|| NotMeasured::broken(format!("no {path}")))?.1)?;
+        for row in &table.rows {
+            let [words, series] = [table.cell(row, axis)?, table.cell(row, "series")?].map(str::to_owned);
+            drawn.push((figure.clone(), words, series, [table.number(row, "x")?, table.number(row, "y")?]));
+        }
+    }
+    not_among(&stated, &drawn, &mut worst);
+    not_among(&drawn, &stated, &mut worst);
+    Ok(worst.measurement())
+}
+
 fn bench_levels(subject: &Subject<'_>) -> Found {
-    let line = format!("bench {} --parts work-precision --repeats 1", subject.scene_name()?);
-    let answer = Answer::of(subject.program()?, &line, &[])?;
-    let (said, _) = run(subject.program()?, &line, &[])?;
+    let line = format!("bench {} --parts work-precision --repeats 1 --out r", subject.scene_name()?);
+    let (said, files) = run(subject.program()?, &line, &[])?;
+    let report = files.into_iter().find(|(path, _)| path == "r/report.json").unwrap_or_default().1;
+    let answer = Answer::read(&line, &Said { out: report, ..said.clone() })?;
     let (mut worst, mut rows) = (Worst::default(), 0);
     let mut levels: Vec<f64> = Vec::new();
     for row in said.out.lines() {
