@@ -230,6 +230,12 @@ impl<S: Scalar> Problem<S> {
         for (index, law) in stages.iter().enumerate().filter(|(_, law)| law.stiffness.value() < 0.0) {
             let is_static = law.viscosity.value() == 0.0 && law.drag.value() == 0.0;
             assert!(is_static, "stage {index} has viscosity or drag beside a force that falls with depth");
+            let start = if index > 0 { stages[index - 1].end.value() } else { 0.0 };
+            let [from, to] = [start, law.end.value()].map(|x| law.static_force.value() + law.stiffness.value() * x);
+            // Where the stage ends at the zero of the force, round-off is left of it.
+            let rounding = 4.0 * f64::EPSILON * law.static_force.value().abs();
+            let keeps_sign = from <= rounding || to >= -rounding || law.end.value() == f64::INFINITY;
+            assert!(keeps_sign, "the force of stage {index} falls through zero: end a stage there");
         }
         Self { mass, impact_speed, exit_depth, stages, crater: None, target: Target::Stages, laws: Laws::none() }
     }
@@ -530,6 +536,13 @@ mod tests {
         let c = continuous.stages[0].stiffness;
         let v1 = (300.0_f64.powi(2) - c * 0.01 / 2.0).sqrt();
         approx::assert_relative_eq!(c * 0.1, tunnel.force(0.1, v1), max_relative = 1e-14);
+    }
+
+    #[test]
+    #[should_panic(expected = "the force of stage 0 falls through zero")]
+    fn a_force_that_falls_through_zero_inside_a_stage_is_refused() {
+        let falling = Stage { stiffness: -10.0, ..Stage::tunnel(2.0, 0.0) };
+        Problem::of_stages(1.0, 1.0, [falling.until(0.3), Stage::tunnel(1.0, 0.0)]);
     }
 
     #[test]

@@ -22,7 +22,6 @@ use rayon::prelude::*;
 
 use super::claim::{Found, NotMeasured};
 use super::program::Program;
-use crate::integrators::MethodName;
 
 macro_rules! recorded {
     ($($name:literal),* $(,)?) => {
@@ -124,24 +123,6 @@ impl Transcript {
             run.again(&given, program)
         };
         program.waiting(|| self.0.par_iter().enumerate().map(again).collect::<Found<_>>()).map(Self)
-    }
-
-    /// The runs that this build can make: those that use no method that it leaves out, and `bench` uses each. Solvers that
-    /// are given with `--peer` or diagnosed are shell scripts.
-    #[must_use]
-    pub fn possible(self) -> Self {
-        let is_whole = MethodName::ALL.iter().all(|name| name.is_built());
-        let is_left_out = |word: &str| match word {
-            "--peer" | "diagnose" => !cfg!(unix),
-            "bench" => !is_whole,
-            _ => word.parse::<MethodName>().is_ok_and(|name| !name.is_built()),
-        };
-        let is_possible = |run: &Run| {
-            let given = run.given.iter().flat_map(|text| &text.lines);
-            let mut words = given.chain([&run.line]).flat_map(|line| line.split([' ', '"', ',']));
-            !words.any(is_left_out)
-        };
-        Self(self.0.into_iter().filter(is_possible).collect())
     }
 
     /// How many runs.

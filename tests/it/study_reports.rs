@@ -132,7 +132,9 @@ fn the_report_of_a_scheme_shows_its_orders_its_table_and_its_uncertainty() {
     assert_eq!(row("stiffness,"), "stiffness,1,1,1,1,1,1,1,1");
     assert_eq!(row("drag,"), "drag,1,1,1,1,0,0,0,0");
     assert!(
-        page.contains("The path does not meet, and nothing is shown of: driving force, later stiffness, viscosity,"),
+        page.contains(
+            "The path does not meet, and nothing is shown of: driving force, later stiffness, softening, viscosity,"
+        ),
         "{page:.900}"
     );
     let table = report.file("tables/grid-convergence.csv");

@@ -520,7 +520,7 @@ const LOWERS: &[(&str, &[Content], &str)] = &[
     ("drag-lagged", &[Content::Drag, Content::Viscosity], "the order falls to 1 where the force depends on V"),
     (
         "force-stale",
-        &[Content::Stiffness, Content::LaterStiffness],
+        &[Content::Stiffness, Content::LaterStiffness, Content::Softening],
         "the order falls to 1 where the force depends on x: its depth is that of another time",
     ),
     ("stage-end-late", &[Content::ForceJump], "the order falls to 1 where the force jumps at the end of a stage"),

@@ -47,6 +47,8 @@ pub enum Content {
     Stiffness,
     /// A spring in a later stage.
     LaterStiffness,
+    /// A force that falls with the depth, as a piece of a table may.
+    Softening,
     /// A force proportional to V.
     Viscosity,
     /// A force proportional to V².
@@ -186,11 +188,12 @@ impl Question {
 
 impl Content {
     /// What a force is made of.
-    pub const TERMS: [Self; 11] = [
+    pub const TERMS: [Self; 12] = [
         Self::StaticForce,
         Self::Drive,
         Self::Stiffness,
         Self::LaterStiffness,
+        Self::Softening,
         Self::Viscosity,
         Self::Drag,
         Self::AirGap,
@@ -248,6 +251,7 @@ pub fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec
         (in_any(|law| law.static_force < 0.0), Content::Drive),
         (spring(&met[0]), Content::Stiffness),
         (met[1..].iter().any(spring), Content::LaterStiffness),
+        (in_any(|law| law.stiffness < 0.0), Content::Softening),
         (in_any(|law| law.viscosity > 0.0), Content::Viscosity),
         (in_any(|law| law.drag > 0.0), Content::Drag),
         (met.iter().any(free), Content::AirGap),
@@ -342,7 +346,7 @@ fn stiff(random: &mut Random) -> Problem {
 }
 
 /// The families in the order in which they are asked: what tells causes apart first.
-const FAMILIES: [Family; 30] = [
+const FAMILIES: [Family; 31] = [
     Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
     Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
     Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
@@ -388,6 +392,22 @@ const FAMILIES: [Family; 30] = [
             );
             let off = if random.chance(0.5) { 0.2 } else { -0.02 };
             near_rest(problem, off)
+        },
+    },
+    Family {
+        name: "softening",
+        // A piece of a table: the force falls with the depth and keeps its sign, one that slows or one that drives.
+        draw: |random| {
+            let soft = random.below(2);
+            let problem = layered(random, 2, |random, scale, index| {
+                if index != soft {
+                    return mixed(random, scale);
+                }
+                let force = random.log_uniform(0.3, 2.0);
+                let [static_force, most] = if random.chance(0.5) { [force, 2.4] } else { [-0.5 * force, 8.0] };
+                scale.stage([static_force, -force * random.uniform(0.5, most), 0.0, 0.0])
+            });
+            near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.2 })
         },
     },
     Family { name: "driven", draw: |random| Kind::Driven.draw(random) },

@@ -6,7 +6,7 @@ mod report;
 mod ties;
 
 pub use self::{printed::*, report::*, ties::*};
-use super::Subject;
+use super::{Subject, complete_build};
 use crate::suite::claim::{Found, Measurement, NotMeasured};
 use crate::suite::transcript::{TRANSCRIPTS, Transcript, misjudged};
 
@@ -48,8 +48,11 @@ fn changed_record(_: &Subject<'_>) -> Found {
 fn recorded(Recorded { runs, tolerance }: &Recorded, subject: &Subject<'_>) -> Found {
     let program = subject.program()?;
     let text = TRANSCRIPTS.iter().find(|(name, _)| name == runs).map(|(_, text)| *text);
-    let recorded =
-        Transcript::read(text.ok_or_else(|| NotMeasured::broken(format!("no transcript {runs}")))?)?.possible();
+    let recorded = Transcript::read(text.ok_or_else(|| NotMeasured::broken(format!("no transcript {runs}")))?)?;
+    complete_build()?;
+    if !cfg!(unix) {
+        return Err(NotMeasured::lacks("solvers of the recorded runs are shell scripts"));
+    }
     let found = recorded.differences(&recorded.again(program)?, *tolerance);
     let remark = if found.lines == 0 { format!("{} runs", recorded.len()) } else { found.first };
     Ok(Measurement::count(found.lines).remark(remark).cases(recorded.len()))

@@ -294,11 +294,19 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// The method `name`; one that this build lacks makes the claim inapplicable.
+/// Makes a claim about the method `name` inapplicable where this build lacks it.
+fn must_be_built(name: MethodName) -> Found<()> {
+    if name.is_built() { Ok(()) } else { Err(NotMeasured::lacks(format!("this build leaves out {name}"))) }
+}
+
+/// The same of every method.
+fn complete_build() -> Found<()> {
+    MethodName::ALL.iter().copied().try_for_each(must_be_built)
+}
+
+/// The method `name`.
 fn build(name: MethodName, options: &MethodOptions) -> Found<Method> {
-    if !name.is_built() {
-        return Err(NotMeasured::lacks(format!("this build leaves out {name}")));
-    }
+    must_be_built(name)?;
     Ok(Method::new(name, options)?)
 }
 

@@ -24,19 +24,21 @@ fn is_in(part: u8, index: usize, count: usize) -> bool {
     }
 }
 
-/// Terms of the force; a drive is a static force below zero.
+/// Terms of the force; a drive is a static force below zero, softening a stiffness below zero.
 const STATIC_FORCE: u8 = 0;
 const STIFFNESS: u8 = 1;
 const VISCOSITY: u8 = 2;
 const DRAG: u8 = 3;
 const DRIVE: u8 = 4;
+const SOFTENING: u8 = 5;
 
 /// The `TERM` of the force times `factor` in a `PART` of the stages.
 fn scale_term<const TERM: u8, const PART: u8>(problem: &mut Problem, factor: f64) {
     let count = problem.stages.len();
     for (index, law) in problem.stages.iter_mut().enumerate() {
-        if is_in(PART, index, count) && (TERM != DRIVE || law.static_force < 0.0) {
-            *term_of(law, TERM) *= factor;
+        let term = term_of(law, TERM);
+        if is_in(PART, index, count) && (TERM < DRIVE || *term < 0.0) {
+            *term *= factor;
         }
     }
 }
@@ -77,7 +79,7 @@ const SUM: u8 = 8;
 
 fn term_of(law: &mut Stage, term: u8) -> &mut f64 {
     match term {
-        STIFFNESS => &mut law.stiffness,
+        STIFFNESS | SOFTENING => &mut law.stiffness,
         VISCOSITY => &mut law.viscosity,
         DRAG => &mut law.drag,
         _ => &mut law.static_force,
@@ -341,6 +343,15 @@ macro_rules! term {
             ),
             of(
                 $id,
+                concat!($what, " is not divided by the mass"),
+                Parameter::None,
+                &[Change::Problem(|p, _| {
+                    let mass = p.mass;
+                    alter_term::<$term>(p, |own| own * mass);
+                })],
+            ),
+            of(
+                $id,
                 concat!($what, " is the mean of this stage's and that of the stage before"),
                 Parameter::None,
                 &[Change::Problem(borrow_term::<$term, MEAN>)],
@@ -386,7 +397,7 @@ macro_rules! term {
 }
 
 /// Faults of single terms.
-pub(super) static TERMS: [[Hypothesis; 21]; 4] = [
+pub(super) static TERMS: [[Hypothesis; 22]; 4] = [
     term!("term:static-force", "the static force p", STATIC_FORCE, 1e3, "input-clipped"),
     term!("term:stiffness", "the stiffness s", STIFFNESS, 1e4, "force-clipped"),
     term!("term:viscosity", "the viscosity r", VISCOSITY, 1e2, "force-clipped"),
@@ -1047,6 +1058,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
             p.mass = to_single(p.mass);
             single_coefficients(p);
         })],
+    ),
+    of(
+        "term:softening",
+        "a stiffness below zero is {} times the right one",
+        Parameter::Factor,
+        &[Change::Problem(scale_term::<SOFTENING, ALL>)],
     ),
     of(
         "term:drive",
