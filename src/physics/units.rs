@@ -46,15 +46,29 @@ pub enum Dimension {
 /// The units, one a line: dimension, spellings, SI value.
 const UNITS: &str = include_str!("units.txt");
 
-/// Every spelling of every unit, with its dimension and its SI value, in the order of [`UNITS`]. An uncia is a mass and a length.
-static KNOWN: LazyLock<Vec<(Dimension, &str, &str)>> = LazyLock::new(|| {
-    let units_of = |line: &'static str| {
-        let (name, rest) = line.split_once(" | ")?;
-        let (units, value) = rest.split_once(" | ")?;
+/// A unit: a line of [`UNITS`].
+struct Unit {
+    dimension: Dimension,
+    spellings: &'static str,
+    value: &'static str,
+}
+
+impl Unit {
+    fn spellings(&self) -> impl Iterator<Item = &'static str> {
+        self.spellings.split(',').map(str::trim_start)
+    }
+}
+
+/// Every unit, in the order of [`UNITS`]; an uncia is a mass and a length. Spellings are parted only where they are asked for: most
+/// runs ask for a few.
+static KNOWN: LazyLock<Vec<Unit>> = LazyLock::new(|| {
+    let unit = |line: &'static str| {
+        let mut parts = line.split('|').map(str::trim);
+        let (name, spellings, value) = (parts.next()?, parts.next()?, parts.next()?);
         let dimension = Dimension::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name)?;
-        Some(units.split(", ").map(move |unit| (dimension, unit, value)))
+        Some(Unit { dimension, spellings, value })
     };
-    UNITS.lines().filter_map(units_of).flatten().collect()
+    UNITS.lines().filter_map(unit).collect()
 });
 
 impl Dimension {
@@ -93,19 +107,20 @@ impl Dimension {
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
     pub fn coefficient(self, unit: &str) -> Option<f64> {
         let unit = canonical(unit);
-        let (_, _, value) = KNOWN.iter().find(|(dimension, name, _)| *dimension == self && *name == unit)?;
+        let mut known = KNOWN.iter().filter(|known| known.dimension == self);
+        let value = known.find(|known| known.spellings().any(|name| name == unit))?.value;
         value.parse().ok()
     }
 
     /// Every spelling of every unit, with its dimension.
     pub fn spellings() -> impl Iterator<Item = (Self, &'static str)> {
-        KNOWN.iter().map(|(dimension, unit, _)| (*dimension, *unit))
+        KNOWN.iter().flat_map(|known| known.spellings().map(|name| (known.dimension, name)))
     }
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
         let unit = canonical(unit);
-        KNOWN.iter().find(|(_, name, _)| *name == unit).map(|(dimension, ..)| *dimension)
+        Self::spellings().find(|(_, name)| *name == unit).map(|(dimension, _)| dimension)
     }
 }
 

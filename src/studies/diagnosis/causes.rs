@@ -427,7 +427,10 @@ impl Evidence<'_> {
             }
             if let Some((difference, faults)) = difference.zip(faults) {
                 found.largest = found.largest.max(difference);
-                found.told_apart += usize::from(seen.is_misnamed || seen.is_told_apart(&faults));
+                // Only that an outcome is misnamed explains a misnamed one.
+                let is_told =
+                    if seen.is_misnamed { hypothesis.changes.is_empty() } else { seen.is_told_apart(&faults) };
+                found.told_apart += usize::from(is_told);
             }
         }
         if matches!(hypothesis.parameter, Parameter::Bracket) {

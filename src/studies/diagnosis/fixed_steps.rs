@@ -184,7 +184,18 @@ impl Laddered<'_> {
 
     fn is(&self, of: impl Fn(&Limit, f64) -> bool) -> bool {
         let wrong_outcome = self.rungs.last().is_some_and(|rung| !rung.is_outcome_right);
-        wrong_outcome || (0..3).any(|i| self.limits()[i].is_some_and(|limit| of(&limit, self.question.conditions[i])))
+        wrong_outcome || self.any_limit(of)
+    }
+
+    /// Whether its numbers go to the right limits, and its outcome is another at the finest step.
+    fn is_misnamed(&self) -> bool {
+        let finest = self.rungs.iter().min_by(|a, b| a.step.total_cmp(&b.step));
+        finest.is_some_and(|rung| !rung.is_outcome_right) && !self.any_limit(Limit::is_wrong)
+    }
+
+    /// Whether the limit of a quantity is as `of` says.
+    fn any_limit(&self, of: impl Fn(&Limit, f64) -> bool) -> bool {
+        (0..3).any(|i| self.limits()[i].is_some_and(|limit| of(&limit, self.question.conditions[i])))
     }
 
     /// What is wrong with the events listed: their list, or the limit of a number.
@@ -326,13 +337,14 @@ fn fixed_causes(
         let mut seen = Vec::new();
         for (laddered, row) in answered().filter(|(_, row)| row.verdict != Verdict::Undecided) {
             for rung in [laddered.rungs.first(), laddered.rungs.get(LADDER.len() - 1)].into_iter().flatten() {
+                let (is_misnamed, is_other) = (laddered.is_misnamed(), !rung.is_outcome_right);
                 seen.push(Seen {
                     question: laddered.question,
                     answer: rung.answer,
                     how: How::Scheme(*scheme, rung.step),
                     accuracy: REPRODUCED,
-                    fails: row.verdict == Verdict::Failed,
-                    is_misnamed: false,
+                    fails: row.verdict == Verdict::Failed && (is_other || !is_misnamed),
+                    is_misnamed: is_misnamed && is_other,
                 });
             }
         }
@@ -357,12 +369,10 @@ fn fixed_causes(
             |i: usize| limits[i].map_or(f64::INFINITY, |limit| 6.0 * limit.standard_error / question.conditions[i]);
         let accuracy = sure(0).max(sure(1)).max(sure(2)).max(1e-9);
         let finest = laddered.rungs.iter().min_by(|a, b| a.step.total_cmp(&b.step));
-        // Where the outcome is another, the limit of the numbers is that of a flight that ends elsewhere.
-        let answer = match finest {
-            Some(rung) if !rung.is_outcome_right => State { ..rung.answer },
-            _ => answer,
-        };
-        let is_other = finest.is_some_and(|rung| !rung.is_outcome_right);
+        let is_misnamed = laddered.is_misnamed();
+        // Where the outcome is another, the limit of the numbers may be that of a flight that ends elsewhere.
+        let other = finest.filter(|rung| !rung.is_outcome_right && !is_misnamed);
+        let answer = other.map_or(answer, |rung| rung.answer);
         if row.verdict == Verdict::Undecided {
             continue;
         }
@@ -370,9 +380,9 @@ fn fixed_causes(
             question,
             answer,
             how: How::Exact,
-            accuracy: if is_other { 0.1 } else { accuracy },
+            accuracy: if other.is_some() { 0.1 } else { accuracy },
             fails: row.verdict == Verdict::Failed,
-            is_misnamed: false,
+            is_misnamed,
         });
     }
     causes(&seen, identity.reads_scene, &others, Effort::Pairs)

@@ -446,6 +446,8 @@ pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
         .chain(force::BOUNDED.iter().chain(&report::BOUNDED).flatten())
         .chain(events::FAULTS)
         .chain(report::FAULTS)
+        .chain(report::TIMES.iter().flatten())
+        .chain(report::UNEVEN_TIMES.iter().flatten())
         .chain(scene::FAULTS)
         .chain(force::EARLIER)
 }

@@ -293,12 +293,19 @@ fn straight_steps(asking: &mut Asking<'_>) -> Option<Cause> {
 
 /// Whether the depth at rest lies on a chord: under a constant force V is a straight line itself, so that the time of rest is right.
 fn straight_to_rest(asking: &mut Asking<'_>) -> Option<Cause> {
-    let flights = RESTS.map(|(speed, force)| {
-        let problem = Problem::of_stages(1.0, speed, [Stage::tunnel(force, 0.0)]);
-        let [found, exact] = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[0]))?;
-        Some(errors(found, exact, speed))
-    });
-    let all: Vec<[f64; 3]> = flights.into_iter().collect::<Option<_>>()?;
+    let mut errors_of = |problem: &Problem| {
+        let [found, exact] = ends(asking, problem, &PeerRequest::from_problem(problem, TOLERANCES[0]))?;
+        Some(errors(found, exact, problem.impact_speed))
+    };
+    let to_rest = |(speed, force): (f64, f64)| Problem::of_stages(1.0, speed, [Stage::tunnel(force, 0.0)]);
+    let all: Vec<[f64; 3]> = RESTS.map(|flight| errors_of(&to_rest(flight))).into_iter().collect::<Option<_>>()?;
+    // Steps that are wrong themselves are so on the way too.
+    let halfway = |(speed, force): (f64, f64)| to_rest((speed, force)).with_exit(0.25 * speed * speed / force);
+    let on_the_way: Vec<[f64; 3]> =
+        RESTS.map(|flight| errors_of(&halfway(flight))).into_iter().collect::<Option<_>>()?;
+    if on_the_way.iter().flatten().any(|error| error.abs() > ALLOWED * TOLERANCES[0]) {
+        return None;
+    }
     let is_right = |[_, time, velocity]: &[f64; 3]| time.abs() <= TOLERANCES[1] && *velocity == 0.0;
     let is_short = |[depth, ..]: &[f64; 3]| *depth < -ALLOWED * TOLERANCES[1];
     let short = all.iter().filter(|errors| is_short(errors)).count();

@@ -1,6 +1,7 @@
 //! What do the answers show by themselves, without any hypothesis? Looked at where none explains them.
 
 use super::causes::{Cause, Certainty};
+use super::questions::Content;
 use super::{Answered, QUANTITIES, end_of};
 use crate::exchange::peers::PeerAnswer;
 use crate::exchange::peers::wire::errors;
@@ -46,6 +47,12 @@ pub(super) fn shown(judged: &[Judged<'_>]) -> Option<Cause> {
     }
     if is_shown(&|answered| last(answered).is_some_and(|answer| is_moving(answered, answer))) {
         return plain("flight-cut-short", "the flight is said to stop, with V > 0 and no exit reached".to_owned());
+    }
+    let is_weak = |answered: &Answered<'_>| answered.question.contains.contains(&Content::WeakTerm);
+    if is_shown(&|answered| is_one_error(answered) && is_weak(answered)) {
+        let statement = "answers fail where a term is next to nothing beside another, and are the same at every tolerance: \
+                         digits cancel in a formula";
+        return plain("digits-lost", statement.to_owned());
     }
     if is_shown(&is_same) {
         let statement = "answers that fail are the same at every tolerance, as with a least step: it is not kept there";

@@ -22,6 +22,8 @@ const BORDER: f64 = 1e-7;
 const DRAWS_MAX: usize = 200;
 /// Relative distance from rest within which an exit is grazed.
 const GRAZING: f64 = 0.02;
+/// Part of the greatest term of a stage below which another is weak.
+const WEAK: f64 = 3e-3;
 /// Part of the depth of the flight below which a stage is short.
 const SHORT: f64 = 1e-2;
 /// Fast rate of a stage, times the duration of the flight, from which it is stiff.
@@ -53,6 +55,8 @@ pub enum Content {
     Viscosity,
     /// A force proportional to V².
     Drag,
+    /// A term that is next to nothing beside another of its stage.
+    WeakTerm,
     /// A stage without force.
     AirGap,
     /// The end of a stage.
@@ -188,7 +192,7 @@ impl Question {
 
 impl Content {
     /// What a force is made of.
-    pub const TERMS: [Self; 12] = [
+    pub const TERMS: [Self; 13] = [
         Self::StaticForce,
         Self::Drive,
         Self::Stiffness,
@@ -196,6 +200,7 @@ impl Content {
         Self::Softening,
         Self::Viscosity,
         Self::Drag,
+        Self::WeakTerm,
         Self::AirGap,
         Self::Stiff,
         Self::Scene,
@@ -245,6 +250,13 @@ pub fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec
     let is_short = |index: usize| problem.limit_of(index) - problem.start_of(index) < SHORT * exact.end.depth;
     let concrete = scene.and_then(Scene::concrete);
     let spring = |law: &Stage| law.stiffness > 0.0;
+    // Each at its greatest.
+    let (depth, speed) = (exact.end.depth, problem.impact_speed);
+    let is_weak = |law: &Stage| {
+        let terms = [law.static_force, law.stiffness * depth, law.viscosity * speed, law.drag * speed * speed];
+        let greatest = terms.iter().fold(0.0, |most, term| f64::max(most, term.abs()));
+        terms.iter().any(|term| *term != 0.0 && term.abs() < WEAK * greatest)
+    };
     let free = |law: &Stage| Stage { end: 0.0, ..*law } == Stage { end: 0.0, ..Stage::free() };
     [
         (in_any(|law| law.static_force > 0.0), Content::StaticForce),
@@ -254,6 +266,7 @@ pub fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec
         (in_any(|law| law.stiffness < 0.0), Content::Softening),
         (in_any(|law| law.viscosity > 0.0), Content::Viscosity),
         (in_any(|law| law.drag > 0.0), Content::Drag),
+        (met.iter().any(is_weak), Content::WeakTerm),
         (met.iter().any(free), Content::AirGap),
         (!ends.is_empty(), Content::StageEnd),
         (ends.len() > 1, Content::SeveralStageEnds),
@@ -282,7 +295,8 @@ pub fn contents(problem: &Problem, scene: Option<&Scene>, exact: &Flight) -> Vec
 /// A way to draw a problem.
 struct Family {
     name: &'static str,
-    draw: fn(&mut Random) -> Option<Problem>,
+    /// The problem, by the number of the round from 0.
+    draw: fn(&mut Random, usize) -> Option<Problem>,
 }
 
 /// One stage of shares of p, s, r and q, drawn where the share is 1; with an exit before rest, or not.
@@ -296,6 +310,13 @@ fn single(random: &mut Random, terms: [f64; 4]) -> Option<Problem> {
     }
     let far = if rests { Truth::of(&endless).ok()?.flight.end.depth } else { scale.length };
     Some(endless.with_exit(far * random.uniform(0.2, 0.95)))
+}
+
+/// A static force and one other term, another in every round, which is next to nothing beside it: digits cancel in many a formula.
+fn weak(random: &mut Random, round: usize) -> Option<Problem> {
+    let mut terms = [1.0, 0.0, 0.0, 0.0];
+    terms[1 + (round + 1) % 3] = random.log_uniform(1e-6, 1e-3);
+    single(random, terms)
 }
 
 /// A problem of several stages whose laws hold every pair of terms in turn, ending where `exit` says.
@@ -347,18 +368,18 @@ fn stiff(random: &mut Random) -> Problem {
 
 /// The families in the order in which they are asked: what tells causes apart first.
 const FAMILIES: [Family; 31] = [
-    Family { name: "static-force", draw: |random| single(random, [1.0, 0.0, 0.0, 0.0]) },
-    Family { name: "spring", draw: |random| single(random, [0.0, 1.0, 0.0, 0.0]) },
-    Family { name: "drag", draw: |random| single(random, [0.0, 0.0, 0.0, 1.0]) },
-    Family { name: "viscosity", draw: |random| single(random, [0.0, 0.0, 1.0, 0.0]) },
-    Family { name: "tunnel", draw: |random| Kind::Tunnel.draw(random) },
+    Family { name: "static-force", draw: |random, _| single(random, [1.0, 0.0, 0.0, 0.0]) },
+    Family { name: "spring", draw: |random, _| single(random, [0.0, 1.0, 0.0, 0.0]) },
+    Family { name: "drag", draw: |random, _| single(random, [0.0, 0.0, 0.0, 1.0]) },
+    Family { name: "viscosity", draw: |random, _| single(random, [0.0, 0.0, 1.0, 0.0]) },
+    Family { name: "tunnel", draw: |random, _| Kind::Tunnel.draw(random) },
     Family {
         name: "layers",
-        draw: |random| near_rest(layered(random, 2, |random, scale, _| mixed(random, scale)), 0.3),
+        draw: |random, _| near_rest(layered(random, 2, |random, scale, _| mixed(random, scale)), 0.3),
     },
     Family {
         name: "later-spring",
-        draw: |random| {
+        draw: |random, _| {
             let problem = layered(random, 1, |random, scale, index| {
                 let p = random.log_uniform(0.2, 1.0);
                 scale.stage([p, if index > 0 { random.log_uniform(0.5, 5.0) } else { 0.0 }, 0.0, 0.0])
@@ -369,7 +390,7 @@ const FAMILIES: [Family; 31] = [
     },
     Family {
         name: "exit-in-a-stage",
-        draw: |random| {
+        draw: |random, _| {
             let problem = layered(random, 3, |random, scale, _| mixed(random, scale));
             let stage = random.below(3);
             let (from, to) = (problem.start_of(stage), problem.stages[stage].end);
@@ -377,12 +398,12 @@ const FAMILIES: [Family; 31] = [
             Some(problem.with_exit(exit))
         },
     },
-    Family { name: "four-terms", draw: |random| single(random, [1.0, 1.0, 1.0, 1.0]) },
-    Family { name: "grazing", draw: |random| grazing(random, [2.0, 4.5]) },
-    Family { name: "crater", draw: |random| Kind::Crater.draw(random) },
+    Family { name: "four-terms", draw: |random, _| single(random, [1.0, 1.0, 1.0, 1.0]) },
+    Family { name: "grazing", draw: |random, _| grazing(random, [2.0, 4.5]) },
+    Family { name: "crater", draw: |random, _| Kind::Crater.draw(random) },
     Family {
         name: "air-gap",
-        draw: |random| {
+        draw: |random, _| {
             let problem = layered(
                 random,
                 2,
@@ -397,7 +418,7 @@ const FAMILIES: [Family; 31] = [
     Family {
         name: "softening",
         // A piece of a table: the force falls with the depth and keeps its sign, one that slows or one that drives.
-        draw: |random| {
+        draw: |random, _| {
             let soft = random.below(2);
             let problem = layered(random, 2, |random, scale, index| {
                 if index != soft {
@@ -410,11 +431,11 @@ const FAMILIES: [Family; 31] = [
             near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.2 })
         },
     },
-    Family { name: "driven", draw: |random| Kind::Driven.draw(random) },
+    Family { name: "driven", draw: |random, _| Kind::Driven.draw(random) },
     Family {
         name: "driven-out",
         // Left faster than entered.
-        draw: |random| {
+        draw: |random, _| {
             let scale = Scale::draw(random);
             let drive = random.uniform(0.5, 3.0);
             let drag = if random.chance(0.5) { 0.1 * drive } else { 0.0 };
@@ -423,11 +444,11 @@ const FAMILIES: [Family; 31] = [
             Some(Problem::of_stages(scale.mass, scale.speed, [law]).with_exit(exit))
         },
     },
-    Family { name: "stiff", draw: |random| Some(stiff(random)) },
+    Family { name: "stiff", draw: |random, _| Some(stiff(random)) },
     Family {
         name: "small-term",
         // Terms that are next to nothing beside another still count.
-        draw: |random| {
+        draw: |random, _| {
             let great = if random.chance(0.5) { 0 } else { 1 + random.below(3) };
             let share = |term| if term == great { 1.0 } else { random.log_uniform(1e-5, 1e-3) };
             let terms = [0, 1, 2, 3].map(share);
@@ -436,7 +457,7 @@ const FAMILIES: [Family; 31] = [
     },
     Family {
         name: "exit-at-stage-end",
-        draw: |random| {
+        draw: |random, _| {
             let problem = layered(random, 2, |random, scale, _| mixed(random, scale));
             let exit = problem.stages[random.below(2)].end;
             Some(problem.with_exit(exit))
@@ -445,15 +466,18 @@ const FAMILIES: [Family; 31] = [
     Family {
         name: "hardly-out",
         // What is left of V is less than thresholds of rest are, and still more than the tightest tolerance allows.
-        draw: |random| grazing(random, [7.8, 8.6]),
+        draw: |random, _| grazing(random, [7.8, 8.6]),
     },
-    Family { name: "several", draw: |random| Kind::Several.draw(random) },
-    Family { name: "spring-and-drag", draw: |random| Kind::SpringAndDrag.draw(random) },
-    Family { name: "viscous", draw: |random| Kind::Viscous.draw(random) },
-    Family { name: "viscous-spring", draw: |random| Kind::ViscousSpring.draw(random) },
+    Family { name: "weak-term", draw: weak },
+    Family { name: "several", draw: |random, _| Kind::Several.draw(random) },
+    Family { name: "spring-and-drag", draw: |random, _| Kind::SpringAndDrag.draw(random) },
+    Family {
+        name: "viscous",
+        draw: |random, round| if round.is_multiple_of(2) { Kind::Viscous } else { Kind::ViscousSpring }.draw(random),
+    },
     Family {
         name: "short-stages",
-        draw: |random| {
+        draw: |random, _| {
             let mut problem = layered(random, 5, |random, scale, _| mixed(random, scale));
             // A few stages share what is next to nothing of the way.
             let (from, thin) = (problem.stages[1].end, problem.stages[0].end * random.log_uniform(1e-5, 1e-3));
@@ -465,7 +489,7 @@ const FAMILIES: [Family; 31] = [
     },
     Family {
         name: "many-stages",
-        draw: |random| {
+        draw: |random, _| {
             // Fast enough to pass them all.
             let ends = 9 + random.below(32);
             let mut problem = layered(random, ends, |random, scale, _| mixed(random, scale));
@@ -477,17 +501,17 @@ const FAMILIES: [Family; 31] = [
     Family {
         name: "no-length",
         // The first or a later one ends where it begins.
-        draw: |random| {
+        draw: |random, _| {
             let mut problem = layered(random, 3, |random, scale, _| mixed(random, scale));
             let stage = if random.chance(0.5) { 0 } else { 1 + random.below(2) };
             problem.stages[stage].end = problem.start_of(stage);
             near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
         },
     },
-    Family { name: "several-viscous", draw: |random| Kind::SeveralViscous.draw(random) },
+    Family { name: "several-viscous", draw: |random, _| Kind::SeveralViscous.draw(random) },
     Family {
         name: "driven-later",
-        draw: |random| {
+        draw: |random, _| {
             let problem = layered(random, 2, |random, scale, index| {
                 let mut law = mixed(random, scale);
                 if index == 1 {
@@ -501,7 +525,7 @@ const FAMILIES: [Family; 31] = [
     Family {
         name: "through",
         // Hardly slowed: many boundaries lie in one step.
-        draw: |random| {
+        draw: |random, _| {
             let mut problem = layered(random, 4, |random, scale, _| mixed(random, scale));
             let exit = problem.stages[3].end * random.uniform(1.01, 1.3);
             problem.impact_speed *= random.log_uniform(3.0, 30.0);
@@ -510,7 +534,7 @@ const FAMILIES: [Family; 31] = [
     },
     Family {
         name: "stop-in-spring",
-        draw: |random| {
+        draw: |random, _| {
             let problem = layered(random, 1, |random, scale, index| {
                 scale.stage([0.0, random.log_uniform(0.5, 5.0) * f64::from(1 + index as u8), 0.0, 0.0])
             });
@@ -519,7 +543,7 @@ const FAMILIES: [Family; 31] = [
     },
     Family {
         name: "no-speed",
-        draw: |random| {
+        draw: |random, _| {
             let scale = Scale::draw(random);
             let law = mixed(random, &scale);
             Some(Problem::of_stages(scale.mass, 0.0, [law]).with_exit(scale.length))
@@ -601,7 +625,7 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
         // The first has an exit, which a solver may keep.
         let is_wanted = |problem: &Problem| !asked.is_empty() || problem.has_exit();
         let found = (0..DRAWS_MAX).find_map(|_| {
-            let problem = draw(&mut random).filter(is_wanted)?;
+            let problem = draw(&mut random, round).filter(is_wanted)?;
             Question::new(format!("{name}-{}", round + 1), problem, None)
         });
         asked.extend(found);

@@ -29,6 +29,9 @@ const LOOKED_EACH: usize = 40;
 /// Accuracies (relative error over the condition) of a solver that does not do what it is asked for.
 const ACCURACIES: [f64; 4] = [1e-9, 1e-7, 1e-5, 1e-3];
 
+/// Part of its error at the loosest tolerance that an answer has left at the tightest, where the scheme and not the equation is wrong:
+/// a long series takes hardly shorter steps then.
+const FALLEN: f64 = 0.5;
 /// Part of its error by which an answer changes at most where the tolerance is not kept.
 const FLOOR_SPREAD: f64 = 0.1;
 
@@ -254,7 +257,8 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         let statement = format!(
             "{} no answer: {words}{}",
             if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") },
-            of_silent(&rows).map_or_else(String::new, |content| format!("; all of them hold `{content}`"))
+            of_all(&rows, |row| row.verdict == Verdict::Failed && row.answered.is_none())
+                .map_or_else(String::new, |content| format!("; all of them hold `{content}`"))
         );
         let certainty = if silent == failed { Certainty::Likely } else { Certainty::Possible };
         Cause::plain("no-answer", statement, certainty, silent, failed)
@@ -280,7 +284,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
                 // A small fault of the force in a solver that is exact looks alike.
                 Cause::plain("tolerance-ignored", statement, Certainty::Likely, failed, failed)
             } else {
-                inaccurate(answered, failed)
+                inaccurate(answered, &rows, failed)
             }
         })];
     }
@@ -297,7 +301,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         return vec![Cause::plain("tolerance-ignored", statement, Certainty::Likely, failed, failed)];
     }
     if found.is_none() && converges(answered) {
-        return vec![inaccurate(answered, failed)];
+        return vec![inaccurate(answered, &rows, failed)];
     }
     if effort == Effort::All {
         return found.unwrap_or_default();
@@ -359,12 +363,11 @@ fn floor(answered: &[Answered<'_>]) -> Option<Cause> {
     is_floor.then(|| Cause::plain("tolerance-ignored", statement, Certainty::Likely, same, answered.len()))
 }
 
-/// What every question without an answer holds, and few others do.
-fn of_silent(rows: &[Asked]) -> Option<Content> {
-    let (silent, others): (Vec<&Asked>, Vec<&Asked>) =
-        rows.iter().partition(|row| row.verdict == Verdict::Failed && row.answered.is_none());
+/// What every question of which `is_one` holds, and few others do.
+fn of_all(rows: &[Asked], is_one: impl Fn(&Asked) -> bool) -> Option<Content> {
+    let (these, others): (Vec<&Asked>, Vec<&Asked>) = rows.iter().partition(|row| is_one(row));
     let count = |rows: &[&Asked], content| rows.iter().filter(|row| row.contains.contains(&content)).count();
-    let stands_in_all = |content: &Content| count(&silent, *content) == silent.len();
+    let stands_in_all = |content: &Content| count(&these, *content) == these.len();
     Content::iter()
         .filter(stands_in_all)
         .map(|content| (count(&others, content), content))
@@ -419,10 +422,10 @@ fn converges(answered: &[Answered<'_>]) -> bool {
             && loose.max(tight) > TOLERANCES[0]
         {
             all += 1;
-            fall += usize::from(tight < 0.1 * loose);
+            fall += usize::from(tight < FALLEN * loose);
         }
     }
-    all > 0 && 4 * fall >= 3 * all
+    all > 0 && 2 * fall >= all
 }
 
 /// The answers that came, an answer failing where it is beyond its limit and off by more than `accuracy`.
@@ -486,11 +489,11 @@ fn alone_wrong(answered: &[Answered<'_>]) -> Option<&'static str> {
 }
 
 /// The cause of errors that are small, and beyond the tolerance.
-fn inaccurate(answered: &[Answered<'_>], failed: usize) -> Cause {
-    // Errors over the condition at each tolerance: their medians.
-    let median = |which: usize| {
-        let mut all: Vec<f64> = answered
-            .iter()
+fn inaccurate(answered: &[Answered<'_>], rows: &[Asked], failed: usize) -> Cause {
+    let failing = || answered.iter().zip(rows).filter(|(_, row)| row.verdict == Verdict::Failed).map(|(one, _)| one);
+    // Errors over the condition at each tolerance.
+    let usual = |which: usize| {
+        let mut all: Vec<f64> = failing()
             .filter_map(|Answered { question, answers }| {
                 let (rtol, answer) = answers.get(which)?;
                 let judged = judge(question, *rtol, answer.as_ref().ok()?);
@@ -500,7 +503,7 @@ fn inaccurate(answered: &[Answered<'_>], failed: usize) -> Cause {
         all.sort_by(f64::total_cmp);
         all.get(all.len() * 3 / 4).copied().unwrap_or(0.0)
     };
-    let errors = [0, 1, 2].map(median);
+    let errors = [0, 1, 2].map(usual);
     let alike = answered.iter().filter(|one| is_one_error(one)).count();
     // Where the two tightest tolerances give nearly one answer, no noise of few digits is in it.
     let stays = errors[2] > 0.3 * errors[0] && (errors[2] > 1e-6 || 2 * alike > answered.len())
@@ -526,7 +529,9 @@ fn inaccurate(answered: &[Answered<'_>], failed: usize) -> Cause {
         } else {
             "the error is not what the tolerance asks for".to_owned()
         };
-        let statement = format!("{found}: {falls}");
+        let holds = of_all(rows, |row| row.verdict == Verdict::Failed)
+            .map_or_else(String::new, |content| format!("; all that fail hold `{content}`"));
+        let statement = format!("{found}: {falls}{holds}");
         Cause::plain("tolerance-missed", statement, Certainty::Likely, failed, failed)
     }
 }

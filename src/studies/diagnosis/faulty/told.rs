@@ -1113,7 +1113,7 @@ const TOLD: &[Told] = &[
             )
         },
         asked: Questions(60),
-        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is scales-1 (static-force, stiffness, viscosity, drag, exit); `viscosity` stands in 100 % of the failing and 40 % of the passing questions",
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is weak-term-1 (static-force, viscosity, weak-term, exit); `viscosity` stands in 100 % of the failing and 39 % of the passing questions",
     },
     Told {
         what: "the last event is another end than the one reported",
@@ -1164,5 +1164,59 @@ const TOLD: &[Told] = &[
         },
         asked: Questions(12),
         says: "failed | flight-cut-short, likely: the flight is said to stop, with V > 0 and no exit reached",
+    },
+    Told {
+        what: "digits cancel where viscosity is weak beside a static force",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    let Stage { static_force, viscosity, .. } = problem.stages[0];
+                    let ratio = viscosity * problem.impact_speed / static_force;
+                    if problem.stages.len() == 1 && ratio > 0.0 && ratio < 0.01 {
+                        let lost = f64::EPSILON / ratio / ratio;
+                        end.time *= 1.0 + lost;
+                        if end.velocity > 0.0 {
+                            end.velocity *= 1.0 + lost;
+                        } else {
+                            end.depth *= 1.0 + lost;
+                        }
+                    }
+                },
+            )
+        },
+        asked: Questions(200),
+        says: "failed | digits-lost, likely: answers fail where a term is next to nothing beside another, and are the same at every tolerance: digits cancel in a formula",
+    },
+    Told {
+        what: "a rest near the exit is called a perforation",
+        solver: || {
+            central(|_, problem, flight| {
+                if flight.end.depth > 0.9 * problem.exit_depth {
+                    flight.outcome = Outcome::Perforated;
+                }
+            })
+        },
+        asked: Questions(40),
+        says: "failed | outcome-name, certain: the numbers are right, and the outcome named is not",
+    },
+    Told {
+        what: "steps are of order one, and the depth at rest under a constant force is too small",
+        solver: || {
+            by_request(
+                |_, _| (),
+                |request, problem, end| {
+                    let error = 0.3 * request.rtol.powf(0.125);
+                    if end.velocity > 0.0 {
+                        end.time *= 1.0 + error;
+                    } else {
+                        end.depth *= 1.0 - error;
+                        end.time *= if is_steady(problem) { 1.0 } else { 1.0 - error };
+                    }
+                },
+            )
+        },
+        asked: Questions(40),
+        says: "failed | tolerance-missed, likely: errors of 5e-2, 2e-2 and 9e-3, at tolerances of 1e-6, 1e-9 and 1e-12: they fall as the tolerance to the power of 0.1, as with a wrong coefficient of the scheme, or events that are located less accurately than steps are taken",
     },
 ];

@@ -734,6 +734,19 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         })],
     ),
     of(
+        "stage-end-nudged",
+        "ends of stages and the exit count as reached {} m before them",
+        Parameter::Value(1e-4),
+        &[
+            Change::Problem(|p, n| {
+                p.exit_depth -= n;
+                p.stages.iter_mut().for_each(|law| law.end -= n);
+            }),
+            Change::AtStageEnd(|_, state, n| state.depth += n),
+            Change::Report(|p, found, n| right_exit(found, found.end.depth >= p.exit_depth, p.exit_depth + n)),
+        ],
+    ),
+    of(
         "stage-end-velocity",
         "{} m/s of V are lost behind each end of a stage",
         Parameter::Value(1.0),

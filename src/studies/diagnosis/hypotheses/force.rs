@@ -985,6 +985,45 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         })],
     ),
     of(
+        "stiffness-origin",
+        "the depth in s x is counted from the start of the stage where it comes to rest in one of stiffness and static force",
+        Parameter::None,
+        &[Change::OfRight(|p, right, _| {
+            let stage = p.stages.iter().position(|law| right.depth < law.end).unwrap_or(0);
+            let start = p.start_of(stage);
+            let law = &mut p.stages[stage];
+            if right.velocity <= 0.0 && law.viscosity == 0.0 && law.drag == 0.0 {
+                law.static_force -= law.stiffness * start;
+            }
+        })],
+    ),
+    of(
+        "parameter:crater-stiffness",
+        "the stiffness of a first stage without other forces is not the one given: it continues the force of the second",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            if let [crater, tunnel, ..] = p.stages[..]
+                && Stage::crater(crater.stiffness, crater.end) == crater
+                && tunnel.static_force > 0.0
+            {
+                let (p0, q, depth) = (tunnel.static_force, tunnel.drag, crater.end);
+                let force = p0 + q * p.impact_speed * p.impact_speed;
+                p.stages[0].stiffness = p.mass * force / (depth * (p.mass + depth * q));
+            }
+        })],
+    ),
+    of(
+        "term:velocity",
+        "the force is that of {} times V: drag and viscosity are both wrong",
+        Parameter::Factor,
+        &[Change::Problem(|p, f| {
+            for law in &mut p.stages {
+                law.viscosity *= f;
+                law.drag *= f * f;
+            }
+        })],
+    ),
+    of(
         "force-smoothed",
         "behind each end of a stage the force goes over from that of the stage before within {} m",
         Parameter::Value(1e-3),

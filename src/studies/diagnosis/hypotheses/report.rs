@@ -2,7 +2,7 @@
 
 use super::super::simulation::{Simulated, continued};
 use super::{Change, DIGITS, GRAINS, Hypothesis, Parameter, of, to_digits, to_grain, to_single};
-use crate::physics::{Problem, State};
+use crate::physics::{Problem, Stage, State};
 
 fn shift_time(found: &mut Simulated, by: f64) {
     found.end.time += by;
@@ -25,12 +25,131 @@ fn of_exit(problem: &Problem, found: &mut Simulated, alter: impl Fn(f64, f64) ->
     }
 }
 
-/// The start and the end of the flight through each stage.
-fn legs(problem: &Problem, found: &Simulated) -> impl Iterator<Item = [State; 2]> {
+/// The flight through a stage.
+struct Leg<'a> {
+    index: usize,
+    is_last: bool,
+    law: &'a Stage,
+    from: State,
+    to: State,
+}
+
+impl Leg<'_> {
+    fn time(&self) -> f64 {
+        self.to.time - self.from.time
+    }
+
+    /// Its time at one speed.
+    fn time_at(&self, speed: f64) -> f64 {
+        (self.to.depth - self.from.depth) / speed
+    }
+
+    fn mean_speed(&self) -> f64 {
+        0.5 * (self.from.velocity + self.to.velocity)
+    }
+
+    fn is_free(&self) -> bool {
+        self.law.force(1.0, 1.0) == 0.0
+    }
+
+    fn is_of_rest(&self) -> bool {
+        self.to.velocity <= 0.0
+    }
+
+    /// Whether it has stiffness, viscosity, drag.
+    fn terms(&self) -> [bool; 3] {
+        [self.law.stiffness, self.law.viscosity, self.law.drag].map(|term| term != 0.0)
+    }
+
+    /// Whether it has a closed form: one term at most beside the static force.
+    fn is_simple(&self) -> bool {
+        self.terms().iter().filter(|is| **is).count() < 2
+    }
+
+    /// What its time lacks if a quarter of an oscillation takes `factor` times its time: of rest under a spring and a static force.
+    fn of_quarter(&self, mass: f64, factor: f64) -> f64 {
+        let stiffness = self.law.stiffness;
+        let is_oscillation = self.is_of_rest() && stiffness > 0.0 && self.terms() == [true, false, false];
+        if is_oscillation { (factor - 1.0) * std::f64::consts::FRAC_PI_2 * (mass / stiffness).sqrt() } else { 0.0 }
+    }
+}
+
+fn legs<'a>(problem: &'a Problem, found: &Simulated) -> impl Iterator<Item = Leg<'a>> {
     let ends = found.passed.iter().filter(|(index, _)| *index < found.stage).map(|(_, state)| *state);
     let all: Vec<State> = std::iter::once(State::at_impact(problem)).chain(ends).chain([found.end]).collect();
-    (1..all.len()).map(move |index| [all[index - 1], all[index]])
+    let count = all.len() - 1;
+    problem.stages.iter().enumerate().take(count).map(move |(index, law)| Leg {
+        index,
+        is_last: index + 1 == count,
+        law,
+        from: all[index],
+        to: all[index + 1],
+    })
 }
+
+/// The time of each stage by a rule.
+fn retime(problem: &Problem, found: &mut Simulated, time: impl Fn(&Leg<'_>) -> f64) {
+    found.end.time = legs(problem, found).map(|leg| time(&leg)).sum();
+}
+
+/// The time in some stages by other rules: of any kind of stage, or of one whose velocity does not change evenly.
+macro_rules! timed {
+    (of any $stages:literal, $is:expr) => {
+        [
+            timed!("time-formula", $stages, " is {} times the right one", Factor, $is, |leg, _, n| n * leg.time()),
+            timed!("time-left-out", $stages, " is not counted", None, $is, |_, _, _| 0.0),
+            timed!("time-formula", $stages, " is that of V0 throughout", None, $is, |leg, p, _| leg
+                .time_at(p.impact_speed)),
+        ]
+    };
+    (of uneven $stages:literal, $is:expr) => {
+        [
+            timed!("time-formula", $stages, " is that of V at the start throughout", None, $is, |leg, _, _| leg
+                .time_at(leg.from.velocity)),
+            timed!("time-formula", $stages, " is that of the mean of V at both ends", None, $is, |leg, _, _| leg
+                .time_at(leg.mean_speed())),
+        ]
+    };
+    ($id:literal, $stages:literal, $says:literal, $number:ident, $is:expr, |$leg:pat_param, $p:pat_param, $n:pat_param| $time:expr) => {
+        of(
+            $id,
+            concat!("the time in ", $stages, $says),
+            Parameter::$number,
+            &[Change::Report(|p, found, n| {
+                let is_one: fn(&Leg<'_>) -> bool = $is;
+                let time: fn(&Leg<'_>, &Problem, f64) -> f64 = |$leg, $p, $n| $time;
+                retime(p, found, |leg| if is_one(leg) { time(leg, p, n) } else { leg.time() });
+            })],
+        )
+    };
+}
+
+/// Times by other rules than the flight.
+pub(super) static TIMES: [[Hypothesis; 3]; 10] = [
+    timed!(of any "the first stage", |leg| leg.index == 0),
+    timed!(of any "the last stage", |leg| leg.is_last),
+    timed!(of any "the stage of rest", |leg| leg.is_of_rest()),
+    timed!(of any "stages without force", |leg| leg.is_free()),
+    timed!(of any "stages of a static force alone", |leg| leg.terms() == [false; 3] && !leg.is_free()),
+    timed!(of any "stages of stiffness, or that and a static force", |leg| leg.terms() == [true, false, false]),
+    timed!(of any "stages of viscosity, or that and a static force", |leg| leg.terms() == [false, true, false]),
+    timed!(of any "stages of drag, or that and a static force", |leg| leg.terms() == [false, false, true]),
+    timed!(of any "stages of a static force and one other term, or less", |leg| leg.is_simple()),
+    timed!(of any "stages that drive", |leg| leg.law.static_force < 0.0),
+];
+
+/// The same by formulas that are right where V changes evenly.
+pub(super) static UNEVEN_TIMES: [[Hypothesis; 2]; 9] = [
+    timed!(of uneven "every stage", |_| true),
+    timed!(of uneven "the first stage", |leg| leg.index == 0),
+    timed!(of uneven "the last stage", |leg| leg.is_last),
+    timed!(of uneven "the stage of rest", |leg| leg.is_of_rest()),
+    timed!(of uneven "stages of stiffness, or that and a static force", |leg| leg.terms() == [true, false, false]),
+    timed!(of uneven "stages of viscosity, or that and a static force", |leg| leg.terms() == [false, true, false]),
+    timed!(of uneven "stages of drag, or that and a static force", |leg| leg.terms() == [false, false, true]),
+    timed!(of uneven "stages of a static force and one other term, or less", |leg| leg.is_simple()),
+    timed!(of uneven "stages that drive", |leg| leg.law.static_force < 0.0),
+];
 
 /// Numbers of the end that are rounded.
 pub(super) static ROUNDED: [[Hypothesis; 4]; 3] = [
@@ -196,55 +315,15 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         Parameter::Factor,
         &[Change::Report(|p, found, f| of_exit(p, found, |speed, impact| impact - f * (impact - speed)))],
     ),
+    timed!("time-formula", "every stage", " is that of V0 throughout", None, |_| true, |leg, p, _| leg
+        .time_at(p.impact_speed)),
+    timed!("time-formula", "every stage", " is that of V at the end throughout", None, |_| true, |leg, _, _| leg
+        .time_at(leg.to.velocity)),
     of(
         "time-formula",
-        "the time in the first stage is {} times the right one",
+        "a quarter of an oscillation, at whose end a spring stops the projectile, takes {} times its time",
         Parameter::Factor,
-        &[Change::Report(|_, found, f| {
-            let first = first_end(found).unwrap_or(found.end).time;
-            found.end.time += (f - 1.0) * first;
-        })],
-    ),
-    of(
-        "time-formula",
-        "the time in the last stage is {} times the right one",
-        Parameter::Factor,
-        &[Change::Report(|_, found, f| {
-            let last = found.end.time - last_end(found).map_or(0.0, |state| state.time);
-            found.end.time += (f - 1.0) * last;
-        })],
-    ),
-    of(
-        "time-formula",
-        "the time of a stage is its length over the mean of V at its two ends",
-        Parameter::None,
-        &[Change::Report(|p, found, _| {
-            found.end.time = legs(p, found).map(|[a, b]| 2.0 * (b.depth - a.depth) / (a.velocity + b.velocity)).sum();
-        })],
-    ),
-    of(
-        "time-formula",
-        "the time of a stage is its length over V at its start",
-        Parameter::None,
-        &[Change::Report(|p, found, _| {
-            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / a.velocity).sum();
-        })],
-    ),
-    of(
-        "time-formula",
-        "the time of a stage is its length over V at its end",
-        Parameter::None,
-        &[Change::Report(|p, found, _| {
-            found.end.time = legs(p, found).map(|[a, b]| (b.depth - a.depth) / b.velocity).sum();
-        })],
-    ),
-    of(
-        "time-left-out",
-        "the time in the first stage is not counted",
-        Parameter::None,
-        &[Change::Report(|_, found, _| {
-            found.end.time -= first_end(found).unwrap_or(found.end).time;
-        })],
+        &[Change::Report(|p, found, n| retime(p, found, |leg| leg.time() + leg.of_quarter(p.mass, n)))],
     ),
     of(
         "time-left-out",
@@ -252,25 +331,6 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         Parameter::None,
         &[Change::Report(|_, found, _| {
             found.end.time -= first_end(found).map_or(0.0, |state| state.time);
-        })],
-    ),
-    of(
-        "time-left-out",
-        "the time in the last stage is not counted",
-        Parameter::None,
-        &[Change::Report(|_, found, _| found.end.time = last_end(found).map_or(0.0, |state| state.time))],
-    ),
-    of(
-        "time-left-out",
-        "the time in stages without force is not counted",
-        Parameter::None,
-        &[Change::Report(|p, found, _| {
-            let free: f64 = legs(p, found)
-                .enumerate()
-                .filter(|(index, _)| p.stages.get(*index).is_some_and(|law| law.force(1.0, 1.0) == 0.0))
-                .map(|(_, [from, to])| to.time - from.time)
-                .sum();
-            found.end.time -= free;
         })],
     ),
     of(
