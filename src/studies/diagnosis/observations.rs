@@ -51,7 +51,7 @@ pub(super) fn shown(judged: &[Judged<'_>]) -> Option<Cause> {
     let is_weak = |answered: &Answered<'_>| answered.question.contains.contains(&Content::WeakTerm);
     if is_shown(&|answered| is_one_error(answered) && is_weak(answered)) {
         let statement = "answers fail where a term is next to nothing beside another, and are the same at every tolerance: \
-                         digits cancel in a formula";
+                         it is dropped, or digits cancel in a formula";
         return plain("digits-lost", statement.to_owned());
     }
     if is_shown(&is_same) {

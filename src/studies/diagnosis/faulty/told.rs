@@ -1186,7 +1186,7 @@ const TOLD: &[Told] = &[
             )
         },
         asked: Questions(200),
-        says: "failed | digits-lost, likely: answers fail where a term is next to nothing beside another, and are the same at every tolerance: digits cancel in a formula",
+        says: "failed | digits-lost, likely: answers fail where a term is next to nothing beside another, and are the same at every tolerance: it is dropped, or digits cancel in a formula",
     },
     Told {
         what: "a rest near the exit is called a perforation",
