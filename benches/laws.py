@@ -129,9 +129,9 @@ def main(program):
         except subprocess.CalledProcessError:
             continue  # it only approaches a depth
         scene = found["scene"]
-        parameters = {one["name"]: one["value"] for one in scene["parameters"]}
-        if any(event["event"] == "stage-end" and event.get("until") for event in found["events"]):
+        if "parameters" not in scene or scene.get("ends"):
             continue
+        parameters = {one["name"]: one["value"] for one in scene["parameters"]}
         golden = 0.6180339887498948
         speeds = [scene["velocity_m_s"] * (0.8 + 0.4 * ((i * golden) % 1.0)) for i in range(200)]
         measured = TARGET / f"criterion/laws/{name}/new/estimates.json"

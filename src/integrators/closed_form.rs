@@ -5,7 +5,7 @@
 use super::flight::{self, Bounded, Course, StageEnd, StageSolver};
 use super::outcome::{Detail, Flight, IntegrationError, Integrator, Sample, Solved, refuse_laws};
 use crate::physics::closed_form::{Line, cross, cross_continuous_crater, margin_error};
-use crate::physics::{CraterStiffness, EventKind, Law, Problem, Stage, State};
+use crate::physics::{CraterStiffness, Law, Problem, Stage, State};
 
 /// Bound on the places tried for a time; halving alone takes 53, and the parabola three or four.
 const PLACE_STEPS_MAX: u32 = 80;
@@ -239,8 +239,7 @@ pub fn path(problem: &Problem, flight: &Flight, intervals: u32, place: impl Fn(f
             }
         }
         samples.push(sample(to, stage));
-        let ends = problem.stages[stage].end <= to.depth || matches!(event.kind, EventKind::StageEnd(_));
-        if stage < flight.stage && ends {
+        if stage < flight.stage && problem.stages[stage].end <= to.depth {
             stage += 1;
             samples.push(sample(to, stage));
         }

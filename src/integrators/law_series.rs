@@ -3,7 +3,7 @@
 //! ```text
 //! over time      x' = V,  V' = -F(x, V)/M                            s = t
 //! over depth     (V²)' = -2 F(x, V)/M,  t' = 1/V                     s = x - x0
-//! over velocity  t' = m M V0 (1-s)^(m-1)/F(x, V),  x' = V t'         V = V0 (1-s)^m, for F > 0
+//! over velocity  t' = -M V'/F(x, V),  x' = V t'                      V = V0 (1-s)^m or V0 e^(-s), for F > 0
 //! ```
 //!
 //! **Time or depth.** The method `taylor` goes over time, and `energy` over depth: the exit and the end of a stage are fixed ends of a
@@ -12,7 +12,8 @@
 //! **Velocity as variable.** A fractional power of V, as in `(V/v1)^1.5`, has a branch point at V = 0: the series in time
 //! ends there, and steps shrink towards rest. With `V = u^m`, m the common denominator of the powers, F is smooth
 //! in u, and rest is the fixed end u = 0 (docs/theory.md, section 10). Where V falls fast enough, steps go by u, else by
-//! time. In place of depth it is taken for every law: m = 1 where no power has a branch point.
+//! time. In place of depth it is taken for every law: m = 1 where no power has a branch point. Powers without a small common
+//! denominator, and logarithms of V, are smooth in the logarithm of V, which never gets to rest.
 //!
 //! **Length of a step.** The last two coefficients give it, as in [`super::taylor`]. They may vanish by chance, and a force may
 //! change where they do not see it. So three places of the step are asked whether the series satisfies the equation there,
@@ -31,14 +32,17 @@
 //! **Events.** The first root of V on the step is isolated ([`locate::first_root`]). x grows until then, so that a boundary
 //! is passed before it exactly when x reaches it there.
 
+use std::cell::LazyCell;
 use std::convert::Infallible;
+
+use smallvec::SmallVec;
 
 use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES};
 use super::locate;
 use super::outcome::{IntegrationError, Solved};
 use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
 use crate::physics::condition::Sight;
-use crate::physics::expression::{Bound, Jets, product};
+use crate::physics::expression::{Bound, Fall, Falling, Jets, product};
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
 
@@ -78,8 +82,10 @@ const FLAT: f64 = 1e-9;
 /// How far behind a turn before zero a step goes on, over the way to it.
 const BEHIND_TURN: f64 = 1e-3;
 
-/// Longest step by velocity where the force vanishes at rest: its quotients cancel towards the end.
+/// Longest step by velocity where the force vanishes at rest: its quotients cancel towards the end. So little of depth and time may
+/// be left that it does not count.
 const VANISHING_SPAN: f64 = 0.5;
+const LITTLE: f64 = 0.01;
 
 /// Longest step in its unit of time or depth, and times that the unit may be changed, by `2^-20`, where coefficients overflow: a unit of
 /// nothing would have the series of a standstill.
@@ -94,6 +100,13 @@ const STILL_ENOUGH: f64 = 0.05;
 /// Halvings of a bracket: more than a number has digits.
 const HALVINGS: u32 = 80;
 
+/// Steps in which a root settles, and how far from its guess, relatively.
+const SETTLING_MAX: u32 = 12;
+const NEAR: f64 = 0.1;
+
+/// How far apart, relatively, the roots of two switches may be that are one place.
+const SAME_PLACE: f64 = 1e-9;
+
 /// Corrections of a root in the number type.
 const CORRECTIONS: usize = 4;
 
@@ -106,6 +119,8 @@ struct Path<S, const K: usize> {
     form: Form,
     /// Length of the step in s.
     span: f64,
+    /// Time before the step (s).
+    before: f64,
 }
 
 /// Which variable a step goes by.
@@ -115,8 +130,18 @@ enum Form {
     Time(f64),
     /// Depth, in a unit of so many metres.
     Depth(f64),
-    /// `V = V0 (1-s)^m`.
-    Velocity(u32),
+    /// The velocity, which falls so.
+    Velocity(Fall),
+}
+
+impl Form {
+    /// Share of the velocity, or of its root, that a step of `span` takes.
+    fn share(self, span: f64) -> f64 {
+        match self {
+            Self::Velocity(Fall::Exponential) => 1.0 - (-span).exp(),
+            _ => span,
+        }
+    }
 }
 
 /// What ends a step.
@@ -127,6 +152,12 @@ enum Event {
     Rest,
     Condition,
 }
+
+/// Switches, by their places among [`Bound::switches`].
+type Kinks = SmallVec<[usize; 2]>;
+
+/// The place of a step at which it ends, and how.
+type Ending<S> = (S, Event);
 
 /// `c[0] + c[1] s + ...`, by four chains at once: each waits for its last product, none for another.
 fn value<S: Scalar>(coefficients: &[S], s: S) -> S {
@@ -171,6 +202,23 @@ fn root_before(function: impl Fn(f64) -> (f64, f64), end: f64) -> f64 {
         at = next;
     }
     at
+}
+
+/// The root near `guess`, by Newton's method with `function` for value and slope; `None` where it does not settle near by.
+fn settled(function: impl Fn(f64) -> (f64, f64), guess: f64) -> Option<f64> {
+    let mut at = guess;
+    for _ in 0..SETTLING_MAX {
+        let (value, slope) = function(at);
+        let next = at - value / slope;
+        if !((next - guess).abs() <= NEAR * guess) {
+            return None;
+        }
+        if (next - at).abs() <= 4.0 * f64::EPSILON * guess {
+            return Some(next);
+        }
+        at = next;
+    }
+    None
 }
 
 /// Value and slope of a series, as numbers; four chains each, as [`value`].
@@ -222,7 +270,8 @@ fn first_fall<S: Scalar, const K: usize>(series: &[S; K], side: f64, span: f64) 
 impl<S: Scalar, const K: usize> Path<S, K> {
     fn start(form: Form, at: State<S>) -> Self {
         let zero = [S::zero(); K];
-        let mut path = Self { depth: zero, velocity: zero, time: zero, form, span: 0.0 };
+        let before = at.time.value();
+        let mut path = Self { depth: zero, velocity: zero, time: zero, form, span: 0.0, before };
         (path.depth[0], path.velocity[0]) = (at.depth, at.velocity);
         path
     }
@@ -232,7 +281,7 @@ impl<S: Scalar, const K: usize> Path<S, K> {
         let velocity = match self.form {
             Form::Time(_) | Form::Depth(_) => value(&self.velocity, s),
             // By its formula: the series cancels towards rest.
-            Form::Velocity(m) => (1..=m).fold(self.velocity[0], |v, _| v * (S::one() - s)),
+            Form::Velocity(fall) => self.velocity[0] * fall.left(s),
         };
         let time = match self.form {
             Form::Time(unit) => s * S::from_f64(unit),
@@ -258,17 +307,29 @@ impl<S: Scalar, const K: usize> Path<S, K> {
         both(&self.velocity, self.span).1 < 0.0
     }
 
-    /// The longest span whose last two terms are within `tolerance` of the second of the series.
+    /// What depth (m) and time (s) of a step by velocity are compared with: their change, and where V falls by shares what they
+    /// are, since each step adds less to it.
+    fn scales(&self) -> (f64, f64) {
+        let (depth, time) = (self.depth[1].value(), self.time[1].value());
+        match self.form {
+            Form::Velocity(Fall::Exponential) => (depth + self.depth[0].value(), time + self.before),
+            _ => (depth, time),
+        }
+    }
+
+    /// The longest span whose last two terms are within `tolerance` of what they are compared with.
     fn spanned(mut self, tolerance: f64) -> Self {
-        let of = |series: &[S; K], scale: S| {
-            let goal = rough_log2(tolerance * scale.value());
+        let of = |series: &[S; K], scale: f64| {
+            let goal = rough_log2(tolerance * scale);
             let by = |k: usize| (goal - rough_log2(series[k].value())) * (1.0 / k as f64);
             rough_exp2(by(K - 1).min(by(K - 2)))
         };
+        let (speed, (depth, time)) = (self.velocity[0].value(), self.scales());
         self.span = match self.form {
-            Form::Time(_) => of(&self.velocity, self.velocity[0]).min(SPAN_MAX),
-            Form::Depth(_) => of(&self.velocity, self.velocity[0]).min(of(&self.time, self.time[1])).min(SPAN_MAX),
-            Form::Velocity(_) => of(&self.depth, self.depth[1]).min(of(&self.time, self.time[1])).min(1.0),
+            Form::Time(_) => of(&self.velocity, speed).min(SPAN_MAX),
+            Form::Depth(_) => of(&self.velocity, speed).min(of(&self.time, time)).min(SPAN_MAX),
+            Form::Velocity(Fall::Power(_)) => of(&self.depth, depth).min(of(&self.time, time)).min(1.0),
+            Form::Velocity(Fall::Exponential) => of(&self.depth, depth).min(of(&self.time, time)).min(SPAN_MAX),
         };
         self
     }
@@ -284,7 +345,7 @@ impl<S: Scalar, const K: usize> Path<S, K> {
         let (velocity, rate) = both(&self.velocity, s);
         let velocity = match self.form {
             Form::Time(_) | Form::Depth(_) => velocity,
-            Form::Velocity(m) => self.velocity[0].value() * (1.0 - s).powi(m.cast_signed()),
+            Form::Velocity(fall) => self.velocity[0].value() * fall.left(s),
         };
         let force = law.force_value(both(&self.depth, s).0, velocity);
         match self.form {
@@ -295,15 +356,15 @@ impl<S: Scalar, const K: usize> Path<S, K> {
                 let of_time = (both(&self.time, s).1 * velocity / unit - 1.0).abs();
                 of_energy.max(of_time) * self.span
             }
-            Form::Velocity(m) => {
-                let falling = (1.0 - s).powi(m.cast_signed() - 1);
-                let rate = f64::from(m) * mass * self.velocity[0].value() * falling / force;
-                let first = self.time[1].value();
+            Form::Velocity(fall) => {
+                let falling = fall.slope(s);
+                let rate = mass * self.velocity[0].value() * falling / force;
+                let (_, scale) = self.scales();
                 // At rest both vanish, and their quotient is the force's.
-                if falling == 0.0 && m > 1 {
+                if falling == 0.0 {
                     return 0.0;
                 }
-                (both(&self.time, s).1 - rate).abs() * self.span / first
+                (both(&self.time, s).1 - rate).abs() * self.span / scale
             }
         }
     }
@@ -314,7 +375,7 @@ impl<S: Scalar, const K: usize> Path<S, K> {
             let largest = series.iter().enumerate().skip(first).rev();
             largest.fold(0.0, |sum, (k, c)| sum * self.span + k as f64 * c.value().abs())
         };
-        let (speed, pace) = (self.velocity[0].value(), self.time[1].value());
+        let (speed, (_, pace)) = (self.velocity[0].value(), self.scales());
         let lost = |unit: f64| force.abs() / mass * unit * self.span;
         match self.form {
             Form::Time(unit) => (of(&self.velocity, 0) + lost(unit)) / speed,
@@ -332,9 +393,11 @@ struct Walk<'l, S, const K: usize> {
     mass: S,
     jets: Jets<S>,
     /// The side of each switch on this step.
-    sides: Vec<bool>,
-    /// The switch at whose root this step starts.
-    kink: Option<usize>,
+    sides: SmallVec<[bool; 4]>,
+    /// How the velocity falls where it is the variable, on these sides.
+    falling: Falling,
+    /// The switches at whose roots this step starts.
+    kinks: Kinks,
     /// Whether the step before went by velocity.
     goes_by_velocity: bool,
     /// The force where the step before ended.
@@ -348,11 +411,11 @@ struct Walk<'l, S, const K: usize> {
     slope: Option<f64>,
 }
 
-/// The force at a state, and `F_V` (kg/s).
+/// The force at a state, and `F_V` (kg/s) where it is below zero, else zero.
 #[derive(Clone, Copy)]
 struct Local<S> {
     force: S,
-    by_velocity: f64,
+    fall: f64,
 }
 
 /// What a step goes by, where it does not go by velocity.
@@ -404,14 +467,16 @@ impl LawSeries {
             let why = "a law in code has no series; take --method adaptive".to_owned();
             return Err(IntegrationError::Refused { method: self.method, why });
         };
+        let sides = SmallVec::from_elem(false, bound.switches().len());
         let mut walk = Walk::<S, K> {
             law,
             bound,
+            falling: bound.falling(&sides),
             mass: course.mass,
             end: law.end().map(|end| (end, end.side(course.state))),
             jets: Jets::default(),
-            sides: vec![false; bound.switches().len()],
-            kink: None,
+            sides,
+            kinks: Kinks::new(),
             goes_by_velocity: false,
             reached: None,
             variable: self.variable,
@@ -446,18 +511,18 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
-        let (path, kink) = match self.path(course, here, limit) {
+        let (path, kinks, (s, event)) = match self.path(course, force, limit) {
             Err(IntegrationError::NoForce { last, .. }) if last == start.values() => {
                 let next = self.leave_branch_point(start, force, limit).ok_or_else(|| self.no_force(course, start))?;
                 course.cost.steps += 1;
                 self.reached = Some(self.widen_bound(course, here, start, next));
                 course.sample_until(next, |time| State { time: S::from_f64(time), ..start });
-                (self.kink, course.state) = (None, next);
+                self.kinks.clear();
+                course.state = next;
                 return Ok(None);
             }
             other => other?,
         };
-        let (s, event) = first_event(&path, limit);
         let (s, event, closeness) = self.first_zero(&path, s, event);
         let local = path.at(s);
         let next = State {
@@ -503,7 +568,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         });
         Ok(match event {
             Event::None => {
-                self.kink = kink.filter(|_| s.value() >= path.span);
+                self.kinks = if s.value() >= path.span { kinks } else { Kinks::new() };
                 self.reached = Some(reached);
                 course.state = next;
                 course.sample(next);
@@ -517,8 +582,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
 
     fn local(&self, at: State<S>) -> Local<S> {
         let State { depth, velocity, .. } = at.values();
-        let by_velocity = self.law.slope_over_velocity(depth, velocity);
-        Local { force: self.law.force(at.depth, at.velocity), by_velocity }
+        Local { force: self.law.force(at.depth, at.velocity), fall: self.law.fall_over_velocity(depth, velocity) }
     }
 
     /// The error where the force has no value.
@@ -618,31 +682,34 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         if self.sides.is_empty() {
             return;
         }
-        let unit = time_unit(start, force, self.mass, limit);
-        // Two rounds: the slope of a switch that stands at zero may depend on the side of another.
-        for _ in 0..2 {
-            self.over_time(start, unit, 4);
-            for (side, register) in self.bound.switches().iter().enumerate() {
-                let series = self.jets.register(*register);
-                let known = if self.kink == Some(side) { &series[1..4] } else { &series[..4] };
-                let first = known.iter().map(|c| c.value()).find(|c| *c != 0.0);
-                self.sides[side] = first.unwrap_or(0.0) > 0.0;
+        let values = self.bound.switch_values(start.depth, start.velocity);
+        let chosen = values.iter().map(|value| value.value() > 0.0).collect();
+        let before = std::mem::replace(&mut self.sides, chosen);
+        if values.iter().enumerate().any(|(side, value)| self.kinks.contains(&side) || value.is_zero()) {
+            let unit = time_unit(start, force, self.mass, limit);
+            // Two rounds: the slope of a switch that stands at zero may depend on the side of another.
+            for _ in 0..2 {
+                self.over_time(start, unit, 4);
+                for (side, register) in self.bound.switches().iter().enumerate() {
+                    let series = self.jets.register(*register);
+                    let known = if self.kinks.contains(&side) { &series[1..4] } else { &series[..4] };
+                    let first = known.iter().map(|c| c.value()).find(|c| *c != 0.0);
+                    self.sides[side] = first.unwrap_or(0.0) > 0.0;
+                }
             }
+        }
+        if self.sides != before {
+            self.falling = self.bound.falling(&self.sides);
         }
     }
 
-    /// A step on which the equation holds, and the switch at whose root it ends.
-    fn path(
-        &mut self,
-        course: &Course<'_, S>,
-        Local { force, by_velocity: slope }: Local<S>,
-        limit: S,
-    ) -> Solved<(Path<S, K>, Option<usize>)> {
+    /// A step on which the equation holds, the switches at whose roots it ends, and where it ends and how.
+    fn path(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<(Path<S, K>, Kinks, Ending<S>)> {
         let start = course.state;
         let by_velocity = self.over_velocity(start, force);
         let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
         let mut path = match by_velocity {
-            Some(path) if path.span >= enough && !self.may_end_over_depth(&path, limit) => path,
+            Some(path) if path.form.share(path.span) >= enough && !self.may_end_over_depth(&path, limit) => path,
             other => {
                 let free = self.over_time_or_depth(course, force, limit)?;
                 match other {
@@ -660,18 +727,30 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         };
         self.goes_by_velocity = matches!(path.form, Form::Velocity(_));
         // What the force is rounded to: its terms may cancel.
-        let by_depth = self.law.slope_over_depth(start.depth.value(), start.velocity.value());
-        let terms = (by_depth * start.depth.value()).abs() + (slope * start.velocity.value()).abs();
-        let size = force.value().abs() + if terms.is_finite() { terms } else { 0.0 };
-        let mut kink = None;
+        let size = LazyCell::new(|| {
+            let State { depth, velocity, .. } = start.values();
+            let (by_depth, by_velocity) = self.law.slopes(depth, velocity);
+            let terms = (by_depth * depth).abs() + (by_velocity * velocity).abs();
+            force.value().abs() + if terms.is_finite() { terms } else { 0.0 }
+        });
+        let mut kinks = Kinks::new();
         for _ in 0..SHORTENED_MAX {
-            if let Some((switch, root)) = self.first_kink(path.span) {
-                (path.span, kink) = (root, Some(switch));
+            if let Some((root, switches)) = self.first_kinks(&path) {
+                (path.span, kinks) = (root, switches);
             }
-            let allowed =
-                DEFECT_MAX * self.tolerance + 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(size, self.mass.value());
-            let holds = |share: &f64| path.defect(share * path.span, self.law, self.mass.value()) <= allowed;
-            let energy = self.mass.value() * start.velocity.value() * start.velocity.value();
+            // Behind rest and the limit the equation need not hold, nor the force have a value.
+            let end = first_event(&path, limit);
+            path.span = end.0.value();
+            let mass = self.mass.value();
+            let allowed = |force: f64| {
+                DEFECT_MAX * self.tolerance + 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(force, mass)
+            };
+            let (least, most) = (allowed(force.value()), LazyCell::new(|| allowed(*size)));
+            let holds = |share: &f64| {
+                let lacking = path.defect(share * path.span, self.law, mass);
+                lacking <= least || lacking <= *most
+            };
+            let energy = mass * start.velocity.value() * start.velocity.value();
             let place = |share: f64| {
                 let at = path.at(S::from_f64(share * path.span)).values();
                 (at.depth, at.velocity.max(0.0))
@@ -680,13 +759,12 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 let parts = self.law.shown_in(place, energy)?;
                 (1..parts).all(|part| holds(&(part as f64 / parts as f64))).then_some(())
             };
-            let shown =
-                if ASKED.iter().all(holds) && shows().is_some() { self.shown_end(&path, limit) } else { SHORTENING };
+            let shown = if ASKED.iter().all(holds) && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
             if shown >= 1.0 {
-                return Ok((path, kink));
+                return Ok((path, kinks, end));
             }
             path.span *= shown;
-            kink = None;
+            kinks.clear();
         }
         let end = path.at(S::from_f64(path.span));
         let last = State { time: start.time + end.time, ..end };
@@ -711,18 +789,10 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         Some(series)
     }
 
-    /// The share of the path on which its series shows where g vanishes: 1 where all of it does, up to rest and the limit.
-    ///
-    /// A path of constant force goes on for long behind them, where the series of g may be anything.
-    fn shown_end(&self, path: &Path<S, K>, limit: S) -> f64 {
+    /// The share of the path on which its series shows where g vanishes: 1 where all of it does.
+    fn shown_end(&self, path: &Path<S, K>) -> f64 {
         let (Some((end, side)), Some(series)) = (self.end, self.condition_series()) else { return 1.0 };
-        let within = Path { span: first_event(path, limit).0.value(), ..path.clone() };
-        let share = self.shown_within(&within, end, side, &series);
-        if share < 1.0 { share * within.span / path.span } else { 1.0 }
-    }
-
-    fn shown_within(&self, path: &Path<S, K>, end: &Condition<S>, side: f64, series: &[S; K]) -> f64 {
-        if !self.shows_end(path, end, series) {
+        if !self.shows_end(path, end, &series) {
             return SHORTENING;
         }
         let place = |share: f64| {
@@ -740,7 +810,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 }
             }
             Sight::Crossed(_, to) => {
-                let (root, _) = first_fall(series, side, path.span);
+                let (root, _) = first_fall(&series, side, path.span);
                 let is_found = root.is_some_and(|root| root <= to * path.span * (1.0 + 1e-9));
                 if is_found { 1.0 } else { to.min(SHORTENING) }
             }
@@ -839,18 +909,50 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         course.is_in_doubt |= beyond.abs() <= allowed;
     }
 
-    /// The first root of a switch on a step of `span`.
-    fn first_kink(&self, span: f64) -> Option<(usize, f64)> {
-        let roots = self.bound.switches().iter().enumerate().filter_map(|(side, register)| {
+    /// The first root of a switch on a step, and the switches that have one there.
+    fn first_kinks(&self, path: &Path<S, K>) -> Option<(f64, Kinks)> {
+        let switches = self.bound.switches();
+        if switches.is_empty() {
+            return None;
+        }
+        let span = path.span;
+        // Where V falls all along, the ends of the step hold x and V between them.
+        let ranges = matches!(path.form, Form::Velocity(_)).then(|| {
+            let (from, to) = (path.at(S::zero()).values(), path.at(S::from_f64(span)).values());
+            self.bound.ranges((from.depth, to.depth), (to.velocity, from.velocity))
+        });
+        let may_vanish = |register: usize| {
+            ranges.as_ref().is_none_or(|ranges| {
+                let (least, most) = ranges[register];
+                !(least > 0.0 || most < 0.0)
+            })
+        };
+        let switches = switches.iter().enumerate().filter(|(_, register)| may_vanish(**register));
+        let roots = switches.filter_map(|(side, register)| {
             // At its root, what is left of it over s.
-            let first = usize::from(self.kink == Some(side));
+            let first = usize::from(self.kinks.contains(&side));
             let mut series = [S::zero(); K];
             series[..K - first].copy_from_slice(&self.jets.register(*register)[first..K]);
+            let (mut root, _) = first_fall(&series, series[0].value().signum(), span);
+            if first == 0 {
+                // The force may have a series that goes on where that of the switch has ended.
+                let before = -series[0].value().signum();
+                let passed = |s: f64| {
+                    let at = path.at(S::from_f64(s));
+                    let value = self.bound.switch_values(at.depth, at.velocity)[side].value();
+                    (before * value, before * both(&series, s).1)
+                };
+                let located = root.and_then(|root| settled(passed, root));
+                root = located.or_else(|| (passed(span).0 > 0.0).then(|| root_before(passed, span))).or(root);
+            }
             // A root at the end of the step is passed by the next.
-            let (root, _) = first_fall(&series, series[0].value().signum(), span);
             root.filter(|root| *root < span).map(|root| (side, root))
         });
-        roots.min_by(|a, b| a.1.total_cmp(&b.1))
+        let roots: SmallVec<[(usize, f64); 4]> = roots.collect();
+        let first = roots.iter().map(|(_, root)| *root).reduce(f64::min)?;
+        // Of two at one place neither may be found again just behind it, for ever.
+        let at_first = roots.iter().filter(|(_, root)| *root <= first * (1.0 + SAME_PLACE));
+        Some((first, at_first.map(|(side, _)| *side).collect()))
     }
 
     /// Whether a step by velocity gets to the limit, where a step over depth may end on it.
@@ -928,33 +1030,26 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
 
     /// The series over velocity, for a force that resists: over time, of a law with a branch point at rest.
     fn over_velocity(&mut self, start: State<S>, force: S) -> Option<Path<S, K>> {
-        let branch = self.law.branch_at_rest();
-        let m = match self.variable {
-            Variable::Time => branch.filter(|m| *m > 1)?,
-            Variable::Depth => branch.unwrap_or(1),
-        };
-        if force.value() <= 0.0 {
+        let fall = self.falling.fall;
+        if force.value() <= 0.0 || self.variable == Variable::Time && fall == Fall::Power(1) {
             return None;
         }
-        let mut path = Path::start(Form::Velocity(m), start);
-        // V0 (1-s)^m, and m M V0 (1-s)^(m-1).
-        let mut rate = [S::zero(); K];
-        for (series, scale, power) in [
-            (&mut path.velocity, start.velocity, m),
-            (&mut rate, start.velocity * self.mass * S::from_f64(f64::from(m)), m - 1),
-        ] {
-            let mut binomial = 1.0;
-            for (k, term) in series.iter_mut().enumerate().take(power as usize + 1) {
-                *term = scale * S::from_f64(binomial);
-                binomial *= -(f64::from(power) - k as f64) / (k as f64 + 1.0);
-            }
+        let mut path = Path::start(Form::Velocity(fall), start);
+        for k in 1..K {
+            path.velocity[k] = fall.coefficient(k, 1.0, path.velocity[k - 1]);
         }
+        // -M dV/ds.
+        let rate: [S; K] = std::array::from_fn(|k| match fall {
+            Fall::Exponential => self.mass * path.velocity[k],
+            Fall::Power(_) if k + 1 < K => -(self.mass * path.velocity[k + 1] * S::from_f64((k + 1) as f64)),
+            Fall::Power(_) => S::zero(),
+        });
         // That of the side chosen: at a switch the other one has the same value, and in dual numbers another slope.
         let mut inverse = S::zero();
         let mut forces = [S::zero(); K];
         // dt/ds.
         let mut pace = [S::zero(); K];
-        self.jets.start_falling(self.bound, &self.sides, m);
+        self.jets.start_falling(self.bound, &self.sides, &self.falling);
         for k in 0..K {
             forces[k] = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
             if k == 0 {
@@ -963,7 +1058,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             pace[k] = (rate[k] - product(&forces[1..=k], &pace[..k])) * inverse;
             if k + 1 < K {
                 let share = reciprocal(k + 1);
-                let advance = (0..=k.min(m as usize)).fold(S::zero(), |sum, i| sum + path.velocity[i] * pace[k - i]);
+                // V has m + 1 coefficients, or all.
+                let terms = if let Fall::Power(m) = fall { k.min(m as usize) } else { k };
+                let advance = product(&path.velocity[..=terms], &pace[k - terms..=k]);
                 path.time[k + 1] = pace[k] * share;
                 path.depth[k + 1] = advance * share;
             }
@@ -972,8 +1069,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return None;
         }
         let mut path = path.spanned(self.tolerance);
-        if self.law.force(start.depth, S::zero()).value() == 0.0 {
-            path.span = path.span.min(VANISHING_SPAN);
+        let is_little =
+            path.depth[1].value() <= LITTLE * start.depth.value() && path.time[1].value() <= LITTLE * path.before;
+        let goes_to_rest = fall != Fall::Exponential && path.span > VANISHING_SPAN;
+        if goes_to_rest && !is_little && self.law.force(start.depth, S::zero()).value() == 0.0 {
+            path.span = VANISHING_SPAN;
         }
         Some(path)
     }
@@ -990,7 +1090,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let (a, b) = (start.values(), next.values());
         let (time, distance) = (b.time - a.time, b.depth - a.depth);
         let reached = self.local(next);
-        let falls = here.by_velocity.min(reached.by_velocity).min(0.0).abs();
+        let falls = here.fall.min(reached.fall).abs();
         let mass = self.mass.value();
         let growth = match self.slope {
             Some(slope) => -time * slope / mass,
@@ -1001,7 +1101,9 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let largest = here.force.value().abs().max(if end_force.is_finite() { end_force } else { 0.0 }) / mass;
         let relative = 1.0 / course.problem.impact_speed.value();
         let rounding = 6.0 * fastest * fastest + 3.0 * largest * (b.depth + 2.0 * distance);
-        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * fastest * fastest;
+        // What a step by shares of V leaves out counts beside the depth reached.
+        let cut = fastest * fastest + if self.falling.fall == Fall::Exponential { largest * b.depth } else { 0.0 };
+        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * cut;
         let grown = if growth.is_finite() { growth.exp() } else { 1.0 };
         course.error_bound = course.error_bound * grown + relative * relative * added;
         reached
@@ -1018,15 +1120,15 @@ fn time_unit<S: Scalar>(start: State<S>, force: S, mass: S, limit: S) -> f64 {
 }
 
 /// Where the step ends, and how: at the first rest, at the limit if that comes before, else at its span.
-fn first_event<S: Scalar, const K: usize>(path: &Path<S, K>, limit: S) -> (S, Event) {
+fn first_event<S: Scalar, const K: usize>(path: &Path<S, K>, limit: S) -> Ending<S> {
     let span = path.span;
     if let Some(end) = path.limit_over_depth(limit) {
         return (end, Event::Limit);
     }
     let rest = match path.form {
         Form::Time(_) => first_fall(&path.velocity, 1.0, span).0,
-        Form::Depth(_) => None,
-        Form::Velocity(_) => (span >= 1.0).then_some(1.0),
+        Form::Velocity(Fall::Power(_)) => (span >= 1.0).then_some(1.0),
+        Form::Depth(_) | Form::Velocity(Fall::Exponential) => None,
     };
     let end = rest.unwrap_or(span);
     let beyond = |s: S| value(&path.depth, s) - limit;

@@ -128,10 +128,6 @@ impl<S: Scalar> Condition<S> {
         &self.parameters
     }
 
-    pub(crate) fn powers_of_v(&self) -> Vec<f64> {
-        self.values.powers_of_v()
-    }
-
     /// g at depth `x` (m) and velocity `v` (m/s).
     pub fn value(&self, x: f64, v: f64) -> f64 {
         self.values.eval(x, v)

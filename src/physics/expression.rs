@@ -34,8 +34,8 @@ use std::ops::Range;
 use thiserror::Error;
 
 pub use bound::Bound;
-pub use jets::Jets;
 pub(crate) use jets::product;
+pub use jets::{Fall, Falling, Jets};
 pub use parse::is_name;
 pub use tape::{DomainError, Reason, Tape};
 pub use unit::Unit;

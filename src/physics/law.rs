@@ -96,8 +96,6 @@ struct Expression<S> {
     bound: Bound<S>,
     /// The same in values, for slopes.
     values: Bound,
-    /// m with which the force is smooth in u at rest, `V = u^m`.
-    branch: Option<u32>,
 }
 
 impl<S: PartialEq> PartialEq for Form<S> {
@@ -118,9 +116,8 @@ impl<S: Scalar> Law<S> {
     pub fn new(tape: &Tape, parameters: Vec<S>) -> Self {
         let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
         let values = tape.bind(&values);
-        let branch = branch(&values.powers_of_v());
         let bound = tape.bind(&parameters);
-        Self::of(Form::Expression(Box::new(Expression { parameters, bound, values, branch })))
+        Self::of(Form::Expression(Box::new(Expression { parameters, bound, values })))
     }
 
     /// The law of a force in code.
@@ -200,9 +197,6 @@ impl<S: Scalar> Law<S> {
     pub(crate) fn ending(mut self, end: Condition<S>) -> Self {
         if let Form::Expression(expression) = &mut self.force {
             expression.bound = expression.bound.with(end.tape(), end.parameters());
-            let mut powers = expression.values.powers_of_v();
-            powers.extend(end.powers_of_v());
-            expression.branch = branch(&powers);
         }
         if let Form::Table(pieces) = &mut self.force {
             // Pieces that were made end without it.
@@ -319,6 +313,12 @@ impl<S: Scalar> Law<S> {
         }
     }
 
+    /// `F_V` (kg/s) where it is below zero, else zero.
+    pub(crate) fn fall_over_velocity(&self, x: f64, v: f64) -> f64 {
+        let is_known = self.expression().is_some_and(|expression| expression.bound.never_falls_with_v());
+        if is_known { 0.0 } else { self.slope_over_velocity(x, v).min(0.0) }
+    }
+
     /// The side of each switch of min, max and abs at depth `x` (m) and velocity `v` (m/s).
     #[cfg(feature = "diffsol")]
     pub(crate) fn sides(&self, x: f64, v: f64) -> smallvec::SmallVec<[bool; 4]> {
@@ -347,34 +347,32 @@ impl<S: Scalar> Law<S> {
     ///
     /// By bounds of the expression over each part. A series sees nothing of what lies far ahead.
     pub(crate) fn shown_in(&self, place: impl Fn(f64) -> (f64, f64), energy: f64) -> Option<usize> {
-        let within = |(from, to): ((f64, f64), (f64, f64)), largest: f64| {
+        let at = |share: f64| {
+            let (x, v) = place(share);
+            (x, v, self.force_value(x, v))
+        };
+        let within = |from: (f64, f64, f64), to: (f64, f64, f64), largest: f64| {
             let (low, high) = (from.1.min(to.1), from.1.max(to.1));
             // What a slower projectile meets is for the steps to come.
             let depths = (from.0.min(to.0), from.0.max(to.0));
             let Some((least, most)) = self.range(depths, (low.max(SLOWEST * high), high)) else { return true };
-            let shown = (self.force_value(to.0, to.1) - self.force_value(from.0, from.1)).abs();
             let hidden = most - least;
-            hidden <= SURPRISE * largest + 2.0 * shown || hidden * (to.0 - from.0).abs() <= NOTHING * energy
+            hidden <= SURPRISE * largest + 2.0 * (to.2 - from.2).abs()
+                || hidden * (to.0 - from.0).abs() <= NOTHING * energy
         };
-        let size = |(x, v): (f64, f64)| self.force_value(x, v).abs();
-        let (start, end) = (place(0.0), place(1.0));
-        if within((start, end), size(start).max(size(end))) {
+        let (start, end) = (at(0.0), at(1.0));
+        if within(start, end, start.2.abs().max(end.2.abs())) {
             return Some(1);
         }
-        let places: [(f64, f64); PARTS + 1] = std::array::from_fn(|part| place(part as f64 / PARTS as f64));
-        let largest = places.iter().map(|place| size(*place)).filter(|size| size.is_finite()).fold(0.0, f64::max);
-        places.windows(2).all(|pair| within((pair[0], pair[1]), largest)).then_some(PARTS)
+        let places: [(f64, f64, f64); PARTS + 1] = std::array::from_fn(|part| at(part as f64 / PARTS as f64));
+        let sizes = places.iter().map(|place| place.2.abs());
+        let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+        places.windows(2).all(|pair| within(pair[0], pair[1], largest)).then_some(PARTS)
     }
 
     /// Whether the force depends on the velocity.
     pub fn depends_on_velocity(&self) -> bool {
         self.expression().is_none_or(|expression| expression.values.tape().depends_on_v())
-    }
-
-    /// m with which the force is smooth in u at rest, `V = u^m`: the common denominator of the powers of V that have a
-    /// branch point there.
-    pub fn branch_at_rest(&self) -> Option<u32> {
-        self.expression()?.branch
     }
 
     /// Whether the force brings a projectile to rest at depth `x` (m) that comes there slower than `v` (m/s): it resists at
@@ -429,9 +427,15 @@ impl<S: Scalar> Law<S> {
             let work = force(from) * (to - from);
             return (work, work.max(0.0));
         }
+        let bounds = |from: f64, to: f64| self.range((from, to), (0.0, 0.0)).unwrap_or((0.0, 0.0));
+        if !matches!(self.force, Form::Code(_)) && bounds(from, to).0 >= 0.0 {
+            // It drives nowhere, and no place has to be found.
+            let rough = integral(&force, &bounds, (from, to), (0.0, 1e-6), HALVINGS);
+            let work = integral(&force, &bounds, (from, to), (rough, 0.0), HALVINGS);
+            return (work, work);
+        }
         let place = |panel: u32| from + (to - from) * f64::from(panel) / f64::from(PANELS);
         let scale = (to - from) / f64::from(PANELS) * (0..PANELS).map(|panel| force(place(panel)).abs()).sum::<f64>();
-        let bounds = |from: f64, to: f64| self.range((from, to), (0.0, 0.0)).unwrap_or((0.0, 0.0));
         // Twice: what the points above miss may be all of it.
         let rough = |panel| integral(&force, &bounds, (place(panel), place(panel + 1)), (scale, 1e-6), HALVINGS).abs();
         let scale = scale + (0..PANELS).map(rough).sum::<f64>();
@@ -477,12 +481,6 @@ fn line() -> &'static Tape {
     }
 }
 
-/// The least m with which powers of V are whole powers of u, `V = u^m`.
-fn branch(powers: &[f64]) -> Option<u32> {
-    let is_whole = |m: u32| powers.iter().all(|power| (power * f64::from(m)).fract() == 0.0);
-    (1..=BRANCH_MAX).find(|m| is_whole(*m))
-}
-
 /// Name of a parameter. Names are few, and are kept as long as the program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Name(&'static str);
@@ -520,9 +518,6 @@ pub struct OwnParameter {
     pub unit: Unit,
 }
 
-/// Largest common denominator of powers of V for which u is taken as variable.
-const BRANCH_MAX: u32 = 12;
-
 /// Parts of a path whose force is bounded.
 const PARTS: usize = 8;
 
@@ -547,30 +542,44 @@ const GAUSS: [(f64, f64); 5] = [
     (0.148_874_338_981_631_22, 0.295_524_224_714_752_87),
 ];
 
+/// Integral of `force` by ten points.
+fn gauss(force: &impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    half * GAUSS.iter().map(|(x, w)| w * (force(middle - half * x) + force(middle + half * x))).sum::<f64>()
+}
+
 /// Integral of `force`: ten points, halved until both halves give the whole, and until its `bounds` leave room for little
 /// else, beside the `scale` of the whole work; `roughly` is the share that may be wrong.
 fn integral(
     force: &impl Fn(f64) -> f64,
     bounds: &impl Fn(f64, f64) -> (f64, f64),
     (from, to): (f64, f64),
+    limits: (f64, f64),
+    halvings: u32,
+) -> f64 {
+    refined(force, bounds, (from, to), gauss(force, from, to), limits, halvings)
+}
+
+/// The same, with what ten points give for the `whole`.
+fn refined(
+    force: &impl Fn(f64) -> f64,
+    bounds: &impl Fn(f64, f64) -> (f64, f64),
+    (from, to): (f64, f64),
+    whole: f64,
     (scale, roughly): (f64, f64),
     halvings: u32,
 ) -> f64 {
-    let rule = |from: f64, to: f64| {
-        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-        half * GAUSS.iter().map(|(x, w)| w * (force(middle - half * x) + force(middle + half * x))).sum::<f64>()
-    };
     let middle = 0.5 * (from + to);
-    let (left, right) = (rule(from, middle), rule(middle, to));
+    let (left, right) = (gauss(force, from, middle), gauss(force, middle, to));
     let (least, most) = bounds(from, to);
     let hides_little = (most - least) * (to - from) <= (left + right).abs() + 0.02 * scale;
-    let is_exact = !((left + right - rule(from, to)).abs() > 1e-15 * scale + roughly * (left.abs() + right.abs()));
+    let is_exact = !((left + right - whole).abs() > 1e-15 * scale + roughly * (left.abs() + right.abs()));
     let is_enough = is_exact && hides_little;
     if is_enough || halvings == 0 {
         return left + right;
     }
-    let part = |from, to| integral(force, bounds, (from, to), (scale, roughly), halvings - 1);
-    part(from, middle) + part(middle, to)
+    let part = |from, to, whole| refined(force, bounds, (from, to), whole, (scale, roughly), halvings - 1);
+    part(from, middle, left) + part(middle, to, right)
 }
 
 /// Where `force`, positive at `low` and negative at `high`, changes its sign.

@@ -421,7 +421,7 @@ impl Numbers {
             return size <= Self::FACTOR * least || least == 0.0 && size < Self::TINY / Self::FACTOR;
         }
         if was.is_short() && is.is_short() {
-            let step = was.last_digit().max(is.last_digit());
+            let step = was.last_digit().min(is.last_digit());
             let is_rounded = was.text.contains('.') && (a - b).abs() <= 1.5 * step;
             self.rounded.take(!is_rounded, place);
             return is_rounded;

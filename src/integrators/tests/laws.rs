@@ -777,8 +777,13 @@ fn an_enclosure_of_coefficients_meets_that_of_the_same_expression() {
 /// A random force of two or three terms, with kinks, slopes of either sign, and branch points at rest. Its numbers are the same in
 /// binary: an enclosure takes them for decimals.
 fn random_force(random: &mut Random) -> String {
-    const TERMS: [&str; 18] = [
+    const TERMS: [&str; 22] = [
         "P",
+        // Kinks at one place, b v1, and powers and logarithms that no power of V makes smooth.
+        "R*abs(V/v1 - b)",
+        "R*max(V/v1, b)^0.23",
+        "P*b*log(max(5*V/v1, 1))",
+        "R*(V/v1)^0.027",
         "R",
         "Q*V^2",
         "R*(V/v1)^1.5",

@@ -6,6 +6,7 @@
 use num_dual::Dual64;
 use smallvec::SmallVec;
 
+use super::jets::{Fall, Falling};
 use super::parse::{Binary, Function, Term};
 use super::tape::{self, DomainError, Tape};
 use crate::physics::scalar::Scalar;
@@ -15,6 +16,9 @@ pub(super) const POWER_MAX: f64 = 64.0;
 
 /// Largest exponent `n + 1/2` that is computed by products and a square root.
 const HALF_POWER_MAX: f64 = 8.0;
+
+/// Largest common denominator of powers of V for which u is taken as variable.
+const ROOT_MAX: u32 = 12;
 
 /// Registers that a law of the field needs: to set more to zero takes longer than to compute it.
 const FEW: usize = 16;
@@ -33,10 +37,10 @@ pub struct Bound<S = f64> {
     result: Value<S>,
     /// The value of the second expression, if there is one.
     beside: Option<Value<S>>,
-    /// e of each register that is a constant times `V^e`; NaN for others.
-    powers: Vec<f64>,
     /// Whether each register is known not to be negative, whatever x and V are.
     signs: Vec<bool>,
+    /// Whether the value is known not to fall with V, at any depth.
+    never_falls_with_v: bool,
 }
 
 /// What a term became.
@@ -159,6 +163,31 @@ impl<S> Step<S> {
 }
 
 impl<S: Scalar> Step<S> {
+    /// The registers that it is computed of, on `sides` of the switches.
+    fn operands(&self, sides: &[bool], mut with: impl FnMut(usize)) {
+        match *self {
+            Self::Constant { .. } => {}
+            Self::Affine { a, .. }
+            | Self::Share { a, .. }
+            | Self::Square { a }
+            | Self::Slope { a }
+            | Self::Sqrt { a } => {
+                with(a);
+            }
+            Self::Ratio { b, .. } => with(b),
+            Self::Sum { a, b, .. } | Self::Multiply { a, b } | Self::Divide { a, b } => {
+                [a, b].into_iter().for_each(with);
+            }
+            Self::HalfPower { a, whole, root, .. } => [a, whole, root].into_iter().for_each(with),
+            Self::Power { a, slope, .. }
+            | Self::Exp { a, slope }
+            | Self::SinCos { a, slope }
+            | Self::Tanh { a, slope } => [a, slope].into_iter().for_each(with),
+            Self::Integral { a, slope, divisor, .. } => [a, slope, divisor].into_iter().for_each(with),
+            Self::Select { index, above, below, .. } => with(if sides[index] { above } else { below }),
+        }
+    }
+
     /// Values of its registers, the second one only where it has two; a constant enters by `lift`. A quotient that only series need
     /// is left out unless they are asked `FOR_SERIES`.
     #[inline(always)]
@@ -203,31 +232,67 @@ impl<S: Scalar> Step<S> {
     }
 }
 
-/// e of each register that is a constant times `V^e`; NaN for others.
-fn powers<S: Scalar>(steps: &[Step<S>], registers: usize) -> Vec<f64> {
-    let mut powers = Vec::with_capacity(registers);
-    powers.extend([f64::NAN, 1.0]);
+/// How a register depends on V.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Degree {
+    /// e of `a V^e`, with any a of x; NaN for another function of V.
+    of_v: f64,
+    /// Whether a is a constant.
+    is_plain: bool,
+}
+
+impl Degree {
+    const NONE: Self = Self { of_v: f64::NAN, is_plain: false };
+
+    fn times(self, other: Self) -> Self {
+        Self { of_v: self.of_v + other.of_v, is_plain: self.is_plain && other.is_plain }
+    }
+
+    fn to(self, exponent: f64) -> Self {
+        Self { of_v: exponent * self.of_v, ..self }
+    }
+
+    /// Of a sum or a function: only what V does not touch is a power of it, the zeroth.
+    fn of_any(degrees: impl IntoIterator<Item = Self>) -> Self {
+        let is_free = degrees.into_iter().all(|degree| degree.of_v == 0.0);
+        Self { of_v: if is_free { 0.0 } else { f64::NAN }, is_plain: false }
+    }
+}
+
+/// The degree of each register, on `sides` of the switches.
+fn degrees<S: Scalar>(steps: &[Step<S>], registers: usize, sides: &[bool]) -> SmallVec<[Degree; FEW]> {
+    let mut degrees = SmallVec::with_capacity(registers);
+    degrees.extend([Degree { of_v: 0.0, is_plain: false }, Degree { of_v: 1.0, is_plain: true }]);
     for step in steps {
-        let of = |register: usize| powers[register];
-        let power = match *step {
-            Step::Constant { .. } => 0.0,
+        let of = |register: usize| -> Degree { degrees[register] };
+        let degree = match *step {
+            Step::Constant { .. } => Degree { of_v: 0.0, is_plain: true },
             Step::Affine { a, shift, .. } if shift.value() == 0.0 && shift.is_constant() => of(a),
+            Step::Affine { a, .. } => Degree::of_any([of(a)]),
             Step::Share { a, .. } => of(a),
-            Step::Multiply { a, b } => of(a) + of(b),
-            Step::Square { a } => 2.0 * of(a),
-            Step::Divide { a, b } => of(a) - of(b),
-            Step::Ratio { b, .. } => -of(b),
-            Step::Sqrt { a } => 0.5 * of(a),
-            Step::HalfPower { a, exponent, .. } => exponent * of(a),
-            Step::Power { a, exponent, .. } if exponent.is_constant() => exponent.value() * of(a),
-            _ => f64::NAN,
+            Step::Slope { .. } => Degree::NONE,
+            Step::Sum { a, b, .. } => Degree::of_any([of(a), of(b)]),
+            Step::Multiply { a, b } => of(a).times(of(b)),
+            Step::Square { a } => of(a).to(2.0),
+            Step::Divide { a, b } => of(a).times(of(b).to(-1.0)),
+            Step::Ratio { b, .. } => of(b).to(-1.0),
+            Step::Sqrt { a } => of(a).to(0.5),
+            Step::HalfPower { a, exponent, .. } => of(a).to(exponent),
+            Step::Power { a, exponent, .. } => {
+                let power = of(a).to(exponent.value());
+                Degree { is_plain: power.is_plain && exponent.is_constant(), ..power }
+            }
+            Step::Select { index, above, below, .. } => of(if sides[index] { above } else { below }),
+            Step::Exp { a, .. } | Step::SinCos { a, .. } | Step::Tanh { a, .. } | Step::Integral { a, .. } => {
+                Degree::of_any([of(a)])
+            }
         };
-        powers.push(power);
+        degrees.push(degree);
         if step.width() == 2 {
-            powers.push(f64::NAN);
+            degrees.push(Degree::NONE);
         }
     }
-    powers
+    degrees
 }
 
 /// Whether each register is not negative by what it is made of: x and V, squares, roots and exponentials, and sums and products of
@@ -265,6 +330,82 @@ fn signs<S: Scalar>(steps: &[Step<S>], registers: usize) -> Vec<bool> {
     signs
 }
 
+/// How a value changes with V at one depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Trend {
+    Constant,
+    Rises,
+    Falls,
+}
+
+impl Trend {
+    fn never_falls(self) -> bool {
+        self != Self::Falls
+    }
+
+    /// Of what falls as this rises.
+    fn turned(self) -> Self {
+        match self {
+            Self::Constant => Self::Constant,
+            Self::Rises => Self::Falls,
+            Self::Falls => Self::Rises,
+        }
+    }
+
+    /// Of a multiple.
+    fn times<S: Scalar>(self, factor: S) -> Self {
+        if factor.value() < 0.0 { self.turned() } else { self }
+    }
+
+    /// Of what rises with both.
+    fn with(self, other: Self) -> Option<Self> {
+        match (self, other) {
+            (Self::Constant, trend) | (trend, Self::Constant) => Some(trend),
+            _ => (self == other).then_some(self),
+        }
+    }
+}
+
+/// The trend of each register, x and V not negative; `None` where it is not known.
+fn trends<S: Scalar>(steps: &[Step<S>], signs: &[bool]) -> SmallVec<[Option<Trend>; FEW]> {
+    let mut trends = SmallVec::with_capacity(signs.len());
+    trends.extend([Some(Trend::Constant), Some(Trend::Rises)]);
+    for step in steps {
+        let place = trends.len();
+        let of = |register: usize| -> Option<Trend> { trends[register] };
+        let constant = |register: usize| of(register).filter(|trend| *trend == Trend::Constant);
+        let both = |a: usize, b: usize| of(a)?.with(of(b)?);
+        let turned = |register: usize| of(register).map(Trend::turned);
+        let trend = match *step {
+            Step::Constant { .. } => Some(Trend::Constant),
+            Step::Affine { a, factor, .. } => of(a).map(|trend| trend.times(factor)),
+            Step::Share { a, divisor, .. } => of(a).map(|trend| trend.times(divisor)),
+            Step::Sum { a, b, factor } => of(a).zip(of(b)).and_then(|(a, b)| a.with(b.times(factor))),
+            Step::Multiply { a, b } if signs[a] && signs[b] => both(a, b),
+            Step::Divide { a, b } if signs[a] && signs[b] => of(a).zip(turned(b)).and_then(|(a, b)| a.with(b)),
+            Step::Multiply { a, b } | Step::Divide { a, b } => constant(a).and(constant(b)),
+            Step::Ratio { dividend, b } if signs[b] => turned(b).map(|trend| trend.times(dividend)),
+            Step::Square { a } if signs[a] => of(a),
+            Step::Power { a, exponent, .. } if signs[a] => of(a).map(|trend| trend.times(exponent)),
+            Step::Ratio { b: a, .. } | Step::Square { a } | Step::Power { a, .. } | Step::SinCos { a, .. } => {
+                constant(a)
+            }
+            // Where they have a value, they rise with it.
+            Step::Sqrt { a }
+            | Step::HalfPower { a, .. }
+            | Step::Exp { a, .. }
+            | Step::Tanh { a, .. }
+            | Step::Integral { a, .. } => of(a),
+            Step::Select { switch, above, below, .. } if switch != above => both(above, below),
+            Step::Select { above, .. } => constant(above),
+            Step::Slope { .. } => None,
+        };
+        trends.push(trend);
+        trends.resize(place + step.width(), None);
+    }
+    trends
+}
+
 impl<S: Scalar> Bound<S> {
     pub(super) fn new(tape: Tape, parameters: &[S]) -> Self {
         Self::of(tape, parameters, None)
@@ -275,10 +416,13 @@ impl<S: Scalar> Bound<S> {
         let result = making.value(&tape, parameters);
         let beside = beside.map(|(tape, parameters)| making.value(tape, parameters));
         let Making { steps, registers, switches, .. } = making;
-        let powers = powers(&steps, registers);
         let signs = signs(&steps, registers);
+        let never_falls_with_v = match result {
+            Value::Constant(_) => true,
+            Value::Register(register) => trends(&steps, &signs)[register].is_some_and(Trend::never_falls),
+        };
         let parameters = parameters.iter().copied().collect();
-        Self { tape, parameters, steps, registers, switches, result, beside, powers, signs }
+        Self { tape, parameters, steps, registers, switches, result, beside, signs, never_falls_with_v }
     }
 
     /// The same expression with a second one `beside` it, at `parameters` of its own: a series of the one comes with that
@@ -294,11 +438,6 @@ impl<S: Scalar> Bound<S> {
             Value::Register(register) => Ok(register),
             Value::Constant(constant) => Err(constant),
         })
-    }
-
-    /// e of `register` where it is a constant times `V^e`.
-    pub(super) fn power(&self, register: usize) -> Option<f64> {
-        self.powers.get(register).copied().filter(|power| power.is_finite())
     }
 
     /// Value at depth `x` (m) and velocity `v` (m/s); not finite where [`Bound::explain`] says why.
@@ -356,6 +495,11 @@ impl<S: Scalar> Bound<S> {
         if T::HAS_RANGE && self.signs[register] { value.not_negative() } else { value }
     }
 
+    /// Whether the value is known not to fall with V, at any depth x >= 0 and V >= 0.
+    pub(crate) fn never_falls_with_v(&self) -> bool {
+        self.never_falls_with_v
+    }
+
     /// The expression that was bound.
     pub fn tape(&self) -> &Tape {
         &self.tape
@@ -394,35 +538,39 @@ impl<S: Scalar> Bound<S> {
         self.tape.fault(&self.parameters, x, v, true)
     }
 
-    /// Exponents e that are no whole numbers, of powers `V^e` that begin a term: a branch point at rest.
+    /// What the expression is at rest, on `sides` of its switches: smooth, or with a branch point at V = 0.
     ///
-    /// Of `(V/v1)^1.5` it is 1.5, of `V*sqrt(V)` 0.5, of `sqrt(x*V^3)` 1.5; `(V - v1)^1.5` has none. Sorted, each once.
-    pub fn powers_of_v(&self) -> Vec<f64> {
-        // An exponent has neither x nor V in it, and the same value everywhere.
-        let numbers = self.tape.values(&self.parameters, S::zero(), S::zero());
-        let mut powers: Vec<Option<f64>> = Vec::with_capacity(numbers.len());
-        let mut found = Vec::new();
-        for term in self.tape.terms() {
-            let power = match term {
-                Term::V => Some(1.0),
-                Term::Number(_) | Term::Parameter(_) | Term::X => Some(0.0),
-                Term::Negative(of) | Term::Call(Function::Abs, of) => powers[of],
-                Term::Call(Function::Sqrt, of) => powers[of].map(|power| 0.5 * power),
-                Term::Binary(Binary::Multiply, a, b) => powers[a].zip(powers[b]).map(|(a, b)| a + b),
-                Term::Binary(Binary::Divide, a, b) => powers[a].zip(powers[b]).map(|(a, b)| a - b),
-                Term::Binary(Binary::Power, base, exponent) => {
-                    powers[base].map(|power| power * numbers[exponent].value())
-                }
-                // Of a sum or a function, only what V does not touch is no power of it.
-                _ => term.operands().all(|operand| powers[operand] == Some(0.0)).then_some(0.0),
-            };
-            let is_root = matches!(term, Term::Call(Function::Sqrt, _) | Term::Binary(Binary::Power, ..));
-            found.extend(power.filter(|power| is_root && power.fract() != 0.0));
-            powers.push(power);
+    /// Of `(V/v1)^1.5`, `V*sqrt(V)` and `sqrt(x*V^3)` it is smooth in u, `V = u²`; of `(V/v1)^0.23` and `log(V/v1)` in the
+    /// logarithm of V alone. `(V - v1)^1.5` has no branch point there.
+    pub fn falling(&self, sides: &[bool]) -> Falling {
+        let degrees = degrees(&self.steps, self.registers, sides);
+        let mut is_used: SmallVec<[bool; FEW]> = SmallVec::from_elem(false, self.registers);
+        for value in [Some(self.result), self.beside].into_iter().flatten() {
+            if let Value::Register(register) = value {
+                is_used[register] = true;
+            }
         }
-        found.sort_by(f64::total_cmp);
-        found.dedup();
-        found
+        let (mut place, mut powers, mut has_logarithm) = (self.registers, SmallVec::<[f64; 4]>::new(), false);
+        for step in self.steps.iter().rev() {
+            place -= step.width();
+            if !is_used[place..place + step.width()].contains(&true) {
+                continue;
+            }
+            step.operands(sides, |operand| is_used[operand] = true);
+            match *step {
+                Step::Integral { function: Function::Log | Function::Log10, a, .. } => {
+                    has_logarithm |= degrees[a].of_v.abs() > 0.0;
+                }
+                Step::Sqrt { .. } | Step::HalfPower { .. } | Step::Power { .. } => {
+                    powers.extend(Some(degrees[place].of_v).filter(|power| !power.is_nan()));
+                }
+                _ => {}
+            }
+        }
+        let is_whole = |m: u32| powers.iter().all(|power| (power * f64::from(m)).fract() == 0.0);
+        let root = (1..=ROOT_MAX).find(|m| !has_logarithm && is_whole(*m));
+        let plain = degrees.iter().map(|degree| if degree.is_plain { degree.of_v } else { f64::NAN });
+        Falling { fall: root.map_or(Fall::Exponential, Fall::Power), powers: plain.collect() }
     }
 
     pub(super) fn steps(&self) -> &[Step<S>] {

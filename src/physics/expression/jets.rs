@@ -16,6 +16,7 @@
 use smallvec::SmallVec;
 
 use super::bound::{Bound, Step, Value};
+use super::parse::Function;
 use crate::physics::scalar::Scalar;
 use crate::physics::scalar::reciprocal;
 
@@ -42,8 +43,64 @@ pub struct Jets<S = f64> {
     /// Of each register.
     coefficients: Vec<[S; ORDERS_MAX]>,
     sides: SmallVec<[bool; 4]>,
-    /// m of a velocity `V0 (1-t)^m`; 0 for any other.
-    falling: u32,
+    /// How V falls, where that is known.
+    falling: Option<Falling>,
+}
+
+/// A velocity that falls in a known way over the variable s of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fall {
+    /// `V = V0 (1-s)^m`: to rest at s = 1.
+    Power(u32),
+    /// `V = V0 e^(-s)`: by the same share over each distance, and never to rest.
+    Exponential,
+}
+
+impl Fall {
+    /// `V/V0` at `s`.
+    pub fn left<S: Scalar>(self, s: S) -> S {
+        match self {
+            Self::Power(m) => (1..=m).fold(S::one(), |left, _| left * (S::one() - s)),
+            Self::Exponential => (-s).exp(),
+        }
+    }
+
+    /// `-d(V/V0)/ds` at `s`.
+    pub fn slope<S: Scalar>(self, s: S) -> S {
+        match self {
+            Self::Power(m) => S::from_f64(f64::from(m)) * Self::Power(m.saturating_sub(1)).left(s),
+            Self::Exponential => self.left(s),
+        }
+    }
+
+    /// Coefficient `k`, above 0, of `V^exponent`, from the one `before`.
+    #[inline(always)]
+    pub fn coefficient<S: Scalar>(self, k: usize, exponent: f64, before: S) -> S {
+        // As a quotient: a factor of one is one.
+        let factor = match self {
+            Self::Power(m) => k as f64 - 1.0 - exponent * f64::from(m),
+            Self::Exponential => -exponent,
+        };
+        before * S::from_f64(factor).over(S::from_f64(k as f64))
+    }
+
+    /// Coefficient `k`, above 0, of the logarithm of `V^exponent`.
+    fn of_logarithm<S: Scalar>(self, k: usize, exponent: f64) -> S {
+        match self {
+            Self::Power(m) => S::from_f64(-exponent * f64::from(m)).over(S::from_f64(k as f64)),
+            Self::Exponential if k == 1 => S::from_f64(-exponent),
+            Self::Exponential => S::zero(),
+        }
+    }
+}
+
+/// How V falls, and what that makes of the registers of an expression ([`Bound::falling`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Falling {
+    /// In which way the expression is smooth.
+    pub fall: Fall,
+    /// e of each register that is a constant times `V^e`; NaN for others.
+    pub(super) powers: SmallVec<[f64; 16]>,
 }
 
 /// Most coefficients of a series.
@@ -51,7 +108,7 @@ const ORDERS_MAX: usize = 48;
 
 impl<S: Scalar> Default for Jets<S> {
     fn default() -> Self {
-        Self { filled: 0, coefficients: Vec::new(), sides: SmallVec::new(), falling: 0 }
+        Self { filled: 0, coefficients: Vec::new(), sides: SmallVec::new(), falling: None }
     }
 }
 
@@ -66,16 +123,16 @@ impl<S: Scalar> Jets<S> {
         self.coefficients.resize(bound.registers(), [S::zero(); ORDERS_MAX]);
         self.sides.clear();
         self.sides.extend_from_slice(sides);
-        self.falling = 0;
+        self.falling = None;
     }
 
-    /// As [`Jets::start`], for a velocity `V0 (1-t)^m`, whose coefficients [`Jets::push`] must be given.
+    /// As [`Jets::start`], for a velocity that falls as `falling` says; [`Jets::push`] must be given its coefficients.
     ///
-    /// Powers of V are then powers of `1-t`, each coefficient a multiple of the one before. The recurrence for a power of
-    /// any series would lose digits here: it cancels where the power is a polynomial.
-    pub fn start_falling(&mut self, bound: &Bound<S>, sides: &[bool], m: u32) {
+    /// Of a power of V each coefficient is then a multiple of the one before, and of its logarithm each is known. The recurrences
+    /// for any series would lose digits here: they cancel.
+    pub fn start_falling(&mut self, bound: &Bound<S>, sides: &[bool], falling: &Falling) {
         self.start(bound, sides);
-        self.falling = m;
+        self.falling = Some(falling.clone());
     }
 
     /// Coefficients of `register` so far, from order 0. Registers 0 and 1 are x and V.
@@ -112,13 +169,9 @@ impl<S: Scalar> Jets<S> {
                     let behind = place + step.width() - 1;
                     (bound.signed(place, first), bound.signed(behind, second))
                 }
-                _ if self.falling > 0
-                    && let Some(power) = bound.power(place) =>
+                _ if let Some(falling) = &self.falling
+                    && let Some((first, order)) = falling.coefficient(step, place, k, rest[0][k - 1]) =>
                 {
-                    let exponent = power * f64::from(self.falling);
-                    // As a quotient: a factor of one is one.
-                    let order = S::from_f64(k as f64);
-                    let first = rest[0][k - 1] * S::from_f64(k as f64 - 1.0 - exponent).over(order);
                     (first, first * order)
                 }
                 _ => step.coefficients(k, done, rest),
@@ -134,6 +187,24 @@ impl<S: Scalar> Jets<S> {
             Value::Register(register) => self.coefficients[register][k],
             Value::Constant(constant) if k == 0 => constant,
             Value::Constant(_) => S::zero(),
+        }
+    }
+}
+
+impl Falling {
+    /// Coefficient `k` of a `step` whose series V decides alone, from the one `before`, and its order.
+    #[inline(always)]
+    fn coefficient<S: Scalar>(&self, step: &Step<S>, place: usize, k: usize, before: S) -> Option<(S, S)> {
+        let order = S::from_f64(k as f64);
+        let power = self.powers[place];
+        if !power.is_nan() {
+            return Some((self.fall.coefficient(k, power, before), order));
+        }
+        match *step {
+            Step::Integral { function: Function::Log | Function::Log10, a, factor, .. } if !self.powers[a].is_nan() => {
+                Some((factor * self.fall.of_logarithm(k, self.powers[a]), order))
+            }
+            _ => None,
         }
     }
 }

@@ -75,10 +75,14 @@ fn power(base: Range, exponent: f64) -> Range {
 impl<S: Scalar> Bound<S> {
     /// Bounds of the value for x and V between these; infinite where a term has no bound or no value.
     pub(crate) fn range(&self, x: Range, v: Range) -> Range {
-        let result = match self.result() {
-            Value::Constant(constant) => return (constant.value(), constant.value()),
-            Value::Register(result) => result,
-        };
+        match self.result() {
+            Value::Constant(constant) => (constant.value(), constant.value()),
+            Value::Register(result) => self.ranges(x, v)[result],
+        }
+    }
+
+    /// The same of each register.
+    pub(crate) fn ranges(&self, x: Range, v: Range) -> SmallVec<[Range; 32]> {
         let mut ranges: SmallVec<[Range; 32]> = SmallVec::with_capacity(self.registers());
         ranges.extend([x, v]);
         for step in self.steps() {
@@ -124,7 +128,7 @@ impl<S: Scalar> Bound<S> {
                 ranges.push(second);
             }
         }
-        ranges[result]
+        ranges
     }
 }
 

@@ -248,19 +248,70 @@ fn parameters_take_other_values_and_their_derivatives() {
 }
 
 #[test]
-fn powers_of_v_that_branch_at_rest_are_found() {
-    for (text, powers) in [
-        ("P + Q*V^2", &[][..]),
-        ("P + R*(V/v1)^1.5", &[1.5]),
-        ("P + R*(V/v1)^n + R*sqrt(V/v1)*V/v1", &[0.5, 1.5]),
-        ("P*(-2*V/v1)^(1/3)", &[1.0 / 3.0]),
-        ("P*(1 + V/v1)^1.5", &[]),
-        ("P*(x/l)^1.5", &[]),
-        ("P*(x/l*V^3/v1^3)^0.5", &[1.5]),
-        ("P*sqrt(V^2/v1^2)", &[]),
-        ("P*sin(b)*sqrt(exp(x/l)*V/v1)", &[0.5]),
+fn the_variable_in_which_an_expression_is_smooth_at_rest_is_found() {
+    for (text, fall) in [
+        ("P + Q*V^2", Fall::Power(1)),
+        ("P + R*(V/v1)^1.5", Fall::Power(2)),
+        ("P + R*(V/v1)^(1/3) + R*sqrt(V/v1)*V/v1", Fall::Power(6)),
+        ("P + R*(V/v1)^0.25 + R*sqrt(V/v1)*V/v1", Fall::Power(4)),
+        ("P*(1 + V/v1)^1.5", Fall::Power(1)),
+        ("P*(x/l)^1.5", Fall::Power(1)),
+        ("P*(x/l*V^3/v1^3)^0.5", Fall::Power(2)),
+        ("P*sqrt(V^2/v1^2)", Fall::Power(1)),
+        ("P*sin(b)*sqrt(exp(x/l)*V/v1)", Fall::Power(2)),
+        ("P*(1 + b*log(V/v1))", Fall::Exponential),
+        ("P*(1 + b*log10(x/l*V^2/v1^2))", Fall::Exponential),
+        ("P*(1 + b*log(1 + V/v1))", Fall::Power(1)),
+        ("P*(1 + b*log(2 + x/l))", Fall::Power(1)),
+        // At 70 m/s, the side on which V counts: V is above v1.
+        ("P*(1 + b*log(max(V/v1, 1)))", Fall::Exponential),
+        ("P*(1 + b*log(min(V/v1, 1)))", Fall::Power(1)),
+        ("P*max((V/v1)^0.23, 1) + Q*V^2", Fall::Exponential),
+        ("P*min((V/v1)^0.23, 1) + Q*V^2", Fall::Power(1)),
     ] {
-        assert_eq!(force(text).powers_of_v(), powers, "{text}");
+        let bound = force(text);
+        assert_eq!(bound.falling(&bound.sides(0.1, 70.0)).fall, fall, "{text}");
+    }
+}
+
+#[test]
+fn a_velocity_that_falls_in_a_known_way_has_the_series_of_any_other() {
+    const ORDERS: usize = 12;
+    for text in [
+        "P + R*(V/v1)^1.5 + Q*V^2",
+        "P*(1 + b*log(V/v1)) + R*(V/v1)^0.3*x/l",
+        "P*log10(2*V^2/v1^2) + R*sqrt(x/l*V/v1)",
+        "P*max(log(V/v1), b) + R*max((V/v1)^0.3, b)",
+    ] {
+        let bound = force(text);
+        let (x, v) = (0.1, 70.0);
+        let sides = bound.sides(x, v);
+        for fall in [Fall::Power(1), Fall::Power(3), Fall::Exponential] {
+            let falling = Falling { fall, ..bound.falling(&sides) };
+            let (mut known, mut any) = (Jets::default(), Jets::default());
+            known.start_falling(&bound, &sides, &falling);
+            any.start(&bound, &sides);
+            let mut velocity = v;
+            for k in 0..ORDERS {
+                if k > 0 {
+                    velocity = fall.coefficient(k, 1.0, velocity);
+                }
+                let depth = if k < 2 { 0.1 } else { 0.0 };
+                let (one, other) = (known.push(&bound, depth, velocity), any.push(&bound, depth, velocity));
+                assert!((one - other).abs() <= 1e-12 * 2e6, "{text}, {fall:?}, order {k}: {one:e} and {other:e}");
+            }
+            // V and its slope along s, beside their series.
+            let s = 0.125;
+            let mut sum = v;
+            let mut term = v;
+            for k in 1..40 {
+                term = fall.coefficient(k, 1.0, term);
+                sum += term * 0.125_f64.powi(k as i32);
+            }
+            approx::assert_relative_eq!(v * fall.left(s), sum, max_relative = 1e-15);
+            let slope = (fall.left(s - 1e-6) - fall.left(s + 1e-6)) / 2e-6;
+            approx::assert_relative_eq!(fall.slope(s), slope, max_relative = 1e-9);
+        }
     }
 }
 
@@ -603,6 +654,8 @@ fn check(tape: &Tape, parameters: &[f64], (x, v): (f64, f64), with_digits: bool,
     assert!((value - values.last().unwrap()).abs() <= 100.0 * ROUNDING * size || size.is_nan(), "{text}: {value}");
 
     let gradient = bound.gradient(x, v);
+    let falls = gradient.2 < -1e-9 * size / v.abs().max(1.0);
+    assert!(!(bound.never_falls_with_v() && x >= 0.0 && v >= 0.0 && falls), "{text} at {x}, {v}: {gradient:?}");
     assert_eq!(gradient.0, value, "{text}");
     let mut jets = Jets::default();
     jets.start(&bound, &bound.sides(x, v));

@@ -232,3 +232,20 @@ impl Sheet {
         text
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_of_a_file_is_as_wide_as_its_widest_cell() {
+        let head = |text: &str| Prose::text(text);
+        let sheet = Sheet::cards("orders", head("Orders"), ["quantity", "interval", "right"].map(head))
+            .row([Cell::text("depth"), Cell::Empty, Cell::Of(3, 4)])
+            .row([Cell::text("time"), Cell::Interval(Some([0.5, 1.25])), Cell::Empty]);
+        let text = sheet.to_csv();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[1..], ["depth,,,3,4", "time,0.5,1.25,,"], "{text}");
+        assert_eq!(lines[0].split(',').count(), 5, "{text}");
+    }
+}

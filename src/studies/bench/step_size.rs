@@ -347,8 +347,8 @@ mod tests {
         assert_eq!(walk().largest(&LEVELS, &mut |_| Some(f64::NAN)).1, [None; 4]);
     }
 
-    /// The depth of the shipped `scene` by lagged drag with `boundaries`: its problem, its exact flight, and the curve.
-    fn lagged(scene: &str, boundaries: Boundaries) -> (Problem, Flight, Curve) {
+    /// The depth of the shipped `scene` by a variant: its problem, its exact flight, and the curve.
+    fn depth(scene: &str, velocity: VelocityAt, boundaries: Boundaries) -> (Problem, Flight, Curve) {
         let scene = crate::testing::shipped(scene);
         let problem = scene.problem().unwrap();
         let exact = Truth::of(&problem).unwrap().flight;
@@ -356,7 +356,8 @@ mod tests {
         let question = Question { scene: &scene, problem: &problem, exact: &exact, critical: None, quantity };
         let time = exact.end.time;
         let steps = Walk { from: time, to: time / STEPS_MAX, per_decade: 12, probes: 128, seed: 3 };
-        let with_size = |dt| MethodOptions { dt: Some(dt), events: Some(boundaries), ..MethodOptions::default() };
+        let variant = MethodOptions { velocity: Some(velocity), events: Some(boundaries), ..MethodOptions::default() };
+        let with_size = |dt| MethodOptions { dt: Some(dt), ..variant.clone() };
         let effort = Effort { samples: 1 };
         let curve = question.curve(String::new(), MethodName::CentralDifference, steps, effort, &with_size);
         (problem, exact, curve)
@@ -366,7 +367,7 @@ mod tests {
     fn at_rest_in_the_crater_the_largest_step_is_that_of_the_error_constant() {
         // X(dt)/X - 1 = (w dt)²/8 with rest located, and the envelope of what step ends leave (docs/theory.md, section 5).
         for (boundaries, most) in [(Boundaries::StepEnd, 1.05), (Boundaries::Interpolated, 1.02)] {
-            let (problem, _, curve) = lagged("crater", boundaries);
+            let (problem, _, curve) = depth("crater", VelocityAt::LaggedHalfStep, boundaries);
             let w = (problem.stages[0].stiffness / problem.mass).sqrt();
             for held in &curve.held[1..] {
                 let ratio = held.size.unwrap() * w / (8.0 * held.level).sqrt();
@@ -378,7 +379,7 @@ mod tests {
     #[test]
     fn with_lagged_drag_the_largest_step_is_that_of_the_error_constant() {
         // X(dt) - X = -D dt, D = V1 - P (T - t1)/M: the velocity lost to drag (docs/theory.md, section 5).
-        let (problem, exact, curve) = lagged("tunnel", Boundaries::Landed);
+        let (problem, exact, curve) = depth("tunnel", VelocityAt::LaggedHalfStep, Boundaries::Landed);
         let start = exact.crater_end().unwrap();
         let lost = start.velocity - problem.stages[1].static_force * (exact.end.time - start.time) / problem.mass;
         for held in &curve.held[2..] {
@@ -388,6 +389,17 @@ mod tests {
             let steps = exact.end.time / held.size.unwrap();
             assert!((held.steps.unwrap() as f64 / steps - 1.0).abs() < 0.02, "{held:?}");
             assert!(held.force_evaluations.unwrap() >= held.steps.unwrap() && held.time.is_some());
+        }
+    }
+
+    #[test]
+    fn steps_with_a_predicted_velocity_are_half_of_the_forces() {
+        let (_, exact, curve) = depth("tunnel", VelocityAt::PredictedHalfStep, Boundaries::Interpolated);
+        for held in &curve.held[2..] {
+            let (steps, forces) = (held.steps.unwrap() as f64, held.force_evaluations.unwrap() as f64);
+            let expected = exact.end.time / held.size.unwrap();
+            assert!((steps / expected - 1.0).abs() < 0.02, "{held:?}");
+            assert!((forces / steps - 2.0).abs() < 0.1, "{held:?}");
         }
     }
 }

@@ -312,12 +312,19 @@ fn single(random: &mut Random, terms: [f64; 4]) -> Option<Problem> {
     Some(endless.with_exit(far * random.uniform(0.2, 0.95)))
 }
 
-/// A static force and one other term, another in every round, which is next to nothing beside it: digits cancel in many a formula,
-/// and by more than the tightest tolerance allows.
+/// A static force and one other term, another in every second round. In one round it is next to nothing: digits cancel in many a
+/// formula, and by more than the tightest tolerance allows. In the other it is small, and the projectile comes to rest: a series in
+/// the place of a formula needs more than a term or two.
 fn weak(random: &mut Random, round: usize) -> Option<Problem> {
     let mut terms = [1.0, 0.0, 0.0, 0.0];
-    terms[1 + (round + 1) % 3] = random.log_uniform(1e-7, 1e-5);
-    single(random, terms)
+    let term = &mut terms[1 + (round / 2 + 1) % 3];
+    if round.is_multiple_of(2) {
+        *term = random.log_uniform(1e-7, 1e-5);
+        return single(random, terms);
+    }
+    *term = random.log_uniform(1e-2, 0.05);
+    let scale = Scale::draw(random);
+    Some(Problem::of_stages(scale.mass, scale.speed, [scale.stage(terms)]))
 }
 
 /// A problem of several stages whose laws hold every pair of terms in turn, ending where `exit` says.

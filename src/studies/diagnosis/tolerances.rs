@@ -535,3 +535,42 @@ fn inaccurate(answered: &[Answered<'_>], rows: &[Asked], failed: usize) -> Cause
         Cause::plain("tolerance-missed", statement, Certainty::Likely, failed, failed)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::studies::diagnosis::faulty;
+    use crate::studies::diagnosis::questions::questions;
+
+    #[test]
+    fn the_numbers_of_an_event_that_is_passed_slowly_have_its_conditioning_for_a_limit() {
+        const RTOL: f64 = 1e-9;
+        let mut slow = 0;
+        for question in questions(1, 400, false) {
+            let (problem, exact) = (&question.problem, &question.exact);
+            let Some(index) = exact.events.iter().position(|event| {
+                let share = event.state.velocity / problem.impact_speed;
+                (0.01..0.2).contains(&share)
+            }) else {
+                continue;
+            };
+            let with = |off: f64| {
+                let mut answer = faulty::answer(exact.outcome, exact.end);
+                answer.events = exact.events.to_vec();
+                answer.events[index].state.velocity += off * problem.impact_speed;
+                judge(&question, RTOL, &answer)
+            };
+            let right = with(0.0);
+            assert_eq!(right.verdict, Verdict::Passed, "{}: {}", question.id, right.reason);
+            let limit = right.limits.iter().copied().fold(0.0, f64::max);
+            let [_, _, conditioning] = conditioning(exact.events[index].state, problem);
+            if conditioning > 2.0 {
+                slow += 1;
+                assert_eq!(with(8.0 * limit * conditioning).verdict, Verdict::Passed, "{}", question.id);
+            }
+            let wrong = with(20.0 * limit * conditioning);
+            assert!(wrong.verdict == Verdict::Failed && wrong.is_in_events, "{}: {}", question.id, wrong.reason);
+        }
+        assert!(slow > 5, "{slow} events are passed slowly");
+    }
+}

@@ -1189,6 +1189,23 @@ const TOLD: &[Told] = &[
         says: "failed | digits-lost, likely: answers fail where a term is next to nothing beside another, and are the same at every tolerance: it is dropped, or digits cancel in a formula",
     },
     Told {
+        what: "the depth of rest has two terms of a series where viscosity is small beside a static force",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    let Stage { static_force, viscosity, .. } = problem.stages[0];
+                    let ratio = viscosity * problem.impact_speed / static_force;
+                    if end.velocity == 0.0 && problem.stages.len() == 1 && ratio > 0.0 && ratio <= 0.1 {
+                        end.depth *= 1.0 - 0.5 * ratio * ratio;
+                    }
+                },
+            )
+        },
+        asked: Questions(200),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is weak-term-2 (static-force, viscosity, rest); `viscosity` stands in 100 % of the failing and 42 % of the passing questions",
+    },
+    Told {
         what: "a rest near the exit is called a perforation",
         solver: || {
             central(|_, problem, flight| {
