@@ -364,6 +364,14 @@ fn with_s(factor: f64, exponent: f64, alter: fn(&mut PeerScene)) -> Answering {
     Answering::plain(answers).of_scenes()
 }
 
+/// r V0 over p in the only stage, 0 where there are several.
+fn viscous_share(problem: &Problem) -> f64 {
+    match problem.stages[..] {
+        [Stage { static_force, viscosity, .. }] => viscosity * problem.impact_speed / static_force,
+        _ => 0.0,
+    }
+}
+
 /// `number` with `digits` digits behind the first.
 fn rounded(number: f64, digits: usize) -> f64 {
     format!("{number:.digits$e}").parse().unwrap_or(f64::NAN)
@@ -1171,9 +1179,8 @@ const TOLD: &[Told] = &[
             altered(
                 |_| (),
                 |problem, end| {
-                    let Stage { static_force, viscosity, .. } = problem.stages[0];
-                    let ratio = viscosity * problem.impact_speed / static_force;
-                    if problem.stages.len() == 1 && ratio > 0.0 && ratio < 0.01 {
+                    let ratio = viscous_share(problem);
+                    if ratio > 0.0 && ratio < 0.01 {
                         let lost = f64::EPSILON / ratio / ratio;
                         end.time *= 1.0 + lost;
                         if end.velocity > 0.0 {
@@ -1194,9 +1201,8 @@ const TOLD: &[Told] = &[
             altered(
                 |_| (),
                 |problem, end| {
-                    let Stage { static_force, viscosity, .. } = problem.stages[0];
-                    let ratio = viscosity * problem.impact_speed / static_force;
-                    if end.velocity == 0.0 && problem.stages.len() == 1 && ratio > 0.0 && ratio <= 0.1 {
+                    let ratio = viscous_share(problem);
+                    if end.velocity == 0.0 && ratio > 0.0 && ratio <= 0.1 {
                         end.depth *= 1.0 - 0.5 * ratio * ratio;
                     }
                 },
