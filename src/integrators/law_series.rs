@@ -46,8 +46,10 @@ use crate::physics::expression::{Bound, Fall, Falling, Jets, product};
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
 
-/// Places of a step, over its length, at which the equation is asked.
+/// Places of a step, over its length, at which the equation is asked, and the share of the step for which each stands: what the
+/// equation lacks grows along it.
 const ASKED: [f64; 3] = [1.0, 0.62, 0.29];
+const STANDS_FOR: [f64; 3] = [0.19, 0.355, 0.455];
 
 /// What the equation may lack over the step, in tolerances: truncation after order K has the factor K there.
 const DEFECT_MAX: f64 = 100.0;
@@ -155,6 +157,16 @@ enum Event {
 
 /// Switches, by their places among [`Bound::switches`].
 type Kinks = SmallVec<[usize; 2]>;
+
+/// A step on which the equation holds.
+struct Held<S, const K: usize> {
+    path: Path<S, K>,
+    /// The switches at whose roots it ends.
+    kinks: Kinks,
+    ending: Ending<S>,
+    /// What the equation lacks on it, summed and relative to the velocity, beyond the roundings of the series.
+    lacking: f64,
+}
 
 /// The place of a step at which it ends, and how.
 type Ending<S> = (S, Event);
@@ -511,11 +523,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
-        let (path, kinks, (s, event)) = match self.path(course, force, limit) {
+        let Held { path, kinks, ending: (s, event), lacking } = match self.held(course, force, limit) {
             Err(IntegrationError::NoForce { last, .. }) if last == start.values() => {
                 let next = self.leave_branch_point(start, force, limit).ok_or_else(|| self.no_force(course, start))?;
                 course.cost.steps += 1;
-                self.reached = Some(self.widen_bound(course, here, start, next));
+                self.reached = Some(self.widen_bound(course, here, (start, next), 0.0));
                 course.sample_until(next, |time| State { time: S::from_f64(time), ..start });
                 self.kinks.clear();
                 course.state = next;
@@ -541,7 +553,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NotFinite { what: "the state", last: start.values() });
         }
         course.cost.steps += 1;
-        let reached = self.widen_bound(course, here, start, next);
+        let reached = self.widen_bound(course, here, (start, next), lacking);
         // A step by velocity can only end at the least one.
         let is_at_least = matches!(path.form, Form::Velocity(_)) && reached.force.value() < 0.0;
         let least = if is_at_least { Some(next.velocity.value()) } else { least_inside(&path, s.value()) };
@@ -703,8 +715,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
     }
 
-    /// A step on which the equation holds, the switches at whose roots it ends, and where it ends and how.
-    fn path(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<(Path<S, K>, Kinks, Ending<S>)> {
+    /// A step on which the equation holds.
+    fn held(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Held<S, K>> {
         let start = course.state;
         let by_velocity = self.over_velocity(start, force);
         let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
@@ -739,16 +751,17 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
                 (path.span, kinks) = (root, switches);
             }
             // Behind rest and the limit the equation need not hold, nor the force have a value.
-            let end = first_event(&path, limit);
-            path.span = end.0.value();
+            let ending = first_event(&path, limit);
+            path.span = ending.0.value();
             let mass = self.mass.value();
-            let allowed = |force: f64| {
-                DEFECT_MAX * self.tolerance + 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(force, mass)
-            };
-            let (least, most) = (allowed(force.value()), LazyCell::new(|| allowed(*size)));
-            let holds = |share: &f64| {
-                let lacking = path.defect(share * path.span, self.law, mass);
-                lacking <= least || lacking <= *most
+            let noise = |force: f64| 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(force, mass);
+            let (least, most) = (noise(force.value()), LazyCell::new(|| noise(*size)));
+            // What it lacks there beyond roundings, if that is little enough.
+            let lacking = |share: f64| {
+                let defect = path.defect(share * path.span, self.law, mass);
+                let allowed = DEFECT_MAX * self.tolerance;
+                let rounded = if defect <= allowed + least { least } else { *most };
+                (defect <= allowed + rounded).then(|| (defect - rounded).max(0.0))
             };
             let energy = mass * start.velocity.value() * start.velocity.value();
             let place = |share: f64| {
@@ -757,11 +770,14 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             };
             let shows = || {
                 let parts = self.law.shown_in(place, energy)?;
-                (1..parts).all(|part| holds(&(part as f64 / parts as f64))).then_some(())
+                (1..parts).all(|part| lacking(part as f64 / parts as f64).is_some()).then_some(())
             };
-            let shown = if ASKED.iter().all(holds) && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
-            if shown >= 1.0 {
-                return Ok((path, kinks, end));
+            let sum =
+                ASKED.iter().zip(STANDS_FOR).try_fold(0.0, |sum, (share, part)| Some(sum + part * lacking(*share)?));
+            let shown = if sum.is_some() && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
+            if let (true, Some(sum)) = (shown >= 1.0, sum) {
+                let power = if let Form::Velocity(Fall::Power(m)) = path.form { f64::from(m) } else { 1.0 };
+                return Ok(Held { path, kinks, ending, lacking: power * sum });
             }
             path.span *= shown;
             kinks.clear();
@@ -1085,8 +1101,15 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// ```
     ///
     /// so that only a force that falls with V lets an error grow; on a piece of a table of velocity F_V is one number, and an error
-    /// falls by it too. What a step adds is that of [`super`]. The force at its end is what comes back.
-    fn widen_bound(&self, course: &mut Course<'_, S>, here: Local<S>, start: State<S>, next: State<S>) -> Local<S> {
+    /// falls by it too. What a step adds is that of [`super`], or what the equation was seen to be `lacking` on it. The force at its end
+    /// is what comes back.
+    fn widen_bound(
+        &self,
+        course: &mut Course<'_, S>,
+        here: Local<S>,
+        (start, next): (State<S>, State<S>),
+        lacking: f64,
+    ) -> Local<S> {
         let (a, b) = (start.values(), next.values());
         let (time, distance) = (b.time - a.time, b.depth - a.depth);
         let reached = self.local(next);
@@ -1103,7 +1126,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let rounding = 6.0 * fastest * fastest + 3.0 * largest * (b.depth + 2.0 * distance);
         // What a step by shares of V leaves out counts beside the depth reached.
         let cut = fastest * fastest + if self.falling.fall == Fall::Exponential { largest * b.depth } else { 0.0 };
-        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance * cut;
+        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance.max(lacking) * cut;
         let grown = if growth.is_finite() { growth.exp() } else { 1.0 };
         course.error_bound = course.error_bound * grown + relative * relative * added;
         reached

@@ -940,6 +940,41 @@ fn random_laws_are_solved_over_time_and_over_depth_within_the_error_bounds() {
     println!("{worst:?}");
 }
 
+/// What a step leaves out is more than its last coefficients say where those are small by chance.
+#[test]
+fn error_bounds_of_margins_hold_at_every_tolerance() {
+    let (random, mut compared) = (&mut Random::new(57), 0);
+    let mut cases = vec![(
+        "P + R*max(sqrt(1 + 2*V/v1) + 1 - exp(-(1 + x/l)), max(max(1, (4*V/v1)^0.2), 4*V/v1))".to_owned(),
+        455.6,
+        0.0946,
+    )];
+    cases.extend(
+        (0..200).map(|_| (random_force(random), random.log_uniform(10.0, 700.0), random.log_uniform(2e-3, 0.3))),
+    );
+    for (force, speed, exit) in cases {
+        let problem = problem(&force, speed).with_exit(exit);
+        let Ok(exact) = Taylor::default().solve(&problem, Detail::End) else { continue };
+        let (Some(margin), Some(bound)) = (exact.exit_margin, exact.exit_margin_error) else { continue };
+        compared += 1;
+        for rtol in [1e-3, 1e-5, 1e-7, 1e-9, 1e-11] {
+            let methods: [Box<dyn Integrator>; 2] =
+                [Box::new(Taylor::with_rtol(rtol).unwrap()), Box::new(Energy::with_rtol(rtol).unwrap())];
+            for method in methods {
+                let flight = method.solve(&problem, Detail::End).unwrap();
+                let (found, allowed) = (flight.exit_margin.unwrap(), flight.exit_margin_error.unwrap() + bound);
+                let off = (found - margin).abs();
+                assert!(
+                    off <= allowed,
+                    "{} at {rtol:e}: {off:e} and not {allowed:e}, {force}, {speed}, {exit}",
+                    method.name()
+                );
+            }
+        }
+    }
+    assert!(compared > 150, "{compared}");
+}
+
 /// In dual numbers, with a switch too: a step begins where both of its sides have one value and two slopes.
 #[test]
 fn derivatives_over_depth_are_those_over_time() {

@@ -542,6 +542,9 @@ impl<S: Scalar> Bound<S> {
     ///
     /// Of `(V/v1)^1.5`, `V*sqrt(V)` and `sqrt(x*V^3)` it is smooth in u, `V = u²`; of `(V/v1)^0.23` and `log(V/v1)` in the
     /// logarithm of V alone. `(V - v1)^1.5` has no branch point there.
+    ///
+    /// # Panics
+    /// If there is not a side for each of [`Bound::switches`].
     pub fn falling(&self, sides: &[bool]) -> Falling {
         let degrees = degrees(&self.steps, self.registers, sides);
         let mut is_used: SmallVec<[bool; FEW]> = SmallVec::from_elem(false, self.registers);

@@ -47,7 +47,8 @@ pub struct Jets<S = f64> {
     falling: Option<Falling>,
 }
 
-/// A velocity that falls in a known way over the variable s of a series.
+/// A velocity V (m/s) that falls from V0 in a known way over the variable s of a series, a number without unit (docs/theory.md, section
+/// 10).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fall {
     /// `V = V0 (1-s)^m`: to rest at s = 1.
