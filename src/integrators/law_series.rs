@@ -15,6 +15,9 @@
 //! time. In place of depth it is taken for every law: m = 1 where no power has a branch point. Powers without a small common
 //! denominator, and logarithms of V, are smooth in the logarithm of V, which never gets to rest.
 //!
+//! **Forces of the velocity alone.** Both equations are integrals over V then, and `taylor` takes a step of them by the rule of
+//! [`super::velocity_integrals`], where a few places show the force all along.
+//!
 //! **Length of a step.** The last two coefficients give it, as in [`super::taylor`]. They may vanish by chance, and a force may
 //! change where they do not see it. So three places of the step are asked whether the series satisfies the equation there,
 //! and a step on which it does not is shortened. What lies between them is bounded by intervals ([`Law::shown_in`]).
@@ -38,9 +41,10 @@ use std::convert::Infallible;
 use smallvec::SmallVec;
 
 use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES};
-use super::locate;
+use super::locate::{self, root_before, settled};
 use super::outcome::{IntegrationError, Solved};
 use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
+use super::velocity_integrals::{Integrals, PLACES};
 use crate::physics::condition::Sight;
 use crate::physics::expression::{Bound, Fall, Falling, Jets, product};
 use crate::physics::scalar::reciprocal;
@@ -99,12 +103,10 @@ const RESCALED_MAX: u32 = 40;
 const ENOUGH: f64 = 0.3;
 const STILL_ENOUGH: f64 = 0.05;
 
-/// Halvings of a bracket: more than a number has digits.
-const HALVINGS: u32 = 80;
-
-/// Steps in which a root settles, and how far from its guess, relatively.
-const SETTLING_MAX: u32 = 12;
-const NEAR: f64 = 0.1;
+/// Lengths of a step that are tried by integrals before a series is, where V falls to rest and where it falls by shares: the poles of
+/// `1/F` decide.
+const TRIED_TO_REST: [f64; 3] = [1.0, 0.85, 0.5];
+const TRIED_BY_SHARES: [f64; 3] = [10.0, 3.0, 1.0];
 
 /// How far apart, relatively, the roots of two switches may be that are one place.
 const SAME_PLACE: f64 = 1e-9;
@@ -159,13 +161,20 @@ enum Event {
 type Kinks = SmallVec<[usize; 2]>;
 
 /// A step on which the equation holds.
-struct Held<S, const K: usize> {
-    path: Path<S, K>,
+struct Held<'l, S, const K: usize> {
+    path: Solution<'l, S, K>,
     /// The switches at whose roots it ends.
     kinks: Kinks,
     ending: Ending<S>,
-    /// What the equation lacks on it, summed and relative to the velocity, beyond the roundings of the series.
-    lacking: f64,
+    /// What the step leaves out, relative to the velocity, beyond roundings.
+    left_out: f64,
+}
+
+/// The solution on a step.
+enum Solution<'l, S, const K: usize> {
+    Series(Path<S, K>),
+    /// Of a force of the velocity alone, to this length in s.
+    Integrals(Integrals<'l, S>, f64),
 }
 
 /// The place of a step at which it ends, and how.
@@ -193,44 +202,6 @@ fn slope<S: Scalar>(coefficients: &[S], s: S) -> S {
 /// What the roundings of the series at `s` may come to.
 fn rounding_of<S: Scalar>(series: &[S], s: f64) -> f64 {
     16.0 * f64::EPSILON * series.iter().rev().fold(0.0, |sum, c| sum * s + c.value().abs())
-}
-
-/// The place before `end` where a function, which rises there from below zero to above it, vanishes: by Newton's method, by
-/// halving where that leaves the bracket. `function` gives value and slope.
-fn root_before(function: impl Fn(f64) -> (f64, f64), end: f64) -> f64 {
-    let (mut low, mut high, mut at) = (0.0, end, end);
-    for _ in 0..HALVINGS {
-        let (value, slope) = function(at);
-        if value < 0.0 {
-            low = at;
-        } else {
-            high = at;
-        }
-        let newton = at - value / slope;
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - at).abs() <= f64::EPSILON * at || next <= low || next >= high {
-            break;
-        }
-        at = next;
-    }
-    at
-}
-
-/// The root near `guess`, by Newton's method with `function` for value and slope; `None` where it does not settle near by.
-fn settled(function: impl Fn(f64) -> (f64, f64), guess: f64) -> Option<f64> {
-    let mut at = guess;
-    for _ in 0..SETTLING_MAX {
-        let (value, slope) = function(at);
-        let next = at - value / slope;
-        if !((next - guess).abs() <= NEAR * guess) {
-            return None;
-        }
-        if (next - at).abs() <= 4.0 * f64::EPSILON * guess {
-            return Some(next);
-        }
-        at = next;
-    }
-    None
 }
 
 /// Value and slope of a series, as numbers; four chains each, as [`value`].
@@ -397,6 +368,57 @@ impl<S: Scalar, const K: usize> Path<S, K> {
     }
 }
 
+impl<S: Scalar, const K: usize> Solution<'_, S, K> {
+    /// Its length in s.
+    fn span(&self) -> f64 {
+        match self {
+            Self::Series(path) => path.span,
+            Self::Integrals(_, span) => *span,
+        }
+    }
+
+    /// The state at `s`, its time since the start of the step.
+    fn at(&self, s: S) -> State<S> {
+        match self {
+            Self::Series(path) => path.at(s),
+            Self::Integrals(integrals, _) => integrals.at(s),
+        }
+    }
+
+    /// Where on the way to `end` so much time (s) has passed `since` the start.
+    fn moment(&self, since: f64, end: f64) -> f64 {
+        match self {
+            Self::Series(path) => match path.form {
+                Form::Time(unit) => since / unit,
+                Form::Depth(_) | Form::Velocity(_) => {
+                    let passed = |s| {
+                        let (time, pace) = both(&path.time, s);
+                        (time - since, pace)
+                    };
+                    root_before(passed, end)
+                }
+            },
+            Self::Integrals(integrals, _) => integrals.moment(since, end),
+        }
+    }
+
+    /// The least velocity on the way to `end`, where it is none of its ends.
+    fn least_inside(&self, end: f64) -> Option<f64> {
+        match self {
+            Self::Series(path) => least_inside(path, end),
+            Self::Integrals(..) => None,
+        }
+    }
+
+    /// Whether the velocity falls all along.
+    fn only_falls(&self) -> bool {
+        match self {
+            Self::Series(path) => matches!(path.form, Form::Velocity(_)),
+            Self::Integrals(..) => true,
+        }
+    }
+}
+
 /// A stage in progress.
 struct Walk<'l, S, const K: usize> {
     law: &'l Law<S>,
@@ -419,8 +441,8 @@ struct Walk<'l, S, const K: usize> {
     tolerance: f64,
     /// The condition that ends the stage, and the sign of g on the way to it.
     end: Option<(&'l Condition<S>, f64)>,
-    /// `F_V` (kg/s) of a piece of a table of velocity.
-    slope: Option<f64>,
+    /// Whether the force is one of the velocity alone.
+    is_of_velocity: bool,
 }
 
 /// The force at a state, and `F_V` (kg/s) where it is below zero, else zero.
@@ -493,7 +515,7 @@ impl LawSeries {
             reached: None,
             variable: self.variable,
             tolerance: self.tolerance,
-            slope: law.line().map(|line| line.slope),
+            is_of_velocity: law.is_of_velocity(),
         };
         while course.cost.steps < STEPS_MAX {
             if let Some(end) = walk.step(course, limit)? {
@@ -505,13 +527,12 @@ impl LawSeries {
     }
 }
 
-impl<S: Scalar, const K: usize> Walk<'_, S, K> {
+impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     /// One step from the state of `course`; how the stage ends, if it does.
     fn step(&mut self, course: &mut Course<'_, S>, limit: S) -> Solved<Option<StageEnd<S>>> {
         let start = course.state;
         let here = self.reached.take().unwrap_or_else(|| self.local(start));
         let force = here.force;
-        course.cost.force_evaluations += K as u64;
         if !force.value().is_finite() {
             return Err(self.no_force(course, start));
         }
@@ -523,11 +544,13 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
-        let Held { path, kinks, ending: (s, event), lacking } = match self.held(course, force, limit) {
+        let held = self.integrated(start, force, limit).map_or_else(|| self.held(course, force, limit), Ok);
+        let Held { path, kinks, ending: (s, event), left_out } = match held {
             Err(IntegrationError::NoForce { last, .. }) if last == start.values() => {
                 let next = self.leave_branch_point(start, force, limit).ok_or_else(|| self.no_force(course, start))?;
                 course.cost.steps += 1;
-                self.reached = Some(self.widen_bound(course, here, (start, next), 0.0));
+                course.cost.force_evaluations += K as u64;
+                self.reached = Some(self.widen_bound(course, here, (start, next), self.tolerance));
                 course.sample_until(next, |time| State { time: S::from_f64(time), ..start });
                 self.kinks.clear();
                 course.state = next;
@@ -535,7 +558,11 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             }
             other => other?,
         };
-        let (s, event, closeness) = self.first_zero(&path, s, event);
+        let (evaluations, (s, event, closeness)) = match &path {
+            Solution::Series(path) => (K, self.first_zero(path, s, event)),
+            Solution::Integrals(..) => (PLACES, (s, event, None)),
+        };
+        course.cost.force_evaluations += evaluations as u64;
         let local = path.at(s);
         let next = State {
             time: start.time + local.time,
@@ -553,10 +580,10 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             return Err(IntegrationError::NotFinite { what: "the state", last: start.values() });
         }
         course.cost.steps += 1;
-        let reached = self.widen_bound(course, here, (start, next), lacking);
+        let reached = self.widen_bound(course, here, (start, next), left_out);
         // A step by velocity can only end at the least one.
-        let is_at_least = matches!(path.form, Form::Velocity(_)) && reached.force.value() < 0.0;
-        let least = if is_at_least { Some(next.velocity.value()) } else { least_inside(&path, s.value()) };
+        let is_at_least = path.only_falls() && reached.force.value() < 0.0;
+        let least = if is_at_least { Some(next.velocity.value()) } else { path.least_inside(s.value()) };
         if let Some(least) = least {
             course.pass_least(least);
         }
@@ -564,23 +591,13 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             self.doubt(course, path.at(S::from_f64(place)), closeness);
         }
         course.sample_until(next, |time| {
-            let since = time - start.time.value();
-            let s = match path.form {
-                Form::Time(unit) => since / unit,
-                Form::Depth(_) | Form::Velocity(_) => {
-                    let passed = |s| {
-                        let (time, pace) = both(&path.time, s);
-                        (time - since, pace)
-                    };
-                    root_before(passed, s.value())
-                }
-            };
+            let s = path.moment(time - start.time.value(), s.value());
             let local = path.at(S::from_f64(s));
             State { time: S::from_f64(time), ..local }
         });
         Ok(match event {
             Event::None => {
-                self.kinks = if s.value() >= path.span { kinks } else { Kinks::new() };
+                self.kinks = if s.value() >= path.span() { kinks } else { Kinks::new() };
                 self.reached = Some(reached);
                 course.state = next;
                 course.sample(next);
@@ -715,8 +732,66 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         }
     }
 
+    /// A step by integrals over the velocity, where the force depends on it alone and a few places show it.
+    fn integrated(&mut self, start: State<S>, force: S, limit: S) -> Option<Held<'l, S, K>> {
+        let applies = self.is_of_velocity && self.variable == Variable::Time && S::EPSILON == f64::EPSILON;
+        if !applies || self.end.is_some() || !(force.value() > 0.0) {
+            return None;
+        }
+        let integrals = Integrals::new(self.bound, self.mass, start, self.falling.clone());
+        let tried = if self.falling.fall == Fall::Exponential { TRIED_BY_SHARES } else { TRIED_TO_REST };
+        for longest in tried {
+            let (mut span, mut kinks) = (longest, Kinks::new());
+            if let Some((root, switches)) = self.first_departure(&integrals, span) {
+                (span, kinks) = (root, switches);
+            }
+            let forces = integrals.forces(S::from_f64(span));
+            let keeps = |(side, register): (usize, &usize)| {
+                forces.keeps(*register, self.sides[side], self.kinks.contains(&side), kinks.contains(&side))
+            };
+            if !self.bound.switches().iter().enumerate().all(keeps) {
+                continue;
+            }
+            let Some(left_out) = forces.lacking() else { continue };
+            let end = integrals.end(&forces);
+            let place = |share: f64| {
+                let depth = start.depth + (end.depth - start.depth) * S::from_f64(share);
+                (depth.value(), integrals.velocity(S::from_f64(share * span)).value().max(0.0))
+            };
+            let energy = self.mass.value() * start.velocity.value() * start.velocity.value();
+            if self.law.shown_in(place, energy) != Some(1) {
+                continue;
+            }
+            self.goes_by_velocity = true;
+            let is_rest = self.falling.fall != Fall::Exponential && span >= 1.0;
+            let ending = if end.depth.value() >= limit.value() {
+                (integrals.passage(limit, end, span), Event::Limit)
+            } else {
+                (S::from_f64(span), if is_rest { Event::Rest } else { Event::None })
+            };
+            return Some(Held { path: Solution::Integrals(integrals, span), kinks, ending, left_out });
+        }
+        None
+    }
+
+    /// The first place at which a switch has left its side by the end of `span`, and the switches that do so there.
+    fn first_departure(&self, integrals: &Integrals<'_, S>, span: f64) -> Option<(f64, Kinks)> {
+        let at_end = self.bound.switch_values(integrals.start.depth, integrals.velocity(S::from_f64(span)));
+        let departure = |(side, value): (usize, &S)| {
+            let sign = if self.sides[side] { -1.0 } else { 1.0 };
+            let passed = |s: f64| {
+                let v = integrals.velocity(S::from_f64(s)).value();
+                let (value, slope) = self.law.switch_over_velocity(side, v);
+                (sign * value, -sign * slope * integrals.fall_rate(s))
+            };
+            (sign * value.value() > 0.0).then(|| (side, root_before(passed, span)))
+        };
+        let roots: SmallVec<[(usize, f64); 4]> = at_end.iter().enumerate().filter_map(departure).collect();
+        first_of(&roots)
+    }
+
     /// A step on which the equation holds.
-    fn held(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Held<S, K>> {
+    fn held(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Held<'l, S, K>> {
         let start = course.state;
         let by_velocity = self.over_velocity(start, force);
         let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
@@ -777,7 +852,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             let shown = if sum.is_some() && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
             if let (true, Some(sum)) = (shown >= 1.0, sum) {
                 let power = if let Form::Velocity(Fall::Power(m)) = path.form { f64::from(m) } else { 1.0 };
-                return Ok(Held { path, kinks, ending, lacking: power * sum });
+                let left_out = self.tolerance.max(power * sum);
+                return Ok(Held { path: Solution::Series(path), kinks, ending, left_out });
             }
             path.span *= shown;
             kinks.clear();
@@ -965,10 +1041,7 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
             root.filter(|root| *root < span).map(|root| (side, root))
         });
         let roots: SmallVec<[(usize, f64); 4]> = roots.collect();
-        let first = roots.iter().map(|(_, root)| *root).reduce(f64::min)?;
-        // Of two at one place neither may be found again just behind it, for ever.
-        let at_first = roots.iter().filter(|(_, root)| *root <= first * (1.0 + SAME_PLACE));
-        Some((first, at_first.map(|(side, _)| *side).collect()))
+        first_of(&roots)
     }
 
     /// Whether a step by velocity gets to the limit, where a step over depth may end on it.
@@ -1100,24 +1173,23 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
     /// d(dW)/dt = -(F_V/M) dW      at one depth
     /// ```
     ///
-    /// so that only a force that falls with V lets an error grow; on a piece of a table of velocity F_V is one number, and an error
-    /// falls by it too. What a step adds is that of [`super`], or what the equation was seen to be `lacking` on it. The force at its end
-    /// is what comes back.
+    /// so that only a force that falls with V lets an error grow; of a force of the velocity alone it is an error of depth, which
+    /// stays as it is: dW changes as F does. What a step adds is its roundings and what it has `left_out`. The force at its end is what comes back.
     fn widen_bound(
         &self,
         course: &mut Course<'_, S>,
         here: Local<S>,
         (start, next): (State<S>, State<S>),
-        lacking: f64,
+        left_out: f64,
     ) -> Local<S> {
         let (a, b) = (start.values(), next.values());
         let (time, distance) = (b.time - a.time, b.depth - a.depth);
         let reached = self.local(next);
-        let falls = here.fall.min(reached.fall).abs();
         let mass = self.mass.value();
-        let growth = match self.slope {
-            Some(slope) => -time * slope / mass,
-            None => time * falls / mass,
+        let grown = if self.is_of_velocity {
+            (reached.force.value() / here.force.value()).abs()
+        } else {
+            (time * here.fall.min(reached.fall).abs() / mass).exp()
         };
         let fastest = a.velocity.max(b.velocity);
         let end_force = reached.force.value().abs();
@@ -1126,8 +1198,8 @@ impl<S: Scalar, const K: usize> Walk<'_, S, K> {
         let rounding = 6.0 * fastest * fastest + 3.0 * largest * (b.depth + 2.0 * distance);
         // What a step by shares of V leaves out counts beside the depth reached.
         let cut = fastest * fastest + if self.falling.fall == Fall::Exponential { largest * b.depth } else { 0.0 };
-        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * self.tolerance.max(lacking) * cut;
-        let grown = if growth.is_finite() { growth.exp() } else { 1.0 };
+        let added = S::EPSILON.max(f64::EPSILON) * rounding + 2.0 * left_out * cut;
+        let grown = if grown.is_finite() { grown } else { 1.0 };
         course.error_bound = course.error_bound * grown + relative * relative * added;
         reached
     }
@@ -1140,6 +1212,14 @@ fn time_unit<S: Scalar>(start: State<S>, force: S, mass: S, limit: S) -> f64 {
     let crossing = (limit.value() - start.depth.value()) / speed;
     let shortest = stopping.min(crossing);
     power_of_two_below(if shortest.is_finite() && shortest > 0.0 { shortest } else { 1.0 })
+}
+
+/// The first of the roots of switches, and the switches that have one there.
+fn first_of(roots: &[(usize, f64)]) -> Option<(f64, Kinks)> {
+    let first = roots.iter().map(|(_, root)| *root).reduce(f64::min)?;
+    // Of two at one place neither may be found again just behind it, for ever.
+    let at_first = roots.iter().filter(|(_, root)| *root <= first * (1.0 + SAME_PLACE));
+    Some((first, at_first.map(|(side, _)| *side).collect()))
 }
 
 /// Where the step ends, and how: at the first rest, at the limit if that comes before, else at its span.

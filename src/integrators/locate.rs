@@ -32,6 +32,13 @@ use crate::physics::{Scalar, Stage, State};
 /// Trials allowed for one event. Four are usual; sixty halvings of a bracket exhaust a 53-bit number.
 const TRIALS_MAX: usize = 80;
 
+/// Halvings of a bracket: more than a number has digits.
+const HALVINGS: u32 = 80;
+
+/// Steps in which a root settles, and how far from its guess, relatively.
+const SETTLING_MAX: u32 = 12;
+const NEAR: f64 = 0.1;
+
 /// What a search on one step found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Found<S> {
@@ -326,6 +333,48 @@ fn at_depth<S: Scalar>(law: &Stage<S>, point: &State<S>, jet: &Jet<S>, step: S) 
     let velocity = point.velocity + step * (jet.first + step * (jet.second * half + step * jet.third * sixth()));
     let velocity = if velocity.value() > 0.0 { velocity } else { S::zero() };
     State { time: point.time + step, depth: law.end, velocity }
+}
+
+/// The place before `end` where a function, which rises there from below zero to above it, vanishes: by Newton's method, by
+/// halving where that leaves the bracket. `function` gives value and slope.
+pub(super) fn root_before(function: impl Fn(f64) -> (f64, f64), end: f64) -> f64 {
+    let (mut low, mut high, mut at) = (0.0, end, end);
+    for _ in 0..HALVINGS {
+        let (value, slope) = function(at);
+        if value < 0.0 {
+            low = at;
+        } else {
+            high = at;
+        }
+        let newton = at - value / slope;
+        // Before the bracket is asked: what rounding put just outside of it is no reason to halve.
+        if (newton - at).abs() <= 2.0 * f64::EPSILON * at {
+            break;
+        }
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if next <= low || next >= high {
+            break;
+        }
+        at = next;
+    }
+    at
+}
+
+/// The root near `guess`, by Newton's method with `function` for value and slope; `None` where it does not settle near by.
+pub(super) fn settled(function: impl Fn(f64) -> (f64, f64), guess: f64) -> Option<f64> {
+    let mut at = guess;
+    for _ in 0..SETTLING_MAX {
+        let (value, slope) = function(at);
+        let next = at - value / slope;
+        if !((next - guess).abs() <= NEAR * guess) {
+            return None;
+        }
+        if (next - at).abs() <= 4.0 * f64::EPSILON * guess {
+            return Some(next);
+        }
+        at = next;
+    }
+    None
 }
 
 /// Whether the polynomial `c[0] + c[1] t + ...` is negative on the whole of `[0, span]`, as its Bernstein coefficients show:

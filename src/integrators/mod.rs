@@ -35,6 +35,7 @@ pub mod outcome;
 #[expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 mod speed_tables;
 pub mod taylor;
+mod velocity_integrals;
 
 pub use central_difference::{Boundaries, CentralDifference, Steps, Summation, VelocityAt};
 pub use closed_form::ClosedForm;

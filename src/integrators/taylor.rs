@@ -156,7 +156,10 @@ impl Integrator for Taylor {
     fn explain(&self, problem: &Problem, flight: &Flight) -> Vec<String> {
         let treatment = |index: usize, law: &Stage| match Shape::of(law) {
             _ if problem.laws.of(index).is_some_and(|law| law.table().is_some()) => {
-                "a table of velocity: series on each of its pieces, F = p + r V"
+                "a table of velocity: integrals over it on each of its pieces, F = p + r V"
+            }
+            _ if problem.laws.of(index).is_some_and(|law| law.is_of_velocity() && law.end().is_none()) => {
+                "a law of its own, of the velocity alone: integrals over it, series where a few places do not show it"
             }
             _ if problem.laws.of(index).is_some() => {
                 "a law of its own: series of its expression, over time or velocity"

@@ -259,6 +259,12 @@ impl<S: Scalar> Law<S> {
         self.expression().map(|expression| &expression.bound)
     }
 
+    /// Of a law of velocity: the value of a switch, by its place among those of [`Law::bound`], and its derivative by V; NaN without.
+    pub(crate) fn switch_over_velocity(&self, switch: usize, v: f64) -> (f64, f64) {
+        let values = self.expression().map(|expression| expression.values.switch_over_velocity(switch, 0.0, v));
+        values.unwrap_or((f64::NAN, f64::NAN))
+    }
+
     fn expression(&self) -> Option<&Expression<S>> {
         match &self.force {
             Form::Expression(expression) => Some(expression),
@@ -370,6 +376,15 @@ impl<S: Scalar> Law<S> {
         places.windows(2).all(|pair| within(pair[0], pair[1], largest)).then_some(PARTS)
     }
 
+    /// Whether the force is known to depend on the velocity alone.
+    pub(crate) fn is_of_velocity(&self) -> bool {
+        match &self.force {
+            Form::Expression(expression) => !expression.values.tape().depends_on_x(),
+            Form::Table(_) => true,
+            Form::Code(_) => false,
+        }
+    }
+
     /// Whether the force depends on the velocity.
     pub fn depends_on_velocity(&self) -> bool {
         self.expression().is_none_or(|expression| expression.values.tape().depends_on_v())
@@ -418,12 +433,7 @@ impl<S: Scalar> Law<S> {
     /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it in between.
     pub fn static_work(&self, from: f64, to: f64) -> (f64, f64) {
         let force = |x: f64| self.force_value(x, 0.0);
-        let is_of_velocity = match &self.force {
-            Form::Expression(expression) => !expression.values.tape().depends_on_x(),
-            Form::Table(_) => true,
-            Form::Code(_) => false,
-        };
-        if is_of_velocity {
+        if self.is_of_velocity() {
             let work = force(from) * (to - from);
             return (work, work.max(0.0));
         }

@@ -61,3 +61,24 @@ pub fn rounding(rows: &[Floor], judged: &[&Judged]) -> Option<Figure> {
     ];
     Some(Figure::new("rounding-floor", "", judged, &[&floors, &last.steps, &gain], panels)?.sharing_axes())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrators::VelocityAt;
+
+    #[test]
+    fn the_largest_deviation_is_stated_above_the_theory_and_below() {
+        for (measured, stated) in [([2.002, 1.99], "0.5"), ([2.01, 1.998], "0.5"), ([1.998, 2.0], "0.1")] {
+            let point = |(index, measured)| BoundaryPoint {
+                velocity: VelocityAt::Centred,
+                drag_group: index as f64,
+                measured,
+                theory: 2.0,
+            };
+            let points: Vec<_> = measured.into_iter().enumerate().map(point).collect();
+            let title = boundary(&points, &[]).map(|figure| figure.message);
+            assert!(title.as_deref().is_some_and(|title| title.contains(&format!("within {stated}"))), "{title:?}");
+        }
+    }
+}

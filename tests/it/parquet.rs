@@ -215,6 +215,9 @@ fn a_bad_row_says_what_is_wrong_and_the_others_are_answered() {
     assert_eq!(found["error"][2], Cell::Text("row 3, column 6: `NaN` in `velocity_m_s` is not finite".to_owned()));
     assert_eq!((&found["error"][0], &found["depth_m"][1]), (&Cell::Absent, &Cell::Absent));
     assert!(matches!(found["depth_m"][4], Cell::Bits(_)));
+    // A part that leaves out a whole row group counts its rows as the table does.
+    run_in(folder.path(), "batch s.parquet --part 3/5 --out p.parquet").expect(3);
+    assert_eq!(columns(&folder.path().join("p.parquet"))["error"], found["error"][2..3]);
 }
 
 #[test]

@@ -940,6 +940,57 @@ fn random_laws_are_solved_over_time_and_over_depth_within_the_error_bounds() {
     println!("{worst:?}");
 }
 
+/// Laws of the velocity alone, by integrals over it; what 24 places do not show is for the series.
+#[test]
+fn laws_of_velocity_are_solved_to_rounding_whatever_hides_between_two_places() {
+    const FORCES: [(&str, u64); 13] = [
+        ("P + R*(V/v1)^1.5", 1),
+        ("P + R*(V/v1)^-0.5", 3),
+        ("R*sqrt(V/v1)", 1),
+        ("R*(V/v1)^(1/3) + Q*V^2", 2),
+        ("P*(1 + b*log(max(V/v1, 0.05)))", 2),
+        ("P*max((5*V/v1)^0.027, 0.5*(5*V/v1)^0.3)", 4),
+        ("P + R*max(1, (V/v1 - 1)^2)", 3),
+        // A spike, and switches that touch zero, pass it twice in a hundredth of the way, or stay there.
+        ("P + 9*P*exp(-((V/v1 - 0.7)/0.002)^2)", 50),
+        ("P + R*max(0, 1 - abs(V/v1 - 0.61)/0.001)", 8),
+        ("P + R*abs((V/v1 - 0.3)^2)", 6),
+        ("P + P*max(0, 1e-5 - (V/v1 - 0.437)^2)*1e5", 9),
+        ("P + R*max(0, 1e-5 - (V/v1 - 0.437)^2)*1e5", 9),
+        ("P + R*max(0, min(V/v1, 0*V/v1))", 1),
+    ];
+    let random = &mut Random::new(8);
+    let mut nearest = 0.0_f64;
+    for (force, steps) in FORCES {
+        for _ in 0..20 {
+            let speed = random.log_uniform(50.0, 400.0);
+            let free = problem(force, speed);
+            let rest = Taylor::default().solve(&free, Detail::End).unwrap();
+            assert!(rest.cost.steps <= steps, "{force}, {speed}: {} steps", rest.cost.steps);
+            for problem in [free.clone(), free.with_exit(rest.end.depth * random.uniform(0.02, 1.2))] {
+                let exact = Taylor::default().solve_in(&problem.cast::<TwoFloat>(), Detail::End).unwrap().values();
+                let flight = Taylor::default().solve(&problem, Detail::End).unwrap();
+                let said = format!("{force}, {problem:?}");
+                assert_eq!(flight.outcome, exact.outcome, "{said}");
+                let scales = [exact.end.time, exact.end.depth, speed];
+                let [ours, known] = [flight.end, exact.end].map(|end| [end.time, end.depth, end.velocity]);
+                for place in 0..3 {
+                    assert!((ours[place] - known[place]).abs() <= 1e-14 * scales[place], "{ours:?} {known:?} {said}");
+                }
+                // A force without bound at rest leaves a margin without bound.
+                if let (Some(margin), Some(bound)) = (flight.exit_margin, flight.exit_margin_error)
+                    && margin.is_finite()
+                {
+                    let share = (margin - exact.exit_margin.unwrap()).abs() / bound;
+                    assert!(share <= 1.0, "{share} {said}");
+                    nearest = nearest.max(share);
+                }
+            }
+        }
+    }
+    assert!(nearest > 0.1, "{nearest}");
+}
+
 /// What a step leaves out is more than its last coefficients say where those are small by chance.
 #[test]
 fn error_bounds_of_margins_hold_at_every_tolerance() {

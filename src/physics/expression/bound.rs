@@ -232,6 +232,14 @@ impl<S: Scalar> Step<S> {
     }
 }
 
+/// Sets each lane of a register.
+#[inline(always)]
+fn set<S, const N: usize>(register: &mut [S; N], mut value: impl FnMut(usize) -> S) {
+    for (lane, of_lane) in register.iter_mut().enumerate() {
+        *of_lane = value(lane);
+    }
+}
+
 /// How a register depends on V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Degree {
@@ -489,6 +497,55 @@ impl<S: Scalar> Bound<S> {
         }
     }
 
+    /// The values of all registers at the depth `x` and at N places `s` of a fall from `v`, side by side: a step of the tape serves all of
+    /// them.
+    pub(crate) fn along<const N: usize>(&self, falling: &Falling, x: S, v: S, s: &[S; N]) -> Vec<[S; N]> {
+        let mut registers = vec![[x; N]; self.registers];
+        registers[1] = s.map(|s| v * falling.fall.left(s));
+        let mut place = 2;
+        for step in &self.steps {
+            let (done, rest) = registers.split_at_mut(place);
+            let of = |register: usize| &done[register];
+            // One loop for each kind of step, which the compiler turns into vector instructions.
+            match *step {
+                Step::Affine { a, factor, shift } => set(&mut rest[0], |lane| of(a)[lane] * factor + shift),
+                Step::Sum { a, b, factor } => set(&mut rest[0], |lane| of(a)[lane] + of(b)[lane] * factor),
+                Step::Share { a, divisor, .. } => set(&mut rest[0], |lane| of(a)[lane].over(divisor)),
+                Step::Multiply { a, b } => set(&mut rest[0], |lane| of(a)[lane] * of(b)[lane]),
+                Step::Square { a } => set(&mut rest[0], |lane| of(a)[lane] * of(a)[lane]),
+                Step::Select { switch, above, below, .. } => {
+                    set(&mut rest[0], |lane| of(switch)[lane].select(of(above)[lane], of(below)[lane]));
+                }
+                _ => {
+                    let values = |lane: usize| step.values::<_, false>(|register| of(register)[lane], |value| value);
+                    if falling.fill_along(step, place, s, || values(0).0, &mut rest[0]) {
+                        place += step.width();
+                        continue;
+                    }
+                    let mut second = [S::zero(); N];
+                    set(&mut rest[0], |lane| {
+                        let (first, behind) = values(lane);
+                        second[lane] = behind;
+                        first
+                    });
+                    if step.width() == 2 {
+                        rest[1] = second;
+                    }
+                }
+            }
+            place += step.width();
+        }
+        registers
+    }
+
+    /// The values of the expression among those of its registers.
+    pub(crate) fn result_of<const N: usize>(&self, registers: &[[S; N]]) -> [S; N] {
+        match self.result {
+            Value::Constant(constant) => [constant; N],
+            Value::Register(register) => registers[register],
+        }
+    }
+
     /// `value` of a register, without what rounding put below zero.
     #[inline(always)]
     pub(super) fn signed<T: Scalar>(&self, register: usize, value: T) -> T {
@@ -603,6 +660,13 @@ impl Bound {
     pub fn gradient(&self, x: f64, v: f64) -> (f64, f64, f64) {
         // Dual numbers divide with another rounding.
         (self.eval(x, v), self.slope((x, 1.0), (v, 0.0)), self.slope((x, 0.0), (v, 1.0)))
+    }
+
+    /// A switch, by its place among [`Bound::switches`], and its derivative by V.
+    pub(crate) fn switch_over_velocity(&self, switch: usize, x: f64, v: f64) -> (f64, f64) {
+        let value =
+            self.run(Dual64::from_f64(x), Dual64::new(v, 1.0), Dual64::from_f64, |all| all[self.switches[switch]]);
+        (value.re, value.eps)
     }
 
     /// The derivative at depth `x` (m) and velocity `v` (m/s), each with how it changes.

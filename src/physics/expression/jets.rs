@@ -66,6 +66,22 @@ impl Fall {
         }
     }
 
+    /// `(V/V0)^exponent` as a function of s, where it is no root.
+    fn power<S: Scalar>(self, exponent: f64) -> Option<impl Fn(S) -> S> {
+        let whole = match self {
+            Self::Power(m) => exponent * f64::from(m),
+            Self::Exponential => 0.0,
+        };
+        let size = whole.abs() as i32;
+        (!exponent.is_nan() && f64::from(size) == whole.abs()).then_some(move |s: S| match self {
+            Self::Exponential => (s * S::from_f64(-exponent)).exp(),
+            Self::Power(_) => {
+                let power = (0..size).fold(S::one(), |power, _| power * (S::one() - s));
+                if whole < 0.0 { S::one().over(power) } else { power }
+            }
+        })
+    }
+
     /// `-d(V/V0)/ds` at `s`.
     pub fn slope<S: Scalar>(self, s: S) -> S {
         match self {
@@ -193,6 +209,35 @@ impl<S: Scalar> Jets<S> {
 }
 
 impl Falling {
+    /// Fills in the values of a `step` at the places `s` from the one at the `start`, s = 0, and says whether it did: of a power of V that
+    /// is no root in s, and of its logarithm.
+    pub(super) fn fill_along<S: Scalar, const N: usize>(
+        &self,
+        step: &Step<S>,
+        place: usize,
+        s: &[S; N],
+        start: impl FnOnce() -> S,
+        values: &mut [S; N],
+    ) -> bool {
+        match *step {
+            Step::Power { .. } => {
+                let Some(power) = self.fall.power(self.powers[place]) else { return false };
+                let start = start();
+                *values = s.map(|s| start * power(s));
+            }
+            Step::Integral { function: Function::Log | Function::Log10, a, factor, .. } => {
+                let degree = self.powers[a];
+                if !(degree == 0.0 || self.fall == Fall::Exponential && !degree.is_nan()) {
+                    return false;
+                }
+                let (start, slope) = (start(), factor * S::from_f64(-degree));
+                *values = s.map(|s| start + slope * s);
+            }
+            _ => return false,
+        }
+        true
+    }
+
     /// Coefficient `k` of a `step` whose series V decides alone, from the one `before`, and its order.
     #[inline(always)]
     fn coefficient<S: Scalar>(&self, step: &Step<S>, place: usize, k: usize, before: S) -> Option<(S, S)> {

@@ -1,0 +1,218 @@
+//! A force that depends on the velocity alone: depth and time are integrals over the velocity.
+//!
+//! ```text
+//! V = V0 (1-s)^m or V0 e^(-s):   t = integral of -M V'(s)/F(V) ds,   x = x0 + integral of V dt
+//! ```
+//!
+//! The rule of Gauss and Legendre takes both from the force at [`NODES`] places of the step, and each step of the expression serves
+//! all of them. It is exact for polynomials of degree 47: where the pace dt/ds is a polynomial of degree 23 to ten digits, as three
+//! other places show, its integral has all of them (docs/theory.md, section 10).
+
+use std::sync::LazyLock;
+
+use super::locate::{root_before, settled};
+use crate::physics::expression::{Bound, Fall, Falling};
+use crate::physics::{Scalar, State};
+
+/// Places of the rule.
+const NODES: usize = 24;
+
+/// The upper half of the places in (-1, 1), and their weights. Source: Abramowitz, Stegun (1964), table 25.4; digits by Newton's method.
+const GAUSS: [(f64, f64); NODES / 2] = [
+    (0.064_056_892_862_605_63, 0.127_938_195_346_752_16),
+    (0.191_118_867_473_616_3, 0.125_837_456_346_828_3),
+    (0.315_042_679_696_163_4, 0.121_670_472_927_803_39),
+    (0.433_793_507_626_045_1, 0.115_505_668_053_725_6),
+    (0.545_421_471_388_839_6, 0.107_444_270_115_965_63),
+    (0.648_093_651_936_975_5, 0.097_618_652_104_113_88),
+    (0.740_124_191_578_554_4, 0.086_190_161_531_953_27),
+    (0.820_001_985_973_903, 0.073_346_481_411_080_3),
+    (0.886_415_527_004_401_1, 0.059_298_584_915_436_78),
+    (0.938_274_552_002_732_8, 0.044_277_438_817_419_81),
+    (0.974_728_555_971_309_5, 0.028_531_388_628_933_663),
+    (0.995_187_219_997_021_3, 0.012_341_229_799_987_2),
+];
+
+/// Other places at which the pace is asked, as shares of the step. The force at rest may have no quotient: it is asked close to there.
+const ASKED: [f64; 3] = [0.0, 0.5, 0.98];
+
+/// All places in order: the start, the nodes with the two others among them, and the end.
+pub(super) const PLACES: usize = NODES + ASKED.len() + 1;
+
+/// What the polynomial may lack of the pace at the places asked, over the greatest pace.
+const LACKING_MAX: f64 = 1e-10;
+
+/// What the integral lacks over the square of that.
+const LACKING_OF_INTEGRAL: f64 = 100.0;
+
+/// The places of a step in order, as shares of it.
+struct Rule {
+    share: [f64; PLACES],
+    /// Weight of each in the integral.
+    weight: [f64; PLACES],
+    /// The place of each of [`ASKED`], and what each place weighs in the polynomial there.
+    asked: [(usize, [f64; PLACES]); ASKED.len()],
+}
+
+static RULE: LazyLock<Rule> = LazyLock::new(|| {
+    let nodes = GAUSS.iter().flat_map(|(z, w)| [(0.5 - 0.5 * z, 0.5 * w), (0.5 + 0.5 * z, 0.5 * w)]);
+    let others = ASKED.into_iter().chain([1.0]).map(|share| (share, 0.0));
+    let mut places: Vec<(f64, f64)> = nodes.chain(others).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let share = std::array::from_fn(|place| places[place].0);
+    let weight: [f64; PLACES] = std::array::from_fn(|place| places[place].1);
+    // Second barycentric formula; its weights for the places of Gauss are (-1)^i sqrt((1 - z²) w).
+    let asked = ASKED.map(|at| {
+        let mut sign = 1.0;
+        let mut parts = places.iter().map(|(share, weight)| {
+            sign = if *weight > 0.0 { -sign } else { sign };
+            if *weight > 0.0 { sign * (share * (1.0 - share) * weight).sqrt() / (at - share) } else { 0.0 }
+        });
+        let parts: [f64; PLACES] = std::array::from_fn(|_| parts.next().unwrap_or(0.0));
+        let sum: f64 = parts.iter().sum();
+        let place = places.iter().position(|(share, _)| *share == at).unwrap_or(0);
+        (place, parts.map(|part| part / sum))
+    });
+    Rule { share, weight, asked }
+});
+
+/// A step of a law of velocity over the fall of V.
+pub(super) struct Integrals<'l, S> {
+    bound: &'l Bound<S>,
+    mass: S,
+    pub(super) start: State<S>,
+    falling: Falling,
+}
+
+/// The force at the places of a step.
+pub(super) struct Forces<S> {
+    span: S,
+    /// All registers of the expression.
+    registers: Vec<[S; PLACES]>,
+    /// dt/ds (s).
+    pace: [S; PLACES],
+}
+
+impl<'l, S: Scalar> Integrals<'l, S> {
+    pub(super) fn new(bound: &'l Bound<S>, mass: S, start: State<S>, falling: Falling) -> Self {
+        Self { bound, mass, start, falling }
+    }
+
+    /// The velocity (m/s) at `s`.
+    pub(super) fn velocity(&self, s: S) -> S {
+        self.start.velocity * self.falling.fall.left(s)
+    }
+
+    /// -dV/ds (m/s) at `s`.
+    pub(super) fn fall_rate(&self, s: f64) -> f64 {
+        self.start.velocity.value() * self.falling.fall.slope(s)
+    }
+
+    /// The force at the places of a step of the length `span`.
+    pub(super) fn forces(&self, span: S) -> Forces<S> {
+        let places = RULE.share.map(|share| span * S::from_f64(share));
+        let registers = self.bound.along(&self.falling, self.start.depth, self.start.velocity, &places);
+        let force = self.bound.result_of(&registers);
+        // -M dV/ds, which is M V where V falls by shares.
+        let momentum = self.mass * self.start.velocity;
+        let rate = match self.falling.fall {
+            Fall::Exponential => registers[1].map(|velocity| self.mass * velocity),
+            Fall::Power(_) => places.map(|s| momentum * self.falling.fall.slope(s)),
+        };
+        let pace = std::array::from_fn(|place| rate[place].over(force[place]));
+        Forces { span, registers, pace }
+    }
+
+    /// The state at the end of such a step, its time since the start of the step.
+    pub(super) fn end(&self, forces: &Forces<S>) -> State<S> {
+        let (mut time, mut distance) = (S::zero(), S::zero());
+        // Not at the very end, where the pace need not be a number.
+        let places = forces.registers[1].iter().zip(&forces.pace).zip(RULE.weight).take(PLACES - 1);
+        for ((velocity, pace), weight) in places {
+            let part = *pace * S::from_f64(weight);
+            time += part;
+            distance += part * *velocity;
+        }
+        let (time, distance) = (time * forces.span, distance * forces.span);
+        State { time, depth: self.start.depth + distance, velocity: self.velocity(forces.span) }
+    }
+
+    /// The state at `s`, its time since the start of the step.
+    pub(super) fn at(&self, s: S) -> State<S> {
+        self.end(&self.forces(s))
+    }
+
+    /// dt/ds (s) at `s`.
+    pub(super) fn pace(&self, s: S) -> S {
+        let force = self.bound.eval(self.start.depth, self.velocity(s));
+        (self.mass * self.start.velocity * self.falling.fall.slope(s)).over(force)
+    }
+
+    /// Where the depth is `limit` on a step that `ends` at `span` behind it.
+    pub(super) fn passage(&self, limit: S, ends: State<S>, span: f64) -> S {
+        // As under a constant force.
+        let share = ((limit - self.start.depth).over(ends.depth - self.start.depth)).value();
+        let (from, to) = (self.start.velocity.value(), ends.velocity.value());
+        let left = (from * from + (to * to - from * from) * share).sqrt() / from;
+        let guess = match self.falling.fall {
+            Fall::Power(m) => 1.0 - left.powf(1.0 / f64::from(m)),
+            Fall::Exponential => -left.ln(),
+        };
+        let beyond = |s: S| {
+            let at = self.at(s);
+            (at.depth - limit, at.velocity * self.pace(s))
+        };
+        let values = |s: f64| {
+            let (value, slope) = beyond(S::from_f64(s));
+            (value.value(), slope.value())
+        };
+        let root = settled(values, guess).filter(|root| *root <= span).unwrap_or_else(|| root_before(values, span));
+        let root = S::from_f64(root);
+        let (value, slope) = beyond(root);
+        root - value.over(slope)
+    }
+
+    /// Where the time since the start is `since` (s), before `end`.
+    pub(super) fn moment(&self, since: f64, end: f64) -> f64 {
+        let passed = |s: f64| {
+            let s = S::from_f64(s);
+            (self.at(s).time.value() - since, self.pace(s).value())
+        };
+        root_before(passed, end)
+    }
+}
+
+impl<S: Scalar> Forces<S> {
+    /// What the integrals lack, relatively; `None` where the places show too little, or where the force does not resist all along.
+    pub(super) fn lacking(&self) -> Option<f64> {
+        // Not at the very end, where the pace need not be a number.
+        let pace: [f64; PLACES - 1] = std::array::from_fn(|place| self.pace[place].value());
+        let resists = pace.iter().all(|pace| *pace >= 0.0 && pace.is_finite());
+        let largest = pace.iter().copied().fold(0.0, f64::max);
+        let lacking = RULE.asked.iter().map(|(place, weights)| {
+            let polynomial: f64 = weights.iter().zip(&pace).map(|(weight, pace)| weight * pace).sum();
+            (polynomial - pace[*place]).abs() / largest
+        });
+        let lacking = lacking.fold(0.0, f64::max);
+        (resists && largest > 0.0 && lacking <= LACKING_MAX).then_some(LACKING_OF_INTEGRAL * lacking * lacking)
+    }
+
+    /// Whether the places show that the switch in `register` keeps its side, which begins or ends at a root of it or not.
+    pub(super) fn keeps(&self, register: usize, is_above: bool, from_root: bool, to_root: bool) -> bool {
+        let side = if is_above { 1.0 } else { -1.0 };
+        let values = self.registers[register].map(|value| side * value.value());
+        let first = usize::from(from_root || values[0] == 0.0);
+        let values = &values[first..PLACES - usize::from(to_root)];
+        let mut has_fallen = false;
+        let changes = values.windows(2).map(|pair| pair[1] - pair[0]);
+        // Where it comes nearest to zero it may touch it between two places.
+        let turns = changes.fold(false, |turns, change| {
+            let turns = turns || has_fallen && change > 0.0;
+            has_fallen |= change < 0.0;
+            turns
+        });
+        // At the very end it may be zero: the step goes no further.
+        !turns
+            && values.iter().rev().enumerate().all(|(from_end, value)| *value > 0.0 || from_end == 0 && *value == 0.0)
+    }
+}
