@@ -509,13 +509,11 @@ impl OwnLaw {
         })
     }
 
-    /// Whether the step from `before` to `after` shows its force ([`Law::shown_in`]).
+    /// Whether the step from `before` to `after` shows its force ([`Law::is_shown_by`]).
     fn hides_nothing(&self, before: Node, after: Node) -> bool {
         let ends = [before, after].map(|node| self.place(&[node.depth, node.velocity]));
-        let between = |share: f64, a: f64, b: f64| a + share * (b - a);
-        let place = |share| (between(share, ends[0].0, ends[1].0), between(share, ends[0].1, ends[1].1));
         let mass = self.length / self.acceleration / self.speed / self.speed;
-        self.law.shown_in(place, mass * self.speed * self.speed) == Some(1)
+        self.law.is_shown_by(ends, mass * self.speed * self.speed)
     }
 
     /// Whether it only goes on slowing down from `at` (in the units of the stage) to the limit at `end`.

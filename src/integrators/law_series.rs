@@ -20,7 +20,8 @@
 //!
 //! **Length of a step.** The last two coefficients give it, as in [`super::taylor`]. They may vanish by chance, and a force may
 //! change where they do not see it. So three places of the step are asked whether the series satisfies the equation there,
-//! and a step on which it does not is shortened. What lies between them is bounded by intervals ([`Law::shown_in`]).
+//! and a step on which it does not is shortened. Between them a narrow term may hide: a force that has no bound on a disc of the complex
+//! plane around the step has one ([`Disc`]).
 //!
 //! **Branch points over depth.** `(x/l)^1.5` has no series at x = 0, nor has a root where its argument begins. A step so short
 //! that F is `F0 + a (x - x0)^p` on it, to a rounding of what it takes of the energy, leaves such a place.
@@ -46,7 +47,7 @@ use super::outcome::{IntegrationError, Solved};
 use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
 use super::velocity_integrals::{Integrals, PLACES};
 use crate::physics::condition::Sight;
-use crate::physics::expression::{Bound, Fall, Falling, Jets, product};
+use crate::physics::expression::{Around, Bound, Disc, Fall, Falling, Jets, product};
 use crate::physics::scalar::reciprocal;
 use crate::physics::{Condition, Law, Scalar, State};
 
@@ -107,6 +108,20 @@ const STILL_ENOUGH: f64 = 0.05;
 /// `1/F` decide.
 const TRIED_TO_REST: [f64; 3] = [1.0, 0.85, 0.5];
 const TRIED_BY_SHARES: [f64; 3] = [10.0, 3.0, 1.0];
+
+/// Radius of the disc on which a force must have a bound, over the length of a step by series, and over half of one by integrals. An error
+/// of K coefficients falls as 2.5^-K, and that of the rule, whose ellipse has these half axes in it, as 2.6^-48.
+const DISC_OF_SERIES: f64 = 2.5;
+const DISC_OF_INTEGRAL: f64 = 1.5;
+
+/// That bound over the greatest force seen.
+const HIDDEN_MAX: f64 = 1e3;
+
+/// Step, over depth and velocity, on which nothing is taken to hide: a force that ends in a root has no bound on any.
+const SHORT: f64 = 1e-9;
+
+/// Share of the energy that is nothing.
+const NOTHING: f64 = 1e-18;
 
 /// How far apart, relatively, the roots of two switches may be that are one place.
 const SAME_PLACE: f64 = 1e-9;
@@ -664,7 +679,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         if relative > SLOW {
             return None;
         }
-        let at_rest = self.law.force(depth, S::zero()).value();
+        // In values: other number types have no infinity.
+        let at_rest = self.law.force_value(x, 0.0);
         let deceleration = force.over(self.mass);
         let rest = State {
             time: time + velocity.over(deceleration),
@@ -754,12 +770,14 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             }
             let Some(left_out) = forces.lacking() else { continue };
             let end = integrals.end(&forces);
-            let place = |share: f64| {
-                let depth = start.depth + (end.depth - start.depth) * S::from_f64(share);
-                (depth.value(), integrals.velocity(S::from_f64(share * span)).value().max(0.0))
-            };
-            let energy = self.mass.value() * start.velocity.value() * start.velocity.value();
-            if self.law.shown_in(place, energy) != Some(1) {
+            let around = Around::falling(
+                Disc::of(start.depth.value()),
+                start.velocity.value(),
+                &self.falling,
+                Disc::new(0.5 * span, DISC_OF_INTEGRAL * 0.5 * span),
+            );
+            let disc = self.bound.disc(around, &self.sides, |register| forces.at_start(register));
+            if !(disc.size() <= HIDDEN_MAX * forces.largest()) {
                 continue;
             }
             self.goes_by_velocity = true;
@@ -822,12 +840,16 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         });
         let mut kinks = Kinks::new();
         for _ in 0..SHORTENED_MAX {
-            if let Some((root, switches)) = self.first_kinks(&path) {
-                (path.span, kinks) = (root, switches);
-            }
-            // Behind rest and the limit the equation need not hold, nor the force have a value.
-            let ending = first_event(&path, limit);
+            // Behind rest and the limit the equation need not hold, nor the force have a value, and switches grow large there: their roots
+            // would be lost in roundings.
+            let mut ending = first_event(&path, limit);
             path.span = ending.0.value();
+            if path.span > 0.0
+                && let Some((root, switches)) = self.first_kinks(&path)
+            {
+                (path.span, kinks) = (root, switches);
+                ending = (S::from_f64(root), Event::None);
+            }
             let mass = self.mass.value();
             let noise = |force: f64| 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(force, mass);
             let (least, most) = (noise(force.value()), LazyCell::new(|| noise(*size)));
@@ -838,18 +860,10 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
                 let rounded = if defect <= allowed + least { least } else { *most };
                 (defect <= allowed + rounded).then(|| (defect - rounded).max(0.0))
             };
-            let energy = mass * start.velocity.value() * start.velocity.value();
-            let place = |share: f64| {
-                let at = path.at(S::from_f64(share * path.span)).values();
-                (at.depth, at.velocity.max(0.0))
-            };
-            let shows = || {
-                let parts = self.law.shown_in(place, energy)?;
-                (1..parts).all(|part| lacking(part as f64 / parts as f64).is_some()).then_some(())
-            };
             let sum =
                 ASKED.iter().zip(STANDS_FOR).try_fold(0.0, |sum, (share, part)| Some(sum + part * lacking(*share)?));
-            let shown = if sum.is_some() && shows().is_some() { self.shown_end(&path) } else { SHORTENING };
+            let shown =
+                if sum.is_some() && self.shows_force(&path, force) { self.shown_end(&path) } else { SHORTENING };
             if let (true, Some(sum)) = (shown >= 1.0, sum) {
                 let power = if let Form::Velocity(Fall::Power(m)) = path.form { f64::from(m) } else { 1.0 };
                 let left_out = self.tolerance.max(power * sum);
@@ -869,6 +883,30 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             return Err(IntegrationError::NotFinite { what: "the step", last: start.values() });
         }
         Err(self.no_force(course, last))
+    }
+
+    /// Whether the series over the path that was made last show its force all along: by its bound on a disc around the start, what they
+    /// leave out is of no count.
+    fn shows_force(&self, path: &Path<S, K>, force: S) -> bool {
+        let reach = DISC_OF_SERIES * path.span;
+        let around = |series: &[S; K]| {
+            let radius = series[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * reach);
+            Disc::new(series[0].value(), radius)
+        };
+        let depth = around(&path.depth);
+        let around = match path.form {
+            Form::Time(_) | Form::Depth(_) => Around { x: depth, v: around(&path.velocity), fall: None },
+            Form::Velocity(_) => Around::falling(depth, path.velocity[0].value(), &self.falling, Disc::new(0.0, reach)),
+        };
+        let disc = self.bound.disc(around, &self.sides, |register| self.jets.register(register)[0].value());
+        let end = path.at(S::from_f64(path.span)).values();
+        let at_end = self.law.force_value(end.depth, end.velocity.max(0.0)).abs();
+        let largest = force.value().abs().max(if at_end.is_finite() { at_end } else { 0.0 });
+        let distance = end.depth - path.depth[0].value();
+        let speed = path.velocity[0].value();
+        let left_out = disc.size() * DISC_OF_SERIES.powi(-(K as i32)) * distance;
+        let is_short = distance <= SHORT * end.depth && (end.velocity - speed).abs() <= SHORT * speed;
+        is_short || disc.size() <= HIDDEN_MAX * largest || left_out <= NOTHING * self.mass.value() * speed * speed
     }
 
     /// The series of g over the path that was made last.
@@ -1001,13 +1039,16 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         course.is_in_doubt |= beyond.abs() <= allowed;
     }
 
-    /// The first root of a switch on a step, and the switches that have one there.
+    /// The first root of a switch on a step, and the switches that have one there: none where the step must end before a root whose place
+    /// is not known.
     fn first_kinks(&self, path: &Path<S, K>) -> Option<(f64, Kinks)> {
         let switches = self.bound.switches();
         if switches.is_empty() {
             return None;
         }
         let span = path.span;
+        // Before a root whose place is not known.
+        let mut unknown = f64::INFINITY;
         // Where V falls all along, the ends of the step hold x and V between them.
         let ranges = matches!(path.form, Form::Velocity(_)).then(|| {
             let (from, to) = (path.at(S::zero()).values(), path.at(S::from_f64(span)).values());
@@ -1035,13 +1076,21 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
                     (before * value, before * both(&series, s).1)
                 };
                 let located = root.and_then(|root| settled(passed, root));
-                root = located.or_else(|| (passed(span).0 > 0.0).then(|| root_before(passed, span))).or(root);
+                let located = located.or_else(|| (passed(span).0 > 0.0).then(|| root_before(passed, span)));
+                if let (None, Some(near)) = (located, root)
+                    && !(passed(near).0.abs() <= FLAT * series[0].value().abs())
+                {
+                    // Somewhere here: a shorter step tells.
+                    unknown = unknown.min(SHORTENING * near);
+                    return None;
+                }
+                root = located.or(root);
             }
             // A root at the end of the step is passed by the next.
             root.filter(|root| *root < span).map(|root| (side, root))
         });
         let roots: SmallVec<[(usize, f64); 4]> = roots.collect();
-        first_of(&roots)
+        first_of(&roots).filter(|(root, _)| *root <= unknown).or((unknown < span).then(|| (unknown, Kinks::new())))
     }
 
     /// Whether a step by velocity gets to the limit, where a step over depth may end on it.

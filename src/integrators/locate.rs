@@ -39,6 +39,9 @@ const HALVINGS: u32 = 80;
 const SETTLING_MAX: u32 = 12;
 const NEAR: f64 = 0.1;
 
+/// How much of the way to a root may be lost in the roundings of the function.
+const SETTLED: f64 = 1e-10;
+
 /// What a search on one step found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Found<S> {
@@ -362,19 +365,20 @@ pub(super) fn root_before(function: impl Fn(f64) -> (f64, f64), end: f64) -> f64
 
 /// The root near `guess`, by Newton's method with `function` for value and slope; `None` where it does not settle near by.
 pub(super) fn settled(function: impl Fn(f64) -> (f64, f64), guess: f64) -> Option<f64> {
-    let mut at = guess;
+    let (mut at, mut change) = (guess, f64::INFINITY);
     for _ in 0..SETTLING_MAX {
         let (value, slope) = function(at);
         let next = at - value / slope;
         if !((next - guess).abs() <= NEAR * guess) {
             return None;
         }
-        if (next - at).abs() <= 4.0 * f64::EPSILON * guess {
-            return Some(next);
-        }
+        change = (next - at).abs();
         at = next;
+        if change <= 4.0 * f64::EPSILON * guess {
+            break;
+        }
     }
-    None
+    (change <= SETTLED * guess).then_some(at)
 }
 
 /// Whether the polynomial `c[0] + c[1] t + ...` is negative on the whole of `[0, span]`, as its Bernstein coefficients show:

@@ -89,6 +89,7 @@ pub(super) struct Forces<S> {
     span: S,
     /// All registers of the expression.
     registers: Vec<[S; PLACES]>,
+    force: [S; PLACES],
     /// dt/ds (s).
     pace: [S; PLACES],
 }
@@ -120,7 +121,7 @@ impl<'l, S: Scalar> Integrals<'l, S> {
             Fall::Power(_) => places.map(|s| momentum * self.falling.fall.slope(s)),
         };
         let pace = std::array::from_fn(|place| rate[place].over(force[place]));
-        Forces { span, registers, pace }
+        Forces { span, registers, force, pace }
     }
 
     /// The state at the end of such a step, its time since the start of the step.
@@ -183,6 +184,17 @@ impl<'l, S: Scalar> Integrals<'l, S> {
 }
 
 impl<S: Scalar> Forces<S> {
+    /// The value of a register at the start.
+    pub(super) fn at_start(&self, register: usize) -> f64 {
+        self.registers[register][0].value()
+    }
+
+    /// The greatest force (N) at the places.
+    pub(super) fn largest(&self) -> f64 {
+        let sizes = self.force.iter().map(|force| force.value().abs());
+        sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
+    }
+
     /// What the integrals lack, relatively; `None` where the places show too little, or where the force does not resist all along.
     pub(super) fn lacking(&self) -> Option<f64> {
         // Not at the very end, where the pace need not be a number.

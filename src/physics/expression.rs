@@ -19,6 +19,7 @@
 //! was started with, so that a step of an integrator is smooth, and the switch's own series shows where it ends.
 
 mod bound;
+mod disc;
 mod jets;
 mod parse;
 mod polynomial;
@@ -34,6 +35,7 @@ use std::ops::Range;
 use thiserror::Error;
 
 pub use bound::Bound;
+pub(crate) use disc::{Around, Disc};
 pub(crate) use jets::product;
 pub use jets::{Fall, Falling, Jets};
 pub use parse::is_name;

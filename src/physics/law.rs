@@ -347,33 +347,23 @@ impl<S: Scalar> Law<S> {
         self.range((from, f64::INFINITY), (0.0, f64::INFINITY)).is_some_and(|(_, most)| most <= 0.0)
     }
 
-    /// In how many parts of a path the ends of the parts show its force: 1 or 8. `None` where a part may hide more than half of the
-    /// greatest force seen, and enough to count beside the `energy` (J). `place` gives depth (m) and velocity (m/s) at a share
-    /// of the path from 0 to 1.
-    ///
-    /// By bounds of the expression over each part. A series sees nothing of what lies far ahead.
-    pub(crate) fn shown_in(&self, place: impl Fn(f64) -> (f64, f64), energy: f64) -> Option<usize> {
-        let at = |share: f64| {
-            let (x, v) = place(share);
-            (x, v, self.force_value(x, v))
-        };
-        let within = |from: (f64, f64, f64), to: (f64, f64, f64), largest: f64| {
-            let (low, high) = (from.1.min(to.1), from.1.max(to.1));
-            // What a slower projectile meets is for the steps to come.
-            let depths = (from.0.min(to.0), from.0.max(to.0));
-            let Some((least, most)) = self.range(depths, (low.max(SLOWEST * high), high)) else { return true };
-            let hidden = most - least;
-            hidden <= SURPRISE * largest + 2.0 * (to.2 - from.2).abs()
-                || hidden * (to.0 - from.0).abs() <= NOTHING * energy
-        };
-        let (start, end) = (at(0.0), at(1.0));
-        if within(start, end, start.2.abs().max(end.2.abs())) {
-            return Some(1);
-        }
-        let places: [(f64, f64, f64); PARTS + 1] = std::array::from_fn(|part| at(part as f64 / PARTS as f64));
-        let sizes = places.iter().map(|place| place.2.abs());
-        let largest = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
-        places.windows(2).all(|pair| within(pair[0], pair[1], largest)).then_some(PARTS)
+    /// Whether the ends of a path, depth (m) and velocity (m/s), show its force: bounds of it between them leave room for no more than
+    /// a fiftieth of it, or for too little to count beside the `energy` (J).
+    #[cfg(feature = "diffsol")]
+    pub(crate) fn is_shown_by(&self, ends: [(f64, f64); 2], energy: f64) -> bool {
+        let [from, to] = ends;
+        let forces = ends.map(|(x, v)| self.force_value(x, v));
+        let (low, high) = (from.1.min(to.1), from.1.max(to.1));
+        let depths = (from.0.min(to.0), from.0.max(to.0));
+        let bounds = |low: f64| self.range(depths, (low, high)).map(|(least, most)| most - least);
+        let Some(hidden) = bounds(low) else { return true };
+        // A force without bound at rest: what a slower projectile meets is for the steps to come.
+        let hidden = if hidden.is_finite() { hidden } else { bounds(low.max(SLOWEST * high)).unwrap_or(hidden) };
+        // Of a force of the velocity alone the bounds are as narrow as its terms go one way.
+        let changes = if self.is_of_velocity() { 1.0 } else { 2.0 };
+        let largest = forces[0].abs().max(forces[1].abs());
+        hidden <= SURPRISE * largest + changes * (forces[1] - forces[0]).abs()
+            || hidden * (depths.1 - depths.0) <= NOTHING * energy
     }
 
     /// Whether the force is known to depend on the velocity alone.
@@ -528,13 +518,13 @@ pub struct OwnParameter {
     pub unit: Unit,
 }
 
-/// Parts of a path whose force is bounded.
-const PARTS: usize = 8;
-
-/// Share of the greatest force of a path that may lie hidden in a part of it; share of the energy that is nothing; and share of
-/// the greatest velocity of a part below which its force is not asked.
-const SURPRISE: f64 = 0.5;
+/// Share of the greatest force of a path that may lie hidden on it; share of the energy that is nothing; and share of the greatest
+/// velocity below which a force without bound is not asked.
+#[cfg(feature = "diffsol")]
+const SURPRISE: f64 = 0.02;
+#[cfg(feature = "diffsol")]
 const NOTHING: f64 = 1e-18;
+#[cfg(feature = "diffsol")]
 const SLOWEST: f64 = 0.05;
 
 /// Parts in which a stretch is searched for places where its force begins to drive.

@@ -1,0 +1,263 @@
+//! How large may the value of an expression get, where x and V lie in discs of the complex plane?
+//!
+//! A function with the bound M in a disc of the radius R has coefficients within `M/R^k` about its centre (Cauchy), so that a series
+//! shows it on a part of the disc, and so does a polynomial through a few places. What is narrow has no bound there: the terms
+//! `exp(-(x/w)²)` and `1/(1 + (x/w)²)` of a disc a few w wide.
+//!
+//! Each term is a disc again, about the value at the centre. Its radius is that of the majorant, the series of the absolute values of
+//! its coefficients: f64 rounded to nearest.
+
+use smallvec::SmallVec;
+
+use super::bound::{Bound, Step, Value};
+use super::jets::{Fall, Falling};
+use super::parse::Function;
+use crate::physics::scalar::Scalar;
+
+/// The numbers within `radius` of a real `centre`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Disc {
+    pub(crate) centre: f64,
+    /// Infinite, or no number, where there is no bound.
+    pub(crate) radius: f64,
+}
+
+impl Disc {
+    pub(crate) const fn new(centre: f64, radius: f64) -> Self {
+        Self { centre, radius }
+    }
+
+    pub(crate) const fn of(value: f64) -> Self {
+        Self::new(value, 0.0)
+    }
+
+    /// Bound of the absolute value; infinite where there is none.
+    pub(crate) fn size(self) -> f64 {
+        let size = self.centre.abs() + self.radius;
+        if size.is_finite() { size } else { f64::INFINITY }
+    }
+
+    fn scaled(self, factor: f64) -> Self {
+        Self::new(self.centre * factor, self.radius * factor.abs())
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self::new(self.centre + other.centre, self.radius + other.radius)
+    }
+
+    fn times(self, other: Self) -> Self {
+        let radius = self.centre.abs() * other.radius + other.centre.abs() * self.radius + self.radius * other.radius;
+        Self::new(self.centre * other.centre, radius)
+    }
+
+    /// About the value at the centre, not the middle of the image.
+    fn inverse(self) -> Self {
+        let nearest = self.centre.abs() - self.radius;
+        Self::new(
+            1.0 / self.centre,
+            if nearest > 0.0 { self.radius / (self.centre.abs() * nearest) } else { f64::INFINITY },
+        )
+    }
+
+    /// Where the centre is above zero and the disc holds no zero; a power of constants besides.
+    fn power(self, exponent: f64) -> Self {
+        let value = self.centre.powf(exponent);
+        if self.radius == 0.0 {
+            return Self::of(value);
+        }
+        let ratio = self.radius / self.centre;
+        let whole = exponent.max(0.0).floor();
+        let rest = exponent - whole;
+        if rest == 0.0 {
+            let (size, more) = (self.centre.abs(), self.centre.abs() + self.radius);
+            return Self::new(value, more.powf(whole) - size.powf(whole));
+        }
+        if !(ratio > 0.0 && ratio < 1.0) {
+            return Self::new(value, f64::INFINITY);
+        }
+        // Of (1+z)^e, e below 1: all coefficients have signs in turn below zero, and above it all but the first are negative there.
+        let majorant = ((1.0 - ratio).powf(rest) - 1.0).abs();
+        let of_whole = (1.0 + ratio).powf(whole);
+        Self::new(value, value.abs() * (of_whole * (1.0 + majorant) - 1.0))
+    }
+
+    fn exp(self) -> Self {
+        let value = self.centre.exp();
+        let far = self.centre + self.radius;
+        // The product would be none where the first factor rounds to zero and the second to no number.
+        Self::new(value, if self.radius < 1.0 { value * self.radius.exp_m1() } else { far.exp() - value })
+    }
+
+    /// Sine, or cosine.
+    fn sine(self, is_cosine: bool) -> Self {
+        let (sin, cos) = self.centre.sin_cos();
+        let (value, slope) = if is_cosine { (cos, sin) } else { (sin, cos) };
+        Self::new(value, value.abs() * (self.radius.cosh() - 1.0) + slope.abs() * self.radius.sinh())
+    }
+
+    /// Near zero the majorant m has `m' = 1 - T² + 2 |T| m + m²`, T the value: a tangent. Elsewhere by `tanh z = 1 - 2/(1 + e^(2z))`.
+    fn tanh(self) -> Self {
+        let value = self.centre.tanh();
+        let t = value.abs();
+        if t < 0.5 {
+            let rate = (1.0 - 2.0 * t * t).sqrt();
+            let angle = rate * self.radius + (t / rate).atan();
+            let radius = if angle < std::f64::consts::FRAC_PI_2 { rate * angle.tan() - t } else { f64::INFINITY };
+            return Self::new(value, radius);
+        }
+        let share = Self::new(-2.0 * self.centre.abs(), 2.0 * self.radius).exp();
+        // 2 w/(1 + w) = 2 - 2/(1 + w).
+        Self::new(value, 2.0 * share.plus(Self::of(1.0)).inverse().radius)
+    }
+
+    fn log(self) -> Self {
+        let ratio = self.radius / self.centre;
+        Self::new(self.centre.ln(), if ratio < 1.0 { -(-ratio).ln_1p() } else { f64::INFINITY })
+    }
+
+    /// Its coefficients are within `D^-k/k`, D the distance to the branch points.
+    fn atan(self) -> Self {
+        let ratio = self.radius / 1.0_f64.hypot(self.centre);
+        Self::new(self.centre.atan(), if ratio < 1.0 { -(-ratio).ln_1p() } else { f64::INFINITY })
+    }
+}
+
+/// Discs of x and of V, and how V falls over the variable of a step, with the disc of that.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Around<'f> {
+    pub(crate) x: Disc,
+    pub(crate) v: Disc,
+    pub(crate) fall: Option<(&'f Falling, Disc)>,
+}
+
+impl Around<'_> {
+    /// Of V that falls from `v` (m/s) so, s in a disc.
+    pub(crate) fn falling(x: Disc, v: f64, falling: &Falling, s: Disc) -> Around<'_> {
+        Around { x, v: falling.fall.disc(1.0, s).unwrap_or(Disc::of(1.0)).scaled(v), fall: Some((falling, s)) }
+    }
+}
+
+impl Fall {
+    /// The disc of `(V/V0)^exponent`, where that is no root.
+    fn disc(self, exponent: f64, s: Disc) -> Option<Disc> {
+        if exponent.is_nan() {
+            return None;
+        }
+        match self {
+            Self::Exponential => Some(s.scaled(-exponent).exp()),
+            Self::Power(m) => {
+                let (whole, left) = (exponent * f64::from(m), Disc::new(1.0 - s.centre, s.radius));
+                (whole.fract() == 0.0)
+                    .then(|| if whole < 0.0 { left.power(-whole).inverse() } else { left.power(whole) })
+            }
+        }
+    }
+}
+
+/// The discs of all registers, on `sides` of the switches; `starts` gives the value of a register where V begins to fall.
+pub(super) fn discs<S: Scalar>(
+    steps: &[Step<S>],
+    around: Around<'_>,
+    sides: &[bool],
+    start: impl Fn(usize) -> f64,
+) -> SmallVec<[Disc; 32]> {
+    let mut discs: SmallVec<[Disc; 32]> = SmallVec::from_slice(&[around.x, around.v]);
+    for step in steps {
+        let place = discs.len();
+        let of = |register: usize| discs[register];
+        let fallen = around.fall.and_then(|(falling, s)| match *step {
+            _ if let Some(disc) = falling.fall.disc(falling.powers[place], s) => Some(disc.scaled(start(place))),
+            Step::Integral { function: Function::Log | Function::Log10, a, factor, .. }
+                if falling.fall == Fall::Exponential && !falling.powers[a].is_nan() =>
+            {
+                Some(Disc::of(start(place)).plus(s.scaled(-factor.value() * falling.powers[a])))
+            }
+            _ => None,
+        });
+        let mut second = Disc::of(0.0);
+        let first = fallen.unwrap_or_else(|| match *step {
+            Step::Constant { value } => Disc::of(value.value()),
+            Step::Affine { a, factor, shift } => of(a).scaled(factor.value()).plus(Disc::of(shift.value())),
+            Step::Sum { a, b, factor } => of(a).plus(of(b).scaled(factor.value())),
+            Step::Share { a, divisor, .. } => of(a).scaled(1.0 / divisor.value()),
+            Step::Multiply { a, b } | Step::HalfPower { whole: a, root: b, .. } => of(a).times(of(b)),
+            Step::Square { a } => of(a).times(of(a)),
+            Step::Divide { a, b } => of(a).times(of(b).inverse()),
+            Step::Ratio { dividend, b } => of(b).inverse().scaled(dividend.value()),
+            Step::Slope { .. } => Disc::of(0.0),
+            Step::Sqrt { a } => of(a).power(0.5),
+            Step::Power { a, exponent, .. } => of(a).power(exponent.value()),
+            Step::Exp { a, .. } => of(a).exp(),
+            Step::SinCos { a, .. } => {
+                second = of(a).sine(true);
+                of(a).sine(false)
+            }
+            Step::Tanh { a, .. } => of(a).tanh(),
+            Step::Integral { function: Function::Log, a, .. } => of(a).log(),
+            Step::Integral { function: Function::Log10, a, factor, .. } => of(a).log().scaled(factor.value()),
+            Step::Integral { a, .. } => of(a).atan(),
+            Step::Select { index, above, below, .. } => of(if sides[index] { above } else { below }),
+        });
+        discs.push(first);
+        if step.width() == 2 {
+            discs.push(second);
+        }
+    }
+    discs
+}
+
+impl<S: Scalar> Bound<S> {
+    /// The disc of the value, on `sides` of [`Bound::switches`]; `start` gives the value of a register where V begins to fall.
+    pub(crate) fn disc(&self, around: Around<'_>, sides: &[bool], start: impl Fn(usize) -> f64) -> Disc {
+        match self.result() {
+            Value::Constant(constant) => Disc::of(constant.value()),
+            Value::Register(result) => discs(self.steps(), around, sides, start)[result],
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a text that is no expression is a failed test")]
+mod tests {
+    use super::{Around, Disc};
+    use crate::physics::expression::{Jets, Known, Tape, Unit};
+    use crate::physics::units::Dimension;
+    use crate::testing::Random;
+
+    /// The coefficients of the series along a line through the centre add up to no more than the radius.
+    #[test]
+    fn a_disc_holds_what_the_series_along_any_line_adds_up_to() {
+        let known = |name, value, dimension: Dimension| Known { name, value, unit: dimension.into() };
+        let known = [known("l", 0.3, Dimension::Length), known("u", 40.0, Dimension::Velocity)];
+        let mut random = Random::new(5);
+        let mut bounded = 0;
+        for text in [
+            "(x/l - 1)^2 - (V/u)^3 + 2",
+            "exp(-((x/l - 1)/0.1)^2)*(1 + V/u)",
+            "tanh(x/l - V/u)*abs(x/l - 1) - min(V/u, x/l)",
+            "sin(3*x/l)*cos(V/u) + max(x/l, 1 - V/u)",
+            "log(1 + V/u)/(2 + x/l) + log10(2 + x/l) + atan(x/l - 1)",
+            "(1 + V/u)^1.7 + (V/u)^0.2 + sqrt(1 + x/l)/(1 + x/l)^-2 + 1/(3 - sin(V/u))",
+            "tanh(0.3*x/l) + tanh(4 - x/l) + (1 + x/l)^2.5 + (2 + V/u)^-0.7",
+        ] {
+            let tape = Tape::read(text, &known, Unit::NONE).unwrap();
+            let bound = tape.bind(tape.parameters());
+            for _ in 0..400 {
+                let (x, v) = (random.uniform(0.1, 0.9), random.uniform(10.0, 90.0));
+                let (dx, dv) = (random.log_uniform(1e-3, 0.3), random.log_uniform(0.1, 40.0));
+                let sides = bound.sides(x, v);
+                let around = Around { x: Disc::new(x, dx), v: Disc::new(v, dv), fall: None };
+                let disc = bound.disc(around, &sides, |_| f64::NAN);
+                let mut jets = Jets::default();
+                jets.start(&bound, &sides);
+                let first = jets.push(&bound, x, v);
+                let next = [(dx, -dv), (0.0, 0.0)].into_iter().chain([(0.0, 0.0); 20]);
+                let sum: f64 = next.map(|(dx, dv)| jets.push(&bound, dx, dv).abs()).sum();
+                assert!((disc.centre - first).abs() <= 1e-14 * (1.0 + first.abs()), "{text}");
+                assert!(!(sum > disc.radius * (1.0 + 1e-12) + 1e-14), "{text}: {sum} in {disc:?}");
+                bounded += u32::from(disc.size() < 1e3);
+            }
+        }
+        assert!(bounded > 1000, "{bounded}");
+    }
+}
