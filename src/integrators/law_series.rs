@@ -45,7 +45,7 @@ use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES};
 use super::locate::{self, root_before, settled};
 use super::outcome::{IntegrationError, Solved};
 use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
-use super::velocity_integrals::{Integrals, PLACES};
+use super::velocity_integrals::{Forces, Integrals, PLACES};
 use crate::physics::condition::Sight;
 use crate::physics::expression::{Around, Bound, Disc, Fall, Falling, Jets, product};
 use crate::physics::scalar::reciprocal;
@@ -776,8 +776,13 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
                 &self.falling,
                 Disc::new(0.5 * span, DISC_OF_INTEGRAL * 0.5 * span),
             );
-            let disc = self.bound.disc(around, &self.sides, |register| forces.at_start(register));
-            if !(disc.size() <= HIDDEN_MAX * forces.largest()) {
+            let (disc, switches) = self.bound.discs(around, &self.sides, |register| forces.at_start(register));
+            let seen = |switch: usize| Forces::largest(&forces.registers[self.bound.switches()[switch]]);
+            let depth = start.depth.value();
+            let velocities = (end.velocity.value().max(0.0), start.velocity.value());
+            let is_shown = disc.size() <= HIDDEN_MAX * Forces::largest(&forces.force)
+                && self.are_shown(&switches, seen, ((depth, depth), velocities));
+            if !is_shown {
                 continue;
             }
             self.goes_by_velocity = true;
@@ -885,6 +890,21 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         Err(self.no_force(course, last))
     }
 
+    /// Whether the discs of switches show them, of which the largest value `seen` is known, or bounds between the depths and velocities of
+    /// the step show that they keep their sides: one that leaves its side unseen hides a branch.
+    fn are_shown(&self, switches: &[Disc], seen: impl Fn(usize) -> f64, (x, v): ((f64, f64), (f64, f64))) -> bool {
+        let ranges = LazyCell::new(|| self.bound.ranges(x, v));
+        switches.iter().enumerate().all(|(switch, disc)| {
+            if disc.has_one_sign() || disc.size() <= HIDDEN_MAX * seen(switch) {
+                return true;
+            }
+            // A branch point at rest, say: it may begin or end at a root, as far as that is rounded.
+            let (least, most) = ranges[self.bound.switches()[switch]];
+            let rounding = FLAT * seen(switch);
+            if self.sides[switch] { least >= -rounding } else { most <= rounding }
+        })
+    }
+
     /// Whether the series over the path that was made last show its force all along: by its bound on a disc around the start, what they
     /// leave out is of no count.
     fn shows_force(&self, path: &Path<S, K>, force: S) -> bool {
@@ -898,15 +918,31 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             Form::Time(_) | Form::Depth(_) => Around { x: depth, v: around(&path.velocity), fall: None },
             Form::Velocity(_) => Around::falling(depth, path.velocity[0].value(), &self.falling, Disc::new(0.0, reach)),
         };
-        let disc = self.bound.disc(around, &self.sides, |register| self.jets.register(register)[0].value());
+        let (disc, switches) =
+            self.bound.discs(around, &self.sides, |register| self.jets.register(register)[0].value());
         let end = path.at(S::from_f64(path.span)).values();
         let at_end = self.law.force_value(end.depth, end.velocity.max(0.0)).abs();
         let largest = force.value().abs().max(if at_end.is_finite() { at_end } else { 0.0 });
         let distance = end.depth - path.depth[0].value();
         let speed = path.velocity[0].value();
+        if distance <= SHORT * end.depth && (end.velocity - speed).abs() <= SHORT * speed {
+            return true;
+        }
+        let depths = (path.depth[0].value(), end.depth);
+        let velocities = (end.velocity.max(0.0).min(speed), end.velocity.max(speed));
         let left_out = disc.size() * DISC_OF_SERIES.powi(-(K as i32)) * distance;
-        let is_short = distance <= SHORT * end.depth && (end.velocity - speed).abs() <= SHORT * speed;
-        is_short || disc.size() <= HIDDEN_MAX * largest || left_out <= NOTHING * self.mass.value() * speed * speed
+        let of_switches = LazyCell::new(|| {
+            ASKED.map(|share| {
+                let at = path.at(S::from_f64(share * path.span));
+                self.bound.switch_values(at.depth, at.velocity)
+            })
+        });
+        let seen = |switch: usize| {
+            let values = of_switches.iter().map(|values| values[switch].value().abs());
+            values.fold(self.jets.register(self.bound.switches()[switch])[0].value().abs(), f64::max)
+        };
+        (disc.size() <= HIDDEN_MAX * largest || left_out <= NOTHING * self.mass.value() * speed * speed)
+            && self.are_shown(&switches, seen, (depths, velocities))
     }
 
     /// The series of g over the path that was made last.

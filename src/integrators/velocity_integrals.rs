@@ -88,8 +88,8 @@ pub(super) struct Integrals<'l, S> {
 pub(super) struct Forces<S> {
     span: S,
     /// All registers of the expression.
-    registers: Vec<[S; PLACES]>,
-    force: [S; PLACES],
+    pub(super) registers: Vec<[S; PLACES]>,
+    pub(super) force: [S; PLACES],
     /// dt/ds (s).
     pace: [S; PLACES],
 }
@@ -189,9 +189,9 @@ impl<S: Scalar> Forces<S> {
         self.registers[register][0].value()
     }
 
-    /// The greatest force (N) at the places.
-    pub(super) fn largest(&self) -> f64 {
-        let sizes = self.force.iter().map(|force| force.value().abs());
+    /// The greatest size of a register, or of the force, at the places.
+    pub(super) fn largest(values: &[S; PLACES]) -> f64 {
+        let sizes = values.iter().map(|value| value.value().abs());
         sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
     }
 

@@ -1004,6 +1004,10 @@ fn a_small_narrow_term_is_not_stepped_over() {
         ("P + 0.6*R*exp(-((x/l - 1.3)/0.002)^2)", 300.0),
         // Its switch grows so large by the end of the first step that the roots of it are lost in roundings there.
         ("P + 0.1*R*max(0, 1 - ((x/l - 2.16)/0.001178)^2) + 0.1581*R*exp(-((x/l - 1.016)/0.0004073)^2)", 443.6),
+        // Hidden in a switch: each side of it is smooth, and nothing of the other is there at the places asked.
+        ("P + R*max(0, exp(-((x/l - 1.3)/0.002)^2) - 0.5)", 300.0),
+        ("P + R*max(0.3, exp(-((V/v1 - 1.3)/0.02)^2))", 300.0),
+        ("P + R*min(1, 2 - 3*exp(-((x/l - 1.3)/0.02)^2))", 300.0),
         // A thousandth of the force, and of the way.
         ("P + 0.001*P*exp(-((V/v1 - 0.6237)/0.001)^2)", 300.0),
         ("P*(1 + x/l*exp(-x/l)) + 1e-4*P/(1 + ((x/l - 1.7)/0.001)^2)", 250.0),
@@ -1012,6 +1016,19 @@ fn a_small_narrow_term_is_not_stepped_over() {
         let [ours, theirs] = exact_methods().map(|method| method.solve(&problem, Detail::End).unwrap().end);
         assert!((ours.depth / theirs.depth - 1.0).abs() < 1e-12, "{force}: {ours:?} {theirs:?}");
         assert!((ours.time / theirs.time - 1.0).abs() < 1e-12, "{force}: {ours:?} {theirs:?}");
+        // Both may miss the same: a sum over the middles of equal parts, far narrower than the term, sees it.
+        let law = problem.laws.of(0).unwrap();
+        let sum_to = |end: f64, value: &dyn Fn(f64) -> f64| -> f64 {
+            let part = end / 400_000.0;
+            (0..400_000).map(|place| part * value((f64::from(place) + 0.5) * part)).sum()
+        };
+        let mass = problem.mass;
+        let known = if force.contains('x') && !force.contains("V/") {
+            sum_to(ours.depth, &|x| law.force_value(x, 0.0)) / (0.5 * mass * speed * speed)
+        } else {
+            sum_to(speed, &|v| mass * v / law.force_value(0.0, v)) / ours.depth
+        };
+        assert!((known - 1.0).abs() < 1e-9, "{force}: {known}");
     }
 }
 

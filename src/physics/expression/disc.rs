@@ -37,6 +37,11 @@ impl Disc {
         if size.is_finite() { size } else { f64::INFINITY }
     }
 
+    /// Whether it leaves room for one sign only.
+    pub(crate) fn has_one_sign(self) -> bool {
+        self.centre.abs() > self.radius
+    }
+
     fn scaled(self, factor: f64) -> Self {
         Self::new(self.centre * factor, self.radius * factor.abs())
     }
@@ -207,12 +212,20 @@ pub(super) fn discs<S: Scalar>(
 }
 
 impl<S: Scalar> Bound<S> {
-    /// The disc of the value, on `sides` of [`Bound::switches`]; `start` gives the value of a register where V begins to fall.
-    pub(crate) fn disc(&self, around: Around<'_>, sides: &[bool], start: impl Fn(usize) -> f64) -> Disc {
-        match self.result() {
+    /// The disc of the value and those of [`Bound::switches`], on `sides` of them; `start` gives the value of a register where V begins
+    /// to fall.
+    pub(crate) fn discs(
+        &self,
+        around: Around<'_>,
+        sides: &[bool],
+        start: impl Fn(usize) -> f64,
+    ) -> (Disc, SmallVec<[Disc; 4]>) {
+        let all = discs(self.steps(), around, sides, start);
+        let value = match self.result() {
             Value::Constant(constant) => Disc::of(constant.value()),
-            Value::Register(result) => discs(self.steps(), around, sides, start)[result],
-        }
+            Value::Register(result) => all[result],
+        };
+        (value, self.switches().iter().map(|register| all[*register]).collect())
     }
 }
 
@@ -247,7 +260,7 @@ mod tests {
                 let (dx, dv) = (random.log_uniform(1e-3, 0.3), random.log_uniform(0.1, 40.0));
                 let sides = bound.sides(x, v);
                 let around = Around { x: Disc::new(x, dx), v: Disc::new(v, dv), fall: None };
-                let disc = bound.disc(around, &sides, |_| f64::NAN);
+                let (disc, _) = bound.discs(around, &sides, |_| f64::NAN);
                 let mut jets = Jets::default();
                 jets.start(&bound, &sides);
                 let first = jets.push(&bound, x, v);
