@@ -493,27 +493,31 @@ impl OwnLaw {
     ) -> Result<Option<f64>, DiffsolError> {
         let start = epoch + before.time;
         let is_at_kink = kink.is_some_and(|kink| (start - kink).abs() <= 1e-3 * (after.time - before.time));
-        let length = self.to_kink(before, after, &mut at)?.filter(|_| !is_at_kink);
-        *kink = length.map_or(kink.filter(|_| !is_at_kink), |length| Some(start + length));
-        let step = after.time - before.time;
-        if length.is_some() || step <= NARROWEST * start {
-            return Ok(length);
+        if !is_at_kink && let Some(length) = self.to_kink(before, after, &mut at)? {
+            *kink = Some(start + length);
+            return Ok(Some(length));
         }
-        if !self.hides_nothing(before, after) {
+        let step = after.time - before.time;
+        let is_narrow = step <= NARROWEST * start;
+        if !(is_narrow || self.hides_nothing(before, after, is_at_kink)) {
             return Ok(Some(SHORTENING * step));
         }
-        let Some(end) = self.law.end() else { return Ok(None) };
-        Ok(match end.look(self.side, |share| at(before.time + share * step).map(|y| self.place(&y)))? {
-            Sight::Hidden(from, to) => Some(if from > 0.0 { from } else { to } * step),
-            _ => None,
-        })
+        if let Some(end) = self.law.end().filter(|_| !is_narrow) {
+            let place = |share| at(before.time + share * step).map(|y| self.place(&y));
+            if let Sight::Hidden(from, to) = end.look(self.side, place)? {
+                return Ok(Some(if from > 0.0 { from } else { to } * step));
+            }
+        }
+        kink.take_if(|_| is_at_kink);
+        Ok(None)
     }
 
     /// Whether the step from `before` to `after` shows its force ([`Law::is_shown_by`]).
-    fn hides_nothing(&self, before: Node, after: Node) -> bool {
+    fn hides_nothing(&self, before: Node, after: Node, is_at_kink: bool) -> bool {
         let ends = [before, after].map(|node| self.place(&[node.depth, node.velocity]));
         let mass = self.length / self.acceleration / self.speed / self.speed;
-        self.law.is_shown_by(ends, mass * self.speed * self.speed)
+        let at_kink = [if is_at_kink { AFTER_KINK } else { AT_AN_END }, AT_AN_END];
+        self.law.is_shown_by(ends, at_kink, mass * self.speed * self.speed)
     }
 
     /// Whether it only goes on slowing down from `at` (in the units of the stage) to the limit at `end`.
@@ -834,6 +838,9 @@ const NARROWEST: f64 = 1e-9;
 
 /// Share of a step within which a kink lies at its end: what the force is off there does not count.
 const AT_AN_END: f64 = 1e-7;
+
+/// The same share of the values of a switch, where a step was cut short at its kink: the next begins as far from it as the first was wrong.
+const AFTER_KINK: f64 = 0.5;
 
 /// How often a step that ended in NaN is tried again, each time ten times shorter.
 const RETRIES_MAX: u32 = 60;

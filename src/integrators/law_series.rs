@@ -114,9 +114,6 @@ const TRIED_BY_SHARES: [f64; 3] = [10.0, 3.0, 1.0];
 const DISC_OF_SERIES: f64 = 2.5;
 const DISC_OF_INTEGRAL: f64 = 1.5;
 
-/// That bound over the greatest force seen.
-const HIDDEN_MAX: f64 = 1e3;
-
 /// Step, over depth and velocity, on which nothing is taken to hide: a force that ends in a root has no bound on any.
 const SHORT: f64 = 1e-9;
 
@@ -780,8 +777,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             let seen = |switch: usize| Forces::largest(&forces.registers[self.bound.switches()[switch]]);
             let depth = start.depth.value();
             let velocities = (end.velocity.value().max(0.0), start.velocity.value());
-            let is_shown = disc.size() <= HIDDEN_MAX * Forces::largest(&forces.force)
-                && self.are_shown(&switches, seen, ((depth, depth), velocities));
+            let is_shown = disc.shows(Forces::largest(&forces.force))
+                && self.bound.are_shown(&switches, &self.sides, seen, ((depth, depth), velocities));
             if !is_shown {
                 continue;
             }
@@ -890,21 +887,6 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         Err(self.no_force(course, last))
     }
 
-    /// Whether the discs of switches show them, of which the largest value `seen` is known, or bounds between the depths and velocities of
-    /// the step show that they keep their sides: one that leaves its side unseen hides a branch.
-    fn are_shown(&self, switches: &[Disc], seen: impl Fn(usize) -> f64, (x, v): ((f64, f64), (f64, f64))) -> bool {
-        let ranges = LazyCell::new(|| self.bound.ranges(x, v));
-        switches.iter().enumerate().all(|(switch, disc)| {
-            if disc.has_one_sign() || disc.size() <= HIDDEN_MAX * seen(switch) {
-                return true;
-            }
-            // A branch point at rest, say: it may begin or end at a root, as far as that is rounded.
-            let (least, most) = ranges[self.bound.switches()[switch]];
-            let rounding = FLAT * seen(switch);
-            if self.sides[switch] { least >= -rounding } else { most <= rounding }
-        })
-    }
-
     /// Whether the series over the path that was made last show its force all along: by its bound on a disc around the start, what they
     /// leave out is of no count.
     fn shows_force(&self, path: &Path<S, K>, force: S) -> bool {
@@ -941,8 +923,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             let values = of_switches.iter().map(|values| values[switch].value().abs());
             values.fold(self.jets.register(self.bound.switches()[switch])[0].value().abs(), f64::max)
         };
-        (disc.size() <= HIDDEN_MAX * largest || left_out <= NOTHING * self.mass.value() * speed * speed)
-            && self.are_shown(&switches, seen, (depths, velocities))
+        (disc.shows(largest) || left_out <= NOTHING * self.mass.value() * speed * speed)
+            && self.bound.are_shown(&switches, &self.sides, seen, (depths, velocities))
     }
 
     /// The series of g over the path that was made last.

@@ -347,22 +347,26 @@ impl<S: Scalar> Law<S> {
         self.range((from, f64::INFINITY), (0.0, f64::INFINITY)).is_some_and(|(_, most)| most <= 0.0)
     }
 
-    /// Whether the ends of a path, depth (m) and velocity (m/s), show its force: bounds of it between them leave room for no more than
-    /// a fiftieth of it, or for too little to count beside the `energy` (J).
+    /// Whether the ends of a path, depth (m) and velocity (m/s), show its force: it has a bound on a disc around the path, or the path
+    /// comes close to rest, where there may be none, and the force goes but one way between them, or what may lie hidden is too little
+    /// to count beside the `energy` (J). `at_kink`: as for [`Bound::is_shown_between`].
     #[cfg(feature = "diffsol")]
-    pub(crate) fn is_shown_by(&self, ends: [(f64, f64); 2], energy: f64) -> bool {
-        let [from, to] = ends;
+    pub(crate) fn is_shown_by(&self, ends: [(f64, f64); 2], at_kink: [f64; 2], energy: f64) -> bool {
+        let between = |[from, to]: [f64; 2]| (from.min(to), from.max(to));
+        let (depths, velocities) = (between(ends.map(|(x, _)| x)), between(ends.map(|(_, v)| v)));
+        let bound = self.expression().map(|expression| &expression.values);
+        if bound.is_some_and(|bound| bound.is_shown_between(ends, at_kink)) {
+            return true;
+        }
+        let may_be_singular = bound.is_none() || velocities.0 <= CLOSE_TO_REST * velocities.1;
         let forces = ends.map(|(x, v)| self.force_value(x, v));
-        let (low, high) = (from.1.min(to.1), from.1.max(to.1));
-        let depths = (from.0.min(to.0), from.0.max(to.0));
-        let bounds = |low: f64| self.range(depths, (low, high)).map(|(least, most)| most - least);
-        let Some(hidden) = bounds(low) else { return true };
+        let bounds = |low: f64| self.range(depths, (low, velocities.1)).map(|(least, most)| most - least);
+        let Some(hidden) = bounds(velocities.0) else { return true };
         // A force without bound at rest: what a slower projectile meets is for the steps to come.
-        let hidden = if hidden.is_finite() { hidden } else { bounds(low.max(SLOWEST * high)).unwrap_or(hidden) };
-        // Of a force of the velocity alone the bounds are as narrow as its terms go one way.
-        let changes = if self.is_of_velocity() { 1.0 } else { 2.0 };
+        let low = velocities.0.max(SLOWEST * velocities.1);
+        let hidden = if hidden.is_finite() { hidden } else { bounds(low).unwrap_or(hidden) };
         let largest = forces[0].abs().max(forces[1].abs());
-        hidden <= SURPRISE * largest + changes * (forces[1] - forces[0]).abs()
+        (may_be_singular && hidden <= SURPRISE * largest + (forces[1] - forces[0]).abs())
             || hidden * (depths.1 - depths.0) <= NOTHING * energy
     }
 
@@ -518,10 +522,14 @@ pub struct OwnParameter {
     pub unit: Unit,
 }
 
-/// Share of the greatest force of a path that may lie hidden on it; share of the energy that is nothing; and share of the greatest
-/// velocity below which a force without bound is not asked.
+/// Share of the velocity down to which discs around a path hold no rest.
 #[cfg(feature = "diffsol")]
-const SURPRISE: f64 = 0.02;
+const CLOSE_TO_REST: f64 = 1.0 / 3.0;
+
+/// Share of the greatest force of a path that roundings of its bounds may take; share of the energy that is nothing; and share of the
+/// greatest velocity below which a force without bound is not asked.
+#[cfg(feature = "diffsol")]
+const SURPRISE: f64 = 1e-9;
 #[cfg(feature = "diffsol")]
 const NOTHING: f64 = 1e-18;
 #[cfg(feature = "diffsol")]

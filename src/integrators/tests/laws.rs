@@ -991,7 +991,7 @@ fn laws_of_velocity_are_solved_to_rounding_whatever_hides_between_two_places() {
     assert!(nearest > 0.1, "{nearest}");
 }
 
-/// Each was stepped over by `energy`: a term far below half of the force, and narrow.
+/// Each was stepped over by `energy`, or by the library's methods: a term far below half of the force, and narrow.
 #[test]
 fn a_small_narrow_term_is_not_stepped_over() {
     for (force, speed) in [
@@ -1011,11 +1011,24 @@ fn a_small_narrow_term_is_not_stepped_over() {
         // A thousandth of the force, and of the way.
         ("P + 0.001*P*exp(-((V/v1 - 0.6237)/0.001)^2)", 300.0),
         ("P*(1 + x/l*exp(-x/l)) + 1e-4*P/(1 + ((x/l - 1.7)/0.001)^2)", 250.0),
+        // Its switch has one side at both ends of a long step.
+        ("P + R*0.4158*max(0, 1 - ((V/v1 - 0.4309)/0.0139)^2)", 105.5),
+        ("P + R*max(0, sin(40*x/l) - 0.99)", 300.0),
+        // A kink that `bdf` locates too early, and a step from there that begins on its old side.
+        (
+            "P*(1.01 - exp(-x/l)) + 2.234*R*max(0, 1 - ((x/l - 2.004)/0.1078)^2) + 0.0345*R*max(0, 1 - ((x/l - 0.5091)/0.01876)^2)",
+            141.32,
+        ),
     ] {
         let problem = problem(force, speed);
         let [ours, theirs] = exact_methods().map(|method| method.solve(&problem, Detail::End).unwrap().end);
         assert!((ours.depth / theirs.depth - 1.0).abs() < 1e-12, "{force}: {ours:?} {theirs:?}");
         assert!((ours.time / theirs.time - 1.0).abs() < 1e-12, "{force}: {ours:?} {theirs:?}");
+        for scheme in [Scheme::Tsit45, Scheme::Bdf] {
+            let flight = Diffsol::new(scheme, 1e-10).solve(&problem, Detail::End).unwrap();
+            let off = (flight.end.depth / ours.depth - 1.0).abs();
+            assert!(off < 1e-7 && flight.cost.steps < 5_000, "{}, {force}: {off:e}, {:?}", scheme.name(), flight.cost);
+        }
         // Both may miss the same: a sum over the middles of equal parts, far narrower than the term, sees it.
         let law = problem.laws.of(0).unwrap();
         let sum_to = |end: f64, value: &dyn Fn(f64) -> f64| -> f64 {

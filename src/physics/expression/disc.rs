@@ -7,12 +7,25 @@
 //! Each term is a disc again, about the value at the centre. Its radius is that of the majorant, the series of the absolute values of
 //! its coefficients: f64 rounded to nearest.
 
+use std::cell::LazyCell;
+
 use smallvec::SmallVec;
 
 use super::bound::{Bound, Step, Value};
 use super::jets::{Fall, Falling};
 use super::parse::Function;
+use super::range::Range;
 use crate::physics::scalar::Scalar;
+
+/// The bound on a disc over the greatest value seen on it, above which something may hide there.
+const HIDDEN_MAX: f64 = 1e3;
+
+/// Radius of a disc around a path that is known at its ends, over half of it.
+#[cfg(feature = "diffsol")]
+const DISC: f64 = 2.0;
+
+/// Share of a switch by which it may lie beyond its root: that is rounded.
+const ROUNDING: f64 = 1e-9;
 
 /// The numbers within `radius` of a real `centre`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +48,11 @@ impl Disc {
     pub(crate) fn size(self) -> f64 {
         let size = self.centre.abs() + self.radius;
         if size.is_finite() { size } else { f64::INFINITY }
+    }
+
+    /// Whether it shows what has the largest value `seen`, so that nothing narrow hides.
+    pub(crate) fn shows(self, seen: f64) -> bool {
+        self.size() <= HIDDEN_MAX * seen
     }
 
     /// Whether it leaves room for one sign only.
@@ -227,6 +245,53 @@ impl<S: Scalar> Bound<S> {
         };
         (value, self.switches().iter().map(|register| all[*register]).collect())
     }
+
+    /// Whether the discs of switches show them, of which the largest value `seen` is known, or they keep their `sides` between depths `x` and
+    /// velocities `v`: one that leaves its side unseen hides a branch.
+    pub(crate) fn are_shown(
+        &self,
+        switches: &[Disc],
+        sides: &[bool],
+        seen: impl Fn(usize) -> f64,
+        (x, v): (Range, Range),
+    ) -> bool {
+        let ranges = LazyCell::new(|| self.ranges(x, v));
+        let keeps = |switch: usize| keeps(ranges[self.switches()[switch]], sides[switch], ROUNDING * seen(switch));
+        let shows = |switch: usize, disc: &Disc| disc.has_one_sign() || disc.shows(seen(switch));
+        switches.iter().enumerate().all(|(switch, disc)| shows(switch, disc) || keeps(switch))
+    }
+
+    /// Whether the ends of a path, depth (m) and velocity (m/s), and its middle show all that lies between: the value has a bound on a disc
+    /// around them, and all switches keep their sides. One whose kink lies `at_kink`, the share of the path from each of its ends,
+    /// leaves it there, since a kink is located with an error.
+    #[cfg(feature = "diffsol")]
+    pub(crate) fn is_shown_between(&self, [from, to]: [(f64, f64); 2], at_kink: [f64; 2]) -> bool {
+        let between = |from: f64, to: f64| (from.min(to), from.max(to));
+        let (x, v) = (between(from.0, to.0), between(from.1, to.1));
+        let middle = (0.5 * (from.0 + to.0), 0.5 * (from.1 + to.1));
+        let places = [from, middle, to].map(|(x, v)| (S::from_f64(x), S::from_f64(v)));
+        let sides = self.sides(places[1].0, places[1].1);
+        let around = |middle: f64, ends: Range| Disc::new(middle, DISC * 0.5 * (ends.1 - ends.0));
+        let around = Around { x: around(middle.0, x), v: around(middle.1, v), fall: None };
+        let (disc, _) = self.discs(around, &sides, |_| f64::NAN);
+        let largest = |values: [f64; 3]| values.into_iter().map(f64::abs).fold(0.0, f64::max);
+        if !disc.shows(largest(places.map(|(x, v)| self.eval(x, v).value()))) {
+            return false;
+        }
+        let ranges = LazyCell::new(|| self.ranges(x, v));
+        self.switches().iter().zip(&sides).enumerate().all(|(switch, (register, side))| {
+            let values = places.map(|(x, v)| self.switch_values(x, v)[switch].value());
+            let seen = largest(values);
+            let beyond = [values[0], values[2]].map(|value| if *side { -value } else { value }.max(0.0));
+            let left = beyond.into_iter().zip(at_kink).filter(|(beyond, share)| *beyond <= share * seen);
+            keeps(ranges[*register], *side, left.map(|(beyond, _)| beyond).fold(ROUNDING * seen, f64::max))
+        })
+    }
+}
+
+/// Whether a switch in `range` keeps its side: it may begin or end at a root, rest say, as far as that is in `error`.
+fn keeps((least, most): Range, side: bool, error: f64) -> bool {
+    if side { least >= -error } else { most <= error }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::parse::Function;
 use crate::physics::scalar::Scalar;
 
 /// Least and greatest value.
-type Range = (f64, f64);
+pub(super) type Range = (f64, f64);
 
 /// No bound at all.
 const ALL: Range = (f64::NEG_INFINITY, f64::INFINITY);
