@@ -114,8 +114,11 @@ const TRIED_BY_SHARES: [f64; 3] = [10.0, 3.0, 1.0];
 const DISC_OF_SERIES: f64 = 2.5;
 const DISC_OF_INTEGRAL: f64 = 1.5;
 
-/// Step, over depth and velocity, on which nothing is taken to hide: a force that ends in a root has no bound on any.
+/// Step, over depth and the energy at impact, on which nothing is taken to hide: a force that ends in a root has no bound on any.
 const SHORT: f64 = 1e-9;
+
+/// Energy that a flight lacks to get to the limit, over its error bound, above which it comes to rest before.
+const DECIDED: f64 = 4.0;
 
 /// Share of the energy that is nothing.
 const NOTHING: f64 = 1e-18;
@@ -437,6 +440,8 @@ struct Walk<'l, S, const K: usize> {
     /// Its expression.
     bound: &'l Bound<S>,
     mass: S,
+    /// (m/s)
+    impact_speed: f64,
     jets: Jets<S>,
     /// The side of each switch on this step.
     sides: SmallVec<[bool; 4]>,
@@ -519,6 +524,7 @@ impl LawSeries {
             bound,
             falling: bound.falling(&sides),
             mass: course.mass,
+            impact_speed: course.problem.impact_speed.value(),
             end: law.end().map(|end| (end, end.side(course.state))),
             jets: Jets::default(),
             sides,
@@ -646,10 +652,12 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         for trial in 0..BRANCH_TRIALS {
             let distance = longest * 0.125_f64.powi(trial);
             let share = |force: f64| force.abs() * distance / (mass * v * v);
-            let p = power(distance);
-            let lost = share(excess(distance)) * (p - power(0.5 * distance)).abs();
+            // Of a power above two next to nothing is left so close to its root.
+            let is_flat = excess(distance).abs() <= 4.0 * f64::EPSILON * force.value().abs();
+            let p = if is_flat { 1.0 } else { power(distance) };
+            let lost = if is_flat { 0.0 } else { share(excess(distance)) * (p - power(0.5 * distance)).abs() };
             let is_little = share(force.value().abs() + excess(distance).abs()) <= BRANCH_SHARE;
-            if !(p > 0.0 && is_little && lost <= f64::EPSILON / 16.0) {
+            if !(p > 0.0 && is_little && x + distance > x && lost <= f64::EPSILON / 16.0) {
                 continue;
             }
             let d = S::from_f64(distance);
@@ -693,9 +701,15 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         let is_lost = has_margin && relative * relative <= course.error_bound && !(to_rest <= NEAR_REST * x);
         // What drives it, however uncertain its speed, brings it to no rest.
         if is_lost && resists {
-            // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides.
-            let present = State { velocity: S::zero(), ..course.state };
-            return Some(StageEnd::Rest(if is_before { rest } else { present }));
+            // The energy is lost in its error bound, and no force ends it soon: the margin says what that decides. Where it would take more
+            // than is lost to get to the limit, the rest is still to be found.
+            let (_, ahead) = self.law.static_work(x, limit.value());
+            let needed = 2.0 * ahead / self.mass.value() / course.problem.impact_speed.value().powi(2);
+            if !(is_before && needed > DECIDED * course.error_bound) {
+                let still_resists = is_before && self.law.force_value(rest.depth.value(), 0.0) > 0.0;
+                let present = State { velocity: S::zero(), ..course.state };
+                return Some(StageEnd::Rest(if still_resists { rest } else { present }));
+            }
         }
         if resists {
             // A force without bound at rest ends it before the present one would.
@@ -846,11 +860,19 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             // would be lost in roundings.
             let mut ending = first_event(&path, limit);
             path.span = ending.0.value();
-            if path.span > 0.0
-                && let Some((root, switches)) = self.first_kinks(&path)
-            {
-                (path.span, kinks) = (root, switches);
-                ending = (S::from_f64(root), Event::None);
+            if path.span > 0.0 && !self.bound.switches().is_empty() {
+                // Over a longer step the series of a switch may lack roots that the switch has.
+                for _ in 0..SHORTENED_MAX {
+                    if self.shows_switches(&path) {
+                        break;
+                    }
+                    path.span *= SHORTENING;
+                    ending = (S::from_f64(path.span), Event::None);
+                }
+                if let Some((root, switches)) = self.first_kinks(&path) {
+                    (path.span, kinks) = (root, switches);
+                    ending = (S::from_f64(root), Event::None);
+                }
             }
             let mass = self.mass.value();
             let noise = |force: f64| 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(force, mass);
@@ -887,9 +909,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         Err(self.no_force(course, last))
     }
 
-    /// Whether the series over the path that was made last show its force all along: by its bound on a disc around the start, what they
-    /// leave out is of no count.
-    fn shows_force(&self, path: &Path<S, K>, force: S) -> bool {
+    /// Discs of the force and of the switches around the path that was made last.
+    fn discs(&self, path: &Path<S, K>) -> (Disc, SmallVec<[Disc; 4]>) {
         let reach = DISC_OF_SERIES * path.span;
         let around = |series: &[S; K]| {
             let radius = series[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * reach);
@@ -900,31 +921,55 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             Form::Time(_) | Form::Depth(_) => Around { x: depth, v: around(&path.velocity), fall: None },
             Form::Velocity(_) => Around::falling(depth, path.velocity[0].value(), &self.falling, Disc::new(0.0, reach)),
         };
-        let (disc, switches) =
-            self.bound.discs(around, &self.sides, |register| self.jets.register(register)[0].value());
+        self.bound.discs(around, &self.sides, |register| self.jets.register(register)[0].value())
+    }
+
+    /// Whether the path that was made last is too short for anything to hide on it.
+    fn is_short(&self, path: &Path<S, K>, end: State) -> bool {
+        let (start, speed) = (path.depth[0].value(), path.velocity[0].value());
+        let distance = end.depth - start;
+        // Close to rest the energy counts: the velocity may fall to nothing where the force has its root.
+        let change = (speed * speed - end.velocity * end.velocity).abs();
+        distance > 0.0 && distance <= SHORT * end.depth && change <= SHORT * self.impact_speed * self.impact_speed
+    }
+
+    /// Whether the series over the path that was made last show the switches all along, so that none of their roots is missed.
+    fn shows_switches(&self, path: &Path<S, K>) -> bool {
         let end = path.at(S::from_f64(path.span)).values();
-        let at_end = self.law.force_value(end.depth, end.velocity.max(0.0)).abs();
-        let largest = force.value().abs().max(if at_end.is_finite() { at_end } else { 0.0 });
-        let distance = end.depth - path.depth[0].value();
+        self.is_short(path, end) || self.are_shown(path, end, &self.discs(path).1)
+    }
+
+    /// The same of their discs, on the path to `end`.
+    fn are_shown(&self, path: &Path<S, K>, end: State, switches: &[Disc]) -> bool {
         let speed = path.velocity[0].value();
-        if distance <= SHORT * end.depth && (end.velocity - speed).abs() <= SHORT * speed {
-            return true;
-        }
-        let depths = (path.depth[0].value(), end.depth);
         let velocities = (end.velocity.max(0.0).min(speed), end.velocity.max(speed));
-        let left_out = disc.size() * DISC_OF_SERIES.powi(-(K as i32)) * distance;
-        let of_switches = LazyCell::new(|| {
+        let values = LazyCell::new(|| {
             ASKED.map(|share| {
                 let at = path.at(S::from_f64(share * path.span));
                 self.bound.switch_values(at.depth, at.velocity)
             })
         });
         let seen = |switch: usize| {
-            let values = of_switches.iter().map(|values| values[switch].value().abs());
+            let values = values.iter().map(|values| values[switch].value().abs());
             values.fold(self.jets.register(self.bound.switches()[switch])[0].value().abs(), f64::max)
         };
+        self.bound.are_shown(switches, &self.sides, seen, ((path.depth[0].value(), end.depth), velocities))
+    }
+
+    /// Whether the series over the path that was made last show its force all along: by its bound on a disc around the start, what they
+    /// leave out is of no count.
+    fn shows_force(&self, path: &Path<S, K>, force: S) -> bool {
+        let end = path.at(S::from_f64(path.span)).values();
+        if self.is_short(path, end) {
+            return true;
+        }
+        let (disc, switches) = self.discs(path);
+        let at_end = self.law.force_value(end.depth, end.velocity.max(0.0)).abs();
+        let largest = force.value().abs().max(if at_end.is_finite() { at_end } else { 0.0 });
+        let speed = path.velocity[0].value();
+        let left_out = disc.size() * DISC_OF_SERIES.powi(-(K as i32)) * (end.depth - path.depth[0].value());
         (disc.shows(largest) || left_out <= NOTHING * self.mass.value() * speed * speed)
-            && self.bound.are_shown(&switches, &self.sides, seen, (depths, velocities))
+            && self.are_shown(path, end, &switches)
     }
 
     /// The series of g over the path that was made last.

@@ -48,6 +48,8 @@ pub struct LawOfValues {
     pub law: PowerLaw,
     /// The second term, where the table shows one.
     pub second: Option<SecondTerm>,
+    /// Its constant D, signed.
+    second_constant: f64,
     /// Limit f0; without meaning unless converging.
     pub limit: f64,
     /// 95 % interval of the limit for orders of one half and more, whatever the values do.
@@ -165,6 +167,7 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
         reason,
         law: PowerLaw { order: p, interval95, verdict_band, error_constant: best.constant },
         second,
+        second_constant: best.second,
         limit: best.limit,
         limit95,
         limit_band,
@@ -181,6 +184,12 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
 }
 
 impl LawOfValues {
+    /// The value that the law has at `step`.
+    pub fn value_at(&self, step: f64) -> f64 {
+        let second = self.second.map_or(0.0, |second| self.second_constant * step.powf(second.order));
+        self.limit + self.law.error_constant * step.powf(self.law.order) + second
+    }
+
     /// Half-width of the 95 % interval of the limit about the `finest` value.
     pub fn half_width(&self, finest: &GridValue) -> f64 {
         let half = self.envelope.unwrap_or_else(|| {

@@ -360,6 +360,18 @@ impl Identification {
         orders.all(|order| order == Some(first)).then_some(first)
     }
 
+    /// Whether the order `given` of `quantity` is theirs. That of Runge-Kutta 4 is four, or more by chance, where its steps land on the
+    /// events.
+    pub fn bears_out(&self, quantity: Quantity, given: f64) -> bool {
+        let lands = |found: &Candidate| {
+            found.scheme.advance == Advance::RungeKutta4 && found.scheme.events == Boundaries::Landed
+        };
+        match self.formal_order(quantity) {
+            Some(order) => order == given,
+            None => given == 4.0 && !self.candidates.is_empty() && self.candidates.iter().all(lands),
+        }
+    }
+
     /// Whether a scheme reproduces `quantity` in all of `rows` rows, three at least. A quantity that was not compared is
     /// not reproduced.
     pub fn reproduces(&self, quantity: Quantity, rows: usize) -> bool {

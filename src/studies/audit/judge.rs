@@ -3,12 +3,14 @@
 use super::AUDIT_LEVEL;
 use super::judgement::{AuditPoint, Exact, ExactValues, Finding, FindingKind, Finest, QuantityAudit};
 use super::table::{ResultColumn, StepRow, Table};
+use crate::physics::Shown;
 use crate::studies::enclosure;
 use crate::studies::grid_convergence::{Behaviour, GridValue, local_order, range};
 use crate::studies::limit::{
     LawOfValues, SCATTER_SURE, SecondTerm, closest_limits, is_constant, is_monotone, law_of_values, order_ahead,
 };
 use crate::studies::order::{Class, ORDER_RESOLUTION, PowerLaw, ROUND_OFF_ALLOWANCE, StepError, fit_at_level};
+use crate::studies::quantity::Quantity;
 use crate::studies::scheme_of_table::Identification;
 use crate::studies::verdict::Verdict;
 
@@ -36,6 +38,12 @@ const DIGITS_LEAST: f64 = 2e-3;
 
 /// How far from the orders of the three finest rows an order may lie, and from the formal one before it is missed.
 const ORDER_SPARE: f64 = 0.25;
+
+/// The finest value follows the law of the others within this share of the last change, and this many times what they scatter; so
+/// many rows tell.
+const STRAY_SHARE: f64 = 0.5;
+const STRAY_NOISE: f64 = 10.0;
+const STRAY_ROWS: usize = 6;
 
 /// The judgement of a column while it is made.
 pub(super) struct Judge<'a> {
@@ -140,8 +148,10 @@ impl<'a> Judge<'a> {
         self.classify(law.as_ref());
         self.add_bands(law.as_ref());
         self.compare_limit(law.as_ref());
-        let is_expected = given.is_none_or(|given| of_scheme == Some(given));
-        if let Some(scheme) = self.scheme.filter(|scheme| is_expected && self.is_reproduced(scheme)) {
+        let is_expected = |scheme: &Identification| {
+            given.is_none_or(|given| quantity.is_some_and(|quantity| scheme.bears_out(quantity, given)))
+        };
+        if let Some(scheme) = self.scheme.filter(|scheme| is_expected(scheme) && self.is_reproduced(scheme)) {
             let order = of_scheme.map_or_else(String::new, |order| format!(", of order {order} here"));
             self.judged.verdict = Verdict::Passed;
             self.judged.advice = None;
@@ -307,14 +317,18 @@ impl<'a> Judge<'a> {
             }
             // Two terms leave little room: the interval itself must hold the order.
             Some(formal) if judged.second_term.is_some() => {
-                (low - ORDER_RESOLUTION..=high + ORDER_RESOLUTION).contains(&formal) && (order - formal).abs() < 0.5
+                let is_held = (low - ORDER_RESOLUTION..=high + ORDER_RESOLUTION).contains(&formal);
+                is_held && (order - formal).abs() < 0.5 && formal - 0.5 < low && high < formal + 0.5
             }
-            Some(formal) => (order - formal).abs() < 0.5 && formal - 1.0 < low && high < formal + 1.0,
+            Some(formal) => {
+                let is_near = (low - ORDER_SPARE..=high + ORDER_SPARE).contains(&formal);
+                is_near && (order - formal).abs() < 0.5 && formal - 1.0 < low && high < formal + 1.0
+            }
             None => high - low < 1.0 && order > ORDER_PASSED,
         };
         if !is_clear {
             let why = match judged.formal_order {
-                Some(formal) if (order - formal).abs() >= 0.5 => {
+                Some(formal) if !(low - ORDER_SPARE..=high + ORDER_SPARE).contains(&formal) => {
                     format!("{formal} is not borne out, and the finer rows alone do not exclude it")
                 }
                 _ => "too few or too noisy rows to tell".to_owned(),
@@ -347,8 +361,41 @@ impl<'a> Judge<'a> {
             self.advise(self.finer_rows());
             return self.end(Verdict::Undecided, FindingKind::OrderUnclear, format!("{found}, but {why}"));
         }
+        if let Some(stray) = self.stray_finest() {
+            self.advise("solve the finest step again, or leave its row out".to_owned());
+            return self.end(Verdict::Undecided, FindingKind::StrayRow, format!("{found}, but {stray}"));
+        }
+        let flight = self.exact.map(|exact| exact.values[Quantity::Time as usize]);
+        if let Some(Exact::Free(time)) = flight
+            && self.finest().step > time
+        {
+            self.advise("give dt_s in seconds".to_owned());
+            let why = format!("{found}, but each step is longer than the flight of {} s", Shown(time));
+            return self.end(Verdict::Undecided, FindingKind::OrderUnclear, why);
+        }
         self.judged.verdict = Verdict::Passed;
         self.judged.reason = found;
+    }
+
+    /// Why the finest value does not follow the law of the others: it is that of another step, or its solver no longer gets nearer.
+    fn stray_finest(&self) -> Option<String> {
+        let [finest, others @ ..] = self.grids.as_slice() else { return None };
+        if self.grids.len() < STRAY_ROWS {
+            return None;
+        }
+        let law = law_of_values(others, None, AUDIT_LEVEL).ok()?;
+        let expected = law.value_at(finest.step);
+        let off = (finest.value - expected).abs();
+        let change = (law.value_at(others[0].step) - expected).abs();
+        let noise = law.deviations[0] + finest.round_off + others[0].round_off;
+        let is_stray =
+            law.behaviour == Behaviour::MonotoneConverging && off > STRAY_SHARE * change && off > STRAY_NOISE * noise;
+        is_stray.then(|| {
+            let at = Shown(finest.step);
+            format!(
+                "the other rows let the finest value be {expected:.9e} at the step {at} s, and it is {off:.1e} off that"
+            )
+        })
     }
 
     /// The order of the finest rows, where it contradicts the `formal` one.

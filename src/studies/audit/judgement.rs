@@ -44,6 +44,8 @@ pub enum FindingKind {
     OrderMissed,
     /// The order asked for cannot be distinguished from its neighbours.
     OrderUnclear,
+    /// The finest value does not follow the law of the others.
+    StrayRow,
     /// The values approach something else than the exact value.
     WrongLimit,
     /// The scene does not have the quantity.

@@ -447,6 +447,75 @@ fn an_order_that_the_finest_rows_exclude_never_passes_as_a_law_of_two_terms() {
     assert_ne!(judge_text(&text, Some(5.0), None).verdict, Verdict::Passed);
 }
 
+/// Few digits make the band of the verdict wide, and a law of two terms its interval.
+#[test]
+fn an_order_far_from_the_interval_that_is_printed_never_passes() {
+    let rounded = |digits: i32, order: f64, ratio: f64, rows: i32| {
+        let mut text = "dt_s,q\n".to_owned();
+        for i in 0..rows {
+            let h = 0.4 / ratio.powi(i);
+            let unit = 10_f64.powi(digits);
+            writeln!(text, "{h:.12},{}", ((120.0 + 43.0 * h.powf(order)) * unit).round() / unit).unwrap();
+        }
+        text
+    };
+    let softened = |claim: f64| {
+        let text = table(8, |h, _| 7.0 + 0.2 * h + 0.027 * h.powf(1.5));
+        judge_text(&text, Some(claim), None).verdict
+    };
+    for (text, order, others) in [
+        (rounded(2, 2.0, 1.5, 6), 2.0, [1.5, 2.5]),
+        (rounded(2, 1.0, 1.5, 6), 1.0, [0.5, 1.5]),
+        (rounded(3, 1.5, 2.0, 7), 1.5, [1.0, 2.0]),
+    ] {
+        assert_eq!(judge_text(&text, Some(order), None).verdict, Verdict::Passed, "{order}");
+        for other in others {
+            assert_ne!(judge_text(&text, Some(other), None).verdict, Verdict::Passed, "{order} as {other}");
+        }
+    }
+    assert_ne!(softened(0.25), Verdict::Passed);
+    assert_ne!(softened(0.5), Verdict::Passed);
+}
+
+/// A row that was not solved again, a solver that stops getting nearer, a row of something else.
+#[test]
+fn a_finest_value_off_the_law_of_the_others_does_not_pass() {
+    let value = |h: f64| 7.0 + 0.4 * h * h;
+    for rows in [6, 8, 10] {
+        let right = table(rows, |h, _| value(h));
+        assert_eq!(judge_text(&right, Some(2.0), None).verdict, Verdict::Passed);
+        let finest = 0.5_f64.powi(rows - 1);
+        let change = value(2.0 * finest) - value(finest);
+        for (wrong, kind) in [
+            (table(rows, |h, i| value(if i == rows - 1 { 2.0 * h } else { h })), "stale"),
+            (table(rows, |h, _| value(h.max(4.0 * finest))), "at a floor"),
+            (table(rows, |h, i| value(h) - if i == rows - 1 { 20.0 * change } else { 0.0 }), "of something else"),
+        ] {
+            for order in [Some(2.0), None] {
+                let audit = judge_text(&wrong, order, None);
+                assert_eq!(audit.verdict, Verdict::Undecided, "{kind}, {rows} rows: {:?}", audit.findings);
+                // Six rows of which one is far off show no order either.
+                if kind != "of something else" {
+                    assert_eq!(kinds(&audit), [FindingKind::StrayRow], "{kind}, {rows} rows");
+                }
+            }
+        }
+    }
+    // Rows at round-off follow no law, and refute none.
+    let text = table(9, |h, _| ((5.0 + 0.1 * h * h) * 1e4).round() / 1e4);
+    assert_eq!(judge_text(&text, Some(2.0), None).verdict, Verdict::Passed);
+}
+
+#[test]
+fn steps_longer_than_the_flight_do_not_pass() {
+    let mut known = exact(Quantity::Depth, Exact::Free(5.0), true);
+    known.values[Quantity::Time as usize] = Exact::Free(1e-3);
+    let text = table(6, |h, _| 5.0 + 0.1 * h);
+    assert_eq!(judge_against(&text, Some(1.0), &known).verdict, Verdict::Passed);
+    known.values[Quantity::Time as usize] = Exact::Free(1e-8);
+    assert_eq!(judge_against(&text, Some(1.0), &known).verdict, Verdict::Undecided);
+}
+
 #[test]
 fn not_finite_values_fail_in_every_spelling() {
     for cell in ["nan", "NaN", "-inf", "Infinity", "1e999", "1.#IND", "-1.#INF", "nan(ind)"] {
