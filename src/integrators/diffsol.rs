@@ -470,13 +470,9 @@ impl OwnLaw {
         if first.is_empty() || first == sides([after.depth, after.velocity]) {
             return Ok(None);
         }
-        let (mut low, mut high) = (before.time, after.time);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if sides(at(middle)?) == first { low = middle } else { high = middle }
-        }
-        let share = (high - before.time) / (after.time - before.time);
-        Ok((AT_AN_END..1.0 - AT_AN_END).contains(&share).then_some(high - before.time))
+        let length = first_time(before.time, after.time, |time| Ok(sides(at(time)?) != first))? - before.time;
+        let share = length / (after.time - before.time);
+        Ok((AT_AN_END..1.0 - AT_AN_END).contains(&share).then_some(length))
     }
 
     /// Length of a shorter step, where this one passed a kink or may hide a part of the force.
@@ -491,6 +487,8 @@ impl OwnLaw {
         after: Node,
         mut at: impl FnMut(f64) -> Result<[f64; 2], DiffsolError>,
     ) -> Result<Option<f64>, DiffsolError> {
+        // Behind rest the path turns round: its ends would not show how deep it goes.
+        let after = if after.velocity < 0.0 { Self::turn(before, after, &mut at)? } else { after };
         let start = epoch + before.time;
         let is_at_kink = kink.is_some_and(|kink| (start - kink).abs() <= 1e-3 * (after.time - before.time));
         if !is_at_kink && let Some(length) = self.to_kink(before, after, &mut at)? {
@@ -510,6 +508,17 @@ impl OwnLaw {
         }
         kink.take_if(|_| is_at_kink);
         Ok(None)
+    }
+
+    /// Where the step from `before` to `after` turns round.
+    fn turn(
+        before: Node,
+        after: Node,
+        mut at: impl FnMut(f64) -> Result<[f64; 2], DiffsolError>,
+    ) -> Result<Node, DiffsolError> {
+        let time = first_time(before.time, after.time, |time| at(time).map(|[_, velocity]| velocity <= 0.0))?;
+        let [depth, _] = at(time)?;
+        Ok(Node { time, depth, velocity: 0.0 })
     }
 
     /// Whether the step from `before` to `after` shows its force ([`Law::is_shown_by`]).
@@ -636,6 +645,19 @@ impl OwnLaw {
         let scaled = |slope: f64, unit: f64| if slope.is_finite() { slope * self.acceleration * unit } else { 0.0 };
         (scaled(by_depth, self.length), scaled(by_velocity, self.speed))
     }
+}
+
+/// The first time at which `is_past`, between one at which it is not and one at which it is.
+fn first_time(
+    mut before: f64,
+    mut past: f64,
+    mut is_past: impl FnMut(f64) -> Result<bool, DiffsolError>,
+) -> Result<f64, DiffsolError> {
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (before + past);
+        *if is_past(middle)? { &mut past } else { &mut before } = middle;
+    }
+    Ok(past)
 }
 
 /// What the steps of a stage have shown.

@@ -110,7 +110,8 @@ const TRIED_TO_REST: [f64; 3] = [1.0, 0.85, 0.5];
 const TRIED_BY_SHARES: [f64; 3] = [10.0, 3.0, 1.0];
 
 /// Radius of the disc on which a force must have a bound, over the length of a step by series, and over half of one by integrals. An error
-/// of K coefficients falls as 2.5^-K, and that of the rule, whose ellipse has these half axes in it, as 2.6^-48.
+/// of 22 coefficients falls as 2.5^-22, and that of the rule, whose ellipse has these half axes in it, as 2.6^-48. With fewer coefficients the
+/// first radius is greater, so that as little is left out, or the tolerance.
 const DISC_OF_SERIES: f64 = 2.5;
 const DISC_OF_INTEGRAL: f64 = 1.5;
 
@@ -442,6 +443,8 @@ struct Walk<'l, S, const K: usize> {
     mass: S,
     /// (m/s)
     impact_speed: f64,
+    /// Radius of the disc on which the force must have a bound, over the length of a step.
+    disc: f64,
     jets: Jets<S>,
     /// The side of each switch on this step.
     sides: SmallVec<[bool; 4]>,
@@ -525,6 +528,7 @@ impl LawSeries {
             falling: bound.falling(&sides),
             mass: course.mass,
             impact_speed: course.problem.impact_speed.value(),
+            disc: DISC_OF_SERIES.max(DISC_OF_SERIES.powi(22).min(self.tolerance.recip()).powf(1.0 / K as f64)),
             end: law.end().map(|end| (end, end.side(course.state))),
             jets: Jets::default(),
             sides,
@@ -792,7 +796,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             let depth = start.depth.value();
             let velocities = (end.velocity.value().max(0.0), start.velocity.value());
             let is_shown = disc.shows(Forces::largest(&forces.force))
-                && self.bound.are_shown(&switches, &self.sides, seen, ((depth, depth), velocities));
+                && self.bound.shown(&switches, &self.sides, seen, ((depth, depth), velocities)).is_some();
             if !is_shown {
                 continue;
             }
@@ -860,19 +864,20 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             // would be lost in roundings.
             let mut ending = first_event(&path, limit);
             path.span = ending.0.value();
-            if path.span > 0.0 && !self.bound.switches().is_empty() {
-                // Over a longer step the series of a switch may lack roots that the switch has.
-                for _ in 0..SHORTENED_MAX {
-                    if self.shows_switches(&path) {
-                        break;
-                    }
-                    path.span *= SHORTENING;
-                    ending = (S::from_f64(path.span), Event::None);
+            // Over a longer step the series of a switch may lack roots that the switch has.
+            let Some(shown) = self.shown_switches(&path) else {
+                path.span *= SHORTENING;
+                continue;
+            };
+            if path.span > 0.0
+                && let Some((root, switches)) = self.first_kinks(&path, &shown)
+            {
+                path.span = root;
+                // In front of a root whose place is not known another may lie, which a shorter step shows.
+                if switches.is_empty() && !self.is_short(&path, path.at(S::from_f64(root)).values()) {
+                    continue;
                 }
-                if let Some((root, switches)) = self.first_kinks(&path) {
-                    (path.span, kinks) = (root, switches);
-                    ending = (S::from_f64(root), Event::None);
-                }
+                (kinks, ending) = (switches, (S::from_f64(root), Event::None));
             }
             let mass = self.mass.value();
             let noise = |force: f64| 16.0 * f64::EPSILON.max(S::EPSILON) * path.noise(force, mass);
@@ -911,7 +916,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
 
     /// Discs of the force and of the switches around the path that was made last.
     fn discs(&self, path: &Path<S, K>) -> (Disc, SmallVec<[Disc; 4]>) {
-        let reach = DISC_OF_SERIES * path.span;
+        let reach = self.disc * path.span;
         let around = |series: &[S; K]| {
             let radius = series[1..].iter().rev().fold(0.0, |sum, c| (sum + c.value().abs()) * reach);
             Disc::new(series[0].value(), radius)
@@ -933,14 +938,16 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         distance > 0.0 && distance <= SHORT * end.depth && change <= SHORT * self.impact_speed * self.impact_speed
     }
 
-    /// Whether the series over the path that was made last show the switches all along, so that none of their roots is missed.
-    fn shows_switches(&self, path: &Path<S, K>) -> bool {
+    /// Of each switch, whether its series over the path that was made last shows it all along ([`Bound::shown`]).
+    fn shown_switches(&self, path: &Path<S, K>) -> Option<SmallVec<[bool; 4]>> {
+        let count = self.bound.switches().len();
+        if count == 0 {
+            return Some(SmallVec::new());
+        }
         let end = path.at(S::from_f64(path.span)).values();
-        self.is_short(path, end) || self.are_shown(path, end, &self.discs(path).1)
-    }
-
-    /// The same of their discs, on the path to `end`.
-    fn are_shown(&self, path: &Path<S, K>, end: State, switches: &[Disc]) -> bool {
+        if self.is_short(path, end) {
+            return Some(SmallVec::from_elem(true, count));
+        }
         let speed = path.velocity[0].value();
         let velocities = (end.velocity.max(0.0).min(speed), end.velocity.max(speed));
         let values = LazyCell::new(|| {
@@ -953,7 +960,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             let values = values.iter().map(|values| values[switch].value().abs());
             values.fold(self.jets.register(self.bound.switches()[switch])[0].value().abs(), f64::max)
         };
-        self.bound.are_shown(switches, &self.sides, seen, ((path.depth[0].value(), end.depth), velocities))
+        let depths = (path.depth[0].value(), end.depth);
+        self.bound.shown(&self.discs(path).1, &self.sides, seen, (depths, velocities))
     }
 
     /// Whether the series over the path that was made last show its force all along: by its bound on a disc around the start, what they
@@ -963,13 +971,12 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         if self.is_short(path, end) {
             return true;
         }
-        let (disc, switches) = self.discs(path);
+        let (disc, _) = self.discs(path);
         let at_end = self.law.force_value(end.depth, end.velocity.max(0.0)).abs();
         let largest = force.value().abs().max(if at_end.is_finite() { at_end } else { 0.0 });
         let speed = path.velocity[0].value();
-        let left_out = disc.size() * DISC_OF_SERIES.powi(-(K as i32)) * (end.depth - path.depth[0].value());
-        (disc.shows(largest) || left_out <= NOTHING * self.mass.value() * speed * speed)
-            && self.are_shown(path, end, &switches)
+        let left_out = disc.size() * self.disc.powi(-(K as i32)) * (end.depth - path.depth[0].value());
+        disc.shows(largest) || left_out <= NOTHING * self.mass.value() * speed * speed
     }
 
     /// The series of g over the path that was made last.
@@ -1103,8 +1110,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     }
 
     /// The first root of a switch on a step, and the switches that have one there: none where the step must end before a root whose place
-    /// is not known.
-    fn first_kinks(&self, path: &Path<S, K>) -> Option<(f64, Kinks)> {
+    /// is not known. A switch that is not `shown` by its series keeps its side.
+    fn first_kinks(&self, path: &Path<S, K>, shown: &[bool]) -> Option<(f64, Kinks)> {
         let switches = self.bound.switches();
         if switches.is_empty() {
             return None;
@@ -1123,7 +1130,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
                 !(least > 0.0 || most < 0.0)
             })
         };
-        let switches = switches.iter().enumerate().filter(|(_, register)| may_vanish(**register));
+        let switches = switches.iter().enumerate().filter(|(side, register)| shown[*side] && may_vanish(**register));
         let roots = switches.filter_map(|(side, register)| {
             // At its root, what is left of it over s.
             let first = usize::from(self.kinks.contains(&side));

@@ -184,7 +184,7 @@ pub fn law_of_values(grids: &[GridValue], known: Option<f64>, level: f64) -> Res
 }
 
 impl LawOfValues {
-    /// The value that the law has at `step`.
+    /// The value that the law has at `step` (s), in the unit of the values.
     pub fn value_at(&self, step: f64) -> f64 {
         let second = self.second.map_or(0.0, |second| self.second_constant * step.powf(second.order));
         self.limit + self.law.error_constant * step.powf(self.law.order) + second

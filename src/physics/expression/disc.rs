@@ -246,19 +246,23 @@ impl<S: Scalar> Bound<S> {
         (value, self.switches().iter().map(|register| all[*register]).collect())
     }
 
-    /// Whether the discs of switches show them, of which the largest value `seen` is known, or they keep their `sides` between depths `x` and
-    /// velocities `v`: one that leaves its side unseen hides a branch.
-    pub(crate) fn are_shown(
+    /// Of each switch, of which the largest value `seen` is known, whether its disc shows it, so that none of its roots is missed. One whose disc
+    /// does not must keep its side of `sides` between depths `x` and velocities `v`: one that leaves it unseen hides a branch, `None`.
+    pub(crate) fn shown(
         &self,
         switches: &[Disc],
         sides: &[bool],
         seen: impl Fn(usize) -> f64,
         (x, v): (Range, Range),
-    ) -> bool {
+    ) -> Option<SmallVec<[bool; 4]>> {
         let ranges = LazyCell::new(|| self.ranges(x, v));
         let keeps = |switch: usize| keeps(ranges[self.switches()[switch]], sides[switch], ROUNDING * seen(switch));
         let shows = |switch: usize, disc: &Disc| disc.has_one_sign() || disc.shows(seen(switch));
-        switches.iter().enumerate().all(|(switch, disc)| shows(switch, disc) || keeps(switch))
+        let shown = switches.iter().enumerate().map(|(switch, disc)| {
+            let is_shown = shows(switch, disc);
+            (is_shown || keeps(switch)).then_some(is_shown)
+        });
+        shown.collect()
     }
 
     /// Whether the ends of a path, depth (m) and velocity (m/s), and its middle show all that lies between: the value has a bound on a disc

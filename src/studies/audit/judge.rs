@@ -371,7 +371,7 @@ impl<'a> Judge<'a> {
         {
             self.advise("give dt_s in seconds".to_owned());
             let why = format!("{found}, but each step is longer than the flight of {} s", Shown(time));
-            return self.end(Verdict::Undecided, FindingKind::OrderUnclear, why);
+            return self.end(Verdict::Undecided, FindingKind::LongSteps, why);
         }
         self.judged.verdict = Verdict::Passed;
         self.judged.reason = found;
@@ -391,10 +391,8 @@ impl<'a> Judge<'a> {
         let is_stray =
             law.behaviour == Behaviour::MonotoneConverging && off > STRAY_SHARE * change && off > STRAY_NOISE * noise;
         is_stray.then(|| {
-            let at = Shown(finest.step);
-            format!(
-                "the other rows let the finest value be {expected:.9e} at the step {at} s, and it is {off:.1e} off that"
-            )
+            let (expected, at) = (Shown(expected), Shown(finest.step));
+            format!("by the other rows the finest value, at the step {at} s, is {expected}: it is {off:.1e} off that")
         })
     }
 

@@ -46,6 +46,8 @@ pub enum FindingKind {
     OrderUnclear,
     /// The finest value does not follow the law of the others.
     StrayRow,
+    /// Each step is longer than the flight of the scene.
+    LongSteps,
     /// The values approach something else than the exact value.
     WrongLimit,
     /// The scene does not have the quantity.
