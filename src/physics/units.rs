@@ -10,8 +10,6 @@
 //!   1 in = 25.4 mm, g = 9.80665 m/s²); `uom` rounds them to seven digits;
 //! - a power of ten is one: some prefixes of `uom` are quotients of rounded powers, and 1 µg gives 9.999999999999999e-10 kg.
 
-use std::sync::LazyLock;
-
 use strum::VariantArray;
 use thiserror::Error;
 
@@ -46,7 +44,7 @@ pub enum Dimension {
 /// The units, one a line: dimension, spellings, SI value.
 const UNITS: &str = include_str!("units.txt");
 
-/// A unit: a line of [`UNITS`].
+/// A unit: a line of [`UNITS`]; an uncia is a mass and a length.
 struct Unit {
     dimension: Dimension,
     spellings: &'static str,
@@ -54,22 +52,26 @@ struct Unit {
 }
 
 impl Unit {
-    fn spellings(&self) -> impl Iterator<Item = &'static str> {
-        self.spellings.split(',').map(str::trim_start)
-    }
-}
-
-/// Every unit, in the order of [`UNITS`]; an uncia is a mass and a length. Spellings are parted only where they are asked for: most
-/// runs ask for a few.
-static KNOWN: LazyLock<Vec<Unit>> = LazyLock::new(|| {
-    let unit = |line: &'static str| {
+    fn read(line: &'static str) -> Option<Self> {
         let mut parts = line.split('|').map(str::trim);
         let (name, spellings, value) = (parts.next()?, parts.next()?, parts.next()?);
         let dimension = Dimension::VARIANTS.iter().copied().find(|known| <&str>::from(*known) == name)?;
-        Some(Unit { dimension, spellings, value })
-    };
-    UNITS.lines().filter_map(unit).collect()
-});
+        Some(Self { dimension, spellings, value })
+    }
+
+    fn spellings(&self) -> impl Iterator<Item = &'static str> + use<> {
+        self.spellings.split(',').map(str::trim_start)
+    }
+
+    /// The units that have the spelling of `unit`, in the order of [`UNITS`].
+    fn spelled(unit: &str) -> impl Iterator<Item = Self> {
+        let name = canonical(unit);
+        // A run asks for a few, and the table has hundreds: lines without the text are not read.
+        let behind_a_space = format!(" {name}");
+        let lines = UNITS.lines().filter(move |line| line.contains(&behind_a_space));
+        lines.filter_map(Self::read).filter(move |known| known.spellings().any(|spelling| spelling == name))
+    }
+}
 
 impl Dimension {
     /// Name for messages, and common units, the SI unit first.
@@ -106,21 +108,19 @@ impl Dimension {
 
     /// SI value of one `unit`; `None` for a unit that is not of this dimension.
     pub fn coefficient(self, unit: &str) -> Option<f64> {
-        let unit = canonical(unit);
-        let mut known = KNOWN.iter().filter(|known| known.dimension == self);
-        let value = known.find(|known| known.spellings().any(|name| name == unit))?.value;
+        let value = Unit::spelled(unit).find(|known| known.dimension == self)?.value;
         value.parse().ok()
     }
 
     /// Every spelling of every unit, with its dimension.
     pub fn spellings() -> impl Iterator<Item = (Self, &'static str)> {
-        KNOWN.iter().flat_map(|known| known.spellings().map(|name| (known.dimension, name)))
+        let known = UNITS.lines().filter_map(Unit::read);
+        known.flat_map(|known| known.spellings().map(move |name| (known.dimension, name)))
     }
 
     /// The dimension that `unit` has, if any.
     pub fn of(unit: &str) -> Option<Self> {
-        let unit = canonical(unit);
-        Self::spellings().find(|(_, name)| *name == unit).map(|(dimension, _)| dimension)
+        Unit::spelled(unit).next().map(|known| known.dimension)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::text::{count, number, one_line, or_dash};
 use crate::studies::bench::growth::Growth;
 use crate::studies::experiments::{Comparison, SetSummary};
-use crate::studies::extreme_scenes::Summary;
+use crate::studies::extreme_scenes::{Summary, Tally};
 
 /// Columns of [`sets`].
 pub const SETS: [&str; 12] = [
@@ -65,9 +65,8 @@ pub const OUTCOMES: [&str; 5] = ["outcomes of", "right", "undecided", "refused",
 
 /// The outcomes of each method over random scenes.
 pub fn outcomes(summary: &Summary) -> impl Iterator<Item = [String; 5]> {
-    summary.tallies.iter().map(|(method, tally)| {
-        let [right, undecided, refused, wrong] =
-            [tally.right, tally.undecided, tally.refused, tally.wrong].map(|count| count.to_string());
+    summary.tallies.iter().map(|(method, &Tally { right, undecided, refused, wrong })| {
+        let [right, undecided, refused, wrong] = [right, undecided, refused, wrong].map(|count| count.to_string());
         [method.name().to_owned(), right, undecided, refused, wrong]
     })
 }
@@ -102,7 +101,19 @@ pub fn growth(growth: &[Growth]) -> impl Iterator<Item = [String; 6]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrators::MethodName;
     use crate::studies::bench::growth::Source;
+
+    #[test]
+    fn each_count_of_outcomes_stands_under_its_name() {
+        let tally = Tally { right: 5, undecided: 2, refused: 3, wrong: 4 };
+        let summary = Summary { tallies: [(MethodName::Taylor, tally)].into(), ..Summary::default() };
+        let rows: Vec<_> = outcomes(&summary).collect();
+        let named = serde_json::to_value(tally).unwrap();
+        for (name, cell) in OUTCOMES.iter().zip(&rows[0]).skip(1) {
+            assert_eq!(named[name].to_string(), *cell, "{name}");
+        }
+    }
 
     #[test]
     fn growth_is_shown_in_seconds_microseconds_and_megabytes() {

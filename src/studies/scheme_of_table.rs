@@ -44,7 +44,7 @@ const FEW_DIGITS: f64 = 1e-3;
 const NAMED_MAX: usize = 3;
 
 /// How x and V advance by a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Advance {
     CentralDifference(VelocityAt),
     Euler,
@@ -98,7 +98,7 @@ impl Advance {
 }
 
 /// A scheme of equal steps: how it advances, and what it does about stage ends, exit and rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Scheme {
     advance: Advance,
     events: Boundaries,
@@ -183,9 +183,11 @@ impl Scheme {
         let is_crater_end = |index: usize| EventKind::boundary(problem, index) == EventKind::CraterEnd;
         while steps < max_steps {
             let law = laws[stage];
+            let start = if stage == 0 { f64::NEG_INFINITY } else { laws[stage - 1].end };
             let advance = |part: f64| {
-                // A step that lands on the end of its stage has one law.
-                let a = |x: f64, v: f64| -if lands { law } else { laws[stage_at(x)] }.force(x, v);
+                // A step that lands on the end of its stage has one law. Nearly all others stay inside of theirs.
+                let is_here = |x: f64| lands || start <= x && x < law.end;
+                let a = |x: f64, v: f64| -if is_here(x) { law } else { laws[stage_at(x)] }.force(x, v);
                 self.advance.step(a, state.depth, state.velocity, part)
             };
             let (x, v) = advance(h);

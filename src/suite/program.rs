@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use tempfile::TempDir;
 use wait_timeout::ChildExt;
@@ -19,7 +20,7 @@ use crate::exchange::scene_file::SHIPPED;
 const TIME_MAX: Duration = Duration::from_secs(60);
 
 /// Threads that wait for a run, for each that computes.
-const WAITING: usize = 2;
+const WAITING: usize = 3;
 
 /// The program with a folder of its own, which holds the shipped scenes as `NAME.toml` and what runs leave there.
 #[derive(Debug)]
@@ -121,6 +122,14 @@ impl Program {
             return Err(io::Error::other(format!("does not end within {} s", TIME_MAX.as_secs())));
         };
         Ok(Said { code: status.code().unwrap_or(-1), out: fs::read_to_string(&out)?, err: fs::read_to_string(&err)? })
+    }
+}
+
+impl Drop for Program {
+    /// Several threads remove thousands of folders sooner than one; what is left goes with the folder that holds them.
+    fn drop(&mut self) {
+        let folders: Vec<_> = fs::read_dir(self.folder()).into_iter().flatten().flatten().collect();
+        self.waiting(|| folders.par_iter().for_each(|folder| drop(fs::remove_dir_all(folder.path()))));
     }
 }
 

@@ -8,7 +8,7 @@ use crate::integrators::outcome::{Detail, Flight, IntegrationError, Solved};
 use crate::physics::{Condition, Problem, Scalar, State};
 
 /// Steps without any change of x and V after which the scheme counts as stuck for ever.
-const STUCK_STEPS: u64 = 1 << 20;
+const STUCK_STEPS: u64 = 1 << 16;
 
 /// Halvings of a step in which a condition is met: more than a number has digits.
 const HALVINGS: u32 = 80;

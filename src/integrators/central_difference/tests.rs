@@ -721,13 +721,13 @@ fn a_flight_without_an_end_is_refused_where_it_becomes_one() {
     let at_once = stages(smallvec![dashpot(256.0)], 8.0, 10.0);
     let lagged = scheme(1.0 / 64.0, VelocityAt::LaggedHalfStep, Boundaries::StepEnd);
     assert_eq!(refused(&lagged, &at_once), State::at_impact(&at_once));
-    // The slowest of all speeds moves nothing in a step of 1 ms: refused after 2^20 of them.
+    // The slowest of all speeds moves nothing in a step of 1 ms: refused after 2^16 of them.
     let slowest = f64::from_bits(1);
     let creep = stages(smallvec![dashpot(0.0)], slowest, 1.0);
     let long =
         CentralDifference { max_steps: 3 << 20, ..scheme(1e-3, VelocityAt::LaggedHalfStep, Boundaries::StepEnd) };
-    assert_eq!(refused(&long, &creep), State { time: 1_048_576.0 * 1e-3, depth: 0.0, velocity: slowest });
-    // As many steps that do move are no standstill: 3/2 2^20 of them to a place one metre away.
+    assert_eq!(refused(&long, &creep), State { time: 65_536.0 * 1e-3, depth: 0.0, velocity: slowest });
+    // More steps that do move are no standstill: 3/2 2^20 of them to a place one metre away.
     let slow = Problem { impact_speed: 2.0_f64.powi(20) / 1.5, exit_depth: 1.0, ..creep };
     let flight =
         CentralDifference { steps: Steps::Uniform(2.0_f64.powi(-40)), ..long }.solve(&slow, Detail::End).unwrap();

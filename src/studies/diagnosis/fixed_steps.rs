@@ -335,8 +335,10 @@ fn fixed_causes(
     // Step by step, where the passing answers show which scheme it is.
     for (scheme, _) in reproducing.iter().take(3) {
         let mut seen = Vec::new();
-        for (laddered, row) in answered().filter(|(_, row)| row.verdict != Verdict::Undecided) {
-            for rung in [laddered.rungs.first(), laddered.rungs.get(LADDER.len() - 1)].into_iter().flatten() {
+        // The coarsest steps of all first, where schemes differ most: a number is fitted to those. The finest would take the longest.
+        for part in [0, LADDER.len() / 2] {
+            for (laddered, row) in answered().filter(|(_, row)| row.verdict != Verdict::Undecided) {
+                let Some(rung) = laddered.rungs.get(part) else { continue };
                 let (is_misnamed, is_other) = (laddered.is_misnamed(), !rung.is_outcome_right);
                 seen.push(Seen {
                     question: laddered.question,

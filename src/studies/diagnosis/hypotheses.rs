@@ -376,10 +376,13 @@ pub(super) struct Predicted {
     pub conditions: [f64; 3],
 }
 
-/// What exact solvers with one fault or none answer to a question, by fault and number. It does not depend on what was
+/// What solvers with one fault or none answer to a question, by fault, number, scheme and step. It does not depend on what was
 /// answered, and causes are looked for several times.
 #[derive(Debug, Default)]
-pub(super) struct Predictions(Mutex<HashMap<(usize, u64), Option<Predicted>>>);
+pub(super) struct Predictions(Mutex<HashMap<Prediction, Option<Predicted>>>);
+
+/// Bits of the number of the fault at an address, and of the step.
+type Prediction = (usize, u64, Option<(Scheme, u64)>);
 
 /// The end of [`predict`].
 pub(super) fn predicted(question: &Question, faults: &[Fault<'static>], how: How) -> Option<Predicted> {
@@ -387,9 +390,13 @@ pub(super) fn predicted(question: &Question, faults: &[Fault<'static>], how: How
         let (problem, Simulated { end, .. }) = predict(question, faults, how)?;
         Some(Predicted { end, conditions: conditioning(end, &problem) })
     };
-    let key = match (how, faults) {
-        (How::Exact, []) => (0, 0),
-        (How::Exact, [(fault, number)]) => (std::ptr::from_ref(*fault).addr(), number.to_bits()),
+    let scheme = match how {
+        How::Exact => None,
+        How::Scheme(scheme, step) => Some((scheme, step.to_bits())),
+    };
+    let key = match faults {
+        [] => (0, 0, scheme),
+        [(fault, number)] => (std::ptr::from_ref(*fault).addr(), number.to_bits(), scheme),
         _ => return find(),
     };
     let known = || question.predicted.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -105,29 +105,39 @@ pub(super) struct Simulated {
 fn extrapolated(a: &impl Fn(f64, f64) -> f64, x: f64, v: f64, h: f64) -> ([f64; 2], [f64; 2]) {
     let mut row = [[0.0; 2]; COLUMNS];
     let (mut best, mut error) = ([x, v], [f64::INFINITY; 2]);
-    for column in 0..COLUMNS {
-        let steps = 2 * (column + 1);
-        let part = h / steps as f64;
-        let (mut before, mut now) = ([x, v], [x + part * v, v - part * a(x, v)]);
-        for _ in 1..steps {
-            let next = [before[0] + 2.0 * part * now[1], before[1] - 2.0 * part * a(now[0], now[1])];
-            (before, now) = (now, next);
+    let first = a(x, v);
+    let start = |part: f64| ([x, v], [x + part * v, v - part * first]);
+    let step = |part: f64, (before, now): ([f64; 2], [f64; 2])| {
+        (now, [before[0] + 2.0 * part * now[1], before[1] - 2.0 * part * a(now[0], now[1])])
+    };
+    for pair in (0..COLUMNS).step_by(2) {
+        // Two columns side by side: neither waits for the steps of the other.
+        let counts = [2 * (pair + 1), 2 * (pair + 2)];
+        let parts = counts.map(|steps| h / steps as f64);
+        let mut ends = parts.map(start);
+        for _ in 1..counts[0] {
+            ends = [step(parts[0], ends[0]), step(parts[1], ends[1])];
         }
-        // Neville's scheme in h²: row k of the last column gives way to that of this one.
-        let mut finer =
-            [0.5 * (before[0] + now[0] + part * now[1]), 0.5 * (before[1] + now[1] - part * a(now[0], now[1]))];
-        for (k, entry) in row.iter_mut().enumerate().take(column + 1) {
-            let coarser = std::mem::replace(entry, finer);
-            if k < column {
-                let ratio = (column + 1) as f64 / (column - k) as f64;
-                finer = std::array::from_fn(|i| finer[i] + (finer[i] - coarser[i]) / (ratio * ratio - 1.0));
+        for _ in counts[0]..counts[1] {
+            ends[1] = step(parts[1], ends[1]);
+        }
+        for (column, (part, (before, now))) in (pair..).zip(parts.into_iter().zip(ends)) {
+            // Neville's scheme in h²: row k of the last column gives way to that of this one.
+            let mut finer =
+                [0.5 * (before[0] + now[0] + part * now[1]), 0.5 * (before[1] + now[1] - part * a(now[0], now[1]))];
+            for (k, entry) in row.iter_mut().enumerate().take(column + 1) {
+                let coarser = std::mem::replace(entry, finer);
+                if k < column {
+                    let ratio = (column + 1) as f64 / (column - k) as f64;
+                    finer = std::array::from_fn(|i| finer[i] + (finer[i] - coarser[i]) / (ratio * ratio - 1.0));
+                }
             }
-        }
-        error = std::array::from_fn(|i| (finer[i] - best[i]).abs());
-        best = finer;
-        // A short step needs few columns.
-        if column > 0 && error[0] <= ROUNDING * (h * v).abs() && error[1] <= ROUNDING * v.abs() {
-            break;
+            error = std::array::from_fn(|i| (finer[i] - best[i]).abs());
+            best = finer;
+            // A short step needs few columns.
+            if column > 0 && error[0] <= ROUNDING * (h * v).abs() && error[1] <= ROUNDING * v.abs() {
+                return (best, error);
+            }
         }
     }
     (best, error)
