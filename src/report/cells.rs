@@ -99,6 +99,7 @@ pub fn growth(growth: &[Growth]) -> impl Iterator<Item = [String; 6]> {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
     use crate::integrators::MethodName;
