@@ -12,7 +12,7 @@ use super::{Answer, Ask, CliError, Exit, command_typed, program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
 use crate::suite::checks::{PeerAnswers, USER};
-use crate::suite::{Check, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, grouped, looseness};
+use crate::suite::{Check, Claim, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, grouped, looseness};
 
 /// Arguments of `verify`.
 #[derive(Args, Debug)]
@@ -81,6 +81,13 @@ impl Ask for VerifyArgs {
             return Err(CliError::usage(
                 "no claim of the suite sweeps H/d or is about measured energies, so --data would not be used",
                 "leave out --data, or --only",
+            ));
+        }
+        let asks_peer = |claim: &Claim| matches!(&claim.check, Check::Peer(peer) if peer.name == USER);
+        if self.peer.is_some() && !suite.claims.iter().any(asks_peer) {
+            return Err(CliError::usage(
+                "no claim of the suite asks the program of --peer, so it would not be judged",
+                "add a claim with check = { peer = { name = \"user\", tolerance = 1e-6 } }, leave out --peer, or --only",
             ));
         }
         let peers = self.peers()?;

@@ -430,6 +430,10 @@ impl Judged {
     /// `claim` with what its check found in `wall_ms` (ms).
     pub fn new(claim: Claim, found: Found, wall_ms: f64) -> Self {
         let lacks = found.as_ref().is_err_and(|lack| lack.lacks);
+        let found = found.and_then(|measured| match measured.cases {
+            0 => Err(NotMeasured::broken("measured on no case at all")),
+            _ => Ok(measured),
+        });
         let Measurement { value, resolution, verdict, remark, evidence, cases } = found.unwrap_or_else(|lack| {
             Measurement { verdict: Some(lack.verdict), ..Measurement::new(f64::NAN).remark(lack.reason).cases(0) }
         });

@@ -62,6 +62,17 @@ pub enum Source {
     Truth,
 }
 
+impl Check {
+    /// Whether a claim of this kind may name `method`: what asks no method of the claim would measure the same whatever its name.
+    pub(super) fn asks(&self, method: MethodName) -> bool {
+        let Some(roads) = self.roads() else { return true };
+        let has = |sources: &[Source]| roads.iter().any(|road| sources.iter().any(|source| road.contains(source)));
+        has(&[Source::Method, Source::MethodItself, Source::Commands, Source::Lanes])
+            || method == MethodName::CentralDifference && has(&[Source::Steps])
+            || method == MethodName::Enclosure && has(&[Source::Enclosure])
+    }
+}
+
 impl Source {
     /// What `self` stands for in `claim`.
     fn of(self, claim: &Claim) -> Vec<Self> {

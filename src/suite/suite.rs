@@ -145,6 +145,9 @@ impl Suite {
         let mut ids = BTreeSet::new();
         for spec in &read.claim {
             let id = spec.id.get_ref();
+            if id.trim().is_empty() {
+                return Err(refuse(spec.id.span(), "the id is empty".to_owned(), "a name", "name the claim"));
+            }
             if !ids.insert(id.clone()) {
                 return Err(refuse(
                     spec.id.span(),
@@ -160,6 +163,15 @@ impl Suite {
                     format!("a limit of {} decides nothing", Shown(limit)),
                     "a finite number, zero or above",
                     "write the largest value that you would accept",
+                ));
+            }
+            let unit = spec.check.get_ref().unit();
+            if unit.starts_with("wrong ") && limit >= 1.0 {
+                return Err(refuse(
+                    spec.limit.span(),
+                    format!("a limit of {} lets {unit} pass", Shown(limit)),
+                    "a number below one",
+                    "write 0",
                 ));
             }
             for scene in &spec.scenes {
@@ -183,7 +195,26 @@ impl Suite {
                 };
                 scenes.insert(name, found);
             }
-            claims.extend(spec.expand());
+            for claim in spec.expand() {
+                if let Some(method) = claim.method.filter(|method| !claim.check.asks(*method)) {
+                    return Err(refuse(
+                        spec.check.span(),
+                        format!("this check does not ask `{method}`"),
+                        "no `methods`, or those that the check asks",
+                        "remove the method from `methods`, or state it of another check",
+                    ));
+                }
+                // Where a table has one claim alone, its id is that of the table, which is taken already.
+                if claim.id != *id && !ids.insert(claim.id.clone()) {
+                    return Err(refuse(
+                        spec.id.span(),
+                        format!("the id `{}` is taken, as that of a claim of this table or of another", claim.id),
+                        "claims with an id each",
+                        "name each scene, method and quantity once, and rename one of the two",
+                    ));
+                }
+                claims.push(claim);
+            }
         }
         Ok(Self {
             title: read.title,

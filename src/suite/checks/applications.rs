@@ -22,6 +22,7 @@ check! {
         /// Largest H/d.
         to: f64,
         /// How many, evenly.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         points: usize,
     } in Slab, "relative", by sweep, compares (Method Search | ClosedForm);
     /// Perforation limit of the scene by both criteria: critical velocity of that thickness against the impact speed, and
@@ -31,6 +32,7 @@ check! {
     /// from that of the line.
     Map {
         /// How many places of each line.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         points: usize,
     } in Applicability, "relative", by map, compares (Method | Formulas);
     /// Median of predicted over measured depth of each set of the shipped data, shallow tests apart: worst distance
@@ -46,6 +48,7 @@ check! {
     /// of the other outcome. Intervals that are not found, or whose ends lie elsewhere.
     HiddenIntervals {
         /// How many functions.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         functions: usize,
     } in Slab, "violations", counting hidden_intervals, compares nothing;
 }

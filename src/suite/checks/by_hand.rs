@@ -13,6 +13,7 @@ check! {
     /// outcome, the work and the stated limit of the step; worst difference.
     StepsByHand {
         /// How many problems of each kind.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
     } in Steps, "relative", by steps_by_hand, compares (Steps | Itself);
 }

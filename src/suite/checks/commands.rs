@@ -24,6 +24,7 @@ check! {
         /// File of `verification/transcript`, without its ending.
         runs: String,
         /// Relative tolerance of the numbers.
+        #[serde(deserialize_with = "crate::suite::checks::positive")]
         tolerance: f64,
     } in Commands, "lines that differ", by recorded, compares nothing;
 

@@ -21,8 +21,10 @@ check! {
     /// that measure another number, or on fewer cases. A check that sees less than it did passes everywhere else.
     Remeasured {
         /// Factor within which two numbers above round-off are the same.
+        #[serde(deserialize_with = "crate::suite::checks::positive")]
         within: f64,
         /// The same of round-off, which another processor or library of mathematics has otherwise.
+        #[serde(deserialize_with = "crate::suite::checks::positive")]
         rounding_within: f64,
     } in Judge, "differences", by remeasured, compares nothing;
     /// Claims whose two computations share more than the scene ([`crate::suite::roads`]).
@@ -42,6 +44,7 @@ pub struct Family {
 }
 
 fn counted(Counted { families }: &Counted, subject: &Subject<'_>) -> Found {
+    holds!(!families.is_empty(), "there is no family to count");
     let judged = subject.context.judged.ok_or_else(|| NotMeasured::skip("a part of the suite was run"))?;
     let mut found: BTreeMap<&str, Vec<&Judged>> = families.keys().map(|name| (name.as_str(), Vec::new())).collect();
     for claim in judged {

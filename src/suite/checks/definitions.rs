@@ -17,6 +17,7 @@ check! {
     /// Random expressions with powers of every kind: derivatives by x and by V that are not the limit of their differences.
     Gradients {
         /// How many expressions.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         expressions: usize,
     } in Input, "violations", counting gradients, compares nothing;
 
@@ -24,6 +25,7 @@ check! {
     /// units that are refused.
     UnlikeUnits {
         /// How many of each.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         expressions: usize,
     } in Input, "violations", counting unlike_units, compares nothing;
 
@@ -31,6 +33,7 @@ check! {
     /// unit are in a scene file, and rows that do not have their number.
     TablesInMemory {
         /// How many tables.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         tables: usize,
     } in Input, "violations", counting tables_in_memory, compares nothing;
 
@@ -38,6 +41,7 @@ check! {
     /// are not in proportion.
     Quartiles {
         /// How many samplings.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         samplings: usize,
     } in Commands, "violations", counting quartiles, compares nothing;
 
@@ -45,6 +49,7 @@ check! {
     /// Student's t that are not the shares of these.
     LimitsOfLadders {
         /// How many ladders of steps.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         ladders: usize,
     } in Commands, "violations", counting limits_of_ladders, compares nothing;
 }

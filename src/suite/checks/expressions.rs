@@ -12,6 +12,7 @@ check! {
     /// an event may hide follows from such ranges.
     Ranges {
         /// How many expressions.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         expressions: usize,
     } in Input, "violations", counting ranges, compares nothing;
 }

@@ -28,6 +28,7 @@ check! {
         /// Largest I.
         to: f64,
         /// How many, log-uniform from the seed.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         points: usize,
     } in Exact, "relative", by small_impact, compares (Method | Formulas);
     /// X/d at finite N against Eq. 11-12 as N grows: distance of the fitted order in 1/N from 1.
@@ -62,6 +63,7 @@ check! {
     /// branches and their neighbours among them; worst relative difference.
     NdrcCriterion {
         /// How many H/d, log-uniform from the seed.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         points: usize,
     } in Exact, "relative", by ndrc_criterion, compares (Method Search | Formulas);
 }

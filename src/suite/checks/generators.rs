@@ -12,6 +12,7 @@ check! {
     /// seldom.
     Generators {
         /// How many.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         scenes: usize,
     } in Random, "violations", counting generators, compares nothing;
 }

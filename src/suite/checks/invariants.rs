@@ -25,12 +25,14 @@ check! {
     /// Every stage cut into pieces and restarted; relative change of depth, time and velocity.
     Split {
         /// Pieces of a stage.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         pieces: usize,
     } in Energy, "relative", by split, compares nothing;
     /// Random stages at whose ends masses join, by momentum and energy: worst error of depth, time and velocity at the end,
     /// and, where no drag acts, of the exit margin.
     JoinedMasses {
         /// How many problems.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         problems: usize,
     } in Energy, "relative", by joined_masses, compares (Method | Itself);
 }
@@ -104,6 +106,7 @@ fn time_reversal(subject: &Subject<'_>) -> Found {
 }
 
 fn similarity(&Similarity { length, mass, time }: &Similarity, subject: &Subject<'_>) -> Found {
+    holds!([length, mass, time] != [1.0; 3], "scaled by one, the scene is compared with itself");
     let problem = subject.problem()?;
     if !problem.laws.is_empty() {
         return Err(NotMeasured::skip("the parameters of an expression would have to be scaled, too"));
@@ -123,6 +126,7 @@ fn similarity(&Similarity { length, mass, time }: &Similarity, subject: &Subject
 }
 
 fn split(&Split { pieces }: &Split, subject: &Subject<'_>) -> Found {
+    holds!(pieces > 1, "one piece is the whole stage, compared with itself");
     let problem = subject.problem()?;
     let plain = subject.solution(Detail::Events)?;
     let mut stages = Stages::new();

@@ -19,6 +19,7 @@ check! {
         /// What is wrong with every solution that the check sees; without it, the claim itself is what is wrong.
         flaw: Option<Flaw>,
         /// Limit of the check.
+        #[serde(deserialize_with = "crate::suite::checks::not_negative")]
         limit: f64,
         /// The check.
         check: Box<Check>,

@@ -20,12 +20,14 @@ check! {
     /// outcome, and a cell that is not the number it names break it.
     TableOfScenes {
         /// How many, besides one that is bad.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         rows: usize,
     } in Random, "promises x condition", by table_of_scenes, compares (Lanes | FiftyDigits);
     /// Error bounds of `rows` margins computed in lanes against those of the Taylor series alone: the worst quotient of
     /// the larger and the smaller.
     BoundsOfLanes {
         /// How many.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         rows: usize,
     } in Random, "quotient", by bounds_of_lanes, compares nothing;
 }

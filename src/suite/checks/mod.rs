@@ -94,7 +94,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::de::{Error as _, Unexpected};
+use serde::{Deserialize, Deserializer};
 
 use super::claim::{Claim, Found, Judged, Measurement, NotMeasured, Section};
 use super::program::Program;
@@ -176,6 +177,40 @@ every_check! {
     Objectives NoRoot CriticalErrorBound JumpsOfEq15
     TableOfScenes BoundsOfLanes
     EveryNumber MarginBound CriticalBound Response StepsByHand Generators Encloses EnclosesTexts SecondOpinion Refuted RefutedLaws
+}
+
+/// Reads how many cases there are: without any, nothing would be measured.
+fn count<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    let count = usize::deserialize(from)?;
+    if count > 0 { Ok(count) } else { Err(D::Error::invalid_value(Unexpected::Unsigned(0), &"one or more")) }
+}
+
+/// Reads one or more.
+fn some<'de, T: Deserialize<'de>, D: Deserializer<'de>>(from: D) -> Result<Vec<T>, D::Error> {
+    let all = Vec::deserialize(from)?;
+    if all.is_empty() { Err(D::Error::invalid_length(0, &"one or more")) } else { Ok(all) }
+}
+
+/// Reads a finite number above zero: in units of any other one everything would be small.
+fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    number(from, |number| number > 0.0, "a finite number above zero")
+}
+
+/// Reads a finite number, zero or above.
+fn not_negative<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    number(from, |number| number >= 0.0, "a finite number, zero or above")
+}
+
+fn number<'de, D: Deserializer<'de>>(
+    from: D,
+    is_allowed: fn(f64) -> bool,
+    allowed: &'static str,
+) -> Result<f64, D::Error> {
+    let number = f64::deserialize(from)?;
+    if number.is_finite() && is_allowed(number) {
+        return Ok(number);
+    }
+    Err(D::Error::invalid_value(Unexpected::Float(number), &allowed))
 }
 
 /// What several claims share, computed once.

@@ -12,6 +12,7 @@ check! {
     /// of the end and the exit margin, beside 20,000 equal steps with the force computed of its terms.
     GeneratedLaws {
         /// How many laws.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         laws: usize,
     } in Model, "violations", counting generated_laws, compares (Method | Elsewhere);
 }

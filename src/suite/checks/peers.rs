@@ -16,28 +16,34 @@ check! {
         /// Name of the recorded peer, or `user` for the one given on the command line.
         name: String,
         /// Relative tolerance claimed.
+        #[serde(deserialize_with = "crate::suite::checks::positive")]
         tolerance: f64,
     } in CrossCode, "tolerance", by agreement, compares (Method | Elsewhere);
     /// Faults that `diagnose` knows, at the number at which nothing is wrong: those that change an answer all the same.
     Neutral {
         /// How many questions about stages, and how many about scenes.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         questions: usize,
     } in CrossCode, "faults", by neutral, compares nothing;
     /// Solvers with one known fault each, exact but for it: those to which `diagnose` does not name it and its number first.
     NamedFaults {
         /// How many questions about stages, and how many about scenes.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         questions: usize,
         /// One fault of so many is tried.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         each: usize,
     } in CrossCode, "faults", by named_faults, compares nothing;
     /// Schemes of fixed steps, sound and with twice the drag: those to which `diagnose` does not say so.
     NamedSchemes {
         /// How many questions.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         questions: usize,
     } in CrossCode, "schemes", by named_schemes, compares nothing;
     /// Solvers with faults that no hypothesis computes, and right ones: those that are told anything but what stands beside them.
     ToldSolvers {
         /// Those are tried that are asked at most so many questions.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         questions: usize,
     } in CrossCode, "solvers", by told_solvers, compares nothing;
 }

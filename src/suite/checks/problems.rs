@@ -19,8 +19,10 @@ check! {
     /// velocity, force and stage) and the end against double-double; worst error over its condition.
     EveryNumber {
         /// Kinds of the problems.
+        #[serde(deserialize_with = "crate::suite::checks::some")]
         kinds: Vec<Kind>,
         /// How many of each.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
         /// Relative tolerance of the method.
         rtol: Option<f64>,
@@ -30,8 +32,10 @@ check! {
     /// it, and so does a kind below `least`.
     MarginBound {
         /// Kinds of the problems.
+        #[serde(deserialize_with = "crate::suite::checks::some")]
         kinds: Vec<Kind>,
         /// How many of each.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
         /// The least quotient of bound and error.
         least: f64,
@@ -41,8 +45,10 @@ check! {
     /// The same of the critical velocity, found by halving in double-double.
     CriticalBound {
         /// Kinds of the problems.
+        #[serde(deserialize_with = "crate::suite::checks::some")]
         kinds: Vec<Kind>,
         /// How many of each.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
         /// The least quotient of bound and error.
         least: f64,
@@ -61,6 +67,7 @@ check! {
         /// Error at `to` over `to`.
         level: f64,
         /// How many problems.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
     } in Random, "order", by response, compares (Method | FiftyDigits);
 }

@@ -15,11 +15,13 @@ check! {
         /// w dt in the crater; in the tunnel dt over the tunnel time.
         step: f64,
         /// Number of steps at most.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         steps: usize,
     } in Constants, "relative", by discrete_solution, compares (Steps | Itself);
     /// Central difference: worst relative distance of the time of step i from i dt, over `steps` steps.
     Clock {
         /// How many steps.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         steps: usize,
     } in Constants, "relative", by clock, compares (Steps | Itself);
     /// Central difference at rest in the crater, rest located: relative distance of error/(w dt)² from 1/8 (depth) or
@@ -36,6 +38,7 @@ check! {
     /// one over the drag group Q V dt/M, for every velocity rule.
     StabilityMap {
         /// How many drag groups, for each velocity rule.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         points: usize,
     } in Stability, "relative", by stability_map, compares (Steps | Itself);
     /// Central difference: rounding error of the depth with compensated sums over that with plain ones, after

@@ -52,11 +52,13 @@ check! {
     /// Random problems and scenes as a peer reads them: fields that are missing, or that say another number.
     Wire {
         /// How many.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         problems: usize,
     } in CrossCode, "differences", counting wire, compares nothing;
     /// Random answers of a peer: numbers that are read otherwise, and differences between two answers other than those put in.
     WireAnswer {
         /// How many.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         problems: usize,
     } in CrossCode, "differences", counting wire_answer, compares nothing;
 }

@@ -14,6 +14,7 @@ check! {
     /// `verification/references/exact.json`, against the one there: numbers, words, and what is `null`.
     Printed {
         /// Only each so-manieth scene.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         each: usize,
     } in Commands, "relative x condition", by printed, compares (Commands | Elsewhere);
 

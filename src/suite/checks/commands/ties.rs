@@ -41,7 +41,7 @@ check! {
     Slopes {
         /// Relative change of each number.
         by: f64,
-    } in Commands, "relative", by slopes, compares (Duals | Itself);
+    } in Commands, "relative", by slopes, compares (Commands Duals | Itself);
 
     /// `critical --spread`: first order and shares from the elasticities of `solve --sensitivities`.
     SpreadParts {
@@ -65,6 +65,7 @@ check! {
     /// Each column of `batch` on random rows against `solve` and `critical` on the same numbers.
     BatchRows {
         /// Rows.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
         rows: usize,
     } in Commands, "relative", by batch_rows, compares nothing;
 
