@@ -63,13 +63,14 @@ pub enum Source {
 }
 
 impl Check {
-    /// Whether a claim of this kind may name `method`: what asks no method of the claim would measure the same whatever its name.
-    pub(super) fn asks(&self, method: MethodName) -> bool {
-        let Some(roads) = self.roads() else { return true };
-        let has = |sources: &[Source]| roads.iter().any(|road| sources.iter().any(|source| road.contains(source)));
-        has(&[Source::Method, Source::MethodItself, Source::Commands, Source::Lanes])
-            || method == MethodName::CentralDifference && has(&[Source::Steps])
-            || method == MethodName::Enclosure && has(&[Source::Enclosure])
+    /// Whether it is about `method` alone, and need not ask for it.
+    pub(super) fn is_about(&self, method: MethodName) -> bool {
+        let source = match method {
+            MethodName::CentralDifference => Source::Steps,
+            MethodName::Enclosure => Source::Enclosure,
+            _ => return false,
+        };
+        self.roads().is_some_and(|roads| roads.concat().contains(&source))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -196,14 +197,6 @@ impl Suite {
                 scenes.insert(name, found);
             }
             for claim in spec.expand() {
-                if let Some(method) = claim.method.filter(|method| !claim.check.asks(*method)) {
-                    return Err(refuse(
-                        spec.check.span(),
-                        format!("this check does not ask `{method}`"),
-                        "no `methods`, or those that the check asks",
-                        "remove the method from `methods`, or state it of another check",
-                    ));
-                }
                 // Where a table has one claim alone, its id is that of the table, which is taken already.
                 if claim.id != *id && !ids.insert(claim.id.clone()) {
                     return Err(refuse(
@@ -255,7 +248,7 @@ impl Suite {
             let those = self.claims.iter().enumerate().filter(|(_, claim)| claim.check.is_last() == is_last);
             let (of_peers, others): (Vec<_>, Vec<_>) = those.partition(|(_, c)| matches!(c.check, Check::Peer(_)));
             let judge_one = |(place, claim)| {
-                let judged = judge(Subject { claim, context, flaw: None });
+                let judged = judge(Subject { claim, context, flaw: None, asks_method: &AtomicBool::new(false) });
                 done(&judged);
                 (place, judged)
             };
@@ -313,6 +306,13 @@ pub(super) fn judge(subject: Subject<'_>) -> Judged {
         Some(method) => Err(NotMeasured::lacks(format!("this build leaves out {method}"))),
         None => claim.check.measure(&subject),
     };
+    let found = found.and_then(|measured| match claim.method {
+        // It would be measured the same under the name of any method.
+        Some(method) if !(subject.asks_method.load(Ordering::Relaxed) || claim.check.is_about(method)) => {
+            Err(NotMeasured::broken(format!("this check does not ask {method}: remove `methods`")))
+        }
+        _ => Ok(measured),
+    });
     Judged::new(claim.clone(), found, started.elapsed().as_secs_f64() * 1e3)
 }
 

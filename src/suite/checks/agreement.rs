@@ -41,8 +41,8 @@ check! {
     } in Events, "error bars", by margin, compares (Method | FiftyDigits);
     /// Outcome of the method: 0 if it is right or undecided, 1 if it is wrong.
     Outcome {
-        /// Name of the right outcome.
-        is: String,
+        /// The right outcome.
+        is: physics::Outcome,
     } in Events, "wrong outcomes", by outcome, compares (Method | Elsewhere);
     /// One method against another; difference over the tolerance that both may claim.
     Pair {
@@ -89,9 +89,10 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
         return Err(NotMeasured::undecided(remark));
     }
     holds!(flight.outcome.agrees_with(exact.outcome), "{} where {} is right", flight.outcome, exact.outcome);
-    let (found, value) = (value_of(quantity, &flight), value_of(quantity, exact));
-    let (found, exact) =
-        found.zip(value).ok_or_else(|| NotMeasured::broken(format!("no {quantity}, where {value:?} is right")))?;
+    let exact = value_of(quantity, exact)
+        .ok_or_else(|| NotMeasured::broken(format!("the exact solution has no {quantity}")))?;
+    let found = value_of(quantity, &flight)
+        .ok_or_else(|| NotMeasured::broken(format!("no {quantity}, where {exact} is right")))?;
     let error = signed_error(quantity, found, exact, problem.impact_speed);
     let compute = || reference::conditions(Source::Problem(problem)).ok();
     let conditions = subject.context.memo.conditions.get(subject.scene_name()?.to_owned(), compute);
@@ -161,9 +162,9 @@ fn margin_of(flight: &Flight) -> String {
     format!("margin {margin} +- {error}")
 }
 
-fn outcome(Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
+fn outcome(&Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::End)?;
-    let right = flight.outcome.name() == is || flight.outcome == physics::Outcome::Undecided;
+    let right = flight.outcome == is || flight.outcome == physics::Outcome::Undecided;
     Ok(Measurement::count(usize::from(!right)).remark(format!("{}, {}", flight.outcome, margin_of(&flight))))
 }
 

@@ -91,6 +91,7 @@ mod scheme;
 mod texts;
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use schemars::JsonSchema;
@@ -268,6 +269,8 @@ pub struct Subject<'a> {
     pub context: Context<'a>,
     /// What is wrong on purpose with the solutions of its method.
     pub flaw: Option<Flaw>,
+    /// Set where the check asks for the method of the claim.
+    pub asks_method: &'a AtomicBool,
 }
 
 impl<'a> Subject<'a> {
@@ -293,6 +296,7 @@ impl<'a> Subject<'a> {
 
     /// Name of the claim's method; the Taylor series where it names none.
     fn method_name(&self) -> MethodName {
+        self.asks_method.store(true, Ordering::Relaxed);
         self.claim.method.unwrap_or_default()
     }
 

@@ -17,6 +17,7 @@ use crate::studies::limit::law_of_values;
 use crate::studies::order::{Class, FALSE_ALARM_LEVEL, FitError, OrderFit, PowerLaw};
 use crate::studies::quantity::Quantity;
 use crate::studies::random::Random;
+use crate::text::or_dash;
 
 check! {
     /// Central difference: distance of the fitted order from `order`.
@@ -83,9 +84,9 @@ fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subjec
         let study = FixedSteps { scheme: &scheme, range, points, seed, with_critical: critical, progress: &|_, _| {} };
         Ok(convergence::of_fixed_steps(subject.scene()?, subject.problem()?, exact, &study)?)
     })?;
-    let formal = study.formal;
-    let agree = formal == Some(expected);
-    holds!(agree, "the claim expects order {expected}, the formal order is {formal:?}: one of them is wrong");
+    let formal = or_dash(study.formal, |order| order.to_string());
+    let agree = study.formal == Some(expected);
+    holds!(agree, "the claim expects order {expected}, the formal order is {formal}: one of them is wrong");
     judge(study.fit, study.lost, expected)
 }
 

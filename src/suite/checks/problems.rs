@@ -38,6 +38,7 @@ check! {
         #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
         /// The least quotient of bound and error.
+        #[serde(deserialize_with = "crate::suite::checks::positive")]
         least: f64,
         /// Relative tolerance of the method.
         rtol: Option<f64>,
@@ -51,6 +52,7 @@ check! {
         #[serde(deserialize_with = "crate::suite::checks::count")]
         count: usize,
         /// The least quotient of bound and error.
+        #[serde(deserialize_with = "crate::suite::checks::positive")]
         least: f64,
         /// Relative tolerance of the method.
         rtol: Option<f64>,

@@ -41,7 +41,7 @@ check! {
     Slopes {
         /// Relative change of each number.
         by: f64,
-    } in Commands, "relative", by slopes, compares (Commands Duals | Itself);
+    } in Commands, "relative", by slopes, compares (Duals | Itself);
 
     /// `critical --spread`: first order and shares from the elasticities of `solve --sensitivities`.
     SpreadParts {
