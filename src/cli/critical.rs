@@ -343,7 +343,8 @@ fn add_uncertainty(text: &mut Text, found: &Uncertainty) {
     text.line(format!("  spread     +- {:.4} m/s to first order", found.first_order));
     for Share { spread: Spread { parameter, relative, distribution }, share } in &found.spreads {
         let relative = significant(100.0 * relative);
-        let relative = relative.trim_end_matches('0').trim_end_matches('.');
+        let relative =
+            if relative.contains('.') { relative.trim_end_matches('0').trim_end_matches('.') } else { &relative };
         let (name, share) = (distribution.name(), 100.0 * share);
         text.line(format!("             {parameter} {relative} %, {name}: {share:.1} % of the variance"));
     }

@@ -11,7 +11,7 @@ use super::sweep::read_data;
 use super::{Answer, Ask, CliError, Exit, command_typed, program};
 use crate::exchange::peers::{BundledPeer, Environment as PeerEnvironment, PeerStartError};
 use crate::report::{Environment, Run, VerifyJson, folder};
-use crate::suite::checks::{PeerAnswers, USER};
+use crate::suite::checks::{PeerAnswers, PeerName, USER};
 use crate::suite::{Check, Claim, Counts, Inputs, Judged, LOOSENESS_MAX, Program, Suite, Verdict, grouped, looseness};
 
 /// Arguments of `verify`.
@@ -83,7 +83,7 @@ impl Ask for VerifyArgs {
                 "leave out --data, or --only",
             ));
         }
-        let asks_peer = |claim: &Claim| matches!(&claim.check, Check::Peer(peer) if peer.name == USER);
+        let asks_peer = |claim: &Claim| matches!(&claim.check, Check::Peer(peer) if peer.name == PeerName::User);
         if self.peer.is_some() && !suite.claims.iter().any(asks_peer) {
             return Err(CliError::usage(
                 "no claim of the suite asks the program of --peer, so it would not be judged",

@@ -9,7 +9,8 @@
 //!
 //! `xi` counts from the start of the stage. L is the first boundary in x, the exit depth among them, or the distance
 //! through the stage where that is shorter. In these units the absolute tolerances are both `rtol`, for every scene: one problem and one solver
-//! serve a whole study, and only the four coefficients change.
+//! serve a whole study, and only the four coefficients change. Under a law of its own whose force falls far to rest the time there hangs
+//! on small velocities: that of the velocity is 1e-12 times as much.
 //!
 //! # What the library cannot be trusted with
 //!
@@ -27,6 +28,8 @@
 //! | Newton failures are counted over a solver's life and fail it at 50, a Jacobian outlives the law | an implicit solver lives for one stage |
 
 use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::rc::Rc;
 
 use diffsol::{
@@ -36,7 +39,7 @@ use diffsol::{
 use self_cell::self_cell;
 
 use super::adaptive::{Choice, EXPLICIT, IMPLICIT};
-use super::flight::{self, Bounded, Course, SLOW, StageEnd, StageSolver, VANISHES};
+use super::flight::{self, Bounded, Course, SLOW, StageEnd, StageSolver, VANISHES, VANISHING, rest_by_power};
 use super::outcome::{Cost, Detail, IntegrationError, Integrator, Solved};
 use crate::physics::condition::Sight;
 use crate::physics::{Law, Problem, Stage, State};
@@ -158,9 +161,7 @@ impl Diffsol {
             let allowed = if strictest.is_implicit() { "1e-14 to 0.1" } else { "1e-15 to 0.1" };
             return Err(IntegrationError::bad_option("rtol", &format!("{:e}", self.rtol), allowed));
         }
-        let schemes = self.scheme.map_or(vec![EXPLICIT, IMPLICIT], |scheme| vec![scheme]);
-        let solvers = schemes.into_iter().map(|scheme| Solver::of(scheme, self.rtol)).collect::<Result<_, _>>()?;
-        Ok(Reusing { of: *self, solvers: RefCell::new(solvers) })
+        Ok(Reusing { of: *self, solvers: RefCell::default() })
     }
 
     fn budget_spent(&self, last: State) -> IntegrationError {
@@ -197,8 +198,8 @@ impl Integrator for Diffsol {
 /// takes.
 struct Reusing {
     of: Diffsol,
-    /// One for the scheme; where it is chosen, the explicit and the implicit one.
-    solvers: RefCell<Vec<Solver>>,
+    /// For each scheme that was asked, and for stages whose force falls to rest ([`Reduced::falls`]) or does not.
+    solvers: RefCell<HashMap<(Scheme, bool), Solver>>,
 }
 
 impl Integrator for Reusing {
@@ -219,8 +220,14 @@ impl Integrator for Reusing {
 impl StageSolver<f64> for &Reusing {
     fn solve_stage(&mut self, course: &mut Course<'_>) -> Solved<StageEnd> {
         let stage = Reduced::of(course)?;
-        let index = if self.of.scheme.is_some() { 0 } else { usize::from(Choice::note(course).is_implicit()) };
-        self.solvers.borrow_mut()[index].with_dependent_mut(|_, solve| solve(&stage, &self.of, course))
+        let chosen = || if Choice::note(course).is_implicit() { IMPLICIT } else { EXPLICIT };
+        let scheme = self.of.scheme.unwrap_or_else(chosen);
+        let mut solvers = self.solvers.borrow_mut();
+        let solver = match solvers.entry((scheme, stage.falls)) {
+            Entry::Occupied(solver) => solver.into_mut(),
+            Entry::Vacant(place) => place.insert(Solver::of(scheme, self.of.rtol, stage.falls)?),
+        };
+        solver.with_dependent_mut(|_, solve| solve(&stage, &self.of, course))
     }
 
     fn margin(&mut self, course: &mut Course<'_>) -> Solved<Bounded> {
@@ -332,6 +339,8 @@ struct Reduced {
     start: State,
     /// Speed at the start [V0].
     speed: f64,
+    /// Whether its force falls so far to rest that the time to rest hangs on velocities below the tolerance.
+    falls: bool,
 }
 
 impl Reduced {
@@ -363,7 +372,8 @@ impl Reduced {
                 side: law.end().map_or(1.0, |end| end.side(start)),
             })
         });
-        Ok(Self { law, own, length, unit_speed: speed, start, speed: start.velocity / speed })
+        let falls = own.as_ref().is_some_and(|own| own.falls_to_rest(start.velocity));
+        Ok(Self { law, own, length, unit_speed: speed, start, speed: start.velocity / speed, falls })
     }
 
     /// The state at `node`.
@@ -426,6 +436,24 @@ impl OwnLaw {
     fn stops(&self, place: Node) -> bool {
         let (depth, _) = self.place(&[place.depth, 0.0]);
         self.law.stops(depth, self.speed)
+    }
+
+    /// Whether its force at rest is little beside that at `velocity` (m/s), and ends the motion.
+    fn falls_to_rest(&self, velocity: f64) -> bool {
+        let inside = self.start + 0.5 * self.length;
+        let [at_rest, at_start] = [0.0, velocity].map(|velocity| self.law.force_value(inside, velocity));
+        (0.0..FALLEN * at_start).contains(&at_rest) && self.law.stops(inside, velocity)
+    }
+
+    /// The end of a flight that is as good as over `at` a node, in front of the limit at `end`: rest where the force vanishes as a power
+    /// of the velocity, or an approach.
+    fn end_of_slow(&self, at: Node, end: f64) -> Option<StageEnd> {
+        let (depth, velocity) = self.place(&[at.depth, at.velocity]);
+        if at.velocity <= VANISHING && self.law.force_value(depth, 0.0) == 0.0 && self.stops(at) {
+            let rest = rest_by_power(at, self.force(&[at.depth, at.velocity]), self.law.power(depth, velocity));
+            return (rest.depth < end).then_some(StageEnd::Rest(rest));
+        }
+        (at.velocity < SLOW && self.is_approach(at, end)).then_some(StageEnd::Approach(at, VANISHES))
     }
 
     /// Adds to `seen` what the step from `before` to `after` shows, on the library's interpolant `at`.
@@ -758,8 +786,8 @@ self_cell! {
 }
 
 impl Solver {
-    /// A solver by `scheme`, for tolerance `rtol`.
-    fn of(scheme: Scheme, rtol: f64) -> Solved<Self> {
+    /// A solver by `scheme`, for tolerance `rtol`, of stages whose force `falls` to rest or does not.
+    fn of(scheme: Scheme, rtol: f64, falls: bool) -> Solved<Self> {
         let force = Rc::new(Force {
             law: Cell::new(None),
             own: RefCell::default(),
@@ -768,9 +796,11 @@ impl Solver {
         });
         let [of_rate, of_jacobian, of_start] = [&force, &force, &force].map(Rc::clone);
         let tolerance = scheme.library_rtol(rtol);
+        // Velocity [V0] down to which errors of the velocity are relative to itself.
+        let floor = if falls { VANISHING } else { 1.0 };
         let mut problem = OdeBuilder::<Matrix>::new()
             .rtol(tolerance)
-            .atol([tolerance])
+            .atol([tolerance, floor * tolerance])
             .rhs_implicit(
                 move |y, _p, _t, dy| of_rate.rate(y, dy),
                 move |y, _p, _t, v, jv| of_jacobian.jacobian_product(y, v, jv),
@@ -785,13 +815,14 @@ impl Solver {
         problem.ode_options.min_timestep = STEP_MIN;
         // A failing step ends at `min_timestep`; a stage of many steps may meet more than the default of 50.
         problem.ode_options.max_nonlinear_solver_failures = usize::MAX;
-        Ok(Self::new(Box::new(OfScheme { scheme, rtol, force, problem }), |owner| owner.stage_solver()))
+        Ok(Self::new(Box::new(OfScheme { scheme, rtol, floor, force, problem }), |owner| owner.stage_solver()))
     }
 }
 
 struct OfScheme<Eqn: OdeEquations> {
     scheme: Scheme,
     rtol: f64,
+    floor: f64,
     force: Rc<Force>,
     problem: OdeSolverProblem<Eqn>,
 }
@@ -842,6 +873,9 @@ impl<Eqn: OdeEquations<V = Pair, T = f64>> OfScheme<Eqn> {
 
 /// Shortest step [L/V0]. Each stage starts at time zero, so no time swallows it.
 const STEP_MIN: f64 = 1e-30;
+
+/// Force at rest over that at the start below which errors of the velocity are kept relative to itself.
+const FALLEN: f64 = 0.01;
 
 /// Halvings of a step with a kink or a least velocity inside.
 const HALVINGS: u32 = 40;
@@ -912,7 +946,7 @@ where
 
     fn solve(&mut self, stage: &Reduced, method: &Diffsol, course: &mut Course<'_>) -> Solved<StageEnd> {
         let law = stage.law;
-        let &OfScheme { scheme, rtol, ref force, .. } = self.of;
+        let &OfScheme { scheme, rtol, floor, ref force, .. } = self.of;
         force.law.set(stage.own.is_none().then_some(law));
         force.own.replace(stage.own.clone());
         force.evaluations.set(0);
@@ -940,7 +974,7 @@ where
             }
             // The stop reason says nothing here: there is neither a root function nor a stop time.
             if let Err(cause) = solver.step() {
-                if is_lost(before.velocity, rtol, seen.energy_max) && stage.is_held(before) {
+                if is_lost(before.velocity, floor * rtol, seen.energy_max) && stage.is_held(before) {
                     break StageEnd::Rest(Node { velocity: 0.0, ..before });
                 }
                 return Err(failure(cause, epoch, before));
@@ -951,7 +985,7 @@ where
             // Backwards with u > 0 at both ends: u was negative in between. Where it was lost in the tolerance already
             // (an explicit method at its stability limit), that is the rest; elsewhere the step was too long.
             let backwards = after.depth < before.depth && after.velocity > 0.0;
-            if backwards && is_lost(before.velocity, rtol, seen.energy_max) {
+            if backwards && is_lost(before.velocity, floor * rtol, seen.energy_max) {
                 cost.steps += 1;
                 break StageEnd::Rest(before);
             }
@@ -999,8 +1033,8 @@ where
             }
             before = after;
             course.sample(state_at(epoch, after));
-            if after.velocity < SLOW && stage.own.as_ref().is_some_and(|own| own.is_approach(after, law.end)) {
-                break StageEnd::Approach(after, VANISHES);
+            if let Some(end) = stage.own.as_ref().and_then(|own| own.end_of_slow(after, law.end)) {
+                break end;
             }
             h = next_step;
             if h > longest_step {

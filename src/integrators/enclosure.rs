@@ -1118,22 +1118,25 @@ impl StageSolver<Ball> for Steps {
 
     fn margin(&mut self, course: &mut Course<'_, Ball>) -> Solved<Bounded> {
         let margin = course.margin();
-        if self.open.is_some() {
-            return Ok(Bounded { bound: margin.value.abs(), ..margin });
+        let energy = course.problem.mass * course.problem.impact_speed * course.problem.impact_speed;
+        let stage = course.stage.min(course.problem.stages.len() - 1);
+        let of_depth = || {
+            let force = course.problem.force(stage, course.state.depth, Ball::zero());
+            (force * course.state.depth / energy).magnitude()
+        };
+        // The margin is a number, and that of a stop is continued from the depth as rounded.
+        let rounding = if course.is_through { 4.0 * margin.value } else { of_depth() };
+        let bound = margin.bound + f64::EPSILON * 2.0 * rounding;
+        if let Some(State { velocity, .. }) = &self.open {
+            // Between a stop there and all of the speed that may be left.
+            let left = (*velocity / course.problem.impact_speed).magnitude();
+            return Ok(Bounded { bound: bound + margin.value.abs() + left * left, ..margin });
         }
-        let is_of_law = course.problem.laws.of(course.stage.min(course.problem.stages.len() - 1)).is_some();
+        let is_of_law = course.problem.laws.of(stage).is_some();
         if is_of_law && !course.is_through {
             return Ok(margin);
         }
-        let energy = course.problem.mass * course.problem.impact_speed * course.problem.impact_speed;
-        // The margin is a number, and that of a stop is continued from the depth as rounded.
-        let rounding = if course.is_through {
-            4.0 * margin.value
-        } else {
-            let force = course.problem.force(course.stage, course.state.depth, Ball::zero());
-            (force * course.state.depth / energy).magnitude()
-        };
-        let margin = Bounded { bound: margin.bound + f64::EPSILON * 2.0 * rounding, ..margin };
+        let margin = Bounded { bound, ..margin };
         if margin.is_decided() || course.is_through {
             return Ok(margin);
         }

@@ -22,6 +22,20 @@ const LEAST_TIME: &str = "the speed vanishes towards the end: the time is the le
 /// Velocity over the impact speed below which a force that vanishes with it is taken for its power.
 pub(crate) const SLOW: f64 = 1e-6;
 
+/// Velocity over the impact speed below which what is left of a flight goes by the power of V with which the force vanishes.
+pub(crate) const VANISHING: f64 = 1e-12;
+
+/// The rest of a projectile `at` a state with this `deceleration` (m/s²) where the force vanishes as `F = a V^n`, n < 1: M V/((1 - n) F)
+/// later and M V²/((2 - n) F) deeper.
+pub(crate) fn rest_by_power<S: Scalar>(at: State<S>, deceleration: S, power: f64) -> State<S> {
+    let over = |exponent: f64| S::one().over(S::from_f64(exponent - power) * deceleration);
+    State {
+        time: at.time + at.velocity * over(1.0),
+        depth: at.depth + at.velocity * at.velocity * over(2.0),
+        velocity: S::zero(),
+    }
+}
+
 /// Why a law of its own brings nothing to rest.
 pub(crate) const VANISHES: &str = "its resistance vanishes with the velocity, so that it is only slowed for ever";
 

@@ -41,7 +41,7 @@ use std::convert::Infallible;
 
 use smallvec::SmallVec;
 
-use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES};
+use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES, VANISHING, rest_by_power};
 use super::locate::{self, root_before, settled};
 use super::outcome::{IntegrationError, Solved};
 use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
@@ -62,9 +62,6 @@ const DEFECT_MAX: f64 = 100.0;
 /// Times that a step may be shortened, each by [`SHORTENING`].
 const SHORTENED_MAX: u32 = 100;
 const SHORTENING: f64 = 0.7;
-
-/// Velocity over the impact speed below which what is left of a flight goes by the power of V with which the force vanishes.
-const VANISHING: f64 = 1e-12;
 
 /// Distance to rest over the depth below which a force is about to end the flight, and no barrier holds it up.
 const NEAR_REST: f64 = 1e-11;
@@ -724,12 +721,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             return (is_over && is_before).then_some(StageEnd::Rest(rest));
         }
         if at_rest == 0.0 && v <= VANISHING * course.problem.impact_speed.value() && self.law.stops(x, v) {
-            // F = a V^n, n < 1.
-            let rest = |power: f64| S::one().over(S::from_f64(power - self.law.power(x, v)));
-            let time = time + velocity.over(deceleration) * rest(1.0);
-            let depth = depth + velocity * velocity.over(deceleration) * rest(2.0);
-            let is_before = depth.value() < limit.value();
-            return is_before.then_some(StageEnd::Rest(State { time, depth, velocity: S::zero() }));
+            let rest = rest_by_power(course.state, deceleration, self.law.power(x, v));
+            return (rest.depth.value() < limit.value()).then_some(StageEnd::Rest(rest));
         }
         let reach = |law: &Law<S>| x + law.reach(self.mass.value(), course.state.values()).min(limit.value() - x);
         let may_end = self.end.is_some_and(|(end, _)| end.may_vanish((x, reach(self.law)), (0.0, v)));

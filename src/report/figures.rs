@@ -182,7 +182,7 @@ fn errors_over_step(run: &Run<'_>, scene: &str, quantity: Quantity) -> Option<Fi
             .slope("slope 2", 2.0, (coarsest, largest * 3.0));
         let mut drawn: Vec<(Boundaries, &OrderFit)> = Vec::new();
         for (index, boundaries) in Boundaries::ALL.into_iter().enumerate() {
-            let is_this = |j: &Judged| j.claim.velocity == velocity && j.claim.boundaries == boundaries;
+            let is_this = |j: &Judged| j.claim.rules() == (velocity, boundaries);
             let Some(&(.., fit)) = fits.iter().find(|(j, ..)| is_this(j)) else { continue };
             let style = Style::nested(index);
             let same = drawn.iter().find(|(_, other)| coincide(other, fit));

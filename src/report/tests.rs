@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use super::{Environment, Run, folder};
-use crate::suite::checks::{Peer, PeerAnswers};
+use crate::suite::checks::{Peer, PeerAnswers, PeerName};
 use crate::suite::{Check, Evidence, Inputs, Judged, Suite, Verdict};
 
 const HOSTILE: &str = "=1+1,a\"b'<script>alert(1)</script>&|`*_\n\u{1b}[2J\u{7}\u{202e},=1+1]]> ";
@@ -31,7 +31,7 @@ static JUDGED: LazyLock<(Suite, Vec<Judged>)> = LazyLock::new(|| {
         judged.push(hostile);
     }
     let mut peer = judged.iter().find(|j| matches!(j.claim.check, Check::Peer(_))).unwrap().clone();
-    peer.claim.check = Check::Peer(Peer { name: HOSTILE.to_owned(), tolerance: 1e-6 });
+    peer.claim.check = Check::Peer(Peer { name: PeerName::User, tolerance: 1e-6 });
     peer.measured = Some(0.5);
     judged.push(peer);
     suite.title = HOSTILE.to_owned();

@@ -66,7 +66,7 @@ pub(super) fn subject(run: &Run<'_>, noun: &str) -> Markup {
 /// The claims that compare with another program: its name, the difference, and the claim.
 fn peers(judged: &[Judged]) -> impl Iterator<Item = (&str, f64, &Judged)> {
     judged.iter().filter_map(|judged| match (&judged.claim.check, judged.measured) {
-        (Check::Peer(peer), Some(measured)) => Some((peer.name.as_str(), measured, judged)),
+        (Check::Peer(peer), Some(measured)) => Some((<&str>::from(peer.name), measured, judged)),
         _ => None,
     })
 }
@@ -290,7 +290,7 @@ fn order_table(scene: &str, mine: &[&Judged]) -> Table {
     let caption =
         format!("Scene {scene}: observed order, half-width of its 95 % interval, and the formal order in brackets");
     let header = ["velocity", "boundaries"].into_iter().chain(quantities.iter().map(|q| words_for(*q)));
-    let mut variants = grouped(mine.iter().copied(), |j| (j.claim.velocity, j.claim.boundaries));
+    let mut variants = grouped(mine.iter().copied(), |j| j.claim.rules());
     variants.sort_by_key(|((velocity, boundaries), _)| (*velocity as usize, *boundaries as usize));
     Table::grid(caption, header).numbers(2..9).rows(variants, |((velocity, boundaries), members)| {
         let of = |quantity: &Quantity| members.iter().find(|j| j.claim.quantity == Some(*quantity)).copied();

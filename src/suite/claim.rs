@@ -9,7 +9,7 @@ use std::fmt;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-use super::checks::{Check, USER};
+use super::checks::{Asked, Check, Named, PeerName};
 use super::verdict::Verdict;
 use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::central_difference::{Boundaries, VelocityAt};
@@ -140,12 +140,12 @@ pub struct Claim {
     /// Quantity, where the claim has one.
     #[schemars(with = "Option<String>")]
     pub quantity: Option<Quantity>,
-    /// Velocity rule, where the check has one.
+    /// Velocity rule, where the claim has one.
     #[serde(skip)]
-    pub velocity: VelocityAt,
-    /// Boundary rule, where the check has one.
+    pub velocity: Option<VelocityAt>,
+    /// Boundary rule, where the claim has one.
     #[serde(skip)]
-    pub boundaries: Boundaries,
+    pub boundaries: Option<Boundaries>,
     /// Largest admissible value.
     pub limit: f64,
     /// Unit of both.
@@ -158,6 +158,25 @@ impl Claim {
     /// The unit in words that say what the number is of: `0.03 off the formal order`.
     pub fn unit_in_words(&self) -> &'static str {
         in_words(self.unit)
+    }
+
+    /// The rules of the scheme, where the check asks for them.
+    pub fn rules(&self) -> (VelocityAt, Boundaries) {
+        (self.velocity.unwrap_or_default(), self.boundaries.unwrap_or_default())
+    }
+
+    /// The first of what the claim names, with its key, that its check has not `asked` for: it would measure the same without.
+    pub(super) fn not_asked(&self, asked: &Asked) -> Option<(&'static str, String)> {
+        let about = |method: &MethodName| self.check.is_about(*method);
+        let named = [
+            (Named::Scene, "scenes", self.scene.clone()),
+            (Named::Method, "methods", self.method.filter(|method| !about(method)).map(|method| method.to_string())),
+            (Named::Quantity, "quantities", self.quantity.map(|quantity| quantity.to_string())),
+            (Named::Velocity, "velocities", self.velocity.map(|rule| rule.to_string())),
+            (Named::Boundaries, "boundaries", self.boundaries.map(|rule| rule.to_string())),
+        ];
+        let mut not_asked = named.into_iter().filter(|(part, ..)| !asked.has(*part));
+        not_asked.find_map(|(_, key, name)| Some((key, name?)))
     }
 
     /// First part of the id, by which reports group claims.
@@ -179,8 +198,8 @@ impl ClaimSpec {
             scene: None,
             method: None,
             quantity: None,
-            velocity: VelocityAt::default(),
-            boundaries: Boundaries::default(),
+            velocity: None,
+            boundaries: None,
             limit: *self.limit.get_ref(),
             unit: check.unit(),
             reason: self.reason.clone(),
@@ -190,15 +209,16 @@ impl ClaimSpec {
             stem.rsplit('/').next().unwrap_or(stem).to_owned()
         };
         let claims = varied(&[claim], &self.scenes, stem, |claim, name| claim.scene = Some(name.get_ref().clone()));
-        let claims = varied(&claims, &self.velocities, ToString::to_string, |claim, rule| claim.velocity = *rule);
-        let claims = varied(&claims, &self.boundaries, ToString::to_string, |claim, rule| claim.boundaries = *rule);
+        let claims = varied(&claims, &self.velocities, ToString::to_string, |claim, rule| claim.velocity = Some(*rule));
+        let claims =
+            varied(&claims, &self.boundaries, ToString::to_string, |claim, rule| claim.boundaries = Some(*rule));
         let claims = varied(&claims, &self.methods, ToString::to_string, |claim, name| claim.method = Some(*name));
         varied(&claims, &self.quantities, ToString::to_string, |claim, name| claim.quantity = Some(*name))
     }
 }
 
 /// Units of numbers of things.
-const THINGS: [&str; 11] = [
+pub(super) const THINGS: [&str; 11] = [
     "families",
     "claims",
     "violations",
@@ -453,7 +473,7 @@ impl Judged {
     /// `None` where nothing was measured, for counts and limits of zero, and for a program given with `--peer`: no limit
     /// of a suite knows how good it is.
     pub fn looseness(&self) -> Option<f64> {
-        let is_given = matches!(&self.claim.check, Check::Peer(peer) if peer.name == USER);
+        let is_given = matches!(&self.claim.check, Check::Peer(peer) if peer.name == PeerName::User);
         let is_decisive = self.claim.limit > 0.0 && self.resolution.is_finite() && !is_given;
         self.measured.filter(|_| is_decisive).map(|measured| self.claim.limit / measured.max(self.resolution))
     }

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -10,8 +9,8 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 
-use super::checks::{Check, Context, Memo, PeerAnswers, Subject};
-use super::claim::{Claim, ClaimSpec, Judged, NotMeasured};
+use super::checks::{Asked, Check, Context, Memo, PeerAnswers, Subject};
+use super::claim::{Claim, ClaimSpec, Judged, NotMeasured, THINGS};
 use super::program::Program;
 use crate::exchange::SceneError;
 use crate::exchange::decode::decode;
@@ -167,7 +166,15 @@ impl Suite {
                 ));
             }
             let unit = spec.check.get_ref().unit();
-            if unit.starts_with("wrong ") && limit >= 1.0 {
+            if unit == "relative" && limit >= 1.0 {
+                return Err(refuse(
+                    spec.limit.span(),
+                    format!("a relative difference of {} says nothing", Shown(limit)),
+                    "a number below one",
+                    "write the largest difference that you would accept",
+                ));
+            }
+            if THINGS.contains(&unit) && limit >= 1.0 {
                 return Err(refuse(
                     spec.limit.span(),
                     format!("a limit of {} lets {unit} pass", Shown(limit)),
@@ -248,7 +255,7 @@ impl Suite {
             let those = self.claims.iter().enumerate().filter(|(_, claim)| claim.check.is_last() == is_last);
             let (of_peers, others): (Vec<_>, Vec<_>) = those.partition(|(_, c)| matches!(c.check, Check::Peer(_)));
             let judge_one = |(place, claim)| {
-                let judged = judge(Subject { claim, context, flaw: None, asks_method: &AtomicBool::new(false) });
+                let judged = judge(Subject { claim, context, flaw: None, asked: &Asked::default() });
                 done(&judged);
                 (place, judged)
             };
@@ -306,12 +313,9 @@ pub(super) fn judge(subject: Subject<'_>) -> Judged {
         Some(method) => Err(NotMeasured::lacks(format!("this build leaves out {method}"))),
         None => claim.check.measure(&subject),
     };
-    let found = found.and_then(|measured| match claim.method {
-        // It would be measured the same under the name of any method.
-        Some(method) if !(subject.asks_method.load(Ordering::Relaxed) || claim.check.is_about(method)) => {
-            Err(NotMeasured::broken(format!("this check does not ask {method}: remove `methods`")))
-        }
-        _ => Ok(measured),
+    let found = found.and_then(|measured| match claim.not_asked(subject.asked) {
+        Some((key, name)) => Err(NotMeasured::broken(format!("this check does not ask for {name}: remove `{key}`"))),
+        None => Ok(measured),
     });
     Judged::new(claim.clone(), found, started.elapsed().as_secs_f64() * 1e3)
 }

@@ -287,7 +287,7 @@ fn unit_of_length_is_the_nearest_boundary_or_the_shortest_length_of_the_law() {
     let light = Problem { mass: 1e-30, ..of_stages(1.0, 3.0, INF, &[stage(4.5e-30, 0.0, 0.0, 1e300, INF)]) };
     assert!((length_of(&light) - 1.0).abs() < 1e-15);
     let start = State { time: 1.0, depth: 10.0, velocity: 7.0 };
-    let stage = Reduced { law: still, own: None, length: 2.0, unit_speed: 4.0, start, speed: 1.75 };
+    let stage = Reduced { law: still, own: None, length: 2.0, unit_speed: 4.0, start, speed: 1.75, falls: false };
     let state = stage.state(Node { time: 3.0, depth: 5.0, velocity: 6.0 });
     assert_eq!(state, State { time: 2.5, depth: 20.0, velocity: 24.0 });
 }

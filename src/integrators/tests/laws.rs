@@ -580,6 +580,27 @@ fn a_force_without_bound_at_rest_brings_it_to_rest() {
     }
 }
 
+/// `P (V/v1)^n`, n < 1, stops it at `M V0²/((2 - n) F0)` after `M V0/((1 - n) F0)`, much of which passes at speeds below any tolerance
+/// where n is near one. Beside a static force of a millionth the series tell.
+#[test]
+fn a_force_that_falls_to_rest_brings_it_to_rest_in_its_time() {
+    for n in [0.2, 0.5, 0.8, 0.95] {
+        let (vanishing, held) = (format!("P*(V/v1)^{n}"), format!("P*((V/v1)^{n} + 1e-6)"));
+        let problems = [vanishing, held].map(|force| problem(&force, 300.0));
+        let force = problems[0].force(0, 0.0, 300.0);
+        let known = [2.0 * 300.0 * 300.0 / ((2.0 - n) * force), 2.0 * 300.0 / ((1.0 - n) * force)];
+        let series = Taylor::default().solve(&problems[1], Detail::End).unwrap().end;
+        for (name, method) in methods(1e-8) {
+            for (problem, [depth, time]) in problems.iter().zip([known, [series.depth, series.time]]) {
+                let end = method.integrator().solve(problem, Detail::End).unwrap().end;
+                let error = (end.depth / depth - 1.0).abs().max((end.time / time - 1.0).abs());
+                let allowed = if is_exact(name) { 1e-12 } else { 100.0 * name.promise_at(1e-8) };
+                assert!(error <= allowed, "{name}, n = {n}: {error:e}, {end}");
+            }
+        }
+    }
+}
+
 /// Behind a stage in which its error bound outgrew its energy: `-R (1 + V/v1)` drives from rest to V over `M v1²/R (u - ln(1 + u))`,
 /// u = V/v1, and 3 MN stop it.
 #[test]

@@ -39,7 +39,7 @@ check! {
         #[serde(deserialize_with = "crate::suite::checks::count")]
         points: usize,
     } in Events, "error bars", by margin, compares (Method | FiftyDigits);
-    /// Outcome of the method: 0 if it is right or undecided, 1 if it is wrong.
+    /// Outcome of the method: 0 if it is right, 1 if it is wrong; undecided where the method is.
     Outcome {
         /// The right outcome.
         is: physics::Outcome,
@@ -58,7 +58,7 @@ check! {
 
 fn reference(&Reference { random }: &Reference, subject: &Subject<'_>) -> Found {
     let mut worst = Worst::default();
-    if let Some(name) = &subject.claim.scene {
+    if let Some(name) = subject.named_scene() {
         let errors = random_scenes::closed_form_errors(subject.scene()?)?;
         let (error, quantity) = errors.worst().ok_or_else(|| NotMeasured::skip("the stages have no reference"))?;
         worst.take(error, || format!("in the {quantity} of {name}"));
@@ -157,15 +157,17 @@ fn margin(&Margin { points }: &Margin, subject: &Subject<'_>) -> Found {
 
 /// `margin 5e-15 +- 2e-15`.
 fn margin_of(flight: &Flight) -> String {
-    let [margin, error] =
-        [flight.exit_margin, flight.exit_margin_error].map(|value| or_dash(value, |value| format!("{value:.2e}")));
-    format!("margin {margin} +- {error}")
+    let Some(margin) = flight.exit_margin else { return "no margin".to_owned() };
+    format!("margin {margin:.2e} +- {}", or_dash(flight.exit_margin_error, |error| format!("{error:.2e}")))
 }
 
 fn outcome(&Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::End)?;
-    let right = flight.outcome == is || flight.outcome == physics::Outcome::Undecided;
-    Ok(Measurement::count(usize::from(!right)).remark(format!("{}, {}", flight.outcome, margin_of(&flight))))
+    let remark = format!("{}, {}", flight.outcome, margin_of(&flight));
+    if flight.outcome == physics::Outcome::Undecided && is != flight.outcome {
+        return Err(NotMeasured::undecided(remark));
+    }
+    Ok(Measurement::count(usize::from(flight.outcome != is)).remark(remark))
 }
 
 fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
@@ -174,6 +176,9 @@ fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
     applies!(subject.method_name() != with, "a method agrees with itself");
     let one = subject.solution(Detail::Events)?;
     let other = solve(&build(with, &MethodOptions::default())?, problem, Detail::Events)?;
+    if let Some(open) = [&one, &other].into_iter().find(|flight| flight.outcome == physics::Outcome::Undecided) {
+        return Err(NotMeasured::undecided(format!("undecided: {}", margin_of(open))));
+    }
     applies!(!is_fixed(quantity, &other), "{FIXED}");
     let is_one_solver = [subject.method_name(), with].contains(&MethodName::Adaptive) && one.end == other.end;
     applies!(!is_one_solver, "adaptive solves this scene by the other method");
@@ -206,11 +211,15 @@ fn faults(problem: &Problem, flight: &Flight) -> Vec<String> {
         let end = problem.stages[index].end;
         let kind = EventKind::boundary(problem, index);
         let times = flight.events.iter().filter(|e| e.kind == kind).count();
-        let reached = end <= flight.end.depth && end <= problem.exit_depth;
+        // A stage that ends at a speed or on a condition has no place.
+        let has_place = end.is_finite();
+        let reached =
+            if has_place { end <= flight.end.depth && end <= problem.exit_depth } else { index < flight.stage };
         if times != usize::from(reached) {
             faults.push(format!("end of stage {index} listed {times} times"));
         }
-        if let Some(state) = flight.at(kind)
+        if has_place
+            && let Some(state) = flight.at(kind)
             && state.depth != end
         {
             faults.push(format!("end of stage {index} at {} and not at {end}", state.depth));

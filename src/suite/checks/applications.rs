@@ -87,6 +87,8 @@ fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
 fn thickness_limit(subject: &Subject<'_>) -> Found {
     let scene = subject.scene()?;
     let speed = scene.velocity.ok_or_else(|| NotMeasured::skip("the scene gives no impact speed"))?;
+    let is_layered = scene.concrete().is_some_and(|concrete| !concrete.layers.is_empty());
+    applies!(!is_layered && subject.problem()?.laws.is_empty(), "layers have their thickness, and laws no exact V_c");
     let method = subject.method(None)?;
     let mut worst = Worst::default();
     let mut bounds = Vec::new();

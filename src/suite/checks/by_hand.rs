@@ -247,7 +247,7 @@ fn steps_by_hand(&StepsByHand { count }: &StepsByHand, subject: &Subject<'_>) ->
     for kind in KINDS {
         for (index, problem) in problems(subject, kind, count)?.iter().enumerate() {
             let name = || format!("in problem {index} of {kind:?}, {problem:?}");
-            let (velocity, boundaries) = (subject.claim.velocity, subject.claim.boundaries);
+            let (velocity, boundaries) = (subject.velocity(), subject.boundaries());
             let duration = in_double_double(problem)?.end.time.hi();
             let dt = duration * random.log_uniform(2e-3, 1e-2);
             let scheme = CentralDifference::uniform(dt, velocity, boundaries);

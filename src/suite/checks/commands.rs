@@ -24,7 +24,7 @@ check! {
         /// File of `verification/transcript`, without its ending.
         runs: String,
         /// Relative tolerance of the numbers.
-        #[serde(deserialize_with = "crate::suite::checks::positive")]
+        #[serde(deserialize_with = "crate::suite::checks::share")]
         tolerance: f64,
     } in Commands, "lines that differ", by recorded, compares nothing;
 

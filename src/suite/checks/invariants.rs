@@ -1,7 +1,7 @@
 //! What holds whatever the answer is: energy, reversal in time, similarity, composition.
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
-use super::{Subject, Worst, off, solve, worse, worst_of};
+use super::{LAWS, Subject, Worst, off, solve, worse, worst_of};
 use crate::integrators::{Detail, Flight};
 use crate::physics::{Problem, Scene, Stage, Stages, State, Target};
 use crate::studies::error::{free_quantities, signed_error, value_of};
@@ -41,6 +41,7 @@ check! {
 /// [`work`]: nothing of the method's own integration enters.
 fn energy_balance(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
+    applies!(problem.laws.is_empty(), "{LAWS}");
     let is_viscous = problem.stages.iter().any(|s| s.viscosity != 0.0);
     applies!(!is_viscous, "the work of a viscous force is not smooth in x at rest");
     let flight = subject.solution(Detail::Trajectory)?;
@@ -96,6 +97,7 @@ fn work(stage: &Stage, mass: f64, depth: f64, distance: f64, speed: f64) -> f64 
 
 fn time_reversal(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
+    applies!(problem.laws.is_empty(), "{LAWS}");
     let there = subject.solution(Detail::Events)?;
     let back = reversed(problem, &there)
         .ok_or_else(|| NotMeasured::skip("from rest, or through viscosity, there is no motion back"))?;
@@ -106,11 +108,11 @@ fn time_reversal(subject: &Subject<'_>) -> Found {
 }
 
 fn similarity(&Similarity { length, mass, time }: &Similarity, subject: &Subject<'_>) -> Found {
-    holds!([length, mass, time] != [1.0; 3], "scaled by one, the scene is compared with itself");
+    let units = [length, mass, time];
+    holds!(units.iter().all(|unit| *unit > 0.0 && unit.is_finite()), "a unit is a number above zero");
+    holds!(units != [1.0; 3], "scaled by one, the scene is compared with itself");
     let problem = subject.problem()?;
-    if !problem.laws.is_empty() {
-        return Err(NotMeasured::skip("the parameters of an expression would have to be scaled, too"));
-    }
+    applies!(problem.laws.is_empty(), "{LAWS}");
     let plain = subject.solution(Detail::Events)?;
     let scaled = in_units(problem, Units { length, mass, time });
     let scaled = solve(&subject.method(None)?, &scaled, Detail::Events)?;
@@ -129,6 +131,7 @@ fn split(&Split { pieces }: &Split, subject: &Subject<'_>) -> Found {
     holds!(pieces > 1, "one piece is the whole stage, compared with itself");
     let problem = subject.problem()?;
     let plain = subject.solution(Detail::Events)?;
+    applies!(problem.laws.is_empty(), "{LAWS}");
     let mut stages = Stages::new();
     for index in 0..problem.stages.len() {
         let law = problem.stages[index];

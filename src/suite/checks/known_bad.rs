@@ -12,7 +12,7 @@ use crate::suite::suite::judge;
 use crate::suite::verdict::Verdict;
 
 check! {
-    /// A claim that is wrong on purpose, judged as any other: 0 if it comes out as it must, 1 if not.
+    /// A claim that is wrong on purpose, judged as any other: 0 if it comes out as it must, 1 if not. Without its flaw it must pass.
     KnownBad {
         /// The verdict that is right: `failed` or `undecided`.
         is: Bad,
@@ -103,7 +103,8 @@ impl Flaw {
                     flight.events.insert(index, flight.events[index]);
                 }
             }
-            Self::OtherOutcome(_) => {
+            Self::OtherOutcome(false) => {}
+            Self::OtherOutcome(true) => {
                 flight.outcome = if flight.outcome.is_stop() { Outcome::Perforated } else { Outcome::Stopped };
             }
             Self::MarginOff(bounds) => {
@@ -143,6 +144,11 @@ impl Integrator for Flawed {
 fn known_bad(KnownBad { is, flaw, limit, check }: &KnownBad, subject: &Subject<'_>) -> Found {
     let claim = Claim { check: (**check).clone(), limit: *limit, unit: check.unit(), ..subject.claim.clone() };
     let judged = judge(Subject { claim: &claim, flaw: *flaw, ..*subject });
+    if flaw.is_some() && !judged.lacks {
+        let sound = judge(Subject { claim: &claim, flaw: None, ..*subject });
+        let is_sound = sound.verdict == Verdict::Passed;
+        holds!(is_sound, "without the flaw it is {}, too: {}", sound.verdict.name(), sound.remark);
+    }
     if judged.lacks {
         return Err(NotMeasured::lacks(judged.remark));
     }

@@ -94,18 +94,20 @@ fn order(&Manufactured { path, order: expected }: &Manufactured, subject: &Subje
     let problem = Problem::of_stages(MASS, impact_speed, [FIRST, SECOND]);
     let ends = path.ends();
     let (amplitude, ..) = path_at(ends.len() - 1, END);
-    let error =
-        |size: f64| -> Found<StepError> {
-            let states = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries)
-                .forced_states(&problem, |stage, t| source(&problem, stage, t), ends)?;
-            let off = |state: &State| {
-                let stage = ends.iter().take_while(|&&end| end < state.time).count().min(ends.len() - 1);
-                state.depth - path_at(stage, state.time).0
-            };
-            // `f64::max` would drop a NaN.
-            let worst = states.iter().map(off).fold(0.0, |a: f64, b| if b.abs() <= a.abs() { a } else { b });
-            Ok(StepError::new(size, worst / amplitude))
+    let error = |size: f64| -> Found<StepError> {
+        let states = CentralDifference::uniform(size, subject.velocity(), subject.boundaries()).forced_states(
+            &problem,
+            |stage, t| source(&problem, stage, t),
+            ends,
+        )?;
+        let off = |state: &State| {
+            let stage = ends.iter().take_while(|&&end| end < state.time).count().min(ends.len() - 1);
+            state.depth - path_at(stage, state.time).0
         };
+        // `f64::max` would drop a NaN.
+        let worst = states.iter().map(off).fold(0.0, |a: f64, b| if b.abs() <= a.abs() { a } else { b });
+        Ok(StepError::new(size, worst / amplitude))
+    };
     let [from, to] = STEPS_OVER_TIME.map(|share| share * END);
     let sizes = Ladder { from, to, points: POINTS, seed: subject.context.seed }.sizes();
     let errors: Vec<StepError> = sizes.into_par_iter().map(error).collect::<Result<_, _>>()?;

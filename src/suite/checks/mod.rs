@@ -104,7 +104,7 @@ use super::recorded::shipped;
 use super::roads::Source;
 use super::suite::Scenes;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
-use crate::integrators::{Detail, Flight};
+use crate::integrators::{Boundaries, Detail, Flight, VelocityAt};
 use crate::physics::reference::Conditions;
 use crate::physics::{Advice, Problem, Scene};
 use crate::studies::convergence::QuantityStudy;
@@ -197,6 +197,11 @@ fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     number(from, |number| number > 0.0, "a finite number above zero")
 }
 
+/// Reads a number above zero and below one.
+fn share<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    number(from, |number| number > 0.0 && number < 1.0, "a number above zero and below one")
+}
+
 /// Reads a finite number, zero or above.
 fn not_negative<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     number(from, |number| number >= 0.0, "a finite number, zero or above")
@@ -269,13 +274,51 @@ pub struct Subject<'a> {
     pub context: Context<'a>,
     /// What is wrong on purpose with the solutions of its method.
     pub flaw: Option<Flaw>,
-    /// Set where the check asks for the method of the claim.
-    pub asks_method: &'a AtomicBool,
+    /// What the check has asked for of what the claim names.
+    pub asked: &'a Asked,
+}
+
+/// What a claim may name for its check to ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Named {
+    /// `scenes`.
+    Scene,
+    /// `methods`.
+    Method,
+    /// `quantities`.
+    Quantity,
+    /// `velocities`.
+    Velocity,
+    /// `boundaries`.
+    Boundaries,
+}
+
+/// The parts of a claim that its check has asked for: what it does not ask for does not change what it measures.
+#[derive(Debug, Default)]
+pub struct Asked([AtomicBool; 5]);
+
+impl Asked {
+    /// Whether `part` was asked for.
+    pub fn has(&self, part: Named) -> bool {
+        self.0[part as usize].load(Ordering::Relaxed)
+    }
 }
 
 impl<'a> Subject<'a> {
+    /// What the claim names, noted as asked for.
+    fn ask<T>(&self, part: Named, named: Option<T>) -> Option<T> {
+        self.asked.0[part as usize].store(true, Ordering::Relaxed);
+        named
+    }
+
+    /// Name of the scene of the claim, if it has one.
+    fn named_scene(&self) -> Option<&'a str> {
+        self.ask(Named::Scene, self.claim.scene.as_deref())
+    }
+
+    /// Name of the scene of the claim.
     fn scene_name(&self) -> Found<&'a str> {
-        self.claim.scene.as_deref().ok_or_else(|| NotMeasured::broken("the claim names no scene"))
+        self.named_scene().ok_or_else(|| NotMeasured::broken("the claim names no scene"))
     }
 
     /// Scene of the claim.
@@ -289,15 +332,29 @@ impl<'a> Subject<'a> {
         self.context.scenes.problem(self.scene_name()?).map_err(NotMeasured::broken)
     }
 
+    /// Quantity of the claim, if it has one.
+    fn named_quantity(&self) -> Option<Quantity> {
+        self.ask(Named::Quantity, self.claim.quantity)
+    }
+
     /// Quantity of the claim.
     fn quantity(&self) -> Found<Quantity> {
-        self.claim.quantity.ok_or_else(|| NotMeasured::broken("the claim names no quantity"))
+        self.named_quantity().ok_or_else(|| NotMeasured::broken("the claim names no quantity"))
+    }
+
+    /// Velocity rule of the claim.
+    fn velocity(&self) -> VelocityAt {
+        self.ask(Named::Velocity, self.claim.velocity).unwrap_or_default()
+    }
+
+    /// Boundary rule of the claim.
+    fn boundaries(&self) -> Boundaries {
+        self.ask(Named::Boundaries, self.claim.boundaries).unwrap_or_default()
     }
 
     /// Name of the claim's method; the Taylor series where it names none.
     fn method_name(&self) -> MethodName {
-        self.asks_method.store(true, Ordering::Relaxed);
-        self.claim.method.unwrap_or_default()
+        self.ask(Named::Method, self.claim.method).unwrap_or_default()
     }
 
     /// The claim's method at a tolerance, or at its default.
@@ -360,11 +417,12 @@ fn refusal_or_failure(error: impl Advice) -> NotMeasured {
 
 /// Why a claim about a quantity is skipped.
 pub const FIXED: &str = "the scene fixes this quantity";
+const LAWS: &str = "a stage has a law of its own, or ends elsewhere than at a place";
 const NO_FAR_SIDE: &str = "a target without a far side has no critical velocity";
 
 /// Relative difference of `value` from `exact`.
 fn off(value: f64, exact: f64) -> f64 {
-    (value / exact - 1.0).abs()
+    if value == exact { 0.0 } else { (value / exact - 1.0).abs() }
 }
 
 /// The larger; NaN if either is.

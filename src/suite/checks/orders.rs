@@ -69,16 +69,17 @@ pub enum StepPattern {
 }
 
 fn fixed_step(&Order { order: expected, steps: pattern, points }: &Order, subject: &Subject<'_>) -> Found {
-    let (claim, seed, points) = (subject.claim, subject.context.seed, points.unwrap_or(60));
-    let critical = claim.quantity == Some(Quantity::CriticalVelocity);
-    let key = format!("{:?} {} {} {pattern:?} {points} {critical}", claim.scene, claim.velocity, claim.boundaries);
+    let (seed, points) = (subject.context.seed, points.unwrap_or(60));
+    let (velocity, boundaries) = (subject.velocity(), subject.boundaries());
+    let critical = subject.quantity()? == Quantity::CriticalVelocity;
+    let key = format!("{} {velocity} {boundaries} {pattern:?} {points} {critical}", subject.scene_name()?);
     let study = shared_study(subject, key, |exact| {
         let [from, to] = STEPS_OVER_TIME.map(|share| share * exact.end.time);
         // The shortest steps take most of the time, and narrow no interval much.
         let from = 3.0 * from;
         let scheme = |size| CentralDifference {
             steps: steps(pattern, size, seed),
-            ..CentralDifference::uniform(size, claim.velocity, claim.boundaries)
+            ..CentralDifference::uniform(size, velocity, boundaries)
         };
         let range = Some([from, to]);
         let study = FixedSteps { scheme: &scheme, range, points, seed, with_critical: critical, progress: &|_, _| {} };
@@ -110,7 +111,7 @@ fn work_order(&WorkOrder { from, to }: &WorkOrder, subject: &Subject<'_>) -> Fou
 fn values_at(subject: &Subject<'_>, quantity: Quantity, sizes: &[f64]) -> Found<Vec<GridValue>> {
     let mut grids = Vec::new();
     for &size in sizes {
-        let scheme = CentralDifference::uniform(size, subject.claim.velocity, subject.claim.boundaries);
+        let scheme = CentralDifference::uniform(size, subject.velocity(), subject.boundaries());
         let flight = scheme.solve(subject.problem()?, Detail::Events)?;
         grids.extend(value_of(quantity, &flight).map(|value| GridValue::new(size, value)));
     }
@@ -137,11 +138,11 @@ fn self_convergence(subject: &Subject<'_>) -> Found {
 /// Steps and landing make the error smooth only for [`Boundaries::Landed`]; with any other rule a triple shows noise.
 fn grid_convergence(subject: &Subject<'_>) -> Found {
     let quantity = free_quantity(subject)?;
-    let claim = subject.claim;
-    let lands = claim.boundaries == Boundaries::Landed;
+    let boundaries = subject.boundaries();
+    let lands = boundaries == Boundaries::Landed;
     applies!(lands, "three runs show an order only where the steps land on k d");
     let exact = subject.truth()?.flight;
-    let formal = formal_order(claim.velocity, claim.boundaries, &Path::of(subject.problem()?, &exact), quantity)
+    let formal = formal_order(subject.velocity(), boundaries, &Path::of(subject.problem()?, &exact), quantity)
         .ok_or_else(|| NotMeasured::skip("no formal order"))?;
     let truth = value_of(quantity, &exact).ok_or_else(|| NotMeasured::skip(NOT_OF_A_FLIGHT))?;
     let sizes = [1.0 / 20_011.3, 1.0 / 12_007.7, 1.0 / 7_001.9].map(|share| share * exact.end.time);
@@ -162,7 +163,7 @@ const NOT_OF_A_FLIGHT: &str = "no such quantity of one solution";
 
 fn tolerance_study(subject: &Subject<'_>, from: f64, to: f64) -> Found<QuantityStudy> {
     let ladder = Ladder { from: to.min(from), to: to.max(from), points: 40, seed: subject.context.seed };
-    let key = format!("{:?} {} {from} {to}", subject.claim.scene, subject.method_name());
+    let key = format!("{} {} {from} {to}", subject.scene_name()?, subject.method_name());
     shared_study(subject, key, |exact| {
         Ok(convergence::of_tolerances(subject.problem()?, exact, subject.method_name(), ladder)?)
     })

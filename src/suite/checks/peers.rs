@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
+use schemars::JsonSchema;
+use serde::Deserialize;
+
 use super::super::claim::{Found, Measurement, NotMeasured};
 use super::{Subject, Worst};
 use crate::exchange::peers::{self, NO_LAWS, PeerAnswer, PeerRequest, PeerStartError, Recording, recordings};
@@ -13,8 +16,8 @@ use crate::studies::diagnosis;
 check! {
     /// Answers of another program: largest difference from the claim's method, over its conditioning and the tolerance.
     Peer {
-        /// Name of the recorded peer, or `user` for the one given on the command line.
-        name: String,
+        /// The recorded peer, or `user` for the one given on the command line.
+        name: PeerName,
         /// Relative tolerance claimed.
         #[serde(deserialize_with = "crate::suite::checks::positive")]
         tolerance: f64,
@@ -46,6 +49,23 @@ check! {
         #[serde(deserialize_with = "crate::suite::checks::count")]
         questions: usize,
     } in CrossCode, "solvers", by told_solvers, compares nothing;
+}
+
+/// A program that claims ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema, strum::Display, strum::IntoStaticStr)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum PeerName {
+    /// heyoka, Taylor series.
+    HeyokaTaylor,
+    /// CVODE of SUNDIALS, Adams' methods.
+    SundaeAdams,
+    /// CVODE of SUNDIALS, backward differentiation.
+    SundaeBdf,
+    /// IDA of SUNDIALS.
+    SundaeIda,
+    /// The one given on the command line.
+    User,
 }
 
 /// Names by which claims ask for the recorded programs, in the order of [`recordings`].
@@ -205,9 +225,9 @@ fn is_same(a: &Problem, b: &Problem) -> bool {
     a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| close(*a, *b))
 }
 
-fn agreement(Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {
+fn agreement(&Peer { name, tolerance }: &Peer, subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
-    let theirs = subject.context.peers.answer(name, subject.scene_name()?, problem)?;
+    let theirs = subject.context.peers.answer(name.into(), subject.scene_name()?, problem)?;
     let ours = subject.solution(Detail::Events)?;
     let differences = theirs.differences_from(&ours, problem).ok_or_else(|| {
         NotMeasured::broken(format!(

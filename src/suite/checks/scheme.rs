@@ -53,13 +53,13 @@ check! {
 
 /// Solution by the claim's velocity rule and `boundaries` at equal steps of `dt` (s).
 fn at_step(subject: &Subject<'_>, boundaries: Boundaries, dt: f64) -> Found<Flight> {
-    let scheme = CentralDifference::uniform(dt, subject.claim.velocity, boundaries);
+    let scheme = CentralDifference::uniform(dt, subject.velocity(), boundaries);
     Ok(scheme.solve(subject.problem()?, Detail::Events)?)
 }
 
 /// First `steps` nodes of the claim's scheme at equal steps of `dt` (s), boundaries ignored.
 fn free_states(subject: &Subject<'_>, problem: &Problem, dt: f64, steps: usize) -> Found<Vec<State>> {
-    Ok(CentralDifference::uniform(dt, subject.claim.velocity, Boundaries::StepEnd).free_states(problem, steps)?)
+    Ok(CentralDifference::uniform(dt, subject.velocity(), Boundaries::StepEnd).free_states(problem, steps)?)
 }
 
 /// Mean of `of` over `places`.
@@ -122,11 +122,11 @@ fn clock(&Clock { steps }: &Clock, subject: &Subject<'_>) -> Found {
 /// At rest in the crater `X(dt)/X - 1 -> (w dt)²/8` and `T(dt)/T - 1 -> -(w dt)²/24`, rest located.
 fn crater_constant(subject: &Subject<'_>) -> Found {
     let (exact, w) = rest_in_crater(subject)?;
-    let is_located = subject.claim.boundaries != Boundaries::StepEnd;
+    let is_located = subject.boundaries() != Boundaries::StepEnd;
     applies!(is_located, "step ends leave a depth error anywhere between 0 and (w dt)²/8");
     // Richardson over two steps removes the next even power; what remains is (w dt)^4.
     let ratio = |w_dt: f64| -> Found<f64> {
-        let flight = at_step(subject, subject.claim.boundaries, w_dt / w)?;
+        let flight = at_step(subject, subject.boundaries(), w_dt / w)?;
         Ok(match subject.quantity()? {
             Quantity::Depth => (flight.end.depth / exact.end.depth - 1.0) / (w_dt * w_dt) * 8.0,
             Quantity::Time => (flight.end.time / exact.end.time - 1.0) / (w_dt * w_dt) * -24.0,
@@ -165,8 +165,8 @@ fn crater_band(subject: &Subject<'_>) -> Found {
 /// ```
 fn lagged_constant(subject: &Subject<'_>) -> Found {
     let problem = subject.problem()?;
-    let claim = subject.claim;
-    applies!(claim.velocity == VelocityAt::LaggedHalfStep, "only a lagged drag has this constant");
+    let (quantity, boundaries) = (subject.named_quantity(), subject.boundaries());
+    applies!(subject.velocity() == VelocityAt::LaggedHalfStep, "only a lagged drag has this constant");
     let exact = subject.truth()?.flight;
     let is_plain = subject.scene()?.concrete().is_some_and(|concrete| concrete.layers.is_empty());
     let ends_in = |stage: &&Stage| is_plain && exact.stage + 1 == problem.stages.len() && stage.drag > 0.0;
@@ -177,28 +177,28 @@ fn lagged_constant(subject: &Subject<'_>) -> Found {
         let (left, right) = (problem.stages[i].force(at.depth, at.velocity), tunnel.force(at.depth, at.velocity));
         (left - right).abs() <= 1e-9 * right.abs()
     });
-    let has_limit = continuous || claim.boundaries == Boundaries::Landed;
+    let has_limit = continuous || boundaries == Boundaries::Landed;
     applies!(has_limit, "after a jump that is not landed on, error/dt has no limit");
     let (p, q, mass) = (tunnel.static_force, tunnel.drag, problem.mass);
     let entry = exact.crater_end().unwrap_or(State { time: 0.0, depth: 0.0, velocity: problem.impact_speed });
     let end = exact.end;
     let lost = (entry.velocity - end.velocity) - p * (end.time - entry.time) / mass;
     let perforated = !exact.outcome.is_stop();
-    let predicted = match (claim.quantity, perforated) {
+    let predicted = match (quantity, perforated) {
         (Some(Quantity::Depth), false) => -lost,
         (Some(Quantity::Time), false) => -q * (end.depth - entry.depth) / mass,
         (Some(Quantity::Velocity), true) => -(p + q * end.velocity * end.velocity) * lost / (mass * end.velocity),
         (Some(Quantity::Time), true) => lost / end.velocity - q * (end.depth - entry.depth) / mass,
         _ => return Err(NotMeasured::skip("the scene fixes this quantity, or no constant is known for it")),
     };
-    let has_limit = claim.boundaries != Boundaries::StepEnd || claim.quantity == Some(Quantity::Depth);
+    let has_limit = boundaries != Boundaries::StepEnd || quantity == Some(Quantity::Depth);
     applies!(has_limit, "with step ends only the depth has a limit of error/dt");
     // error(dt)/dt = C + C' dt: extrapolated from a step and twice the step, averaged over steps without common ratio.
     let error = |steps: f64| -> Found<f64> {
         let dt = end.time / steps;
-        let flight = at_step(subject, claim.boundaries, dt)?;
+        let flight = at_step(subject, boundaries, dt)?;
         holds!(flight.outcome.agrees_with(exact.outcome), "the scheme has another outcome at this step");
-        let difference = match claim.quantity {
+        let difference = match quantity {
             Some(Quantity::Depth) => flight.end.depth - end.depth,
             Some(Quantity::Time) => flight.end.time - end.time,
             _ => flight.end.velocity - end.velocity,
@@ -230,7 +230,7 @@ fn stability_limit(subject: &Subject<'_>) -> Found {
     holds!(!grows(stable)? && grows(unstable)?, "no limit between w dt = 1 and 3");
     let limit = try_bisect(stable, unstable, 40, |w_dt| grows(w_dt).map(|grows| !grows))?;
     // What the crate states, for a crater without drag.
-    let stated = w * stability_limit_of(&crater, free.mass, free.impact_speed, subject.claim.velocity);
+    let stated = w * stability_limit_of(&crater, free.mass, free.impact_speed, subject.velocity());
     let error = worst_of([limit, stated].map(|limit| (limit - 2.0).abs() / 2.0));
     Ok(Measurement::new(error).remark(format!("growth sets in at w dt = {limit:.9}")))
 }

@@ -93,7 +93,10 @@ fn grazing_ladder(subject: &Subject<'_>, seen: &mut Violations) -> Found<()> {
                 decided = j;
             }
         }
-        check_outcome(subject, &scene.resolve(critical)?, seen)?;
+        // The next numbers on either side, where proofs are open.
+        for ulps in -3..=3 {
+            check_outcome(subject, &scene.resolve(critical * (1.0 + f64::from(ulps) * f64::EPSILON))?, seen)?;
+        }
         seen.notes.push(format!("decided to 1e-{decided} {}", if drag { "with drag" } else { "without drag" }));
     }
     Ok(())

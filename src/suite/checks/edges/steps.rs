@@ -417,9 +417,7 @@ fn viscous_driven(subject: &Subject<'_>) -> Found {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a check that cannot be measured has failed")]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
-    use crate::suite::checks::{Context, Memo, PeerAnswers, Subject};
+    use crate::suite::checks::{Asked, Context, Memo, PeerAnswers, Subject};
     use crate::suite::{Scenes, Suite};
 
     #[test]
@@ -431,10 +429,8 @@ mod tests {
         for seed in [1, u64::MAX - 1, u64::MAX] {
             let context =
                 Context { scenes: &scenes, peers: &peers, memo: &memo, program: None, points: &[], judged: None, seed };
-            let measured = claim
-                .check
-                .measure(&Subject { claim, context, flaw: None, asks_method: &AtomicBool::new(false) })
-                .unwrap();
+            let measured =
+                claim.check.measure(&Subject { claim, context, flaw: None, asked: &Asked::default() }).unwrap();
             assert!(measured.value <= claim.limit, "seed {seed}: {}", measured.remark);
         }
     }
