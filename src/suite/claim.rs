@@ -218,12 +218,18 @@ impl ClaimSpec {
 }
 
 /// Units of numbers of things.
-pub(super) const THINGS: [&str; 11] = [
+pub(super) const THINGS: [&str; 17] = [
     "families",
     "claims",
     "violations",
     "differences",
     "defects",
+    "faults",
+    "schemes",
+    "solvers",
+    "changes",
+    "points outside",
+    "refuted",
     "wrong outcomes",
     "wrong answers",
     "wrong verdicts",

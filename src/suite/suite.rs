@@ -166,7 +166,7 @@ impl Suite {
                 ));
             }
             let unit = spec.check.get_ref().unit();
-            if unit == "relative" && limit >= 1.0 {
+            if unit.starts_with("relative") && limit >= 1.0 {
                 return Err(refuse(
                     spec.limit.span(),
                     format!("a relative difference of {} says nothing", Shown(limit)),
@@ -177,7 +177,7 @@ impl Suite {
             if THINGS.contains(&unit) && limit >= 1.0 {
                 return Err(refuse(
                     spec.limit.span(),
-                    format!("a limit of {} lets {unit} pass", Shown(limit)),
+                    format!("a limit of {} lets wrong cases pass ({unit})", Shown(limit)),
                     "a number below one",
                     "write 0",
                 ));

@@ -84,10 +84,7 @@ fn with_exact(&Agreement { rtol }: &Agreement, subject: &Subject<'_>) -> Found {
     let is_independent = *is_exact || subject.method_name() != MethodName::Taylor;
     applies!(is_independent, "no exact answer, and the refined one is the method's own");
     let flight = solve(&method, problem, Detail::Events)?;
-    if flight.outcome == physics::Outcome::Undecided {
-        let remark = format!("undecided: {}", margin_of(&flight));
-        return Err(NotMeasured::undecided(remark));
-    }
+    must_be_decided(&flight)?;
     holds!(flight.outcome.agrees_with(exact.outcome), "{} where {} is right", flight.outcome, exact.outcome);
     let exact = value_of(quantity, exact)
         .ok_or_else(|| NotMeasured::broken(format!("the exact solution has no {quantity}")))?;
@@ -124,6 +121,7 @@ fn stated(&Stated { value: stated }: &Stated, subject: &Subject<'_>) -> Found {
         critical_velocity::of_scene(subject.scene()?, method.integrator())?.velocity
     } else {
         let flight = subject.solution(Detail::Events)?;
+        must_be_decided(&flight)?;
         value_of(quantity, &flight).ok_or_else(|| NotMeasured::broken(format!("{} has none", flight.outcome)))?
     };
     Ok(Measurement::new(off(value, stated)).remark(format!("{value}, stated {stated}")))
@@ -155,6 +153,14 @@ fn margin(&Margin { points }: &Margin, subject: &Subject<'_>) -> Found {
     Ok(worst.measurement())
 }
 
+/// Leaves open what is claimed of an undecided flight.
+fn must_be_decided(flight: &Flight) -> Found<()> {
+    match flight.outcome {
+        physics::Outcome::Undecided => Err(NotMeasured::undecided(format!("undecided: {}", margin_of(flight)))),
+        _ => Ok(()),
+    }
+}
+
 /// `margin 5e-15 +- 2e-15`.
 fn margin_of(flight: &Flight) -> String {
     let Some(margin) = flight.exit_margin else { return "no margin".to_owned() };
@@ -163,10 +169,10 @@ fn margin_of(flight: &Flight) -> String {
 
 fn outcome(&Outcome { is }: &Outcome, subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::End)?;
-    let remark = format!("{}, {}", flight.outcome, margin_of(&flight));
-    if flight.outcome == physics::Outcome::Undecided && is != flight.outcome {
-        return Err(NotMeasured::undecided(remark));
+    if is != physics::Outcome::Undecided {
+        must_be_decided(&flight)?;
     }
+    let remark = format!("{}, {}", flight.outcome, margin_of(&flight));
     Ok(Measurement::count(usize::from(flight.outcome != is)).remark(remark))
 }
 
@@ -176,9 +182,7 @@ fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
     applies!(subject.method_name() != with, "a method agrees with itself");
     let one = subject.solution(Detail::Events)?;
     let other = solve(&build(with, &MethodOptions::default())?, problem, Detail::Events)?;
-    if let Some(open) = [&one, &other].into_iter().find(|flight| flight.outcome == physics::Outcome::Undecided) {
-        return Err(NotMeasured::undecided(format!("undecided: {}", margin_of(open))));
-    }
+    [&one, &other].into_iter().try_for_each(must_be_decided)?;
     applies!(!is_fixed(quantity, &other), "{FIXED}");
     let is_one_solver = [subject.method_name(), with].contains(&MethodName::Adaptive) && one.end == other.end;
     applies!(!is_one_solver, "adaptive solves this scene by the other method");
@@ -192,6 +196,7 @@ fn pair(&Pair { with, tolerance }: &Pair, subject: &Subject<'_>) -> Found {
 
 fn event_order(subject: &Subject<'_>) -> Found {
     let flight = subject.solution(Detail::Events)?;
+    must_be_decided(&flight)?;
     let faults = faults(subject.problem()?, &flight);
     let names = flight.events.iter().map(|e| e.kind.name()).collect::<Vec<_>>();
     let remark = if faults.is_empty() { names.join(", ") } else { faults.join("; ") };
@@ -206,13 +211,16 @@ fn faults(problem: &Problem, flight: &Flight) -> Vec<String> {
             faults.push(format!("{} does not come before {}", pair[0].kind.name(), pair[1].kind.name()));
         }
     }
-    // Every stage end up to the end of the motion, once, at its depth.
+    // Every stage end up to the end of the motion, once, at its depth; that where a plug breaks off has its name.
     for index in 0..problem.stages.len() {
         let end = problem.stages[index].end;
         let kind = EventKind::boundary(problem, index);
         let times = flight.events.iter().filter(|e| e.kind == kind).count();
         // A stage that ends at a speed or on a condition has no place.
         let has_place = end.is_finite();
+        if !has_place && flight.at(EventKind::Plug).is_some() {
+            continue;
+        }
         let reached =
             if has_place { end <= flight.end.depth && end <= problem.exit_depth } else { index < flight.stage };
         if times != usize::from(reached) {

@@ -2,7 +2,7 @@
 
 use super::super::claim::{Evidence, Found, Measurement, NotMeasured};
 use super::edges::Violations;
-use super::{Subject, Worst, formulas, off};
+use super::{LAWS, Subject, Worst, formulas, off};
 use crate::integrators::outcome::{Events, Solved};
 use crate::integrators::{Cost, Detail, Flight, IntegrationError, Integrator, MethodName};
 use crate::physics::groups::dimensionless_energy;
@@ -89,6 +89,8 @@ fn thickness_limit(subject: &Subject<'_>) -> Found {
     let speed = scene.velocity.ok_or_else(|| NotMeasured::skip("the scene gives no impact speed"))?;
     let is_layered = scene.concrete().is_some_and(|concrete| !concrete.layers.is_empty());
     applies!(!is_layered && subject.problem()?.laws.is_empty(), "layers have their thickness, and laws no exact V_c");
+    let has_steps = subject.method_name().needs_diffsol() || subject.method_name() == MethodName::CentralDifference;
+    applies!(!has_steps, "the bound is that of a method without a tolerance");
     let method = subject.method(None)?;
     let mut worst = Worst::default();
     let mut bounds = Vec::new();
@@ -155,6 +157,7 @@ fn measured_depth(subject: &Subject<'_>) -> Found {
 
 fn sensitivities(subject: &Subject<'_>) -> Found {
     let scene = subject.scene()?;
+    applies!(subject.problem()?.laws.is_empty(), "{LAWS}");
     let exact = sensitivity::by_closed_form(scene)?;
     let found = match subject.method_name() {
         MethodName::Taylor => sensitivity::by_taylor(scene),

@@ -103,6 +103,7 @@ use super::program::Program;
 use super::recorded::shipped;
 use super::roads::Source;
 use super::suite::Scenes;
+use crate::exchange::scene_file;
 use crate::integrators::method::{Method, MethodName, MethodOptions};
 use crate::integrators::{Boundaries, Detail, Flight, VelocityAt};
 use crate::physics::reference::Conditions;
@@ -319,6 +320,13 @@ impl<'a> Subject<'a> {
     /// Name of the scene of the claim.
     fn scene_name(&self) -> Found<&'a str> {
         self.named_scene().ok_or_else(|| NotMeasured::broken("the claim names no scene"))
+    }
+
+    /// The same for a claim about commands, which know the scenes that ship.
+    fn shipped_scene(&self) -> Found<&'a str> {
+        let name = self.scene_name()?;
+        applies!(scene_file::shipped(name).is_some(), "commands are run on scenes that ship");
+        Ok(name)
     }
 
     /// Scene of the claim.

@@ -135,7 +135,7 @@ struct PathRow {
 
 /// A flight with its trajectory.
 fn path(options: &str, subject: &Subject<'_>) -> Found<(Answer, Vec<PathRow>)> {
-    let (scene, method) = (subject.scene_name()?, subject.method_name());
+    let (scene, method) = (subject.shipped_scene()?, subject.method_name());
     applies!(subject.problem()?.laws.is_empty(), "{LAWS}");
     let rules = match method {
         MethodName::CentralDifference => {
@@ -196,7 +196,7 @@ fn path_momentum(PathMomentum { options }: &PathMomentum, subject: &Subject<'_>)
 }
 
 fn tolerance(subject: &Subject<'_>) -> Found {
-    let (program, scene, method) = (subject.program()?, subject.scene_name()?, subject.method_name());
+    let (program, scene, method) = (subject.program()?, subject.shipped_scene()?, subject.method_name());
     let plain = Answer::of(program, &format!("solve {scene}.toml --method {method}"), &[])?;
     let mut seen = Vec::new();
     let mut before = f64::INFINITY;
@@ -221,7 +221,7 @@ fn tolerance(subject: &Subject<'_>) -> Found {
 }
 
 fn step_option(StepOption { order, step }: &StepOption, subject: &Subject<'_>) -> Found {
-    let (program, scene) = (subject.program()?, subject.scene_name()?);
+    let (program, scene) = (subject.program()?, subject.shipped_scene()?);
     let [velocity, events] = [subject.velocity().name(), subject.boundaries().name()];
     let mut errors = Vec::new();
     let mut worst = Worst::default();
@@ -252,7 +252,7 @@ fn step_option(StepOption { order, step }: &StepOption, subject: &Subject<'_>) -
 }
 
 fn slopes(Slopes { by }: &Slopes, subject: &Subject<'_>) -> Found {
-    let (program, scene, method) = (subject.program()?, subject.scene_name()?, subject.method_name());
+    let (program, scene, method) = (subject.program()?, subject.shipped_scene()?, subject.method_name());
     let answer = Answer::of(program, &format!("solve {scene}.toml --sensitivities --method {method}"), &[])?;
     let mut centres = Vec::new();
     for of in ["solve", "critical"] {
@@ -304,7 +304,7 @@ fn slopes(Slopes { by }: &Slopes, subject: &Subject<'_>) -> Found {
 
 /// `critical --spread` of `spreads`, and the relative deviation of V_c that each makes, by the elasticities of `solve`.
 fn spread(spreads: &[String], seed: u64, subject: &Subject<'_>) -> Found<(Answer, Vec<f64>)> {
-    let (program, scene) = (subject.program()?, subject.scene_name()?);
+    let (program, scene) = (subject.program()?, subject.shipped_scene()?);
     let asked = spreads.iter().fold(String::new(), |asked, spread| asked + " --spread " + spread);
     let answer = Answer::of(program, &format!("critical {scene}.toml{asked} --samples 4000 --seed {seed}"), &[])?;
     let slopes = Answer::of(program, &format!("solve {scene}.toml --sensitivities"), &[])?;
@@ -451,7 +451,7 @@ fn batch_rows(BatchRows { rows }: &BatchRows, subject: &Subject<'_>) -> Found {
 
 fn sweep_rows(SweepRows { path, from, to, log }: &SweepRows, subject: &Subject<'_>) -> Found {
     const POINTS: usize = 5;
-    let (program, scene) = (subject.program()?, subject.scene_name()?);
+    let (program, scene) = (subject.program()?, subject.shipped_scene()?);
     applies!(subject.problem()?.laws.is_empty(), "{LAWS}");
     let axis = format!("{path}={from:?}:{to:?}:{POINTS}{}", if *log { ":log" } else { "" });
     let (answer, files) = Answer::and_files(program, &format!("sweep {scene}.toml --vary {axis} --out s.csv"), &[])?;
@@ -774,7 +774,7 @@ fn middle_and_bar(MiddleAndBar { of: scenes }: &MiddleAndBar, subject: &Subject<
 }
 
 fn step_errors(StepErrors { options }: &StepErrors, subject: &Subject<'_>) -> Found {
-    let (program, scene) = (subject.program()?, subject.scene_name()?);
+    let (program, scene) = (subject.program()?, subject.shipped_scene()?);
     let answer = Answer::of(program, &format!("converge {scene}.toml {options}"), &[])?;
     let rules = ["velocity", "events"].map(|rule| answer.at("method")[rule].as_str().unwrap_or_default());
     let [velocity, events] = rules;
@@ -840,7 +840,7 @@ fn not_among(points: &[Drawn], others: &[Drawn], worst: &mut Worst) {
 fn bench_figures(subject: &Subject<'_>) -> Found {
     const PAGE: f64 = 4096.0;
     complete_build()?;
-    let scene = subject.scene_name()?;
+    let scene = subject.shipped_scene()?;
     let line = format!("bench {scene} --parts work-precision,scaling --most 10 --repeats 1 --out r");
     let (answer, files) = Answer::and_files(subject.program()?, &line, &[])?;
     let [cost, growth] = [format!("cost-{scene}"), "growth".to_owned()];
@@ -886,7 +886,7 @@ fn bench_figures(subject: &Subject<'_>) -> Found {
 
 fn bench_levels(subject: &Subject<'_>) -> Found {
     complete_build()?;
-    let line = format!("bench {} --parts work-precision --repeats 1 --out r", subject.scene_name()?);
+    let line = format!("bench {} --parts work-precision --repeats 1 --out r", subject.shipped_scene()?);
     let (said, files) = run(subject.program()?, &line, &[])?;
     let report = files.into_iter().find(|(path, _)| path == "r/report.json").unwrap_or_default().1;
     let answer = Answer::read(&line, &Said { out: report, ..said.clone() })?;
