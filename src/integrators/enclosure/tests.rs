@@ -1,8 +1,11 @@
 use twofloat::TwoFloat;
 
 use super::*;
+use crate::exchange::scene_file::shipped;
 use crate::integrators::Taylor;
-use crate::physics::reference::{self, ExactState, Source};
+use crate::physics::Scene;
+use crate::physics::reference::{self, Exact, ExactState, Source};
+use crate::studies::critical_velocity;
 use crate::studies::random_problems::Kind;
 use crate::studies::relations::{Units, in_units};
 use crate::testing::Random;
@@ -28,6 +31,28 @@ fn holds(state: &State<Ball>, exact: &ExactState) -> bool {
 fn spacings(ball: Ball, scale: f64) -> f64 {
     let (low, high) = ball.interval();
     (high - low) / (scale.next_up() - scale)
+}
+
+/// Within a few spacings of V_c the proof is open, also where the margin of its midpoint is zero.
+#[test]
+fn the_margin_of_an_open_proof_holds_the_exact_one() {
+    let slab = Scene::from_toml(shipped("perforate").unwrap(), "perforate").unwrap();
+    let mut open = 0;
+    for part in 0..24 {
+        let thickness = slab.thickness.map(|thickness| thickness * (1.0 + f64::from(part) / 64.0));
+        let scene = Scene { thickness, ..slab.clone() };
+        let critical = critical_velocity::exact(&scene).unwrap();
+        for ulps in -6..=6 {
+            let problem = scene.resolve(critical * (1.0 + f64::from(ulps) * f64::EPSILON)).unwrap();
+            let flight = Enclosure.solve(&problem, Detail::End).unwrap();
+            open += u32::from(flight.outcome == Outcome::Undecided);
+            let [margin, bound] = [flight.exit_margin, flight.exit_margin_error].map(Option::unwrap);
+            let exact = reference::flight(Source::Problem(&problem)).unwrap().exit_margin.unwrap();
+            let error = exact.error_over(margin, &Exact::one());
+            assert!(error <= bound, "{margin:e} +- {bound:e} is off by {error:e} at {} m/s", problem.impact_speed);
+        }
+    }
+    assert!(open > 10, "{open} of 312 are open");
 }
 
 #[test]
