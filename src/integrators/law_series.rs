@@ -15,6 +15,8 @@
 //! time. In place of depth it is taken for every law: m = 1 where no power has a branch point. Powers without a small common
 //! denominator, and logarithms of V, are smooth in the logarithm of V, which never gets to rest.
 //!
+//! **Forces `p(x) + q(x) V²`.** `taylor` takes a step of them by integrals over depth ([`super::depth_integrals`]).
+//!
 //! **Forces of the velocity alone.** Both equations are integrals over V then, and `taylor` takes a step of them by the rule of
 //! [`super::velocity_integrals`], where a few places show the force all along.
 //!
@@ -41,6 +43,7 @@ use std::convert::Infallible;
 
 use smallvec::SmallVec;
 
+use super::depth_integrals::{Ahead, Stretch, Way};
 use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES, VANISHING, rest_by_power};
 use super::locate::{self, root_before, settled};
 use super::outcome::{IntegrationError, Solved};
@@ -188,6 +191,8 @@ enum Solution<'l, S, const K: usize> {
     Series(Path<S, K>),
     /// Of a force of the velocity alone, to this length in s.
     Integrals(Integrals<'l, S>, f64),
+    /// Of a force `p(x) + q(x) V²`, its length 1.
+    Stretch(Stretch<'l, S>),
 }
 
 /// The place of a step at which it ends, and how.
@@ -387,6 +392,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
         match self {
             Self::Series(path) => path.span,
             Self::Integrals(_, span) => *span,
+            Self::Stretch(_) => 1.0,
         }
     }
 
@@ -395,6 +401,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
         match self {
             Self::Series(path) => path.at(s),
             Self::Integrals(integrals, _) => integrals.at(s),
+            Self::Stretch(stretch) => stretch.at(s),
         }
     }
 
@@ -412,6 +419,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
                 }
             },
             Self::Integrals(integrals, _) => integrals.moment(since, end),
+            Self::Stretch(stretch) => stretch.moment(since, end),
         }
     }
 
@@ -419,7 +427,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
     fn least_inside(&self, end: f64) -> Option<f64> {
         match self {
             Self::Series(path) => least_inside(path, end),
-            Self::Integrals(..) => None,
+            Self::Integrals(..) | Self::Stretch(_) => None,
         }
     }
 
@@ -427,7 +435,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
     fn only_falls(&self) -> bool {
         match self {
             Self::Series(path) => matches!(path.form, Form::Velocity(_)),
-            Self::Integrals(..) => true,
+            Self::Integrals(..) | Self::Stretch(_) => true,
         }
     }
 }
@@ -451,6 +459,8 @@ struct Walk<'l, S, const K: usize> {
     kinks: Kinks,
     /// Whether the step before went by velocity.
     goes_by_velocity: bool,
+    /// The distance (m) of the last step by integrals over depth.
+    stretched: f64,
     /// The force where the step before ended.
     reached: Option<Local<S>>,
     /// What a step goes by that does not go by velocity.
@@ -531,6 +541,7 @@ impl LawSeries {
             sides,
             kinks: Kinks::new(),
             goes_by_velocity: false,
+            stretched: f64::INFINITY,
             reached: None,
             variable: self.variable,
             tolerance: self.tolerance,
@@ -580,6 +591,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         let (evaluations, (s, event, closeness)) = match &path {
             Solution::Series(path) => (K, self.first_zero(path, s, event)),
             Solution::Integrals(..) => (PLACES, (s, event, None)),
+            Solution::Stretch(stretch) => (stretch.evaluations, (s, event, None)),
         };
         course.cost.force_evaluations += evaluations as u64;
         let local = path.at(s);
@@ -756,12 +768,32 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         }
     }
 
-    /// A step by integrals over the velocity, where the force depends on it alone and a few places show it.
+    /// A step by integrals, where the force is of one of their kinds and a few places show it.
     fn integrated(&mut self, start: State<S>, force: S, limit: S) -> Option<Held<'l, S, K>> {
-        let applies = self.is_of_velocity && self.variable == Variable::Time && S::EPSILON == f64::EPSILON;
+        let applies = self.variable == Variable::Time && S::EPSILON == f64::EPSILON;
         if !applies || self.end.is_some() || !(force.value() > 0.0) {
             return None;
         }
+        if self.is_of_velocity { self.over_velocities(start, limit) } else { self.over_depths(start, limit) }
+    }
+
+    /// A step over depth, of a force `p(x) + q(x) V²`.
+    fn over_depths(&mut self, start: State<S>, limit: S) -> Option<Held<'l, S, K>> {
+        let ahead = Ahead { parts: self.law.by_square_of_v()?, mass: self.mass, start };
+        let stretch = ahead.stretch(limit, self.stretched)?;
+        self.stretched = (stretch.end.depth - start.depth).value();
+        self.goes_by_velocity = false;
+        let event = match stretch.way {
+            Way::Through(_) => Event::None,
+            Way::ToLimit(_) => Event::Limit,
+            Way::ToRest(_) => Event::Rest,
+        };
+        let left_out = stretch.left_out;
+        Some(Held { path: Solution::Stretch(stretch), kinks: Kinks::new(), ending: (S::one(), event), left_out })
+    }
+
+    /// A step over the velocity, of a force of it alone.
+    fn over_velocities(&mut self, start: State<S>, limit: S) -> Option<Held<'l, S, K>> {
         let integrals = Integrals::new(self.bound, self.mass, start, self.falling.clone());
         let tried = if self.falling.fall == Fall::Exponential { TRIED_BY_SHARES } else { TRIED_TO_REST };
         for longest in tried {

@@ -6,6 +6,7 @@
 pub mod adaptive;
 pub mod central_difference;
 pub mod closed_form;
+mod depth_integrals;
 #[cfg(feature = "diffsol")]
 pub mod diffsol;
 #[cfg(feature = "diffsol")]
@@ -21,6 +22,7 @@ pub mod energy;
 #[expect(clippy::unwrap_used, clippy::panic, reason = "a test may stop at the first surprise")]
 mod every_method;
 mod flight;
+mod gauss;
 pub mod lanes;
 mod law_series;
 #[cfg(test)]

@@ -161,6 +161,9 @@ impl Integrator for Taylor {
             _ if problem.laws.of(index).is_some_and(|law| law.is_of_velocity() && law.end().is_none()) => {
                 "a law of its own, of the velocity alone: integrals over it, series where a few places do not show it"
             }
+            _ if problem.laws.of(index).is_some_and(|law| law.by_square_of_v().is_some() && law.end().is_none()) => {
+                "a law of its own, p(x) + q(x) V²: integrals over depth, series where a few places do not show it"
+            }
             _ if problem.laws.of(index).is_some() => {
                 "a law of its own: series of its expression, over time or velocity"
             }

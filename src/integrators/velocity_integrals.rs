@@ -10,28 +10,10 @@
 
 use std::sync::LazyLock;
 
+use super::gauss::{GAUSS, NODES};
 use super::locate::{root_before, settled};
 use crate::physics::expression::{Bound, Fall, Falling};
 use crate::physics::{Scalar, State};
-
-/// Places of the rule.
-const NODES: usize = 24;
-
-/// The upper half of the places in (-1, 1), and their weights. Source: Abramowitz, Stegun (1964), table 25.4; digits by Newton's method.
-const GAUSS: [(f64, f64); NODES / 2] = [
-    (0.064_056_892_862_605_63, 0.127_938_195_346_752_16),
-    (0.191_118_867_473_616_3, 0.125_837_456_346_828_3),
-    (0.315_042_679_696_163_4, 0.121_670_472_927_803_39),
-    (0.433_793_507_626_045_1, 0.115_505_668_053_725_6),
-    (0.545_421_471_388_839_6, 0.107_444_270_115_965_63),
-    (0.648_093_651_936_975_5, 0.097_618_652_104_113_88),
-    (0.740_124_191_578_554_4, 0.086_190_161_531_953_27),
-    (0.820_001_985_973_903, 0.073_346_481_411_080_3),
-    (0.886_415_527_004_401_1, 0.059_298_584_915_436_78),
-    (0.938_274_552_002_732_8, 0.044_277_438_817_419_81),
-    (0.974_728_555_971_309_5, 0.028_531_388_628_933_663),
-    (0.995_187_219_997_021_3, 0.012_341_229_799_987_2),
-];
 
 /// Other places at which the pace is asked, as shares of the step. The force at rest may have no quotient: it is asked close to there.
 const ASKED: [f64; 3] = [0.0, 0.5, 0.98];
@@ -55,25 +37,20 @@ struct Rule {
 }
 
 static RULE: LazyLock<Rule> = LazyLock::new(|| {
-    let nodes = GAUSS.iter().flat_map(|(z, w)| [(0.5 - 0.5 * z, 0.5 * w), (0.5 + 0.5 * z, 0.5 * w)]);
-    let others = ASKED.into_iter().chain([1.0]).map(|share| (share, 0.0));
-    let mut places: Vec<(f64, f64)> = nodes.chain(others).collect();
+    let of_rule = (0..NODES).map(|node| (GAUSS.nodes[node], GAUSS.weights[node], Some(node)));
+    let others = ASKED.into_iter().chain([1.0]).map(|share| (share, 0.0, None));
+    let mut places: Vec<(f64, f64, Option<usize>)> = of_rule.chain(others).collect();
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let share = std::array::from_fn(|place| places[place].0);
-    let weight: [f64; PLACES] = std::array::from_fn(|place| places[place].1);
-    // Second barycentric formula; its weights for the places of Gauss are (-1)^i sqrt((1 - z²) w).
     let asked = ASKED.map(|at| {
-        let mut sign = 1.0;
-        let mut parts = places.iter().map(|(share, weight)| {
-            sign = if *weight > 0.0 { -sign } else { sign };
-            if *weight > 0.0 { sign * (share * (1.0 - share) * weight).sqrt() / (at - share) } else { 0.0 }
-        });
-        let parts: [f64; PLACES] = std::array::from_fn(|_| parts.next().unwrap_or(0.0));
-        let sum: f64 = parts.iter().sum();
-        let place = places.iter().position(|(share, _)| *share == at).unwrap_or(0);
-        (place, parts.map(|part| part / sum))
+        let of_nodes = GAUSS.at(at);
+        let place = places.iter().position(|(share, ..)| *share == at).unwrap_or(0);
+        (place, std::array::from_fn(|place| places[place].2.map_or(0.0, |node| of_nodes[node])))
     });
-    Rule { share, weight, asked }
+    Rule {
+        share: std::array::from_fn(|place| places[place].0),
+        weight: std::array::from_fn(|place| places[place].1),
+        asked,
+    }
 });
 
 /// A step of a law of velocity over the fall of V.
@@ -112,7 +89,8 @@ impl<'l, S: Scalar> Integrals<'l, S> {
     /// The force at the places of a step of the length `span`.
     pub(super) fn forces(&self, span: S) -> Forces<S> {
         let places = RULE.share.map(|share| span * S::from_f64(share));
-        let registers = self.bound.along(&self.falling, self.start.depth, self.start.velocity, &places);
+        let ways = ([self.start.depth; PLACES], places.map(|s| self.velocity(s)));
+        let registers = self.bound.along(ways, Some((&self.falling, &places)));
         let force = self.bound.result_of(&registers);
         // -M dV/ds, which is M V where V falls by shares.
         let momentum = self.mass * self.start.velocity;

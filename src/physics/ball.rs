@@ -7,7 +7,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use super::elementary::Elementary;
+use super::elementary::{Elementary, LOGARITHM_BY_SERIES, TERMS_OF_LOGARITHM, logarithm_by_series};
 use super::scalar::Scalar;
 
 /// Relative error of a sum or a product of double words: 3 and 7 units of 2^-106 (Joldes, Muller, Popescu 2017,
@@ -472,6 +472,15 @@ impl Elementary for Ball {
         (near + series).widened(size * size * size * size)
     }
 
+    fn ln_1p(self) -> Self {
+        let size = self.magnitude();
+        if size < LOGARITHM_BY_SERIES {
+            // Less than the next term and those of a geometric series behind it.
+            return logarithm_by_series(self).widened(size.powi(TERMS_OF_LOGARITHM + 1));
+        }
+        Elementary::ln(Self::one() + self)
+    }
+
     fn log10(self) -> Self {
         Elementary::ln(self) / Elementary::ln(Self::from_f64(10.0))
     }
@@ -595,10 +604,12 @@ mod tests {
     /// mpmath, 40 digits.
     #[test]
     fn functions_hold_their_values() {
-        let cases: [(Ball, &str); 9] = [
+        let cases: [(Ball, &str); 11] = [
             (Elementary::exp(Ball::decimal(-3.7)), "0.0247235264703393912027573829834026293"),
             (Elementary::exp(Ball::decimal(41.3)), "863698375211744030.739264471924966797"),
             (Elementary::ln(Ball::decimal(0.0007)), "-7.2644302229208694309666130752942771"),
+            (Elementary::ln_1p(Ball::decimal(0.0007)), "0.00069975511427334192773692436514632782"),
+            (Elementary::ln_1p(Ball::decimal(0.7)), "0.53062825106217039623154316318876233"),
             (Elementary::sin(Ball::decimal(21.7)), "0.287052651327727771011170646739079869"),
             (Elementary::cos(Ball::decimal(21.7)), "-0.957914805901715848378263695053676037"),
             (Elementary::tanh(Ball::decimal(-0.3)), "-0.291312612451590905818221272823765928"),

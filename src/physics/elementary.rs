@@ -16,6 +16,10 @@ pub trait Elementary: Copy {
     #[must_use]
     fn ln(self) -> Self;
 
+    /// `ln(1 + self)`, without loss near zero.
+    #[must_use]
+    fn ln_1p(self) -> Self;
+
     /// Decimal logarithm.
     #[must_use]
     fn log10(self) -> Self;
@@ -56,6 +60,12 @@ impl<S: Differentiable> Elementary for S {
     fn ln(self) -> Self {
         let value = self.value();
         self.apply(value.ln(), || 1.0 / value)
+    }
+
+    #[inline]
+    fn ln_1p(self) -> Self {
+        let value = self.value();
+        self.apply(value.ln_1p(), || 1.0 / (1.0 + value))
     }
 
     #[inline]
@@ -104,6 +114,16 @@ impl<S: Differentiable> Elementary for S {
     }
 }
 
+/// Terms of [`logarithm_by_series`], and the size below which those behind them are less than 1e-33 of it.
+pub(super) const TERMS_OF_LOGARITHM: i32 = 16;
+pub(super) const LOGARITHM_BY_SERIES: f64 = 0.01;
+
+/// `ln(1 + z) = z - z²/2 + z³/3 - ...`
+pub(super) fn logarithm_by_series<S: Scalar>(z: S) -> S {
+    let part = |k: i32| S::one().over(S::from_f64(f64::from(k)));
+    z * (1..TERMS_OF_LOGARITHM).rev().fold(part(TERMS_OF_LOGARITHM), |sum, k| part(k) - z * sum)
+}
+
 impl Elementary for TwoFloat {
     fn exp(self) -> Self {
         let value = f64::exp(self.hi());
@@ -123,6 +143,13 @@ impl Elementary for TwoFloat {
         }
         // One step of Newton's method for e^y = z, from 16 digits to 32.
         self * Elementary::exp(Self::from(-near)) - 1.0 + near
+    }
+
+    fn ln_1p(self) -> Self {
+        if self.hi().abs() < LOGARITHM_BY_SERIES {
+            return logarithm_by_series(self);
+        }
+        Elementary::ln(self + 1.0)
     }
 
     fn log10(self) -> Self {
@@ -238,6 +265,8 @@ mod tests {
         for (name, error) in [
             ("exp", worst(Elementary::exp, Big::exp, (1e-10, 700.0, true))),
             ("ln", worst(Elementary::ln, Big::ln, (1e-200, 1e200, false))),
+            ("ln_1p", worst(Elementary::ln_1p, Big::ln_1p, (1e-40, 1e40, false))),
+            ("ln_1p below zero", worst(|z| Elementary::ln_1p(-z), |z| (-z).ln_1p(), (1e-40, 0.7, false))),
             ("log10", worst(Elementary::log10, |z| z.ln() / big(10.0).ln(), (1e-9, 0.1, false))),
             ("sin", worst(Elementary::sin, Big::sin, (1e-10, 3.0, true))),
             ("cos", worst(Elementary::cos, Big::cos, (1e-10, 1.5, true))),

@@ -96,6 +96,8 @@ struct Expression<S> {
     bound: Bound<S>,
     /// The same in values, for slopes.
     values: Bound,
+    /// [`Law::by_square_of_v`], once it was asked for.
+    parts: OnceLock<Option<Bound<S>>>,
 }
 
 impl<S: PartialEq> PartialEq for Form<S> {
@@ -117,7 +119,7 @@ impl<S: Scalar> Law<S> {
         let values: Vec<_> = parameters.iter().map(|parameter| parameter.value()).collect();
         let values = tape.bind(&values);
         let bound = tape.bind(&parameters);
-        Self::of(Form::Expression(Box::new(Expression { parameters, bound, values })))
+        Self::of(Form::Expression(Box::new(Expression { parameters, bound, values, parts: OnceLock::new() })))
     }
 
     /// The law of a force in code.
@@ -257,6 +259,12 @@ impl<S: Scalar> Law<S> {
     /// The expression with its parameters, for series; `None` for code and tables.
     pub(crate) fn bound(&self) -> Option<&Bound<S>> {
         self.expression().map(|expression| &expression.bound)
+    }
+
+    /// Of a force `p(x) + q(x) V²` without kinks: p as an expression of x, and q beside it.
+    pub(crate) fn by_square_of_v(&self) -> Option<&Bound<S>> {
+        let Expression { bound, parts, .. } = self.expression()?;
+        parts.get_or_init(|| bound.switches().is_empty().then(|| bound.by_square_of_v()).flatten()).as_ref()
     }
 
     /// Of a law of velocity: the value of a switch, by its place among those of [`Law::bound`], and its derivative by V; NaN without.

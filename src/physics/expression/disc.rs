@@ -17,9 +17,6 @@ use super::parse::Function;
 use super::range::Range;
 use crate::physics::scalar::Scalar;
 
-/// The bound on a disc over the greatest value seen on it, above which something may hide there.
-const HIDDEN_MAX: f64 = 1e3;
-
 /// Radius of a disc around a path that is known at its ends, over half of it.
 #[cfg(feature = "diffsol")]
 const DISC: f64 = 2.0;
@@ -36,6 +33,9 @@ pub(crate) struct Disc {
 }
 
 impl Disc {
+    /// The bound on a disc over the greatest value seen on it, above which something may hide there.
+    pub(crate) const HIDDEN_MAX: f64 = 1e3;
+
     pub(crate) const fn new(centre: f64, radius: f64) -> Self {
         Self { centre, radius }
     }
@@ -52,7 +52,7 @@ impl Disc {
 
     /// Whether it shows what has the largest value `seen`, so that nothing narrow hides.
     pub(crate) fn shows(self, seen: f64) -> bool {
-        self.size() <= HIDDEN_MAX * seen
+        self.size() <= Self::HIDDEN_MAX * seen
     }
 
     /// Whether it leaves room for one sign only.
@@ -229,6 +229,14 @@ pub(super) fn discs<S: Scalar>(
     discs
 }
 
+/// The disc of a value among those of all registers.
+fn of<S: Scalar>(value: Value<S>, all: &[Disc]) -> Disc {
+    match value {
+        Value::Constant(constant) => Disc::of(constant.value()),
+        Value::Register(register) => all[register],
+    }
+}
+
 impl<S: Scalar> Bound<S> {
     /// The disc of the value and those of [`Bound::switches`], on `sides` of them; `start` gives the value of a register where V begins
     /// to fall.
@@ -239,11 +247,17 @@ impl<S: Scalar> Bound<S> {
         start: impl Fn(usize) -> f64,
     ) -> (Disc, SmallVec<[Disc; 4]>) {
         let all = discs(self.steps(), around, sides, start);
-        let value = match self.result() {
-            Value::Constant(constant) => Disc::of(constant.value()),
-            Value::Register(result) => all[result],
-        };
-        (value, self.switches().iter().map(|register| all[*register]).collect())
+        (of(self.result(), &all), self.switches().iter().map(|register| all[*register]).collect())
+    }
+
+    /// The discs of an expression of x without switches, and of the second one beside it.
+    pub(crate) fn discs_of_both(&self, x: Disc) -> [Disc; 2] {
+        let all = discs(self.steps(), Around { x, v: Disc::of(0.0), fall: None }, &[], |_| f64::NAN);
+        let beside = self.beside().map_or(Disc::of(0.0), |beside| match beside {
+            Ok(register) => all[register],
+            Err(constant) => Disc::of(constant.value()),
+        });
+        [of(self.result(), &all), beside]
     }
 
     /// Of each switch, of which the largest value `seen` is known, whether its disc shows it, so that none of its roots is missed. One whose disc

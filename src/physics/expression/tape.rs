@@ -1,14 +1,14 @@
 //! One list of operations for every number type: each term once, operands before what is made of them.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use thiserror::Error;
 
 use super::bound::Bound;
 use super::parse::{self, Binary, Function, Node, Term};
 use super::unit::{self, Unit};
-use super::{ExpressionError, Known, quoted};
+use super::{ExpressionError, Known, polynomial, quoted};
 use crate::physics::scalar::Scalar;
 use crate::text::Shown;
 
@@ -29,6 +29,8 @@ struct Program {
     parameters: Vec<f64>,
     /// The bits of numbers of which the text has more than 15 digits.
     long_numbers: Vec<u64>,
+    /// [`Tape::by_square_of_v`], once it was asked for.
+    parts: OnceLock<Option<(Tape, Tape)>>,
 }
 
 /// The same function of x, V and its parameters, whatever the values that it was read with.
@@ -165,6 +167,13 @@ impl Tape {
         Bound::new(self.clone(), parameters)
     }
 
+    /// p and q of an expression that is built as `p(x) + q(x) V²`.
+    pub(super) fn by_square_of_v(&self) -> Option<&(Self, Self)> {
+        let part = |nodes| Self(Arc::new(Program::new(self.0.text.clone(), nodes, self.0.parameters.clone())));
+        let parts = || polynomial::by_square_of_v(&self.0.nodes).map(|[p, q]| (part(p), part(q)));
+        self.0.parts.get_or_init(parts).as_ref()
+    }
+
     /// Its terms, the whole last.
     pub(super) fn terms(&self) -> impl ExactSizeIterator<Item = Term> {
         self.0.nodes.iter().map(|node| node.term)
@@ -250,7 +259,7 @@ impl Program {
             });
             moved.push(place);
         }
-        Self { text, nodes: kept, varies, parameters, long_numbers }
+        Self { text, nodes: kept, varies, parameters, long_numbers, parts: OnceLock::new() }
     }
 }
 
