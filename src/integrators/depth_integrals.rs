@@ -178,7 +178,7 @@ pub(super) enum Way<S> {
 }
 
 impl<'l, S: Scalar> Ahead<'l, S> {
-    /// A stretch whose places show the force, up to `limit` (m), and little longer than the one `before` (m).
+    /// A stretch whose places show the force, up to `limit` (m), and at most four times as long as the one `before` (m).
     pub(super) fn stretch(self, limit: S, before: f64) -> Option<Stretch<'l, S>> {
         let x = self.start.depth;
         let mut far = (limit.value() - x.value()).min(AHEAD * self.stopping_distance()).min(GROWTH * before);
@@ -189,7 +189,7 @@ impl<'l, S: Scalar> Ahead<'l, S> {
             let distance = if x.value() + far >= limit.value() { limit - x } else { S::from_f64(far) };
             let passed = self.energies(distance);
             evaluations += PLACES;
-            let rest = self.first_rest(&passed.energies).map(|share| share * far);
+            let rest = first_rest(&passed.energies).map(|share| share * far);
             let found = match rest {
                 Some(distance) => self.to_rest(distance, &mut evaluations),
                 None => self.through(distance, limit, &passed),
@@ -262,35 +262,12 @@ impl<'l, S: Scalar> Ahead<'l, S> {
         } else {
             TABLES.places.map(|u| forces.q[START] * rate * S::from_f64(u))
         };
-        let growth = spent.map(|b| b.exp());
+        let growth = spent.map(S::exp);
         let integrand: [S; PLACES] = std::array::from_fn(|i| forces.p[i] * growth[i]);
         let lost = times(&TABLES.up_to, |j| integrand[j] * rate);
         let energy = self.start.velocity * self.start.velocity;
         let energies = std::array::from_fn(|i| (energy - lost[i]).over(growth[i]));
         Passed { forces, integrand, energies }
-    }
-
-    /// The share of a stretch at which W falls to zero, if it does: on the polynomial through its values.
-    fn first_rest(self, energies: &[S; PLACES]) -> Option<f64> {
-        let values = energies.map(Scalar::value);
-        let nodes = || TABLES.places[..NODES].iter().chain([&1.0]).zip(values[..NODES].iter().chain([&values[END]]));
-        let (high, at_high) = nodes().find(|(_, energy)| **energy <= 0.0)?;
-        let before = nodes().take_while(|(place, _)| *place < high).last();
-        let (low, at_low) = before.unwrap_or((&0.0, &values[START]));
-        let value = |at: f64| GAUSS.at(at).iter().zip(&values).map(|(weight, energy)| weight * energy).sum::<f64>();
-        // Between two nodes it is as good as a line: secants.
-        let ((mut one, mut at_one), (mut other, mut at_other)) = ((*low, *at_low), (*high, *at_high));
-        for _ in 0..SECANTS {
-            let next = other - (other - one) * at_other / (at_other - at_one);
-            if !(next > 0.0 && next <= 1.0) {
-                return Some(other);
-            }
-            (one, at_one, other, at_other) = (other, at_other, next, value(next));
-            if at_other.abs() <= 4.0 * f64::EPSILON * values[START] || at_other == at_one {
-                break;
-            }
-        }
-        Some(other)
     }
 
     /// The solution through a stretch.
@@ -380,6 +357,29 @@ impl<'l, S: Scalar> Ahead<'l, S> {
         let pace = quotients.map(|quotient| twice.over(quotient.sqrt()));
         (Passed { forces, integrand, energies }, growth[START], pace)
     }
+}
+
+/// The share of a stretch at which W falls to zero, if it does: on the polynomial through its values.
+fn first_rest<S: Scalar>(energies: &[S; PLACES]) -> Option<f64> {
+    let values = energies.map(Scalar::value);
+    let nodes = || TABLES.places[..NODES].iter().chain([&1.0]).zip(values[..NODES].iter().chain([&values[END]]));
+    let (high, at_high) = nodes().find(|(_, energy)| **energy <= 0.0)?;
+    let before = nodes().take_while(|(place, _)| *place < high).last();
+    let (low, at_low) = before.unwrap_or((&0.0, &values[START]));
+    let value = |at: f64| GAUSS.at(at).iter().zip(&values).map(|(weight, energy)| weight * energy).sum::<f64>();
+    // Between two nodes it is as good as a line: secants.
+    let ((mut one, mut at_one), (mut other, mut at_other)) = ((*low, *at_low), (*high, *at_high));
+    for _ in 0..SECANTS {
+        let next = other - (other - one) * at_other / (at_other - at_one);
+        if !(next > 0.0 && next <= 1.0) {
+            return Some(other);
+        }
+        (one, at_one, other, at_other) = (other, at_other, next, value(next));
+        if at_other.abs() <= 4.0 * f64::EPSILON * values[START] || at_other == at_one {
+            break;
+        }
+    }
+    Some(other)
 }
 
 /// The integral by the rule.
