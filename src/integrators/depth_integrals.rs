@@ -167,6 +167,8 @@ pub(super) struct Stretch<'l, S> {
     /// What it leaves out, relative to the velocity.
     pub(super) left_out: f64,
     pub(super) evaluations: usize,
+    /// How long the next one may be (m).
+    pub(super) next: f64,
 }
 
 /// How a stretch ends: at a distance (m) from its start.
@@ -178,10 +180,11 @@ pub(super) enum Way<S> {
 }
 
 impl<'l, S: Scalar> Ahead<'l, S> {
-    /// A stretch whose places show the force, up to `limit` (m), and at most four times as long as the one `before` (m).
-    pub(super) fn stretch(self, limit: S, before: f64) -> Option<Stretch<'l, S>> {
+    /// A stretch whose places show the force, up to `limit` (m); the one before knows how long it may be (m).
+    pub(super) fn stretch(self, limit: S, longest: Option<f64>) -> Option<Stretch<'l, S>> {
         let x = self.start.depth;
-        let mut far = (limit.value() - x.value()).min(AHEAD * self.stopping_distance()).min(GROWTH * before);
+        let longest = longest.unwrap_or_else(|| AHEAD * self.stopping_distance());
+        let mut far = (limit.value() - x.value()).min(longest);
         let mut evaluations = 0;
         let least = LEAST * far;
         for _ in 0..TRIED {
@@ -210,18 +213,11 @@ impl<'l, S: Scalar> Ahead<'l, S> {
 
     /// Distance (m) to rest, roughly.
     fn stopping_distance(self) -> f64 {
-        let (x, mass) = (self.start.depth.value(), self.mass.value());
+        let x = self.start.depth.value();
         let energy = self.start.velocity.value() * self.start.velocity.value();
-        // Under constant p and q.
-        let under = |(p, q): (f64, f64)| {
-            if p > 0.0 && q > 0.0 {
-                0.5 * mass / q * (q * energy / p).ln_1p()
-            } else {
-                0.5 * mass * energy / (p + q * energy)
-            }
-        };
-        let first = under(self.at(x));
-        first.max(under(self.at(x + 0.5 * first)))
+        let under = |at: f64| stopping_distance(self.mass.value(), energy, self.at(at));
+        let first = under(x);
+        first.max(under(x + 0.5 * first))
     }
 
     /// The longest stretch, `far` (m) at most, around which p and q have a bound.
@@ -296,12 +292,16 @@ impl<'l, S: Scalar> Ahead<'l, S> {
         let force = largest(&forces.p) + largest(&forces.q) * energy;
         let distance = (end.depth - self.start.depth).value();
         let of_velocity = lacks * force * distance / (self.mass.value() * energy);
+        let at_end = (forces.p[END].value(), forces.q[END].value());
+        let speed = end.velocity.value();
+        let next = (AHEAD * stopping_distance(self.mass.value(), speed * speed, at_end)).min(GROWTH * distance);
         Stretch {
             ahead: self,
             way,
             end,
             left_out: of_velocity + LACKING_OF_INTEGRAL * of_pace * of_pace,
             evaluations: 0,
+            next,
         }
     }
 
@@ -380,6 +380,11 @@ fn first_rest<S: Scalar>(energies: &[S; PLACES]) -> Option<f64> {
         }
     }
     Some(other)
+}
+
+/// Distance (m) in which constant p and q take all of W (m²/s²).
+fn stopping_distance(mass: f64, energy: f64, (p, q): (f64, f64)) -> f64 {
+    if p > 0.0 && q > 0.0 { 0.5 * mass / q * (q * energy / p).ln_1p() } else { 0.5 * mass * energy / (p + q * energy) }
 }
 
 /// The integral by the rule.

@@ -459,8 +459,8 @@ struct Walk<'l, S, const K: usize> {
     kinks: Kinks,
     /// Whether the step before went by velocity.
     goes_by_velocity: bool,
-    /// The distance (m) of the last step by integrals over depth.
-    stretched: f64,
+    /// How long a step by integrals over depth may be (m), behind another such step.
+    stretched: Option<f64>,
     /// The force where the step before ended.
     reached: Option<Local<S>>,
     /// What a step goes by that does not go by velocity.
@@ -541,7 +541,7 @@ impl LawSeries {
             sides,
             kinks: Kinks::new(),
             goes_by_velocity: false,
-            stretched: f64::INFINITY,
+            stretched: None,
             reached: None,
             variable: self.variable,
             tolerance: self.tolerance,
@@ -780,8 +780,8 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     /// A step over depth, of a force `p(x) + q(x) V²`.
     fn over_depths(&mut self, start: State<S>, limit: S) -> Option<Held<'l, S, K>> {
         let ahead = Ahead { parts: self.law.by_square_of_v()?, mass: self.mass, start };
-        let stretch = ahead.stretch(limit, self.stretched)?;
-        self.stretched = (stretch.end.depth - start.depth).value();
+        let stretch = ahead.stretch(limit, self.stretched.take())?;
+        self.stretched = Some(stretch.next);
         self.goes_by_velocity = false;
         let event = match stretch.way {
             Way::Through(_) => Event::None,

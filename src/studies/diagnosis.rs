@@ -2,11 +2,13 @@
 //!
 //! The solver is asked generated questions whose answers are known (`questions`). An adaptive one is asked at three
 //! tolerances and may err by [`ALLOWED`] times the tolerance and the condition of the problem (`tolerances`); one of fixed
-//! steps is asked on a ladder of steps, and its limit judged (`fixed_steps`, `ladder`). Where answers fail, each cause that is known
+//! steps is asked on a ladder of steps, and its limit judged (`fixed_steps`, `ladder`), and its list of events where several lie in
+//! one step (`crowded`). Where answers fail, each cause that is known
 //! computes what it would have answered (`hypotheses`, `simulation`), and the one that explains them is named
 //! (`causes`). Where none is certain, questions of another kind measure what the solver does (`measurements`).
 
 mod causes;
+mod crowded;
 #[cfg(any(test, feature = "report"))]
 mod faulty;
 mod fixed_steps;
@@ -34,7 +36,7 @@ pub use self::hypotheses::{Effect, KnownCause, known_causes};
 pub(crate) use self::ladder::{LADDER, Limit};
 use self::measurements::measured;
 pub use self::questions::{Content, contents};
-use self::questions::{Question, edge_questions, in_order, questions};
+use self::questions::{Question, edge_questions, in_order, questions, slow_questions};
 use self::tolerances::{at_tolerances, row};
 use super::verdict::Verdict;
 use crate::exchange::peers::{Peer, PeerAnswer, PeerFailure, PeerFault, PeerIdentity, PeerRequest};
@@ -98,7 +100,7 @@ pub struct Plan {
     pub seed: u64,
     /// How many.
     pub questions: usize,
-    /// Whether the events at their edges are asked too, of a solver that reads stages and takes a tolerance.
+    /// Whether the events at their edges, and slow flights, are asked too, of a solver that reads stages and takes a tolerance.
     pub asks_edges: bool,
 }
 
@@ -269,6 +271,7 @@ fn questions_to(identity: &PeerIdentity, plan: Plan) -> Vec<Question> {
     let mut all = questions(plan.seed, plan.questions, identity.reads_scene);
     if plan.asks_edges && !identity.fixed_step && !identity.reads_scene {
         all.extend(edge_questions());
+        all.extend(slow_questions(plan.seed));
     }
     in_order(&mut all);
     all
@@ -300,6 +303,8 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
         // A clock is found where events under a constant force are on time.
         let is_refuted = |known: &str| known == "event-time-late" && cause.id == "clock";
         found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
+        // What is measured says more of the same.
+        found.causes.retain(|known| known.id != cause.id || !SYMPTOMS.contains(&cause.id.as_str()));
         // What is likely, and is no symptom alone, stays first beside what is no more.
         let stays = |known: &Cause| known.certainty <= cause.certainty && !SYMPTOMS.contains(&known.id.as_str());
         let place = usize::from(found.causes.first().is_some_and(stays));

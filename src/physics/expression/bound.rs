@@ -260,7 +260,7 @@ fn set<S, const N: usize>(register: &mut [S; N], mut value: impl FnMut(usize) ->
 /// tanh by one exponential where that loses nothing: a quarter of the time of the function.
 fn tanh<S: Scalar>(of: S) -> S {
     let size = of.select(of, -of);
-    if size.value() < 0.5 {
+    if size.value() < 0.2 {
         return of.tanh();
     }
     let left = (-(size + size)).exp();

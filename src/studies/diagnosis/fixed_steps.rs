@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::causes::{Cause, Certainty, Effort, Seen, causes};
+use super::crowded::crowded;
 use super::hypotheses::How;
 use super::ladder::{FINER, LADDER, Limit, REPRODUCED, Rung, coarsest_step, order, pooled, rung_errors, schemes};
 use super::numbers::few_digits;
@@ -77,8 +78,10 @@ pub(super) fn in_fixed_steps(
             break;
         }
     }
-    let rows: Vec<Asked> = laddered.iter().map(Laddered::row).collect();
-    let counts = count(&rows, usable.len());
+    let mut rows: Vec<Asked> = laddered.iter().map(Laddered::row).collect();
+    let lists = if asking.is_gone { Vec::new() } else { crowded(asking, all) };
+    rows.extend(lists);
+    let counts = count(&rows, usable.len() + rows.len() - laddered.len());
     let right: Vec<(&Question, &[Rung])> = laddered
         .iter()
         .zip(&rows)
@@ -398,7 +401,8 @@ fn cut_short(laddered: &[Laddered<'_>]) -> Vec<(f64, f64)> {
 
 /// Every end is right, and the events listed are not.
 fn of_events(laddered: &[Laddered<'_>], rows: &[Asked], failed: usize) -> Option<Cause> {
-    let all = laddered.iter().filter(|one| one.wrong_in_events().is_some()).count() == failed;
+    let of_lists = rows[laddered.len()..].iter().filter(|row| row.verdict == Verdict::Failed).count();
+    let all = laddered.iter().filter(|one| one.wrong_in_events().is_some()).count() + of_lists == failed;
     let first = rows.iter().find(|row| row.verdict == Verdict::Failed)?;
     let statement = format!("every end is right, and the events listed are not: {}", first.reason);
     all.then(|| Cause::plain("event-list", statement, Certainty::Certain, failed, failed))

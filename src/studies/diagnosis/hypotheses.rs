@@ -1,7 +1,8 @@
 //! What can be wrong with a solver: one small change of the problem, of the force or of the answer each.
 //!
 //! A hypothesis says what a solver with its fault would answer; [`super::causes`] asks which of them explains the answers
-//! that came. The next one is one more entry of the table of its kind: `force`, `events`, `report` or `scene`.
+//! that came. The next one is one more entry of the table of its kind: `force`, `formulas`, `spread`, `events`,
+//! `report` or `scene`.
 
 /// A number of the problem or of its end that is rounded: what it is called, its unit, what `Change` reaches it, and where.
 macro_rules! rounded {
@@ -57,8 +58,10 @@ macro_rules! bounded {
 
 mod events;
 mod force;
+mod formulas;
 mod report;
 mod scene;
+mod spread;
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -108,7 +111,7 @@ pub(super) enum Parameter {
     Exponent(#[cfg_attr(not(feature = "report"), expect(dead_code, reason = "a claim asks for it"))] f64),
     /// A speed (m/s), the same in every answer.
     Speed,
-    /// Part of the impact speed, the same in every answer.
+    /// Part of the impact speed, or of a length, the same in every answer.
     Fraction,
     /// A distance (m), another one in every answer.
     Delay,
@@ -456,6 +459,9 @@ pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
         .chain(report::TIMES.iter().flatten())
         .chain(report::UNEVEN_TIMES.iter().flatten())
         .chain(scene::FAULTS)
+        .chain(formulas::FAULTS)
+        .chain(spread::PARTS.iter().flatten())
+        .chain(&spread::LENGTHS)
         .chain(force::EARLIER)
 }
 

@@ -7,9 +7,14 @@
 //!   and the velocity as functions of the depth, and their second differences vanish.
 //! - The same flight with other units of length and speed: the relative error of a solver whose tolerance is relative
 //!   stays, and that of one with an absolute tolerance of its own falls as the numbers grow.
+//! - The first step of a scheme that takes a tolerance (`first_step`), and exits over many of its steps (`within_step`).
+//! - One flight in ever shorter times, and at ever tighter tolerances: a step or a tolerance that is never undercut (`bounds`).
 //! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`).
 
+mod bounds;
+mod first_step;
 mod one_step;
+mod within_step;
 
 use super::causes::{Cause, Certainty};
 use super::questions::Question;
@@ -78,8 +83,12 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         .or_else(|| coasting(asking))
         .or_else(|| drag_by_speed(asking))
         .or_else(|| straight_steps(asking))
+        .or_else(|| first_step::measured(asking))
         .or_else(|| straight_to_rest(asking))
+        .or_else(|| within_step::measured(asking))
         .or_else(|| absolute_tolerance(asking))
+        .or_else(|| bounds::least_step(asking))
+        .or_else(|| bounds::least_tolerance(asking))
 }
 
 /// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones,
@@ -339,7 +348,7 @@ fn absolute_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
     }
     let statement = format!(
         "at one relative tolerance the error falls from {smallest:.0e} to {largest:.0e} as the same flight grows {:.0} times \
-         in length and speed: the tolerance is an absolute one, whatever is asked for",
+         in length and speed: the tolerance, or that of an iteration, is an absolute one, whatever is asked for",
         SIZES[SIZES.len() - 1] / SIZES[0]
     );
     let asked = SIZES.len() * flights.len();

@@ -330,6 +330,16 @@ fn weak(random: &mut Random, round: usize) -> Option<Problem> {
 /// A problem of several stages whose laws hold every pair of terms in turn, ending where `exit` says.
 fn layered(random: &mut Random, ends: usize, law: impl Fn(&mut Random, &Scale, usize) -> Stage) -> Problem {
     let scale = Scale::draw(random);
+    layered_to(scale, random, ends, law)
+}
+
+/// The same of a `scale`.
+fn layered_to(
+    scale: Scale,
+    random: &mut Random,
+    ends: usize,
+    law: impl Fn(&mut Random, &Scale, usize) -> Stage,
+) -> Problem {
     let mut end = 0.0;
     let mut stages = Vec::new();
     for index in 0..=ends {
@@ -372,6 +382,18 @@ fn stiff(random: &mut Random) -> Problem {
     let first = scale.stage([random.uniform(0.1, 1.0), 0.0, 0.0, random.uniform(0.0, 1.0)]);
     let stages = if random.chance(0.5) { vec![driven] } else { vec![first.until(end), driven] };
     Problem::of_stages(scale.mass, scale.speed, stages).with_exit(scale.length * random.uniform(0.8, 2.0))
+}
+
+/// Bands of r²/(s M), of which 4 is the border between underdamped and overdamped: one for each stage of a problem.
+const DAMPINGS: [[f64; 2]; 3] = [[0.3, 1.8], [2.2, 3.9], [4.1, 12.0]];
+
+/// A spring and viscosity whose r²/(s M) lies in the band `index`, and every other time a static force.
+fn damped(random: &mut Random, scale: &Scale, index: usize) -> Stage {
+    let [low, high] = DAMPINGS[index % DAMPINGS.len()];
+    let stiffness = random.log_uniform(0.3, 3.0);
+    let viscosity = (stiffness * random.log_uniform(low, high)).sqrt();
+    let static_force = if random.chance(0.5) { random.log_uniform(0.1, 0.5) } else { 0.0 };
+    scale.stage([static_force, stiffness, viscosity, 0.0])
 }
 
 /// The families in the order in which they are asked: what tells causes apart first.
@@ -481,7 +503,15 @@ const FAMILIES: [Family; 31] = [
     Family { name: "spring-and-drag", draw: |random, _| Kind::SpringAndDrag.draw(random) },
     Family {
         name: "viscous",
-        draw: |random, round| if round.is_multiple_of(2) { Kind::Viscous } else { Kind::ViscousSpring }.draw(random),
+        // A formula for a spring and viscosity has two forms, and a border between them: stages on both sides of it, and near.
+        draw: |random, round| match round % 4 {
+            1 => Kind::Viscous.draw(random),
+            3 => Kind::ViscousSpring.draw(random),
+            _ => {
+                let problem = layered(random, 2, |random, scale, index| damped(random, scale, index + round));
+                near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })
+            }
+        },
     },
     Family {
         name: "short-stages",
@@ -558,6 +588,34 @@ const FAMILIES: [Family; 31] = [
         },
     },
 ];
+
+/// Slow questions, and the decade (a power of ten) of the impact speed (m/s) of each in turn. A threshold of an iteration in
+/// m/s is nothing beside the speeds of projectiles, and hides until all of the flight is slower than it.
+const SLOW: usize = 12;
+const SLOW_SPEEDS: [i32; 2] = [-2, -1];
+
+/// Questions of `seed` at impact speeds that no projectile has, through every term.
+pub(super) fn slow_questions(seed: u64) -> Vec<Question> {
+    let draw = |index: usize| {
+        let mut random = Random::for_part(seed, &format!("diagnosis slow {index}"));
+        let random = &mut random;
+        (0..DRAWS_MAX).find_map(|_| {
+            let speed = 10f64.powi(SLOW_SPEEDS[index % SLOW_SPEEDS.len()]) * random.log_uniform(1.2, 8.0);
+            let scale = Scale { mass: random.log_uniform(1e-2, 1e2), speed, length: random.log_uniform(1e-2, 1.0) };
+            let problem = match index / SLOW_SPEEDS.len() % 3 {
+                0 => {
+                    let shares = [0, 1, 2, 3].map(|_| random.log_uniform(0.2, 2.0));
+                    Problem::of_stages(scale.mass, scale.speed, [scale.stage(shares)])
+                }
+                1 => layered_to(scale, random, 2, |random, scale, _| mixed(random, scale)),
+                _ => layered_to(scale, random, 2, damped),
+            };
+            let problem = near_rest(problem, if random.chance(0.5) { 0.3 } else { -0.1 })?;
+            Question::new(format!("slow-{}", index + 1), problem, None)
+        })
+    };
+    (0..SLOW).filter_map(draw).collect()
+}
 
 /// Of so many questions, one is of the scales below.
 const SCALED_EACH: usize = 8;

@@ -9,6 +9,8 @@ pub(super) enum Placed {
     ByPart,
     /// On the chord of the step.
     OnChord,
+    /// On the cubics by values and slopes at both ends of the step, those of V times these factors.
+    OnCubic([f64; 2]),
     /// At the end of the step.
     AtStepEnd,
     /// At the end of the step, with the depth of the boundary.
@@ -112,6 +114,17 @@ impl Stepping {
                     Placed::ByPart => first(&|state| state.depth >= limit),
                     Placed::OnChord if rests => on_chord(now, next, |state| -state.velocity, 0.0),
                     Placed::OnChord => on_chord(now, next, |state| state.depth, limit),
+                    Placed::OnCubic(factors) => {
+                        let slope = |state: State| -law.force(state.depth, state.velocity) / problem.mass;
+                        let slopes = [factors[0] * slope(now), factors[1] * slope(next)];
+                        let is_past = |state: State| if rests { state.velocity <= 0.0 } else { state.depth >= limit };
+                        let (mut low, mut high) = (0.0, 1.0);
+                        for _ in 0..HALVINGS {
+                            let middle = 0.5 * (low + high);
+                            if is_past(on_cubic(now, next, slopes, middle)) { high = middle } else { low = middle }
+                        }
+                        on_cubic(now, next, slopes, high)
+                    }
                     Placed::AtStepEnd | Placed::AtStepEndByDepth => next,
                 };
                 let velocity =
@@ -144,6 +157,21 @@ impl Stepping {
         let k4 = behind(a4, k3);
         let sum = |i: usize| h * (b1 * k1[i] + b2 * k2[i] + b3 * k3[i] + b4 * k4[i]);
         State { time: now.time + h, depth: x + sum(0), velocity: v + sum(1) }
+    }
+}
+
+/// The state at a `part` of the way from `from` to `to`, on cubics with these slopes of V.
+fn on_cubic(from: State, to: State, slopes: [f64; 2], part: f64) -> State {
+    let step = to.time - from.time;
+    let cubic = |[a, b]: [f64; 2], [da, db]: [f64; 2]| {
+        let left = 1.0 - part;
+        left * left * ((1.0 + 2.0 * part) * a + part * step * da)
+            + part * part * ((3.0 - 2.0 * part) * b - left * step * db)
+    };
+    State {
+        time: from.time + part * step,
+        depth: cubic([from.depth, to.depth], [from.velocity, to.velocity]),
+        velocity: cubic([from.velocity, to.velocity], slopes),
     }
 }
 

@@ -1,8 +1,8 @@
 //! Faults of events: ends of stages, exit and rest that are late, early, misplaced, missed, or change the state.
 
 use super::super::questions::Question;
-use super::super::simulation::{Passage, Simulated, continued};
-use super::force::{clear_speed, reorder};
+use super::super::simulation::{Passage, Simulated, continued, solve};
+use super::force::{DRAG, STATIC_FORCE, STIFFNESS, VISCOSITY, clear_speed, reorder, term_of};
 use super::{COUNTS, Change, Hypothesis, Parameter, of};
 use crate::physics::{Problem, Stage, State};
 
@@ -33,6 +33,53 @@ fn without_speed_terms(&Passage { problem, index, start }: &Passage<'_>, depth: 
     let Stage { static_force, stiffness, .. } = problem.stages[index];
     let work = (depth - start.depth) * (static_force + 0.5 * stiffness * (depth + start.depth));
     (start.velocity * start.velocity - 2.0 * work / problem.mass).max(0.0).sqrt()
+}
+
+/// The velocity at `depth` in a stage, as if it had no term but those of `KEPT`: p, s, r and q are its bits from the first on.
+fn of_terms<const KEPT: u8>(&Passage { problem, index, start }: &Passage<'_>, depth: f64) -> f64 {
+    let way = depth - start.depth;
+    if !(way > 0.0 && start.velocity > 0.0) {
+        return start.velocity;
+    }
+    let mut law = problem.stages[index].until(f64::INFINITY);
+    for term in [STATIC_FORCE, STIFFNESS, VISCOSITY, DRAG] {
+        if KEPT & (1 << term) == 0 {
+            *term_of(&mut law, term) = 0.0;
+        }
+    }
+    // From its start on.
+    law.static_force += law.stiffness * start.depth;
+    let alone = Problem::of_stages(problem.mass, start.velocity, [law]).with_exit(way);
+    solve(&alone).map_or(f64::NAN, |found| found.end.velocity)
+}
+
+/// The state a distance (m) before an end of a stage.
+fn ahead_of(&Passage { problem, index, start }: &Passage<'_>, state: State, by: f64) -> Option<State> {
+    const ROUNDS: usize = 8;
+    let depth = state.depth - by;
+    let mut early = by / state.velocity;
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let there = continued(problem, index, state, -early).filter(|there| there.velocity > 0.0)?;
+        early += (there.depth - depth) / there.velocity;
+        found = Some(there);
+    }
+    found.filter(|there| there.depth >= start.depth && (there.depth - depth).abs() <= 1e-9 * by)
+}
+
+/// The end of a stage as it seems from a state before it, or behind: at one velocity, or at one deceleration. There is none where
+/// that deceleration stops it on the way.
+fn extrapolated(at: &Passage<'_>, end: State, from: Option<State>, is_even: bool) -> State {
+    let none = State { time: f64::NAN, ..end };
+    let Some(State { time, depth, velocity }) = from else { return none };
+    let way = end.depth - depth;
+    let force = if is_even { 0.0 } else { at.problem.stages[at.index].force(depth, velocity) };
+    let square = velocity * velocity - 2.0 * way * force / at.problem.mass;
+    if square <= 0.0 {
+        return none;
+    }
+    let there = square.sqrt();
+    State { time: time + 2.0 * way / (velocity + there), depth: end.depth, velocity: there }
 }
 
 fn exit_at_start_of_last(problem: &mut Problem) {
@@ -751,5 +798,79 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "{} m/s of V are lost behind each end of a stage",
         Parameter::Value(1.0),
         &[Change::AtStageEnd(|_, state, n| state.velocity = (state.velocity - n).max(0.0))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that without its static force",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b1110>(at, state.depth))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that without its stiffness",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b1101>(at, state.depth))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that without its viscosity",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b1011>(at, state.depth))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that without its drag",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b0111>(at, state.depth))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that of its static force and its drag alone",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b1001>(at, state.depth))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that of its static force alone",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b0001>(at, state.depth))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind each end of a stage is that of its drag alone",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| state.velocity = of_terms::<0b1000>(at, state.depth))],
+    ),
+    of(
+        "stage-end-extrapolated",
+        "the way from the last step before the end of a stage to that end is taken at the V of that step",
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| {
+            *state = extrapolated(at, *state, ahead_of(at, *state, by), true);
+        })],
+    ),
+    of(
+        "stage-end-extrapolated",
+        "the way from the last step before the end of a stage to that end is taken at the deceleration of that step",
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| {
+            *state = extrapolated(at, *state, ahead_of(at, *state, by), false);
+        })],
+    ),
+    of(
+        "stage-end-extrapolated",
+        "the way back from the first step behind the end of a stage to that end is taken at the V of that step",
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| {
+            *state = extrapolated(at, *state, Some(overshot(at, *state, by)), true);
+        })],
+    ),
+    of(
+        "stage-end-extrapolated",
+        "the way back from the first step behind the end of a stage to that end is taken at the deceleration of that step",
+        Parameter::Overshoot,
+        &[Change::AtStageEnd(|at, state, by| {
+            *state = extrapolated(at, *state, Some(overshot(at, *state, by)), false);
+        })],
     ),
 ];

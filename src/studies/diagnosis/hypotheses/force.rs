@@ -25,10 +25,10 @@ fn is_in(part: u8, index: usize, count: usize) -> bool {
 }
 
 /// Terms of the force; a drive is a static force below zero, softening a stiffness below zero.
-const STATIC_FORCE: u8 = 0;
-const STIFFNESS: u8 = 1;
-const VISCOSITY: u8 = 2;
-const DRAG: u8 = 3;
+pub(super) const STATIC_FORCE: u8 = 0;
+pub(super) const STIFFNESS: u8 = 1;
+pub(super) const VISCOSITY: u8 = 2;
+pub(super) const DRAG: u8 = 3;
 const DRIVE: u8 = 4;
 const SOFTENING: u8 = 5;
 
@@ -77,7 +77,7 @@ const PREVIOUS_IN_TURN: u8 = 6;
 const NEXT_IN_TURN: u8 = 7;
 const SUM: u8 = 8;
 
-fn term_of(law: &mut Stage, term: u8) -> &mut f64 {
+pub(super) fn term_of(law: &mut Stage, term: u8) -> &mut f64 {
     match term {
         STIFFNESS | SOFTENING => &mut law.stiffness,
         VISCOSITY => &mut law.viscosity,

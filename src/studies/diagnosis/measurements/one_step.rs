@@ -18,16 +18,16 @@ use crate::physics::{Problem, Stage, State};
 /// Steps asked for, each beyond the exit: the answer must not depend on it.
 const STEPS: [f64; 2] = [0.8, 1.1];
 /// Sizes `-z` of the steps from which the coefficients follow.
-const SIZES: [f64; COEFFICIENTS] = [0.015, 0.03, 0.05, 0.075, 0.1, 0.125];
-const COEFFICIENTS: usize = 6;
+pub(super) const SIZES: [f64; COEFFICIENTS] = [0.015, 0.03, 0.05, 0.075, 0.1, 0.125];
+pub(super) const COEFFICIENTS: usize = 6;
 /// Size of the step that they must foretell.
-const FORETOLD: f64 = 0.06;
+pub(super) const FORETOLD: f64 = 0.06;
 /// Relative difference of two ends that are the same.
 const LANDED: f64 = 1e-12;
 /// Difference of coefficients that are the same.
-const SAME: f64 = 1e-6;
+pub(super) const SAME: f64 = 1e-6;
 /// Part of a coefficient by which it is another one. Of a scheme that is no polynomial the fourth is found to some 1e-5.
-const ANOTHER: f64 = 1e-3;
+pub(super) const ANOTHER: f64 = 1e-3;
 /// Highest order whose coefficient is compared.
 const ORDER_MAX: usize = 4;
 

@@ -1,0 +1,103 @@
+//! Is there a step that is never undercut, or a tolerance? One flight in shorter and shorter times, and at tighter and tighter
+//! tolerances.
+
+use super::super::causes::{Cause, Certainty};
+use super::super::{ALLOWED, Asking, TOLERANCES};
+use super::{ends, off};
+use crate::exchange::peers::PeerRequest;
+use crate::physics::{Problem, Stage, State};
+
+/// Durations (powers of ten, s) of one flight, and its lengths (m): of one duration the length tells a step from a tolerance that is
+/// absolute.
+const DURATIONS: [i32; 2] = [-7, 1];
+const LENGTHS: [f64; 2] = [0.01, 1.0];
+/// Durations in a row that must show it.
+const SHOWN: usize = 2;
+
+/// Tolerances (powers of ten) from the loosest to the tightest.
+const POWERS: [i32; 2] = [-13, -2];
+/// Tolerances that must give one answer.
+const ALIKE: usize = 3;
+/// Their error over the tightest of them from which it is none of a solver that has done its best.
+const FAR: f64 = 100.0;
+
+/// A flight of a length in a time, nearly, with two terms.
+fn flight(length: f64, duration: f64) -> Problem {
+    let speed = length / duration;
+    let stage = Stage::tunnel(0.2 * speed * speed / length, 0.3 / length);
+    Problem::of_stages(1.0, speed, [stage]).with_exit(0.8 * length)
+}
+
+/// What a flight shows of its steps.
+#[derive(Clone, Copy, PartialEq)]
+enum Steps {
+    /// They follow the tolerance.
+    Free,
+    /// They are the same at two tolerances, and too long.
+    Bound,
+    /// It ends otherwise, or not at all.
+    Lost,
+    /// Nothing of these.
+    Other,
+}
+
+/// Difference of two answers over their error, below which they are one: tolerances that are scaled differ in their last digits.
+const SAME: f64 = 1e-3;
+
+/// Whether flights below some duration are the same at every tolerance, and wrong.
+pub(super) fn least_step(asking: &mut Asking<'_>) -> Option<Cause> {
+    let mut of = |length: f64, duration: f64| -> Steps {
+        let problem = flight(length, duration);
+        let mut at = |rtol| ends(asking, &problem, &PeerRequest::from_problem(&problem, rtol));
+        let [Some([looser, _]), Some([found, exact])] = [at(TOLERANCES[1]), at(TOLERANCES[2])] else {
+            return Steps::Lost;
+        };
+        let error = off(found, exact, problem.impact_speed);
+        match () {
+            () if error <= ALLOWED * TOLERANCES[2] => Steps::Free,
+            () if off(looser, found, problem.impact_speed) <= SAME * error => Steps::Bound,
+            () => Steps::Other,
+        }
+    };
+    // From the longest on.
+    let durations: Vec<f64> = (DURATIONS[0]..=DURATIONS[1]).rev().map(|power| 10f64.powi(power)).collect();
+    let mut found = Vec::with_capacity(durations.len());
+    for duration in &durations {
+        let [one, other] = LENGTHS.map(|length| of(length, *duration));
+        found.push(if one == other { one } else { Steps::Other });
+    }
+    let free = found.iter().take_while(|steps| **steps == Steps::Free).count();
+    // A step far longer than the flight may end it anywhere.
+    let bound = found.iter().rev().take_while(|steps| matches!(**steps, Steps::Bound | Steps::Lost)).count();
+    // One or two durations in between may lie on either side.
+    let is_shown = free >= SHOWN && bound >= SHOWN && found.contains(&Steps::Bound) && free + bound + 2 >= found.len();
+    let longest = durations[durations.len() - bound.max(1)];
+    let statement = format!(
+        "flights of {longest:.0e} s and less have one answer at every tolerance, and longer ones are right: there is a least step, \
+         which the tolerance does not undercut"
+    );
+    let asked = 2 * LENGTHS.len() * durations.len();
+    is_shown.then(|| Cause::plain("least-step", statement, Certainty::Likely, asked, asked))
+}
+
+/// Whether answers follow the tolerance down to one below which they are the same, and wrong.
+pub(super) fn least_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
+    let problem = flight(1.0, 0.01);
+    let tolerances: Vec<f64> = (POWERS[0]..=POWERS[1]).map(|power| 10f64.powi(power)).collect();
+    let mut exact = State { time: 0.0, depth: 0.0, velocity: 0.0 };
+    let mut found = Vec::with_capacity(tolerances.len());
+    for rtol in &tolerances {
+        let [state, right] = ends(asking, &problem, &PeerRequest::from_problem(&problem, *rtol))?;
+        exact = right;
+        found.push(state);
+    }
+    let error = off(found[0], exact, problem.impact_speed);
+    let alike = found.iter().take_while(|state| off(**state, found[0], problem.impact_speed) <= SAME * error).count();
+    let is_shown = alike >= ALIKE && alike < found.len() && error > FAR * tolerances[0];
+    let least = tolerances[alike - 1];
+    let statement = format!(
+        "answers at tolerances of {least:.0e} and less are one, with an error of {error:.0e}, and looser ones differ: no tolerance \
+         below about {least:.0e} is taken"
+    );
+    is_shown.then(|| Cause::plain("tolerance-ignored", statement, Certainty::Likely, alike, found.len()))
+}
