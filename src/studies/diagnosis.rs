@@ -300,8 +300,9 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
         && !is_named
         && let Some(cause) = measured(&mut asking, all, &found)
     {
-        // A clock is found where events under a constant force are on time.
-        let is_refuted = |known: &str| known == "event-time-late" && cause.id == "clock";
+        // A clock is found where events under a constant force are on time; weights make every time late, or early.
+        let is_refuted =
+            |known: &str| known.starts_with("event-time-") && ["clock", "weights"].contains(&cause.id.as_str());
         found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
         // What is measured says more of the same.
         found.causes.retain(|known| known.id != cause.id || !SYMPTOMS.contains(&cause.id.as_str()));

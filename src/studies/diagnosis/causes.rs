@@ -33,7 +33,7 @@ const ROUNDS_MAX: usize = 80;
 /// Numbers that lie within this factor are one.
 const ONE_NUMBER: f64 = 1.01;
 /// Failing answers that must be explained for certainty.
-const CERTAIN_FROM: usize = 3;
+pub(super) const CERTAIN_FROM: usize = 3;
 /// First causes with which a second one is tried.
 const FIRST_OF_TWO: usize = 5;
 /// Two causes at once leave at most one failing answer of so many.

@@ -451,6 +451,7 @@ pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
         .iter()
         .flatten()
         .chain(force::FAULTS)
+        .chain(force::BY_MASS.iter().flatten())
         .chain(force::SMOOTHED.iter().flatten())
         .chain(force::ROUNDED.iter().chain(&report::ROUNDED).flatten())
         .chain(force::BOUNDED.iter().chain(&report::BOUNDED).flatten())

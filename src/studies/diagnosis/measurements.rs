@@ -9,10 +9,12 @@
 //!   stays, and that of one with an absolute tolerance of its own falls as the numbers grow.
 //! - The first step of a scheme that takes a tolerance (`first_step`), and exits over many of its steps (`within_step`).
 //! - One flight in ever shorter times, and at ever tighter tolerances: a step or a tolerance that is never undercut (`bounds`).
+//! - Failing flights in ever shorter parts (`long_steps`).
 //! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`).
 
 mod bounds;
 mod first_step;
+mod long_steps;
 mod one_step;
 mod within_step;
 
@@ -89,6 +91,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         .or_else(|| absolute_tolerance(asking))
         .or_else(|| bounds::least_step(asking))
         .or_else(|| bounds::least_tolerance(asking))
+        .or_else(|| long_steps::measured(asking, all, found))
 }
 
 /// Whether failing questions are answered otherwise by a solver that has just started: then it keeps something of earlier ones,
@@ -339,7 +342,8 @@ fn absolute_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
     };
     let found = SIZES.map(&mut error_of);
     let [smallest, .., largest] = found[..] else { return None };
-    let falls = found.windows(2).all(|pair| pair[0] >= FALLS * pair[1]);
+    // The smallest takes the first step that is tried, whatever the tolerance, and the next may too.
+    let falls = found[0] >= found[1] && found[1..].windows(2).all(|pair| pair[0] >= FALLS * pair[1]);
     // What is added to the equation, and has a unit, falls as the size does: that is no tolerance.
     let by_size =
         |(errors, sizes): (&[f64], &[f64])| (errors[0] * sizes[0] / (errors[1] * sizes[1]) - 1.0).abs() < SAME_FALL;

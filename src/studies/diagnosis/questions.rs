@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::hypotheses::Predictions;
 use crate::exchange::peers::wire::PeerScene;
 use crate::integrators::Flight;
-use crate::physics::{CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, Stage};
+use crate::physics::{CraterStiffness, Criterion, Outcome, Problem, Resistance, Scene, Stage, State};
 use crate::studies::edge_problems::{Case, cases};
 use crate::studies::error::{Truth, conditions_in_dual_numbers};
 use crate::studies::random::Random;
@@ -123,6 +123,19 @@ pub(super) struct Earlier {
     pub exit: f64,
 }
 
+/// What alone differs between a question and the one before it.
+#[derive(Clone, Copy, Debug)]
+enum Input {
+    /// The exit depth or the impact speed.
+    Impact,
+    /// The mass.
+    Mass,
+    /// The forces, or the density of the concrete.
+    Target,
+    /// The end of the first stage, or the thickness.
+    Ends,
+}
+
 /// Tells each of `questions` what is asked before it.
 pub(super) fn in_order(questions: &mut [Question]) {
     let Some(first) = questions.first().map(|first| first.problem.clone()) else { return };
@@ -153,22 +166,37 @@ impl Question {
         is_usable.then_some(Self { id, problem, scene, exact, contains, conditions, earlier: None, predicted })
     }
 
-    /// The same question with one number next to its own: the exit depth, the impact speed, or, every other time, the mass.
-    fn again(&self, takes_mass: bool) -> Option<Self> {
+    /// The same question with one of its inputs next to its own.
+    fn again(&self, input: Input) -> Option<Self> {
         let (mut problem, mut scene) = (self.problem.clone(), self.scene.clone());
         if let Some(scene) = &mut scene {
-            if takes_mass {
-                scene.mass *= NEXT_TO;
-            } else {
-                scene.velocity = scene.velocity.map(|velocity| velocity * NEXT_TO);
+            let concrete = match &mut scene.resistance {
+                Resistance::Concrete(concrete) => Some(concrete),
+                Resistance::Stages(_) => None,
+            };
+            match input {
+                Input::Mass => scene.mass *= NEXT_TO,
+                Input::Target => concrete?.density *= NEXT_TO,
+                Input::Ends if scene.thickness.is_some() => scene.thickness = scene.thickness.map(|far| far * NEXT_TO),
+                Input::Impact | Input::Ends => scene.velocity = scene.velocity.map(|velocity| velocity * NEXT_TO),
             }
             problem = scene.problem().ok()?;
-        } else if takes_mass {
-            problem.mass *= NEXT_TO;
-        } else if self.exact.outcome == Outcome::Perforated {
-            problem.exit_depth *= NEXT_TO;
         } else {
-            problem.impact_speed *= NEXT_TO;
+            let is_through = self.exact.outcome == Outcome::Perforated;
+            match input {
+                Input::Mass => problem.mass *= NEXT_TO,
+                Input::Target => {
+                    for law in &mut problem.stages {
+                        let Stage { static_force, stiffness, viscosity, drag, .. } = law;
+                        for term in [static_force, stiffness, viscosity, drag] {
+                            *term *= NEXT_TO;
+                        }
+                    }
+                }
+                Input::Ends if problem.stages[0].end < problem.exit_depth => problem.stages[0].end /= NEXT_TO,
+                Input::Impact | Input::Ends if is_through => problem.exit_depth *= NEXT_TO,
+                Input::Impact | Input::Ends => problem.impact_speed *= NEXT_TO,
+            }
         }
         Self::new(format!("{}-again", self.id), problem, scene)
     }
@@ -180,8 +208,11 @@ impl Question {
 
     /// Whether the flight ends so near the end of a stage that a fault there decides it by round-off.
     pub(super) fn is_on_a_border(&self) -> bool {
-        let depth = self.exact.end.depth;
-        self.problem.stages.iter().any(|law| law.end != depth && (law.end - depth).abs() <= BORDER * depth)
+        let State { depth, velocity, .. } = self.exact.end;
+        let rests = velocity <= 0.0;
+        // An exit at the very end of a stage is none.
+        let is_near = |end: f64| (rests || end != depth) && (end - depth).abs() <= BORDER * depth;
+        self.problem.stages.iter().any(|law| is_near(law.end))
     }
 
     /// The scene as a peer gets it.
@@ -645,6 +676,8 @@ fn scaled(random: &mut Random, round: usize) -> Problem {
 /// Of so many questions, these repeat the one before them, of a scene and of stages: what a solver keeps of it shows.
 const AGAIN_EACH: usize = 24;
 const AGAIN: [usize; 2] = [4, 9];
+/// What differs from the question before, in turn.
+const INPUTS: [Input; 4] = [Input::Impact, Input::Mass, Input::Target, Input::Ends];
 /// A number over that of the question before.
 const NEXT_TO: f64 = 1.01;
 /// Of so many questions of all families, one is of a physical scene.
@@ -664,7 +697,8 @@ pub(super) fn questions(seed: u64, count: usize, of_scenes: bool) -> Vec<Questio
         drawn += 1;
         let number = asked.len();
         if AGAIN.contains(&(number % AGAIN_EACH))
-            && let Some(next) = asked.last().and_then(|before: &Question| before.again(number / AGAIN_EACH % 2 == 1))
+            && let Some(next) =
+                asked.last().and_then(|before: &Question| before.again(INPUTS[number / AGAIN_EACH % INPUTS.len()]))
         {
             asked.push(next);
             continue;

@@ -6,7 +6,7 @@
 
 use strum::IntoEnumIterator;
 
-use super::causes::{Cause, Certainty, Effort, Seen, causes};
+use super::causes::{CERTAIN_FROM, Cause, Certainty, Effort, Seen, causes};
 use super::hypotheses::How;
 use super::numbers::few_digits;
 use super::observations::{is_one_error, is_same, shown};
@@ -324,7 +324,8 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         let now = failing(&seen);
         if found.is_none() && now > 0 && 10 * now < 9 * before {
             before = now;
-            found = named(&seen, Effort::Nearly).and_then(as_likely).map(|mut causes| {
+            let is_of_enough = |causes: &Vec<Cause>| causes.first().is_some_and(|cause| 4 * cause.of >= failed);
+            found = named(&seen, Effort::Nearly).and_then(as_likely).filter(is_of_enough).map(|mut causes| {
                 causes.extend(of_numbers.clone());
                 causes
             });
@@ -389,7 +390,8 @@ fn of_events(answered: &[Answered<'_>], failed: usize) -> Option<Cause> {
     let first = failing.first()?;
     let statement = format!("every end is right, and the events listed are not: {}", first.reason);
     let all = failing.len() == failed && failing.iter().all(|judged| judged.is_in_events);
-    all.then(|| Cause::plain("event-list", statement, Certainty::Certain, failed, failed))
+    let certainty = if failed >= CERTAIN_FROM { Certainty::Certain } else { Certainty::Likely };
+    all.then(|| Cause::plain("event-list", statement, certainty, failed, failed))
 }
 
 /// Whether most failing answers differ far less between the two tightest tolerances than from the right ones.

@@ -15,6 +15,8 @@ pub(super) enum Placed {
     AtStepEnd,
     /// At the end of the step, with the depth of the boundary.
     AtStepEndByDepth,
+    /// By a step that lasts the distance over V at its start, with the depth of the boundary.
+    AtFirstSpeed,
 }
 
 /// A scheme.
@@ -37,6 +39,8 @@ pub(super) struct Stepping {
     pub clock: fn(f64, f64) -> f64,
     /// Part of the force of the stage before in the first slope behind its end.
     pub stale: f64,
+    /// Part of the change of V that the first step behind the end of a stage makes.
+    pub restart: f64,
     /// Parts by which depth and velocity in the force stay behind, at those of the start of the step.
     pub lag: [f64; 2],
     /// Steps by which V0 is taken for an earlier velocity.
@@ -60,6 +64,7 @@ pub(super) const RIGHT: Stepping = Stepping {
     step: |step| step,
     clock: |part, _| part,
     stale: 0.0,
+    restart: 1.0,
     lag: [0.0; 2],
     kick: 0.0,
     is_fixed: false,
@@ -125,6 +130,7 @@ impl Stepping {
                         }
                         on_cubic(now, next, slopes, high)
                     }
+                    Placed::AtFirstSpeed => ahead((limit - now.depth) / now.velocity),
                     Placed::AtStepEnd | Placed::AtStepEndByDepth => next,
                 };
                 let velocity =
@@ -156,7 +162,8 @@ impl Stepping {
         let k3 = behind(a3, k2);
         let k4 = behind(a4, k3);
         let sum = |i: usize| h * (b1 * k1[i] + b2 * k2[i] + b3 * k3[i] + b4 * k4[i]);
-        State { time: now.time + h, depth: x + sum(0), velocity: v + sum(1) }
+        let part = if left_over.is_some() { self.restart } else { 1.0 };
+        State { time: now.time + h, depth: x + sum(0), velocity: v + part * sum(1) }
     }
 }
 

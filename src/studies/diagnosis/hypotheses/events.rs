@@ -140,6 +140,13 @@ fn exit_in(problem: &mut Problem, is_seen: impl Fn(usize) -> bool, is_late: bool
     }
 }
 
+/// V behind a crater of the depth k d whose force goes on into the tunnel: `c k d = P + Q V²` and `M (V0² - V²) = c (k d)²`.
+fn of_one_force(at: &Passage<'_>, depth: f64) -> f64 {
+    let (mass, tunnel, impact) = (at.problem.mass, at.problem.stages[at.index + 1], at.start.velocity);
+    let square = (mass * impact * impact - depth * tunnel.static_force) / (mass + depth * tunnel.drag);
+    square.max(0.0).sqrt()
+}
+
 /// The velocity at the exit, in numbers that a threshold may lie between.
 fn exit_speed(question: &Question) -> Vec<f64> {
     if question.exact.end.depth >= question.problem.exit_depth { vec![question.exact.end.velocity] } else { Vec::new() }
@@ -611,6 +618,31 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::EndTime(|p, _, n| n * p.exit_depth / p.impact_speed)],
     ),
     of(
+        "stage-left-out",
+        "stages without force are left out, and the next one begins in their place",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            for index in 0..p.stages.len() - 1 {
+                let start = p.start_of(index);
+                let law = &mut p.stages[index];
+                if law.force(1.0, 1.0) == 0.0 {
+                    law.end = start;
+                }
+            }
+        })],
+    ),
+    of(
+        "exit-invented",
+        "where no exit is asked for, the start of the last stage is one",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            let start = p.start_of(p.stages.len() - 1);
+            if !p.has_exit() && start > 0.0 {
+                p.exit_depth = start;
+            }
+        })],
+    ),
+    of(
         "exit-invented",
         "where no exit is asked for, there is one at {} m",
         Parameter::Value(0.3),
@@ -625,6 +657,20 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "an exit inside a stage is seen at the end of that stage",
         Parameter::None,
         &[Change::Problem(|p, _| exit_in(p, |_| false, true))],
+    ),
+    of(
+        "exit-late",
+        "time and velocity at an exit inside a stage are those of the end of that stage, or of rest before it",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            let mut moved = p.clone();
+            exit_in(&mut moved, |_| false, true);
+            if found.end.depth >= p.exit_depth
+                && let Some(Simulated { end, .. }) = solve(&moved)
+            {
+                found.end = if end.velocity > 0.0 { State { depth: p.exit_depth, ..end } } else { end };
+            }
+        })],
     ),
     of(
         "exit-missed",
@@ -798,6 +844,29 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "{} m/s of V are lost behind each end of a stage",
         Parameter::Value(1.0),
         &[Change::AtStageEnd(|_, state, n| state.velocity = (state.velocity - n).max(0.0))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind the crater is that of a force that goes on into the tunnel, also where the crater stiffness is given",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| {
+            if at.problem.crater == Some(at.index) {
+                state.velocity = of_one_force(at, state.depth);
+            }
+        })],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind the crater, and the time there by it, are those of a force that goes on into the tunnel, also where the crater \
+         stiffness is given",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| {
+            if at.problem.crater == Some(at.index) {
+                state.velocity = of_one_force(at, state.depth);
+                let frequency = (at.problem.stages[at.index].stiffness / at.problem.mass).sqrt();
+                state.time = (frequency * state.depth).atan2(state.velocity) / frequency;
+            }
+        })],
     ),
     of(
         "stage-end-velocity",

@@ -404,6 +404,34 @@ pub(super) static TERMS: [[Hypothesis; 22]; 4] = [
     term!("term:drag", "the drag q", DRAG, 1.0, "force-clipped"),
 ];
 
+/// A term that meets the mass once too often or once too rarely.
+macro_rules! by_mass {
+    ($id:literal, $what:literal, $term:ident) => {
+        [
+            of(
+                $id,
+                concat!($what, " is divided by the mass in kg, which the equation does too"),
+                Parameter::None,
+                &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, 1.0 / p.mass))],
+            ),
+            of(
+                $id,
+                concat!($what, " is not divided by the mass"),
+                Parameter::None,
+                &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, p.mass))],
+            ),
+        ]
+    };
+}
+
+/// Terms with the mass in the wrong place.
+pub(super) static BY_MASS: [[Hypothesis; 2]; 4] = [
+    by_mass!("term:static-force", "the static force p", STATIC_FORCE),
+    by_mass!("term:stiffness", "the stiffness s", STIFFNESS),
+    by_mass!("term:viscosity", "the viscosity r", VISCOSITY),
+    by_mass!("term:drag", "the drag q", DRAG),
+];
+
 /// A static force that vanishes at rest, by several thresholds of rest.
 macro_rules! smoothed {
     ($formula:literal, |$at:ident, $speed:ident| $share:expr) => {
@@ -1118,6 +1146,19 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
 ];
 
+/// Keeps what `keep` takes from the question `before`, if nothing else differs from it.
+fn keep_alone(problem: &mut Problem, before: &Problem, keep: impl Fn(&mut Problem, &Problem)) {
+    let mut kept = problem.clone();
+    keep(&mut kept, before);
+    let is_before = kept.mass == before.mass
+        && kept.impact_speed == before.impact_speed
+        && kept.exit_depth == before.exit_depth
+        && kept.stages == before.stages;
+    if is_before {
+        *problem = kept;
+    }
+}
+
 /// Inputs kept from an earlier question: looked at last, for a question may have none of them.
 pub(super) static EARLIER: &[Hypothesis] = &[
     of(
@@ -1181,6 +1222,28 @@ pub(super) static EARLIER: &[Hypothesis] = &[
             {
                 p.stages[0] = before.stages[0];
             }
+        })],
+    ),
+    of(
+        "input-kept",
+        "where the mass alone differs from the question before, the answer is the one given there",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| keep_alone(p, &earlier.previous, |p, before| p.mass = before.mass))],
+    ),
+    of(
+        "input-kept",
+        "where the impact speed alone differs from the question before, the answer is the one given there",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| {
+            keep_alone(p, &earlier.previous, |p, before| p.impact_speed = before.impact_speed);
+        })],
+    ),
+    of(
+        "input-kept",
+        "where the stages alone differ from the question before, the answer is the one given there",
+        Parameter::None,
+        &[Change::Kept(|p, earlier| {
+            keep_alone(p, &earlier.previous, |p, before| p.stages.clone_from(&before.stages));
         })],
     ),
     of(

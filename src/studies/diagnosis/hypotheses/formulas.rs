@@ -20,6 +20,7 @@ const SPRING: u8 = 1;
 const VISCOUS: u8 = 2;
 const DRAGGED: u8 = 3;
 const DAMPED: u8 = 4;
+const BRAKED_SPRING: u8 = 5;
 
 fn is_of_kind(law: &Stage, kind: u8) -> bool {
     let terms = [law.stiffness, law.viscosity, law.drag].map(|term| term != 0.0);
@@ -29,7 +30,8 @@ fn is_of_kind(law: &Stage, kind: u8) -> bool {
             SPRING => [true, false, false],
             VISCOUS => [false, true, false],
             DRAGGED => [false, false, true],
-            _ => [true, true, false],
+            DAMPED => [true, true, false],
+            _ => [true, false, true],
         }
 }
 
@@ -37,6 +39,17 @@ fn is_of_kind(law: &Stage, kind: u8) -> bool {
 fn scale_in<const TERM: u8, const KIND: u8>(problem: &mut Problem, factor: f64) {
     for law in problem.stages.iter_mut().filter(|law| is_of_kind(law, KIND)) {
         *term_of(law, TERM) *= factor;
+    }
+}
+
+/// The depth in s x counted from the start of the stage, in stages of a `KIND`.
+fn from_the_start<const KIND: u8>(problem: &mut Problem) {
+    for index in 1..problem.stages.len() {
+        let start = problem.start_of(index);
+        let law = &mut problem.stages[index];
+        if is_of_kind(law, KIND) {
+            law.static_force -= law.stiffness * start;
+        }
     }
 }
 
@@ -119,6 +132,34 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "stages with r² between {} s M and 4 s M, the right border, are taken for critically damped",
         Parameter::Threshold(2.0, ratios),
         &[Change::Problem(|p, border| with_border(p, border, |_| 0.0))],
+    ),
+    of(
+        "term:drive",
+        "a static force that drives (p < 0) is left out in stages of a static force and drag",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            for law in p.stages.iter_mut().filter(|law| is_of_kind(law, DRAGGED)) {
+                law.static_force = law.static_force.max(0.0);
+            }
+        })],
+    ),
+    of(
+        "stiffness-origin",
+        "the depth in s x is counted from the start of the stage where it has stiffness, or that and a static force",
+        Parameter::None,
+        &[Change::Problem(|p, _| from_the_start::<SPRING>(p))],
+    ),
+    of(
+        "stiffness-origin",
+        "the depth in s x is counted from the start of the stage where it has stiffness and viscosity, and no drag",
+        Parameter::None,
+        &[Change::Problem(|p, _| from_the_start::<DAMPED>(p))],
+    ),
+    of(
+        "stiffness-origin",
+        "the depth in s x is counted from the start of the stage where it has stiffness and drag, and no viscosity",
+        Parameter::None,
+        &[Change::Problem(|p, _| from_the_start::<BRAKED_SPRING>(p))],
     ),
     in_kind!("term:static-force", "the static force p", STATIC_FORCE, STEADY, "a static force alone"),
     in_kind!("term:static-force", "the static force p", STATIC_FORCE, SPRING, "a static force and stiffness"),

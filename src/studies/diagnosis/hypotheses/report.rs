@@ -1,5 +1,6 @@
 //! Faults of the report: the flight is right, and a number of its end is not.
 
+use super::super::questions::Question;
 use super::super::simulation::{Simulated, continued};
 use super::{Change, DIGITS, GRAINS, Hypothesis, Parameter, of, to_digits, to_grain, to_single};
 use crate::physics::{Problem, Stage, State};
@@ -66,6 +67,17 @@ impl Leg<'_> {
         self.terms().iter().filter(|is| **is).count() < 2
     }
 
+    /// Its time by `of` a and b, `V sqrt(q/p)` at both ends, over `sqrt(p q)/M`: right with `atan(a) - atan(b)`. That of
+    /// another law stays.
+    fn of_arctangents(&self, mass: f64, of: impl Fn(f64, f64) -> f64) -> f64 {
+        let Stage { static_force, drag, .. } = *self.law;
+        if self.terms() != [false, false, true] || static_force <= 0.0 {
+            return self.time();
+        }
+        let at = |state: State| state.velocity * (drag / static_force).sqrt();
+        mass / (static_force * drag).sqrt() * of(at(self.from), at(self.to))
+    }
+
     /// What its time lacks if a quarter of an oscillation takes `factor` times its time: of rest under a spring and a static force.
     fn of_quarter(&self, mass: f64, factor: f64) -> f64 {
         let stiffness = self.law.stiffness;
@@ -90,6 +102,15 @@ fn legs<'a>(problem: &'a Problem, found: &Simulated) -> impl Iterator<Item = Leg
 /// The time of each stage by a rule.
 fn retime(problem: &Problem, found: &mut Simulated, time: impl Fn(&Leg<'_>) -> f64) {
     found.end.time = legs(problem, found).map(|leg| time(&leg)).sum();
+}
+
+/// How far it is through a stage, to its end or to the exit.
+fn thickness(problem: &Problem, index: usize) -> f64 {
+    problem.limit_of(index) - problem.start_of(index)
+}
+
+fn thicknesses(question: &Question) -> Vec<f64> {
+    (0..question.problem.stages.len()).map(|index| thickness(&question.problem, index)).collect()
 }
 
 /// The time in some stages by other rules: of any kind of stage, or of one whose velocity does not change evenly.
@@ -248,6 +269,15 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         })],
     ),
     of(
+        "time-restarts",
+        "the time at which the last stage starts is added to that of the end",
+        Parameter::None,
+        &[Change::Report(|_, found, _| {
+            let start = last_end(found).map_or(0.0, |state| state.time);
+            shift_time(found, start);
+        })],
+    ),
+    of(
         "velocity-stale",
         "only the velocity is wrong, as that of a step before the end",
         Parameter::Lateness,
@@ -315,6 +345,24 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         Parameter::Factor,
         &[Change::Report(|p, found, f| of_exit(p, found, |speed, impact| impact - f * (impact - speed)))],
     ),
+    of(
+        "velocity-misreported",
+        "the velocity at the exit is the root of V0² - V_c², which is right without drag alone",
+        Parameter::None,
+        &[Change::Report(|p, found, _| {
+            // With static force, stiffness and drag V² = (V0² - V_c²) exp(-2 (q1 l1 + q2 l2 + ...)/M); where the force of a crater
+            // goes on into the tunnel, c depends on V there, and (V0² - V_c²) is 1 + k d Q/M times that behind the crater.
+            let lost: f64 = legs(p, found).map(|leg| leg.law.drag * (leg.to.depth - leg.from.depth)).sum();
+            let goes_on = |state: &State| {
+                let [crater, tunnel] = [0, 1].map(|stage| p.stages[stage].force(state.depth, state.velocity));
+                p.crater == Some(0) && (crater - tunnel).abs() <= 1e-9 * crater
+            };
+            let behind = first_end(found).filter(goes_on);
+            let of_crater = behind.map_or(1.0, |state| 1.0 + state.depth * p.stages[1].drag / p.mass);
+            let factor = of_crater.sqrt() * (lost / p.mass).exp();
+            of_exit(p, found, |speed, _| speed * factor);
+        })],
+    ),
     timed!("time-formula", "every stage", " is that of V0 throughout", None, |_| true, |leg, p, _| leg
         .time_at(p.impact_speed)),
     timed!("time-formula", "every stage", " is that of V at the end throughout", None, |_| true, |leg, _, _| leg
@@ -324,6 +372,35 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "a quarter of an oscillation, at whose end a spring stops the projectile, takes {} times its time",
         Parameter::Factor,
         &[Change::Report(|p, found, n| retime(p, found, |leg| leg.time() + leg.of_quarter(p.mass, n)))],
+    ),
+    of(
+        "time-formula",
+        "the time in stages of a static force and drag has atan(a - b) in place of atan(a) - atan(b), with a and b of V at both ends",
+        Parameter::None,
+        &[Change::Report(|p, found, _| retime(p, found, |leg| leg.of_arctangents(p.mass, |a, b| (a - b).atan())))],
+    ),
+    of(
+        "time-formula",
+        "the time in stages of a static force and drag is that to rest, wherever they end",
+        Parameter::None,
+        &[Change::Report(|p, found, _| retime(p, found, |leg| leg.of_arctangents(p.mass, |a, _| a.atan())))],
+    ),
+    of(
+        "stage-left-out",
+        "stages that end, or are left, less than {} m behind their start are passed in no time, with V as it is",
+        Parameter::Threshold(0.01, thicknesses),
+        &[
+            Change::Problem(|p, least| {
+                for index in 0..p.stages.len() {
+                    if thickness(p, index) < least {
+                        p.stages[index] = Stage::free().until(p.stages[index].end);
+                    }
+                }
+            }),
+            Change::Report(|p, found, least| {
+                retime(p, found, |leg| if thickness(p, leg.index) < least { 0.0 } else { leg.time() });
+            }),
+        ],
     ),
     of(
         "time-left-out",

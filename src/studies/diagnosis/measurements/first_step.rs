@@ -1,9 +1,9 @@
 //! What does an adaptive scheme make of its first step? An exit within it shows that, where the step is shortened to land there.
 //!
 //! Of one step the velocity is a power series of the time: under `V' = -V` its coefficients are `1/k!` up to the order of the
-//! scheme, under drag alone, `V' = -V²`, they are all one. How long the first step is nobody says, so that ever shorter exits are
-//! asked for until a few of them lie on one polynomial, and that must be the same with other tolerances, or else it is the
-//! interpolant of a longer step.
+//! scheme, under drag alone, `V' = -V²`, they are all one, under stiffness alone, `V' = -x`, they are those of the cosine. How
+//! long the first step is nobody says, so that ever shorter exits are asked for until a few of them lie on one polynomial, and that
+//! must be the same with other tolerances, or else it is the interpolant of a longer step.
 //!
 //! Source: Hairer, Nørsett, Wanner (1993), Solving Ordinary Differential Equations I, section II.1; Jorba, Zou (2005), A software
 //! package for the numerical integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14.
@@ -22,6 +22,8 @@ use crate::physics::{Problem, Stage, State};
 const SCALES: [(f64, usize); 3] = [(0.1, 4), (0.03, 3), (0.003, 2)];
 /// A coefficient below which only its absolute error counts.
 const LEAST: f64 = 0.03;
+/// Depth (m) at which V shows whether a force is another one.
+const BRAKED: f64 = 0.03;
 /// Relative tolerances with the depth (m) that scales the absolute one.
 const SETTINGS: [(f64, f64); 2] = [(TOLERANCES[0], 1.0), (TOLERANCES[1], 0.3)];
 
@@ -92,8 +94,21 @@ pub(super) fn measured(asking: &mut Asking<'_>) -> Option<Cause> {
     let constant = |value| Motion { stage: steady, depth: |t| t - 0.5 * t * t, value };
     // A velocity that is wrong there is that of another force, or of another time: no scheme makes it so.
     let ([first, second, ..], _) = constant(velocity).coefficients(asking)?;
-    if is_another(first, 1.0) || second.abs() > ANOTHER {
+    if is_another(first, 1.0) {
         return None;
+    }
+    if second.abs() > ANOTHER {
+        // Where V is right at its depth, the time alone is wrong.
+        let problem = Problem::of_stages(1.0, 1.0, [steady]).with_exit(BRAKED);
+        let [found, exact] = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[0]))?;
+        if (found.velocity - exact.velocity).abs() <= ANOTHER * BRAKED * BRAKED {
+            return None;
+        }
+        let statement = format!(
+            "the first step under a constant deceleration a has a term {second:.6} (a t)²/V0 in V, where there is none: a series with a \
+             term too many, or a force that does not stay the same"
+        );
+        return Some(Cause::plain("scheme-coefficient", statement, Certainty::Likely, asked, asked));
     }
     let ([first, ..], _) = constant(|state| state.depth / state.time).coefficients(asking)?;
     if is_another(first, 0.5) {
@@ -112,6 +127,22 @@ pub(super) fn measured(asking: &mut Asking<'_>) -> Option<Cause> {
             "the first step under V' = z V/h gives V the term {found:.6} z^{power}, where order {power} has {right:.6} z^{power}"
         );
         return likely(found / right, statement);
+    }
+    let spring = Stage { stiffness: 1.0, ..Stage::free() };
+    let (of_stiffness, known_here) = Motion { stage: spring, depth: f64::sin, value: velocity }.coefficients(asking)?;
+    let of_cosine = [0.0, -0.5, 0.0, 1.0 / 24.0];
+    let order = right_terms(&of_viscosity[..known]).min(known_here).max(2);
+    let is_off = |k: &usize| (of_stiffness[*k] - of_cosine[*k]).abs() > ANOTHER;
+    if let Some(index) = (0..order.min(of_cosine.len())).find(is_off) {
+        // Adding zero makes 0 of -0.
+        let found = (1e6 * of_stiffness[index]).round() / 1e6 + 0.0;
+        let (right, power) = (of_cosine[index], index + 1);
+        let statement = format!(
+            "the first step under stiffness alone, V' = -z² x/h², gives V the term {found:.6} (-z)^{power}, where order {power} has \
+             {right:.6} (-z)^{power}, and without stiffness it is right: the x in the force is that of another time, or another term of its \
+             series"
+        );
+        return Some(Cause::plain("scheme-coefficient", statement, Certainty::Likely, asked, asked));
     }
     let dragged = Stage { drag: 1.0, ..Stage::free() };
     let (of_drag, known_too) = Motion { stage: dragged, depth: f64::ln_1p, value: velocity }.coefficients(asking)?;

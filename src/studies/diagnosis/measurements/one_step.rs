@@ -33,11 +33,25 @@ const ORDER_MAX: usize = 4;
 
 /// What one step shows of a scheme that should have the order `claimed`.
 pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
+    let asked = STEPS.len() * SIZES.len();
     let certain = |id: &str, factor, statement| {
-        let asked = STEPS.len() * SIZES.len();
         Some(Cause { factor, ..Cause::plain(id, statement, Certainty::Certain, asked, asked) })
     };
-    let Some(first) = constant_force(asking, 0.0) else { return start_kick(asking) };
+    let Some(first) = constant_force(asking, 0.0, 0.0) else {
+        if let Some(part) = kick_of_step_asked(asking) {
+            let statement = format!(
+                "where a step under a constant deceleration a is shortened to land on an end, V is {part:.6} a smaller for each second \
+                 of the step asked for: part of its force acts for as long as a whole step"
+            );
+            return certain("scheme-coefficient", Some(part), statement);
+        }
+        return start_kick(asking);
+    };
+    if lands_straight(asking) {
+        let statement = "the step that lands on an end lasts the distance to it over V at the start of the step: the time and V there \
+                         have an order that the steps do not have";
+        return certain("event-straight", None, statement.to_owned());
+    }
     let coefficients = coefficients(asking);
     let tableau =
         || coefficients.as_ref().and_then(changed_number).map_or_else(String::new, |said| format!(": {said}"));
@@ -51,18 +65,36 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
         );
         return certain("scheme-coefficient", Some(found / right), statement);
     }
-    let (near, far) = (constant_force(asking, 0.1)?, constant_force(asking, 0.25)?);
+    let (near, far) = (constant_force(asking, 0.1, 0.0)?, constant_force(asking, 0.25, 0.0)?);
     if let Some((what, [found, right])) = near.first_wrong(claimed) {
         return if near.is_same_as(&far) {
-            let statement = format!(
-                "the first step behind the end of a stage has {what} with a factor {found:.6}, not {right}: part of its \
-                 force is that of the stage before"
-            );
-            certain("force-stale", None, statement)
+            let statement =
+                format!("the first step behind the end of a stage has {what} with a factor {found:.6}, not {right}");
+            // Where the force is the same on both sides, part of the one before does no harm.
+            let is_stale =
+                constant_force(asking, 0.1, DECELERATION).is_none_or(|same| same.first_wrong(claimed).is_none());
+            if is_stale {
+                certain("force-stale", None, statement + ": part of its force is that of the stage before")
+            } else {
+                certain(
+                    "start-kick",
+                    None,
+                    statement + ", whatever the force before: it is not started as the first step of all is",
+                )
+            }
         } else {
             let statement = "steps do not land on the ends of stages: where the force jumps the order falls to 1";
             certain("stage-end-late", None, statement.to_owned())
         };
+    }
+    if let Some((part, is_of_before)) = kick_behind(asking) {
+        let reason = if is_of_before {
+            "where the force there is another one: a slope of the stage before is kept"
+        } else {
+            "whatever the force before: it is not started as the first step of all is"
+        };
+        let statement = format!("behind the end of a stage V is {part:.6} a h off, whatever the step h, {reason}");
+        return certain(if is_of_before { "force-stale" } else { "start-kick" }, None, statement);
     }
     // A scheme of Runge and Kutta that takes x rightly takes V so too: one that does not has another V in its force.
     let order = (claimed.round() as usize).min(ORDER_MAX);
@@ -73,17 +105,46 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
         let found = (1e9 * found).round() / 1e9 + 0.0;
         if (found - right).abs() > ANOTHER * right {
             let tableau = tableau();
-            let id = if index == 1 && tableau.is_empty() { "drag-lagged" } else { "scheme-coefficient" };
-            let lagged = if id == "drag-lagged" { ": the V in the force is that of another time" } else { "" };
+            // Without the term the force is that of V at the start; with a part of it weights may be wrong too.
+            let may_lag = tableau.is_empty() && index == 1 && found < right;
+            let (id, certainty, lagged) = match may_lag {
+                true if found.abs() <= SAME => {
+                    ("drag-lagged", Certainty::Certain, ": the V in the force is that of the start of the step")
+                }
+                true => (
+                    "drag-lagged",
+                    Certainty::Likely,
+                    ": the V in the force is that of another time, or a weight is wrong",
+                ),
+                false => ("scheme-coefficient", Certainty::Certain, ""),
+            };
             let statement = format!(
                 "the first step under V' = z V/h gives V the term {found:.6} z^{power}, where order {power} has {right:.6} \
                  z^{power}{lagged}{tableau}",
                 power = index + 1
             );
-            return certain(id, Some(found / right).filter(|_| id != "drag-lagged"), statement);
+            let factor = Some(found / right).filter(|_| !may_lag);
+            return Some(Cause { factor, ..Cause::plain(id, statement, certainty, asked, asked) });
         }
     }
     None
+}
+
+/// By how much V falls with the step asked for, over the deceleration, where time and depth do not depend on it.
+fn kick_of_step_asked(asking: &mut Asking<'_>) -> Option<f64> {
+    let problem = Problem::of_stages(1.0, 1.0, [Stage::tunnel(DECELERATION, 0.0)]).with_exit(0.4);
+    let mut end = |step: f64| {
+        let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
+        Some(end_of(&asking.ask(&request).ok()?).state).filter(|end| end.velocity > 0.0 && end.time < step)
+    };
+    let [first, middle, last] = [STEPS[0], 0.5 * (STEPS[0] + STEPS[1]), STEPS[1]].map(&mut end);
+    let (first, middle, last) = (first?, middle?, last?);
+    let is_same = |a: f64, b: f64| (a - b).abs() <= LANDED * a.abs();
+    let is_one_place =
+        [middle, last].iter().all(|end| is_same(end.time, first.time) && is_same(end.depth, first.depth));
+    let is_even = is_same(first.velocity - middle.velocity, middle.velocity - last.velocity);
+    let part = (first.velocity - last.velocity) / (DECELERATION * (STEPS[1] - STEPS[0]));
+    (is_one_place && is_even && part.abs() > ANOTHER).then_some(part)
 }
 
 /// The end of a flight within one step, which is the same whatever the step asked for.
@@ -125,24 +186,39 @@ impl Constant {
     }
 }
 
-/// The step at impact, or the one behind a first stage without force that ends at `before` (m).
-fn constant_force(asking: &mut Asking<'_>, before: f64) -> Option<Constant> {
-    const DECELERATION: f64 = 0.5;
+/// The deceleration (m/s²) of flights with V0 = 1 m/s and M = 1 kg.
+const DECELERATION: f64 = 0.5;
+
+/// The step at impact, or the one behind a first stage with the deceleration `of_first` that ends at `before` (m).
+fn constant_force(asking: &mut Asking<'_>, before: f64, of_first: f64) -> Option<Constant> {
     let braked = Stage::tunnel(DECELERATION, 0.0);
-    let stages = if before > 0.0 { vec![Stage { end: before, ..Stage::free() }, braked] } else { vec![braked] };
+    let first = Stage::tunnel(of_first, 0.0).until(before);
+    let stages = if before > 0.0 { vec![first, braked] } else { vec![braked] };
     let exit = 0.4;
     let end = landed(asking, &Problem::of_stages(1.0, 1.0, stages).with_exit(before + exit))?;
-    let h = end.time - before;
+    let speed = (1.0 - 2.0 * of_first * before).sqrt();
+    let h = end.time - 2.0 * before / (1.0 + speed);
     (h > 0.0).then(|| Constant {
-        velocity: (1.0 - end.velocity) / (DECELERATION * h),
-        depth: (h - exit) / (DECELERATION * h * h),
+        velocity: (speed - end.velocity) / (DECELERATION * h),
+        depth: (speed * h - exit) / (DECELERATION * h * h),
     })
+}
+
+/// Whether the last of two steps, onto the exit, lasts the distance left over V at its start, under a constant deceleration,
+/// where the whole step before it is right.
+fn lands_straight(asking: &mut Asking<'_>) -> bool {
+    let (step, exit) = (0.3, 0.4);
+    let problem = Problem::of_stages(1.0, 1.0, [Stage::tunnel(DECELERATION, 0.0)]).with_exit(exit);
+    let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
+    let Ok(answer) = asking.ask(&request) else { return false };
+    let [depth, speed] = [step - 0.5 * DECELERATION * step * step, 1.0 - DECELERATION * step];
+    let straight = step + (exit - depth) / speed;
+    (answer.time_s - straight).abs() <= LANDED * straight
 }
 
 /// A velocity that is off from the start on by a part of what a step takes: `V + a t` stays `V0 - k a h` under a constant
 /// deceleration. A central difference that takes V0 for the velocity half a step before has k = 1/2.
 fn start_kick(asking: &mut Asking<'_>) -> Option<Cause> {
-    const DECELERATION: f64 = 0.5;
     const STEPS: [f64; 4] = [0.1, 0.043, 0.021, 0.0097];
     let problem = Problem::of_stages(1.0, 1.0, [Stage::tunnel(DECELERATION, 0.0)]).with_exit(0.4);
     let lost = STEPS.map(|step| {
@@ -161,6 +237,29 @@ fn start_kick(asking: &mut Asking<'_>) -> Option<Cause> {
     );
     (part.abs() > ANOTHER && is_one)
         .then(|| Cause::plain("start-kick", statement, Certainty::Certain, STEPS.len(), STEPS.len()))
+}
+
+/// By how much of `a h` V is off behind the end of a stage, whatever the step h, and whether it is right where the force is the same
+/// on both sides. A scheme of several steps that keeps its slopes is off by a half.
+fn kick_behind(asking: &mut Asking<'_>) -> Option<(f64, bool)> {
+    const STEPS: [f64; 3] = [0.043, 0.021, 0.0097];
+    const END: f64 = 0.25;
+    let mut of = |of_first: f64| -> Option<f64> {
+        let stages = [Stage::tunnel(of_first, 0.0).until(END), Stage::tunnel(DECELERATION, 0.0)];
+        let problem = Problem::of_stages(1.0, 1.0, stages).with_exit(END + 0.4);
+        let speed = (1.0 - 2.0 * of_first * END).sqrt();
+        let parts = STEPS.map(|step| {
+            let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
+            let end = end_of(&asking.ask(&request).ok()?).state;
+            let time = end.time - 2.0 * END / (1.0 + speed);
+            Some((end.velocity - speed + DECELERATION * time) / (DECELERATION * step))
+        });
+        let [first, others @ ..] = parts;
+        let (first, others) = (first?, others.into_iter().collect::<Option<Vec<f64>>>()?);
+        others.iter().all(|part| (part - first).abs() <= ANOTHER).then_some(first)
+    };
+    let part = of(0.0).filter(|part| part.abs() > ANOTHER)?;
+    Some((part, of(DECELERATION).is_some_and(|same| same.abs() <= ANOTHER)))
 }
 
 /// c1, c2 ... of a step under `V' = -r V`, if a polynomial it is.
@@ -199,7 +298,8 @@ fn changed_number(found: &SVector<f64, COEFFICIENTS>) -> Option<String> {
         let moved = (0..base.len()).find(|k| (slope[*k] - base[*k]).abs() > SAME)?;
         let number = right[which] + (found[moved] - base[moved]) / (slope[moved] - base[moved]);
         let fits = with(number).iter().zip(found.iter()).all(|(a, b)| (a - b).abs() <= SAME);
-        fits.then(|| match which {
+        let is_changed = (number - right[which]).abs() > SAME;
+        (fits && is_changed).then(|| match which {
             0..3 => format!("slope {} taken at {number:.6} h, not {}", which + 2, right[which]),
             _ => format!("a weight of {number:.6} for slope {}, not {:.6}", which - 2, right[which]),
         })
