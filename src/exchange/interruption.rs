@@ -7,10 +7,10 @@
 //! A program with nothing to remove and no peer has no handler: to start its thread takes a tenth of a short run.
 
 use std::ops::{Deref, DerefMut};
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::{env, io};
+use std::{env, fs, io};
 
 use tempfile::{NamedTempFile, TempDir};
 
@@ -100,12 +100,29 @@ pub fn folder_in(place: &Path) -> io::Result<Temporary<TempDir>> {
     Temporary::new(|| tempfile::Builder::new().prefix(PREFIX).tempdir_in(place), TempDir::path)
 }
 
-/// An empty folder where the system has such.
+/// An empty folder where the system has such; its path is absolute.
 ///
 /// # Errors
 /// What the system says.
 pub fn folder() -> io::Result<Temporary<TempDir>> {
-    folder_in(&env::temp_dir())
+    folder_in(&path::absolute(env::temp_dir())?)
+}
+
+/// Writes `bytes` to the file `name` in `folder`, and makes the folders that `name` goes through.
+///
+/// `folder` itself is not made: an interruption of this program, or of the one that runs it, may have removed it.
+///
+/// # Errors
+/// What the system says.
+pub fn write_below(folder: &Path, name: &Path, bytes: &[u8]) -> io::Result<()> {
+    let parts: Vec<_> = name.ancestors().skip(1).filter(|part| !part.as_os_str().is_empty()).collect();
+    for part in parts.into_iter().rev() {
+        fs::create_dir(folder.join(part)).or_else(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => Ok(()),
+            _ => Err(error),
+        })?;
+    }
+    fs::write(folder.join(name), bytes)
 }
 
 /// Does `step`, which no interruption cuts in two: it must end soon, and contain no other `whole` step.
@@ -147,8 +164,8 @@ mod unix {
     use super::{MADE, WHOLE, lock};
     use crate::exchange::peers::end_all;
 
-    /// How often the removal of a folder is tried into which another thread or process still writes, a millisecond apart.
-    const TRIES_MAX: u32 = 200;
+    /// How often the removal of a folder is tried in which another process still writes, a millisecond apart.
+    const TRIES_MAX: u32 = 2000;
 
     pub(super) fn receive_signals() -> io::Result<()> {
         static IS_DONE: Mutex<bool> = Mutex::new(false);
@@ -182,12 +199,34 @@ mod unix {
     }
 
     fn remove(path: &Path) {
+        // Under another name at first, so that other threads, which go on, add nothing to a folder.
+        let mut moved = path.as_os_str().to_owned();
+        moved.push(".removed");
+        let path = if fs::rename(path, &moved).is_ok() { Path::new(&moved) } else { path };
         for _ in 0..TRIES_MAX {
             let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
             match removed {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => thread::sleep(Duration::from_millis(1)),
                 _ => return,
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_was_removed_is_not_made_again_by_what_is_written_there() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("folder");
+        assert_eq!(write_below(&folder, Path::new("a/b/c"), b"x").unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert!(!folder.exists());
+        fs::create_dir(&folder).unwrap();
+        for name in ["a/b/c", "a/d", "e"] {
+            write_below(&folder, Path::new(name), name.as_bytes()).unwrap();
+            assert_eq!(fs::read(folder.join(name)).unwrap(), name.as_bytes());
         }
     }
 }

@@ -166,11 +166,8 @@ pub fn write(files: io::Result<Files>, folder: &Path) -> Result<(), FolderError>
 fn fill(stage: &Path, files: Files, folder: &Path) -> Result<(), FolderError> {
     let failed = FolderError::write;
     for (name, bytes) in files {
-        let path = stage.join(&name);
-        if let Some(part) = path.parent() {
-            fs::create_dir_all(part).map_err(|cause| failed(part, cause))?;
-        }
-        fs::write(&path, bytes).map_err(|cause| failed(&folder.join(&name), cause))?;
+        let written = interruption::write_below(stage, Path::new(&name), &bytes);
+        written.map_err(|cause| failed(&folder.join(&name), cause))?;
     }
     #[cfg(unix)]
     {

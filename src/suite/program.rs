@@ -90,9 +90,7 @@ impl Program {
             let given = given.iter().map(|(name, text)| (name.clone(), text.as_str()));
             let there: Vec<_> = shipped.filter(|(name, _)| words.contains(name)).chain(given).collect();
             for (name, text) in &there {
-                let path = folder.join(name);
-                fs::create_dir_all(path.parent().unwrap_or(&folder))?;
-                fs::write(path, text)?;
+                interruption::write_below(&folder, Path::new(name), text.as_bytes())?;
             }
             let said = self.run_words(&words, &folder)?;
             let mut written = Vec::new();
@@ -111,6 +109,8 @@ impl Program {
             .args(words)
             .current_dir(folder)
             .env("NO_COLOR", "1")
+            // What a run leaves behind goes with the folder.
+            .env("TMPDIR", self.folder())
             .stdin(Stdio::null())
             .stdout(File::create(&out)?)
             .stderr(File::create(&err)?)
