@@ -214,6 +214,7 @@ mod unix {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a folder that cannot be made is a failed test")]
 mod tests {
     use super::*;
 

@@ -278,7 +278,11 @@ fn straight_steps(asking: &mut Asking<'_>) -> Option<Cause> {
     };
     let rise = |three: &[[State; 2]], of: fn(&State) -> f64, which: usize| of(&three[2][which]) - of(&three[0][which]);
     let velocity: fn(&State) -> f64 = |state| state.velocity;
-    if part(&|three| rise(three, velocity, 0).abs() <= STRAIGHT * rise(three, velocity, 1).abs()) {
+    // One that has come to rest does so too.
+    let is_same = |three: &[[State; 2]]| {
+        three[1][0].velocity > 0.0 && rise(three, velocity, 0).abs() <= STRAIGHT * rise(three, velocity, 1).abs()
+    };
+    if part(&is_same) {
         let [found, exact] = flights[EXITS / 2];
         let (id, end) =
             if found.velocity > exact.velocity { ("velocity-stale", "start") } else { ("exit-velocity-late", "end") };

@@ -7,10 +7,11 @@ use crate::text::count;
 
 /// Digits up to which an answer has few.
 const FEW_DIGITS: usize = 9;
-/// Decimals up to which an answer has few.
-const FEW_DECIMALS: usize = 8;
+/// Decimals up to which an answer has few, and digits that half of the numbers then have at most.
+const FEW_DECIMALS: usize = 9;
+const HALF_DIGITS: usize = 12;
 
-/// What the numbers of `ends` themselves show, all or those of one quantity: single precision, or few digits.
+/// What the numbers of `ends` themselves show, all or those of some quantities: single precision, or few digits.
 pub(super) fn few_digits(ends: impl Iterator<Item = State>, failed: usize) -> Option<Cause> {
     let mut each = [const { Vec::new() }; 3];
     for State { depth, time, velocity } in ends {
@@ -18,31 +19,69 @@ pub(super) fn few_digits(ends: impl Iterator<Item = State>, failed: usize) -> Op
         each[1].push(time);
         each[2].push(velocity);
     }
-    let of_each = || (0..3).find_map(|which| of_numbers(QUANTITIES[which], &each[which], failed));
-    of_numbers("number", &each.concat(), failed).or_else(of_each)
+    let shown = each.map(of_numbers);
+    let (id, first) = shown.iter().flatten().next()?;
+    let of_all = shown.iter().all(|of| of.as_ref().is_some_and(|(_, what)| what == first));
+    let listed: Vec<String> = if of_all {
+        vec![format!("every number {first}")]
+    } else {
+        let same = QUANTITIES.iter().zip(&shown).filter_map(|(kind, of)| Some((kind, of.as_ref()?)));
+        same.filter(|(_, (other, _))| other == id).map(|(kind, (_, what))| format!("every {kind} {what}")).collect()
+    };
+    let advice = if *id == "few-digits" { ": print 17 digits" } else { "" };
+    let statement = format!("{}{advice}", listed.join(", "));
+    Some(Cause::plain(id, statement, Certainty::Certain, failed, failed))
 }
 
-/// The same of the `numbers` of one kind; zeros say nothing.
-pub(super) fn of_numbers(kind: &str, numbers: &[f64], failed: usize) -> Option<Cause> {
-    let numbers: Vec<f64> = numbers.iter().copied().filter(|number| *number != 0.0).collect();
+/// Whether what `ends` miss of the exact ones, behind them, is what the digits or the decimals that they have cut off, of every
+/// quantity; `accuracy` is the relative error that has another cause.
+pub(super) fn is_cut_off(ends: &[(State, State)], accuracy: f64) -> bool {
+    let of: [fn(&State) -> f64; 3] = [|end| end.depth, |end| end.time, |end| end.velocity];
+    of.iter().all(|of| {
+        let numbers = || ends.iter().map(|(found, exact)| (of(found), of(exact))).filter(|(found, _)| *found != 0.0);
+        let (most, decimals) = numbers()
+            .map(|(found, _)| digits(found))
+            .fold((0, 0), |most, (digits, decimals)| (most.0.max(digits), most.1.max(decimals)));
+        // Of each quantity, in its unit and over itself.
+        let grain = HALF * 0.1_f64.powi(i32::try_from(decimals).unwrap_or(i32::MAX));
+        let part = HALF * 0.1_f64.powi(i32::try_from(most).unwrap_or(i32::MAX) - 1);
+        numbers().all(|(found, exact)| (found - exact).abs() <= grain + accuracy * exact.abs())
+            || numbers().all(|(found, exact)| (found - exact).abs() <= (part + accuracy) * exact.abs())
+    })
+}
+
+/// Half a unit of the last digit, and a little for a number that is not represented.
+const HALF: f64 = 0.500_000_1;
+
+/// What `numbers` show, as id and words; zeros say nothing.
+pub(super) fn of_numbers(mut numbers: Vec<f64>) -> Option<(&'static str, String)> {
+    numbers.retain(|number| *number != 0.0);
     if numbers.len() < 10 {
         return None;
     }
     if numbers.iter().all(|number| f64::from(*number as f32) == *number) {
-        let statement = format!("every {kind} is one of single precision (f32)");
-        return Some(Cause::plain("single-precision", statement, Certainty::Certain, failed, failed));
+        return Some(("single-precision", "is one of single precision (f32)".to_owned()));
     }
+    numbers.sort_by(|one, other| one.abs().total_cmp(&other.abs()));
     let all: Vec<(usize, usize)> = numbers.iter().map(|number| digits(*number)).collect();
-    let most = all.iter().map(|(significant, _)| *significant).max().unwrap_or(0);
-    let decimals = all.iter().map(|(_, decimals)| *decimals).max().unwrap_or(0);
-    let statement = if most <= FEW_DIGITS {
-        format!("every {kind} is printed with at most {}: print 17", count(most, "digit"))
-    } else if decimals <= FEW_DECIMALS {
-        format!("every {kind} is printed with at most {}: print 17 digits", count(decimals, "decimal"))
+    // Numbers cut behind a decimal have the more digits the larger they are, and those cut behind a digit the fewer decimals.
+    let halves = all.split_at(all.len() / 2);
+    let most = |of: fn(&(usize, usize)) -> usize| {
+        let [small, large] = [halves.0, halves.1].map(|half| half.iter().map(of).max().unwrap_or(0));
+        (small.max(large), small == large)
+    };
+    let (digits, _) = most(|(digits, _)| *digits);
+    let (decimals, is_even) = most(|(_, decimals)| *decimals);
+    let short = all.iter().filter(|(digits, _)| *digits <= HALF_DIGITS).count();
+    let is_of_decimals = decimals <= FEW_DECIMALS && 2 * short >= all.len();
+    let what = if is_of_decimals && (is_even || digits > FEW_DIGITS) {
+        count(decimals, "decimal")
+    } else if digits <= FEW_DIGITS {
+        count(digits, "digit")
     } else {
         return None;
     };
-    Some(Cause::plain("few-digits", statement, Certainty::Certain, failed, failed))
+    Some(("few-digits", format!("is printed with at most {what}")))
 }
 
 /// Significant digits, and decimals, of `number` as it is written.

@@ -40,12 +40,19 @@ fn every_solver_is_told_what_is_written_beside_it() {
 #[test]
 fn numbers_of_single_precision_and_of_few_digits_are_seen() {
     let exact: Vec<f64> = (1..40).map(|i| f64::from(i).sqrt()).collect();
-    let id = |numbers: Vec<f64>| of_numbers("number", &numbers, 3).map(|cause| cause.id);
+    let id = |numbers: Vec<f64>| of_numbers(numbers).map(|(id, _)| id);
     assert_eq!(id(exact.clone()), None);
-    assert_eq!(id(exact.iter().map(|x| f64::from(*x as f32)).collect()).as_deref(), Some("single-precision"));
+    assert_eq!(id(exact.iter().map(|x| f64::from(*x as f32)).collect()), Some("single-precision"));
     let printed = |digits: usize| exact.iter().map(|x| format!("{x:.digits$e}").parse().unwrap()).collect();
-    assert_eq!(id(printed(6)).as_deref(), Some("few-digits"));
+    assert_eq!(id(printed(6)), Some("few-digits"));
     assert_eq!(id(printed(14)), None);
+    let cut = |decimals: i32, size: f64| {
+        let grain = 10.0_f64.powi(decimals);
+        of_numbers(exact.iter().map(|x| (size * x * x * x * grain).round() / grain).collect()).map(|(_, what)| what)
+    };
+    assert_eq!(cut(6, 1.0).as_deref(), Some("is printed with at most 6 decimals"));
+    assert_eq!(cut(9, 1e-3).as_deref(), Some("is printed with at most 9 decimals"));
+    assert_eq!(cut(9, 1e4), None);
 }
 
 /// What is found of `solver` by the questions of `plan`.

@@ -8,7 +8,7 @@ use strum::IntoEnumIterator;
 
 use super::causes::{CERTAIN_FROM, Cause, Certainty, Effort, Seen, causes};
 use super::hypotheses::How;
-use super::numbers::few_digits;
+use super::numbers::{few_digits, is_cut_off};
 use super::observations::{is_one_error, is_same, shown};
 use super::questions::{Content, Question};
 use super::{
@@ -231,9 +231,23 @@ fn proof(problem: &Problem, index: usize, end: State) -> Option<String> {
     is_proved.then(said).flatten()
 }
 
-/// The ends of all answers that came, at the tightest tolerance.
-fn ends(answered: &[Answered<'_>]) -> impl Iterator<Item = State> {
-    answered.iter().filter_map(|one| Some(end_of(one.answers.last()?.1.as_ref().ok()?).state))
+/// The ends of all answers that came, at the tightest tolerance, and the exact ones.
+fn ends_and_exact(answered: &[Answered<'_>]) -> Vec<(State, State)> {
+    let end = |one: &Answered<'_>| Some(end_of(one.answers.last()?.1.as_ref().ok()?).state);
+    answered.iter().filter_map(|one| Some((end(one)?, one.question.exact.end))).collect()
+}
+
+/// That questions have no answer: so many of those that fail.
+fn no_answer(rows: &[Asked], silent: usize, failed: usize) -> Cause {
+    let is_silent = |row: &Asked| row.verdict == Verdict::Failed && row.answered.is_none();
+    let words = rows.iter().find(|row| row.answered.is_none()).map_or("", |row| row.reason.as_str());
+    let statement = format!(
+        "{} no answer: {words}{}",
+        if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") },
+        of_all(rows, is_silent).map_or_else(String::new, |content| format!("; all of them hold `{content}`"))
+    );
+    let certainty = if silent == failed { Certainty::Likely } else { Certainty::Possible };
+    Cause::plain("no-answer", statement, certainty, silent, failed)
 }
 
 /// Causes of the answers of an adaptive solver.
@@ -245,29 +259,27 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         return Vec::new();
     }
     let others: Vec<&Question> = all.iter().collect();
-    let of_numbers = few_digits(ends(answered), failed);
+    let of_numbers = few_digits(ends_and_exact(answered).into_iter().map(|(end, _)| end), failed);
     let at = |accuracy: f64| seen(answered, |_| accuracy);
     let failing = |seen: &[Seen<'_>]| seen.iter().filter(|seen| seen.fails).count();
     let named = |seen: &[Seen<'_>], effort: Effort| {
         let found = causes(seen, identity.reads_scene, &others, effort);
         found.first().is_some_and(|cause| cause.certainty != Certainty::Possible).then_some(found)
     };
-    let no_answer = (silent > 0).then(|| {
-        let words = rows.iter().find(|row| row.answered.is_none()).map_or("", |row| row.reason.as_str());
-        let statement = format!(
-            "{} no answer: {words}{}",
-            if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") },
-            of_all(&rows, |row| row.verdict == Verdict::Failed && row.answered.is_none())
-                .map_or_else(String::new, |content| format!("; all of them hold `{content}`"))
-        );
-        let certainty = if silent == failed { Certainty::Likely } else { Certainty::Possible };
-        Cause::plain("no-answer", statement, certainty, silent, failed)
-    });
+    let no_answer = (silent > 0).then(|| no_answer(&rows, silent, failed));
     let exactly = at(ACCURACIES[0]);
     if let Some(cause) = of_events(answered, failed) {
         return vec![cause];
     }
     let mut found = named(&exactly, if effort == Effort::All { effort } else { Effort::Nearly });
+    let is_certain = |found: &[Cause]| found.first().is_some_and(|cause| cause.certainty == Certainty::Certain);
+    if let Some(cause) = &of_numbers
+        && silent == 0
+        && !found.as_deref().is_some_and(is_certain)
+        && is_cut_off(&ends_and_exact(answered), ACCURACIES[0])
+    {
+        return vec![cause.clone()];
+    }
     // Small errors alone are those of a solver that does not do what the tolerance asks for, unless they are in few
     // answers, and those are sure of themselves.
     let is_of_few = 2 * failed < rows.len() && are_sure(answered);

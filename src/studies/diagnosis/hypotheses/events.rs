@@ -554,6 +554,16 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Problem(|p, n| cut_stages(p, n as usize))],
     ),
     of(
+        "stage-end-missed",
+        "a stage without thickness does not end, and its law goes on",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            if let Some(thin) = (0..p.stages.len()).find(|index| p.stages[*index].end <= p.start_of(*index)) {
+                cut_stages(p, thin + 1);
+            }
+        })],
+    ),
+    of(
         "stage-end-misplaced",
         "a stage is at least {} m thick, and those behind it move",
         Parameter::Value(0.03),

@@ -42,6 +42,18 @@ fn scale_in<const TERM: u8, const KIND: u8>(problem: &mut Problem, factor: f64) 
     }
 }
 
+/// The stiffness as a force that stays that of the start of the stage, in stages of a `KIND`.
+fn held_from_the_start<const KIND: u8>(problem: &mut Problem) {
+    for index in 0..problem.stages.len() {
+        let start = problem.start_of(index);
+        let law = &mut problem.stages[index];
+        if is_of_kind(law, KIND) {
+            law.static_force += law.stiffness * start;
+            law.stiffness = 0.0;
+        }
+    }
+}
+
 /// The depth in s x counted from the start of the stage, in stages of a `KIND`.
 fn from_the_start<const KIND: u8>(problem: &mut Problem) {
     for index in 1..problem.stages.len() {
@@ -160,6 +172,24 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the depth in s x is counted from the start of the stage where it has stiffness and drag, and no viscosity",
         Parameter::None,
         &[Change::Problem(|p, _| from_the_start::<BRAKED_SPRING>(p))],
+    ),
+    of(
+        "force-stale",
+        "the spring gives the force of the start of the stage throughout where it has stiffness, or that and a static force",
+        Parameter::None,
+        &[Change::Problem(|p, _| held_from_the_start::<SPRING>(p))],
+    ),
+    of(
+        "force-stale",
+        "the spring gives the force of the start of the stage throughout where it has stiffness and viscosity, and no drag",
+        Parameter::None,
+        &[Change::Problem(|p, _| held_from_the_start::<DAMPED>(p))],
+    ),
+    of(
+        "force-stale",
+        "the spring gives the force of the start of the stage throughout where it has stiffness and drag, and no viscosity",
+        Parameter::None,
+        &[Change::Problem(|p, _| held_from_the_start::<BRAKED_SPRING>(p))],
     ),
     in_kind!("term:static-force", "the static force p", STATIC_FORCE, STEADY, "a static force alone"),
     in_kind!("term:static-force", "the static force p", STATIC_FORCE, SPRING, "a static force and stiffness"),

@@ -78,6 +78,16 @@ impl Leg<'_> {
         mass / (static_force * drag).sqrt() * of(at(self.from), at(self.to))
     }
 
+    /// The time in which it would slow down to the velocity at its end from `speed`: of a static force that resists, alone or
+    /// beside drag. That of another law stays.
+    fn time_from(&self, mass: f64, speed: f64) -> f64 {
+        let Stage { static_force, drag, .. } = *self.law;
+        match self.terms() {
+            [false, false, false] if static_force > 0.0 => mass * (speed - self.to.velocity) / static_force,
+            _ => self.of_arctangents(mass, |_, b| (speed * (drag / static_force).sqrt()).atan() - b.atan()),
+        }
+    }
+
     /// What its time lacks if a quarter of an oscillation takes `factor` times its time: of rest under a spring and a static force.
     fn of_quarter(&self, mass: f64, factor: f64) -> f64 {
         let stiffness = self.law.stiffness;
@@ -384,6 +394,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the time in stages of a static force and drag is that to rest, wherever they end",
         Parameter::None,
         &[Change::Report(|p, found, _| retime(p, found, |leg| leg.of_arctangents(p.mass, |a, _| a.atan())))],
+    ),
+    of(
+        "time-formula",
+        "the time in stages of a static force, or that and drag, is that of slowing down from V0, not from V at the start",
+        Parameter::None,
+        &[Change::Report(|p, found, _| retime(p, found, |leg| leg.time_from(p.mass, p.impact_speed)))],
     ),
     of(
         "stage-left-out",

@@ -1,10 +1,12 @@
 //! Are steps too long? A flight that fails is asked anew in parts, each from the exact state at the end of the one before.
 //!
 //! What is wrong with the force or with a threshold stays: the errors of the parts add up to that of the whole. An error of the
-//! steps falls as the parts get shorter, since each of them starts with a short step.
+//! steps falls as the parts get shorter, since each of them starts with a short step: as a power of their length. Where it stays
+//! and then vanishes at once, each of the shortest parts is a single step, and what is wrong begins with the second.
 
 use super::super::causes::{Cause, Certainty};
 use super::super::questions::{Content, Question};
+use super::super::simulation::{Rules, simulate};
 use super::super::{Asked, Asking, Diagnosis};
 use super::ends;
 use crate::exchange::peers::PeerRequest;
@@ -18,8 +20,13 @@ const FLIGHTS: usize = 4;
 const SHOWN: usize = 3;
 /// Numbers of parts.
 const PARTS: [usize; 3] = [1, 8, 64];
-/// Part of the error of the whole that the parts may have left, in that order.
-const LEFT: [f64; 3] = [1.0, 0.25, 0.01];
+/// Part of the error of the whole that so many parts may leave.
+const LEFT_OF_FEW: f64 = 0.25;
+const LEFT: f64 = 0.01;
+/// What twice as many leave at least of an error that is a power of their length, of any order up to 26.
+const POWER: f64 = 1e-8;
+/// Error of a flight that is lost.
+const EXPLODED: f64 = 0.9;
 /// Causes beside which this one says more.
 const OPEN: [&str; 2] = ["unknown", "tolerance-missed"];
 
@@ -37,30 +44,44 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let flights: Vec<(&Asked, &Question)> = failing
         .filter_map(|row| Some((row, all.iter().find(|question| question.id == row.id).filter(of_one_stage)?)))
         .collect();
-    let (mut shown, mut asked) = (0, 0);
+    let (mut falling, mut vanishing, mut asked) = (0, 0, 0);
     let mut worst = [0.0_f64; PARTS.len()];
     for (row, question) in flights.iter().step_by((flights.len() / FLIGHTS).max(1)).take(FLIGHTS) {
-        let errors = PARTS.map(|parts| in_parts(asking, &question.problem, row.rtol?, parts));
+        let mut error = |parts| in_parts(asking, &question.problem, row.rtol?, parts);
+        let [Some(whole), Some(few), Some(many)] = PARTS.map(&mut error) else { continue };
         asked += 1;
-        let [Some(whole), ..] = errors else { continue };
-        let falls = errors.iter().zip(LEFT).all(|(error, left)| error.is_some_and(|error| error <= left * whole));
-        if falls {
-            shown += 1;
-            worst = std::array::from_fn(|index| worst[index].max(errors[index].unwrap_or(0.0)));
+        if many > LEFT * whole {
+            continue;
         }
+        let steep = if many <= POWER * few { Some(PARTS[1]) } else { (few <= POWER * whole).then_some(PARTS[0]) };
+        let doubled: Vec<f64> =
+            steep.into_iter().flat_map(|parts| [1, 2, 4, 8].map(|by| by * parts)).map_while(error).collect();
+        // A step so long that it explodes leaves nothing right.
+        vanishing += usize::from(doubled.windows(2).any(|pair| pair[0] < EXPLODED && pair[1] <= POWER * pair[0]));
+        falling += usize::from(few <= LEFT_OF_FEW * whole);
+        worst = std::array::from_fn(|index| worst[index].max([whole, few, many][index]));
     }
     let [whole, few, many] = worst.map(|error| format!("{error:.0e}"));
-    let statement = format!(
-        "flights that fail are right in parts: errors of {whole} as a whole, {few} in {} and {many} in {} parts. The force is right, and \
-         steps are too long: the estimate of their error is wrong, or a coefficient of the scheme",
+    let right = format!(
+        "flights that fail are right in parts: errors of {whole} as a whole, {few} in {} and {many} in {} parts.",
         PARTS[1], PARTS[2]
     );
-    (shown >= SHOWN.min(flights.len()).max(2))
-        .then(|| Cause::plain("steps-too-long", statement, Certainty::Likely, shown, asked))
+    let needed = SHOWN.min(flights.len()).max(2);
+    if vanishing >= needed {
+        let statement = format!(
+            "{right} Twice as many parts leave nothing of the error where each becomes a single step: what is wrong begins with the \
+             second step of a stage, which finds something that the first one left"
+        );
+        return Some(Cause::plain("step-kept", statement, Certainty::Likely, vanishing, asked));
+    }
+    let statement = format!(
+        "{right} The force is right, and steps are too long: the estimate of their error is wrong, or a coefficient of the scheme"
+    );
+    (falling >= needed).then(|| Cause::plain("steps-too-long", statement, Certainty::Likely, falling, asked))
 }
 
-/// The sum of the errors of so many parts of the flight through the first stage of `problem`, over its end; one for a part that ends
-/// otherwise, `None` where one has no answer.
+/// The sum of the errors of so many parts, of one length in time, of the flight through the first stage of `problem`, over its
+/// end; one for a part that ends otherwise, `None` where one has no answer.
 fn in_parts(asking: &mut Asking<'_>, problem: &Problem, rtol: f64, parts: usize) -> Option<f64> {
     let law = Stage { end: f64::INFINITY, ..problem.stages[0] };
     let whole = Problem::of_stages(problem.mass, problem.impact_speed, [law]).with_exit(problem.exit_depth);
@@ -69,11 +90,17 @@ fn in_parts(asking: &mut Asking<'_>, problem: &Problem, rtol: f64, parts: usize)
     let mut sums = [0.0; 3];
     let (mut from, mut speed) = (0.0, problem.impact_speed);
     for index in 1..=parts {
-        let is_rest = index == parts && end.velocity <= 0.0;
-        let to = if index == parts { end.depth } else { end.depth * index as f64 / parts as f64 };
         let stage = Stage { static_force: law.static_force + law.stiffness * from, ..law };
         let endless = Problem::of_stages(problem.mass, speed, [stage]);
-        let part = if is_rest { endless } else { endless.with_exit(to - from) };
+        let (part, to) = if index < parts {
+            let rules = Rules { end_time: end.time / parts as f64, ..Rules::default() };
+            let way = simulate(&endless, rules)?.end.depth;
+            (endless.with_exit(way), from + way)
+        } else if end.velocity > 0.0 {
+            (endless.with_exit(end.depth - from), end.depth)
+        } else {
+            (endless, end.depth)
+        };
         let exact = solver.solve(&part, Detail::End).ok()?.end;
         let Some([found, exact]) = ends(asking, &part, &PeerRequest::from_problem(&part, rtol)) else {
             if asking.is_gone {
