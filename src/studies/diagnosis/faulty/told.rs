@@ -1346,6 +1346,12 @@ const TOLD: &[Told] = &[
         says: "failed | step-kept, likely: flights that fail are right in parts: errors of 2e-1 as a whole, 5e-16 in 8 and 3e-15 in 64 parts. Twice as many parts leave nothing of the error where each becomes a single step: what is wrong begins with the second step of a stage, which finds something that the first one left",
     },
     Told {
+        what: "steps of one length at every tolerance",
+        solver: || Stepping { steps: |_, _| 12.0, ..RIGHT }.solver(),
+        asked: Questions(60),
+        says: "failed | steps-too-long, likely: flights that fail are right in parts: errors of 1e0 as a whole, 1e-9 in 8 and 3e-13 in 64 parts. The force is right, and steps are too long, and the same at every tolerance: it is ignored, or the estimate of their error is wrong",
+    },
+    Told {
         what: "every number is printed with six decimals",
         solver: || {
             altered(

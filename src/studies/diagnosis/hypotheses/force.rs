@@ -647,6 +647,26 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Force(|at, _| right_force(&Place { velocity: at.impact_speed, ..*at }, 1.0))],
     ),
     of(
+        "term:drag",
+        "the drag q is left out in stages that have stiffness",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            for law in p.stages.iter_mut().filter(|law| law.stiffness != 0.0) {
+                law.drag = 0.0;
+            }
+        })],
+    ),
+    of(
+        "term:viscosity",
+        "the viscosity r is left out in stages that have stiffness",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            for law in p.stages.iter_mut().filter(|law| law.stiffness != 0.0) {
+                law.viscosity = 0.0;
+            }
+        })],
+    ),
+    of(
         "drag-on-viscosity",
         "the drag is left out where there is viscosity",
         Parameter::None,

@@ -7,7 +7,7 @@
 use super::super::causes::{Cause, Certainty};
 use super::super::questions::{Content, Question};
 use super::super::simulation::{Rules, simulate};
-use super::super::{Asked, Asking, Diagnosis};
+use super::super::{Asked, Asking, Diagnosis, TOLERANCES};
 use super::ends;
 use crate::exchange::peers::PeerRequest;
 use crate::exchange::peers::wire::errors;
@@ -25,6 +25,8 @@ const LEFT_OF_FEW: f64 = 0.25;
 const LEFT: f64 = 0.01;
 /// What twice as many leave at least of an error that is a power of their length, of any order up to 26.
 const POWER: f64 = 1e-8;
+/// Part of the error by which answers at two tolerances may differ that are one.
+const UNMOVED: f64 = 0.01;
 /// Error of a flight that is lost.
 const EXPLODED: f64 = 0.9;
 /// Causes beside which this one says more.
@@ -44,7 +46,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let flights: Vec<(&Asked, &Question)> = failing
         .filter_map(|row| Some((row, all.iter().find(|question| question.id == row.id).filter(of_one_stage)?)))
         .collect();
-    let (mut falling, mut vanishing, mut asked) = (0, 0, 0);
+    let (mut falling, mut vanishing, mut unmoved, mut asked) = (0, 0, 0, 0);
     let mut worst = [0.0_f64; PARTS.len()];
     for (row, question) in flights.iter().step_by((flights.len() / FLIGHTS).max(1)).take(FLIGHTS) {
         let mut error = |parts| in_parts(asking, &question.problem, row.rtol?, parts);
@@ -58,7 +60,10 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
             steep.into_iter().flat_map(|parts| [1, 2, 4, 8].map(|by| by * parts)).map_while(error).collect();
         // A step so long that it explodes leaves nothing right.
         vanishing += usize::from(doubled.windows(2).any(|pair| pair[0] < EXPLODED && pair[1] <= POWER * pair[0]));
-        falling += usize::from(few <= LEFT_OF_FEW * whole);
+        if few <= LEFT_OF_FEW * whole {
+            falling += 1;
+            unmoved += usize::from(is_unmoved(asking, &question.problem));
+        }
         worst = std::array::from_fn(|index| worst[index].max([whole, few, many][index]));
     }
     let [whole, few, many] = worst.map(|error| format!("{error:.0e}"));
@@ -74,10 +79,21 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         );
         return Some(Cause::plain("step-kept", statement, Certainty::Likely, vanishing, asked));
     }
-    let statement = format!(
-        "{right} The force is right, and steps are too long: the estimate of their error is wrong, or a coefficient of the scheme"
-    );
+    let (what, why) = if unmoved == falling {
+        (", and the same at every tolerance", "it is ignored, or the estimate of their error is wrong")
+    } else {
+        ("", "the estimate of their error is wrong, or a coefficient of the scheme")
+    };
+    let statement = format!("{right} The force is right, and steps are too long{what}: {why}");
     (falling >= needed).then(|| Cause::plain("steps-too-long", statement, Certainty::Likely, falling, asked))
+}
+
+/// Whether the flight through `problem` ends alike at the loosest and the tightest tolerance, and wrongly.
+fn is_unmoved(asking: &mut Asking<'_>, problem: &Problem) -> bool {
+    let [loose, .., tight] = TOLERANCES.map(|rtol| ends(asking, problem, &PeerRequest::from_problem(problem, rtol)));
+    let (Some([loose, _]), Some([tight, exact])) = (loose, tight) else { return false };
+    let off = |a, b| errors(a, b, problem.impact_speed).map(f64::abs).into_iter().fold(0.0, f64::max);
+    off(loose, tight) <= UNMOVED * off(tight, exact)
 }
 
 /// The sum of the errors of so many parts, of one length in time, of the flight through the first stage of `problem`, over its
