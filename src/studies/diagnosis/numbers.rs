@@ -33,8 +33,8 @@ pub(super) fn few_digits(ends: impl Iterator<Item = State>, failed: usize) -> Op
     Some(Cause::plain(id, statement, Certainty::Certain, failed, failed))
 }
 
-/// Whether what `ends` miss of the exact ones, behind them, is what the digits or the decimals that they have cut off, of every
-/// quantity; `accuracy` is the relative error that has another cause.
+/// Whether each answer, with the exact one beside it, errs by no more than half a unit of its last decimal, or of its last digit, the
+/// most that any answer has of its quantity; a relative error of `accuracy` may come on top.
 pub(super) fn is_cut_off(ends: &[(State, State)], accuracy: f64) -> bool {
     let of: [fn(&State) -> f64; 3] = [|end| end.depth, |end| end.time, |end| end.velocity];
     of.iter().all(|of| {

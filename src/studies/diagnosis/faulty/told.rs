@@ -1349,7 +1349,7 @@ const TOLD: &[Told] = &[
         what: "steps of one length at every tolerance",
         solver: || Stepping { steps: |_, _| 12.0, ..RIGHT }.solver(),
         asked: Questions(60),
-        says: "failed | steps-too-long, likely: flights that fail are right in parts: errors of 1e0 as a whole, 1e-9 in 8 and 3e-13 in 64 parts. The force is right, and steps are too long, and the same at every tolerance: it is ignored, or the estimate of their error is wrong",
+        says: "failed | steps-too-long, likely: flights that fail are right in parts: errors of 1e0 as a whole, 1e-9 in 8 and 3e-13 in 64 parts. The force is right, and steps are too long, and the same at every tolerance: that is ignored, or the estimate of their error is wrong",
     },
     Told {
         what: "every number is printed with six decimals",

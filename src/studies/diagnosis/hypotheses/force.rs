@@ -124,6 +124,15 @@ fn leave_alone<const TERM: u8>(problem: &mut Problem, _: f64) {
     }
 }
 
+/// No `TERM` in the stages that have the `OTHER`.
+fn leave_out_beside<const TERM: u8, const OTHER: u8>(problem: &mut Problem, _: f64) {
+    for law in &mut problem.stages {
+        if *term_of(law, OTHER) != 0.0 {
+            *term_of(law, TERM) = 0.0;
+        }
+    }
+}
+
 /// The number of `TERM` in every stage as `alter` has it.
 fn alter_term<const TERM: u8>(problem: &mut Problem, alter: impl Fn(f64) -> f64) {
     for law in &mut problem.stages {
@@ -163,14 +172,14 @@ fn at_velocity(at: &Place<'_>, velocity: f64) -> f64 {
     right_force(&Place { velocity, ..*at }, 1.0)
 }
 
-/// The stiffness of every stage but an endless one as a static force at a part of its way.
-fn spring_at(problem: &mut Problem, part: f64) {
+/// The stiffness of stages as a static force, that at a part of their way; an endless stage has none but at its start.
+pub(super) fn spring_at(problem: &mut Problem, part: f64, is_one: impl Fn(&Stage) -> bool) {
     for index in 0..problem.stages.len() {
-        let (start, end) = (problem.start_of(index), problem.stages[index].end);
-        if part == 0.0 || end.is_finite() {
-            let depth = if part == 0.0 { start } else { start + part * (end - start) };
-            problem.stages[index].static_force += problem.stages[index].stiffness * depth;
-            problem.stages[index].stiffness = 0.0;
+        let (start, law) = (problem.start_of(index), &mut problem.stages[index]);
+        if is_one(law) && (part == 0.0 || law.end.is_finite()) {
+            let depth = if part == 0.0 { start } else { start + part * (law.end - start) };
+            law.static_force += law.stiffness * depth;
+            law.stiffness = 0.0;
         }
     }
 }
@@ -650,37 +659,25 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "term:drag",
         "the drag q is left out in stages that have stiffness",
         Parameter::None,
-        &[Change::Problem(|p, _| {
-            for law in p.stages.iter_mut().filter(|law| law.stiffness != 0.0) {
-                law.drag = 0.0;
-            }
-        })],
+        &[Change::Problem(leave_out_beside::<DRAG, STIFFNESS>)],
     ),
     of(
         "term:viscosity",
         "the viscosity r is left out in stages that have stiffness",
         Parameter::None,
-        &[Change::Problem(|p, _| {
-            for law in p.stages.iter_mut().filter(|law| law.stiffness != 0.0) {
-                law.viscosity = 0.0;
-            }
-        })],
+        &[Change::Problem(leave_out_beside::<VISCOSITY, STIFFNESS>)],
     ),
     of(
         "drag-on-viscosity",
         "the drag is left out where there is viscosity",
         Parameter::None,
-        &[Change::Problem(|p, _| {
-            p.stages.iter_mut().filter(|law| law.viscosity > 0.0).for_each(|law| law.drag = 0.0);
-        })],
+        &[Change::Problem(leave_out_beside::<DRAG, VISCOSITY>)],
     ),
     of(
         "drag-on-viscosity",
         "the viscosity is left out where there is drag",
         Parameter::None,
-        &[Change::Problem(|p, _| {
-            p.stages.iter_mut().filter(|law| law.drag > 0.0).for_each(|law| law.viscosity = 0.0);
-        })],
+        &[Change::Problem(leave_out_beside::<VISCOSITY, DRAG>)],
     ),
     of(
         "stiffness-origin",
@@ -929,19 +926,19 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "force-stale",
         "the spring gives the force of the start of the stage throughout",
         Parameter::None,
-        &[Change::Problem(|p, _| spring_at(p, 0.0))],
+        &[Change::Problem(|p, _| spring_at(p, 0.0, |_| true))],
     ),
     of(
         "force-stale",
         "the spring gives the force of the middle of the stage throughout",
         Parameter::None,
-        &[Change::Problem(|p, _| spring_at(p, 0.5))],
+        &[Change::Problem(|p, _| spring_at(p, 0.5, |_| true))],
     ),
     of(
         "force-stale",
         "the spring gives the force of the end of the stage throughout",
         Parameter::None,
-        &[Change::Problem(|p, _| spring_at(p, 1.0))],
+        &[Change::Problem(|p, _| spring_at(p, 1.0, |_| true))],
     ),
     of(
         "viscosity-power",

@@ -10,7 +10,7 @@
 //! at the start of the stage, its flight is that of a stage with r = 2 M g, s = M (g² + w²) and the same p/s.
 
 use super::super::questions::Question;
-use super::force::{DRAG, STATIC_FORCE, STIFFNESS, VISCOSITY, term_of};
+use super::force::{DRAG, STATIC_FORCE, STIFFNESS, VISCOSITY, spring_at, term_of};
 use super::{Change, Hypothesis, Parameter, of};
 use crate::physics::{Problem, Stage};
 
@@ -39,18 +39,6 @@ fn is_of_kind(law: &Stage, kind: u8) -> bool {
 fn scale_in<const TERM: u8, const KIND: u8>(problem: &mut Problem, factor: f64) {
     for law in problem.stages.iter_mut().filter(|law| is_of_kind(law, KIND)) {
         *term_of(law, TERM) *= factor;
-    }
-}
-
-/// The stiffness as a force that stays that of the start of the stage, in stages of a `KIND`.
-fn held_from_the_start<const KIND: u8>(problem: &mut Problem) {
-    for index in 0..problem.stages.len() {
-        let start = problem.start_of(index);
-        let law = &mut problem.stages[index];
-        if is_of_kind(law, KIND) {
-            law.static_force += law.stiffness * start;
-            law.stiffness = 0.0;
-        }
     }
 }
 
@@ -177,19 +165,19 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "force-stale",
         "the spring gives the force of the start of the stage throughout where it has stiffness, or that and a static force",
         Parameter::None,
-        &[Change::Problem(|p, _| held_from_the_start::<SPRING>(p))],
+        &[Change::Problem(|p, _| spring_at(p, 0.0, |law| is_of_kind(law, SPRING)))],
     ),
     of(
         "force-stale",
         "the spring gives the force of the start of the stage throughout where it has stiffness and viscosity, and no drag",
         Parameter::None,
-        &[Change::Problem(|p, _| held_from_the_start::<DAMPED>(p))],
+        &[Change::Problem(|p, _| spring_at(p, 0.0, |law| is_of_kind(law, DAMPED)))],
     ),
     of(
         "force-stale",
         "the spring gives the force of the start of the stage throughout where it has stiffness and drag, and no viscosity",
         Parameter::None,
-        &[Change::Problem(|p, _| held_from_the_start::<BRAKED_SPRING>(p))],
+        &[Change::Problem(|p, _| spring_at(p, 0.0, |law| is_of_kind(law, BRAKED_SPRING)))],
     ),
     in_kind!("term:static-force", "the static force p", STATIC_FORCE, STEADY, "a static force alone"),
     in_kind!("term:static-force", "the static force p", STATIC_FORCE, SPRING, "a static force and stiffness"),

@@ -80,7 +80,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         return Some(Cause::plain("step-kept", statement, Certainty::Likely, vanishing, asked));
     }
     let (what, why) = if unmoved == falling {
-        (", and the same at every tolerance", "it is ignored, or the estimate of their error is wrong")
+        (", and the same at every tolerance", "that is ignored, or the estimate of their error is wrong")
     } else {
         ("", "the estimate of their error is wrong, or a coefficient of the scheme")
     };
@@ -90,7 +90,9 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
 
 /// Whether the flight through `problem` ends alike at the loosest and the tightest tolerance, and wrongly.
 fn is_unmoved(asking: &mut Asking<'_>, problem: &Problem) -> bool {
-    let [loose, .., tight] = TOLERANCES.map(|rtol| ends(asking, problem, &PeerRequest::from_problem(problem, rtol)));
+    let [loosest, .., tightest] = TOLERANCES;
+    let [loose, tight] =
+        [loosest, tightest].map(|rtol| ends(asking, problem, &PeerRequest::from_problem(problem, rtol)));
     let (Some([loose, _]), Some([tight, exact])) = (loose, tight) else { return false };
     let off = |a, b| errors(a, b, problem.impact_speed).map(f64::abs).into_iter().fold(0.0, f64::max);
     off(loose, tight) <= UNMOVED * off(tight, exact)
