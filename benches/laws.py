@@ -156,4 +156,5 @@ def main(program):
 
 if __name__ == "__main__":
     np.seterr(all="ignore")
+    hy.set_logger_level_error()  # a law without an end at a depth warns of each step
     main(sys.argv[1])

@@ -34,7 +34,7 @@ pub(crate) use self::hypotheses::changed_by_nothing;
 pub use self::hypotheses::{Effect, KnownCause, known_causes};
 #[cfg(feature = "report")]
 pub(crate) use self::ladder::{LADDER, Limit};
-use self::measurements::measured;
+use self::measurements::add_measured;
 pub use self::questions::{Content, contents};
 use self::questions::{Question, edge_questions, in_order, questions, slow_questions};
 use self::tolerances::{at_tolerances, row};
@@ -296,20 +296,8 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
     };
     let is_named = found.causes.iter().any(|cause| cause.certainty == Certainty::Certain);
     let is_of_low_order = found.causes.first().is_some_and(|cause| cause.id == "first-order-scheme");
-    if (found.verdict == Verdict::Failed || is_of_low_order)
-        && !is_named
-        && let Some(cause) = measured(&mut asking, all, &found)
-    {
-        // A clock is found where events under a constant force are on time; weights make every time late, or early.
-        let is_refuted =
-            |known: &str| known.starts_with("event-time-") && ["clock", "weights"].contains(&cause.id.as_str());
-        found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
-        // What is measured says more of the same.
-        found.causes.retain(|known| known.id != cause.id || !SYMPTOMS.contains(&cause.id.as_str()));
-        // What is likely, and is no symptom alone, stays first beside what is no more.
-        let stays = |known: &Cause| known.certainty <= cause.certainty && !SYMPTOMS.contains(&known.id.as_str());
-        let place = usize::from(found.causes.first().is_some_and(stays));
-        found.causes.insert(if cause.certainty == Certainty::Certain { 0 } else { place }, cause);
+    if (found.verdict == Verdict::Failed || is_of_low_order) && !is_named {
+        add_measured(&mut asking, all, &mut found);
     }
     found
 }

@@ -161,18 +161,14 @@ impl Around<'_> {
 }
 
 impl Fall {
-    /// The disc of `(V/V0)^exponent`, where that is no root.
+    /// The disc of `(V/V0)^exponent`.
     fn disc(self, exponent: f64, s: Disc) -> Option<Disc> {
         if exponent.is_nan() {
             return None;
         }
         match self {
             Self::Exponential => Some(s.scaled(-exponent).exp()),
-            Self::Power(m) => {
-                let (whole, left) = (exponent * f64::from(m), Disc::new(1.0 - s.centre, s.radius));
-                (whole.fract() == 0.0)
-                    .then(|| if whole < 0.0 { left.power(-whole).inverse() } else { left.power(whole) })
-            }
+            Self::Power(m) => Some(Disc::new(1.0 - s.centre, s.radius).power(exponent * f64::from(m))),
         }
     }
 }
@@ -316,7 +312,7 @@ fn keeps((least, most): Range, side: bool, error: f64) -> bool {
 #[expect(clippy::unwrap_used, reason = "a text that is no expression is a failed test")]
 mod tests {
     use super::{Around, Disc};
-    use crate::physics::expression::{Jets, Known, Tape, Unit};
+    use crate::physics::expression::{Fall, Jets, Known, Tape, Unit};
     use crate::physics::units::Dimension;
     use crate::testing::Random;
 
@@ -355,5 +351,22 @@ mod tests {
             }
         }
         assert!(bounded > 1000, "{bounded}");
+    }
+
+    /// A switch may hold `V^0.03` where the force goes by `V^(1/3)`.
+    #[test]
+    fn any_power_of_a_velocity_that_falls_by_a_power_has_a_disc_up_to_rest() {
+        for power in [0.0274, 0.5, 1.0, 1.7, -0.3, -1.0] {
+            for (centre, radius) in [(0.3, 0.5), (0.4, 0.59), (0.0, 0.9)] {
+                let disc = Fall::Power(3).disc(power, Disc::new(centre, radius)).unwrap();
+                let value = |s: f64| (1.0 - s).powf(3.0 * power);
+                assert!((disc.centre - value(centre)).abs() <= 1e-15 * value(centre), "{power}: {disc:?}");
+                for s in [centre - radius, centre + radius, centre + 0.5 * radius] {
+                    let off = (value(s) - disc.centre).abs();
+                    assert!(off <= disc.radius * (1.0 + 1e-14), "{power} at {s}: {off} beyond {disc:?}");
+                }
+                assert!(disc.radius.is_finite(), "{power}: {disc:?}");
+            }
+        }
     }
 }

@@ -38,6 +38,10 @@ const FLOOR_MAX: f64 = 1e-8;
 const FLOOR_EXCESS: f64 = 10.0;
 /// Answers that must end after one number of steps, and the error at a far smaller step from which a flight may be cut short.
 const LEAST_CUTS: usize = 3;
+/// The order that a scheme has at least where nothing lowers it to one, and how far below and beside an order is lost and kept.
+const SECOND: f64 = 2.0;
+const LOST: f64 = 0.5;
+const KEPT: f64 = 0.4;
 const CUT: f64 = 1e-2;
 /// Least order with which errors of a sound scheme fall.
 const FLOOR_ORDER: f64 = 0.8;
@@ -484,9 +488,12 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
         let below = orders.iter().find(|order| order.verdict == Verdict::Failed);
         let cause = below.map(|below| {
             let (found, claimed) = (below.observed_order.unwrap_or(0.0), below.formal_order.unwrap_or(0.0));
-            let statement =
-                format!("the order of the {} is {found:.1} in questions of every kind, not {claimed}", below.quantity);
-            Cause::plain("order", statement, Certainty::Likely, of, of)
+            let where_it_falls = where_it_falls(right, claimed, true);
+            where_it_falls.into_iter().next().unwrap_or_else(|| {
+                let statement =
+                    format!("the order of the {} is {found:.1} over all questions, not {claimed}", below.quantity);
+                Cause::plain("order", statement, Certainty::Likely, of, of)
+            })
         });
         return cause.into_iter().collect();
     }
@@ -507,8 +514,18 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
         let statement = "every flight ends at the end of a step: exit and rest are not located, order 1".to_owned();
         return vec![Cause::plain("exit-late", statement, Certainty::Certain, of, of)];
     }
+    let mut causes = where_it_falls(right, SECOND, false);
+    if causes.is_empty() {
+        let statement = "the order is about 1 in questions of every kind".to_owned();
+        causes.push(Cause::plain("first-order-scheme", statement, Certainty::Likely, of, of));
+    }
+    causes
+}
+
+/// Kinds of questions to which the order `full` is lost, where others keep it: two at most.
+fn where_it_falls(right: &[(&Question, &[Rung])], full: f64, is_high: bool) -> Vec<Cause> {
     let mut causes = Vec::new();
-    for (id, contents, statement) in LOWERS {
+    for Lowering { id, contents, place, of_one, of_more } in LOWERS {
         if causes.len() == 2 || (*id == "start-kick" && !causes.is_empty()) {
             break;
         }
@@ -519,40 +536,89 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
         let lowest =
             |part: &[(&Question, &[Rung])]| (0..3).filter_map(|which| order(part, which)).fold(f64::INFINITY, f64::min);
         let (inside, outside) = (part(true), part(false));
-        if !inside.is_empty() && !outside.is_empty() && lowest(&inside) < 1.5 && lowest(&outside) > 1.6 {
-            causes.push(Cause::plain(id, (*statement).to_owned(), Certainty::Likely, inside.len(), of));
+        if inside.is_empty() || outside.is_empty() {
+            continue;
+        }
+        let (found, beside) = (lowest(&inside), lowest(&outside));
+        if found < full - LOST && beside > full - KEPT {
+            let (id, why) = if is_high { ("order", *of_more) } else { (*id, *of_one) };
+            let statement = format!("the order falls to {found:.0} {place}{why}");
+            causes.push(Cause::plain(id, statement, Certainty::Likely, inside.len(), right.len()));
         }
     }
     causes.dedup_by(|a, b| a.id == b.id);
-    if causes.is_empty() {
-        let statement = "the order is about 1 in questions of every kind".to_owned();
-        causes.push(Cause::plain("first-order-scheme", statement, Certainty::Likely, of, of));
-    }
     causes
 }
 
-/// Id, contents and sentence of what lowers an order to one, where every question of that order holds one of the contents.
-const LOWERS: &[(&str, &[Content], &str)] = &[
-    ("drag-lagged", &[Content::Drag, Content::Viscosity], "the order falls to 1 where the force depends on V"),
-    (
-        "force-stale",
-        &[Content::Stiffness, Content::LaterStiffness, Content::Softening],
-        "the order falls to 1 where the force depends on x: its depth is that of another time",
-    ),
-    ("stage-end-late", &[Content::ForceJump], "the order falls to 1 where the force jumps at the end of a stage"),
-    ("stage-end-late", &[Content::StageEnd], "the order falls to 1 where the end of a stage is passed"),
-    ("exit-late", &[Content::Exit], "the order falls to 1 at the exit"),
-    (
-        "stage-end-late",
-        &[Content::StageEnd, Content::Exit],
-        "the order falls to 1 at ends of stages and at the exit: a step that passes one is taken whole",
-    ),
-    ("rest-late", &[Content::Rest], "the order falls to 1 at rest: it is taken at a step"),
-    (
-        "start-kick",
-        &[Content::StaticForce, Content::Drive, Content::Viscosity, Content::Drag],
-        "the order falls to 1 where there is a force at impact: V half a step back is V0 itself",
-    ),
+/// What lowers an order, where every question of the lower one holds one of the contents.
+struct Lowering {
+    /// Id where the order falls to one.
+    id: &'static str,
+    contents: &'static [Content],
+    /// Where it falls.
+    place: &'static str,
+    /// Why, to one, and to more.
+    of_one: &'static str,
+    of_more: &'static str,
+}
+
+const LOWERS: &[Lowering] = &[
+    Lowering {
+        id: "drag-lagged",
+        contents: &[Content::Drag, Content::Viscosity],
+        place: "where the force depends on V",
+        of_one: "",
+        of_more: ": its V is not that of the scheme's stage",
+    },
+    Lowering {
+        id: "force-stale",
+        contents: &[Content::Stiffness, Content::LaterStiffness, Content::Softening],
+        place: "where the force depends on x",
+        of_one: ": its depth is that of another time",
+        of_more: ": its depth is not that of the scheme's stage",
+    },
+    Lowering {
+        id: "stage-end-late",
+        contents: &[Content::ForceJump],
+        place: "where the force jumps at the end of a stage",
+        of_one: "",
+        of_more: ": that end is not located to the order of the scheme",
+    },
+    Lowering {
+        id: "stage-end-late",
+        contents: &[Content::StageEnd],
+        place: "where the end of a stage is passed",
+        of_one: "",
+        of_more: ": it is not located to the order of the scheme, or the step to it is of a lower one",
+    },
+    Lowering {
+        id: "exit-late",
+        contents: &[Content::Exit],
+        place: "at the exit",
+        of_one: "",
+        of_more: ": it is not located to the order of the scheme, or the step to it is of a lower one",
+    },
+    Lowering {
+        id: "stage-end-late",
+        contents: &[Content::StageEnd, Content::Exit],
+        place: "at ends of stages and at the exit",
+        of_one: ": a step that passes one is taken whole",
+        of_more: ": they are not located to the order of the scheme, or the step to them is of a lower one",
+    },
+    Lowering {
+        id: "rest-late",
+        contents: &[Content::Rest],
+        place: "at rest",
+        of_one: ": it is taken at a step",
+        of_more: ": it is not located to the order of the scheme",
+    },
+    Lowering {
+        id: "start-kick",
+        contents: &[Content::StaticForce, Content::Drive, Content::Viscosity, Content::Drag],
+        place: "where there is a force at impact",
+        of_one: ": V half a step back is V0 itself",
+        of_more: "",
+    },
 ];
 
 /// The rules of a known scheme that lower its order.

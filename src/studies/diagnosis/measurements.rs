@@ -11,16 +11,18 @@
 //! - One flight in ever shorter times, and at ever tighter tolerances: a step or a tolerance that is never undercut (`bounds`).
 //! - Failing flights in ever shorter parts (`long_steps`).
 //! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`).
+//! - Each stage by itself, from the state that the solver lists at its start (`stage_by_stage`).
 
 mod bounds;
 mod first_step;
 mod long_steps;
 mod one_step;
+mod stage_by_stage;
 mod within_step;
 
 use super::causes::{Cause, Certainty};
 use super::questions::Question;
-use super::{ALLOWED, Asked, Asking, Diagnosis, Each, TOLERANCES, end_of, request};
+use super::{ALLOWED, Asked, Asking, Diagnosis, Each, SYMPTOMS, TOLERANCES, end_of, request};
 use crate::exchange::peers::PeerRequest;
 use crate::exchange::peers::wire::errors;
 use crate::integrators::{Detail, Integrator, Taylor};
@@ -66,6 +68,44 @@ const FALLS: f64 = 3.0;
 const FALLS_IN_ALL: f64 = 1e3;
 /// Part by which a fall of the error with the size differs from the ratio of sizes.
 const SAME_FALL: f64 = 0.05;
+
+/// Causes that act in stages of every kind: where only some kinds are wrong, that goes before them.
+const OF_EVERY_KIND: [&str; 7] = [
+    "exit-late",
+    "exit-velocity-late",
+    "rest-late",
+    "event-time-late",
+    "event-time-early",
+    "flight-cut-short",
+    "steps-too-long",
+];
+
+/// Adds what questions made for it show of the solver of `found`, which none of its causes explains with certainty.
+pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mut Diagnosis) {
+    let cause = measured(asking, all, found);
+    let is_open = cause.as_ref().is_none_or(|cause| OF_EVERY_KIND.contains(&cause.id.as_str()));
+    let by_stages = if is_open && !found.peer.fixed_step { stage_by_stage::measured(asking, all, found) } else { None };
+    if let Some(cause) = cause {
+        // A clock is found where events under a constant force are on time; weights make every time late, or early.
+        let is_refuted =
+            |known: &str| known.starts_with("event-time-") && ["clock", "weights"].contains(&cause.id.as_str());
+        found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
+        // What is measured says more of the same.
+        found.causes.retain(|known| known.id != cause.id || !SYMPTOMS.contains(&cause.id.as_str()));
+        // What is likely, and is no symptom alone, stays first beside what is no more.
+        let stays = |known: &Cause| known.certainty <= cause.certainty && !SYMPTOMS.contains(&known.id.as_str());
+        let place = usize::from(found.causes.first().is_some_and(stays));
+        found.causes.insert(if cause.certainty == Certainty::Certain { 0 } else { place }, cause);
+    }
+    if let Some((cause, is_of_kinds)) = by_stages {
+        found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
+        let goes_behind = |known: &Cause| {
+            known.certainty > cause.certainty || is_of_kinds && OF_EVERY_KIND.contains(&known.id.as_str())
+        };
+        let place = usize::from(found.causes.first().is_some_and(|known| !goes_behind(known)));
+        found.causes.insert(place, cause);
+    }
+}
 
 /// What questions made for it show of the solver of `found`.
 pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {

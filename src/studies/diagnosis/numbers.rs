@@ -11,7 +11,8 @@ const FEW_DIGITS: usize = 9;
 const FEW_DECIMALS: usize = 9;
 const HALF_DIGITS: usize = 12;
 
-/// What the numbers of `ends` themselves show, all or those of some quantities: single precision, or few digits.
+/// What the numbers of `ends` themselves show, all or those of some quantities: single precision, or few digits. That few are printed
+/// need not be what is wrong ([`is_cut_off`]).
 pub(super) fn few_digits(ends: impl Iterator<Item = State>, failed: usize) -> Option<Cause> {
     let mut each = [const { Vec::new() }; 3];
     for State { depth, time, velocity } in ends {
@@ -28,9 +29,18 @@ pub(super) fn few_digits(ends: impl Iterator<Item = State>, failed: usize) -> Op
         let same = QUANTITIES.iter().zip(&shown).filter_map(|(kind, of)| Some((kind, of.as_ref()?)));
         same.filter(|(_, (other, _))| other == id).map(|(kind, (_, what))| format!("every {kind} {what}")).collect()
     };
-    let advice = if *id == "few-digits" { ": print 17 digits" } else { "" };
+    let (advice, certainty) =
+        if *id == "few-digits" { (": print 17 digits", Certainty::Likely) } else { ("", Certainty::Certain) };
     let statement = format!("{}{advice}", listed.join(", "));
-    Some(Cause::plain(id, statement, Certainty::Certain, failed, failed))
+    Some(Cause::plain(id, statement, certainty, failed, failed))
+}
+
+/// That all `ends` are one.
+pub(super) fn same_answer(mut ends: impl Iterator<Item = State>, failed: usize) -> Option<Cause> {
+    let first = ends.next()?;
+    let State { depth, time, velocity } = first;
+    let statement = format!("every question has the same answer: x = {depth} m, t = {time} s, V = {velocity} m/s");
+    ends.all(|end| end == first).then(|| Cause::plain("same-answer", statement, Certainty::Certain, failed, failed))
 }
 
 /// Whether each answer, with the exact one beside it, errs by no more than half a unit of its last decimal, or of its last digit, the

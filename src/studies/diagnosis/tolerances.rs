@@ -8,7 +8,7 @@ use strum::IntoEnumIterator;
 
 use super::causes::{CERTAIN_FROM, Cause, Certainty, Effort, Seen, causes};
 use super::hypotheses::How;
-use super::numbers::{few_digits, is_cut_off};
+use super::numbers::{few_digits, is_cut_off, same_answer};
 use super::observations::{is_one_error, is_same, shown};
 use super::questions::{Content, Question};
 use super::{
@@ -237,6 +237,17 @@ fn ends_and_exact(answered: &[Answered<'_>]) -> Vec<(State, State)> {
     answered.iter().filter_map(|one| Some((end(one)?, one.question.exact.end))).collect()
 }
 
+/// The ends of all answers that came, at the tightest tolerance.
+fn ends(answered: &[Answered<'_>]) -> impl Iterator<Item = State> {
+    ends_and_exact(answered).into_iter().map(|(end, _)| end)
+}
+
+/// That all questions have one answer.
+fn of_one_answer(answered: &[Answered<'_>], failed: usize) -> Option<Cause> {
+    let all = ends(answered);
+    (answered.len() >= LOOKED_EACH).then(|| same_answer(all, failed)).flatten()
+}
+
 /// That questions have no answer: so many of those that fail.
 fn no_answer(rows: &[Asked], silent: usize, failed: usize) -> Cause {
     let is_silent = |row: &Asked| row.verdict == Verdict::Failed && row.answered.is_none();
@@ -258,8 +269,11 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     if failed == 0 {
         return Vec::new();
     }
+    if let Some(cause) = of_one_answer(answered, failed).or_else(|| of_events(answered, failed)) {
+        return vec![cause];
+    }
     let others: Vec<&Question> = all.iter().collect();
-    let of_numbers = few_digits(ends_and_exact(answered).into_iter().map(|(end, _)| end), failed);
+    let of_numbers = few_digits(ends(answered), failed);
     let at = |accuracy: f64| seen(answered, |_| accuracy);
     let failing = |seen: &[Seen<'_>]| seen.iter().filter(|seen| seen.fails).count();
     let named = |seen: &[Seen<'_>], effort: Effort| {
@@ -268,9 +282,6 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     };
     let no_answer = (silent > 0).then(|| no_answer(&rows, silent, failed));
     let exactly = at(ACCURACIES[0]);
-    if let Some(cause) = of_events(answered, failed) {
-        return vec![cause];
-    }
     let mut found = named(&exactly, if effort == Effort::All { effort } else { Effort::Nearly });
     let is_certain = |found: &[Cause]| found.first().is_some_and(|cause| cause.certainty == Certainty::Certain);
     if let Some(cause) = &of_numbers
@@ -278,7 +289,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         && !found.as_deref().is_some_and(is_certain)
         && is_cut_off(&ends_and_exact(answered), ACCURACIES[0])
     {
-        return vec![cause.clone()];
+        return vec![Cause { certainty: Certainty::Certain, ..cause.clone() }];
     }
     // Small errors alone are those of a solver that does not do what the tolerance asks for, unless they are in few
     // answers, and those are sure of themselves.
@@ -329,6 +340,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     if found.is_none() && of_numbers.is_none() {
         found = named(&seen(answered, |one| spread(one).max(ACCURACIES[0])), Effort::Nearly).and_then(as_likely);
     }
+    let beside = of_numbers.map(|cause| Cause { certainty: Certainty::Possible, ..cause });
     // Behind small errors of everything there may be a great one of something.
     let mut before = failing(&exactly);
     for accuracy in &ACCURACIES[1..] {
@@ -338,7 +350,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
             before = now;
             let is_of_enough = |causes: &Vec<Cause>| causes.first().is_some_and(|cause| 4 * cause.of >= failed);
             found = named(&seen, Effort::Nearly).and_then(as_likely).filter(is_of_enough).map(|mut causes| {
-                causes.extend(of_numbers.clone());
+                causes.extend(beside.clone());
                 causes
             });
         }
@@ -352,7 +364,7 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
     }
     let mut found = found.unwrap_or_else(|| {
         let possible = causes(&exactly, identity.reads_scene, &others, Effort::Some);
-        of_numbers.into_iter().chain(possible).collect()
+        beside.into_iter().chain(possible).collect()
     });
     found.extend(no_answer);
     found

@@ -1,6 +1,7 @@
 //! Faults of a solver that reads the physical scene: its parameters, and what is formed of them.
 
 use super::{Change, GRAINS, Hypothesis, Parameter, of, to_grain};
+use crate::physics::semi_empirical::perforated_thickness_ratio;
 use crate::physics::{Concrete, CraterStiffness, Criterion, Resistance, Scene, Stage};
 
 /// The same of strengths (Pa).
@@ -342,6 +343,21 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "the criterion is always ndrc",
         Parameter::None,
         &[Change::Scene(|s, _| s.criterion = Criterion::Ndrc)],
+    ),
+    of(
+        "parameter:criterion",
+        "the line of the criterion ndrc, H/d = 1.32 + 1.24 y, is taken from H/d = 1.35 on, not from y = 1.35 on",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            let diameter = s.concrete().map(|c| c.diameter);
+            let ndrc = s.thickness.zip(diameter).filter(|_| s.criterion == Criterion::Ndrc);
+            if let Some((thickness, diameter)) = ndrc
+                && thickness > 1.35 * diameter
+            {
+                let depth_ratio = (thickness / diameter - 1.32) / 1.24;
+                s.thickness = Some(diameter * perforated_thickness_ratio(depth_ratio));
+            }
+        })],
     ),
     of(
         "parameter:S",

@@ -1,0 +1,352 @@
+//! Through which stages does a solver go wrong? Each stage is judged by itself, from the state that the solver lists at its start.
+//!
+//! The list of events cuts a flight into passages, one a stage. Where the formula of one kind of stage is wrong, or one below a
+//! threshold, the wrong passages have something in common: the simplest [`Condition`], or pair of them, that holds for all of them
+//! and for hardly any right one.
+
+use std::fmt::{self, Display, Formatter};
+
+use super::super::causes::{Cause, Certainty};
+use super::super::questions::{Content, Question};
+use super::super::{Asking, Diagnosis, QUANTITIES, TOLERANCES, end_of, request};
+use crate::exchange::peers::PeerAnswer;
+use crate::exchange::peers::wire::{conditioning, errors};
+use crate::integrators::{Detail, Integrator, Taylor};
+use crate::physics::{EventKind, Outcome, Problem, Stage, State};
+use crate::studies::verdict::Verdict;
+
+/// Relative errors over the condition from which a passage is wrong, and up to which it is right.
+const WRONG: f64 = 1e-7;
+const RIGHT: f64 = 3e-9;
+/// Condition above which a passage tells nothing, and the least part of depth and time that one must take.
+const CONDITION_MAX: f64 = 1e3;
+const LEAST_PART: f64 = 1e-5;
+/// Wrong passages, and right ones elsewhere, that a condition needs.
+const ENOUGH: usize = 8;
+/// Part of the passages under a condition that must be wrong, and of their factors that must be one.
+const MOST: f64 = 0.8;
+/// What a condition costs, without a number and with one, in parts of all right passages that it holds for.
+const PRICE: f64 = 0.01;
+const PRICE_OF_NUMBER: f64 = 0.04;
+/// Part of the wrong passages in which a quantity must be wrong to be named, and part by which factors that are one differ.
+const NAMED: f64 = 0.5;
+const ONE_FACTOR: f64 = 1e-6;
+
+/// How a passage ends.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    Through,
+    Exit,
+    Rest,
+}
+
+/// The flight through one stage, from a state that a solver lists.
+struct Passage {
+    question: usize,
+    index: usize,
+    mass: f64,
+    law: Stage,
+    from: State,
+    /// The right end, its time since the start.
+    end: State,
+    way: Way,
+    /// Which of depth, time and velocity are wrong.
+    wrong: [bool; 3],
+    /// What is found of each over what is right.
+    ratios: [f64; 3],
+}
+
+impl Passage {
+    fn is_wrong(&self) -> bool {
+        self.wrong.contains(&true)
+    }
+
+    /// Which of its terms the force has.
+    fn terms(&self) -> [bool; 4] {
+        let Stage { static_force, stiffness, viscosity, drag, .. } = self.law;
+        [static_force, stiffness, viscosity, drag].map(|coefficient| coefficient != 0.0)
+    }
+
+    fn distance(&self) -> f64 {
+        self.end.depth - self.from.depth
+    }
+
+    /// Sizes of the force (N) at the start and at the end.
+    fn forces(&self) -> [f64; 2] {
+        [self.from, self.end].map(|at| self.law.force(at.depth, at.velocity).abs())
+    }
+}
+
+const TERMS: [&str; 4] = ["a static force", "a spring", "viscosity", "drag"];
+
+/// A number of a passage: what it is, its unit, and itself.
+type Number = (&'static str, &'static str, fn(&Passage) -> f64);
+
+static NUMBERS: [Number; 15] = [
+    ("the smaller force at its ends", " N", |at| at.forces()[0].min(at.forces()[1])),
+    ("the greater force at its ends", " N", |at| at.forces()[0].max(at.forces()[1])),
+    ("V at its start", " m/s", |at| at.from.velocity),
+    ("V at its end", " m/s", |at| at.end.velocity),
+    ("its distance", " m", Passage::distance),
+    ("its time", " s", |at| at.end.time),
+    ("the depth at its start", " m", |at| at.from.depth),
+    ("the depth at its end", " m", |at| at.end.depth),
+    ("the mass", " kg", |at| at.mass),
+    ("q V²/p at its start", "", |at| at.law.drag * at.from.velocity.powi(2) / at.law.static_force.abs()),
+    ("q L/M", "", |at| at.law.drag * at.distance() / at.mass),
+    ("r L/(M V) at its start", "", |at| at.law.viscosity * at.distance() / (at.mass * at.from.velocity)),
+    ("s L²/(M V²) at its start", "", |at| {
+        at.law.stiffness.abs() * at.distance().powi(2) / (at.mass * at.from.velocity.powi(2))
+    }),
+    ("r²/(4 s M)", "", |at| at.law.viscosity.powi(2) / (4.0 * at.law.stiffness.abs() * at.mass)),
+    ("its share of the time so far", "", |at| at.end.time / (at.from.time + at.end.time)),
+];
+
+/// What a passage may have.
+#[derive(Clone, Copy)]
+enum Condition {
+    /// A term, or not.
+    Term(usize, bool),
+    /// These terms and no other.
+    Alone([bool; 4]),
+    Ends(Way),
+    /// It ends at its end, or at the exit.
+    Left,
+    First(bool),
+    /// A number that is smaller, or greater, than all between two bounds.
+    Below(&'static Number, [f64; 2]),
+    Above(&'static Number, [f64; 2]),
+}
+
+impl Condition {
+    fn holds(&self, passage: &Passage) -> bool {
+        match *self {
+            Self::Term(term, has) => passage.terms()[term] == has,
+            Self::Alone(terms) => passage.terms() == terms,
+            Self::Ends(way) => passage.way == way,
+            Self::Left => passage.way != Way::Rest,
+            Self::First(is_first) => (passage.index == 0) == is_first,
+            Self::Below((_, _, of), [bound, _]) => of(passage) <= bound,
+            Self::Above((_, _, of), [_, bound]) => of(passage) >= bound,
+        }
+    }
+
+    fn has_number(&self) -> bool {
+        matches!(self, Self::Below(..) | Self::Above(..))
+    }
+
+    fn price(&self) -> f64 {
+        if self.has_number() { PRICE_OF_NUMBER } else { PRICE }
+    }
+
+    /// Whether the ends of all flights may have it.
+    fn is_of_an_end(&self) -> bool {
+        matches!(self, Self::Ends(Way::Exit | Way::Rest) | Self::Left | Self::First(_))
+    }
+
+    /// All without a number.
+    fn plain() -> impl Iterator<Item = Self> {
+        let both = [true, false];
+        let terms = (0..TERMS.len()).flat_map(move |term| both.map(|has| Self::Term(term, has)));
+        let ways = [Way::Through, Way::Exit, Way::Rest].map(Self::Ends);
+        let alone = (0..16_u8).map(|bits| Self::Alone([1, 2, 4, 8].map(|bit| bits & bit > 0)));
+        terms.chain(ways).chain([Self::Left]).chain(both.map(Self::First)).chain(alone)
+    }
+
+    /// All with a number that hold for all of `wrong` and for the fewest of `right`.
+    fn of_numbers(wrong: &[&Passage], right: &[&Passage]) -> Vec<Self> {
+        let mut found = Vec::new();
+        for number in &NUMBERS {
+            let of = number.2;
+            let [least, most] = wrong.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], passage| {
+                let value = of(passage);
+                // No number has neither a least nor a greatest.
+                if value.is_nan() { [f64::NAN; 2] } else { [least.min(value), most.max(value)] }
+            });
+            let beside = || right.iter().map(|passage| of(passage));
+            let next = beside().filter(|value| *value > most).fold(f64::INFINITY, f64::min);
+            let before = beside().filter(|value| *value < least).fold(f64::NEG_INFINITY, f64::max);
+            if most < next && next.is_finite() {
+                found.push(Self::Below(number, [most, next]));
+            }
+            if before < least && before.is_finite() {
+                found.push(Self::Above(number, [before, least]));
+            }
+        }
+        found
+    }
+}
+
+impl Display for Condition {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Term(term, true) => write!(f, "it has {}", TERMS[term]),
+            Self::Term(term, false) => write!(f, "it is without {}", TERMS[term]),
+            Self::Alone([false, false, false, false]) => write!(f, "it has no force"),
+            Self::Alone(terms) => {
+                let named: Vec<&str> = TERMS.into_iter().zip(terms).filter(|(_, has)| *has).map(|(of, _)| of).collect();
+                write!(f, "it has {} alone", named.join(" and "))
+            }
+            Self::Ends(Way::Through) => write!(f, "it is passed to its end"),
+            Self::Ends(Way::Exit) => write!(f, "it ends at the exit"),
+            Self::Ends(Way::Rest) => write!(f, "the flight comes to rest in it"),
+            Self::Left => write!(f, "the flight leaves it"),
+            Self::First(true) => write!(f, "it is the first"),
+            Self::First(false) => write!(f, "it is not the first"),
+            Self::Below((what, unit, _), [from, to]) => {
+                write!(f, "{what} is below a number from {from:.3e} to {to:.3e}{unit}")
+            }
+            Self::Above((what, unit, _), [from, to]) => {
+                write!(f, "{what} is above a number from {from:.3e} to {to:.3e}{unit}")
+            }
+        }
+    }
+}
+
+/// What the wrong passages of failing flights have in common, and whether that is a kind of stage, not a number or the event at which
+/// the flight ends.
+pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<(Cause, bool)> {
+    let is_open = |question: &Question| {
+        let never = [Content::NoSpeed, Content::Grazing, Content::Stiff];
+        !never.iter().any(|content| question.contains.contains(content)) && !question.is_on_a_border()
+    };
+    let mut passages = Vec::new();
+    let mut failing = Vec::new();
+    for (index, row) in found.questions.iter().enumerate() {
+        let Some(question) = all.iter().find(|question| question.id == row.id) else { continue };
+        if row.answered.is_none() || !is_open(question) || asking.is_gone {
+            continue;
+        }
+        if row.verdict == Verdict::Failed {
+            failing.push(index);
+        }
+        let Ok(answer) = asking.ask(&request(question, TOLERANCES[TOLERANCES.len() - 1])) else { continue };
+        passages.extend(passages_of(index, &question.problem, &answer));
+    }
+    let (wrong, right): (Vec<&Passage>, Vec<&Passage>) = passages.iter().partition(|passage| passage.is_wrong());
+    let conditions = simplest(&wrong, &right)?;
+    let of_condition = |passages: &[&Passage]| {
+        passages.iter().filter(|passage| conditions.iter().all(|condition| condition.holds(passage))).count()
+    };
+    let (inside, elsewhere) = (wrong.len() + of_condition(&right), right.len() - of_condition(&right));
+    let is_often = |which: &usize| {
+        wrong.iter().filter(|passage| passage.wrong[*which]).count() as f64 >= NAMED * wrong.len() as f64
+    };
+    let often: Vec<usize> = (0..3).filter(is_often).collect();
+    let quantities: Vec<&str> = often.iter().map(|which| QUANTITIES[*which]).collect();
+    let what = if let [one] = quantities[..] { format!("{one} alone") } else { quantities.join(" and ") };
+    let factor =
+        if let [which] = often[..] { one_factor(wrong.iter().map(|passage| passage.ratios[which])) } else { None };
+    let times = factor.map_or_else(String::new, |factor| format!(", {factor:.6} times the right one,"));
+    let said: Vec<String> = conditions.iter().map(ToString::to_string).collect();
+    let statement = format!(
+        "the flight through a stage, from the state listed at its start, has a wrong {what}{times} where {}: {} of {inside} such \
+         passages, and none of the {elsewhere} others",
+        said.join(" and "),
+        wrong.len()
+    );
+    let explained = failing.iter().filter(|index| wrong.iter().any(|passage| passage.question == **index)).count();
+    let certainty = if 10 * explained >= 9 * failing.len() { Certainty::Likely } else { Certainty::Possible };
+    let cause = Cause::plain("stage-wrong", statement, certainty, explained, found.counts.failed);
+    let is_of_kinds = !conditions.iter().any(Condition::has_number) && !conditions.iter().all(Condition::is_of_an_end);
+    Some((Cause { factor, ..cause }, is_of_kinds))
+}
+
+/// The factor that most of `ratios` are.
+fn one_factor(ratios: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut ratios: Vec<f64> = ratios.collect();
+    ratios.sort_by(f64::total_cmp);
+    let middle = *ratios.get(ratios.len() / 2)?;
+    let same = ratios.iter().filter(|ratio| (*ratio - middle).abs() <= ONE_FACTOR * middle.abs()).count();
+    (same as f64 >= MOST * ratios.len() as f64).then_some(middle)
+}
+
+/// The passages of an `answer` to `problem` of which it is plain whether they are right.
+fn passages_of(question: usize, problem: &Problem, answer: &PeerAnswer) -> Vec<Passage> {
+    let mut passages = Vec::new();
+    let last = end_of(answer).state;
+    let mut from = State { time: 0.0, depth: 0.0, velocity: problem.impact_speed };
+    for (index, law) in problem.stages.iter().enumerate() {
+        let is_listed =
+            |kind: EventKind| kind == EventKind::StageEnd(index) || index == 0 && kind == EventKind::CraterEnd;
+        let boundary = law.end.min(problem.exit_depth);
+        let listed = answer.events.iter().find(|event| is_listed(event.kind)).map(|event| event.state);
+        let listed = listed.filter(|_| law.end < problem.exit_depth);
+        if listed.is_none() && last.depth > law.end || !(from.velocity > 0.0) {
+            break;
+        }
+        let found = listed.unwrap_or(last);
+        passages.extend(judged(question, index, problem, [from, found], boundary));
+        if listed.is_none() {
+            break;
+        }
+        from = found;
+    }
+    passages
+}
+
+/// The passage through stage `index` of `problem` from one state to another; `None` where it is not plain whether it is right.
+fn judged(
+    question: usize,
+    index: usize,
+    problem: &Problem,
+    [from, found]: [State; 2],
+    boundary: f64,
+) -> Option<Passage> {
+    let law = problem.stages[index];
+    let shifted = Stage { static_force: law.static_force + law.stiffness * from.depth, end: f64::INFINITY, ..law };
+    let alone = Problem::of_stages(problem.mass, from.velocity, [shifted]);
+    let alone = if boundary.is_finite() { alone.with_exit(boundary - from.depth) } else { alone };
+    if !(boundary > from.depth) {
+        return None;
+    }
+    let exact = Taylor::default().solve(&alone, Detail::End).ok()?;
+    let conditions = conditioning(exact.end, &alone);
+    let is_seen = exact.end.depth >= LEAST_PART * from.depth && exact.end.time >= LEAST_PART * from.time;
+    if !is_seen || conditions.iter().any(|condition| *condition > CONDITION_MAX) {
+        return None;
+    }
+    let way = match exact.outcome {
+        Outcome::Perforated if law.end < problem.exit_depth => Way::Through,
+        Outcome::Perforated => Way::Exit,
+        _ => Way::Rest,
+    };
+    let passed = State { time: found.time - from.time, depth: found.depth - from.depth, velocity: found.velocity };
+    let off = errors(passed, exact.end, from.velocity);
+    let over: [f64; 3] = std::array::from_fn(|which| off[which].abs() / conditions[which]);
+    if over.iter().any(|over| *over > RIGHT && !(*over > WRONG)) {
+        return None;
+    }
+    let end = State { depth: from.depth + exact.end.depth, ..exact.end };
+    let wrong = over.map(|over| !(over <= RIGHT));
+    let of = |state: State| [state.depth, state.time, state.velocity];
+    let ratios = std::array::from_fn(|which| of(passed)[which] / of(exact.end)[which]);
+    Some(Passage { question, index, mass: problem.mass, law, from, end, way, wrong, ratios })
+}
+
+/// The conditions that hold for all of `wrong` and cost least.
+fn simplest(wrong: &[&Passage], right: &[&Passage]) -> Option<Vec<Condition>> {
+    if wrong.len() < ENOUGH || right.len() < ENOUGH {
+        return None;
+    }
+    let of_all = |condition: &Condition| wrong.iter().all(|passage| condition.holds(passage));
+    let plain: Vec<Condition> = Condition::plain().filter(of_all).collect();
+    let mut best: Option<(f64, Vec<Condition>)> = None;
+    let firsts = std::iter::once(None).chain(plain.iter().copied().map(Some));
+    for first in firsts {
+        let inside: Vec<&Passage> =
+            right.iter().copied().filter(|passage| first.is_none_or(|first| first.holds(passage))).collect();
+        let seconds = plain.iter().copied().chain(Condition::of_numbers(wrong, &inside)).map(Some);
+        for second in std::iter::once(None).chain(seconds) {
+            let left = inside.iter().filter(|passage| second.is_none_or(|second| second.holds(passage))).count();
+            let conditions: Vec<Condition> = first.into_iter().chain(second).collect();
+            let is_shown = wrong.len() as f64 >= MOST * (wrong.len() + left) as f64 && right.len() - left >= ENOUGH;
+            let price: f64 = conditions.iter().map(Condition::price).sum();
+            let cost = left as f64 + price * right.len() as f64;
+            if is_shown && best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, conditions));
+            }
+        }
+    }
+    best.map(|(_, conditions)| conditions)
+}
