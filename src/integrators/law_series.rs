@@ -750,7 +750,17 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         let values = self.bound.switch_values(start.depth, start.velocity);
         let chosen = values.iter().map(|value| value.value() > 0.0).collect();
         let before = std::mem::replace(&mut self.sides, chosen);
-        if values.iter().enumerate().any(|(side, value)| self.kinks.contains(&side) || value.is_zero()) {
+        let is_at_root = |side: usize| self.kinks.contains(&side) || values[side].is_zero();
+        let at_roots: Kinks = (0..values.len()).filter(|side| is_at_root(*side)).collect();
+        // A single switch of V alone leaves its root as V falls.
+        let slope = if let ([side], true) = (&at_roots[..], self.is_of_velocity && self.may_integrate(force)) {
+            Some((*side, self.law.switch_over_velocity(*side, start.velocity.value()).1))
+        } else {
+            None
+        };
+        if let Some((side, slope)) = slope.filter(|(_, slope)| *slope != 0.0 && slope.is_finite()) {
+            self.sides[side] = slope < 0.0;
+        } else if !at_roots.is_empty() {
             let unit = time_unit(start, force, self.mass, limit);
             // Two rounds: the slope of a switch that stands at zero may depend on the side of another.
             for _ in 0..2 {
@@ -768,10 +778,14 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         }
     }
 
+    /// Whether a step under this force may go by integrals.
+    fn may_integrate(&self, force: S) -> bool {
+        self.variable == Variable::Time && S::EPSILON == f64::EPSILON && force.value() > 0.0
+    }
+
     /// A step by integrals, where the force is of one of their kinds and a few places show it.
     fn integrated(&mut self, start: State<S>, force: S, limit: S) -> Option<Held<'l, S, K>> {
-        let applies = self.variable == Variable::Time && S::EPSILON == f64::EPSILON;
-        if !applies || self.end.is_some() || !(force.value() > 0.0) {
+        if !self.may_integrate(force) || self.end.is_some() {
             return None;
         }
         if self.is_of_velocity { self.over_velocities(start, limit) } else { self.over_depths(start, limit) }

@@ -87,8 +87,11 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
     let by_stages = if is_open && !found.peer.fixed_step { stage_by_stage::measured(asking, all, found) } else { None };
     if let Some(cause) = cause {
         // A clock is found where events under a constant force are on time; weights make every time late, or early.
-        let is_refuted =
-            |known: &str| known.starts_with("event-time-") && ["clock", "weights"].contains(&cause.id.as_str());
+        let is_refuted = |known: &str| match cause.id.as_str() {
+            "clock" | "weights" => known.starts_with("event-time-"),
+            "tolerance-ignored" => known == "single-precision",
+            _ => false,
+        };
         found.causes.retain(|known| !["unknown", "first-order-scheme"].contains(&&*known.id) && !is_refuted(&known.id));
         // What is measured says more of the same.
         found.causes.retain(|known| known.id != cause.id || !SYMPTOMS.contains(&cause.id.as_str()));
@@ -99,9 +102,8 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
     }
     if let Some((cause, is_of_kinds)) = by_stages {
         found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
-        let goes_behind = |known: &Cause| {
-            known.certainty > cause.certainty || is_of_kinds && OF_EVERY_KIND.contains(&known.id.as_str())
-        };
+        let is_of_every_kind = |known: &Cause| OF_EVERY_KIND.iter().chain(&SYMPTOMS).any(|id| *id == known.id);
+        let goes_behind = |known: &Cause| known.certainty > cause.certainty || is_of_kinds && is_of_every_kind(known);
         let place = usize::from(found.causes.first().is_some_and(|known| !goes_behind(known)));
         found.causes.insert(place, cause);
     }
@@ -131,6 +133,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         .or_else(|| absolute_tolerance(asking))
         .or_else(|| bounds::least_step(asking))
         .or_else(|| bounds::least_tolerance(asking))
+        .or_else(|| bounds::smooth_floor(asking, found))
         .or_else(|| long_steps::measured(asking, all, found))
 }
 

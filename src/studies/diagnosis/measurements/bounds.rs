@@ -2,9 +2,10 @@
 //! tolerances.
 
 use super::super::causes::{Cause, Certainty};
-use super::super::{ALLOWED, Asking, TOLERANCES};
+use super::super::{ALLOWED, Asking, Diagnosis, TOLERANCES};
 use super::{ends, off};
 use crate::exchange::peers::PeerRequest;
+use crate::exchange::peers::wire::errors;
 use crate::physics::{Problem, Stage, State};
 
 /// Durations (powers of ten, s) of one flight, and its lengths (m): of one duration the length tells a step from a tolerance that is
@@ -20,6 +21,12 @@ const POWERS: [i32; 2] = [-13, -2];
 const ALIKE: usize = 3;
 /// Their error over the tightest of them from which it is none of a solver that has done its best.
 const FAR: f64 = 100.0;
+
+/// Exits beside that of the flight, the distance between two (m), and the part of an error by which it differs there at most: round-off is
+/// another at each.
+const BESIDE: usize = 6;
+const BETWEEN: f64 = 1e-4;
+const SMOOTH: f64 = 0.1;
 
 /// A flight of a length in a time, nearly, with two terms.
 fn flight(length: f64, duration: f64) -> Problem {
@@ -100,4 +107,26 @@ pub(super) fn least_tolerance(asking: &mut Asking<'_>) -> Option<Cause> {
          below about {least:.0e} is taken"
     );
     is_shown.then(|| Cause::plain("tolerance-ignored", statement, Certainty::Likely, alike, found.len()))
+}
+
+/// Whether errors that stop falling with the tolerance, as in single precision, are nearly the same at exits close to each other.
+pub(super) fn smooth_floor(asking: &mut Asking<'_>, found: &Diagnosis) -> Option<Cause> {
+    let floor = found.causes.first().filter(|cause| cause.id == "single-precision")?;
+    let problem = flight(1.0, 0.01);
+    let mut errors_at = |index: usize| {
+        let beside = problem.clone().with_exit(problem.exit_depth + BETWEEN * index as f64);
+        let [found, exact] = ends(asking, &beside, &PeerRequest::from_problem(&beside, TOLERANCES[2]))?;
+        Some(errors(found, exact, problem.impact_speed))
+    };
+    let all: Vec<[f64; 3]> = (0..=BESIDE).map(&mut errors_at).collect::<Option<_>>()?;
+    let worst = all[0].iter().fold(0.0, |worst: f64, error| worst.max(error.abs()));
+    let differs = |beside: &[f64; 3]| (0..3).any(|which| (beside[which] - all[0][which]).abs() > SMOOTH * worst);
+    if worst <= FAR * TOLERANCES[2] || all.iter().any(differs) {
+        return None;
+    }
+    let statement = format!(
+        "{}, and are nearly one at exits close to each other, so that they are those of steps: no tolerance below some bound is taken",
+        floor.statement
+    );
+    Some(Cause::plain("tolerance-ignored", statement, Certainty::Likely, floor.explains, floor.of))
 }

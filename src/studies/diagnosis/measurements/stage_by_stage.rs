@@ -235,8 +235,9 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let often: Vec<usize> = (0..3).filter(is_often).collect();
     let quantities: Vec<&str> = often.iter().map(|which| QUANTITIES[*which]).collect();
     let what = if let [one] = quantities[..] { format!("{one} alone") } else { quantities.join(" and ") };
-    let factor =
-        if let [which] = often[..] { one_factor(wrong.iter().map(|passage| passage.ratios[which])) } else { None };
+    // One that leaves the stage in place of coming to rest has another.
+    let alike = wrong.iter().filter(|passage| (0..3).filter(|which| passage.wrong[*which]).eq(often.iter().copied()));
+    let factor = if let [which] = often[..] { one_factor(alike.map(|passage| passage.ratios[which])) } else { None };
     let times = factor.map_or_else(String::new, |factor| format!(", {factor:.6} times the right one,"));
     let said: Vec<String> = conditions.iter().map(ToString::to_string).collect();
     let statement = format!(
