@@ -1502,4 +1502,19 @@ const TOLD: &[Told] = &[
         asked: Questions(200),
         says: "failed | stage-wrong, likely, 0.434294: the flight through a stage, from the state listed at its start, has a wrong depth alone, 0.434294 times the right one, where it has drag and the flight comes to rest in it: 47 of 47 such passages, and none of the 273 others",
     },
+    Told {
+        what: "times and speeds are off by a part that is another at each tolerance and impact speed, and one at exits close to each other",
+        solver: || {
+            by_request(
+                |_, _| (),
+                |request, problem, end| {
+                    let part = (0.37 * request.rtol.log10() + 0.618 * problem.impact_speed).rem_euclid(1.0);
+                    end.time *= 1.0 + 4e-7 * (part - 0.4);
+                    end.velocity *= 1.0 + 4e-7 * (0.6 - part);
+                },
+            )
+        },
+        asked: Questions(60),
+        says: "failed | tolerance-ignored, likely: errors of 8e-8, 1e-7 and 1e-7, at tolerances of 1e-6, 1e-9 and 1e-12: they stop falling far above the round-off of 64-bit numbers, and are nearly one at exits close to each other, so that they are those of steps: no tolerance below some bound is taken",
+    },
 ];
