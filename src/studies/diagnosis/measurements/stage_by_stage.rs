@@ -160,9 +160,13 @@ impl Condition {
             let of = number.2;
             let [least, most] = wrong.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], passage| {
                 let value = of(passage);
-                // No number has neither a least nor a greatest.
+                // What is no number has neither a least nor a greatest.
                 if value.is_nan() { [f64::NAN; 2] } else { [least.min(value), most.max(value)] }
             });
+            // One that a term makes infinite is that term.
+            if !(least.is_finite() && most.is_finite()) {
+                continue;
+            }
             let beside = || right.iter().map(|passage| of(passage));
             let next = beside().filter(|value| *value > most).fold(f64::INFINITY, f64::min);
             let before = beside().filter(|value| *value < least).fold(f64::NEG_INFINITY, f64::max);
