@@ -242,10 +242,15 @@ fn ends(answered: &[Answered<'_>]) -> impl Iterator<Item = State> {
     ends_and_exact(answered).into_iter().map(|(end, _)| end)
 }
 
-/// That all questions have one answer.
+/// That all questions have one answer, which enough of them have.
 fn of_one_answer(answered: &[Answered<'_>], failed: usize) -> Option<Cause> {
-    let all = ends(answered);
-    (answered.len() >= LOOKED_EACH).then(|| same_answer(all, failed)).flatten()
+    let all: Vec<State> = ends(answered).collect();
+    (all.len() >= LOOKED_EACH && all.len() == answered.len()).then(|| same_answer(all.into_iter(), failed)).flatten()
+}
+
+/// Whether nearly all that fail have no answer: the few answers then say little.
+fn is_mostly(silent: usize, failed: usize) -> bool {
+    10 * silent >= 9 * failed
 }
 
 /// That questions have no answer: so many of those that fail.
@@ -257,7 +262,7 @@ fn no_answer(rows: &[Asked], silent: usize, failed: usize) -> Cause {
         if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") },
         of_all(rows, is_silent).map_or_else(String::new, |content| format!("; all of them hold `{content}`"))
     );
-    let certainty = if silent == failed { Certainty::Likely } else { Certainty::Possible };
+    let certainty = if is_mostly(silent, failed) { Certainty::Likely } else { Certainty::Possible };
     Cause::plain("no-answer", statement, certainty, silent, failed)
 }
 
@@ -366,7 +371,8 @@ fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question
         let possible = causes(&exactly, identity.reads_scene, &others, Effort::Some);
         beside.into_iter().chain(possible).collect()
     });
-    found.extend(no_answer);
+    let place = if is_mostly(silent, failed) && !is_certain(&found) { 0 } else { found.len() };
+    found.splice(place..place, no_answer);
     found
 }
 

@@ -1517,4 +1517,31 @@ const TOLD: &[Told] = &[
         asked: Questions(60),
         says: "failed | tolerance-ignored, likely: errors of 8e-8, 1e-7 and 1e-7, at tolerances of 1e-6, 1e-9 and 1e-12: they stop falling far above the round-off of 64-bit numbers, and are nearly one at exits close to each other, so that they are those of steps: no tolerance below some bound is taken",
     },
+    Told {
+        what: "an answer to flights of more than 3 km/s alone",
+        solver: || {
+            Answering::plain(|request| {
+                let problem = request.problem(None);
+                let flight = exact(&problem).filter(|_| problem.impact_speed > 3e3)?;
+                Some(answer(flight.outcome, State { time: 0.001, depth: 0.1, velocity: 0.0 }))
+            })
+        },
+        asked: Questions(60),
+        says: "failed | no-answer, likely: 57 questions have no answer: reports an error: it never ends",
+    },
+    Told {
+        what: "a depth that is another one in every answer, and four digits of every number",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    let cut = |number: f64| format!("{number:.3e}").parse().unwrap_or(number);
+                    end.depth *= 1.0 + 0.2 * (1e3 * problem.impact_speed).sin();
+                    *end = State { time: cut(end.time), depth: cut(end.depth), velocity: cut(end.velocity) };
+                },
+            )
+        },
+        asked: Questions(60),
+        says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is static-force-1 (static-force, exit)",
+    },
 ];
