@@ -153,6 +153,10 @@ fn cases() -> Vec<(String, Case)> {
             cases.push((format!("{name}, {scene}"), case));
         }
     }
+    for (name, _) in SHIPPED.iter().filter(|(name, _)| name.starts_with("law-")) {
+        cases
+            .push((format!("taylor, {name}"), flights(MethodName::Taylor, vec![problem(name)], Detail::Events, 1e-11)));
+    }
     for name in [MethodName::Taylor, MethodName::Energy, MethodName::ClosedForm] {
         cases.push((format!("critical velocity by {name}, paper-slab"), critical(name)));
     }

@@ -319,6 +319,38 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
     }
 
+    /// Enters the piece of a table of velocity on which the projectile is, behind so many `pieces` of this stage.
+    ///
+    /// # Errors
+    /// [`IntegrationError`]: the velocity lies behind the last row, or each piece is passed.
+    #[cold]
+    fn enter_piece(&mut self, pieces: usize) -> Solved<()> {
+        let own = self.problem.laws.of(self.stage);
+        if pieces > own.and_then(Law::table).map_or(0, |table| table.rows().len()) {
+            let last = self.state.values();
+            return Err(IntegrationError::NeverEnds { why: "each piece of its table is passed", last });
+        }
+        self.refuse_unknown_speed()?;
+        self.piece = own.and_then(|law| law.piece(self.state.velocity.value()));
+        Ok(())
+    }
+
+    /// Leaves the piece of a table with the `end` that a method found, and goes on behind it if another piece follows.
+    #[cold]
+    fn goes_on_behind(&mut self, end: &StageEnd<S>, was_in_doubt: bool) -> bool {
+        let own_end = self.condition();
+        let Some(row) = self.piece.take().and_then(Law::end) else { return false };
+        let StageEnd::Condition(state) = *end else { return false };
+        if own_end.is_some_and(|own| own.is_same(row)) {
+            return false;
+        }
+        // The force is the same on both sides of a row: whether one that is touched is passed changes nothing.
+        self.is_in_doubt = was_in_doubt;
+        self.state = state;
+        self.sample(state);
+        true
+    }
+
     /// Where the present stage ends besides a depth.
     #[inline(always)]
     pub(crate) fn condition(&self) -> Option<&'a Condition<S>> {
@@ -501,8 +533,7 @@ impl<'a, S: Scalar> Course<'a, S> {
 
     /// The flight that ends at the present state, with its exit margin.
     #[inline(always)]
-    pub(crate) fn finish(mut self, margin: Option<Bounded>) -> Flight<S> {
-        let margin = if self.is_in_doubt { self.doubted(margin) } else { margin };
+    pub(crate) fn finish(self, margin: Option<Bounded>) -> Flight<S> {
         let outcome = if margin.is_some_and(|margin| !margin.is_decided()) {
             Outcome::Undecided
         } else if self.is_through {
@@ -552,35 +583,6 @@ fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is
     course.finish((is_through && moves).then_some(Bounded { value: 1.0, bound: 0.0 }))
 }
 
-/// Solves the present stage of a problem with laws of its own. A table of velocity is solved piece by piece: V falls or rises
-/// from row to row.
-#[cold]
-fn through_own<S: Scalar>(course: &mut Course<'_, S>, method: &mut impl StageSolver<S>) -> Solved<StageEnd<S>> {
-    let own = course.problem.laws.of(course.stage);
-    let rows = own.and_then(Law::table).map_or(0, |table| table.rows().len());
-    let own_end = own.and_then(Law::end);
-    for _ in 0..=rows {
-        course.refuse_unknown_speed()?;
-        course.piece = own.and_then(|law| law.piece(course.state.velocity.value()));
-        let end_of_piece = course.piece.and_then(Law::end);
-        let is_own = |piece| own_end.is_some_and(|own| own.is_same(piece));
-        let goes_on = end_of_piece.is_some_and(|piece| !is_own(piece));
-        let was_in_doubt = course.is_in_doubt;
-        let end = method.solve_stage(course);
-        course.piece = None;
-        match end? {
-            StageEnd::Condition(state) if goes_on => {
-                // The force is the same on both sides of a row: whether one that is touched is passed changes nothing.
-                course.is_in_doubt = was_in_doubt;
-                course.state = state;
-                course.sample(state);
-            }
-            end => return Ok(end),
-        }
-    }
-    Err(IntegrationError::NeverEnds { why: "each piece of its table is passed", last: course.state.values() })
-}
-
 /// Solves `problem` stage by stage with `method`.
 ///
 /// A stage end or an exit that is reached without speed counts as reached. A stage without length is passed where it
@@ -608,9 +610,19 @@ pub(crate) fn solve<S: Scalar>(
             break;
         }
         course.just_met = None;
-        let end =
-            if problem.laws.is_empty() { method.solve_stage(&mut course) } else { through_own(&mut course, method) };
-        let end = end?;
+        // A table of velocity is solved piece by piece: V falls or rises from row to row, and passes none twice.
+        let mut pieces = 0;
+        let end = loop {
+            let was_in_doubt = course.is_in_doubt;
+            if !problem.laws.is_empty() {
+                course.enter_piece(pieces)?;
+            }
+            let end = method.solve_stage(&mut course)?;
+            if problem.laws.is_empty() || !course.goes_on_behind(&end, was_in_doubt) {
+                break end;
+            }
+            pieces += 1;
+        };
         let rests = match end {
             StageEnd::Limit(state) => {
                 course.state = state;
@@ -643,6 +655,8 @@ pub(crate) fn solve<S: Scalar>(
             course.stage = entered;
             course.end();
             let margin = if problem.has_exit() { Some(method.margin(&mut course)?) } else { None };
+            // Here, for a flight that is changed where it is finished would be copied.
+            let margin = if course.is_in_doubt { course.doubted(margin) } else { margin };
             return Ok(course.finish(margin));
         }
     }

@@ -40,6 +40,7 @@
 
 use std::cell::LazyCell;
 use std::convert::Infallible;
+use std::sync::Arc;
 
 use smallvec::SmallVec;
 
@@ -454,7 +455,7 @@ struct Walk<'l, S, const K: usize> {
     /// The side of each switch on this step.
     sides: SmallVec<[bool; 4]>,
     /// How the velocity falls where it is the variable, on these sides.
-    falling: Falling,
+    falling: Arc<Falling>,
     /// The switches at whose roots this step starts.
     kinks: Kinks,
     /// Whether the step before went by velocity.
@@ -808,7 +809,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
 
     /// A step over the velocity, of a force of it alone.
     fn over_velocities(&mut self, start: State<S>, limit: S) -> Option<Held<'l, S, K>> {
-        let integrals = Integrals::new(self.bound, self.mass, start, self.falling.clone());
+        let integrals = Integrals::new(self.bound, self.mass, start, Arc::clone(&self.falling));
         let tried = if self.falling.fall == Fall::Exponential { TRIED_BY_SHARES } else { TRIED_TO_REST };
         for longest in tried {
             let (mut span, mut kinks) = (longest, Kinks::new());

@@ -8,7 +8,7 @@
 //! all of them. It is exact for polynomials of degree 47: where the pace dt/ds is a polynomial of degree 23 to ten digits, as three
 //! other places show, its integral has all of them (docs/theory.md, section 10).
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use super::gauss::{GAUSS, NODES};
 use super::locate::{root_before, settled};
@@ -32,8 +32,10 @@ struct Rule {
     share: [f64; PLACES],
     /// Weight of each in the integral.
     weight: [f64; PLACES],
-    /// The place of each of [`ASKED`], and what each place weighs in the polynomial there.
-    asked: [(usize, [f64; PLACES]); ASKED.len()],
+    /// The place of each of [`ASKED`].
+    asked: [usize; ASKED.len()],
+    /// What each place weighs in the polynomial at each of [`ASKED`].
+    weights: [[f64; ASKED.len() + 1]; PLACES],
 }
 
 static RULE: LazyLock<Rule> = LazyLock::new(|| {
@@ -41,15 +43,17 @@ static RULE: LazyLock<Rule> = LazyLock::new(|| {
     let others = ASKED.into_iter().chain([1.0]).map(|share| (share, 0.0, None));
     let mut places: Vec<(f64, f64, Option<usize>)> = of_rule.chain(others).collect();
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let asked = ASKED.map(|at| {
-        let of_nodes = GAUSS.at(at);
-        let place = places.iter().position(|(share, ..)| *share == at).unwrap_or(0);
-        (place, std::array::from_fn(|place| places[place].2.map_or(0.0, |node| of_nodes[node])))
-    });
+    let asked = ASKED.map(|at| places.iter().position(|(share, ..)| *share == at).unwrap_or(0));
+    let of_nodes = ASKED.map(|at| GAUSS.at(at));
+    let weight = |place: usize, which: usize| match (places[place].2, of_nodes.get(which)) {
+        (Some(node), Some(of_nodes)) => of_nodes[node],
+        _ => 0.0,
+    };
     Rule {
         share: std::array::from_fn(|place| places[place].0),
         weight: std::array::from_fn(|place| places[place].1),
         asked,
+        weights: std::array::from_fn(|place| std::array::from_fn(|which| weight(place, which))),
     }
 });
 
@@ -58,7 +62,7 @@ pub(super) struct Integrals<'l, S> {
     bound: &'l Bound<S>,
     mass: S,
     pub(super) start: State<S>,
-    falling: Falling,
+    falling: Arc<Falling>,
 }
 
 /// The force at the places of a step.
@@ -72,7 +76,7 @@ pub(super) struct Forces<S> {
 }
 
 impl<'l, S: Scalar> Integrals<'l, S> {
-    pub(super) fn new(bound: &'l Bound<S>, mass: S, start: State<S>, falling: Falling) -> Self {
+    pub(super) fn new(bound: &'l Bound<S>, mass: S, start: State<S>, falling: Arc<Falling>) -> Self {
         Self { bound, mass, start, falling }
     }
 
@@ -88,15 +92,23 @@ impl<'l, S: Scalar> Integrals<'l, S> {
 
     /// The force at the places of a step of the length `span`.
     pub(super) fn forces(&self, span: S) -> Forces<S> {
-        let places = RULE.share.map(|share| span * S::from_f64(share));
-        let ways = ([self.start.depth; PLACES], places.map(|s| self.velocity(s)));
+        let places: [S; PLACES] = std::array::from_fn(|place| span * S::from_f64(RULE.share[place]));
+        let mut velocity = self.falling.fall.left_along(&places);
+        for left in &mut velocity {
+            *left = self.start.velocity * *left;
+        }
+        let ways = ([self.start.depth; PLACES], velocity);
         let registers = self.bound.along(ways, Some((&self.falling, &places)));
         let force = self.bound.result_of(&registers);
         // -M dV/ds, which is M V where V falls by shares.
         let momentum = self.mass * self.start.velocity;
-        let rate = match self.falling.fall {
-            Fall::Exponential => registers[1].map(|velocity| self.mass * velocity),
-            Fall::Power(_) => places.map(|s| momentum * self.falling.fall.slope(s)),
+        let rate: [S; PLACES] = match self.falling.fall {
+            Fall::Exponential => std::array::from_fn(|place| self.mass * registers[1][place]),
+            Fall::Power(m) => {
+                let left = Fall::Power(m.saturating_sub(1)).left_along(&places);
+                let m = S::from_f64(f64::from(m));
+                std::array::from_fn(|place| momentum * (m * left[place]))
+            }
         };
         let pace = std::array::from_fn(|place| rate[place].over(force[place]));
         Forces { span, registers, force, pace }
@@ -179,10 +191,12 @@ impl<S: Scalar> Forces<S> {
         let pace: [f64; PLACES - 1] = std::array::from_fn(|place| self.pace[place].value());
         let resists = pace.iter().all(|pace| *pace >= 0.0 && pace.is_finite());
         let largest = pace.iter().copied().fold(0.0, f64::max);
-        let lacking = RULE.asked.iter().map(|(place, weights)| {
-            let polynomial: f64 = weights.iter().zip(&pace).map(|(weight, pace)| weight * pace).sum();
-            (polynomial - pace[*place]).abs() / largest
-        });
+        // A fourth sum beside the three fills the vector.
+        let mut polynomial = [0.0; ASKED.len() + 1];
+        for (weights, pace) in RULE.weights.iter().zip(&pace) {
+            polynomial.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * pace);
+        }
+        let lacking = RULE.asked.iter().zip(polynomial).map(|(place, value)| (value - pace[*place]).abs() / largest);
         let lacking = lacking.fold(0.0, f64::max);
         (resists && largest > 0.0 && lacking <= LACKING_MAX).then_some(LACKING_OF_INTEGRAL * lacking * lacking)
     }

@@ -807,7 +807,7 @@ impl Scene {
         number: &impl Fn(Parameter, f64) -> S,
     ) -> Resolved<(Stages<S>, Laws<S>, bool)> {
         if self.forces.is_empty() && self.ends.is_empty() {
-            return Ok((given.into(), Laws::none(), false));
+            return Ok((Stages::from_slice(given), Laws::none(), false));
         }
         let parameters: Vec<S> =
             self.parameters.iter().map(|one| number(Parameter::Own(one.name), one.value)).collect();

@@ -337,10 +337,18 @@ pub fn of_scene(scene: &Scene, integrator: &dyn Integrator) -> Sought {
     {
         return Err(CriticalError::TableEnds(last.end));
     }
-    if let Some(found) = perforating(scene, integrator)? {
-        return of_intervals(scene, &found);
+    if has_one_path(scene) {
+        return of_unique(scene, integrator);
     }
-    of_unique(scene, integrator)
+    match perforating(scene, integrator)? {
+        Some(found) => of_intervals(scene, &found),
+        None => of_unique(scene, integrator),
+    }
+}
+
+/// Whether every stage ends at a place, and no mass joins: paths in (x, W) cannot cross then.
+fn has_one_path(scene: &Scene) -> bool {
+    scene.ends.is_empty() && scene.criterion != Criterion::Plug
 }
 
 /// As [`of_scene`], for a scene whose paths cannot cross.
@@ -399,7 +407,7 @@ fn perforates_from_one_on(scene: &Scene) -> bool {
 /// # Errors
 /// [`CriticalError`], several intervals excepted.
 pub fn speeds(scene: &Scene, integrator: &dyn Integrator) -> Sought<(Vec<Interval>, Option<CriticalVelocity>)> {
-    if scene.ends.is_empty() && scene.criterion != Criterion::Plug {
+    if has_one_path(scene) {
         let found = of_scene(scene, integrator)?;
         return Ok((vec![of_one(&found)], Some(found)));
     }

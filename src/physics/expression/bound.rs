@@ -3,6 +3,8 @@
 //! What is made of parameters and numbers alone is computed once, and stands in the steps as a constant. A function whose
 //! series needs that of another (sine and cosine; tanh and its slope) computes both in one step.
 
+use std::sync::{Arc, OnceLock};
+
 use num_dual::Dual64;
 use smallvec::SmallVec;
 
@@ -41,6 +43,8 @@ pub struct Bound<S = f64> {
     signs: Vec<bool>,
     /// Whether the value is known not to fall with V, at any depth.
     never_falls_with_v: bool,
+    /// How V falls best, where no switch has a side; once it is asked.
+    falling: OnceLock<Arc<Falling>>,
 }
 
 /// What a term became.
@@ -458,7 +462,18 @@ impl<S: Scalar> Bound<S> {
             Value::Register(register) => trends(&steps, &signs)[register].is_some_and(Trend::never_falls),
         };
         let parameters = parameters.iter().copied().collect();
-        Self { tape, parameters, steps, registers, switches, result, beside, signs, never_falls_with_v }
+        Self {
+            tape,
+            parameters,
+            steps,
+            registers,
+            switches,
+            result,
+            beside,
+            signs,
+            never_falls_with_v,
+            falling: OnceLock::new(),
+        }
     }
 
     /// The same expression with a second one `beside` it, at `parameters` of its own: a series of the one comes with that
@@ -532,47 +547,55 @@ impl<S: Scalar> Bound<S> {
         (x, v): ([S; N], [S; N]),
         fall: Option<(&Falling, &[S; N])>,
     ) -> Vec<[S; N]> {
-        let mut registers = vec![[S::zero(); N]; self.registers];
-        (registers[0], registers[1]) = (x, v);
-        let mut place = 2;
+        let mut registers = Vec::with_capacity(self.registers);
+        registers.extend([x, v]);
         for step in &self.steps {
+            let place = registers.len();
+            // Rows are made where they stay: to copy one waits until it is written.
+            registers.extend((0..step.width()).map(|_| [S::zero(); N]));
             let (done, rest) = registers.split_at_mut(place);
-            let of = |register: usize| &done[register];
+            let of = |register: usize| -> &[S; N] { &done[register] };
+            let Some((first, rest)) = rest.split_first_mut() else { continue };
             // One loop for each kind of step, which the compiler turns into vector instructions.
             match *step {
-                Step::Affine { a, factor, shift } => set(&mut rest[0], |lane| of(a)[lane] * factor + shift),
-                Step::Sum { a, b, factor } => set(&mut rest[0], |lane| of(a)[lane] + of(b)[lane] * factor),
-                Step::Share { a, divisor, .. } => set(&mut rest[0], |lane| of(a)[lane].over(divisor)),
-                Step::Multiply { a, b } => set(&mut rest[0], |lane| of(a)[lane] * of(b)[lane]),
-                Step::Square { a } => set(&mut rest[0], |lane| of(a)[lane] * of(a)[lane]),
+                Step::Affine { a, factor, shift } => set(first, |lane| of(a)[lane] * factor + shift),
+                Step::Sum { a, b, factor } => set(first, |lane| of(a)[lane] + of(b)[lane] * factor),
+                Step::Share { a, divisor, .. } => set(first, |lane| of(a)[lane].over(divisor)),
+                Step::Multiply { a, b } => set(first, |lane| of(a)[lane] * of(b)[lane]),
+                Step::Square { a } => set(first, |lane| of(a)[lane] * of(a)[lane]),
                 Step::Select { switch, above, below, .. } => {
-                    set(&mut rest[0], |lane| of(switch)[lane].select(of(above)[lane], of(below)[lane]));
+                    set(first, |lane| of(switch)[lane].select(of(above)[lane], of(below)[lane]));
                 }
+                Step::Divide { a, b } => set(first, |lane| of(a)[lane].over(of(b)[lane])),
+                Step::Ratio { dividend, b } => set(first, |lane| dividend.over(of(b)[lane])),
+                Step::Sqrt { a } => set(first, |lane| of(a)[lane].sqrt()),
+                Step::HalfPower { a, whole, root, exponent } => set(first, |lane| {
+                    let slope = || exponent * of(a)[lane].value().powf(exponent - 1.0);
+                    of(a)[lane].with_slope(of(whole)[lane] * of(root)[lane], slope)
+                }),
                 Step::Tanh { a, .. } => {
-                    let (first, second) = rest.split_at_mut(1);
-                    set(&mut first[0], |lane| tanh(of(a)[lane]));
-                    set(&mut second[0], |lane| S::one() - first[0][lane] * first[0][lane]);
+                    set(first, |lane| tanh(of(a)[lane]));
+                    if let Some(second) = rest.first_mut() {
+                        set(second, |lane| S::one() - first[lane] * first[lane]);
+                    }
                 }
                 _ => {
                     let values = |lane: usize| step.values::<_, false>(|register| of(register)[lane], |value| value);
-                    let is_filled = fall
-                        .is_some_and(|(falling, s)| falling.fill_along(step, place, s, || values(0).0, &mut rest[0]));
+                    let is_filled =
+                        fall.is_some_and(|(falling, s)| falling.fill_along(step, place, s, || values(0).0, first));
                     if is_filled {
-                        place += step.width();
                         continue;
                     }
-                    let mut second = [S::zero(); N];
-                    set(&mut rest[0], |lane| {
-                        let (first, behind) = values(lane);
-                        second[lane] = behind;
-                        first
-                    });
-                    if step.width() == 2 {
-                        rest[1] = second;
+                    match rest.first_mut() {
+                        Some(second) => set(first, |lane| {
+                            let (value, behind) = values(lane);
+                            second[lane] = behind;
+                            value
+                        }),
+                        None => set(first, |lane| values(lane).0),
                     }
                 }
             }
-            place += step.width();
         }
         registers
     }
@@ -649,7 +672,14 @@ impl<S: Scalar> Bound<S> {
     ///
     /// # Panics
     /// If there is not a side for each of [`Bound::switches`].
-    pub fn falling(&self, sides: &[bool]) -> Falling {
+    pub fn falling(&self, sides: &[bool]) -> Arc<Falling> {
+        if self.switches.is_empty() {
+            return Arc::clone(self.falling.get_or_init(|| Arc::new(self.falling_on(sides))));
+        }
+        Arc::new(self.falling_on(sides))
+    }
+
+    fn falling_on(&self, sides: &[bool]) -> Falling {
         let degrees = degrees(&self.steps, self.registers, sides);
         let mut is_used: SmallVec<[bool; FEW]> = SmallVec::from_elem(false, self.registers);
         for value in [Some(self.result), self.beside].into_iter().flatten() {

@@ -32,6 +32,17 @@ pub(crate) struct Disc {
     pub(crate) radius: f64,
 }
 
+/// `x^exponent`, the powers of nearly all laws by products.
+fn raised(x: f64, exponent: f64) -> f64 {
+    match exponent {
+        0.0 => 1.0,
+        1.0 => x,
+        2.0 => x * x,
+        3.0 => x * x * x,
+        _ => x.powf(exponent),
+    }
+}
+
 impl Disc {
     /// The bound on a disc over the greatest value seen on it, above which something may hide there.
     pub(crate) const HIDDEN_MAX: f64 = 1e3;
@@ -84,7 +95,7 @@ impl Disc {
 
     /// Where the centre is above zero and the disc holds no zero; a power of constants besides.
     fn power(self, exponent: f64) -> Self {
-        let value = self.centre.powf(exponent);
+        let value = raised(self.centre, exponent);
         if self.radius == 0.0 {
             return Self::of(value);
         }
@@ -93,14 +104,14 @@ impl Disc {
         let rest = exponent - whole;
         if rest == 0.0 {
             let (size, more) = (self.centre.abs(), self.centre.abs() + self.radius);
-            return Self::new(value, more.powf(whole) - size.powf(whole));
+            return Self::new(value, raised(more, whole) - raised(size, whole));
         }
         if !(ratio > 0.0 && ratio < 1.0) {
             return Self::new(value, f64::INFINITY);
         }
         // Of (1+z)^e, e below 1: all coefficients have signs in turn below zero, and above it all but the first are negative there.
         let majorant = ((1.0 - ratio).powf(rest) - 1.0).abs();
-        let of_whole = (1.0 + ratio).powf(whole);
+        let of_whole = raised(1.0 + ratio, whole);
         Self::new(value, value.abs() * (of_whole * (1.0 + majorant) - 1.0))
     }
 

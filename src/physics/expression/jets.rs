@@ -66,6 +66,21 @@ impl Fall {
         }
     }
 
+    /// `V/V0` at N places, side by side.
+    #[inline(always)]
+    pub(crate) fn left_along<S: Scalar, const N: usize>(self, s: &[S; N]) -> [S; N] {
+        let mut left = [S::one(); N];
+        match self {
+            Self::Power(m) => {
+                for _ in 0..m {
+                    left.iter_mut().zip(s).for_each(|(left, s)| *left = *left * (S::one() - *s));
+                }
+            }
+            Self::Exponential => left.iter_mut().zip(s).for_each(|(left, s)| *left = self.left(*s)),
+        }
+        left
+    }
+
     /// `(V/V0)^exponent` as a function of s, where it is no root.
     fn power<S: Scalar>(self, exponent: f64) -> Option<impl Fn(S) -> S> {
         let whole = match self {

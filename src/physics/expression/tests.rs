@@ -287,7 +287,7 @@ fn a_velocity_that_falls_in_a_known_way_has_the_series_of_any_other() {
         let (x, v) = (0.1, 70.0);
         let sides = bound.sides(x, v);
         for fall in [Fall::Power(1), Fall::Power(3), Fall::Exponential] {
-            let falling = Falling { fall, ..bound.falling(&sides) };
+            let falling = Falling { fall, ..(*bound.falling(&sides)).clone() };
             let (mut known, mut any) = (Jets::default(), Jets::default());
             known.start_falling(&bound, &sides, &falling);
             any.start(&bound, &sides);

@@ -603,7 +603,10 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
     if let Some(simplest) = full.first() {
         let rivals: Vec<&&Explanation> =
             full.iter().filter(|explanation| explanation.freedom() == simplest.freedom()).collect();
-        return named(&rivals, &evidence, seen, others);
+        // A number that lies between those of the questions fits by chance where few are asked: whatever else explains all is a rival.
+        let is_cut = simplest.faults.iter().any(|(fault, _)| matches!(fault.parameter, Parameter::Threshold(..)));
+        let is_rivalled = is_cut && full.len() > rivals.len();
+        return named(&rivals, is_rivalled, &evidence, seen, others);
     }
     // What explains a few answers by its freedom explains nothing.
     found.retain(|explanation| 4 * explanation.told_apart >= explanation.concerned().max(of / 4));
@@ -654,7 +657,13 @@ fn are_twins(a: &Explanation, b: &Explanation, seen: &Seen<'_>, others: &[&Quest
 }
 
 /// The causes of explanations that hold equally well.
-fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], others: &[&Question]) -> Vec<Cause> {
+fn named(
+    rivals: &[&&Explanation],
+    is_rivalled: bool,
+    evidence: &Evidence<'_>,
+    seen: &[Seen<'_>],
+    others: &[&Question],
+) -> Vec<Cause> {
     let first = rivals[0];
     let is_per_answer = first.faults.iter().any(|(fault, _)| fault.parameter.is_per_answer());
     let is_same = |rival: &&&&Explanation| {
@@ -666,7 +675,7 @@ fn named(rivals: &[&&Explanation], evidence: &Evidence<'_>, seen: &[Seen<'_>], o
     let is_of_one = first.faults.iter().any(|(fault, _)| is_of_one_number(fault));
     let is_enough = first.told_apart >= if evidence.passing.is_empty() { 2 * CERTAIN_FROM } else { CERTAIN_FROM };
     // Places of their own in every answer are also those of faults that nobody has thought of.
-    let is_certain = is_alone && !first.is_one_number && !is_of_one && !is_per_answer && is_enough;
+    let is_certain = is_alone && !is_rivalled && !first.is_one_number && !is_of_one && !is_per_answer && is_enough;
     let certainty = if is_certain { Certainty::Certain } else { Certainty::Likely };
     let mut causes: Vec<Cause> = Vec::new();
     // Those that cannot be distinguished are one cause.

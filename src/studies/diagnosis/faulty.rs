@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 pub(crate) use self::told::mistold;
 #[cfg(test)]
-pub(super) use self::told::{Answering, altered, exact};
+pub(super) use self::told::{Answering, Staged, altered, by_stages, exact};
 use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
 use super::questions::{Question, questions};
 use super::{Cause, Certainty, Diagnosis, Plan, Solver, Verdict, by_questions, diagnose};

@@ -43,6 +43,8 @@ const SECOND: f64 = 2.0;
 const LOST: f64 = 0.5;
 const KEPT: f64 = 0.4;
 const CUT: f64 = 1e-2;
+/// One question of so many may fail where an order does.
+pub(super) const FEW: usize = 20;
 /// Least order with which errors of a sound scheme fall.
 const FLOOR_ORDER: f64 = 0.8;
 /// Part of V0 below which an end of a stage may be missed: rest is near.
@@ -117,10 +119,13 @@ pub(super) fn in_fixed_steps(
     } else if counts.failed > 0 {
         causes.extend(fixed_causes(&laddered, &rows, &reproducing, identity, all));
     }
+    // A limit or two may seem wrong where an order is lower than claimed.
+    let is_open = causes.iter().all(|cause| cause.certainty == Certainty::Possible);
+    let is_of_order = is_open && fails_an_order && FEW * counts.failed <= counts.asked;
     let scheme = reproducing.first();
     // What has no order is lowered by nothing else.
-    if counts.failed == 0 && causes.is_empty() {
-        causes.extend(what_lowers(scheme.map(|(scheme, _)| *scheme), &right, &orders));
+    if counts.failed == 0 && causes.is_empty() || is_of_order {
+        causes.splice(0..0, what_lowers(scheme.map(|(scheme, _)| *scheme), &right, &orders));
     }
     let scheme = scheme.map(|(scheme, largest)| Reproduced {
         name: scheme.name(),
@@ -488,8 +493,8 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
         let below = orders.iter().find(|order| order.verdict == Verdict::Failed);
         let cause = below.map(|below| {
             let (found, claimed) = (below.observed_order.unwrap_or(0.0), below.formal_order.unwrap_or(0.0));
-            let where_it_falls = where_it_falls(right, claimed, true);
-            where_it_falls.into_iter().next().unwrap_or_else(|| {
+            let alone = of_depth_alone(right, claimed);
+            alone.or_else(|| where_it_falls(right, claimed, true).into_iter().next()).unwrap_or_else(|| {
                 let statement =
                     format!("the order of the {} is {found:.1} over all questions, not {claimed}", below.quantity);
                 Cause::plain("order", statement, Certainty::Likely, of, of)
@@ -499,6 +504,15 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
     }
     let is_first = |which: usize| order(right, which).map(|order| order < 1.5);
     if is_first(1) == Some(true) && [0, 2].iter().all(|which| is_first(*which) != Some(true)) {
+        let (behind, alone): (Vec<_>, Vec<_>) =
+            right.iter().copied().partition(|(question, _)| question.contains.contains(&Content::StageEnd));
+        if order(&alone, 1).is_some_and(|order| order > SECOND - KEPT)
+            && order(&behind, 1).is_some_and(|order| order < 1.5)
+        {
+            let statement = "the time alone has order 1, and only behind the end of a stage: the clock goes on from the end of the step \
+                             that passes it, not from the end of the stage";
+            return vec![Cause::plain("clock", statement.to_owned(), Certainty::Likely, behind.len(), of)];
+        }
         let errors = right.iter().flat_map(|(question, rungs)| rung_errors(question, rungs));
         let (id, statement) = if errors.map(|[_, time, _]| time).sum::<f64>() > 0.0 {
             ("event-time-late", "the time alone has order 1: it is that of the end of a step")
@@ -520,6 +534,26 @@ fn what_lowers(scheme: Option<Scheme>, right: &[(&Question, &[Rung])], orders: &
         causes.push(Cause::plain("first-order-scheme", statement, Certainty::Likely, of, of));
     }
     causes
+}
+
+/// Whether x has a lower order than V: flights to rest under forces of V alone show it.
+fn of_depth_alone(right: &[(&Question, &[Rung])], full: f64) -> Option<Cause> {
+    const OF_DEPTH: [Content; 4] = [Content::Stiffness, Content::LaterStiffness, Content::Softening, Content::StageEnd];
+    let is_of_speed = |question: &Question| {
+        question.contains.contains(&Content::Rest)
+            && !OF_DEPTH.iter().any(|content| question.contains.contains(content))
+    };
+    let alone: Vec<(&Question, &[Rung])> =
+        right.iter().copied().filter(|(question, _)| is_of_speed(question)).collect();
+    let depth = order(&alone, 0)?;
+    // Under a constant force V is exact, and so is the time.
+    let keeps = order(&alone, 1).is_none_or(|order| order > full - KEPT);
+    let statement = format!(
+        "the order of the depth alone falls to {depth:.0}, where the force does not depend on x and the time keeps its order: x is \
+         advanced by a rule of a lower order than V"
+    );
+    (depth < full - LOST && keeps)
+        .then(|| Cause::plain("order", statement, Certainty::Likely, alone.len(), right.len()))
 }
 
 /// Kinds of questions to which the order `full` is lost, where others keep it: two at most.

@@ -21,12 +21,14 @@ mod stage_by_stage;
 mod within_step;
 
 use super::causes::{Cause, Certainty};
+use super::fixed_steps::FEW;
 use super::questions::Question;
+use super::simulation::continued;
 use super::{ALLOWED, Asked, Asking, Diagnosis, Each, SYMPTOMS, TOLERANCES, end_of, request};
 use crate::exchange::peers::PeerRequest;
 use crate::exchange::peers::wire::errors;
 use crate::integrators::{Detail, Integrator, Taylor};
-use crate::physics::{Problem, Stage, State};
+use crate::physics::{Outcome, Problem, Stage, State};
 use crate::studies::verdict::Verdict;
 
 /// Failing questions that a solver that has just started is asked again, and the relative difference that makes another answer.
@@ -39,6 +41,10 @@ const LEAST_ORDER: f64 = 2.0;
 /// Exits in a row, and the distance between two over the depth.
 const EXITS: usize = 24;
 const BETWEEN_EXITS: f64 = 2e-3;
+/// Part by which numbers differ that are nearly one.
+const ONE_PART: f64 = 0.1;
+/// Part by which times of two exits within a step differ otherwise than the right ones.
+const ALONG: f64 = 0.02;
 /// Second differences over the right ones that are none, and the part of them that must be none.
 const STRAIGHT: f64 = 1e-3;
 const STRAIGHT_PART: f64 = 0.75;
@@ -70,7 +76,8 @@ const FALLS_IN_ALL: f64 = 1e3;
 const SAME_FALL: f64 = 0.05;
 
 /// Causes that act in stages of every kind: where only some kinds are wrong, that goes before them.
-const OF_EVERY_KIND: [&str; 7] = [
+const OF_EVERY_KIND: [&str; 8] = [
+    "clock",
     "exit-late",
     "exit-velocity-late",
     "rest-late",
@@ -84,7 +91,8 @@ const OF_EVERY_KIND: [&str; 7] = [
 pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mut Diagnosis) {
     let cause = measured(asking, all, found);
     let is_open = cause.as_ref().is_none_or(|cause| OF_EVERY_KIND.contains(&cause.id.as_str()));
-    let by_stages = if is_open && !found.peer.fixed_step { stage_by_stage::measured(asking, all, found) } else { None };
+    let by_stages =
+        if is_open && found.counts.failed > 0 { stage_by_stage::measured(asking, all, found) } else { None };
     if let Some(cause) = cause {
         // A clock is found where events under a constant force are on time; weights make every time late, or early.
         let is_refuted = |known: &str| match cause.id.as_str() {
@@ -96,7 +104,8 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
         // What is measured says more of the same.
         found.causes.retain(|known| known.id != cause.id || !SYMPTOMS.contains(&cause.id.as_str()));
         // What is likely, and is no symptom alone, stays first beside what is no more.
-        let stays = |known: &Cause| known.certainty <= cause.certainty && !SYMPTOMS.contains(&known.id.as_str());
+        let says_more = |known: &Cause| !SYMPTOMS.contains(&known.id.as_str()) && known.id != "order";
+        let stays = |known: &Cause| known.certainty <= cause.certainty && says_more(known);
         let place = usize::from(found.causes.first().is_some_and(stays));
         found.causes.insert(if cause.certainty == Certainty::Certain { 0 } else { place }, cause);
     }
@@ -104,6 +113,11 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
         found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
         let is_of_every_kind = |known: &Cause| OF_EVERY_KIND.iter().chain(&SYMPTOMS).any(|id| *id == known.id);
         let goes_behind = |known: &Cause| known.certainty > cause.certainty || is_of_kinds && is_of_every_kind(known);
+        // One that explains half as many, or fewer, says less.
+        let explains_few = |known: &Cause| cause.certainty == Certainty::Likely && 2 * known.explains <= cause.explains;
+        let is_of_limits = found.peer.fixed_step && cause.certainty != Certainty::Possible;
+        let goes_behind =
+            |known: &Cause| goes_behind(known) || is_of_limits && is_of_every_kind(known) || explains_few(known);
         let place = usize::from(found.causes.first().is_some_and(|known| !goes_behind(known)));
         found.causes.insert(place, cause);
     }
@@ -117,23 +131,26 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     }
     if found.peer.fixed_step {
         // Where the limit is wrong, so is the force, and the step tells nothing of the scheme.
-        if found.counts.failed > 0 {
+        if FEW * found.counts.failed > found.counts.asked {
             return None;
         }
         let claimed = found.orders.iter().filter_map(|order| order.formal_order).reduce(f64::max);
-        return one_step::measured(asking, claimed.unwrap_or(LEAST_ORDER));
+        return one_step::measured(asking, claimed.unwrap_or(LEAST_ORDER))
+            .or_else(|| within_step::measured(asking, true));
     }
-    clock(asking, found)
+    clock(asking, all, found)
         .or_else(|| coasting(asking))
         .or_else(|| drag_by_speed(asking))
         .or_else(|| straight_steps(asking))
+        .or_else(|| within_step::measured(asking, false))
         .or_else(|| first_step::measured(asking))
         .or_else(|| straight_to_rest(asking))
-        .or_else(|| within_step::measured(asking))
         .or_else(|| absolute_tolerance(asking))
         .or_else(|| bounds::least_step(asking))
         .or_else(|| bounds::least_tolerance(asking))
         .or_else(|| bounds::smooth_floor(asking, found))
+        .or_else(|| one_rate(found))
+        .or_else(|| loose_ends(all, found))
         .or_else(|| long_steps::measured(asking, all, found))
 }
 
@@ -186,30 +203,82 @@ fn ends(asking: &mut Asking<'_>, problem: &Problem, request: &PeerRequest) -> Op
     answer.outcome.agrees_with(exact.outcome).then(|| [end_of(&answer).state, exact.end])
 }
 
-/// Whether the time alone is wrong, and late, and right under constant forces, where no step is rejected.
-fn clock(asking: &mut Asking<'_>, found: &Diagnosis) -> Option<Cause> {
+/// Whether the time alone is wrong, and by what stays the same within a step: the clock then goes on otherwise than the steps do.
+fn clock(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<Cause> {
     let failing = found.questions.iter().filter(|row| row.verdict == Verdict::Failed);
     let errors_of: Vec<[Each; 2]> = failing.filter_map(|row| Some([row.relative_error?, row.limit?])).collect();
-    let is_late = |[error, limit]: &&[Each; 2]| {
-        error.depth.abs() <= limit.depth && error.velocity.abs() <= limit.velocity && error.time > limit.time
+    let of_time = |[error, limit]: &&[Each; 2]| {
+        let is_of_time = error.depth.abs() <= limit.depth && error.velocity.abs() <= limit.velocity;
+        is_of_time && error.time.abs() > limit.time
     };
-    let late = errors_of.iter().filter(is_late).count();
+    let alone: Vec<_> = errors_of.iter().filter(of_time).collect();
+    let late = alone.iter().filter(|[error, _]| error.time > 0.0).count();
     let of = found.counts.failed;
-    // Steps are rejected wherever the force changes: where few questions fail, a formula is wrong.
-    if late == 0 || 10 * late < 9 * of || 2 * of < found.counts.asked {
+    if alone.is_empty() || 10 * alone.len() < 9 * of {
         return None;
     }
-    let are_right = RESTS.iter().all(|(speed, force)| {
-        let problem = Problem::of_stages(1.0, *speed, [Stage::tunnel(*force, 0.0)]);
+    // Steps are rejected wherever the force changes: where few questions fail, a formula is wrong, unless its error follows the steps.
+    if 2 * of < found.counts.asked && !follows_steps(asking, all, found) {
+        return None;
+    }
+    let is_right = |asking: &mut Asking<'_>, (speed, force): (f64, f64)| {
+        let problem = Problem::of_stages(1.0, speed, [Stage::tunnel(force, 0.0)]);
         let to_rest = 0.5 * speed * speed / force;
         [problem.clone(), problem.with_exit(0.7 * to_rest)].iter().all(|problem| {
             ends(asking, problem, &PeerRequest::from_problem(problem, TOLERANCES[0]))
-                .is_some_and(|[found, exact]| off(found, exact, *speed) <= TOLERANCES[1])
+                .is_some_and(|[found, exact]| off(found, exact, speed) <= TOLERANCES[1])
         })
-    });
-    let statement = "the time alone is wrong, and late, and under a constant force it is right: the clock goes on in steps that are \
-                     rejected";
-    are_right.then(|| Cause::plain("clock", statement.to_owned(), Certainty::Likely, late, of))
+    };
+    let said = |statement: &str| Some(Cause::plain("clock", statement.to_owned(), Certainty::Likely, alone.len(), of));
+    if 10 * late >= 9 * of && RESTS.into_iter().all(|flight| is_right(asking, flight)) {
+        return said(
+            "the time alone is wrong, and late, and under a constant force it is right: the clock goes on in steps that are rejected",
+        );
+    }
+    let flights = row_of_exits(asking)?;
+    let is_wrong = |[found, exact]: &[State; 2]| (found.time / exact.time - 1.0).abs() > ALLOWED * TOLERANCES[0];
+    // The time at an end of a step would be the same at each exit within it.
+    let goes_along = |pair: &&[[State; 2]]| {
+        let rise = |which: usize| pair[1][which].time - pair[0][which].time;
+        (rise(0) / rise(1) - 1.0).abs() <= ALONG
+    };
+    let along = flights.windows(2).filter(goes_along).count() as f64;
+    if !flights.iter().any(is_wrong) || along < STRAIGHT_PART * (EXITS - 1) as f64 {
+        return None;
+    }
+    said(
+        "the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than that \
+         of the step",
+    )
+}
+
+/// Whether times of failing questions differ from tolerance to tolerance.
+fn follows_steps(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> bool {
+    let failing = found.questions.iter().filter(|row| row.verdict == Verdict::Failed);
+    let failing: Vec<&Question> =
+        failing.filter_map(|row| all.iter().find(|question| question.id == row.id)).take(ALONE).collect();
+    let mut moves = |question: &&&Question| {
+        let mut at = |rtol| Some(ends(asking, &question.problem, &request(question, rtol))?[0].time);
+        let times = [TOLERANCES[0], TOLERANCES[2]].map(&mut at);
+        let exact = question.exact.end.time;
+        matches!(times, [Some(loose), Some(tight)] if (loose - tight).abs() > ALONG * (tight - exact).abs())
+    };
+    let moved = failing.iter().filter(&mut moves).count();
+    2 * moved > failing.len()
+}
+
+/// Exits in a row, found and exact, by one absolute tolerance.
+fn row_of_exits(asking: &mut Asking<'_>) -> Option<Vec<[State; 2]>> {
+    let of_depth = |depth| Problem::of_stages(1.0, 100.0, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
+    // Else each flight has steps of its own.
+    let atol = PeerRequest::from_problem(&of_depth(1.0), TOLERANCES[0]).atol;
+    (0..EXITS)
+        .map(|index| {
+            let problem = of_depth(1.0 + BETWEEN_EXITS * index as f64);
+            let request = PeerRequest { atol, ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
+            ends(asking, &problem, &request)
+        })
+        .collect()
 }
 
 /// Whether depth grows by `V t` where there is no force: else the weights of the scheme do not add up to one.
@@ -234,6 +303,52 @@ fn coasting(asking: &mut Asking<'_>) -> Option<Cause> {
     );
     let cause = Cause::plain("weights", statement, Certainty::Likely, ratios.len(), ratios.len());
     ((factor - 1.0).abs() > ONE_RATIO && is_of_all).then_some(Cause { factor: Some(factor), ..cause })
+}
+
+/// Whether the time is off by nearly one part of it, and the path hardly is: all rates then have a factor.
+fn one_rate(found: &Diagnosis) -> Option<Cause> {
+    // Of all steps, whatever their length.
+    if found.causes.first().is_none_or(|known| known.id != "tolerance-ignored") {
+        return None;
+    }
+    let failing = found.questions.iter().filter(|row| row.verdict == Verdict::Failed);
+    let errors_of: Vec<Each> = failing.filter_map(|row| row.relative_error).collect();
+    let mut times: Vec<f64> = errors_of.iter().map(|error| error.time).collect();
+    times.sort_by(f64::total_cmp);
+    let part = *times.get(times.len() / 2)?;
+    let is_of_it =
+        |error: &&Each| (error.time - part).abs() <= ONE_PART * part.abs() && error.depth.abs() <= 0.5 * part.abs();
+    let (seen, of) = (errors_of.iter().filter(is_of_it).count(), found.counts.failed);
+    let statement = format!(
+        "the time is off by nearly one part of it, {part:+.1e}, and the path by less: x and V change by {:.7} of their rates, as where the \
+         weights of the scheme add up to that",
+        1.0 / (1.0 + part)
+    );
+    let cause = Cause::plain("weights", statement, Certainty::Likely, seen, of);
+    (2 * seen >= of && 2 * of >= found.counts.asked).then_some(Cause { factor: Some(1.0 / (1.0 + part)), ..cause })
+}
+
+/// Whether time and velocity at exits are those of the right flight a little before or behind it, and the depth is that of the exit.
+fn loose_ends(all: &[Question], found: &Diagnosis) -> Option<Cause> {
+    let failing = found.questions.iter().filter(|row| row.verdict == Verdict::Failed);
+    let on_path = |row: &Asked| {
+        let question = all.iter().find(|question| question.id == row.id)?;
+        let (exact, speed, found) = (&question.exact, question.problem.impact_speed, row.answered?);
+        let off = found.state.velocity - exact.end.velocity;
+        let is_telling = exact.outcome == Outcome::Perforated && found.outcome == exact.outcome && exact.stage == 0;
+        if !is_telling || off.abs() <= row.limit?.velocity * speed {
+            return None;
+        }
+        let there = continued(&question.problem, exact.stage, exact.end, found.state.time - exact.end.time)?;
+        Some((found.state.velocity - there.velocity).abs() <= ONE_PART * off.abs())
+    };
+    let told: Vec<bool> = failing.filter_map(on_path).collect();
+    let seen = told.iter().filter(|is| **is).count();
+    let statement = "time and velocity at an exit are those of a moment a little before or behind it: the end is not located as accurately \
+                     as steps are taken"
+        .to_owned();
+    (seen >= RESTS.len() && 10 * seen >= 9 * told.len())
+        .then(|| Cause::plain("event-loose", statement, Certainty::Likely, seen, told.len()))
 }
 
 /// The largest relative error of `found`.
@@ -306,16 +421,7 @@ fn drag_by_speed(asking: &mut Asking<'_>) -> Option<Cause> {
 
 /// Whether time and velocity run along a straight line within a step.
 fn straight_steps(asking: &mut Asking<'_>) -> Option<Cause> {
-    let of_depth = |depth| Problem::of_stages(1.0, 100.0, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
-    // One absolute tolerance, or else each flight has steps of its own.
-    let atol = PeerRequest::from_problem(&of_depth(1.0), TOLERANCES[0]).atol;
-    let flights: Vec<[State; 2]> = (0..EXITS)
-        .map(|index| {
-            let problem = of_depth(1.0 + BETWEEN_EXITS * index as f64);
-            let request = PeerRequest { atol, ..PeerRequest::from_problem(&problem, TOLERANCES[0]) };
-            ends(asking, &problem, &request)
-        })
-        .collect::<Option<_>>()?;
+    let flights = row_of_exits(asking)?;
     let part = |holds: &dyn Fn(&[[State; 2]]) -> bool| {
         flights.windows(3).filter(|three| holds(three)).count() as f64 >= STRAIGHT_PART * (EXITS - 2) as f64
     };

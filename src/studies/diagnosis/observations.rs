@@ -33,6 +33,10 @@ pub(super) fn shown(judged: &[Judged<'_>]) -> Option<Cause> {
         failing >= MOST && passing <= FEW
     };
     let plain = |id: &str, statement: String| Some(Cause::plain(id, statement, Certainty::Likely, failed, failed));
+    // A stop that still moves, whatever its list says.
+    if is_shown(&|answered| last(answered).is_some_and(|answer| is_moving(answered, answer))) {
+        return plain("flight-cut-short", "the flight is said to stop, with V > 0 and no exit reached".to_owned());
+    }
     if is_shown(&|answered| last(answered).and_then(other_than_event).is_some())
         && let Some((which, event, end)) =
             judged.iter().find(|(_, fails)| *fails).and_then(|(answered, _)| other_than_event(last(answered)?))
@@ -44,9 +48,6 @@ pub(super) fn shown(judged: &[Judged<'_>]) -> Option<Cause> {
                 "the last event listed is not the end reported: a {quantity} of {event} in the list, {end} beside it"
             ),
         );
-    }
-    if is_shown(&|answered| last(answered).is_some_and(|answer| is_moving(answered, answer))) {
-        return plain("flight-cut-short", "the flight is said to stop, with V > 0 and no exit reached".to_owned());
     }
     let is_weak = |answered: &Answered<'_>| answered.question.contains.contains(&Content::WeakTerm);
     if is_shown(&|answered| is_one_error(answered) && is_weak(answered)) {

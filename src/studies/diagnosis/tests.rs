@@ -1,6 +1,8 @@
 #![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use super::faulty::{Answering, Faulty, altered, answer, exact, misnamed, misnamed_schemes, mistold};
+use super::faulty::{
+    Answering, Faulty, Staged, altered, answer, by_stages, exact, misnamed, misnamed_schemes, mistold,
+};
 use super::fixed_steps::is_short_of;
 use super::hypotheses::hypotheses;
 use super::numbers::of_numbers;
@@ -172,6 +174,21 @@ fn a_small_fault_in_few_answers_is_not_taken_for_inaccuracy() {
     let found = diagnosed(strange(stiffer), Plan { asks_edges: false, ..Plan::default() });
     assert_eq!(found.verdict, Verdict::Failed);
     assert!(!found.causes[0].id.starts_with("tolerance"), "{:?}", found.causes);
+}
+
+#[test]
+fn what_is_wrong_in_part_of_the_stages_of_a_kind_is_told_as_possible() {
+    let in_part = by_stages(|Staged { alone, .. }, end| {
+        let law = alone.stages[0];
+        if law.viscosity > 0.0 && law.stiffness > 0.0 && (1e3 * alone.impact_speed).sin() > 0.0 {
+            end.time *= 1.01;
+            end.velocity *= 0.99;
+        }
+    });
+    let found = diagnosed(in_part, Plan { asks_edges: false, ..Plan::default() });
+    let cause = found.causes.iter().find(|cause| cause.id == "stage-wrong").unwrap();
+    assert_eq!(cause.certainty, Certainty::Possible, "{cause:?}");
+    assert!(cause.statement.contains("in part of those where it has a spring and it has viscosity"), "{cause:?}");
 }
 
 #[test]

@@ -17,6 +17,8 @@ pub(super) enum Placed {
     AtStepEndByDepth,
     /// By a step that lasts the distance over V at its start, with the depth of the boundary.
     AtFirstSpeed,
+    /// By a part of a step of the midpoint rule.
+    ByMidpoint,
 }
 
 /// A scheme.
@@ -35,8 +37,10 @@ pub(super) struct Stepping {
     pub steps: fn(f64, f64) -> f64,
     /// The step that is taken for the one asked for.
     pub step: fn(f64) -> f64,
-    /// Time that a shortened step takes, from its length and that of a whole one.
-    pub clock: fn(f64, f64) -> f64,
+    /// Time that a shortened step takes, from its length and that of a whole one, and whether the flight ends with it.
+    pub clock: fn(f64, f64, bool) -> f64,
+    /// Whether x is advanced by the mean of V at both ends of a step.
+    pub by_mean_speed: bool,
     /// Part of the force of the stage before in the first slope behind its end.
     pub stale: f64,
     /// Part of the change of V that the first step behind the end of a stage makes.
@@ -52,6 +56,9 @@ pub(super) struct Stepping {
 /// The slopes and weights of the classical scheme.
 pub(super) const CLASSICAL: ([f64; 3], [f64; 4]) = ([0.5, 0.5, 1.0], [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0]);
 
+/// Those of the midpoint rule.
+const MIDPOINT: ([f64; 3], [f64; 4]) = ([0.5, 0.5, 1.0], [0.0, 1.0, 0.0, 0.0]);
+
 /// The classical scheme, right.
 pub(super) const RIGHT: Stepping = Stepping {
     numbers: CLASSICAL,
@@ -62,7 +69,8 @@ pub(super) const RIGHT: Stepping = Stepping {
     exit_speed: |[_, here, _]| here,
     steps: |_, _| 200.0,
     step: |step| step,
-    clock: |part, _| part,
+    clock: |part, _, _| part,
+    by_mean_speed: false,
     stale: 0.0,
     restart: 1.0,
     lag: [0.0; 2],
@@ -91,20 +99,22 @@ impl Stepping {
                 if steps > STEPS_MAX {
                     return None;
                 }
-                let ahead = |part: f64| self.ahead(law, left_over, problem.mass, now, part);
+                let ahead_by = |scheme: Self, part: f64| scheme.ahead(law, left_over, problem.mass, now, part);
+                let ahead = |part: f64| ahead_by(self, part);
                 let next = ahead(step);
                 if next.depth < limit && next.velocity > 0.0 {
                     (now, left_over) = (next, None);
                     continue;
                 }
-                let first = |is_past: &dyn Fn(State) -> bool| {
+                let first_by = |scheme: Self, is_past: &dyn Fn(State) -> bool| {
                     let (mut low, mut high) = (0.0, step);
                     for _ in 0..HALVINGS {
                         let middle = 0.5 * (low + high);
-                        if is_past(ahead(middle)) { high = middle } else { low = middle }
+                        if is_past(ahead_by(scheme, middle)) { high = middle } else { low = middle }
                     }
-                    ahead(high)
+                    ahead_by(scheme, high)
                 };
+                let first = |is_past: &dyn Fn(State) -> bool| first_by(self, is_past);
                 let rests = next.velocity <= 0.0 && first(&|state| state.velocity <= 0.0).depth < limit;
                 let is_exit = !rests && limit == problem.exit_depth;
                 let placed = if rests {
@@ -130,13 +140,17 @@ impl Stepping {
                         }
                         on_cubic(now, next, slopes, high)
                     }
+                    Placed::ByMidpoint => {
+                        let midpoint = Self { numbers: MIDPOINT, ..self };
+                        first_by(midpoint, &|state| if rests { state.velocity <= 0.0 } else { state.depth >= limit })
+                    }
                     Placed::AtFirstSpeed => ahead((limit - now.depth) / now.velocity),
                     Placed::AtStepEnd | Placed::AtStepEndByDepth => next,
                 };
                 let velocity =
                     if is_exit { (self.exit_speed)([now.velocity, end.velocity, next.velocity]) } else { end.velocity };
                 now = State {
-                    time: now.time + (self.clock)(end.time - now.time, step),
+                    time: now.time + (self.clock)(end.time - now.time, step, rests || is_exit),
                     depth: if rests || placed == Placed::AtStepEnd { end.depth } else { limit },
                     velocity: if rests { 0.0 } else { velocity.max(0.0) },
                 };
@@ -163,7 +177,9 @@ impl Stepping {
         let k4 = behind(a4, k3);
         let sum = |i: usize| h * (b1 * k1[i] + b2 * k2[i] + b3 * k3[i] + b4 * k4[i]);
         let part = if left_over.is_some() { self.restart } else { 1.0 };
-        State { time: now.time + h, depth: x + sum(0), velocity: v + part * sum(1) }
+        let velocity = v + part * sum(1);
+        let distance = if self.by_mean_speed { 0.5 * h * (v + velocity) } else { sum(0) };
+        State { time: now.time + h, depth: x + distance, velocity }
     }
 }
 

@@ -60,6 +60,20 @@ impl Answering {
         self
     }
 
+    /// One that does `report` to what it answers.
+    fn reporting(self, report: fn(&mut PeerAnswer)) -> Self {
+        let Self { identity, start, .. } = self;
+        let again = move || {
+            let mut answers = start();
+            move |request: &PeerRequest| {
+                let mut answer = answers(request)?;
+                report(&mut answer);
+                Some(answer)
+            }
+        };
+        Self { identity, ..Self::new(again) }
+    }
+
     pub(in super::super) fn of_scenes(mut self) -> Self {
         self.identity.reads_scene = true;
         self
@@ -146,8 +160,17 @@ fn listing(report: fn(&Problem, &mut PeerAnswer)) -> Answering {
     })
 }
 
-/// A solver that goes from stage to stage, and does `change` to the end of each flight through one, of which it is given the problem.
-fn by_stages(change: fn(&Problem, &mut State)) -> Answering {
+/// A stage that a solver flies through by itself.
+pub(in super::super) struct Staged<'a> {
+    request: &'a PeerRequest,
+    problem: &'a Problem,
+    index: usize,
+    /// The problem of this stage alone.
+    pub alone: &'a Problem,
+}
+
+/// A solver that goes from stage to stage, and does `change` to the end of each flight through one.
+pub(in super::super) fn by_stages(change: fn(&Staged<'_>, &mut State)) -> Answering {
     Answering::plain(move |request| {
         let problem = request.problem(None);
         let mut at = State { time: 0.0, depth: 0.0, velocity: problem.impact_speed };
@@ -160,7 +183,7 @@ fn by_stages(change: fn(&Problem, &mut State)) -> Answering {
             let alone = if limit.is_finite() { alone.with_exit(limit - at.depth) } else { alone };
             let flight = exact(&alone)?;
             let mut end = flight.end;
-            change(&alone, &mut end);
+            change(&Staged { request, problem: &problem, index, alone: &alone }, &mut end);
             at = State { time: at.time + end.time, depth: at.depth + end.depth, velocity: end.velocity };
             if flight.outcome != Outcome::Perforated || law.end >= problem.exit_depth {
                 return Some(PeerAnswer { events, ..answer(flight.outcome, at) });
@@ -629,7 +652,7 @@ const TOLD: &[Told] = &[
     },
     Told {
         what: "a shortened step takes half the time of a whole one: what one step takes says nothing there",
-        solver: || Stepping { clock: |_, whole| 0.5 * whole, ..FIXED }.solver(),
+        solver: || Stepping { clock: |_, whole, _| 0.5 * whole, ..FIXED }.solver(),
         asked: Measured,
         says: "",
     },
@@ -641,13 +664,13 @@ const TOLD: &[Told] = &[
     },
     Told {
         what: "a shortened step counts as a whole one",
-        solver: || Stepping { clock: |_, whole| whole, ..FIXED }.solver(),
+        solver: || Stepping { clock: |_, whole, _| whole, ..FIXED }.solver(),
         asked: Questions(40),
         says: "passed | event-time-late, likely: the time alone has order 1: it is that of the end of a step",
     },
     Told {
         what: "a shortened step takes no time",
-        solver: || Stepping { clock: |_, _| 0.0, ..FIXED }.solver(),
+        solver: || Stepping { clock: |_, _, _| 0.0, ..FIXED }.solver(),
         asked: Questions(40),
         says: "passed | event-time-early, likely: the time alone has order 1, and is too small: that of a shortened step is not counted",
     },
@@ -914,7 +937,7 @@ const TOLD: &[Told] = &[
         what: "events are late",
         solver: || altered(|_| (), |_, end| delay(end)),
         asked: Questions(60),
-        says: "failed | event-time-late, likely: only the time is wrong, and late, as that of the end of a step",
+        says: "failed | event-time-late, likely: only the time is wrong, and late, as that of the end of a step, or of a clock that goes on by more than its steps",
     },
     Told {
         what: "no answer at the tightest tolerance where there is a gap",
@@ -1481,9 +1504,9 @@ const TOLD: &[Told] = &[
     Told {
         what: "a stage of drag is left at the mean of two speeds",
         solver: || {
-            by_stages(|problem, end| {
-                if problem.stages[0].drag > 0.0 && end.velocity > 0.0 {
-                    end.time = 2.0 * end.depth / (problem.impact_speed + end.velocity);
+            by_stages(|&Staged { alone, .. }, end| {
+                if alone.stages[0].drag > 0.0 && end.velocity > 0.0 {
+                    end.time = 2.0 * end.depth / (alone.impact_speed + end.velocity);
                 }
             })
         },
@@ -1493,8 +1516,8 @@ const TOLD: &[Told] = &[
     Told {
         what: "the depth of a stage of drag by the logarithm to ten",
         solver: || {
-            by_stages(|problem, end| {
-                if problem.stages[0].drag > 0.0 && end.velocity == 0.0 {
+            by_stages(|&Staged { alone, .. }, end| {
+                if alone.stages[0].drag > 0.0 && end.velocity == 0.0 {
                     end.depth /= std::f64::consts::LN_10;
                 }
             })
@@ -1543,5 +1566,110 @@ const TOLD: &[Told] = &[
         },
         asked: Questions(60),
         says: "failed | unknown, possible: no cause that is known explains the failing answers; the smallest that fails is static-force-1 (static-force, exit)",
+    },
+    Told {
+        what: "times are wrong in the stage behind one with viscosity",
+        solver: || {
+            by_stages(|&Staged { problem, index, .. }, end| {
+                if index > 0 && problem.stages[index - 1].viscosity > 0.0 {
+                    end.time *= 1.01;
+                }
+            })
+        },
+        asked: Questions(200),
+        says: "failed | stage-wrong, likely, 1.010000: the flight through a stage, from the state listed at its start, has a wrong time alone, 1.010000 times the right one, where the stage before has viscosity: 58 of 58 such passages, and none of the 262 others",
+    },
+    Told {
+        what: "times are wrong in the crater where the criterion is ndrc",
+        solver: || {
+            by_stages(|&Staged { request, index, .. }, end| {
+                if index == 0 && request.scene.as_ref().is_some_and(|scene| scene.criterion == "ndrc") {
+                    end.time *= 1.01;
+                }
+            })
+            .of_scenes()
+        },
+        asked: Questions(200),
+        says: "failed | stage-wrong, likely, 1.010000: the flight through a stage, from the state listed at its start, has a wrong time alone, 1.010000 times the right one, where it is without a static force and the criterion is `ndrc`: 30 of 30 such passages, and none of the 213 others",
+    },
+    Told {
+        what: "all rates lack nearly one part of them, at every tolerance",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    end.time *= 1.0 + 2e-5 + 1e-6 * (1e3 * problem.impact_speed).sin();
+                    end.depth *= 1.0 + if end.velocity > 0.0 { 0.0 } else { 2e-6 * (1e3 * problem.impact_speed).cos() };
+                },
+            )
+        },
+        asked: Questions(60),
+        says: "failed | weights, likely, 0.999980: the time is off by nearly one part of it, +2.0e-5, and the path by less: x and V change by 0.9999798 of their rates, as where the weights of the scheme add up to that",
+    },
+    Told {
+        what: "exits are taken a little before or behind them, by less at tighter tolerances",
+        solver: || {
+            by_request(
+                |_, _| (),
+                |request, problem, end| {
+                    if end.velocity > 0.0 {
+                        let late = 0.1 * request.rtol.powf(0.3) * (1e3 * problem.impact_speed).sin() * end.time;
+                        let law =
+                            problem.stages[problem.stages.iter().position(|law| end.depth <= law.end).unwrap_or(0)];
+                        end.velocity -= late * law.force(end.depth, end.velocity) / problem.mass;
+                        end.time += late;
+                    }
+                },
+            )
+        },
+        asked: Questions(60),
+        says: "failed | event-loose, likely: time and velocity at an exit are those of a moment a little before or behind it: the end is not located as accurately as steps are taken",
+    },
+    Told {
+        what: "the clock starts anew in each stage, in fixed steps",
+        solver: || {
+            by_stages(|&Staged { request, alone, .. }, end| {
+                let step = request.dt_s.unwrap_or(0.0) * alone.impact_speed / end.depth;
+                end.time *= 1.0 + 0.1 * step * step;
+            })
+            .reporting(|answer| {
+                let entered = answer.events.last().map_or(0.0, |event| event.state.time);
+                answer.time_s -= entered;
+                let times: Vec<f64> = answer.events.iter().map(|event| event.state.time).collect();
+                for (event, before) in answer.events.iter_mut().skip(1).zip(times) {
+                    event.state.time -= before;
+                }
+            })
+            .in_fixed_steps()
+        },
+        asked: Questions(60),
+        says: "failed | time-restarts, certain: time starts anew at the end of each stage",
+    },
+    Told {
+        what: "x is advanced by the mean of V, and V by the classical scheme",
+        solver: || Stepping { by_mean_speed: true, ..FIXED }.solver().claiming(4.0),
+        asked: Questions(120),
+        says: "failed | order, likely: the order of the depth alone falls to 2, where the force does not depend on x and the time keeps its order: x is advanced by a rule of a lower order than V",
+    },
+    Told {
+        what: "behind the end of a stage the clock goes on from the end of the step",
+        solver: || Stepping { clock: |part, whole, is_end| if is_end { part } else { whole }, ..FIXED }.solver(),
+        asked: Questions(120),
+        says: "passed | clock, likely: the time alone has order 1, and only behind the end of a stage: the clock goes on from the end of the step that passes it, not from the end of the stage",
+    },
+    Told {
+        what: "ends are placed on the chord of a fixed step",
+        solver: || {
+            let (exit, rest, stage_end) = (Placed::OnChord, Placed::OnChord, Placed::OnChord);
+            Stepping { exit, rest, stage_end, ..FIXED }.solver().claiming(4.0)
+        },
+        asked: Questions(60),
+        says: "failed | event-interpolated, likely: the time at an exit is right at the ends of steps and off by up to 3e-2 between them at steps of 1.7e-3 s: events are interpolated, less accurately than steps are taken",
+    },
+    Told {
+        what: "the step that lands on the exit is one of the midpoint rule",
+        solver: || Stepping { exit: Placed::ByMidpoint, steps: |_, _| 7.0, ..RIGHT }.solver(),
+        asked: Measured,
+        says: "event-interpolated, likely: the time at an exit is right at the ends of steps and off by up to 2e-3 between them at a tolerance of 1e-6, most of all in front of those: the step that is shortened to land on an end is of a lower order than the others, or the interpolant of a step does not end where the step does",
     },
 ];

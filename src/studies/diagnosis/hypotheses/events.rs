@@ -706,6 +706,15 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "exit-missed",
+        "an exit in front of the last stage is seen at the end of its stage",
+        Parameter::None,
+        &[Change::Problem(|p, _| {
+            let last = p.stages.len() - 1;
+            exit_in(p, |stage| stage == last, true);
+        })],
+    ),
+    of(
+        "exit-missed",
         "an exit at less than {} m/s is missed",
         Parameter::Threshold(30.0, exit_speed),
         &[Change::OfRight(|p, right, n| {

@@ -352,12 +352,9 @@ macro_rules! term {
             ),
             of(
                 $id,
-                concat!($what, " is not divided by the mass"),
+                concat!($what, " keeps the value of the stage before where it is zero"),
                 Parameter::None,
-                &[Change::Problem(|p, _| {
-                    let mass = p.mass;
-                    alter_term::<$term>(p, |own| own * mass);
-                })],
+                &[Change::Problem(borrow_term::<$term, KEPT>)],
             ),
             of(
                 $id,
@@ -790,6 +787,12 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "a force of {} N/m times x is added to the resistance",
         Parameter::Value(0.3),
         &[Change::Force(|at, n| right_force(at, n) + n * at.depth)],
+    ),
+    of(
+        "force-clipped",
+        "a force below {} N in size counts as zero",
+        Parameter::Value(1e3),
+        &[Change::Force(|at, n| Some(right_force(at, n)).filter(|force| force.abs() >= n).unwrap_or(0.0))],
     ),
     of(
         "force-clipped",

@@ -213,13 +213,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "event-time-late",
-        "only the time is wrong, and late, as that of the end of a step",
+        "only the time is wrong, and late, as that of the end of a step, or of a clock that goes on by more than its steps",
         Parameter::Lateness,
         &[Change::Report(|_, found, late| shift_time(found, late))],
     ),
     of(
         "event-time-early",
-        "only the time is wrong, and early, as that of the start of a step, or a sum that is not fine enough",
+        "only the time is wrong, and early, as that of the start of a step, or of a clock that leaves out part of the steps",
         Parameter::Lateness,
         &[Change::Report(|_, found, late| shift_time(found, -late))],
     ),

@@ -360,6 +360,22 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         })],
     ),
     of(
+        "parameter:criterion",
+        "the criterion ndrc is that of scabbing: H/d = 7.91 y - 5.06 y² up to y = 0.65, and 2.12 + 1.36 y beyond",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            let diameter = s.concrete().map(|c| c.diameter);
+            if let Some((thickness, diameter)) = s.thickness.zip(diameter).filter(|_| s.criterion == Criterion::Ndrc) {
+                let ratio = thickness / diameter;
+                let (a, b) = (7.91, 5.06);
+                let is_thin = ratio <= 0.65 * (a - 0.65 * b);
+                let y =
+                    if is_thin { 2.0 * ratio / (a + (a * a - 4.0 * b * ratio).sqrt()) } else { (ratio - 2.12) / 1.36 };
+                s.thickness = Some(diameter * perforated_thickness_ratio(y));
+            }
+        })],
+    ),
+    of(
         "parameter:S",
         "S by Eq. 14 is that of at most {} Pa",
         Parameter::Value(3e7),

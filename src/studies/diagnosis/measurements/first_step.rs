@@ -11,7 +11,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::super::causes::{Cause, Certainty};
-use super::super::{Asking, TOLERANCES};
+use super::super::{ALLOWED, Asking, TOLERANCES};
 use super::ends;
 use super::one_step::{ANOTHER, COEFFICIENTS, FORETOLD, SAME, SIZES};
 use crate::exchange::peers::PeerRequest;
@@ -76,6 +76,14 @@ impl Motion {
     }
 }
 
+/// Whether a flight to rest ends at its depth.
+fn rests_rightly(asking: &mut Asking<'_>, stage: Stage) -> bool {
+    let problem = Problem::of_stages(1.0, 1.0, [stage]);
+    let request = PeerRequest::from_problem(&problem, TOLERANCES[1]);
+    ends(asking, &problem, &request)
+        .is_some_and(|[found, exact]| (found.depth - exact.depth).abs() <= ALLOWED * request.rtol * exact.depth)
+}
+
 /// Whether the coefficient `found` is another one than `right`.
 fn is_another(found: f64, right: f64) -> bool {
     (found - right).abs() > ANOTHER * right
@@ -111,7 +119,8 @@ pub(super) fn measured(asking: &mut Asking<'_>) -> Option<Cause> {
         return Some(Cause::plain("scheme-coefficient", statement, Certainty::Likely, asked, asked));
     }
     let ([first, ..], _) = constant(|state| state.depth / state.time).coefficients(asking)?;
-    if is_another(first, 0.5) {
+    // One that is right at rest has another depth at the exit alone.
+    if is_another(first, 0.5) && !rests_rightly(asking, steady) {
         let statement =
             format!("the first step under a constant deceleration a has a h² in x with a factor {first:.6}, not 0.5");
         return likely(2.0 * first, statement);

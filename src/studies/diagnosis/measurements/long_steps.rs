@@ -23,6 +23,8 @@ const PARTS: [usize; 3] = [1, 8, 64];
 /// Part of the error of the whole that so many parts may leave.
 const LEFT_OF_FEW: f64 = 0.25;
 const LEFT: f64 = 0.01;
+/// Part of the error of few parts that many may leave, where few are no better than the whole.
+const LEFT_OF_MANY: f64 = 1e-3;
 /// What twice as many leave at least of an error that is a power of their length, of any order up to 26.
 const POWER: f64 = 1e-8;
 /// Part of the error by which answers at two tolerances may differ that are one.
@@ -60,7 +62,8 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
             steep.into_iter().flat_map(|parts| [1, 2, 4, 8].map(|by| by * parts)).map_while(error).collect();
         // A step so long that it explodes leaves nothing right.
         vanishing += usize::from(doubled.windows(2).any(|pair| pair[0] < EXPLODED && pair[1] <= POWER * pair[0]));
-        if few <= LEFT_OF_FEW * whole {
+        // Few parts may be as wrong as the whole, by chance.
+        if few <= LEFT_OF_FEW * whole || many <= LEFT_OF_MANY * few {
             falling += 1;
             unmoved += usize::from(is_unmoved(asking, &question.problem));
         }

@@ -7,24 +7,28 @@
 use std::fmt::{self, Display, Formatter};
 
 use super::super::causes::{Cause, Certainty};
-use super::super::questions::{Content, Question};
+use super::super::questions::{Content, Question, questions};
 use super::super::{Asking, Diagnosis, QUANTITIES, TOLERANCES, end_of, request};
-use crate::exchange::peers::PeerAnswer;
 use crate::exchange::peers::wire::{conditioning, errors};
+use crate::exchange::peers::{PeerAnswer, PeerRequest};
 use crate::integrators::{Detail, Integrator, Taylor};
-use crate::physics::{EventKind, Outcome, Problem, Stage, State};
+use crate::physics::{Concrete, CraterStiffness, Criterion, EventKind, Outcome, Problem, Scene, Stage, State};
 use crate::studies::verdict::Verdict;
 
-/// Relative errors over the condition from which a passage is wrong, and up to which it is right.
-const WRONG: f64 = 1e-7;
-const RIGHT: f64 = 3e-9;
+/// Relative errors over the condition up to which a passage is right, and from which it is wrong: of a solver that takes a tolerance,
+/// and of one of fixed steps.
+const RIGHT_AND_WRONG: [[f64; 2]; 2] = [[3e-9, 1e-7], [5e-3, 0.03]];
 /// Condition above which a passage tells nothing, and the least part of depth and time that one must take.
 const CONDITION_MAX: f64 = 1e3;
 const LEAST_PART: f64 = 1e-5;
-/// Wrong passages, and right ones elsewhere, that a condition needs.
+/// Wrong passages, and right ones elsewhere, that a condition needs, and how often more questions are asked for them.
 const ENOUGH: usize = 8;
-/// Part of the passages under a condition that must be wrong, and of their factors that must be one.
+const MORE: u64 = 4;
+const MORE_FROM: u64 = 1_000_003;
+/// Part of the passages under a condition that must be wrong, for it to be what is wrong and for it to be where; and of factors that
+/// must be one.
 const MOST: f64 = 0.8;
+const SOME: f64 = 0.25;
 /// What a condition costs, without a number and with one, in parts of all right passages that it holds for.
 const PRICE: f64 = 0.01;
 const PRICE_OF_NUMBER: f64 = 0.04;
@@ -41,8 +45,8 @@ enum Way {
 }
 
 /// The flight through one stage, from a state that a solver lists.
-struct Passage {
-    question: usize,
+struct Passage<'a> {
+    question: &'a Question,
     index: usize,
     mass: f64,
     law: Stage,
@@ -56,15 +60,28 @@ struct Passage {
     ratios: [f64; 3],
 }
 
-impl Passage {
+impl Passage<'_> {
     fn is_wrong(&self) -> bool {
         self.wrong.contains(&true)
     }
 
     /// Which of its terms the force has.
     fn terms(&self) -> [bool; 4] {
-        let Stage { static_force, stiffness, viscosity, drag, .. } = self.law;
-        [static_force, stiffness, viscosity, drag].map(|coefficient| coefficient != 0.0)
+        terms(&self.law)
+    }
+
+    /// Those of the stage before.
+    fn terms_before(&self) -> Option<[bool; 4]> {
+        Some(terms(self.question.problem.stages.get(self.index.checked_sub(1)?)?))
+    }
+
+    fn concrete(&self) -> Option<&Concrete> {
+        self.question.scene.as_ref()?.concrete()
+    }
+
+    /// A number of its concrete.
+    fn of_concrete(&self, of: impl Fn(&Concrete) -> f64) -> f64 {
+        self.concrete().map_or(f64::NAN, of)
     }
 
     fn distance(&self) -> f64 {
@@ -77,21 +94,30 @@ impl Passage {
     }
 }
 
+fn terms(law: &Stage) -> [bool; 4] {
+    [law.static_force, law.stiffness, law.viscosity, law.drag].map(|coefficient| coefficient != 0.0)
+}
+
 const TERMS: [&str; 4] = ["a static force", "a spring", "viscosity", "drag"];
 
 /// A number of a passage: what it is, its unit, and itself.
-type Number = (&'static str, &'static str, fn(&Passage) -> f64);
+type Number = (&'static str, &'static str, fn(&Passage<'_>) -> f64);
 
-static NUMBERS: [Number; 15] = [
+static NUMBERS: [Number; 27] = [
     ("the smaller force at its ends", " N", |at| at.forces()[0].min(at.forces()[1])),
     ("the greater force at its ends", " N", |at| at.forces()[0].max(at.forces()[1])),
     ("V at its start", " m/s", |at| at.from.velocity),
     ("V at its end", " m/s", |at| at.end.velocity),
-    ("its distance", " m", Passage::distance),
+    ("V at its end over that at its start", "", |at| at.end.velocity / at.from.velocity),
+    ("its distance", " m", |at| at.distance()),
     ("its time", " s", |at| at.end.time),
     ("the depth at its start", " m", |at| at.from.depth),
     ("the depth at its end", " m", |at| at.end.depth),
     ("the mass", " kg", |at| at.mass),
+    ("the size of p", " N", |at| at.law.static_force.abs()),
+    ("the size of s", " N/m", |at| at.law.stiffness.abs()),
+    ("r", " kg/s", |at| at.law.viscosity),
+    ("q", " kg/m", |at| at.law.drag),
     ("q V²/p at its start", "", |at| at.law.drag * at.from.velocity.powi(2) / at.law.static_force.abs()),
     ("q L/M", "", |at| at.law.drag * at.distance() / at.mass),
     ("r L/(M V) at its start", "", |at| at.law.viscosity * at.distance() / (at.mass * at.from.velocity)),
@@ -100,6 +126,27 @@ static NUMBERS: [Number; 15] = [
     }),
     ("r²/(4 s M)", "", |at| at.law.viscosity.powi(2) / (4.0 * at.law.stiffness.abs() * at.mass)),
     ("its share of the time so far", "", |at| at.end.time / (at.from.time + at.end.time)),
+    ("the diameter", " m", |at| at.of_concrete(|concrete| concrete.diameter)),
+    ("the strength", " Pa", |at| at.of_concrete(|concrete| concrete.strength)),
+    ("the density", " kg/m³", |at| at.of_concrete(|concrete| concrete.density)),
+    ("the nose factor", "", |at| at.of_concrete(|concrete| concrete.nose_factor)),
+    ("S", "", |at| at.of_concrete(|concrete| concrete.static_factor)),
+    ("k", "", |at| at.of_concrete(|concrete| concrete.crater_ratio)),
+    ("H/d", "", |at| {
+        let thickness = at.question.scene.as_ref().and_then(|scene| scene.thickness);
+        at.of_concrete(|concrete| thickness.unwrap_or(f64::NAN) / concrete.diameter)
+    }),
+];
+
+/// What a physical scene states, or not: in words, and itself.
+type Statement = ([&'static str; 2], fn(&Scene, &Concrete) -> bool);
+
+static STATEMENTS: [Statement; 3] = [
+    (["the criterion is `ndrc`", "the exit is the far side"], |scene, _| scene.criterion == Criterion::Ndrc),
+    (["S follows from the strength", "S is stated"], |_, concrete| concrete.follows_eq14),
+    (["c follows from the other numbers", "c is stated"], |_, concrete| {
+        concrete.crater_stiffness == CraterStiffness::Continuous
+    }),
 ];
 
 /// What a passage may have.
@@ -109,6 +156,10 @@ enum Condition {
     Term(usize, bool),
     /// These terms and no other.
     Alone([bool; 4]),
+    /// A term of the stage before, or not.
+    TermBefore(usize, bool),
+    /// What the scene states, or not.
+    States(&'static Statement, bool),
     Ends(Way),
     /// It ends at its end, or at the exit.
     Left,
@@ -119,10 +170,15 @@ enum Condition {
 }
 
 impl Condition {
-    fn holds(&self, passage: &Passage) -> bool {
+    fn holds(&self, passage: &Passage<'_>) -> bool {
         match *self {
             Self::Term(term, has) => passage.terms()[term] == has,
             Self::Alone(terms) => passage.terms() == terms,
+            Self::TermBefore(term, has) => passage.terms_before().is_some_and(|terms| terms[term] == has),
+            Self::States((_, holds), has) => {
+                let scene = passage.question.scene.as_ref().zip(passage.concrete());
+                scene.is_some_and(|(scene, concrete)| holds(scene, concrete) == has)
+            }
             Self::Ends(way) => passage.way == way,
             Self::Left => passage.way != Way::Rest,
             Self::First(is_first) => (passage.index == 0) == is_first,
@@ -148,13 +204,16 @@ impl Condition {
     fn plain() -> impl Iterator<Item = Self> {
         let both = [true, false];
         let terms = (0..TERMS.len()).flat_map(move |term| both.map(|has| Self::Term(term, has)));
+        let before = (0..TERMS.len()).flat_map(move |term| both.map(|has| Self::TermBefore(term, has)));
+        let stated = STATEMENTS.iter().flat_map(move |of| both.map(|has| Self::States(of, has)));
         let ways = [Way::Through, Way::Exit, Way::Rest].map(Self::Ends);
         let alone = (0..16_u8).map(|bits| Self::Alone([1, 2, 4, 8].map(|bit| bits & bit > 0)));
-        terms.chain(ways).chain([Self::Left]).chain(both.map(Self::First)).chain(alone)
+        let plain = terms.chain(ways).chain([Self::Left]).chain(both.map(Self::First));
+        plain.chain(alone).chain(before).chain(stated)
     }
 
     /// All with a number that hold for all of `wrong` and for the fewest of `right`.
-    fn of_numbers(wrong: &[&Passage], right: &[&Passage]) -> Vec<Self> {
+    fn of_numbers(wrong: &[&Passage<'_>], right: &[&Passage<'_>]) -> Vec<Self> {
         let mut found = Vec::new();
         for number in &NUMBERS {
             let of = number.2;
@@ -191,6 +250,10 @@ impl Display for Condition {
                 let named: Vec<&str> = TERMS.into_iter().zip(terms).filter(|(_, has)| *has).map(|(of, _)| of).collect();
                 write!(f, "it has {} alone", named.join(" and "))
             }
+            Self::TermBefore(term, true) => write!(f, "the stage before has {}", TERMS[term]),
+            Self::TermBefore(term, false) => write!(f, "the stage before is without {}", TERMS[term]),
+            Self::States(([holds, _], _), true) => f.write_str(holds),
+            Self::States(([_, not], _), false) => f.write_str(not),
             Self::Ends(Way::Through) => write!(f, "it is passed to its end"),
             Self::Ends(Way::Exit) => write!(f, "it ends at the exit"),
             Self::Ends(Way::Rest) => write!(f, "the flight comes to rest in it"),
@@ -216,20 +279,38 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     };
     let mut passages = Vec::new();
     let mut failing = Vec::new();
-    for (index, row) in found.questions.iter().enumerate() {
+    let bounds = RIGHT_AND_WRONG[usize::from(found.peer.fixed_step)];
+    for row in &found.questions {
         let Some(question) = all.iter().find(|question| question.id == row.id) else { continue };
         if row.answered.is_none() || !is_open(question) || asking.is_gone {
             continue;
         }
         if row.verdict == Verdict::Failed {
-            failing.push(index);
+            failing.push(question);
+        }
+        let asked = PeerRequest { dt_s: row.dt_s, ..request(question, TOLERANCES[TOLERANCES.len() - 1]) };
+        let Ok(answer) = asking.ask(&asked) else { continue };
+        passages.extend(passages_of(question, &answer, bounds));
+    }
+    let count = |passages: &[Passage<'_>]| passages.iter().filter(|passage| passage.is_wrong()).count();
+    let more: Vec<Vec<Question>> = if found.peer.fixed_step || count(&passages) >= ENOUGH {
+        Vec::new()
+    } else {
+        (0..MORE).map(|seed| questions(MORE_FROM + seed, found.counts.asked, asking.reads_scene)).collect()
+    };
+    for question in more.iter().flatten().filter(|question| is_open(question)) {
+        if asking.is_gone || count(&passages) >= ENOUGH {
+            break;
         }
         let Ok(answer) = asking.ask(&request(question, TOLERANCES[TOLERANCES.len() - 1])) else { continue };
-        passages.extend(passages_of(index, &question.problem, &answer));
+        passages.extend(passages_of(question, &answer, bounds));
     }
-    let (wrong, right): (Vec<&Passage>, Vec<&Passage>) = passages.iter().partition(|passage| passage.is_wrong());
-    let conditions = simplest(&wrong, &right)?;
-    let of_condition = |passages: &[&Passage]| {
+    let (wrong, right): (Vec<&Passage<'_>>, Vec<&Passage<'_>>) =
+        passages.iter().partition(|passage| passage.is_wrong());
+    let (conditions, is_what) = simplest(&wrong, &right, MOST)
+        .map(|conditions| (conditions, true))
+        .or_else(|| Some((simplest(&wrong, &right, SOME)?, false)))?;
+    let of_condition = |passages: &[&Passage<'_>]| {
         passages.iter().filter(|passage| conditions.iter().all(|condition| condition.holds(passage))).count()
     };
     let (inside, elsewhere) = (wrong.len() + of_condition(&right), right.len() - of_condition(&right));
@@ -245,15 +326,25 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let times = factor.map_or_else(String::new, |factor| format!(", {factor:.6} times the right one,"));
     let said: Vec<String> = conditions.iter().map(ToString::to_string).collect();
     let statement = format!(
-        "the flight through a stage, from the state listed at its start, has a wrong {what}{times} where {}: {} of {inside} such \
+        "the flight through a stage, from the state listed at its start, has a wrong {what}{times} {} {}: {} of {inside} such \
          passages, and none of the {elsewhere} others",
+        if is_what { "where" } else { "in part of those where" },
         said.join(" and "),
         wrong.len()
     );
-    let explained = failing.iter().filter(|index| wrong.iter().any(|passage| passage.question == **index)).count();
-    let certainty = if 10 * explained >= 9 * failing.len() { Certainty::Likely } else { Certainty::Possible };
+    let explained = failing
+        .iter()
+        .filter(|question| wrong.iter().any(|passage| std::ptr::eq(passage.question, **question)))
+        .count();
+    // Of no kind of stage, and whatever the number: where steps end elsewhere, they are right.
+    let located =
+        if let [Condition::Left] = conditions[..] { ": its end is not located as accurately as rest is" } else { "" };
+    let statement = statement + located;
+    let certainty =
+        if is_what && 10 * explained >= 9 * failing.len() { Certainty::Likely } else { Certainty::Possible };
     let cause = Cause::plain("stage-wrong", statement, certainty, explained, found.counts.failed);
-    let is_of_kinds = !conditions.iter().any(Condition::has_number) && !conditions.iter().all(Condition::is_of_an_end);
+    let is_of_kinds =
+        is_what && !conditions.iter().any(Condition::has_number) && !conditions.iter().all(Condition::is_of_an_end);
     Some((Cause { factor, ..cause }, is_of_kinds))
 }
 
@@ -267,8 +358,9 @@ fn one_factor(ratios: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The passages of an `answer` to `problem` of which it is plain whether they are right.
-fn passages_of(question: usize, problem: &Problem, answer: &PeerAnswer) -> Vec<Passage> {
+fn passages_of<'a>(question: &'a Question, answer: &PeerAnswer, bounds: [f64; 2]) -> Vec<Passage<'a>> {
     let mut passages = Vec::new();
+    let problem = &question.problem;
     let last = end_of(answer).state;
     let mut from = State { time: 0.0, depth: 0.0, velocity: problem.impact_speed };
     for (index, law) in problem.stages.iter().enumerate() {
@@ -281,7 +373,7 @@ fn passages_of(question: usize, problem: &Problem, answer: &PeerAnswer) -> Vec<P
             break;
         }
         let found = listed.unwrap_or(last);
-        passages.extend(judged(question, index, problem, [from, found], boundary));
+        passages.extend(judged(question, index, [from, found], boundary, bounds));
         if listed.is_none() {
             break;
         }
@@ -292,12 +384,13 @@ fn passages_of(question: usize, problem: &Problem, answer: &PeerAnswer) -> Vec<P
 
 /// The passage through stage `index` of `problem` from one state to another; `None` where it is not plain whether it is right.
 fn judged(
-    question: usize,
+    question: &Question,
     index: usize,
-    problem: &Problem,
     [from, found]: [State; 2],
     boundary: f64,
-) -> Option<Passage> {
+    [right, wrong]: [f64; 2],
+) -> Option<Passage<'_>> {
+    let problem = &question.problem;
     let law = problem.stages[index];
     let shifted = Stage { static_force: law.static_force + law.stiffness * from.depth, end: f64::INFINITY, ..law };
     let alone = Problem::of_stages(problem.mass, from.velocity, [shifted]);
@@ -319,33 +412,34 @@ fn judged(
     let passed = State { time: found.time - from.time, depth: found.depth - from.depth, velocity: found.velocity };
     let off = errors(passed, exact.end, from.velocity);
     let over: [f64; 3] = std::array::from_fn(|which| off[which].abs() / conditions[which]);
-    if over.iter().any(|over| *over > RIGHT && !(*over > WRONG)) {
+    if over.iter().any(|over| *over > right && !(*over > wrong)) {
         return None;
     }
     let end = State { depth: from.depth + exact.end.depth, ..exact.end };
-    let wrong = over.map(|over| !(over <= RIGHT));
+    let wrong = over.map(|over| !(over <= right));
     let of = |state: State| [state.depth, state.time, state.velocity];
     let ratios = std::array::from_fn(|which| of(passed)[which] / of(exact.end)[which]);
     Some(Passage { question, index, mass: problem.mass, law, from, end, way, wrong, ratios })
 }
 
-/// The conditions that hold for all of `wrong` and cost least.
-fn simplest(wrong: &[&Passage], right: &[&Passage]) -> Option<Vec<Condition>> {
+/// The conditions that hold for all of `wrong` and cost least, where this `part` of the passages that they hold for is wrong.
+fn simplest(wrong: &[&Passage<'_>], right: &[&Passage<'_>], part: f64) -> Option<Vec<Condition>> {
     if wrong.len() < ENOUGH || right.len() < ENOUGH {
         return None;
     }
     let of_all = |condition: &Condition| wrong.iter().all(|passage| condition.holds(passage));
     let plain: Vec<Condition> = Condition::plain().filter(of_all).collect();
+    let alone = plain.iter().map(|one| vec![*one]);
+    let pairs = (0..plain.len()).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| vec![plain[j], plain[i]]);
     let mut best: Option<(f64, Vec<Condition>)> = None;
-    let firsts = std::iter::once(None).chain(plain.iter().copied().map(Some));
-    for first in firsts {
-        let inside: Vec<&Passage> =
-            right.iter().copied().filter(|passage| first.is_none_or(|first| first.holds(passage))).collect();
-        let seconds = plain.iter().copied().chain(Condition::of_numbers(wrong, &inside)).map(Some);
-        for second in std::iter::once(None).chain(seconds) {
-            let left = inside.iter().filter(|passage| second.is_none_or(|second| second.holds(passage))).count();
-            let conditions: Vec<Condition> = first.into_iter().chain(second).collect();
-            let is_shown = wrong.len() as f64 >= MOST * (wrong.len() + left) as f64 && right.len() - left >= ENOUGH;
+    for kinds in std::iter::once(Vec::new()).chain(alone).chain(pairs) {
+        let inside: Vec<&Passage<'_>> =
+            right.iter().copied().filter(|passage| kinds.iter().all(|kind| kind.holds(passage))).collect();
+        let numbers = Condition::of_numbers(wrong, &inside).into_iter().map(Some);
+        for number in std::iter::once(None).chain(numbers) {
+            let left = inside.iter().filter(|passage| number.is_none_or(|number| number.holds(passage))).count();
+            let conditions: Vec<Condition> = kinds.iter().copied().chain(number).collect();
+            let is_shown = wrong.len() as f64 >= part * (wrong.len() + left) as f64 && right.len() - left >= ENOUGH;
             let price: f64 = conditions.iter().map(Condition::price).sum();
             let cost = left as f64 + price * right.len() as f64;
             if is_shown && best.as_ref().is_none_or(|(least, _)| cost < *least) {

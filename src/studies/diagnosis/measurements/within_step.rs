@@ -3,6 +3,7 @@
 //!
 //! A cubic by values and slopes at both ends of a step, with a slope that is off by d, is off by `h d u (1 - u)²` at the part `u`
 //! of the step if it is the slope at its start, and by `h d u² (1 - u)` if it is that at its end: most at a third, or at two thirds.
+//! A step that is shortened to land on an exit, by a scheme of a lower order, is off by ever more up to the whole step.
 
 use super::super::causes::{Cause, Certainty};
 use super::super::{ALLOWED, Asking, QUANTITIES, TOLERANCES};
@@ -23,6 +24,10 @@ const STEPS_PART: f64 = 0.75;
 const LEAST: usize = 5;
 /// Part of a step by which the place of the largest error differs from its middle where a slope is wrong.
 const OFF_MIDDLE: f64 = 0.09;
+/// Part of a step behind which the error is largest where it is that of a shortened step.
+const ALMOST_WHOLE: f64 = 0.9;
+/// Fixed step (s): some ten of them pass all exits.
+const STEP: f64 = 1.7e-3;
 
 /// The error of one quantity within a step: its bounds in the row of exits.
 struct Lobe {
@@ -59,12 +64,15 @@ fn lobes(errors: &[f64]) -> Vec<Lobe> {
     lowest.windows(2).map(|pair| Lobe { from: pair[0], to: pair[1] }).collect()
 }
 
-/// Whether ends are interpolated less accurately than steps are taken.
-pub(super) fn measured(asking: &mut Asking<'_>) -> Option<Cause> {
-    TOLERANCES[..2].iter().find_map(|rtol| at_tolerance(asking, *rtol))
+/// Whether ends are taken less accurately than steps are.
+pub(super) fn measured(asking: &mut Asking<'_>, is_fixed: bool) -> Option<Cause> {
+    if is_fixed {
+        return at_setting(asking, TOLERANCES[0], Some(STEP));
+    }
+    TOLERANCES[..2].iter().find_map(|rtol| at_setting(asking, *rtol, None))
 }
 
-fn at_tolerance(asking: &mut Asking<'_>, rtol: f64) -> Option<Cause> {
+fn at_setting(asking: &mut Asking<'_>, rtol: f64, dt_s: Option<f64>) -> Option<Cause> {
     let of_depth = |depth| Problem::of_stages(1.0, 100.0, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
     // One absolute tolerance, or else each flight has steps of its own.
     let atol = PeerRequest::from_problem(&of_depth(1.0), rtol).atol;
@@ -73,7 +81,7 @@ fn at_tolerance(asking: &mut Asking<'_>, rtol: f64) -> Option<Cause> {
     for index in 0..EXITS {
         let [first, last] = DEPTHS;
         let problem = of_depth(first + (last - first) * index as f64 / (EXITS - 1) as f64);
-        let request = PeerRequest { atol, ..PeerRequest::from_problem(&problem, rtol) };
+        let request = PeerRequest { atol, dt_s, ..PeerRequest::from_problem(&problem, rtol) };
         let [found, exact] = ends(asking, &problem, &request)?;
         times.push(exact.time);
         let errors = errors(found, exact, problem.impact_speed);
@@ -91,7 +99,7 @@ fn at_tolerance(asking: &mut Asking<'_>, rtol: f64) -> Option<Cause> {
         let (late, early) = (all_of(1.0), all_of(-1.0));
         let seen = if late.len() > early.len() { late } else { early };
         let is_shown = seen.len() >= STEPS && seen.len() as f64 >= STEPS_PART * all.len() as f64;
-        if !is_shown || largest <= 0.01 * ALLOWED * rtol {
+        if !is_shown || dt_s.is_none() && largest <= 0.01 * ALLOWED * rtol {
             return None;
         }
         let place = |lobe: &&Lobe| {
@@ -101,14 +109,22 @@ fn at_tolerance(asking: &mut Asking<'_>, rtol: f64) -> Option<Cause> {
         let mut places: Vec<f64> = seen.iter().map(place).collect();
         places.sort_by(f64::total_cmp);
         let middle = places[places.len() / 2];
-        let slope = match () {
-            () if middle < 0.5 - OFF_MIDDLE => ", most in the first half of the step, as with a wrong slope at its start",
-            () if middle > 0.5 + OFF_MIDDLE => ", most in the second half of the step, as with a wrong slope at its end",
-            () => "",
+        let setting = dt_s.map_or_else(|| format!("a tolerance of {rtol:.0e}"), |step| format!("steps of {step:.1e} s"));
+        let interpolated = "events are interpolated, less accurately than steps are taken";
+        let (place, why) = match middle {
+            ALMOST_WHOLE.. => {
+                (", most of all in front of those", "the step that is shortened to land on an end is of a lower order than the others, or the interpolant of a step does not end where the step does")
+            }
+            _ if middle < 0.5 - OFF_MIDDLE => {
+                (", most in the first half of the step, as with a wrong slope at its start", interpolated)
+            }
+            _ if middle > 0.5 + OFF_MIDDLE => {
+                (", most in the second half of the step, as with a wrong slope at its end", interpolated)
+            }
+            _ => ("", interpolated),
         };
         let statement = format!(
-            "the {} at an exit is right at the ends of steps and off by up to {largest:.0e} between them at a tolerance of \
-             {rtol:.0e}{slope}: events are interpolated, less accurately than steps are taken",
+            "the {} at an exit is right at the ends of steps and off by up to {largest:.0e} between them at {setting}{place}: {why}",
             QUANTITIES[which]
         );
         Some(Cause::plain("event-interpolated", statement, Certainty::Likely, EXITS, EXITS))
