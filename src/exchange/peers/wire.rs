@@ -242,10 +242,21 @@ impl PeerAnswer {
             };
             // An event that the reference lacks is none, unless it is where the reference ends.
             let theirs = reference.at(*kind).unwrap_or(reference.end);
-            differences.extend(compare(&prefix, *state, theirs, problem));
+            // Of what happens at impact nothing is relative: a little over the flight is little.
+            let ours = if theirs.time == 0.0 && theirs.depth == 0.0 && is_little(*state, reference.end) {
+                State { velocity: state.velocity, ..theirs }
+            } else {
+                *state
+            };
+            differences.extend(compare(&prefix, ours, theirs, problem));
         }
         Some(differences)
     }
+}
+
+/// Whether a state lies within roundings of a flight behind its impact.
+fn is_little(state: State, end: State) -> bool {
+    state.depth.abs() <= f64::EPSILON * end.depth && state.time.abs() <= f64::EPSILON * end.time
 }
 
 /// Depth, time and velocity of two states, each with its conditioning.
@@ -320,6 +331,25 @@ mod tests {
         let text =
             format!(r#"{{"outcome": "{outcome}", {depth}, {time}, "velocity_m_s": {velocity}, "events": {events}}}"#);
         serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn an_event_at_impact_may_lie_within_roundings_of_the_flight_behind_it() {
+        use crate::integrators::{Detail, Integrator, Taylor};
+        let stages = [Stage::tunnel(1e4, 0.0).until(0.0), Stage::tunnel(8e5, 3.25)];
+        let problem = Problem::of_stages(2.0, 300.0, stages);
+        let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+        let largest = |time: &str| {
+            let listed = format!(
+                r#"[{{"event": "stage-end", "stage": 0, "depth_m": 0.0, "time_s": {time}, "velocity_m_s": 300.0}}]"#
+            );
+            let end = answer(Outcome::Stopped, 0.0, &listed);
+            let answer = PeerAnswer { depth_m: flight.end.depth, time_s: flight.end.time, ..end };
+            let all = answer.differences_from(&flight, &problem).unwrap();
+            all.iter().fold(0.0, |largest, difference| f64::max(largest, difference.relative))
+        };
+        assert_eq!(largest("3e-43"), 0.0);
+        assert_eq!(largest("1e-9"), f64::INFINITY);
     }
 
     #[test]
