@@ -60,10 +60,8 @@ pub enum Fall {
 impl Fall {
     /// `V/V0` at `s`.
     pub fn left<S: Scalar>(self, s: S) -> S {
-        match self {
-            Self::Power(m) => (1..=m).fold(S::one(), |left, _| left * (S::one() - s)),
-            Self::Exponential => (-s).exp(),
-        }
+        let [left] = self.left_along(&[s]);
+        left
     }
 
     /// `V/V0` at N places, side by side.
@@ -76,7 +74,7 @@ impl Fall {
                     left.iter_mut().zip(s).for_each(|(left, s)| *left = *left * (S::one() - *s));
                 }
             }
-            Self::Exponential => left.iter_mut().zip(s).for_each(|(left, s)| *left = self.left(*s)),
+            Self::Exponential => left.iter_mut().zip(s).for_each(|(left, s)| *left = (-*s).exp()),
         }
         left
     }

@@ -10,6 +10,7 @@
 //! - The first step of a scheme that takes a tolerance (`first_step`), and exits over many of its steps (`within_step`).
 //! - One flight in ever shorter times, and at ever tighter tolerances: a step or a tolerance that is never undercut (`bounds`).
 //! - Failing flights in ever shorter parts (`long_steps`).
+//! - What the answers that came show of clocks, of rates that have one factor, and of ends that are those of a moment beside them.
 //! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`).
 //! - Each stage by itself, from the state that the solver lists at its start (`stage_by_stage`).
 
@@ -112,12 +113,16 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
     if let Some((cause, is_of_kinds)) = by_stages {
         found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
         let is_of_every_kind = |known: &Cause| OF_EVERY_KIND.iter().chain(&SYMPTOMS).any(|id| *id == known.id);
-        let goes_behind = |known: &Cause| known.certainty > cause.certainty || is_of_kinds && is_of_every_kind(known);
+        let says_more = is_of_kinds || found.peer.fixed_step && cause.certainty == Certainty::Likely;
         // One that explains half as many, or fewer, says less.
-        let explains_few = |known: &Cause| cause.certainty == Certainty::Likely && 2 * known.explains <= cause.explains;
-        let is_of_limits = found.peer.fixed_step && cause.certainty != Certainty::Possible;
-        let goes_behind =
-            |known: &Cause| goes_behind(known) || is_of_limits && is_of_every_kind(known) || explains_few(known);
+        let explains_few = |known: &Cause| {
+            known.certainty == cause.certainty
+                && cause.certainty == Certainty::Likely
+                && 2 * known.explains <= cause.explains
+        };
+        let goes_behind = |known: &Cause| {
+            known.certainty > cause.certainty || says_more && is_of_every_kind(known) || explains_few(known)
+        };
         let place = usize::from(found.causes.first().is_some_and(|known| !goes_behind(known)));
         found.causes.insert(place, cause);
     }

@@ -176,6 +176,26 @@ fn a_small_fault_in_few_answers_is_not_taken_for_inaccuracy() {
     assert!(!found.causes[0].id.starts_with("tolerance"), "{:?}", found.causes);
 }
 
+/// A rest is found before the exit in the step that holds both: an exit at little speed is missed, at another one in each flight.
+#[test]
+fn a_threshold_that_fits_by_chance_is_never_certain() {
+    for seed in 1..=8 {
+        let hasty = Answering::plain(|request| {
+            let problem = request.problem(None);
+            let flight = exact(&problem)?;
+            let endless = exact(&Problem { exit_depth: f64::INFINITY, ..problem.clone() });
+            let rest = endless.filter(|rest| rest.end.time < 1.05 * flight.end.time);
+            Some(match rest {
+                Some(rest) if flight.end.velocity > 0.0 => answer(Outcome::Stopped, rest.end),
+                _ => answer(flight.outcome, flight.end),
+            })
+        });
+        let found = diagnosed(hasty, Plan { seed, ..Plan::default() });
+        let is_certain = found.causes.iter().any(|cause| cause.certainty == Certainty::Certain);
+        assert!(found.verdict == Verdict::Failed && !is_certain, "{seed}: {:?}", found.causes);
+    }
+}
+
 #[test]
 fn what_is_wrong_in_part_of_the_stages_of_a_kind_is_told_as_possible() {
     let in_part = by_stages(|Staged { alone, .. }, end| {

@@ -1593,6 +1593,32 @@ const TOLD: &[Told] = &[
         says: "failed | stage-wrong, likely, 1.010000: the flight through a stage, from the state listed at its start, has a wrong time alone, 1.010000 times the right one, where it is without a static force and the criterion is `ndrc`: 30 of 30 such passages, and none of the 213 others",
     },
     Told {
+        what: "times are wrong in some of the stages with drag",
+        solver: || {
+            by_stages(|&Staged { alone, .. }, end| {
+                if alone.stages[0].drag > 0.0 && (1e3 * alone.impact_speed).sin() > 0.0 {
+                    end.time *= 1.01;
+                }
+            })
+        },
+        asked: Questions(200),
+        says: "failed | event-time-late, likely: only the time is wrong, and late, as that of the end of a step, or of a clock that goes on by more than its steps",
+    },
+    Told {
+        what: "each whole step counts as a tenth more than it lasts",
+        solver: || {
+            by_request(
+                |_, _| (),
+                |request, problem, end| {
+                    let step = request.atol[0] / (request.rtol * problem.impact_speed) / 23.0;
+                    end.time += 0.1 * step * (end.time / step).floor();
+                },
+            )
+        },
+        asked: Questions(60),
+        says: "failed | clock, likely: the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than that of the step",
+    },
+    Told {
         what: "all rates lack nearly one part of them, at every tolerance",
         solver: || {
             altered(

@@ -366,6 +366,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Scene(|s, _| {
             let diameter = s.concrete().map(|c| c.diameter);
             if let Some((thickness, diameter)) = s.thickness.zip(diameter).filter(|_| s.criterion == Criterion::Ndrc) {
+                // Source: Kennedy (1976), the modified NDRC formula of scabbing.
                 let ratio = thickness / diameter;
                 let (a, b) = (7.91, 5.06);
                 let is_thin = ratio <= 0.65 * (a - 0.65 * b);

@@ -47,6 +47,8 @@ enum Way {
 /// The flight through one stage, from a state that a solver lists.
 struct Passage<'a> {
     question: &'a Question,
+    /// What a reader of scenes was asked.
+    scene: Option<&'a Scene>,
     index: usize,
     mass: f64,
     law: Stage,
@@ -76,7 +78,7 @@ impl Passage<'_> {
     }
 
     fn concrete(&self) -> Option<&Concrete> {
-        self.question.scene.as_ref()?.concrete()
+        self.scene?.concrete()
     }
 
     /// A number of its concrete.
@@ -133,7 +135,7 @@ static NUMBERS: [Number; 27] = [
     ("S", "", |at| at.of_concrete(|concrete| concrete.static_factor)),
     ("k", "", |at| at.of_concrete(|concrete| concrete.crater_ratio)),
     ("H/d", "", |at| {
-        let thickness = at.question.scene.as_ref().and_then(|scene| scene.thickness);
+        let thickness = at.scene.and_then(|scene| scene.thickness);
         at.of_concrete(|concrete| thickness.unwrap_or(f64::NAN) / concrete.diameter)
     }),
 ];
@@ -176,7 +178,7 @@ impl Condition {
             Self::Alone(terms) => passage.terms() == terms,
             Self::TermBefore(term, has) => passage.terms_before().is_some_and(|terms| terms[term] == has),
             Self::States((_, holds), has) => {
-                let scene = passage.question.scene.as_ref().zip(passage.concrete());
+                let scene = passage.scene.zip(passage.concrete());
                 scene.is_some_and(|(scene, concrete)| holds(scene, concrete) == has)
             }
             Self::Ends(way) => passage.way == way,
@@ -290,7 +292,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         }
         let asked = PeerRequest { dt_s: row.dt_s, ..request(question, TOLERANCES[TOLERANCES.len() - 1]) };
         let Ok(answer) = asking.ask(&asked) else { continue };
-        passages.extend(passages_of(question, &answer, bounds));
+        passages.extend(passages_of(question, asking.reads_scene, &answer, bounds));
     }
     let count = |passages: &[Passage<'_>]| passages.iter().filter(|passage| passage.is_wrong()).count();
     let more: Vec<Vec<Question>> = if found.peer.fixed_step || count(&passages) >= ENOUGH {
@@ -303,13 +305,13 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
             break;
         }
         let Ok(answer) = asking.ask(&request(question, TOLERANCES[TOLERANCES.len() - 1])) else { continue };
-        passages.extend(passages_of(question, &answer, bounds));
+        passages.extend(passages_of(question, asking.reads_scene, &answer, bounds));
     }
     let (wrong, right): (Vec<&Passage<'_>>, Vec<&Passage<'_>>) =
         passages.iter().partition(|passage| passage.is_wrong());
-    let (conditions, is_what) = simplest(&wrong, &right, MOST)
-        .map(|conditions| (conditions, true))
-        .or_else(|| Some((simplest(&wrong, &right, SOME)?, false)))?;
+    let what_is_wrong = simplest(&wrong, &right, MOST);
+    let is_what = what_is_wrong.is_some();
+    let conditions = what_is_wrong.or_else(|| simplest(&wrong, &right, SOME))?;
     let of_condition = |passages: &[&Passage<'_>]| {
         passages.iter().filter(|passage| conditions.iter().all(|condition| condition.holds(passage))).count()
     };
@@ -358,9 +360,15 @@ fn one_factor(ratios: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The passages of an `answer` to `problem` of which it is plain whether they are right.
-fn passages_of<'a>(question: &'a Question, answer: &PeerAnswer, bounds: [f64; 2]) -> Vec<Passage<'a>> {
+fn passages_of<'a>(
+    question: &'a Question,
+    reads_scene: bool,
+    answer: &PeerAnswer,
+    bounds: [f64; 2],
+) -> Vec<Passage<'a>> {
     let mut passages = Vec::new();
     let problem = &question.problem;
+    let scene = question.scene.as_ref().filter(|_| reads_scene);
     let last = end_of(answer).state;
     let mut from = State { time: 0.0, depth: 0.0, velocity: problem.impact_speed };
     for (index, law) in problem.stages.iter().enumerate() {
@@ -373,7 +381,8 @@ fn passages_of<'a>(question: &'a Question, answer: &PeerAnswer, bounds: [f64; 2]
             break;
         }
         let found = listed.unwrap_or(last);
-        passages.extend(judged(question, index, [from, found], boundary, bounds));
+        let judged = judged(question, index, [from, found], boundary, bounds);
+        passages.extend(judged.map(|passage| Passage { scene, ..passage }));
         if listed.is_none() {
             break;
         }
@@ -419,7 +428,7 @@ fn judged(
     let wrong = over.map(|over| !(over <= right));
     let of = |state: State| [state.depth, state.time, state.velocity];
     let ratios = std::array::from_fn(|which| of(passed)[which] / of(exact.end)[which]);
-    Some(Passage { question, index, mass: problem.mass, law, from, end, way, wrong, ratios })
+    Some(Passage { question, scene: None, index, mass: problem.mass, law, from, end, way, wrong, ratios })
 }
 
 /// The conditions that hold for all of `wrong` and cost least, where this `part` of the passages that they hold for is wrong.
@@ -435,7 +444,9 @@ fn simplest(wrong: &[&Passage<'_>], right: &[&Passage<'_>], part: f64) -> Option
     for kinds in std::iter::once(Vec::new()).chain(alone).chain(pairs) {
         let inside: Vec<&Passage<'_>> =
             right.iter().copied().filter(|passage| kinds.iter().all(|kind| kind.holds(passage))).collect();
-        let numbers = Condition::of_numbers(wrong, &inside).into_iter().map(Some);
+        // A number is no place, where much of what lies on its side is right.
+        let numbers = if part < MOST { Vec::new() } else { Condition::of_numbers(wrong, &inside) };
+        let numbers = numbers.into_iter().map(Some);
         for number in std::iter::once(None).chain(numbers) {
             let left = inside.iter().filter(|passage| number.is_none_or(|number| number.holds(passage))).count();
             let conditions: Vec<Condition> = kinds.iter().copied().chain(number).collect();
