@@ -21,6 +21,7 @@ mod one_step;
 mod stage_by_stage;
 mod within_step;
 
+use self::stage_by_stage::ByStages;
 use super::causes::{Cause, Certainty};
 use super::fixed_steps::FEW;
 use super::questions::Question;
@@ -110,15 +111,15 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
         let place = usize::from(found.causes.first().is_some_and(stays));
         found.causes.insert(if cause.certainty == Certainty::Certain { 0 } else { place }, cause);
     }
-    if let Some((cause, is_of_kinds)) = by_stages {
+    if let Some(ByStages { cause, is_of_kinds, shown_by }) = by_stages {
         found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
         let is_of_every_kind = |known: &Cause| OF_EVERY_KIND.iter().chain(&SYMPTOMS).any(|id| *id == known.id);
         let says_more = is_of_kinds || found.peer.fixed_step && cause.certainty == Certainty::Likely;
-        // One that explains half as many, or fewer, says less.
+        // One that explains half as many questions, or fewer, says less, and so does one that fits a single answer.
         let explains_few = |known: &Cause| {
             known.certainty == cause.certainty
                 && cause.certainty == Certainty::Likely
-                && 2 * known.explains <= cause.explains
+                && (2 * known.explains <= cause.explains || known.explains == 1 && shown_by > 1)
         };
         let goes_behind = |known: &Cause| {
             known.certainty > cause.certainty || says_more && is_of_every_kind(known) || explains_few(known)

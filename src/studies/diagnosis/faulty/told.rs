@@ -1619,6 +1619,21 @@ const TOLD: &[Told] = &[
         says: "failed | clock, likely: the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than that of the step",
     },
     Told {
+        what: "V at the exit is a thousandth too small above a mass that few questions have",
+        solver: || {
+            altered(
+                |_| (),
+                |problem, end| {
+                    if problem.mass > 200.0 {
+                        end.velocity *= 0.999;
+                    }
+                },
+            )
+        },
+        asked: AtEdges(200),
+        says: "failed | stage-wrong, likely, 0.999000: the flight through a stage, from the state listed at its start, has a wrong velocity alone, 0.999000 times the right one, where it ends at the exit and the mass is above a number from 1.887e2 to 2.313e2 kg: 8 of 8 such passages, and none of the 523 others",
+    },
+    Told {
         what: "all rates lack nearly one part of them, at every tolerance",
         solver: || {
             altered(

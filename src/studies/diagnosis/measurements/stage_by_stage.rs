@@ -272,9 +272,17 @@ impl Display for Condition {
     }
 }
 
-/// What the wrong passages of failing flights have in common, and whether that is a kind of stage, not a number or the event at which
-/// the flight ends.
-pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<(Cause, bool)> {
+/// What wrong passages have in common.
+pub(super) struct ByStages {
+    pub cause: Cause,
+    /// Whether it is a kind of stage, not a number or the event at which the flight ends.
+    pub is_of_kinds: bool,
+    /// Questions that show it, those asked for it among them.
+    pub shown_by: usize,
+}
+
+/// What the wrong passages of failing flights have in common.
+pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option<ByStages> {
     let is_open = |question: &Question| {
         let never = [Content::NoSpeed, Content::Grazing, Content::Stiff];
         !never.iter().any(|content| question.contains.contains(content)) && !question.is_on_a_border()
@@ -347,7 +355,9 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let cause = Cause::plain("stage-wrong", statement, certainty, explained, found.counts.failed);
     let is_of_kinds =
         is_what && !conditions.iter().any(Condition::has_number) && !conditions.iter().all(Condition::is_of_an_end);
-    Some((Cause { factor, ..cause }, is_of_kinds))
+    // Passages of one question follow each other.
+    let shown_by = wrong.chunk_by(|one, next| std::ptr::eq(one.question, next.question)).count();
+    Some(ByStages { cause: Cause { factor, ..cause }, is_of_kinds, shown_by })
 }
 
 /// The factor that most of `ratios` are.
