@@ -223,6 +223,82 @@ impl<'a, S: Scalar> Course<'a, S> {
         }
     }
 
+    /// Begins the flight, behind the stages that end at impact.
+    #[inline(always)]
+    pub(crate) fn begin(&mut self, method: &mut impl StageSolver<S>) {
+        let problem = self.problem;
+        self.sample(self.state);
+        self.sample_until(self.state, |_| State::at_impact(problem));
+        self.pass_ends(|condition, at| method.meets(condition, at));
+    }
+
+    /// Enters the present stage, if there is one.
+    #[inline(always)]
+    pub(crate) fn enters_stage(&mut self) -> bool {
+        self.just_met = None;
+        self.stage < self.problem.stages.len()
+    }
+
+    /// The `end` that a method found; of an approach, that at the limit, if it may get there.
+    ///
+    /// # Errors
+    /// [`IntegrationError::NeverEnds`]: it does not.
+    #[inline(always)]
+    pub(crate) fn arrived(&mut self, end: StageEnd<S>) -> Solved<StageEnd<S>> {
+        match end {
+            StageEnd::Approach(state, why) => self.arrive_in_doubt(state, why).map(StageEnd::Limit),
+            end => Ok(end),
+        }
+    }
+
+    /// Leaves the present stage by the `end` that a method found, which is no approach, and says whether the flight ends there too.
+    #[inline(always)]
+    pub(crate) fn leaves_stage(&mut self, end: StageEnd<S>, method: &mut impl StageSolver<S>) -> bool {
+        let (problem, entered) = (self.problem, self.stage);
+        let rests = match end {
+            StageEnd::Limit(state) | StageEnd::Approach(state, _) => {
+                self.state = state;
+                false
+            }
+            StageEnd::Condition(state) => {
+                self.state = state;
+                self.just_met = Some(entered);
+                false
+            }
+            StageEnd::Rest(state) => {
+                let limit = problem.limit_of(entered);
+                let depth = if state.depth.value() > limit.value() { limit } else { state.depth };
+                self.state = State { depth, ..state };
+                true
+            }
+        };
+        self.sample_rest_of_stage();
+        if !rests {
+            self.pass_ends(|condition, at| method.meets(condition, at));
+            self.is_through = self.state.depth.value() >= problem.exit_depth.value();
+        } else if !problem.laws.is_empty() {
+            self.pass_if_met(|condition, at| method.meets(condition, at));
+        }
+        let is_over = self.is_through || self.state.velocity.value() <= 0.0;
+        if is_over {
+            self.stage = entered;
+            self.end();
+        }
+        is_over
+    }
+
+    /// The exit margin of a flight that has ended, unless it may have taken another way.
+    #[inline(always)]
+    pub(crate) fn unless_doubted(&mut self, margin: Option<Bounded>) -> Option<Bounded> {
+        if self.is_in_doubt { self.doubted(margin) } else { margin }
+    }
+
+    /// Why a flight ends whose last stage has ended.
+    #[cold]
+    pub(crate) fn nothing_follows(&self) -> IntegrationError {
+        IntegrationError::NeverEnds { why: "the last stage ends and nothing follows", last: self.state.values() }
+    }
+
     /// Adds a row to the trajectory, if one is wanted: `state`, in the present stage.
     #[inline(always)]
     pub(crate) fn sample(&mut self, state: State<S>) {
@@ -565,13 +641,19 @@ const TOUCHES: &str =
 /// `None` for every other problem. Methods ask this first, so that none has to treat a vanishing scale.
 #[inline(always)]
 pub(crate) fn at_once<S: Scalar>(problem: &Problem<S>, detail: Detail) -> Option<Flight<S>> {
-    let moves = problem.impact_speed.value() > 0.0;
-    let is_through = problem.exit_depth.value() <= 0.0;
-    if moves && !is_through { None } else { Some(never_starts(problem, detail, moves, is_through)) }
+    if starts(problem) { None } else { Some(never_starts(problem, detail)) }
+}
+
+/// Whether a flight starts at all.
+#[inline(always)]
+pub(crate) fn starts<S: Scalar>(problem: &Problem<S>) -> bool {
+    problem.impact_speed.value() > 0.0 && problem.exit_depth.value() > 0.0
 }
 
 #[cold]
-fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail, moves: bool, is_through: bool) -> Flight<S> {
+fn never_starts<S: Scalar>(problem: &Problem<S>, detail: Detail) -> Flight<S> {
+    let is_through = problem.exit_depth.value() <= 0.0;
+    let moves = problem.impact_speed.value() > 0.0;
     let mut course = Course::new(problem, if matches!(detail, Detail::Trajectory) { Detail::Events } else { detail });
     course.sample_until(course.state, |_| State::at_impact(problem));
     // Ends at the face itself (k d = 0 leaves no crater, but a user's stage may end at 0) are reached at once.
@@ -600,68 +682,46 @@ pub(crate) fn solve<S: Scalar>(
         return Ok(flight);
     }
     let mut course = Course::new(problem, detail);
-    course.sample(course.state);
-    course.sample_until(course.state, |_| State::at_impact(problem));
-    course.pass_ends(|condition, at| method.meets(condition, at));
+    course.begin(method);
     // Each round passes a stage, or ends the flight.
     for _ in 0..problem.stages.len() {
-        let entered = course.stage;
-        if entered >= problem.stages.len() {
+        if !course.enters_stage() {
             break;
         }
-        course.just_met = None;
-        // A table of velocity is solved piece by piece: V falls or rises from row to row, and passes none twice.
-        let mut pieces = 0;
-        let end = loop {
-            let was_in_doubt = course.is_in_doubt;
-            if !problem.laws.is_empty() {
-                course.enter_piece(pieces)?;
-            }
-            let end = method.solve_stage(&mut course)?;
-            if problem.laws.is_empty() || !course.goes_on_behind(&end, was_in_doubt) {
-                break end;
-            }
-            pieces += 1;
-        };
-        let rests = match end {
-            StageEnd::Limit(state) => {
-                course.state = state;
-                false
-            }
-            StageEnd::Condition(state) => {
-                course.state = state;
-                course.just_met = Some(entered);
-                false
-            }
-            StageEnd::Rest(state) => {
-                let limit = problem.limit_of(entered);
-                let depth = if state.depth.value() > limit.value() { limit } else { state.depth };
-                course.state = State { depth, ..state };
-                true
-            }
-            StageEnd::Approach(state, why) => {
-                course.state = course.arrive_in_doubt(state, why)?;
-                false
-            }
-        };
-        course.sample_rest_of_stage();
-        if !rests {
-            course.pass_ends(|condition, at| method.meets(condition, at));
-            course.is_through = course.state.depth.value() >= problem.exit_depth.value();
-        } else if !problem.laws.is_empty() {
-            course.pass_if_met(|condition, at| method.meets(condition, at));
-        }
-        if course.is_through || course.state.velocity.value() <= 0.0 {
-            course.stage = entered;
-            course.end();
+        let end = end_of_stage(&mut course, method)?;
+        if course.leaves_stage(end, method) {
             let margin = if problem.has_exit() { Some(method.margin(&mut course)?) } else { None };
             // Here, for a flight that is changed where it is finished would be copied.
-            let margin = if course.is_in_doubt { course.doubted(margin) } else { margin };
+            let margin = course.unless_doubted(margin);
             return Ok(course.finish(margin));
         }
     }
-    let last = course.state.values();
-    Err(IntegrationError::NeverEnds { why: "the last stage ends and nothing follows", last })
+    Err(course.nothing_follows())
+}
+
+/// How the present stage of `course` ends by `method`; an approach that may get to the limit does.
+///
+/// # Errors
+/// As [`StageSolver::solve_stage`].
+#[inline(always)]
+pub(crate) fn end_of_stage<S: Scalar>(
+    course: &mut Course<'_, S>,
+    method: &mut impl StageSolver<S>,
+) -> Solved<StageEnd<S>> {
+    let has_laws = !course.problem.laws.is_empty();
+    // A table of velocity is solved piece by piece: V falls or rises from row to row, and passes none twice.
+    let mut pieces = 0;
+    loop {
+        let was_in_doubt = course.is_in_doubt;
+        if has_laws {
+            course.enter_piece(pieces)?;
+        }
+        let end = method.solve_stage(course)?;
+        if !(has_laws && course.goes_on_behind(&end, was_in_doubt)) {
+            return course.arrived(end);
+        }
+        pieces += 1;
+    }
 }
 
 #[cfg(test)]

@@ -19,7 +19,8 @@
 //!
 //! **What is not proven is not answered.** An exit margin within ten error bounds of zero, a crater that all but stops the
 //! projectile at k d, numbers of extreme magnitude, stages other than one crater and one tunnel: all these go
-//! to the scalar [`Taylor`], whose answer is taken as it is.
+//! to the scalar [`Taylor`], whose answer is taken as it is. Laws of one's own that go by series do so side by side
+//! ([`side_by_side`]), with the same answer.
 //!
 //! **Bit by bit.** A result depends on nothing but its scene: not on the neighbours, on the number of lanes, or on the
 //! processor. Products and sums are never fused, divisions and roots are rounded correctly everywhere.
@@ -29,12 +30,13 @@
     clippy::out_of_bounds_indexing,
     clippy::needless_bitwise_bool,
     clippy::struct_field_names,
-    clippy::trivially_copy_pass_by_ref,
     reason = "one shape for every lane: unrolled coefficients behind a constant bound, and conditions without a branch"
 )]
 
 use std::f64::consts::FRAC_PI_2;
 
+use super::instructions::{Instructions, Work};
+use super::law_series::side_by_side;
 use super::outcome::{Cost, Detail, Flight, Integrator, Solved};
 use super::taylor::Taylor;
 use crate::physics::{Event, EventKind, Outcome, Problem, State, Target, exit_energy};
@@ -127,40 +129,6 @@ impl Summary {
     }
 }
 
-/// What the processor offers for a loop over lanes. Results are the same bits on each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Instructions {
-    /// What every processor of this architecture has.
-    Baseline,
-    /// 256-bit vectors (x86-64).
-    Avx2,
-    /// 512-bit vectors (x86-64).
-    Avx512,
-}
-
-impl Instructions {
-    /// Every kind, narrow to wide.
-    const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
-
-    /// The widest that this processor has.
-    fn detect() -> Self {
-        Self::ALL.into_iter().rev().find(|kind| kind.is_available()).unwrap_or(Self::Baseline)
-    }
-
-    /// Whether this processor has them.
-    fn is_available(self) -> bool {
-        match self {
-            Self::Baseline => true,
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2"),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq"),
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => false,
-        }
-    }
-}
-
 /// Solves many problems at once.
 ///
 /// # Example
@@ -201,45 +169,17 @@ impl Batch {
         let mut block = Block::default();
         for part in problems.chunks(BLOCK) {
             block.prepare(part);
-            self.run(&mut block);
+            self.instructions.run(&mut block);
+            let with_laws: Vec<&Problem> = part.iter().filter(|problem| side_by_side::serves(problem)).collect();
+            let mut with_laws = side_by_side::solve(&with_laws, self.instructions).into_iter();
             for (index, problem) in part.iter().enumerate() {
-                let alone = || Ok(Summary::from(&Taylor::default().solve(problem, Detail::Events)?));
-                answers.push(block.summary(index, problem).map_or_else(alone, Ok));
+                let together = if side_by_side::serves(problem) { with_laws.next() } else { None };
+                let alone = || together.unwrap_or_else(|| Taylor::default().solve(problem, Detail::Events));
+                answers.push(block.summary(index, problem).map_or_else(|| Ok(Summary::from(&alone()?)), Ok));
             }
         }
         answers
     }
-
-    fn run(&self, block: &mut Block) {
-        match self.instructions {
-            Instructions::Baseline => solve_block(block),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the one thing that a function with `target_feature` asks for is a processor that has its features.
-            // The field is private to this file, and here only `new` sets it, to what `detect` found: that asks the
-            // processor for every feature that the function names, and no processor loses one (the tests set it to what
-            // `is_available` allows, which asks the same). The argument is a reference and the
-            // function returns nothing, so no vector crosses a border between calling conventions. The function
-            // itself is safe code. CONTRIBUTING.md, "Tests", has the command that runs it under a sanitizer.
-            Instructions::Avx512 => unsafe { solve_block_avx512(block) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above, for `Instructions::Avx2`.
-            Instructions::Avx2 => unsafe { solve_block_avx2(block) },
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => solve_block(block),
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn solve_block_avx512(block: &mut Block) {
-    solve_block(block);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn solve_block_avx2(block: &mut Block) {
-    solve_block(block);
 }
 
 /// State of a scene. It is a number like the others, so lanes need no second type.
@@ -383,11 +323,13 @@ impl Block {
     }
 }
 
-/// Solves a prepared block: all craters, then all tunnels.
-#[inline(always)]
-fn solve_block(block: &mut Block) {
-    cross_craters(block);
-    cross_tunnels(block);
+impl Work for Block {
+    /// Solves a prepared block: all craters, then all tunnels.
+    #[inline(always)]
+    fn run(&mut self) {
+        cross_craters(self);
+        cross_tunnels(self);
+    }
 }
 
 /// A time near an event, and the law there: `g t - g2 t²/2 - g3 t³/6 - g4 t⁴/24 = distance`.

@@ -38,6 +38,8 @@
 //! **Events.** The first root of V on the step is isolated ([`locate::first_root`]). x grows until then, so that a boundary
 //! is passed before it exactly when x reaches it there.
 
+pub(super) mod side_by_side;
+
 use std::cell::LazyCell;
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -45,7 +47,7 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::depth_integrals::{Ahead, Stretch, Way};
-use super::flight::{Course, DRIVES, SLOW, StageEnd, VANISHES, VANISHING, rest_by_power};
+use super::flight::{Course, DRIVES, SLOW, StageEnd, StageSolver, VANISHES, VANISHING, rest_by_power};
 use super::locate::{self, root_before, settled};
 use super::outcome::{IntegrationError, Solved};
 use super::taylor::{Precision, STEPS_MAX, power_of_two_below, rough_exp2, rough_log2};
@@ -278,6 +280,90 @@ impl<S: Scalar, const K: usize> Path<S, K> {
         path
     }
 
+    /// The first `count` coefficients over time in units of `unit` (s), from those that `force` makes of the ones of x and V.
+    #[inline(always)]
+    fn over_time(
+        start: State<S>,
+        mass: S,
+        form: Form,
+        unit: S,
+        count: usize,
+        mut force: impl FnMut(S, S) -> S,
+    ) -> Self {
+        let mut path = Self::start(form, start);
+        path.time[1] = unit;
+        let rate = unit.over(mass);
+        for k in 0..count {
+            let force = force(path.depth[k], path.velocity[k]);
+            if k + 1 < K {
+                let share = reciprocal(k + 1);
+                path.depth[k + 1] = unit * path.velocity[k] * share;
+                path.velocity[k + 1] = -(rate * force * share);
+            }
+        }
+        path
+    }
+
+    /// The series over depth in units of `unit` (m).
+    fn over_depth(start: State<S>, mass: S, unit: f64, mut force: impl FnMut(S, S) -> S) -> Self {
+        let mut path = Self::start(Form::Depth(unit), start);
+        path.depth[1] = S::from_f64(unit);
+        let inverse = S::one().over(start.velocity);
+        let rate = S::from_f64(unit).over(mass);
+        // 1/V.
+        let mut slowness = [S::zero(); K];
+        slowness[0] = inverse;
+        for k in 0..K {
+            let force = force(path.depth[k], path.velocity[k]);
+            let next = k + 1;
+            if next < K {
+                let share = reciprocal(next);
+                path.time[next] = S::from_f64(unit) * slowness[k] * share;
+                let v = &mut path.velocity;
+                let known = product(&v[1..next], &v[1..next]);
+                v[next] = -((rate * force * share + known * S::from_f64(0.5)) * inverse);
+                slowness[next] = -(product(&v[1..=next], &slowness[..next]) * inverse);
+            }
+        }
+        path
+    }
+
+    /// The series over a velocity that falls so, under a force that resists.
+    #[inline(always)]
+    fn over_velocity(start: State<S>, mass: S, fall: Fall, mut force: impl FnMut(S, S) -> S) -> Self {
+        let mut path = Self::start(Form::Velocity(fall), start);
+        for k in 1..K {
+            path.velocity[k] = fall.coefficient(k, 1.0, path.velocity[k - 1]);
+        }
+        // -M dV/ds.
+        let rate: [S; K] = std::array::from_fn(|k| match fall {
+            Fall::Exponential => mass * path.velocity[k],
+            Fall::Power(_) if k + 1 < K => -(mass * path.velocity[k + 1] * S::from_f64((k + 1) as f64)),
+            Fall::Power(_) => S::zero(),
+        });
+        // That of the side chosen: at a switch the other one has the same value, and in dual numbers another slope.
+        let mut inverse = S::zero();
+        let mut forces = [S::zero(); K];
+        // dt/ds.
+        let mut pace = [S::zero(); K];
+        for k in 0..K {
+            forces[k] = force(path.depth[k], path.velocity[k]);
+            if k == 0 {
+                inverse = S::one().over(forces[0]);
+            }
+            pace[k] = (rate[k] - product(&forces[1..=k], &pace[..k])) * inverse;
+            if k + 1 < K {
+                let share = reciprocal(k + 1);
+                // V has m + 1 coefficients, or all.
+                let terms = if let Fall::Power(m) = fall { k.min(m as usize) } else { k };
+                let advance = product(&path.velocity[..=terms], &pace[k - terms..=k]);
+                path.time[k + 1] = pace[k] * share;
+                path.depth[k + 1] = advance * share;
+            }
+        }
+        path
+    }
+
     /// The state at `s`, its time since the start of the step.
     fn at(&self, s: S) -> State<S> {
         let velocity = match self.form {
@@ -473,6 +559,26 @@ struct Walk<'l, S, const K: usize> {
     is_of_velocity: bool,
 }
 
+/// Series at the start of a step that are made already, the last of them with the jets of its stage.
+struct Made<S, const K: usize> {
+    by_velocity: Option<Path<S, K>>,
+    by_time: Option<Path<S, K>>,
+}
+
+impl<S, const K: usize> Default for Made<S, K> {
+    fn default() -> Self {
+        Self { by_velocity: None, by_time: None }
+    }
+}
+
+/// How a step begins.
+enum Begun<S> {
+    /// Nothing is left of the stage.
+    Ended(StageEnd<S>),
+    /// Here.
+    At(Local<S>),
+}
+
 /// The force at a state, and `F_V` (kg/s) where it is below zero, else zero.
 #[derive(Clone, Copy)]
 struct Local<S> {
@@ -497,6 +603,17 @@ pub(super) struct LawSeries {
     pub(super) variable: Variable,
     /// Truncation error of a step, relative to the velocity.
     pub(super) tolerance: f64,
+}
+
+impl<S: Scalar> StageSolver<S> for LawSeries {
+    fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Solved<StageEnd<S>> {
+        let limit = course.limit()?;
+        let Some(law) = course.law() else {
+            let why = "the stage has coefficients and no law of its own".to_owned();
+            return Err(IntegrationError::Refused { method: self.method, why });
+        };
+        self.solve(course, law, limit)
+    }
 }
 
 impl LawSeries {
@@ -525,12 +642,22 @@ impl LawSeries {
         law: &Law<S>,
         limit: S,
     ) -> Solved<StageEnd<S>> {
+        let mut walk = self.walk::<S, K>(course, law)?;
+        loop {
+            if let Some(end) = walk.step(course, limit)? {
+                return Ok(end);
+            }
+        }
+    }
+
+    /// The present stage, of `law`, about to begin.
+    fn walk<'l, S: Scalar, const K: usize>(self, course: &Course<'_, S>, law: &'l Law<S>) -> Solved<Walk<'l, S, K>> {
         let Some(bound) = law.bound() else {
             let why = "a law in code has no series; take --method adaptive".to_owned();
             return Err(IntegrationError::Refused { method: self.method, why });
         };
         let sides = SmallVec::from_elem(false, bound.switches().len());
-        let mut walk = Walk::<S, K> {
+        Ok(Walk {
             law,
             bound,
             falling: bound.falling(&sides),
@@ -547,35 +674,66 @@ impl LawSeries {
             variable: self.variable,
             tolerance: self.tolerance,
             is_of_velocity: law.is_of_velocity(),
-        };
-        while course.cost.steps < STEPS_MAX {
-            if let Some(end) = walk.step(course, limit)? {
-                return Ok(end);
-            }
-        }
-        let remedy = "give the target or the stage an end, or take --method adaptive";
-        Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: course.state.values() })
+        })
     }
 }
 
 impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     /// One step from the state of `course`; how the stage ends, if it does.
     fn step(&mut self, course: &mut Course<'_, S>, limit: S) -> Solved<Option<StageEnd<S>>> {
+        match self.begin(course, limit)? {
+            Begun::Ended(end) => Ok(Some(end)),
+            Begun::At(here) => self.go_on(course, limit, here, Made::default()),
+        }
+    }
+
+    /// Begins a step: the force at its start, and the sides of the switches on it.
+    fn begin(&mut self, course: &Course<'_, S>, limit: S) -> Solved<Begun<S>> {
         let start = course.state;
+        if course.cost.steps >= STEPS_MAX {
+            let remedy = "give the target or the stage an end, or take --method adaptive";
+            return Err(IntegrationError::StepBudgetSpent { max_steps: STEPS_MAX, remedy, last: start.values() });
+        }
         let here = self.reached.take().unwrap_or_else(|| self.local(start));
         let force = here.force;
         if !force.value().is_finite() {
             return Err(self.no_force(course, start));
         }
         if let Some(end) = self.end_of_slow(course, force, limit) {
-            return Ok(Some(end));
+            return Ok(Begun::Ended(end));
         }
         let is_endless = limit.value() == f64::INFINITY && self.end.is_none();
         if is_endless && force.value() < 0.0 && self.law.never_slows(start.depth.value()) {
             return Err(IntegrationError::NeverEnds { why: DRIVES, last: start.values() });
         }
         self.choose_sides(start, force, limit);
-        let held = self.integrated(start, force, limit).map_or_else(|| self.held(course, force, limit), Ok);
+        Ok(Begun::At(here))
+    }
+
+    /// How the series goes that the step asks for next, beside those that are `made`.
+    fn asks(&self, start: State<S>, force: S, limit: S, made: &Made<S, K>) -> Option<Form> {
+        let is_enough = |path: &Path<S, K>| {
+            let path = self.spanned_by_velocity(path.clone(), start);
+            path.is_some_and(|path| self.is_enough(&path, limit))
+        };
+        match (&made.by_velocity, &made.by_time) {
+            (None, None) if self.may_go_by_velocity(force) => Some(Form::Velocity(self.falling.fall)),
+            (Some(path), None) if is_enough(path) => None,
+            (_, None) => Some(Form::Time(time_unit(start, force, self.mass, limit))),
+            (_, Some(_)) => None,
+        }
+    }
+
+    /// The step that has begun; its first series may be `made` already.
+    fn go_on(
+        &mut self,
+        course: &mut Course<'_, S>,
+        limit: S,
+        here: Local<S>,
+        made: Made<S, K>,
+    ) -> Solved<Option<StageEnd<S>>> {
+        let (start, force) = (course.state, here.force);
+        let held = self.integrated(start, force, limit).map_or_else(|| self.held(course, force, limit, made), Ok);
         let Held { path, kinks, ending: (s, event), left_out } = match held {
             Err(IntegrationError::NoForce { last, .. }) if last == start.values() => {
                 let next = self.leave_branch_point(start, force, limit).ok_or_else(|| self.no_force(course, start))?;
@@ -869,14 +1027,13 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     }
 
     /// A step on which the equation holds.
-    fn held(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Held<'l, S, K>> {
+    fn held(&mut self, course: &Course<'_, S>, force: S, limit: S, made: Made<S, K>) -> Solved<Held<'l, S, K>> {
         let start = course.state;
-        let by_velocity = self.over_velocity(start, force);
-        let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
+        let by_velocity = self.over_velocity(start, force, made.by_velocity);
         let mut path = match by_velocity {
-            Some(path) if path.form.share(path.span) >= enough && !self.may_end_over_depth(&path, limit) => path,
+            Some(path) if self.is_enough(&path, limit) => path,
             other => {
-                let free = self.over_time_or_depth(course, force, limit)?;
+                let free = self.over_time_or_depth(course, force, limit, made.by_time)?;
                 match other {
                     // Behind a least velocity, steps by velocity would only approach it.
                     Some(path)
@@ -884,7 +1041,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
                             && free.slows_at_its_end()
                             && free.limit_over_depth(limit).is_none() =>
                     {
-                        self.over_velocity(start, force).unwrap_or(path)
+                        self.over_velocity(start, force, None).unwrap_or(path)
                     }
                     _ => free,
                 }
@@ -1203,6 +1360,12 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         first_of(&roots).filter(|(root, _)| *root <= unknown).or((unknown < span).then(|| (unknown, Kinks::new())))
     }
 
+    /// Whether a step by velocity takes so much of it that no other is asked for.
+    fn is_enough(&self, path: &Path<S, K>, limit: S) -> bool {
+        let enough = if self.goes_by_velocity { STILL_ENOUGH } else { ENOUGH };
+        path.form.share(path.span) >= enough && !self.may_end_over_depth(path, limit)
+    }
+
     /// Whether a step by velocity gets to the limit, where a step over depth may end on it.
     fn may_end_over_depth(&self, path: &Path<S, K>, limit: S) -> bool {
         self.variable == Variable::Depth
@@ -1211,7 +1374,15 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     }
 
     /// The series over time or depth, in a unit in which it has finite coefficients.
-    fn over_time_or_depth(&mut self, course: &Course<'_, S>, force: S, limit: S) -> Solved<Path<S, K>> {
+    ///
+    /// The first one, over time, may be `made` already.
+    fn over_time_or_depth(
+        &mut self,
+        course: &Course<'_, S>,
+        force: S,
+        limit: S,
+        mut made: Option<Path<S, K>>,
+    ) -> Solved<Path<S, K>> {
         let start = course.state;
         let mut unit = time_unit(start, force, self.mass, limit);
         if self.variable == Variable::Depth {
@@ -1219,7 +1390,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
         }
         for _ in 0..RESCALED_MAX {
             let path = match self.variable {
-                Variable::Time => self.over_time(start, unit, K),
+                Variable::Time => made.take().unwrap_or_else(|| self.over_time(start, unit, K)),
                 Variable::Depth => self.over_depth(start, unit),
             };
             if path.is_finite() {
@@ -1236,86 +1407,43 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
 
     /// The first `count` coefficients over time in units of `unit` (s).
     fn over_time(&mut self, start: State<S>, unit: f64, count: usize) -> Path<S, K> {
-        let mut path = Path::start(Form::Time(unit), start);
-        path.time[1] = S::from_f64(unit);
         self.jets.start(self.bound, &self.sides);
-        let rate = S::from_f64(unit).over(self.mass);
-        for k in 0..count {
-            let force = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
-            if k + 1 < K {
-                let share = reciprocal(k + 1);
-                path.depth[k + 1] = S::from_f64(unit) * path.velocity[k] * share;
-                path.velocity[k + 1] = -(rate * force * share);
-            }
-        }
-        path
+        let Self { bound, jets, .. } = self;
+        Path::over_time(start, self.mass, Form::Time(unit), S::from_f64(unit), count, |x, v| jets.push(bound, x, v))
     }
 
     /// The series over depth in units of `unit` (m).
     fn over_depth(&mut self, start: State<S>, unit: f64) -> Path<S, K> {
-        let mut path = Path::start(Form::Depth(unit), start);
-        path.depth[1] = S::from_f64(unit);
         self.jets.start(self.bound, &self.sides);
-        let inverse = S::one().over(start.velocity);
-        let rate = S::from_f64(unit).over(self.mass);
-        // 1/V.
-        let mut slowness = [S::zero(); K];
-        slowness[0] = inverse;
-        for k in 0..K {
-            let force = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
-            let next = k + 1;
-            if next < K {
-                let share = reciprocal(next);
-                path.time[next] = S::from_f64(unit) * slowness[k] * share;
-                let v = &mut path.velocity;
-                let known = product(&v[1..next], &v[1..next]);
-                v[next] = -((rate * force * share + known * S::from_f64(0.5)) * inverse);
-                slowness[next] = -(product(&v[1..=next], &slowness[..next]) * inverse);
-            }
-        }
-        path
+        let Self { bound, jets, .. } = self;
+        Path::over_depth(start, self.mass, unit, |x, v| jets.push(bound, x, v))
     }
 
-    /// The series over velocity, for a force that resists: over time, of a law with a branch point at rest.
-    fn over_velocity(&mut self, start: State<S>, force: S) -> Option<Path<S, K>> {
-        let fall = self.falling.fall;
-        if force.value() <= 0.0 || self.variable == Variable::Time && fall == Fall::Power(1) {
+    /// Whether a step under this force may go by velocity: over time, of a law with a branch point at rest.
+    fn may_go_by_velocity(&self, force: S) -> bool {
+        force.value() > 0.0 && !(self.variable == Variable::Time && self.falling.fall == Fall::Power(1))
+    }
+
+    /// The series over velocity, for a force that resists; the one `made` already, if there is one.
+    fn over_velocity(&mut self, start: State<S>, force: S, made: Option<Path<S, K>>) -> Option<Path<S, K>> {
+        if !self.may_go_by_velocity(force) {
             return None;
         }
-        let mut path = Path::start(Form::Velocity(fall), start);
-        for k in 1..K {
-            path.velocity[k] = fall.coefficient(k, 1.0, path.velocity[k - 1]);
-        }
-        // -M dV/ds.
-        let rate: [S; K] = std::array::from_fn(|k| match fall {
-            Fall::Exponential => self.mass * path.velocity[k],
-            Fall::Power(_) if k + 1 < K => -(self.mass * path.velocity[k + 1] * S::from_f64((k + 1) as f64)),
-            Fall::Power(_) => S::zero(),
+        let fall = self.falling.fall;
+        let path = made.unwrap_or_else(|| {
+            self.jets.start_falling(self.bound, &self.sides, &self.falling);
+            let Self { bound, jets, .. } = self;
+            Path::over_velocity(start, self.mass, fall, |x, v| jets.push(bound, x, v))
         });
-        // That of the side chosen: at a switch the other one has the same value, and in dual numbers another slope.
-        let mut inverse = S::zero();
-        let mut forces = [S::zero(); K];
-        // dt/ds.
-        let mut pace = [S::zero(); K];
-        self.jets.start_falling(self.bound, &self.sides, &self.falling);
-        for k in 0..K {
-            forces[k] = self.jets.push(self.bound, path.depth[k], path.velocity[k]);
-            if k == 0 {
-                inverse = S::one().over(forces[0]);
-            }
-            pace[k] = (rate[k] - product(&forces[1..=k], &pace[..k])) * inverse;
-            if k + 1 < K {
-                let share = reciprocal(k + 1);
-                // V has m + 1 coefficients, or all.
-                let terms = if let Fall::Power(m) = fall { k.min(m as usize) } else { k };
-                let advance = product(&path.velocity[..=terms], &pace[k - terms..=k]);
-                path.time[k + 1] = pace[k] * share;
-                path.depth[k + 1] = advance * share;
-            }
-        }
+        self.spanned_by_velocity(path, start)
+    }
+
+    /// The longest such step.
+    fn spanned_by_velocity(&self, path: Path<S, K>, start: State<S>) -> Option<Path<S, K>> {
         if !path.is_finite() {
             return None;
         }
+        let fall = self.falling.fall;
         let mut path = path.spanned(self.tolerance);
         let is_little =
             path.depth[1].value() <= LITTLE * start.depth.value() && path.time[1].value() <= LITTLE * path.before;

@@ -23,6 +23,7 @@ pub mod energy;
 mod every_method;
 mod flight;
 mod gauss;
+mod instructions;
 pub mod lanes;
 mod law_series;
 #[cfg(test)]

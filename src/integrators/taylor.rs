@@ -124,6 +124,11 @@ impl Taylor {
     }
 }
 
+/// How it solves stages with laws of their own.
+pub(super) const fn law_series(tolerance: f64) -> LawSeries {
+    LawSeries { method: "taylor", variable: Variable::Time, tolerance }
+}
+
 /// Branches by a constant: the orders of the other number types are not compiled.
 pub(super) struct Precision<S>(PhantomData<S>);
 
@@ -373,8 +378,7 @@ impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> 
         let law = &problem.stages[course.stage];
         let limit = course.limit()?;
         if let Some(law) = course.law() {
-            let series = LawSeries { method: "taylor", variable: Variable::Time, tolerance: self.0.tolerance };
-            return series.solve(course, law, limit);
+            return law_series(self.0.tolerance).solve(course, law, limit);
         }
         match Shape::of(law) {
             Shape::Constant => self.0.step_through::<S, 4, false, false, false>(course, limit),

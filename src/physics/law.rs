@@ -433,7 +433,25 @@ impl<S: Scalar> Law<S> {
     }
 
     /// Static work `integral of F(x, 0) dx` (J) between two depths (m), and the most of it in between.
+    ///
+    /// Up to the first place where the force has no value, where it has none: whoever gets further has come there before.
     pub fn static_work(&self, from: f64, to: f64) -> (f64, f64) {
+        let work = self.work_between(from, to);
+        if !work.0.is_nan() {
+            return work;
+        }
+        let place = |panel: u32| from + (to - from) * f64::from(panel) / f64::from(PANELS);
+        let has_value = |x: f64| self.force_value(x, 0.0).is_finite();
+        let lost = (0..=PANELS).map(place).find(|x| !has_value(*x));
+        let (mut known, mut lost) = (from, lost.unwrap_or(from));
+        while lost - known > SAME_DEPTH * lost {
+            let middle = 0.5 * (known + lost);
+            if has_value(middle) { known = middle } else { lost = middle }
+        }
+        self.work_between(from, known)
+    }
+
+    fn work_between(&self, from: f64, to: f64) -> (f64, f64) {
         let force = |x: f64| self.force_value(x, 0.0);
         if self.is_of_velocity() {
             let work = force(from) * (to - from);
@@ -546,6 +564,9 @@ const SLOWEST: f64 = 0.05;
 /// Parts in which a stretch is searched for places where its force begins to drive.
 const PANELS: u32 = 32;
 
+/// Distance over the depth to which the place is found where a force has no value any more.
+const SAME_DEPTH: f64 = 1e-12;
+
 /// Halvings of a part of which the work is sought.
 const HALVINGS: u32 = 30;
 
@@ -590,7 +611,8 @@ fn refined(
     let (least, most) = bounds(from, to);
     let hides_little = (most - least) * (to - from) <= (left + right).abs() + 0.02 * scale;
     let is_exact = !((left + right - whole).abs() > 1e-15 * scale + roughly * (left.abs() + right.abs()));
-    let is_enough = is_exact && hides_little;
+    // No halving gives a sum a value that a part of it lacks.
+    let is_enough = is_exact && hides_little || (left + right).is_nan();
     if is_enough || halvings == 0 {
         return left + right;
     }

@@ -10,6 +10,7 @@ pub mod exit_energy;
 pub mod expression;
 pub mod force_table;
 pub mod groups;
+pub(crate) mod lanes;
 pub mod law;
 pub mod nose;
 pub mod parameter;

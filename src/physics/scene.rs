@@ -883,6 +883,18 @@ impl Scene {
         Ok((stages, laws, ends_early))
     }
 
+    /// Whether it has forces of its own, and is `other` but for the speed.
+    pub(crate) fn has_laws_of(&self, other: &Self) -> bool {
+        let Self { title: _, velocity: _, mass, resistance, forces, ends, thickness, criterion, plug, parameters } =
+            self;
+        !forces.is_empty()
+            && (*mass, *thickness, *criterion, *plug) == (other.mass, other.thickness, other.criterion, other.plug)
+            && *parameters == other.parameters
+            && *resistance == other.resistance
+            && *forces == other.forces
+            && *ends == other.ends
+    }
+
     /// As [`Scene::resolve`], from the `problem` of this scene at another speed: only a continuous crater constant depends
     /// on the speed.
     ///

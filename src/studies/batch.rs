@@ -527,10 +527,24 @@ pub fn answers(
     method: &Method,
     with_critical: bool,
 ) -> Vec<Result<Answer, RowError>> {
-    let mut problems = Vec::with_capacity(scenes.len());
+    let mut problems: Vec<Problem> = Vec::with_capacity(scenes.len());
     // Why a scene has no problem; scenes are large and stay where they are.
-    let causes: Vec<Option<ResolveError>> =
-        scenes.iter().map(|scene| scene.as_ref().ok()?.problem().map(|problem| problems.push(problem)).err()).collect();
+    let mut causes: Vec<Option<ResolveError>> = Vec::with_capacity(scenes.len());
+    let mut before: Option<&Scene> = None;
+    for scene in &scenes {
+        let Ok(scene) = scene else {
+            causes.push(None);
+            continue;
+        };
+        // Rows that vary the speed alone share the laws of the first of them.
+        let shared = before.filter(|before| scene.has_laws_of(before)).and(problems.last());
+        let problem = match (shared, scene.velocity) {
+            (Some(problem), Some(speed)) => scene.resolve_from(problem, speed),
+            _ => scene.problem(),
+        };
+        causes.push(problem.map(|problem| problems.push(problem)).err());
+        before = causes.last().is_some_and(Option::is_none).then_some(scene);
+    }
     let answer = |solution, stable| Answer {
         solution,
         critical: None,

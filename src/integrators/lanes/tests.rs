@@ -1,8 +1,12 @@
+use std::fmt::Write as _;
+
 use super::super::taylor::Series;
 use super::*;
+use crate::exchange::scene_file::SHIPPED;
 use crate::integrators::IntegrationError;
-use crate::physics::Stage;
 use crate::physics::reference::{self, Exact, Source};
+use crate::physics::{Scene, Stage};
+use crate::testing::shipped;
 
 fn scalar(problem: &Problem) -> Summary {
     Summary::from(&Taylor::default().solve(problem, Detail::Events).unwrap())
@@ -37,7 +41,7 @@ fn every_processor_and_any_neighbours_give_the_same_bits() {
     let count = if cfg!(miri) { 2 * WIDTH } else { 1500 };
     let problems: Vec<Problem> = problems(count, 2.0).into_iter().chain(problems(count, 9.0)).collect();
     let whole = Batch::new().solve(&problems);
-    for instructions in Instructions::ALL.into_iter().filter(|kind| kind.is_available()) {
+    for instructions in Instructions::available() {
         assert_eq!(Batch { instructions }.solve(&problems), whole, "{instructions:?}");
     }
     for (problem, together) in problems.iter().zip(&whole).step_by(7) {
@@ -279,11 +283,7 @@ fn a_summary_gives_the_flight_back() {
 
 #[test]
 fn a_batch_uses_the_widest_instructions_that_the_processor_has() {
-    assert!(Instructions::Baseline.is_available());
-    for kind in Instructions::ALL {
-        assert!(kind <= Instructions::detect() || !kind.is_available());
-    }
-    assert_eq!(Batch::new().instructions, Instructions::detect());
+    assert_eq!(Some(Batch::new().instructions), Instructions::available().max());
 }
 
 /// From a time and a law follow `e`, `b`, `c` and `d`; they give the time back but for the terms left out.
@@ -376,6 +376,68 @@ fn the_tables_of_the_crater_are_the_reciprocals_of_factorials_with_signs_in_turn
             let factorial = (1..=2 * j + first).product::<u128>() as f64;
             let sign = if j % 2 == 0 { 1.0 } else { -1.0 };
             assert!((entry * factorial - sign).abs() <= f64::EPSILON, "{j}, {first}: {entry}");
+        }
+    }
+}
+
+/// The laws that ship, and others with kinks, several stages, conditions, powers of V and places where the force has no value.
+fn problems_with_laws(rows: usize) -> Vec<Problem> {
+    let stages = [
+        "[[stage]]\nforce = 'P*x/l*(V/v1)^0.2'\nend = '20 mm'\n[[stage]]\nforce = 'P*(V/v1)^0.2'\n",
+        "[[stage]]\nforce = 'P*(1 + b*tanh(x/l))*(1 + V/v1) + Q*V^2*sqrt(1 + x/l)'\n",
+        "[[stage]]\nforce = 'max(P*sin(x/l), R) + Q*V^2 + R*V/v1'\nend_velocity = '60 m/s'\n[[stage]]\nforce = 'P + R*V/v1'\n",
+        "[[stage]]\nforce = 'P*exp(-x/l)*log(2 + V/v1) + R'\nuntil = 'x/l = 3*V/v1'\n[[stage]]\nforce = 'P*(V/v1)^1.5 + R*x/l'\n",
+        "[[stage]]\nforce = 'R*V/v1 + P*sqrt(1 - x/(40*l))'\n",
+        "[[stage]]\nforce = 'P*x/l - R + Q*V^2'\n",
+    ];
+    let mut random = fastrand::Rng::with_seed(2);
+    let mut spread = |decades: f64| 10_f64.powf(decades * (2.0 * random.f64() - 1.0));
+    let mut problems = Vec::new();
+    for text in stages {
+        let used = |name: &str| text.split(|c: char| !c.is_alphanumeric()).any(|word| word == name);
+        for row in 0..rows {
+            let known = [("P", 5e5), ("Q", 3.0), ("R", 6e4), ("b", 0.3), ("v1", 100.0), ("l", 0.02)];
+            let units = ["N", "kg/m", "N", "", "m/s", "m"];
+            let mut numbers = String::new();
+            for ((name, value), unit) in known.into_iter().zip(units).filter(|((name, _), _)| used(name)) {
+                // Every second row varies the speed alone.
+                let value = value * if row % 2 == 0 { 1.0 } else { spread(0.5) };
+                writeln!(
+                    numbers,
+                    "{name} = {}",
+                    if unit.is_empty() { format!("{value:?}") } else { format!("'{value:?} {unit}'") }
+                )
+                .unwrap();
+            }
+            let text = format!(
+                "projectile.mass = 2\nimpact.velocity = {:?}\ntarget.thickness = {:?}\n[parameters]\n{numbers}{text}",
+                200.0 * spread(0.7),
+                0.3 * spread(0.7)
+            );
+            problems.push(Scene::from_toml(&text, "law").unwrap().problem().unwrap());
+        }
+    }
+    for (name, _) in SHIPPED.iter().filter(|(name, _)| name.starts_with("law-")) {
+        let scene = shipped(name);
+        problems.extend((0..rows).map(|_| scene.resolve(scene.velocity.unwrap() * spread(0.3)).unwrap()));
+    }
+    problems
+}
+
+#[test]
+fn flights_through_laws_of_their_own_have_the_bits_that_they_have_alone() {
+    let mut problems = problems_with_laws(if cfg!(miri) { 3 } else { 40 });
+    let served = problems.iter().filter(|problem| side_by_side::serves(problem)).count();
+    assert!(4 * served > problems.len(), "{served} of {}", problems.len());
+    let alone =
+        |problem: &Problem| Taylor::default().solve(problem, Detail::Events).map(|flight| Summary::from(&flight));
+    for shuffled in [false, true] {
+        if shuffled {
+            fastrand::Rng::with_seed(3).shuffle(&mut problems);
+        }
+        let expected: Vec<_> = problems.iter().map(alone).collect();
+        for instructions in Instructions::available() {
+            assert_eq!(Batch { instructions }.solve(&problems), expected, "{instructions:?}");
         }
     }
 }

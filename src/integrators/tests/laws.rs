@@ -161,6 +161,18 @@ pub(super) fn exact_methods() -> [Box<dyn Integrator>; 2] {
     [Box::new(Taylor::default()), Box::new(Energy::new())]
 }
 
+/// What it lacks to the far side is at least what it lacks to that place.
+#[test]
+fn a_rest_in_front_of_a_place_where_the_force_has_no_value_is_a_stop() {
+    let problem = problem("P*sqrt(1 - x/(40*l)) + R*V/v1", 100.0).with_exit(1.1);
+    let flight = Taylor::default().solve(&problem, Detail::Events).unwrap();
+    assert_eq!(flight.outcome, Outcome::Stopped);
+    // 2/3 of P times 0.8 m, less the energy at impact, over M V0²/2.
+    let missing = 1.0 - (2.0 / 3.0) * 848e3 * 0.8 / 1e4;
+    let margin = flight.exit_margin.unwrap();
+    assert!(margin < 0.9 * missing && margin > 1.1 * missing, "{margin} of {missing}");
+}
+
 #[test]
 fn every_method_solves_every_law_as_accurately_as_it_promises() {
     for (name, method) in methods(1e-10) {

@@ -11,6 +11,7 @@ use smallvec::SmallVec;
 use super::jets::{Fall, Falling};
 use super::parse::{Binary, Function, Term};
 use super::tape::{self, DomainError, Tape};
+use crate::physics::lanes::Lanes;
 use crate::physics::scalar::Scalar;
 
 /// Largest whole exponent that is computed by products, which hold at zero too.
@@ -21,6 +22,9 @@ const HALF_POWER_MAX: f64 = 8.0;
 
 /// Largest common denominator of powers of V for which u is taken as variable.
 const ROOT_MAX: u32 = 12;
+
+/// Most numbers of a step.
+const NUMBERS_MAX: usize = 2;
 
 /// Registers that a law of the field needs: to set more to zero takes longer than to compute it.
 const FEW: usize = 16;
@@ -160,6 +164,37 @@ pub(super) enum Step<S> {
         /// Whether it is the greater of the two, else the lesser.
         greater: bool,
     },
+}
+
+impl<S: Copy> Step<S> {
+    /// The same step of other numbers: `number` of each of its own, in one order.
+    fn map<T>(self, mut number: impl FnMut(S) -> T) -> Step<T> {
+        match self {
+            Self::Constant { value } => Step::Constant { value: number(value) },
+            Self::Affine { a, factor, shift } => Step::Affine { a, factor: number(factor), shift: number(shift) },
+            Self::Sum { a, b, factor } => Step::Sum { a, b, factor: number(factor) },
+            Self::Share { a, divisor, inverse } => {
+                Step::Share { a, divisor: number(divisor), inverse: number(inverse) }
+            }
+            Self::Multiply { a, b } => Step::Multiply { a, b },
+            Self::Square { a } => Step::Square { a },
+            Self::Divide { a, b } => Step::Divide { a, b },
+            Self::Ratio { dividend, b } => Step::Ratio { dividend: number(dividend), b },
+            Self::Slope { a } => Step::Slope { a },
+            Self::Sqrt { a } => Step::Sqrt { a },
+            Self::HalfPower { a, whole, root, exponent } => Step::HalfPower { a, whole, root, exponent },
+            Self::Power { a, slope, exponent } => Step::Power { a, slope, exponent: number(exponent) },
+            Self::Exp { a, slope } => Step::Exp { a, slope },
+            Self::SinCos { a, slope } => Step::SinCos { a, slope },
+            Self::Tanh { a, slope } => Step::Tanh { a, slope },
+            Self::Integral { function, a, less_one, slope, divisor, factor } => {
+                Step::Integral { function, a, less_one, slope, divisor, factor: number(factor) }
+            }
+            Self::Select { index, switch, above, below, greater } => {
+                Step::Select { index, switch, above, below, greater }
+            }
+        }
+    }
 }
 
 impl<S> Step<S> {
@@ -724,6 +759,40 @@ impl<S: Scalar> Bound<S> {
 }
 
 impl Bound {
+    /// The expressions of N problems side by side; `None` where they do not take the same steps.
+    pub(crate) fn in_lanes<const N: usize>(bounds: [&Self; N]) -> Option<Bound<Lanes<N>>> {
+        let first = *bounds.first()?;
+        let step = |index: usize| {
+            let mut numbers = [Lanes([0.0; N]); NUMBERS_MAX];
+            let mut shape = None;
+            for (lane, bound) in bounds.iter().enumerate() {
+                let mut next = numbers.iter_mut();
+                let number = |number| next.next().map_or((), |lanes| lanes.0[lane] = number);
+                let own = bound.steps.get(index)?.map(number);
+                if *shape.get_or_insert(own) != own {
+                    return None;
+                }
+            }
+            let mut numbers = numbers.into_iter();
+            Some(shape?.map(|()| numbers.next().unwrap_or(Lanes([0.0; N]))))
+        };
+        let steps: Vec<_> = (0..first.steps.len()).map_while(step).collect();
+        let (Value::Register(result), true) = (first.result, steps.len() == first.steps.len()) else { return None };
+        let is_same = |bound: &&Self| bound.steps.len() == steps.len() && bound.result == first.result;
+        bounds.iter().all(is_same).then(|| Bound {
+            tape: first.tape.clone(),
+            parameters: SmallVec::new(),
+            steps,
+            registers: first.registers,
+            switches: first.switches.clone(),
+            result: Value::Register(result),
+            beside: None,
+            signs: first.signs.clone(),
+            never_falls_with_v: first.never_falls_with_v,
+            falling: OnceLock::new(),
+        })
+    }
+
     /// The values of the two sides of an equation; of any other expression, its value and zero.
     pub(crate) fn sides_of_equation(&self, x: f64, v: f64) -> (f64, f64) {
         let values = self.tape.values(&self.parameters, x, v);

@@ -17,8 +17,8 @@ use smallvec::SmallVec;
 
 use super::bound::{Bound, Step, Value};
 use super::parse::Function;
-use crate::physics::scalar::Scalar;
-use crate::physics::scalar::reciprocal;
+use crate::physics::lanes::Lanes;
+use crate::physics::scalar::{Scalar, reciprocal};
 
 /// Power series in time of the registers of a [`Bound`] expression, one order more with each [`Jets::push`].
 ///
@@ -178,6 +178,12 @@ impl<S: Scalar> Jets<S> {
     /// # Panics
     /// If there are [`Jets::ORDERS_MAX`] coefficients already, or `bound` is not the expression of [`Jets::start`].
     pub fn push(&mut self, bound: &Bound<S>, x: S, v: S) -> S {
+        self.push_in_place(bound, x, v)
+    }
+
+    /// As [`Jets::push`], with the instructions of the caller.
+    #[inline(always)]
+    pub(crate) fn push_in_place(&mut self, bound: &Bound<S>, x: S, v: S) -> S {
         let k = self.filled;
         assert!(k < ORDERS_MAX, "the series has its {ORDERS_MAX} coefficients");
         self.filled += 1;
@@ -221,7 +227,33 @@ impl<S: Scalar> Jets<S> {
     }
 }
 
+impl Jets {
+    /// One lane of `others`, series of the same expression: the first coefficient of each register, and all of those that are `kept`.
+    pub(crate) fn take_lane<const N: usize>(
+        &mut self,
+        others: &Jets<Lanes<N>>,
+        lane: usize,
+        kept: impl Iterator<Item = usize>,
+    ) {
+        self.filled = others.filled;
+        self.coefficients.resize(others.coefficients.len(), [0.0; ORDERS_MAX]);
+        for (own, of_all) in self.coefficients.iter_mut().zip(&others.coefficients) {
+            own[0] = of_all[0].0[lane];
+        }
+        for register in kept {
+            let of_all = &others.coefficients[register][..others.filled];
+            self.coefficients[register].iter_mut().zip(of_all).for_each(|(own, of_all)| *own = of_all.0[lane]);
+        }
+    }
+}
+
 impl Falling {
+    /// Whether it is the same of another problem.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        self.fall == other.fall && self.powers.iter().zip(&other.powers).all(is_same)
+    }
+
     /// Fills in the values of a `step` at the places `s` from the one at the `start`, s = 0, and says whether it did: of a power of V that
     /// is no root in s, and of its logarithm.
     pub(super) fn fill_along<S: Scalar, const N: usize>(

@@ -345,6 +345,7 @@ fn fixed_causes(
     let others: Vec<&Question> = all.iter().collect();
     let answered = || laddered.iter().zip(rows).filter(|(laddered, _)| laddered.failure.is_none());
     // Step by step, where the passing answers show which scheme it is.
+    let mut by_steps = None;
     for (scheme, _) in reproducing.iter().take(3) {
         let mut seen = Vec::new();
         // The coarsest steps of all first, where schemes differ most: a number is fitted to those. The finest would take the longest.
@@ -363,11 +364,16 @@ fn fixed_causes(
             }
         }
         let causes = causes(&seen, identity.reads_scene, &others, Effort::Nearly);
-        if causes.first().is_some_and(|cause| cause.certainty != Certainty::Possible) {
-            return causes;
+        match causes.first().map(|cause| cause.certainty) {
+            Some(Certainty::Certain) => return causes,
+            Some(Certainty::Likely) => {
+                by_steps = Some(causes);
+                break;
+            }
+            Some(Certainty::Possible) | None => {}
         }
     }
-    // By the limits, as far as they are known.
+    // By the limits, as far as they are known. What is certain there goes before a number of its own in every answer.
     let mut seen = Vec::new();
     for (laddered, row) in answered() {
         let question = laddered.question;
@@ -399,7 +405,9 @@ fn fixed_causes(
             is_misnamed,
         });
     }
-    causes(&seen, identity.reads_scene, &others, Effort::Pairs)
+    let by_limits = causes(&seen, identity.reads_scene, &others, Effort::Pairs);
+    let is_certain = by_limits.first().is_some_and(|cause| cause.certainty == Certainty::Certain);
+    by_steps.filter(|_| !is_certain).unwrap_or(by_limits)
 }
 
 /// Steps (s) and times (s) of the answers whose outcome is wrong.

@@ -111,14 +111,23 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
         let place = usize::from(found.causes.first().is_some_and(stays));
         found.causes.insert(if cause.certainty == Certainty::Certain { 0 } else { place }, cause);
     }
-    if let Some(ByStages { cause, is_of_kinds, shown_by }) = by_stages {
+    if let Some(ByStages { cause, is_of_kinds, is_told_apart, shown_by }) = by_stages {
         found.causes.retain(|known| known.id != "unknown" || cause.certainty == Certainty::Possible);
         let is_of_every_kind = |known: &Cause| OF_EVERY_KIND.iter().chain(&SYMPTOMS).any(|id| *id == known.id);
-        let says_more = is_of_kinds || found.peer.fixed_step && cause.certainty == Certainty::Likely;
+        // Steps that are too long are so everywhere.
+        let is_of_size = found.causes.first().is_some_and(|known| known.id == "steps-too-long") && is_told_apart;
+        let says_more = is_of_kinds || (found.peer.fixed_step || is_of_size) && cause.certainty == Certainty::Likely;
+        // What acts in stages of every kind does not where only some kinds are wrong.
+        if is_of_kinds {
+            for known in found.causes.iter_mut().filter(|known| OF_EVERY_KIND.contains(&known.id.as_str())) {
+                known.certainty = known.certainty.max(Certainty::Possible);
+            }
+        }
         // One that explains half as many questions, or fewer, says less, and so does one that fits a single answer.
         let explains_few = |known: &Cause| {
             known.certainty == cause.certainty
                 && cause.certainty == Certainty::Likely
+                && known.id != "steps-too-long"
                 && (2 * known.explains <= cause.explains || known.explains == 1 && shown_by > 1)
         };
         let goes_behind = |known: &Cause| {

@@ -164,7 +164,7 @@ every_check! {
     Gradients UnlikeUnits TablesInMemory Quartiles LimitsOfLadders Boxes MiddleAndBar
     ExactText SetText RefuseText Units Wire WireAnswer
     Exits Recorded ChangedRecord Printed PrintedText PathRows PathMomentum Tolerance StepOption Slopes SpreadParts SpreadSamples
-    BatchRows SweepRows MapLines SetsOfTests StepErrors BenchFigures BenchLevels ThreeGridRule Report
+    BatchRows BatchOfScene SweepRows MapLines SetsOfTests StepErrors BenchFigures BenchLevels ThreeGridRule Report
     KnownBad Counted Remeasured Independent
     Reference Agreement Stated Margin Outcome Pair EventOrder
     Nose SmallImpact ApproachOrder ApproachConstant Eq15 Eq15Jump NdrcCriterion

@@ -49,6 +49,8 @@ pub(super) struct Stepping {
     pub lag: [f64; 2],
     /// Steps by which V0 is taken for an earlier velocity.
     pub kick: f64,
+    /// Part of V0 at which it counts as at rest.
+    pub rest_speed: f64,
     /// Whether it takes `dt_s`.
     pub is_fixed: bool,
 }
@@ -75,6 +77,7 @@ pub(super) const RIGHT: Stepping = Stepping {
     restart: 1.0,
     lag: [0.0; 2],
     kick: 0.0,
+    rest_speed: 0.0,
     is_fixed: false,
 };
 
@@ -88,6 +91,7 @@ impl Stepping {
     pub(super) fn end(self, problem: &Problem, step: f64) -> Option<State> {
         let step = (self.step)(step);
         let mut now = State::at_impact(problem);
+        let slowest = self.rest_speed * now.velocity;
         now.velocity -= self.kick * step * problem.stages[0].force(0.0, now.velocity) / problem.mass;
         let mut before: Option<Stage> = None;
         let mut steps = 0;
@@ -102,7 +106,7 @@ impl Stepping {
                 let ahead_by = |scheme: Self, part: f64| scheme.ahead(law, left_over, problem.mass, now, part);
                 let ahead = |part: f64| ahead_by(self, part);
                 let next = ahead(step);
-                if next.depth < limit && next.velocity > 0.0 {
+                if next.depth < limit && next.velocity > slowest {
                     (now, left_over) = (next, None);
                     continue;
                 }
@@ -115,7 +119,7 @@ impl Stepping {
                     ahead_by(scheme, high)
                 };
                 let first = |is_past: &dyn Fn(State) -> bool| first_by(self, is_past);
-                let rests = next.velocity <= 0.0 && first(&|state| state.velocity <= 0.0).depth < limit;
+                let rests = next.velocity <= slowest && first(&|state| state.velocity <= slowest).depth < limit;
                 let is_exit = !rests && limit == problem.exit_depth;
                 let placed = if rests {
                     self.rest
@@ -125,7 +129,7 @@ impl Stepping {
                     self.stage_end
                 };
                 let end = match placed {
-                    Placed::ByPart if rests => first(&|state| state.velocity <= 0.0),
+                    Placed::ByPart if rests => first(&|state| state.velocity <= slowest),
                     Placed::ByPart => first(&|state| state.depth >= limit),
                     Placed::OnChord if rests => on_chord(now, next, |state| -state.velocity, 0.0),
                     Placed::OnChord => on_chord(now, next, |state| state.depth, limit),

@@ -29,6 +29,8 @@ const MORE_FROM: u64 = 1_000_003;
 /// must be one.
 const MOST: f64 = 0.8;
 const SOME: f64 = 0.25;
+/// Right passages elsewhere, over the wrong ones, that are far more.
+const FAR_MORE: usize = 5;
 /// What a condition costs, without a number and with one, in parts of all right passages that it holds for.
 const PRICE: f64 = 0.01;
 const PRICE_OF_NUMBER: f64 = 0.04;
@@ -199,7 +201,7 @@ impl Condition {
 
     /// Whether the ends of all flights may have it.
     fn is_of_an_end(&self) -> bool {
-        matches!(self, Self::Ends(Way::Exit | Way::Rest) | Self::Left | Self::First(_))
+        matches!(self, Self::Ends(Way::Exit | Way::Rest) | Self::Left | Self::First(true))
     }
 
     /// All without a number.
@@ -277,6 +279,8 @@ pub(super) struct ByStages {
     pub cause: Cause,
     /// Whether it is a kind of stage, not a number or the event at which the flight ends.
     pub is_of_kinds: bool,
+    /// Whether far more passages elsewhere are right.
+    pub is_told_apart: bool,
     /// Questions that show it, those asked for it among them.
     pub shown_by: usize,
 }
@@ -342,22 +346,30 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         said.join(" and "),
         wrong.len()
     );
-    let explained = failing
-        .iter()
-        .filter(|question| wrong.iter().any(|passage| std::ptr::eq(passage.question, **question)))
-        .count();
+    let is_of = |question: &Question, passage: &&Passage<'_>| std::ptr::eq(passage.question, question);
+    let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
+    // A flight that fails, and each stage of which is right.
+    let is_right = |question: &&&Question| {
+        let judged: Vec<&Passage<'_>> = passages.iter().filter(|passage| is_of(question, passage)).collect();
+        let ends = judged.last().is_some_and(|last| last.way != Way::Through && last.index + 1 == judged.len());
+        ends && judged.iter().all(|passage| !passage.is_wrong())
+    };
+    let right_in_parts = failing.iter().filter(is_right).count();
     // Of no kind of stage, and whatever the number: where steps end elsewhere, they are right.
     let located =
         if let [Condition::Left] = conditions[..] { ": its end is not located as accurately as rest is" } else { "" };
     let statement = statement + located;
-    let certainty =
-        if is_what && 10 * explained >= 9 * failing.len() { Certainty::Likely } else { Certainty::Possible };
+    // A number that tells few right passages from the wrong ones does so by chance.
+    let has_number = conditions.iter().any(Condition::has_number);
+    let is_where = 10 * right_in_parts <= failing.len() && !(has_number && elsewhere < FAR_MORE * wrong.len());
+    let explains_most = 10 * explained >= 9 * failing.len();
+    let certainty = if is_what && (explains_most || is_where) { Certainty::Likely } else { Certainty::Possible };
     let cause = Cause::plain("stage-wrong", statement, certainty, explained, found.counts.failed);
-    let is_of_kinds =
-        is_what && !conditions.iter().any(Condition::has_number) && !conditions.iter().all(Condition::is_of_an_end);
+    let is_of_kinds = !has_number && !conditions.iter().all(Condition::is_of_an_end);
     // Passages of one question follow each other.
     let shown_by = wrong.chunk_by(|one, next| std::ptr::eq(one.question, next.question)).count();
-    Some(ByStages { cause: Cause { factor, ..cause }, is_of_kinds, shown_by })
+    let is_told_apart = elsewhere >= FAR_MORE * wrong.len();
+    Some(ByStages { cause: Cause { factor, ..cause }, is_of_kinds, is_told_apart, shown_by })
 }
 
 /// The factor that most of `ratios` are.

@@ -69,6 +69,13 @@ check! {
         rows: usize,
     } in Commands, "relative", by batch_rows, compares nothing;
 
+    /// Rows of `batch --scene` that vary speed and mass against `solve --set` on the same numbers.
+    BatchOfScene {
+        /// Rows.
+        #[serde(deserialize_with = "crate::suite::checks::count")]
+        rows: usize,
+    } in Commands, "relative", by batch_of_scene, compares nothing;
+
     /// `critical` and `solve` by enclosure: each number beside an interval is its middle, the error bar of V_c half of its width,
     /// E_c = M V_c²/2 of that.
     MiddleAndBar {
@@ -445,6 +452,39 @@ fn batch_rows(BatchRows { rows }: &BatchRows, subject: &Subject<'_>) -> Found {
     let mut worst = Worst::default();
     for of in texts.par_iter().enumerate().map(of_row).collect::<Found<Vec<_>>>()? {
         worst.take(of.value, || of.place);
+    }
+    Ok(worst.measurement())
+}
+
+fn batch_of_scene(BatchOfScene { rows }: &BatchOfScene, subject: &Subject<'_>) -> Found {
+    let (program, scene) = (subject.program()?, subject.shipped_scene()?);
+    let plain = Answer::of(program, &format!("solve {scene}.toml"), &[])?;
+    let (speed, mass) = (plain.number("scene.velocity_m_s")?, plain.number("scene.mass_kg")?);
+    let mut random = subject.random(&subject.claim.id);
+    // Some rows vary the speed alone.
+    let mut row = |i: usize| {
+        let mass =
+            if i.is_multiple_of(3) { String::new() } else { format!("{:?}", mass * random.log_uniform(0.5, 2.0)) };
+        (format!("{:?}", speed * random.log_uniform(0.2, 3.0)), mass)
+    };
+    let given: Vec<(String, String)> = (0..*rows).map(&mut row).collect();
+    let lines: Vec<String> = given.iter().map(|(speed, mass)| format!("{speed},{mass}")).collect();
+    let table = format!("impact.velocity,projectile.mass\n{}\n", lines.join("\n"));
+    let line = format!("batch in.csv --scene {scene}.toml --out r.csv");
+    let (said, files) = run(program, &line, &[("in.csv", &table)])?;
+    holds!(said.code == 0, "`{line}` exits {} {}", said.code, said.err);
+    let table = Table::read(files.first().map_or("", |(_, text)| text))?;
+    holds!(table.rows.len() == *rows, "{} rows of {rows}", table.rows.len());
+    let mut worst = Worst::default();
+    for (row, (speed, mass)) in table.rows.iter().zip(&given) {
+        let mass = if mass.is_empty() { String::new() } else { format!(" --set projectile.mass={mass}") };
+        let answer = Answer::of(program, &format!("solve {scene}.toml --set impact.velocity={speed}{mass}"), &[])?;
+        for name in ["depth_m", "time_s", "velocity_m_s", "exit_margin"] {
+            let (value, exact) = (table.number(row, name)?, of(&answer.json, name));
+            worst.take(apart(value, exact), || format!("{name} at {speed} m/s{mass}: {value} and not {exact}"));
+        }
+        let is_same = Some(table.cell(row, "outcome")?) == answer.at("outcome").as_str();
+        worst.take(must(is_same), || format!("outcome at {speed} m/s{mass}"));
     }
     Ok(worst.measurement())
 }
