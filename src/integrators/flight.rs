@@ -527,9 +527,9 @@ impl<'a, S: Scalar> Course<'a, S> {
         let scale = self.problem.impact_speed.value();
         let depth = self.state.depth.value();
         let value = energy_beyond_stop_of(self.problem, self.stage, depth, self.mass.value()) / scale / scale;
-        if value == 0.0
+        if (value == 0.0 || value.is_infinite())
             && let Some(law) = self.problem.laws.of(self.stage)
-            && law.force_value(depth, 0.0) == 0.0
+            && [0.0, f64::INFINITY].contains(&law.force_value(depth, 0.0))
         {
             let exit = self.problem.exit_depth.value();
             let (value, bound) = law.margin_of_depth(self.state.values(), exit, scale, self.error_bound);

@@ -424,9 +424,9 @@ impl<S: Scalar> Law<S> {
         if power < 2.0 - 1e-9 { mass * at.velocity * at.velocity / ((2.0 - power) * force) } else { f64::INFINITY }
     }
 
-    /// Exit margin of a rest before `exit` (m) where the force at rest is zero: `(X - H)/H`, its error that of the depth.
+    /// Exit margin of a rest before `exit` (m) where the force at rest is zero or infinite: `(X - H)/H`, its error that of the depth.
     ///
-    /// `F = a V^n` leaves a distance that goes as `W^(1 - n/2)`, and so does the error of the depth.
+    /// `F = a V^n` leaves a distance that goes as `W^(1 - n/2)`, and so does the error of the depth; one below zero counts as n = 0.
     pub(crate) fn margin_of_depth(&self, rest: State, exit: f64, speed: f64, error_bound: f64) -> (f64, f64) {
         let power = self.power(rest.depth, 1e-8 * speed).clamp(0.0, 1.0);
         (rest.depth / exit - 1.0, 8.0 * (error_bound + f64::EPSILON).powf(1.0 - 0.5 * power))
@@ -611,8 +611,8 @@ fn refined(
     let (least, most) = bounds(from, to);
     let hides_little = (most - least) * (to - from) <= (left + right).abs() + 0.02 * scale;
     let is_exact = !((left + right - whole).abs() > 1e-15 * scale + roughly * (left.abs() + right.abs()));
-    // No halving gives a sum a value that a part of it lacks.
-    let is_enough = is_exact && hides_little || (left + right).is_nan();
+    // No halving makes a number of a sum that is none.
+    let is_enough = is_exact && hides_little || !(left + right).is_finite();
     if is_enough || halvings == 0 {
         return left + right;
     }

@@ -173,6 +173,19 @@ fn a_rest_in_front_of_a_place_where_the_force_has_no_value_is_a_stop() {
     assert!(margin < 0.9 * missing && margin > 1.1 * missing, "{margin} of {missing}");
 }
 
+/// The work from there on has no number: the depths tell. An error grows without bound too where the force rises as a logarithm.
+#[test]
+fn a_rest_under_a_force_without_bound_there_is_no_passage() {
+    for (force, outcomes) in [
+        ("P*sqrt(v1/V)*(1 + x/l)", &[Outcome::Stopped][..]),
+        ("P*(1 - b*log(V/v1))*(1 + x/l)", &[Outcome::Stopped, Outcome::Undecided]),
+    ] {
+        let flight = Taylor::default().solve(&problem(force, 100.0).with_exit(1.1), Detail::Events).unwrap();
+        assert!(outcomes.contains(&flight.outcome), "{force}: {:?}", flight.outcome);
+        assert_eq!(flight.exit_margin, Some(flight.end.depth / 1.1 - 1.0), "{force}");
+    }
+}
+
 #[test]
 fn every_method_solves_every_law_as_accurately_as_it_promises() {
     for (name, method) in methods(1e-10) {
