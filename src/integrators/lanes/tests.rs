@@ -389,6 +389,8 @@ fn problems_with_laws(rows: usize) -> Vec<Problem> {
         "[[stage]]\nforce = 'P*exp(-x/l)*log(2 + V/v1) + R'\nuntil = 'x/l = 3*V/v1'\n[[stage]]\nforce = 'P*(V/v1)^1.5 + R*x/l'\n",
         "[[stage]]\nforce = 'R*V/v1 + P*sqrt(1 - x/(40*l))'\n",
         "[[stage]]\nforce = 'P*x/l - R + Q*V^2'\n",
+        "[[stage]]\nforce = 'P*(1 + V/v1)*(1 + sqrt(b*x/l))'\n",
+        "[[stage]]\nforce = 'P*(1 + V/v1)*(1 + (x/l)^(70*b))'\n",
     ];
     let mut random = fastrand::Rng::with_seed(2);
     let mut spread = |decades: f64| 10_f64.powf(decades * (2.0 * random.f64() - 1.0));
@@ -402,6 +404,8 @@ fn problems_with_laws(rows: usize) -> Vec<Problem> {
             for ((name, value), unit) in known.into_iter().zip(units).filter(|((name, _), _)| used(name)) {
                 // Every second row varies the speed alone.
                 let value = value * if row % 2 == 0 { 1.0 } else { spread(0.5) };
+                // A term of some rows is nothing, or another power.
+                let value = if name == "b" && row % 5 == 1 { [0.0, 1.0][row / 5 % 2] } else { value };
                 writeln!(
                     numbers,
                     "{name} = {}",

@@ -218,9 +218,13 @@ impl<'a, 'j> Group<'a, 'j> {
             let One { course, walk: Some((walk, _)), begun: Some((_, made)), .. } = &mut self.flights[*index] else {
                 continue;
             };
+            let path = path.lane(lane, *form, course.state.time);
+            // A term that vanishes in one lane alone has a series there, and none beside others: that flight makes its own.
+            if !path.is_finite() {
+                continue;
+            }
             let kept = bound.switches().iter().copied().chain(walk.bound.beside().and_then(Result::ok));
             walk.jets.take_lane(self.jets, lane, kept);
-            let path = path.lane(lane, *form, course.state.time);
             match form {
                 Form::Velocity(_) => made.by_velocity = Some(path),
                 Form::Time(_) | Form::Depth(_) => made.by_time = Some(path),

@@ -774,7 +774,11 @@ impl Bound {
                 }
             }
             let mut numbers = numbers.into_iter();
-            Some(shape?.map(|()| numbers.next().unwrap_or(Lanes([0.0; N]))))
+            let step = shape?.map(|()| numbers.next().unwrap_or(Lanes([0.0; N])));
+            // What a power has for a series depends on its exponent.
+            let is_one_power =
+                !matches!(step, Step::Power { exponent, .. } if exponent.0.iter().any(|one| *one != exponent.0[0]));
+            is_one_power.then_some(step)
         };
         let steps: Vec<_> = (0..first.steps.len()).map_while(step).collect();
         let (Value::Register(result), true) = (first.result, steps.len() == first.steps.len()) else { return None };
