@@ -92,9 +92,9 @@ impl<const N: usize> Scalar for Lanes<N> {
         Self([value; N])
     }
 
-    /// That of the first lane; NaN if one of any lane is.
+    /// That of the first lane: nothing that lanes may differ in is to be decided by it.
     fn value(self) -> f64 {
-        if self.0.iter().any(|value| value.is_nan()) { f64::NAN } else { self.0[0] }
+        self.0[0]
     }
 
     /// Whether all are.

@@ -197,8 +197,7 @@ impl<S: Scalar> Jets<S> {
                 Step::Select { index, switch, above, below, .. } => {
                     let chosen = done[if self.sides[index] { above } else { below }][k];
                     // A switch without a value has no sides.
-                    let is_lost = k == 0 && done[switch][0].value().is_nan();
-                    (if is_lost { done[switch][0] } else { chosen }, S::zero())
+                    (if k == 0 { done[switch][0].select(chosen, chosen) } else { chosen }, S::zero())
                 }
                 _ if k == 0 => {
                     let (first, second) = step.values::<_, true>(|register| done[register][0], |constant| constant);
