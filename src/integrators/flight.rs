@@ -85,8 +85,8 @@ impl Bounded {
     /// The lesser of the two. The error bound of the greater counts as far as it reaches below that of the lesser.
     pub(crate) fn min(self, other: Self) -> Self {
         let (lesser, greater) = if self.value <= other.value { (self, other) } else { (other, self) };
-        let bound = lesser.bound.max(greater.bound - (greater.value - lesser.value));
-        Self { bound, ..lesser }
+        let reaching = greater.bound - (greater.value - lesser.value);
+        Self { bound: if reaching > lesser.bound { reaching } else { lesser.bound }, ..lesser }
     }
 
     /// Whether the sign of the value is certain. That of NaN is not.
@@ -98,6 +98,8 @@ impl Bounded {
 /// A flight in progress.
 pub(crate) struct Course<'a, S = f64> {
     pub(crate) problem: &'a Problem<S>,
+    /// Its stages.
+    pub(crate) stages: &'a [Stage<S>],
     pub(crate) detail: Detail<'a>,
     /// State at the start of the present stage; at the end of the flight, its end.
     pub(crate) state: State<S>,
@@ -132,6 +134,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     pub(crate) fn new(problem: &'a Problem<S>, detail: Detail<'a>) -> Self {
         Self {
             problem,
+            stages: &problem.stages,
             detail,
             state: State::at_impact(problem),
             mass: problem.mass,
@@ -165,12 +168,13 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// [`IntegrationError::NeverEnds`] where nothing can.
     #[inline(always)]
     pub(crate) fn limit(&self) -> Solved<S> {
-        let limit = self.problem.limit_of(self.stage);
+        let stage = &self.stages[self.stage];
+        let limit = self.problem.limit_in(stage);
         // A static force that is positive far out brings every projectile to rest.
         let stops_far_out = |law: &Stage<S>| {
             law.stiffness.value() > 0.0 || (law.static_force.value() > 0.0 && law.stiffness.value() == 0.0)
         };
-        let is_open = limit.value() == f64::INFINITY && !stops_far_out(&self.problem.stages[self.stage]);
+        let is_open = limit.value() == f64::INFINITY && !stops_far_out(stage);
         if is_open { self.limitless() } else { Ok(limit) }
     }
 
@@ -181,7 +185,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[cold]
     fn limitless(&self) -> Solved<S> {
         self.refuse_unknown_force()?;
-        let law = &self.problem.stages[self.stage];
+        let law = &self.stages[self.stage];
         if let Some(own) = self.problem.laws.of(self.stage) {
             let last = self.state.values();
             if own.end().is_none() && own.table().is_some_and(|table| table.terminal(last.velocity).is_some()) {
@@ -204,7 +208,7 @@ impl<'a, S: Scalar> Course<'a, S> {
 
     /// Error where the table of the force has ended.
     fn refuse_unknown_force(&self) -> Solved<()> {
-        let is_last = self.stage + 1 == self.problem.stages.len();
+        let is_last = self.stage + 1 == self.stages.len();
         if is_last && self.problem.target == Target::StagesToEndOfTable {
             return Err(IntegrationError::TableEnds { last: self.state.values() });
         }
@@ -236,7 +240,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     #[inline(always)]
     pub(crate) fn enters_stage(&mut self) -> bool {
         self.just_met = None;
-        self.stage < self.problem.stages.len()
+        self.stage < self.stages.len()
     }
 
     /// The `end` that a method found; of an approach, that at the limit, if it may get there.
@@ -266,7 +270,7 @@ impl<'a, S: Scalar> Course<'a, S> {
                 false
             }
             StageEnd::Rest(state) => {
-                let limit = problem.limit_of(entered);
+                let limit = problem.limit_in(&self.stages[entered]);
                 let depth = if state.depth.value() > limit.value() { limit } else { state.depth };
                 self.state = State { depth, ..state };
                 true
@@ -287,10 +291,14 @@ impl<'a, S: Scalar> Course<'a, S> {
         is_over
     }
 
-    /// The exit margin of a flight that has ended, unless it may have taken another way.
-    #[inline(always)]
+    /// The exit margin of a flight through laws that has ended: not decided where it may have taken another way.
+    #[cold]
     pub(crate) fn unless_doubted(&mut self, margin: Option<Bounded>) -> Option<Bounded> {
-        if self.is_in_doubt { self.doubted(margin) } else { margin }
+        if !self.is_in_doubt {
+            return margin;
+        }
+        self.notes.push(TOUCHES.to_owned());
+        margin.map(|margin| Bounded { bound: margin.bound.max(margin.value.abs()), ..margin })
     }
 
     /// Why a flight ends whose last stage has ended.
@@ -375,7 +383,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// Lists every stage end at the present state and enters the stage beyond them.
     #[inline(always)]
     pub(crate) fn pass_ends(&mut self, mut meets: impl FnMut(&Condition<S>, State<S>) -> bool) {
-        while let Some(law) = self.problem.stages.get(self.stage) {
+        while let Some(law) = self.stages.get(self.stage) {
             if law.end.value() <= self.state.depth.value() {
                 self.pass_end();
             } else if self.problem.laws.is_empty() || !self.pass_if_met(&mut meets) {
@@ -469,7 +477,7 @@ impl<'a, S: Scalar> Course<'a, S> {
         let slope_behind = -2.0
             * self
                 .problem
-                .force(self.stage.min(self.problem.stages.len() - 1), S::from_f64(x), S::from_f64(behind.velocity))
+                .force(self.stage.min(self.stages.len() - 1), S::from_f64(x), S::from_f64(behind.velocity))
                 .value()
             / self.mass.value();
         let slope_before = slope(before, mass);
@@ -543,7 +551,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// `dV/dx = -(r + q V)/M`: V vanishes at the depth `(M/q) ln(1 + q V/r)`, which is only approached.
     #[cold]
     pub(crate) fn is_only_approached(&self, limit: f64) -> bool {
-        let law = self.problem.stages[self.stage].values();
+        let law = self.stages[self.stage].values();
         speed_missing(&law, self.problem.mass.value(), self.state.values(), limit).is_some()
     }
 
@@ -553,7 +561,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     /// crossed outwards (drag only helps), so from between them u = 0 is approached for ever.
     #[cold]
     pub(crate) fn refuse_creep(&self, limit: f64) -> Result<(), IntegrationError> {
-        let law = self.problem.stages[self.stage].values();
+        let law = self.stages[self.stage].values();
         let (mass, last) = (self.problem.mass.value(), self.state.values());
         let equilibrium = -law.static_force / law.stiffness;
         let missing = equilibrium - last.depth;
@@ -577,7 +585,7 @@ impl<'a, S: Scalar> Course<'a, S> {
     fn arrive_in_doubt(&mut self, at: State<S>, why: &'static str) -> Solved<State<S>> {
         self.refuse_unknown_force()?;
         let (last, limit) = (at.values(), self.problem.limit_of(self.stage));
-        let (law, mass) = (self.problem.stages[self.stage].values(), self.problem.mass.value());
+        let (law, mass) = (self.stages[self.stage].values(), self.problem.mass.value());
         let v = last.velocity.max(0.0);
         let v0 = self.problem.impact_speed.value();
         let missing = speed_missing(&law, mass, State { velocity: v, ..last }, limit.value());
@@ -598,13 +606,6 @@ impl<'a, S: Scalar> Course<'a, S> {
             State { depth: at.depth + S::from_f64(distance), velocity: S::from_f64(velocity), ..at }
         });
         Ok(arrival)
-    }
-
-    /// The margin of a flight that may have taken another way: not decided.
-    #[cold]
-    fn doubted(&mut self, margin: Option<Bounded>) -> Option<Bounded> {
-        self.notes.push(TOUCHES.to_owned());
-        margin.map(|margin| Bounded { bound: margin.bound.max(margin.value.abs()), ..margin })
     }
 
     /// The flight that ends at the present state, with its exit margin.
@@ -684,7 +685,7 @@ pub(crate) fn solve<S: Scalar>(
     let mut course = Course::new(problem, detail);
     course.begin(method);
     // Each round passes a stage, or ends the flight.
-    for _ in 0..problem.stages.len() {
+    for _ in 0..course.stages.len() {
         if !course.enters_stage() {
             break;
         }
@@ -692,7 +693,7 @@ pub(crate) fn solve<S: Scalar>(
         if course.leaves_stage(end, method) {
             let margin = if problem.has_exit() { Some(method.margin(&mut course)?) } else { None };
             // Here, for a flight that is changed where it is finished would be copied.
-            let margin = course.unless_doubted(margin);
+            let margin = if problem.laws.is_empty() { margin } else { course.unless_doubted(margin) };
             return Ok(course.finish(margin));
         }
     }
@@ -712,7 +713,7 @@ pub(crate) fn end_of_stage<S: Scalar>(
     // A table of velocity is solved piece by piece: V falls or rises from row to row, and passes none twice.
     let mut pieces = 0;
     loop {
-        let was_in_doubt = course.is_in_doubt;
+        let was_in_doubt = has_laws && course.is_in_doubt;
         if has_laws {
             course.enter_piece(pieces)?;
         }

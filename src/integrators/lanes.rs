@@ -170,12 +170,19 @@ impl Batch {
         for part in problems.chunks(BLOCK) {
             block.prepare(part);
             self.instructions.run(&mut block);
-            let with_laws: Vec<&Problem> = part.iter().filter(|problem| side_by_side::serves(problem)).collect();
-            let mut with_laws = side_by_side::solve(&with_laws, self.instructions).into_iter();
+            let mut with_laws = None;
             for (index, problem) in part.iter().enumerate() {
-                let together = if side_by_side::serves(problem) { with_laws.next() } else { None };
-                let alone = || together.unwrap_or_else(|| Taylor::default().solve(problem, Detail::Events));
-                answers.push(block.summary(index, problem).map_or_else(|| Ok(Summary::from(&alone()?)), Ok));
+                let alone = || {
+                    let flight = if side_by_side::serves(problem) {
+                        let solve = || side_by_side::solve(part, self.instructions).into_iter();
+                        with_laws.get_or_insert_with(solve).next()
+                    } else {
+                        None
+                    };
+                    let flight = flight.unwrap_or_else(|| Taylor::default().solve(problem, Detail::Events));
+                    flight.map(|flight| Summary::from(&flight))
+                };
+                answers.push(block.summary(index, problem).map_or_else(alone, Ok));
             }
         }
         answers

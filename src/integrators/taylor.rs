@@ -374,8 +374,7 @@ struct Steps {
 impl<S: Scalar, const K: usize, const L: usize> StageSolver<S> for Orders<K, L> {
     #[inline(always)]
     fn solve_stage(&mut self, course: &mut Course<'_, S>) -> Result<StageEnd<S>, IntegrationError> {
-        let problem = course.problem;
-        let law = &problem.stages[course.stage];
+        let law = &course.stages[course.stage];
         let limit = course.limit()?;
         if let Some(law) = course.law() {
             return law_series(self.0.tolerance).solve(course, law, limit);
@@ -401,14 +400,14 @@ impl Steps {
         limit: S,
     ) -> Result<StageEnd<S>, IntegrationError> {
         let problem = course.problem;
-        let stage = &problem.stages[course.stage];
+        let stage = &course.stages[course.stage];
         // Coefficients per unit mass, once a stage.
         let Stage { static_force, stiffness, viscosity, drag, .. } = stage.per_mass(problem.mass);
         let frequency = if SPRING { stiffness.value().abs().sqrt() } else { 0.0 };
         // Only a driven stage with both springs and dashpots can creep towards its equilibrium for ever.
         let may_creep = SPRING && stage.static_force.value() < 0.0 && viscosity.value() >= 2.0 * frequency;
         // Judged again at each step: what is a rounding at the start of a stage is all of the speed that is left.
-        let may_vanish = static_force.value() == 0.0 && stiffness.value() == 0.0 && viscosity.value() > 0.0;
+        let may_vanish = DAMPED && viscosity.value() > 0.0 && static_force.value() == 0.0 && stiffness.value() == 0.0;
 
         while course.cost.steps < STEPS_MAX {
             // Units: velocity and time, powers of two. The time is the shortest of V/|a|, M/r, M/(q V), 1/w, or,

@@ -299,8 +299,13 @@ impl<S: Scalar> Problem<S> {
     ///
     /// Infinite when there is neither.
     pub fn limit_of(&self, index: usize) -> S {
-        let end = self.stages[index].end;
-        if self.exit_depth.value() < end.value() { self.exit_depth } else { end }
+        self.limit_in(&self.stages[index])
+    }
+
+    /// The same of a `stage`.
+    #[inline(always)]
+    pub(crate) fn limit_in(&self, stage: &Stage<S>) -> S {
+        if self.exit_depth.value() < stage.end.value() { self.exit_depth } else { stage.end }
     }
 
     /// The same problem in another number type, coefficients taken over by value.

@@ -905,7 +905,9 @@ impl Scene {
             return self.resolve(impact_speed);
         }
         Parameter::Velocity.admit(impact_speed)?;
-        let mut problem = Problem { impact_speed, ..problem.clone() };
+        // A clone of the list would go stage by stage.
+        let stages = Stages::from_slice(&problem.stages);
+        let mut problem = Problem { impact_speed, stages, laws: problem.laws.clone(), ..*problem };
         let continuous = self.concrete().is_some_and(|c| c.crater_stiffness == CraterStiffness::Continuous);
         if let (Some(crater), true) = (problem.crater, continuous) {
             let stages = &mut problem.stages;

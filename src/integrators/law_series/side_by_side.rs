@@ -36,7 +36,8 @@ type Wide = Lanes<WIDTH>;
 pub(in crate::integrators) fn serves(problem: &Problem) -> bool {
     let law = |stage: usize| problem.laws.of(stage);
     let mut stages = 0..problem.stages.len();
-    flight::starts(problem)
+    !problem.laws.is_empty()
+        && flight::starts(problem)
         && stages.clone().all(|stage| law(stage).is_some())
         && stages.any(|stage| law(stage).is_some_and(goes_by_series))
 }
@@ -48,8 +49,9 @@ fn goes_by_series(law: &Law) -> bool {
     law.bound().is_some() && (law.end().is_some() || !law.is_of_velocity() && law.by_square_of_v().is_none())
 }
 
-/// The flights of `problems` by the default method, in their order.
-pub(in crate::integrators) fn solve(problems: &[&Problem], instructions: Instructions) -> Vec<Solved<Flight>> {
+/// The flights of those of `problems` that it serves, by the default method, in their order.
+pub(in crate::integrators) fn solve(problems: &[Problem], instructions: Instructions) -> Vec<Solved<Flight>> {
+    let problems: Vec<&Problem> = problems.iter().filter(|problem| serves(problem)).collect();
     let mut jets = Jets::default();
     let solve = |group: &[&Problem]| Group::new(group, instructions, &mut jets).solve();
     problems.chunks(TOGETHER).flat_map(solve).collect()
