@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::hypotheses::{Fault, How, Hypothesis, Parameter, Predicted, hypotheses, predicted};
+use super::hypotheses::{Fault, How, Hypothesis, Parameter, Predicted, hypotheses, predicted, slips_of_scenes};
 use super::questions::{Content, Question};
 use crate::exchange::peers::wire::conditioning;
 use crate::physics::State;
@@ -545,7 +545,7 @@ fn inside(low: f64, high: f64) -> f64 {
 }
 
 /// How far causes are looked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Effort {
     /// What explains all: the others are dropped at the first answer that they do not explain.
     All,
@@ -581,7 +581,10 @@ pub(super) fn causes(seen: &[Seen<'_>], reads_scene: bool, others: &[&Question],
     }
     let evidence =
         Evidence { failing, passing: seen.iter().filter(|seen| !seen.fails).collect(), left: effort.may_leave(of) };
+    // A slip explains all, or it says nothing.
+    let slips = if reads_scene && effort <= Effort::Nearly { slips_of_scenes() } else { &[] };
     let usable: Vec<&'static Hypothesis> = hypotheses()
+        .chain(slips)
         .filter(|hypothesis| reads_scene || !hypothesis.needs_scene())
         .filter(|hypothesis| hypothesis.id != "outcome-name" || evidence.failing.iter().all(|seen| seen.is_misnamed))
         .collect();

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 pub(crate) use self::told::mistold;
 #[cfg(test)]
 pub(super) use self::told::{Answering, Staged, altered, by_stages, exact};
+#[cfg(test)]
+use super::hypotheses::slips_of_scenes;
 use super::hypotheses::{Fault, How, Hypothesis, Parameter, hypotheses, predict};
 use super::questions::{Question, questions};
 use super::{Cause, Certainty, Diagnosis, Plan, Solver, Verdict, by_questions, diagnose};
@@ -121,12 +123,29 @@ impl Solver for Paper {
 /// How many known causes are tried, each `each`-th of them, and those that are not named, with their number, to a solver that has
 /// this one fault and is asked `count` questions.
 pub(crate) fn misnamed(seed: u64, count: usize, each: usize) -> (usize, Vec<String>) {
-    // Shared: what a fault makes of a question is computed once, and not for each solver.
-    let of_stages_and_of_scenes = [false, true].map(|of_scenes| questions(seed, count, of_scenes));
     let is_tried = |hypothesis: &&Hypothesis| {
         hypothesis.id != "outcome-name" && !matches!(hypothesis.parameter, Parameter::Choice(_))
     };
-    let all: Vec<&'static Hypothesis> = hypotheses().filter(is_tried).step_by(each.max(1)).collect();
+    misnamed_of(&hypotheses().filter(is_tried).step_by(each.max(1)).collect::<Vec<_>>(), seed, count)
+}
+
+/// The same of slips in the formulas of a scene that flights show.
+#[cfg(test)]
+pub(super) fn misnamed_slips(seed: u64, count: usize) -> (usize, Vec<String>) {
+    let questions = questions(seed, count, true);
+    let is_seen = |slip: &&Hypothesis| {
+        let moves = |question: &&Question| {
+            let found = predict(question, &[(slip, 1.0)], How::Exact);
+            found.is_some_and(|(_, found)| (found.end.depth / question.exact.end.depth - 1.0).abs() > 1e-3)
+        };
+        questions.iter().filter(moves).count() > 10
+    };
+    misnamed_of(&slips_of_scenes().iter().filter(is_seen).collect::<Vec<_>>(), seed, count)
+}
+
+fn misnamed_of(all: &[&'static Hypothesis], seed: u64, count: usize) -> (usize, Vec<String>) {
+    // Shared: what a fault makes of a question is computed once, and not for each solver.
+    let of_stages_and_of_scenes = [false, true].map(|of_scenes| questions(seed, count, of_scenes));
     let missed = all.par_iter().filter_map(|hypothesis| {
         let number = hypothesis.parameter.example();
         let questions = &of_stages_and_of_scenes[usize::from(hypothesis.needs_scene())];

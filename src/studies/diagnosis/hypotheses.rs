@@ -59,9 +59,11 @@ macro_rules! bounded {
 mod events;
 mod force;
 mod formulas;
+mod neighbours;
 mod report;
 mod scene;
 mod spread;
+mod written;
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -71,6 +73,8 @@ use rayon::prelude::*;
 #[cfg(feature = "report")]
 use serde::Serialize;
 
+use self::written::Written;
+pub(super) use self::written::slips_of_scenes;
 #[cfg(feature = "report")]
 use super::Each;
 #[cfg(feature = "report")]
@@ -151,6 +155,8 @@ pub(super) enum Parameter {
 pub(super) enum Change {
     /// The scene, for a solver that reads it.
     Scene(fn(&mut Scene, f64)),
+    /// What is formed of the scene.
+    Written(&'static Written),
     /// The problem.
     Problem(fn(&mut Problem, f64)),
     /// The force.
@@ -305,14 +311,19 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
     let changes =
         || faults.iter().flat_map(|(fault, number)| fault.changes.iter().map(move |change| (change, *number)));
     let mut problem = question.problem.clone();
-    if changes().any(|(change, _)| matches!(change, Change::Scene(_))) {
+    if changes().any(|(change, _)| matches!(change, Change::Scene(_) | Change::Written(_))) {
         let mut scene = question.scene.clone()?;
+        let mut written = None;
         for (change, number) in changes() {
-            if let Change::Scene(alter) = change {
-                alter(&mut scene, number);
+            match change {
+                Change::Scene(alter) => alter(&mut scene, number),
+                // Two formulas cannot both be the one.
+                Change::Written(_) if written.is_some() => return None,
+                Change::Written(other) => written = Some(other),
+                _ => {}
             }
         }
-        problem = scene.problem().ok()?;
+        problem = written.map_or_else(|| scene.problem().ok(), |written| written.problem(&scene))?;
     }
     for (change, number) in changes() {
         match change {
@@ -461,6 +472,7 @@ pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
         .chain(report::UNEVEN_TIMES.iter().flatten())
         .chain(scene::FAULTS)
         .chain(formulas::FAULTS)
+        .chain(neighbours::FAULTS.iter().flatten())
         .chain(spread::PARTS.iter().flatten())
         .chain(&spread::LENGTHS)
         .chain(force::EARLIER)
@@ -469,7 +481,7 @@ pub(super) fn hypotheses() -> impl Iterator<Item = &'static Hypothesis> {
 impl Hypothesis {
     /// Whether it is about a solver that reads the scene.
     pub(super) fn needs_scene(&self) -> bool {
-        self.changes.iter().any(|change| matches!(change, Change::Scene(_) | Change::OfScene(_)))
+        self.changes.iter().any(|change| matches!(change, Change::Scene(_) | Change::Written(_) | Change::OfScene(_)))
     }
 
     /// Whether it has a force of its own.

@@ -140,6 +140,17 @@ fn exit_in(problem: &mut Problem, is_seen: impl Fn(usize) -> bool, is_late: bool
     }
 }
 
+/// Time and velocity at an exit that are those at the end of its stage, or of rest before that, unless it `is_seen`.
+fn state_at_end_of_stage(problem: &Problem, found: &mut Simulated, is_seen: impl Fn(usize) -> bool) {
+    let mut moved = problem.clone();
+    exit_in(&mut moved, is_seen, true);
+    if found.end.depth >= problem.exit_depth
+        && let Some(Simulated { end, .. }) = solve(&moved)
+    {
+        found.end = if end.velocity > 0.0 { State { depth: problem.exit_depth, ..end } } else { end };
+    }
+}
+
 /// V behind a crater of the depth k d whose force goes on into the tunnel: `c k d = P + Q V²` and `M (V0² - V²) = c (k d)²`.
 fn of_one_force(at: &Passage<'_>, depth: f64) -> f64 {
     let (mass, tunnel, impact) = (at.problem.mass, at.problem.stages[at.index + 1], at.start.velocity);
@@ -672,15 +683,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "exit-late",
         "time and velocity at an exit inside a stage are those of the end of that stage, or of rest before it",
         Parameter::None,
-        &[Change::Report(|p, found, _| {
-            let mut moved = p.clone();
-            exit_in(&mut moved, |_| false, true);
-            if found.end.depth >= p.exit_depth
-                && let Some(Simulated { end, .. }) = solve(&moved)
-            {
-                found.end = if end.velocity > 0.0 { State { depth: p.exit_depth, ..end } } else { end };
-            }
-        })],
+        &[Change::Report(|p, found, _| state_at_end_of_stage(p, found, |_| false))],
+    ),
+    of(
+        "exit-late",
+        "time and velocity at an exit in front of the last stage are those of the end of its stage, or of rest before it",
+        Parameter::None,
+        &[Change::Report(|p, found, _| state_at_end_of_stage(p, found, |stage| stage + 1 == p.stages.len()))],
     ),
     of(
         "exit-missed",

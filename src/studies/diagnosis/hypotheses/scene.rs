@@ -240,6 +240,18 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::Scene(|s, more| concrete(s, |c| c.crater_ratio += more))],
     ),
     of(
+        "input-rounded",
+        "k is rounded to a multiple of {}",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, grain| concrete(s, |c| c.crater_ratio = to_grain(c.crater_ratio, grain)))],
+    ),
+    of(
+        "input-rounded",
+        "k is cut to a multiple of {}",
+        Parameter::OneOf(GRAINS),
+        &[Change::Scene(|s, grain| concrete(s, |c| c.crater_ratio = (c.crater_ratio / grain).floor() * grain))],
+    ),
+    of(
         "parameter:thickness",
         "the thickness is {} times the right one",
         Parameter::Factor,
