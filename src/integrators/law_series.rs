@@ -192,8 +192,8 @@ struct Held<'l, S, const K: usize> {
 /// The solution on a step.
 enum Solution<'l, S, const K: usize> {
     Series(Path<S, K>),
-    /// Of a force of the velocity alone, to this length in s.
-    Integrals(Integrals<'l, S>, f64),
+    /// Of a force of the velocity alone, to this length in s, with the state there, its time since the start of the step.
+    Integrals(Integrals<'l, S>, f64, State<S>),
     /// Of a force `p(x) + q(x) V²`, its length 1.
     Stretch(Stretch<'l, S>),
 }
@@ -478,7 +478,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
     fn span(&self) -> f64 {
         match self {
             Self::Series(path) => path.span,
-            Self::Integrals(_, span) => *span,
+            Self::Integrals(_, span, _) => *span,
             Self::Stretch(_) => 1.0,
         }
     }
@@ -487,7 +487,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
     fn at(&self, s: S) -> State<S> {
         match self {
             Self::Series(path) => path.at(s),
-            Self::Integrals(integrals, _) => integrals.at(s),
+            Self::Integrals(integrals, ..) => integrals.at(s),
             Self::Stretch(stretch) => stretch.at(s),
         }
     }
@@ -505,7 +505,7 @@ impl<S: Scalar, const K: usize> Solution<'_, S, K> {
                     root_before(passed, end)
                 }
             },
-            Self::Integrals(integrals, _) => integrals.moment(since, end),
+            Self::Integrals(integrals, ..) => integrals.moment(since, end),
             Self::Stretch(stretch) => stretch.moment(since, end),
         }
     }
@@ -753,7 +753,10 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             Solution::Stretch(stretch) => (stretch.evaluations, (s, event, None)),
         };
         course.cost.force_evaluations += evaluations as u64;
-        let local = path.at(s);
+        let local = match path {
+            Solution::Integrals(_, _, end) if event != Event::Limit => end,
+            _ => path.at(s),
+        };
         let next = State {
             time: start.time + local.time,
             depth: if event == Event::Limit { limit } else { local.depth },
@@ -1005,7 +1008,7 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             } else {
                 (S::from_f64(span), if is_rest { Event::Rest } else { Event::None })
             };
-            return Some(Held { path: Solution::Integrals(integrals, span), kinks, ending, left_out });
+            return Some(Held { path: Solution::Integrals(integrals, span, end), kinks, ending, left_out });
         }
         None
     }

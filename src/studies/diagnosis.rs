@@ -254,6 +254,7 @@ pub struct Diagnosis {
 }
 
 /// Answers to one question.
+#[derive(Clone)]
 struct Answered<'a> {
     question: &'a Question,
     /// Setting (tolerance or step) and answer, or why there is none.
@@ -412,9 +413,12 @@ fn finish(mut diagnosis: Diagnosis) -> Diagnosis {
     diagnosis
 }
 
-/// The smallest question that fails, and what failing questions hold that passing ones do not.
+/// The smallest question that fails, and what failing questions hold that passing ones do not; those about flights, if one fails.
 fn separation(asked: &[Asked]) -> String {
-    let failing: Vec<&Asked> = asked.iter().filter(|asked| asked.verdict == Verdict::Failed).collect();
+    let mut failing: Vec<&Asked> = asked.iter().filter(|asked| asked.verdict == Verdict::Failed).collect();
+    if failing.iter().any(|asked| !asked.contains.contains(&Content::NoSpeed)) {
+        failing.retain(|asked| !asked.contains.contains(&Content::NoSpeed));
+    }
     let passing: Vec<&Asked> = asked.iter().filter(|asked| asked.verdict == Verdict::Passed).collect();
     let smallest = failing.iter().min_by_key(|asked| asked.contains.len());
     let smallest = smallest.map_or(String::new(), |asked| {

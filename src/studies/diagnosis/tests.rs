@@ -281,3 +281,24 @@ fn a_number_that_is_kept_of_a_target_with_another_speed_or_mass_fails() {
         assert!(["input-kept", "state-kept"].contains(&found.causes[0].id.as_str()), "{:?}", found.causes);
     }
 }
+
+/// A projectile without speed answered as if it had some, and a drag that is wrong as well.
+#[test]
+fn a_projectile_without_speed_is_judged_by_itself() {
+    let found_by = |drag: f64| {
+        let solver = Answering::plain(move |request| {
+            let mut problem = request.problem(None);
+            problem.stages.iter_mut().for_each(|law| law.drag *= drag);
+            let flight = exact(&problem)?;
+            let is_still = request.velocity_m_s == 0.0;
+            let end = if is_still { State { time: 1e-3, depth: -1e-3, velocity: 0.0 } } else { flight.end };
+            Some(answer(flight.outcome, end))
+        });
+        diagnosed(solver, Plan::default())
+    };
+    let ids = |found: &Diagnosis| found.causes.iter().map(|cause| cause.id.clone()).collect::<Vec<_>>();
+    let alone = found_by(1.0);
+    assert_eq!((alone.verdict, &ids(&alone)[..]), (Verdict::Failed, &["no-speed".to_owned()][..]));
+    let both = found_by(1.5);
+    assert!(ids(&both)[0] == "term:drag" && both.causes[0].certainty == Certainty::Certain, "{:?}", both.causes);
+}

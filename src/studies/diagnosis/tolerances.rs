@@ -266,8 +266,34 @@ fn no_answer(rows: &[Asked], silent: usize, failed: usize) -> Cause {
     Cause::plain("no-answer", statement, certainty, silent, failed)
 }
 
-/// Causes of the answers of an adaptive solver.
+/// Causes of the answers of an adaptive solver. What it makes of a projectile without speed is judged by itself: that is no flight.
 fn causes_of(answered: &[Answered<'_>], identity: &PeerIdentity, all: &[Question], effort: Effort) -> Vec<Cause> {
+    let is_wrong = |one: &&Answered<'_>| {
+        let row = row(one);
+        row.verdict == Verdict::Failed && row.answered.is_some()
+    };
+    let (standing, flights): (Vec<&Answered<'_>>, Vec<&Answered<'_>>) =
+        answered.iter().partition(|one| one.question.problem.impact_speed == 0.0);
+    let wrong = standing.iter().copied().filter(is_wrong).count();
+    if wrong == 0 {
+        return causes_of_flights(answered, identity, all, effort);
+    }
+    let flights: Vec<Answered<'_>> = flights.into_iter().cloned().collect();
+    let mut found = causes_of_flights(&flights, identity, all, effort);
+    let statement = "a projectile without speed is not left at rest on the face, at t = 0".to_owned();
+    let fail = flights.iter().any(|one| row(one).verdict == Verdict::Failed);
+    let certainty = if fail { Certainty::Possible } else { Certainty::Likely };
+    found.push(Cause::plain("no-speed", statement, certainty, wrong, wrong));
+    found
+}
+
+/// The same where each question is a flight, or a projectile without speed is left alone.
+fn causes_of_flights(
+    answered: &[Answered<'_>],
+    identity: &PeerIdentity,
+    all: &[Question],
+    effort: Effort,
+) -> Vec<Cause> {
     let rows: Vec<Asked> = answered.iter().map(row).collect();
     let failed = rows.iter().filter(|row| row.verdict == Verdict::Failed).count();
     let silent = rows.iter().filter(|row| row.verdict == Verdict::Failed && row.answered.is_none()).count();

@@ -258,7 +258,7 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "unit:time",
-        "the time reported is {} times the right one",
+        "the time is {} times the right one, and the path is right",
         Parameter::Unit,
         &[Change::Report(|_, found, f| found.end.time *= f)],
     ),

@@ -201,6 +201,10 @@ fn tokens(text: &str) -> Vec<String> {
     all
 }
 
+fn is_name(token: &str) -> bool {
+    token.starts_with(|c: char| c.is_ascii_alphabetic())
+}
+
 fn is_operator(token: &str) -> bool {
     ["+", "-", "*", "/", "^"].contains(&token)
 }
@@ -254,7 +258,7 @@ fn slips(text: &str, names: &[&str]) -> Vec<String> {
             ] {
                 with(here.clone(), &other.to_string());
             }
-        } else if token.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        } else if is_name(token) {
             for name in names.iter().filter(|name| *name != token) {
                 with(here.clone(), name);
             }
@@ -266,6 +270,20 @@ fn slips(text: &str, names: &[&str]) -> Vec<String> {
             for other in ["+", "-", "*", "/"] {
                 with(here.clone(), other);
             }
+        }
+    }
+    // Two names exchanged.
+    let mut words: Vec<&String> = tokens.iter().filter(|token| is_name(token)).collect();
+    words.sort();
+    words.dedup();
+    for (place, one) in words.iter().enumerate() {
+        for other in &words[place + 1..] {
+            let exchanged = |token| match () {
+                () if token == *one => *other,
+                () if token == *other => *one,
+                () => token,
+            };
+            all.push(tokens.iter().map(|token| exchanged(token).as_str()).collect());
         }
     }
     // A bracket at another place, or a pair of them left out.
