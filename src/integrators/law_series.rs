@@ -112,6 +112,10 @@ const STILL_ENOUGH: f64 = 0.05;
 const TRIED_TO_REST: [f64; 3] = [1.0, 0.85, 0.5];
 const TRIED_BY_SHARES: [f64; 3] = [10.0, 3.0, 1.0];
 
+/// Part by which the force departs from one power of V, and from a logarithm of it, above which the longest length by shares is not worth
+/// a trial: two terms of unlike powers put a pole of 1/F next to the step.
+const BENT: f64 = 1e-2;
+
 /// Radius of the disc on which a force must have a bound, over the length of a step by series, and over half of one by integrals. An error
 /// of 22 coefficients falls as 2.5^-22, and that of the rule, whose ellipse has these half axes in it, as 2.6^-48. With fewer coefficients the
 /// first radius is greater, so that as little is left out, or the tolerance.
@@ -971,8 +975,12 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
     /// A step over the velocity, of a force of it alone.
     fn over_velocities(&mut self, start: State<S>, limit: S) -> Option<Held<'l, S, K>> {
         let integrals = Integrals::new(self.bound, self.mass, start, Arc::clone(&self.falling));
-        let tried = if self.falling.fall == Fall::Exponential { TRIED_BY_SHARES } else { TRIED_TO_REST };
-        for longest in tried {
+        let tried = match self.falling.fall {
+            Fall::Exponential if self.is_bent(&integrals) => &TRIED_BY_SHARES[1..],
+            Fall::Exponential => &TRIED_BY_SHARES,
+            Fall::Power(_) => &TRIED_TO_REST[..],
+        };
+        for &longest in tried {
             let (mut span, mut kinks) = (longest, Kinks::new());
             if let Some((root, switches)) = self.first_departure(&integrals, span) {
                 (span, kinks) = (root, switches);
@@ -1011,6 +1019,14 @@ impl<'l, S: Scalar, const K: usize> Walk<'l, S, K> {
             return Some(Held { path: Solution::Integrals(integrals, span, end), kinks, ending, left_out });
         }
         None
+    }
+
+    /// Whether the force at s = 0, 1 and 2 is neither a power of V nor a logarithm, nearly.
+    fn is_bent(&self, integrals: &Integrals<'_, S>) -> bool {
+        let depth = integrals.start.depth.value();
+        let [start, one, two] =
+            [0.0, 1.0, 2.0].map(|s| self.law.force_value(depth, integrals.velocity(S::from_f64(s)).value()));
+        (one * one / (start * two) - 1.0).abs() > BENT && (start - 2.0 * one + two).abs() > BENT * one
     }
 
     /// The first place at which a switch has left its side by the end of `span`, and the switches that do so there.

@@ -32,6 +32,9 @@ const FEW: usize = 16;
 /// Registers that need no allocation.
 const MANY: usize = 96;
 
+/// Switches of an expression for whose sides it is kept how V falls.
+const SWITCHES_KEPT: usize = 2;
+
 /// An expression with values of its parameters.
 #[derive(Clone, Debug)]
 pub struct Bound<S = f64> {
@@ -47,8 +50,8 @@ pub struct Bound<S = f64> {
     signs: Vec<bool>,
     /// Whether the value is known not to fall with V, at any depth.
     never_falls_with_v: bool,
-    /// How V falls best, where no switch has a side; once it is asked.
-    falling: OnceLock<Arc<Falling>>,
+    /// How V falls over a step, for the sides of up to [`SWITCHES_KEPT`] switches.
+    falling: [OnceLock<Arc<Falling>>; 1 << SWITCHES_KEPT],
 }
 
 /// What a term became.
@@ -507,7 +510,7 @@ impl<S: Scalar> Bound<S> {
             beside,
             signs,
             never_falls_with_v,
-            falling: OnceLock::new(),
+            falling: Default::default(),
         }
     }
 
@@ -708,10 +711,12 @@ impl<S: Scalar> Bound<S> {
     /// # Panics
     /// If there is not a side for each of [`Bound::switches`].
     pub fn falling(&self, sides: &[bool]) -> Arc<Falling> {
-        if self.switches.is_empty() {
-            return Arc::clone(self.falling.get_or_init(|| Arc::new(self.falling_on(sides))));
+        let find = || Arc::new(self.falling_on(sides));
+        if self.switches.len() > SWITCHES_KEPT {
+            return find();
         }
-        Arc::new(self.falling_on(sides))
+        let place = sides.iter().fold(0, |place, side| 2 * place + usize::from(*side));
+        Arc::clone(self.falling[place].get_or_init(find))
     }
 
     fn falling_on(&self, sides: &[bool]) -> Falling {
@@ -793,7 +798,7 @@ impl Bound {
             beside: None,
             signs: first.signs.clone(),
             never_falls_with_v: first.never_falls_with_v,
-            falling: OnceLock::new(),
+            falling: Default::default(),
         })
     }
 
