@@ -341,6 +341,7 @@ fn check(table: &DeTable<'_>, home: &str) -> Result<(), Fault> {
             (Some(keys), _) if keys.starts_with("*.") => return mistyped(value, "an array"),
             (Some(_), DeValue::Table(table)) => check(table, &path)?,
             (Some(_), DeValue::String(_)) if path == FORCE => {}
+            (Some(_), _) if path == FORCE => return mistyped(value, "an expression in quotes, or a table"),
             (Some(_), _) => return mistyped(value, "a table"),
             (None, DeValue::Table(_)) if path == PARAMETERS => {}
             (None, _) if path == PARAMETERS => return mistyped(value, "a table"),

@@ -14,11 +14,12 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::advice::Advice;
-use super::law::Name;
+use super::expression::Unit;
+use super::law::{Name, OwnParameter};
 use super::problem::Stage;
 use super::scene::Resistance::{Concrete, Stages};
 use super::scene::{CraterStiffness, Layer, Range, ResolveError, Resolved, Scene};
-use super::units::{Dimension, QuantityError, number, quantity};
+use super::units::{Dimension, Quantity, QuantityError, number, quantity};
 use super::{groups, semi_empirical};
 
 /// A number of a scene, or a group of them.
@@ -273,6 +274,55 @@ impl Parameter {
             (bare, _) => bare,
         };
         read.map_err(|cause| ParameterError::Value { parameter: self, text: text.to_owned(), cause })
+    }
+
+    /// The values that two texts give the number, in SI units, and the unit of both, where it is a parameter of a law and has any:
+    /// [`Parameter::admit_unit`] says whether a scene has it in that.
+    ///
+    /// # Errors
+    /// [`ParameterError::Value`]; [`ParameterError::OneUnit`] or [`ParameterError::OtherUnit`] where the two differ.
+    pub fn parse_ends(self, ends: [&str; 2]) -> Result<([f64; 2], Option<Unit>), ParameterError> {
+        let [from, to] = ends;
+        let ((from, unit), (to, unit_of_to)) = (self.parse_value_and_unit(from)?, self.parse_value_and_unit(to)?);
+        let [from_is_bare, to_is_bare] = ends.map(|text| number(text.trim()).is_ok());
+        // Zero is zero in every unit.
+        if from_is_bare != to_is_bare && from != 0.0 && to != 0.0 {
+            let [from, to] = ends.map(str::to_owned);
+            return Err(ParameterError::OneUnit { from, to });
+        }
+        match (unit, unit_of_to) {
+            (Some(right), Some(unit)) if unit != right => {
+                Err(ParameterError::OtherUnit { parameter: self, unit, right })
+            }
+            _ => Ok(([from, to], unit.or(unit_of_to))),
+        }
+    }
+
+    /// As [`Parameter::parse_value`], with the unit that `text` gives a parameter of a law.
+    fn parse_value_and_unit(self, text: &str) -> Result<(f64, Option<Unit>), ParameterError> {
+        let text = text.trim();
+        if !matches!(self, Self::Own(_)) || number(text).is_ok() {
+            return Ok((self.parse_value(text)?, None));
+        }
+        let read = Quantity::with_any_unit(text);
+        let (quantity, powers) =
+            read.map_err(|cause| ParameterError::Value { parameter: self, text: text.to_owned(), cause })?;
+        // A unit of too high a power is none that a parameter has.
+        Ok((quantity.value, Some(Unit::of(&powers).unwrap_or_default())))
+    }
+
+    /// Whether `unit` is the one that `scene` has for the number; no unit is that of a bare number, in SI.
+    ///
+    /// # Errors
+    /// [`ParameterError::OtherUnit`].
+    pub fn admit_unit(self, scene: &Scene, unit: Option<Unit>) -> Result<(), ParameterError> {
+        let own = scene.parameters.iter().find(|one| Self::Own(one.name) == self);
+        match (own, unit) {
+            (Some(OwnParameter { unit: right, .. }), Some(unit)) if unit != *right => {
+                Err(ParameterError::OtherUnit { parameter: self, unit, right: *right })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Every number that `scene` gives, groups left out, in the order of the type.
@@ -571,6 +621,24 @@ pub enum ParameterError {
         /// What is wrong with it.
         cause: QuantityError,
     },
+    /// One end with a unit and one without: a bare number is SI, which is hardly meant.
+    #[error("`{from}:{to}` has one unit and needs two")]
+    OneUnit {
+        /// Text of the first value.
+        from: String,
+        /// Text of the last value.
+        to: String,
+    },
+    /// A parameter of a law in another unit than the scene has it in, or the other end.
+    #[error("`{parameter}` is in {right}, and {unit} is given")]
+    OtherUnit {
+        /// The parameter.
+        parameter: Parameter,
+        /// The unit written.
+        unit: Unit,
+        /// That of the scene.
+        right: Unit,
+    },
     /// A text that is no spread.
     #[error("`{0}` is not of the form PATH=REL, REL from 0 to 1 or in percent")]
     Spread(String),
@@ -595,8 +663,13 @@ impl Advice for ParameterError {
             Self::Absent { .. } => "vary a number that the scene file gives".to_owned(),
             Self::Value { parameter, .. } => match parameter.entry().dimension {
                 Some(dimension) => format!("write {} with its unit, or a bare SI number", dimension.noun()),
+                None if matches!(parameter, Parameter::Own(_)) => {
+                    "write it with its unit, such as 300MPa, or as a bare SI number".to_owned()
+                }
                 None => "write a plain number".to_owned(),
             },
+            Self::OneUnit { .. } => "give both ends a unit, or neither for SI".to_owned(),
+            Self::OtherUnit { right, .. } => format!("write it in a unit of {right}, or as a bare SI number"),
             Self::Spread(_) | Self::Group(_) => {
                 "write for example --spread target.strength=5%, or 5%:normal, 5%:uniform".to_owned()
             }

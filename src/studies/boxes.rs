@@ -12,8 +12,8 @@ use super::error::Studied;
 use crate::integrators::{Detail, Flight};
 use crate::physics::ball::Ball;
 use crate::physics::decimals::Written;
+use crate::physics::expression::Unit;
 use crate::physics::parameter::{LayerNumber, Parameter, ParameterError, StageNumber};
-use crate::physics::units::number;
 use crate::physics::{Advice, CraterStiffness, Criterion, Outcome, Resistance, Scalar, Scene, State};
 
 /// Pieces along each number whose sign is not proved, by how many there are.
@@ -28,6 +28,8 @@ pub struct Side {
     pub low: f64,
     /// The greatest.
     pub high: f64,
+    /// The unit that both are written in, where the number is a parameter of a law.
+    pub unit: Option<Unit>,
 }
 
 /// Why there is no such box. All are mistakes of the caller, exit code 2.
@@ -43,9 +45,6 @@ pub enum BoxError {
     /// A group, which moves another number.
     #[error("`{0}` is a group of numbers, and a box is of numbers of the scene")]
     Group(Parameter),
-    /// One end with a unit and one without: a bare number is SI, which is hardly meant.
-    #[error("`{0}` has one unit and needs two")]
-    OneUnit(String),
     /// The greatest value lies below the least.
     #[error("`{0}` falls: the least value comes first")]
     Falls(String),
@@ -62,7 +61,6 @@ impl Advice for BoxError {
         match self {
             Self::Parameter(error) => error.help(),
             Self::Group(parameter) => format!("give `{}` in its place", parameter.moves()),
-            Self::OneUnit(_) => "give both ends a unit, or neither for SI".to_owned(),
             Self::TooMany(_) => "leave one of them at its value".to_owned(),
             _ => "write for example target.strength=34MPa:38MPa".to_owned(),
         }
@@ -80,13 +78,8 @@ impl FromStr for Side {
         if parameter.moves() != parameter {
             return Err(BoxError::Group(parameter));
         }
-        let (low, high) = (parameter.parse_value(from)?, parameter.parse_value(to)?);
-        let [low_is_bare, high_is_bare] = [from, to].map(|text| number(text.trim()).is_ok());
-        // Zero is zero in every unit.
-        if low_is_bare != high_is_bare && low != 0.0 && high != 0.0 {
-            return Err(BoxError::OneUnit(text.to_owned()));
-        }
-        if high < low { Err(BoxError::Falls(text.to_owned())) } else { Ok(Self { parameter, low, high }) }
+        let ([low, high], unit) = parameter.parse_ends([from, to])?;
+        if high < low { Err(BoxError::Falls(text.to_owned())) } else { Ok(Self { parameter, low, high, unit }) }
     }
 }
 
@@ -147,6 +140,7 @@ impl<'a> Region<'a> {
             if sides[..index].iter().any(|other| other.parameter == side.parameter) {
                 return Err(BoxError::Twice(side.parameter));
             }
+            side.parameter.admit_unit(&probe, side.unit)?;
             side.parameter.set(&mut probe, side.low)?;
             side.parameter.set(&mut probe, side.high)?;
         }

@@ -19,10 +19,10 @@ use super::error::{Studied, StudyError};
 use crate::exchange::tables::{self, Column, Format, Kind, Others, TableError, Value};
 use crate::integrators::{Detail, Integrator, MethodName};
 use crate::physics::decimals::Written;
+use crate::physics::expression::Unit;
 use crate::physics::groups::{Groups, dimensionless_energy};
 use crate::physics::parameter::{Parameter, ParameterError};
 use crate::physics::semi_empirical::{eq15_printed, eq15_unrounded};
-use crate::physics::units::number;
 use crate::physics::{Advice, CraterStiffness, Criterion, Outcome, Range, Resistance, Scene, Shown};
 
 /// Most points of one sweep: a table of a gigabyte.
@@ -40,6 +40,9 @@ pub struct Axis {
     pub from: f64,
     /// Last value, SI.
     pub to: f64,
+    /// The unit that both are written in, where the number is a parameter of a law.
+    #[serde(skip)]
+    pub unit: Option<Unit>,
     /// How many values, both ends among them.
     pub count: usize,
     /// Spaced by ratio in place of difference.
@@ -60,14 +63,6 @@ pub enum SweepError {
     /// A parameter or a value.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// One end with a unit and one without: a bare number is SI, which is hardly meant.
-    #[error("`{from}:{to}` has one unit and needs two")]
-    OneUnit {
-        /// Text of the first value.
-        from: String,
-        /// Text of the last value.
-        to: String,
-    },
     /// A number of values that no two ends have.
     #[error("`{0}` is no number of values: two or more, or one where both ends are equal")]
     Count(String),
@@ -98,7 +93,6 @@ impl Advice for SweepError {
             Self::Parameter(error) => error.help(),
             Self::Twice { .. } => "vary one of them".to_owned(),
             Self::TooMany(_) => "take fewer values".to_owned(),
-            Self::OneUnit { .. } => "give both ends a unit, or neither for SI".to_owned(),
             _ => "write for example H/d=0.5:18:200 or target.strength=20MPa:60MPa:5:log".to_owned(),
         }
     }
@@ -117,14 +111,7 @@ impl std::str::FromStr for Axis {
             [from, to, count, "log"] => (from, to, count, true),
             _ => return Err(form()),
         };
-        let texts = [from, to];
-        let (from, to) = (parameter.parse_value(from)?, parameter.parse_value(to)?);
-        let [from_is_bare, to_is_bare] = texts.map(|text| number(text.trim()).is_ok());
-        // Zero is zero in every unit.
-        if from_is_bare != to_is_bare && from != 0.0 && to != 0.0 {
-            let [from, to] = texts.map(str::to_owned);
-            return Err(SweepError::OneUnit { from, to });
-        }
+        let ([from, to], unit) = parameter.parse_ends([from, to])?;
         let bad_count = || SweepError::Count(count.to_owned());
         let count: usize = count.trim().parse().map_err(|_| bad_count())?;
         if count == 0 || (count == 1 && from != to) {
@@ -136,7 +123,7 @@ impl std::str::FromStr for Axis {
         if logarithmic && !(from > 0.0 && to > 0.0) {
             return Err(SweepError::Logarithm { from, to });
         }
-        Ok(Self { parameter, from, to, count, logarithmic })
+        Ok(Self { parameter, from, to, unit, count, logarithmic })
     }
 }
 
@@ -263,7 +250,14 @@ impl Plan {
         let mut data = Vec::with_capacity(points.len());
         for &(thickness_ratio, measured) in points {
             let parameter = Parameter::ThicknessRatio;
-            let axis = Axis { parameter, from: thickness_ratio, to: thickness_ratio, count: 1, logarithmic: false };
+            let axis = Axis {
+                parameter,
+                from: thickness_ratio,
+                to: thickness_ratio,
+                unit: None,
+                count: 1,
+                logarithmic: false,
+            };
             let there = Self::new(self.scene().clone(), &[axis])?.run(integrator);
             data.extend(there.into_iter().map(|row| {
                 let Row { energy_full_depth, energy_ndrc, eq15_printed, .. } = row;
@@ -293,6 +287,7 @@ impl Plan {
         }
         let mut probe = scene.clone();
         for axis in axes {
+            axis.parameter.admit_unit(&probe, axis.unit)?;
             axis.parameter.set(&mut probe, axis.from)?;
         }
         Ok(Self { scene, written: Written::default(), axes: axes.iter().cloned().collect() })
@@ -562,7 +557,10 @@ mod tests {
         }
         assert!(matches!("N=0:2:3:log".parse::<Axis>(), Err(SweepError::Logarithm { .. })));
         for text in ["target.strength=20MPa:60:3", "target.strength=20e6:60 MPa:3"] {
-            assert!(matches!(text.parse::<Axis>(), Err(SweepError::OneUnit { .. })), "{text}");
+            assert!(
+                matches!(text.parse::<Axis>(), Err(SweepError::Parameter(ParameterError::OneUnit { .. }))),
+                "{text}"
+            );
         }
         for text in ["target.thickness=0:60mm:3", "target.thickness=60 mm:0:3", "target.strength=20e6:60e6:3"] {
             assert!(text.parse::<Axis>().is_ok(), "{text}");
@@ -573,6 +571,22 @@ mod tests {
         assert!(matches!(refused, Err(SweepError::Twice { .. })));
         let refused = Plan::new(slab(), &[axis("N=1:2:10000"), axis("I=1:2:10000")]);
         assert!(matches!(refused, Err(SweepError::TooMany(100_000_000))));
+    }
+
+    #[test]
+    fn a_parameter_of_a_law_is_varied_in_its_own_unit_or_in_si_and_in_no_other() {
+        let axis = |text: &str| text.parse::<Axis>().unwrap();
+        for text in ["parameters.a=300MPa:500 MPa:3", "parameters.a=3e8:5e8:3", "parameters.a=3e8 kg/(m s^2):500MPa:3"]
+        {
+            let axis = axis(text);
+            assert_eq!((axis.from, axis.to), (3e8, 5e8), "{text}");
+            assert!(Plan::new(shipped("law-power"), &[axis]).is_ok(), "{text}");
+        }
+        let refused = Plan::new(shipped("law-power"), &[axis("parameters.a=300mm:500mm:3")]).map(drop).unwrap_err();
+        assert_eq!(refused.to_string(), "`parameters.a` is in Pa, and m is given");
+        for text in ["parameters.a=300MPa:500mm:3", "parameters.a=300MPa:5e8:3"] {
+            assert!(text.parse::<Axis>().is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -55,7 +55,7 @@ check! {
 
 fn sweep(&Sweep { from, to, points }: &Sweep, subject: &Subject<'_>) -> Found {
     let scene = subject.scene()?;
-    let axis = Axis { parameter: Parameter::ThicknessRatio, from, to, count: points, logarithmic: false };
+    let axis = Axis { parameter: Parameter::ThicknessRatio, from, to, unit: None, count: points, logarithmic: false };
     let plan = Plan::new(scene.clone(), &[axis])?;
     let concrete = scene.concrete().ok_or_else(|| NotMeasured::skip("the scene is not of concrete"))?;
     let method = subject.method(None)?;

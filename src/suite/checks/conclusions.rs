@@ -37,7 +37,7 @@ fn concluded(seen: Violations, found: Conclusion) -> Measurement {
 }
 
 fn along(scene: &Scene, from: f64, to: f64, count: usize) -> Found<Plan> {
-    let axis = Axis { parameter: Parameter::ThicknessRatio, from, to, count, logarithmic: false };
+    let axis = Axis { parameter: Parameter::ThicknessRatio, from, to, unit: None, count, logarithmic: false };
     Ok(Plan::new(scene.clone(), &[axis])?)
 }
 

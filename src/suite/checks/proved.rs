@@ -102,7 +102,7 @@ fn random_box(generator: &mut Generator, random: &mut Random, is_near_change: bo
         let high = value * (1.0 + width);
         let high = if parameter == Parameter::NoseFactor { high.min(1.0) } else { high };
         if value > 0.0 && value.is_finite() && sides.iter().all(|side| side.parameter != parameter) {
-            sides.push(Side { parameter, low: value * (1.0 - width), high });
+            sides.push(Side { parameter, low: value * (1.0 - width), high, unit: None });
         }
     }
     (scene, sides)
