@@ -98,7 +98,7 @@ impl Bounded {
 /// A flight in progress.
 pub(crate) struct Course<'a, S = f64> {
     pub(crate) problem: &'a Problem<S>,
-    /// Its stages.
+    /// Its stages, as a slice: the list is asked anew at each use where they lie.
     pub(crate) stages: &'a [Stage<S>],
     pub(crate) detail: Detail<'a>,
     /// State at the start of the present stage; at the end of the flight, its end.

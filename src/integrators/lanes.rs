@@ -170,6 +170,7 @@ impl Batch {
         for part in problems.chunks(BLOCK) {
             block.prepare(part);
             self.instructions.run(&mut block);
+            // Made once one is asked for. Lanes answer none of those that it serves, whose coefficients are no numbers.
             let mut with_laws = None;
             for (index, problem) in part.iter().enumerate() {
                 let alone = || {

@@ -304,11 +304,11 @@ impl Parameter {
         if !matches!(self, Self::Own(_)) || number(text).is_ok() {
             return Ok((self.parse_value(text)?, None));
         }
-        let read = Quantity::with_any_unit(text);
-        let (quantity, powers) =
-            read.map_err(|cause| ParameterError::Value { parameter: self, text: text.to_owned(), cause })?;
-        // A unit of too high a power is none that a parameter has.
-        Ok((quantity.value, Some(Unit::of(&powers).unwrap_or_default())))
+        let error = |cause| ParameterError::Value { parameter: self, text: text.to_owned(), cause };
+        let (quantity, powers) = Quantity::with_any_unit(text).map_err(error)?;
+        // Of too high a power.
+        let unknown = || error(QuantityError::UnknownUnit { unit: text.to_owned() });
+        Ok((quantity.value, Some(Unit::of(&powers).ok_or_else(unknown)?)))
     }
 
     /// Whether `unit` is the one that `scene` has for the number; no unit is that of a bare number, in SI.

@@ -402,6 +402,28 @@ mod tests {
     }
 
     #[test]
+    fn a_wrong_area_is_wrong_in_p_and_q_and_a_wrong_diameter_in_the_crater_too() {
+        let scene = crate::testing::shipped("paper-slab");
+        let right = scene.problem().unwrap();
+        let written = |of: Of, text: &str| {
+            let text = Formula::read(text).unwrap();
+            Written { of, text, exchanged: None }.problem(&scene).unwrap()
+        };
+        let ratios = |wrong: &Problem| {
+            let [(crater, tunnel), (right_crater, right_tunnel)] =
+                [wrong, &right].map(Problem::crater_depth_and_tunnel);
+            [crater / right_crater, tunnel.static_force / right_tunnel.static_force, tunnel.drag / right_tunnel.drag]
+        };
+        let are = |found: [f64; 3], expected: [f64; 3]| {
+            found.iter().zip(expected).all(|(found, expected)| (found / expected - 1.0).abs() < 1e-14)
+        };
+        let area = written(Of::Formula(AREA), "2*pi/4*d^2");
+        assert!(are(ratios(&area), [1.0, 2.0, 2.0]), "{area:?}");
+        let diameter = written(Of::Number(DIAMETER), "2*d");
+        assert!(are(ratios(&diameter), [2.0, 4.0, 4.0]), "{diameter:?}");
+    }
+
+    #[test]
     fn slips_leave_out_exchange_and_move() {
         let right = Formula::read("M + D*Q").unwrap();
         let texts: Vec<String> = others(&slips("M + D*Q", &["k"]), &right).into_iter().map(|one| one.text).collect();
