@@ -302,3 +302,18 @@ fn a_projectile_without_speed_is_judged_by_itself() {
     let both = found_by(1.5);
     assert!(ids(&both)[0] == "term:drag" && both.causes[0].certainty == Certainty::Certain, "{:?}", both.causes);
 }
+
+/// The whole of a first stage that the flight does not leave has the force of the second one.
+#[test]
+fn a_force_that_is_wrong_throughout_a_stage_is_not_told_as_one_of_a_single_step() {
+    let wrong: fn(&mut Problem) = |problem| {
+        if let [first, second, ..] = &mut problem.stages[..]
+            && problem.exit_depth <= first.end
+        {
+            *first = Stage { end: first.end, ..*second };
+        }
+    };
+    let found = diagnosed(strange(wrong), Plan { asks_edges: false, ..Plan::default() });
+    let first = &found.causes[0];
+    assert!(found.verdict == Verdict::Failed && first.id != "force-stale", "{:?}", found.causes);
+}

@@ -18,13 +18,18 @@ fn with_term_of(mut law: Stage, mut other: Stage, term: u8, end: f64) -> Stage {
     Stage { end, ..law }
 }
 
+/// Part of the way through a stage that is one step at most: over all of it the other force would act throughout, which is another fault.
+const OF_STAGE: f64 = 0.9;
+
 /// The last part of the flight, of a `length` (m), with a term of the stage in front of the last one reached, or behind it.
 fn in_last_step<const TERM: u8, const BEHIND: bool>(problem: &mut Problem, right: &State, length: f64) {
     let Some(stage) = problem.stages.iter().position(|law| right.depth <= law.end) else { return };
     let beside = if BEHIND { stage + 1 } else { stage.wrapping_sub(1) };
-    if let Some(other) = problem.stages.get(beside).copied() {
+    if let Some(other) = problem.stages.get(beside).copied()
+        && length <= OF_STAGE * (right.depth - problem.start_of(stage))
+    {
         let law = problem.stages[stage];
-        problem.stages[stage].end = (right.depth - length).max(problem.start_of(stage));
+        problem.stages[stage].end = right.depth - length;
         problem.stages.insert(stage + 1, with_term_of(law, other, TERM, law.end));
     }
 }
@@ -34,9 +39,10 @@ fn in_first_step<const TERM: u8>(problem: &mut Problem, right: &State, length: f
     let Some(stage) = problem.stages.iter().position(|law| right.depth <= law.end).filter(|stage| *stage > 0) else {
         return;
     };
-    let law = problem.stages[stage];
-    let to = (problem.start_of(stage) + length).min(law.end);
-    problem.stages.insert(stage, with_term_of(law, problem.stages[stage - 1], TERM, to));
+    let (law, start) = (problem.stages[stage], problem.start_of(stage));
+    if length <= OF_STAGE * (right.depth - start) {
+        problem.stages.insert(stage, with_term_of(law, problem.stages[stage - 1], TERM, start + length));
+    }
 }
 
 macro_rules! beside {

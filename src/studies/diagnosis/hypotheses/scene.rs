@@ -524,6 +524,19 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         })],
     ),
     of(
+        "parameter:k",
+        "a target that is no thicker than the crater is deep has no crater",
+        Parameter::None,
+        &[Change::Scene(|s, _| {
+            let thickness = s.thickness.unwrap_or(f64::INFINITY);
+            concrete(s, |c| {
+                if thickness <= c.crater_depth() {
+                    c.crater_ratio = 0.0;
+                }
+            });
+        })],
+    ),
+    of(
         "exit-misplaced",
         "the exit lies {} diameters too deep",
         Parameter::Factor,
