@@ -581,7 +581,7 @@ impl<'t> Reader<'t> {
                 format!("`{key}` has no unit"),
                 format!("append one, or leave out the quotes for {}", known[0]),
             ),
-            QuantityError::NoNumber => (
+            QuantityError::NoNumber | QuantityError::Behind { .. } => (
                 number.span(),
                 format!("`{key}` is no quantity: {error}"),
                 format!("write for instance {key} = \"1 {}\"", known[0]),

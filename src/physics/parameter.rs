@@ -19,7 +19,7 @@ use super::law::{Name, OwnParameter};
 use super::problem::Stage;
 use super::scene::Resistance::{Concrete, Stages};
 use super::scene::{CraterStiffness, Layer, Range, ResolveError, Resolved, Scene};
-use super::units::{Dimension, Quantity, QuantityError, number, quantity};
+use super::units::{Dimension, Quantity, QuantityError, number, quantity, split};
 use super::{groups, semi_empirical};
 
 /// A number of a scene, or a group of them.
@@ -271,6 +271,10 @@ impl Parameter {
         let read = match (number(text), self.entry().dimension) {
             // A bare number is SI; anything else must have a unit of the dimension.
             (Err(QuantityError::NoNumber), Some(dimension)) => quantity(text, dimension),
+            (Err(QuantityError::NoNumber), None) => Err(match split(text) {
+                ("", _) => QuantityError::NoNumber,
+                (_, behind) => QuantityError::Behind { text: behind.trim().to_owned() },
+            }),
             (bare, _) => bare,
         };
         read.map_err(|cause| ParameterError::Value { parameter: self, text: text.to_owned(), cause })
@@ -836,6 +840,8 @@ mod tests {
         ] {
             assert!(matches!(parameter.parse_value(text), Err(ParameterError::Value { .. })), "{text}");
         }
+        let behind = Parameter::ThicknessRatio.parse_value("2 m").unwrap_err().to_string();
+        assert_eq!(behind, "`2 m` is no value of `H/d`: it has no unit, and `m` stands behind the number");
     }
 
     #[test]

@@ -160,6 +160,12 @@ pub enum QuantityError {
     /// A number alone.
     #[error("there is no unit")]
     NoUnit,
+    /// A number that has no unit, and something behind it.
+    #[error("it has no unit, and `{text}` stands behind the number")]
+    Behind {
+        /// The text.
+        text: String,
+    },
     /// A unit of another dimension.
     #[error("`{unit}` is a unit of {}", .has.noun())]
     WrongDimension {

@@ -19,6 +19,7 @@ mod numbers;
 mod observations;
 mod questions;
 mod simulation;
+mod slips;
 mod tolerances;
 
 use serde::Serialize;
@@ -296,7 +297,8 @@ fn by_questions(solver: &mut dyn Solver, all: &[Question], progress: &dyn Fn(usi
         at_tolerances(&mut asking, peer, &identity, all, progress)
     };
     let is_named = found.causes.iter().any(|cause| cause.certainty == Certainty::Certain);
-    let is_of_low_order = found.causes.first().is_some_and(|cause| cause.id == "first-order-scheme");
+    let is_of_low_order =
+        found.causes.first().is_some_and(|cause| ["first-order-scheme", "stage-end-late"].contains(&cause.id.as_str()));
     if (found.verdict == Verdict::Failed || is_of_low_order) && !is_named {
         add_measured(&mut asking, all, &mut found);
     }

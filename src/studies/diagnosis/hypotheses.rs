@@ -172,7 +172,7 @@ pub(super) enum Change {
     /// The time (s) at which the flight ends wherever it is, from that of the right end.
     EndTime(fn(&Problem, f64, f64) -> f64),
     /// The same (s), since the start of a stage.
-    StageTime(fn(f64) -> f64),
+    StageTime(fn(&Problem, f64) -> f64),
     /// The state behind each end of a stage.
     AtStageEnd(AtStageEnd),
     /// What is reported of a flight through the problem.
@@ -311,9 +311,9 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
     let changes =
         || faults.iter().flat_map(|(fault, number)| fault.changes.iter().map(move |change| (change, *number)));
     let mut problem = question.problem.clone();
+    let mut written = None;
     if changes().any(|(change, _)| matches!(change, Change::Scene(_) | Change::Written(_))) {
         let mut scene = question.scene.clone()?;
-        let mut written = None;
         for (change, number) in changes() {
             match change {
                 Change::Scene(alter) => alter(&mut scene, number),
@@ -335,8 +335,12 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
         }
     }
     let is_ordered = problem.stages.windows(2).all(|pair| pair[0].end <= pair[1].end);
+    let is_known = problem.stages.iter().all(|law| {
+        [law.static_force, law.stiffness, law.viscosity, law.drag].iter().all(|coefficient| coefficient.is_finite())
+    });
     let is_closed = problem.stages.last().is_some_and(|last| last.end == f64::INFINITY);
     if !(is_ordered
+        && is_known
         && is_closed
         && problem.stages[0].end >= 0.0
         && problem.mass > 0.0
@@ -357,7 +361,7 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
             }
             Change::RestSpeed(of) => rules.rest_speed = of(&problem, number),
             Change::EndTime(of) => rules.end_time = of(&question.problem, question.exact.end.time, number),
-            Change::StageTime(of) => rules.stage_time = of(number),
+            Change::StageTime(of) => rules.stage_time = of(&question.problem, number),
             Change::AtStageEnd(alter) => rules.at_stage_end = Some((*alter, number)),
             _ => continue,
         }
@@ -373,6 +377,11 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
             Simulated { end, stage, passed: Vec::new() }
         }
     };
+    if let Some((written, scene)) = written.zip(question.scene.as_ref())
+        && let Some(square) = written.crater_speed_squared(scene, &problem)
+    {
+        events::behind_crater(&problem, &mut found, square);
+    }
     for (change, number) in changes() {
         if let Change::Report(alter) = change {
             alter(&problem, &mut found, number);

@@ -47,6 +47,8 @@ const BETWEEN_EXITS: f64 = 2e-3;
 const ONE_PART: f64 = 0.1;
 /// Part by which times of two exits within a step differ otherwise than the right ones.
 const ALONG: f64 = 0.02;
+/// Part by which they differ at most where they change smoothly.
+const HALF: f64 = 0.5;
 /// Second differences over the right ones that are none, and the part of them that must be none.
 const STRAIGHT: f64 = 1e-3;
 const STRAIGHT_PART: f64 = 0.75;
@@ -92,9 +94,13 @@ const OF_EVERY_KIND: [&str; 8] = [
 /// Adds what questions made for it show of the solver of `found`, which none of its causes explains with certainty.
 pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mut Diagnosis) {
     let cause = measured(asking, all, found);
-    let is_open = cause.as_ref().is_none_or(|cause| OF_EVERY_KIND.contains(&cause.id.as_str()));
+    // Where few fail, a formula may be wrong that a scheme does not have.
+    let is_of_few =
+        |cause: &Cause| cause.certainty != Certainty::Certain && FEW * found.counts.failed < found.counts.asked;
+    let is_open = cause.as_ref().is_none_or(|cause| OF_EVERY_KIND.contains(&cause.id.as_str()) || is_of_few(cause));
     let by_stages =
         if is_open && found.counts.failed > 0 { stage_by_stage::measured(asking, all, found) } else { None };
+    let measured = cause.as_ref().map(|cause| cause.id.clone());
     if let Some(cause) = cause {
         // A clock is found where events under a constant force are on time; weights make every time late, or early.
         let is_refuted = |known: &str| match cause.id.as_str() {
@@ -128,6 +134,7 @@ pub(super) fn add_measured(asking: &mut Asking<'_>, all: &[Question], found: &mu
             known.certainty == cause.certainty
                 && cause.certainty == Certainty::Likely
                 && known.id != "steps-too-long"
+                && (is_of_kinds || !is_of_every_kind(known) || measured.as_ref() != Some(&known.id))
                 && (2 * known.explains <= cause.explains || known.explains == 1 && shown_by > 1)
         };
         let goes_behind = |known: &Cause| {
@@ -253,18 +260,28 @@ fn clock(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option
     let flights = row_of_exits(asking)?;
     let is_wrong = |[found, exact]: &[State; 2]| (found.time / exact.time - 1.0).abs() > ALLOWED * TOLERANCES[0];
     // The time at an end of a step would be the same at each exit within it.
-    let goes_along = |pair: &&[[State; 2]]| {
+    let over_right = |pair: &[[State; 2]]| {
         let rise = |which: usize| pair[1][which].time - pair[0][which].time;
-        (rise(0) / rise(1) - 1.0).abs() <= ALONG
+        rise(0) / rise(1) - 1.0
     };
-    let along = flights.windows(2).filter(goes_along).count() as f64;
-    if !flights.iter().any(is_wrong) || along < STRAIGHT_PART * (EXITS - 1) as f64 {
+    let rises: Vec<f64> = flights.windows(2).map(over_right).collect();
+    let along = rises.iter().filter(|rise| rise.abs() <= ALONG).count() as f64;
+    let is_smooth = |pair: &&[f64]| (pair[1] - pair[0]).abs() <= ONE_PART * pair[0].abs() && pair[0].abs() <= HALF;
+    let smooth = rises.windows(2).filter(is_smooth).count() as f64;
+    if !flights.iter().any(is_wrong) {
         return None;
     }
-    said(
-        "the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than that \
-         of the step",
-    )
+    if along >= STRAIGHT_PART * rises.len() as f64 {
+        return said(
+            "the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than \
+             that of the step",
+        );
+    }
+    (smooth >= STRAIGHT_PART * rises.len() as f64).then(|| {
+        let statement = "the time alone is wrong, and changes smoothly from exit to exit: it is summed over the steps by a rule of a lower \
+                         order than that of the path";
+        Cause::plain("clock", statement.to_owned(), Certainty::Likely, alone.len(), of)
+    })
 }
 
 /// Whether times of failing questions differ from tolerance to tolerance.
@@ -467,7 +484,7 @@ fn straight_steps(asking: &mut Asking<'_>) -> Option<Cause> {
         (false, true) => "the velocity at the exit is",
         (false, false) => return None,
     };
-    let statement = format!("{what} taken from a straight line between the ends of a step");
+    let statement = format!("{what} taken from a straight line through a step, its chord or a tangent");
     Some(Cause::plain("event-straight", statement, Certainty::Certain, EXITS, EXITS))
 }
 
@@ -489,7 +506,7 @@ fn straight_to_rest(asking: &mut Asking<'_>) -> Option<Cause> {
     let is_right = |[_, time, velocity]: &[f64; 3]| time.abs() <= TOLERANCES[1] && *velocity == 0.0;
     let is_short = |[depth, ..]: &[f64; 3]| *depth < -ALLOWED * TOLERANCES[1];
     let short = all.iter().filter(|errors| is_short(errors)).count();
-    let statement = "the depth at rest is taken from a straight line between the ends of a step: under a constant force its time \
+    let statement = "the depth at rest is taken from a straight line through a step: under a constant force its time \
                      is right and it is too small";
     (all.iter().all(is_right) && 4 * short >= 3 * all.len())
         .then(|| Cause::plain("event-straight", statement.to_owned(), Certainty::Likely, short, all.len()))

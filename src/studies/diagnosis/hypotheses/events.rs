@@ -1,8 +1,10 @@
 //! Faults of events: ends of stages, exit and rest that are late, early, misplaced, missed, or change the state.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::super::questions::Question;
-use super::super::simulation::{Passage, Simulated, continued, solve};
-use super::force::{DRAG, STATIC_FORCE, STIFFNESS, VISCOSITY, clear_speed, reorder, term_of};
+use super::super::simulation::{Passage, Rules, Simulated, continued, simulate, solve};
+use super::force::{DRAG, STATIC_FORCE, STIFFNESS, VISCOSITY, clear_speed, greatest_end, reorder, term_of};
 use super::{COUNTS, Change, Hypothesis, Parameter, of};
 use crate::physics::{Problem, Stage, State};
 
@@ -33,6 +35,49 @@ fn without_speed_terms(&Passage { problem, index, start }: &Passage<'_>, depth: 
     let Stage { static_force, stiffness, .. } = problem.stages[index];
     let work = (depth - start.depth) * (static_force + 0.5 * stiffness * (depth + start.depth));
     (start.velocity * start.velocity - 2.0 * work / problem.mass).max(0.0).sqrt()
+}
+
+/// A rest by a deceleration that is that of the flight at a `speed` from there on.
+fn stop_evenly(problem: &Problem, found: &mut Simulated, speed: f64) {
+    if found.end.velocity != 0.0 || found.end.depth >= problem.exit_depth || speed >= problem.impact_speed {
+        return;
+    }
+    let Some(at) = simulate(problem, Rules { rest_speed: speed, ..Rules::default() }) else { return };
+    let State { time, depth, velocity } = at.end;
+    let deceleration = problem.stages[at.stage].force(depth, velocity) / problem.mass;
+    let rest = depth + 0.5 * velocity * velocity / deceleration;
+    if depth < problem.exit_depth && rest <= problem.limit_of(at.stage) {
+        found.end = State { time: time + velocity / deceleration, depth: rest, velocity: 0.0 };
+    }
+}
+
+/// The flight where V² behind the crater is `square`, and so is the time there: the projectile rests where it is not positive, at the depth
+/// to which the spring alone takes it.
+pub(super) fn behind_crater(problem: &Problem, found: &mut Simulated, square: f64) {
+    let Stage { stiffness, end: depth, .. } = problem.stages[0];
+    if problem.crater != Some(0) || problem.exit_depth <= depth {
+        return;
+    }
+    let frequency = (stiffness / problem.mass).sqrt();
+    if !square.is_finite() {
+        found.end.time = f64::NAN;
+        return;
+    }
+    if square <= 0.0 {
+        let end = State { time: FRAC_PI_2 / frequency, depth: problem.impact_speed / frequency, velocity: 0.0 };
+        *found = Simulated { end, stage: 0, passed: Vec::new() };
+        return;
+    }
+    let velocity = square.sqrt();
+    // The crater is crossed without a force, and its time put right.
+    let mut behind = problem.clone();
+    behind.impact_speed = velocity;
+    behind.stages[0] = Stage::free().until(depth);
+    let Some(flight) = solve(&behind) else { return };
+    let late = (frequency * depth).atan2(velocity) / frequency - depth / velocity;
+    *found = flight;
+    found.passed.iter_mut().for_each(|(_, state)| state.time += late);
+    found.end.time += late;
 }
 
 /// The velocity at `depth` in a stage, as if it had no term but those of `KEPT`: p, s, r and q are its bits from the first on.
@@ -535,6 +580,15 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[Change::AtStageEnd(|_, state, _| state.time *= 2.0)],
     ),
     of(
+        "time-restarts",
+        "the time doubles at the start of each stage that has a force: the time of its end is added to that of its start",
+        Parameter::None,
+        &[Change::AtStageEnd(|at, state, _| {
+            let has_force = at.problem.stages.get(at.index + 1).is_some_and(|law| law.force(1.0, 1.0) != 0.0);
+            state.time *= if has_force { 2.0 } else { 1.0 };
+        })],
+    ),
+    of(
         "stage-left-out",
         "the stage with the index {} is left out, and the next one begins in its place",
         Parameter::OneOf(COUNTS),
@@ -630,7 +684,25 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "flight-cut-short",
         "the flight ends {} s after the start of a stage",
         Parameter::Value(1e-2),
-        &[Change::StageTime(|time| time)],
+        &[Change::StageTime(|_, time| time)],
+    ),
+    of(
+        "flight-cut-short",
+        "the flight ends after {} times the greatest depth of an end or the exit over V0, counted from the start of each stage",
+        Parameter::Value(1.5),
+        &[Change::StageTime(|p, n| n * greatest_end(p).unwrap_or(f64::INFINITY) / p.impact_speed)],
+    ),
+    of(
+        "force-stale",
+        "from {} m/s on the projectile is brought to rest by the force that it has there",
+        Parameter::Speed,
+        &[Change::Report(stop_evenly)],
+    ),
+    of(
+        "force-stale",
+        "from {} V0 on the projectile is brought to rest by the force that it has there",
+        Parameter::Fraction,
+        &[Change::Report(|p, found, part| stop_evenly(p, found, part * p.impact_speed))],
     ),
     of(
         "flight-cut-short",
@@ -885,14 +957,13 @@ pub(super) static FAULTS: &[Hypothesis] = &[
     ),
     of(
         "stage-end-velocity",
-        "V behind the crater, and the time there by it, are those of a force that goes on into the tunnel, also where the crater \
-         stiffness is given",
+        "V behind the crater, the time there by it and whether it is passed are those of a force that goes on into the tunnel, also where \
+         the crater stiffness is given",
         Parameter::None,
-        &[Change::AtStageEnd(|at, state, _| {
-            if at.problem.crater == Some(at.index) {
-                state.velocity = of_one_force(at, state.depth);
-                let frequency = (at.problem.stages[at.index].stiffness / at.problem.mass).sqrt();
-                state.time = (frequency * state.depth).atan2(state.velocity) / frequency;
+        &[Change::Report(|p, found, _| {
+            if p.crater == Some(0) {
+                let at = Passage { problem: p, index: 0, start: State::at_impact(p) };
+                behind_crater(p, found, of_one_force(&at, p.stages[0].end).powi(2));
             }
         })],
     ),

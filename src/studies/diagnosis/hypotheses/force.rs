@@ -43,6 +43,12 @@ fn scale_term<const TERM: u8, const PART: u8>(problem: &mut Problem, factor: f64
     }
 }
 
+/// The greatest depth (m) of an end of a stage or the exit, if there is any.
+pub(super) fn greatest_end(problem: &Problem) -> Option<f64> {
+    let ends = problem.stages.iter().map(|law| law.end).chain([problem.exit_depth]);
+    ends.filter(|end| end.is_finite()).reduce(f64::max)
+}
+
 /// The mass times `factor` in a `PART` of the stages: the same as all forces over it.
 fn scale_mass<const PART: u8>(problem: &mut Problem, factor: f64) {
     if factor <= 0.0 {
@@ -426,12 +432,36 @@ macro_rules! by_mass {
                 Parameter::None,
                 &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, p.mass))],
             ),
+            of(
+                $id,
+                concat!($what, " has the greatest depth of an end or the exit, in m, as a factor: it is not made dimensionless as the others"),
+                Parameter::None,
+                &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, greatest_end(p).unwrap_or(f64::NAN)))],
+            ),
+            of(
+                $id,
+                concat!($what, " is divided by the greatest depth of an end or the exit, in m: it is not made dimensionless as the others"),
+                Parameter::None,
+                &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, 1.0 / greatest_end(p).unwrap_or(f64::NAN)))],
+            ),
+            of(
+                $id,
+                concat!($what, " has V0, in m/s, as a factor: it is not made dimensionless as the others"),
+                Parameter::None,
+                &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, p.impact_speed))],
+            ),
+            of(
+                $id,
+                concat!($what, " is divided by V0, in m/s: it is not made dimensionless as the others"),
+                Parameter::None,
+                &[Change::Problem(|p, _| scale_term::<$term, ALL>(p, 1.0 / p.impact_speed))],
+            ),
         ]
     };
 }
 
-/// Terms with the mass in the wrong place.
-pub(super) static BY_MASS: [[Hypothesis; 2]; 4] = [
+/// Terms with the mass, a length or a speed in the wrong place.
+pub(super) static BY_MASS: [[Hypothesis; 6]; 4] = [
     by_mass!("term:static-force", "the static force p", STATIC_FORCE),
     by_mass!("term:stiffness", "the stiffness s", STIFFNESS),
     by_mass!("term:viscosity", "the viscosity r", VISCOSITY),

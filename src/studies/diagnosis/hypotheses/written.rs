@@ -1,13 +1,13 @@
 //! What a reader of scenes may have written down wrongly: a formula with one name, number, operator or bracket changed, or one number
 //! of the scene in the place of another.
 //!
-//! Each formula is a text ([`crate::physics::expression`]), and its changes are made token by token, as a slip makes them. One that is
-//! still a formula and gives another value is a hypothesis, so that nobody has to think of each.
+//! Each formula is a text, and each slip in it that is still a formula and gives another value is a hypothesis, so that nobody has to think
+//! of each.
 
 use std::sync::LazyLock;
 
+use super::super::slips::{Formula, slips};
 use super::{Change, Hypothesis, Parameter};
-use crate::physics::expression::{Bound, Known, Tape, Unit};
 use crate::physics::parameter::Parameter as Number;
 use crate::physics::semi_empirical::NDRC_FIRST_BRANCH_END;
 use crate::physics::{CraterStiffness, Criterion, Problem, Scene};
@@ -55,6 +55,21 @@ const FORMULAS: [(&str, &str, &str, &str); 8] = [
     ),
     ("X", "parameter:criterion", "the depth that perforates a thick target by ndrc", "d*(H/d - 1.32)/1.24"),
 ];
+/// The square of V behind the crater: where it is formed so, what that is, and its formula.
+const SPEEDS: [(Where, &str, &str); 3] = [
+    (Where::Stated, "V² behind the crater, where c is stated,", "V0^2 - c*D^2/M"),
+    (Where::Follows, "V² behind the crater, where c follows from the other numbers,", "(M*V0^2 - D*P)/(M + D*Q)"),
+    (Where::Always, "V² behind the crater", "V0^2 - c*D^2/M"),
+];
+
+/// By what the scene says of c.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Where {
+    Stated,
+    Follows,
+    Always,
+}
+
 const EQ14: usize = 0;
 const AREA: usize = 1;
 const DEPTH: usize = 2;
@@ -106,31 +121,17 @@ enum Of {
     Number(usize),
     /// The formula with this place among [`FORMULAS`].
     Formula(usize),
+    /// V² behind the crater.
+    Speed(Where),
 }
 
-/// A text of [`NAMES`] that has a value.
-#[derive(Debug)]
-struct Formula {
-    text: String,
-    tape: Tape,
-}
-
-impl Formula {
-    fn read(text: &str) -> Option<Self> {
-        let known = NAMES.map(|name| Known { name, value: 1.0, unit: Unit::NONE });
-        let tape = Tape::read(text, &known, Unit::NONE).ok()?;
-        Some(Self { text: tape.to_text(), tape })
-    }
-
-    fn value(&self, values: &Values) -> f64 {
-        let bound: Bound = self.tape.bind(values);
-        bound.eval(0.0, 0.0)
-    }
+/// `text`, in which [`NAMES`] may stand.
+fn read(text: &str) -> Option<Formula> {
+    Formula::read(text, &NAMES)
 }
 
 /// The formulas as they should be.
-static RIGHT: LazyLock<Vec<Formula>> =
-    LazyLock::new(|| FORMULAS.iter().filter_map(|(.., text)| Formula::read(text)).collect());
+static RIGHT: LazyLock<Vec<Formula>> = LazyLock::new(|| FORMULAS.iter().filter_map(|(.., text)| read(text)).collect());
 
 /// The numbers of `scene`, and nothing yet of what is formed of them.
 fn values_of(scene: &Scene) -> Option<Values> {
@@ -143,6 +144,26 @@ fn values_of(scene: &Scene) -> Option<Values> {
 }
 
 impl Written {
+    /// The square of V behind the crater of `problem`, which is that of `scene`, where it is written so.
+    pub(in super::super) fn crater_speed_squared(&self, scene: &Scene, problem: &Problem) -> Option<f64> {
+        let Of::Speed(place) = self.of else { return None };
+        let follows = scene.concrete()?.crater_stiffness == CraterStiffness::Continuous;
+        if place == if follows { Where::Stated } else { Where::Follows } {
+            return None;
+        }
+        let mut values = values_of(scene)?;
+        let (crater, tunnel) = (problem.stages[problem.crater?], problem.stages.last()?);
+        for (formula, value) in [
+            (DEPTH, crater.end),
+            (STIFFNESS, crater.stiffness),
+            (STATIC_FORCE, tunnel.static_force),
+            (DRAG, tunnel.drag),
+        ] {
+            values[place_of(formula)] = value;
+        }
+        Some(self.text.value(&values))
+    }
+
     /// What a solver that has it so makes of `scene`.
     pub(in super::super) fn problem(&self, scene: &Scene) -> Option<Problem> {
         let (concrete, mut problem) = (scene.concrete()?, scene.problem().ok()?);
@@ -188,124 +209,6 @@ impl Written {
     }
 }
 
-/// A piece of a formula: a name, a number, or one sign.
-fn tokens(text: &str) -> Vec<String> {
-    let mut all: Vec<String> = Vec::new();
-    let is_of_word = |c: char| c.is_ascii_alphanumeric() || c == '.';
-    for c in text.chars().filter(|c| *c != ' ') {
-        match all.last_mut() {
-            Some(last) if is_of_word(c) && last.ends_with(is_of_word) => last.push(c),
-            _ => all.push(c.to_string()),
-        }
-    }
-    all
-}
-
-fn is_name(token: &str) -> bool {
-    token.starts_with(|c: char| c.is_ascii_alphabetic())
-}
-
-fn is_operator(token: &str) -> bool {
-    ["+", "-", "*", "/", "^"].contains(&token)
-}
-
-/// How many of `tokens` are the operand with which they begin, where a bracket opens and closes by these signs and `weaker` operators end it.
-fn operand<'a>(tokens: impl Iterator<Item = &'a String>, (opens, closes): (&str, &str), weaker: &str) -> usize {
-    let mut depth = 0_u32;
-    let is_inside = |token: &&String| {
-        let is_end = depth == 0 && (token.as_str() == closes || weaker.contains(token.as_str()));
-        depth = match token.as_str() {
-            token if token == opens => depth + 1,
-            token if token == closes => depth.saturating_sub(1),
-            _ => depth,
-        };
-        !is_end
-    };
-    tokens.take_while(is_inside).count()
-}
-
-/// The texts that one slip makes of `text`, in which `names` may stand.
-fn slips(text: &str, names: &[&str]) -> Vec<String> {
-    let tokens = tokens(text);
-    let mut all = Vec::new();
-    let mut with = |range: std::ops::Range<usize>, by: &str| {
-        let part = |range: &[String]| range.concat();
-        all.push(part(&tokens[..range.start]) + by + &part(&tokens[range.end..]));
-    };
-    // What is left out first: of two texts of one value the shorter one is told.
-    for (at, token) in tokens.iter().enumerate().filter(|(_, token)| is_operator(token)) {
-        let weaker = match token.as_str() {
-            "+" | "-" => "+-",
-            "*" | "/" => "+-*/",
-            _ => "+-*/^",
-        };
-        with(at - operand(tokens[..at].iter().rev(), (")", "("), weaker)..at + 1, "");
-        with(at..at + 1 + operand(tokens[at + 1..].iter(), ("(", ")"), weaker), "");
-    }
-    for (at, token) in tokens.iter().enumerate() {
-        let here = at..at + 1;
-        if let Ok(number) = token.parse::<f64>() {
-            for other in [
-                1.0,
-                0.5 * number,
-                2.0 * number,
-                number + 1.0,
-                number - 1.0,
-                0.1 * number,
-                10.0 * number,
-                1e3 * number,
-                1e-3 * number,
-            ] {
-                with(here.clone(), &other.to_string());
-            }
-        } else if is_name(token) {
-            for name in names.iter().filter(|name| *name != token) {
-                with(here.clone(), name);
-            }
-            with(here.clone(), "1");
-            for (before, behind) in [("2*", ""), ("", "/2"), ("", "^2"), ("sqrt(", ")"), ("1/", "")] {
-                with(here.clone(), &format!("({before}{token}{behind})"));
-            }
-        } else if is_operator(token) {
-            for other in ["+", "-", "*", "/"] {
-                with(here.clone(), other);
-            }
-        }
-    }
-    // Two names exchanged.
-    let mut words: Vec<&String> = tokens.iter().filter(|token| is_name(token)).collect();
-    words.sort();
-    words.dedup();
-    for (place, one) in words.iter().enumerate() {
-        for other in &words[place + 1..] {
-            let exchanged = |token| match () {
-                () if token == *one => *other,
-                () if token == *other => *one,
-                () => token,
-            };
-            all.push(tokens.iter().map(|token| exchanged(token).as_str()).collect());
-        }
-    }
-    // A bracket at another place, or a pair of them left out.
-    for (at, _) in tokens.iter().enumerate().filter(|(_, token)| ["(", ")"].contains(&token.as_str())) {
-        for place in 0..tokens.len() {
-            let mut moved = tokens.clone();
-            let bracket = moved.remove(at);
-            moved.insert(place, bracket);
-            all.push(moved.concat());
-        }
-        if tokens[at] == "(" {
-            for close in at + 1..tokens.len() {
-                if tokens[close] == ")" {
-                    let kept = |place: usize| place != at && place != close;
-                    all.push((0..tokens.len()).filter(|place| kept(*place)).map(|place| &*tokens[place]).collect());
-                }
-            }
-        }
-    }
-    all
-}
-
 /// Those of `texts` that are formulas with a value that neither `right` has, nor a factor of it, nor one before them: factors of terms and
 /// numbers are hypotheses of their own.
 fn others(texts: &[String], right: &Formula) -> Vec<Formula> {
@@ -314,7 +217,7 @@ fn others(texts: &[String], right: &Formula) -> Vec<Formula> {
     let right = values(right);
     let is_factor = |own: &[f64; 2]| (own[0] / right[0] / (own[1] / right[1]) - 1.0).abs() <= TWO;
     let (mut known, mut found) = (Vec::new(), Vec::new());
-    for formula in texts.iter().filter_map(|text| Formula::read(text)) {
+    for formula in texts.iter().filter_map(|text| read(text)) {
         let own = values(&formula);
         let is_finite = own.iter().all(|value| value.is_finite());
         if is_finite && !is_factor(&own) && !known.iter().any(|known| is_same(known, &own)) {
@@ -348,16 +251,25 @@ static SLIPS: LazyLock<Vec<Hypothesis>> = LazyLock::new(|| {
             all.push(hypothesis(id, statement, Written { of: Of::Formula(which), text, exchanged: None }));
         }
     }
+    let names = ["M", "V0", "D", "P", "Q", "c"];
+    for (place, what, right) in SPEEDS {
+        let Some(right) = read(right) else { continue };
+        for text in others(&slips(&right.text, &names), &right) {
+            let statement = format!("{what} is formed as {}, not as {}", text.text, right.text);
+            let written = Written { of: Of::Speed(place), text, exchanged: None };
+            all.push(hypothesis("stage-end-velocity", statement, written));
+        }
+    }
     let names = NUMBERS.map(|(name, ..)| name);
     for (place, (name, id, _)) in NUMBERS.into_iter().enumerate() {
-        let Some(right) = Formula::read(name) else { continue };
+        let Some(right) = read(name) else { continue };
         let texts = if OF_SEVERAL.contains(&name) { slips(name, &names) } else { Vec::new() };
         for text in others(&texts, &right) {
             let statement = format!("{} is taken for {name}", text.text);
             all.push(hypothesis(id, statement, Written { of: Of::Number(place), text, exchanged: None }));
         }
         for (other, other_name) in names.into_iter().enumerate().skip(place + 1) {
-            let (Some(text), Some(own)) = (Formula::read(other_name), Formula::read(name)) else { continue };
+            let (Some(text), Some(own)) = (read(other_name), read(name)) else { continue };
             let statement = format!("{name} and {other_name} are exchanged");
             let written = Written { of: Of::Number(place), text, exchanged: Some((other, own)) };
             all.push(hypothesis("parameters-exchanged", statement, written));
@@ -383,7 +295,7 @@ mod tests {
         for question in questions(3, 200, true) {
             let scene = question.scene.unwrap();
             for (which, (.., text)) in FORMULAS.iter().enumerate() {
-                let text = Formula::read(text).unwrap();
+                let text = read(text).unwrap();
                 let problem = Written { of: Of::Formula(which), text, exchanged: None }.problem(&scene).unwrap();
                 let right = scene.problem().unwrap();
                 let is_near = |a: f64, b: f64| a == b || (a / b - 1.0).abs() < 1e-14;
@@ -406,7 +318,7 @@ mod tests {
         let scene = crate::testing::shipped("paper-slab");
         let right = scene.problem().unwrap();
         let written = |of: Of, text: &str| {
-            let text = Formula::read(text).unwrap();
+            let text = read(text).unwrap();
             Written { of, text, exchanged: None }.problem(&scene).unwrap()
         };
         let ratios = |wrong: &Problem| {
@@ -421,18 +333,5 @@ mod tests {
         assert!(are(ratios(&area), [1.0, 2.0, 2.0]), "{area:?}");
         let diameter = written(Of::Number(DIAMETER), "2*d");
         assert!(are(ratios(&diameter), [2.0, 4.0, 4.0]), "{diameter:?}");
-    }
-
-    #[test]
-    fn slips_leave_out_exchange_and_move() {
-        let right = Formula::read("M + D*Q").unwrap();
-        let texts: Vec<String> = others(&slips("M + D*Q", &["k"]), &right).into_iter().map(|one| one.text).collect();
-        for text in ["M", "M + Q", "M + k*Q", "M - D*Q", "M + D/Q", "M + D*k"] {
-            assert!(texts.iter().any(|known| known == text), "{text}: {texts:?}");
-        }
-        let texts = slips("P/(D*(M + Q))", &[]);
-        for text in ["P/D*(M+Q)", "P/(D*M+Q)", "P/(D*(Q))", "P/(D*(M-Q))"] {
-            assert!(texts.iter().any(|known| known == text), "{text}: {texts:?}");
-        }
     }
 }

@@ -26,8 +26,9 @@ pub(super) const FORETOLD: f64 = 0.06;
 const LANDED: f64 = 1e-12;
 /// Difference of coefficients that are the same.
 pub(super) const SAME: f64 = 1e-6;
-/// Part of a coefficient by which it is another one. Of a scheme that is no polynomial the fourth is found to some 1e-5.
+/// Part of a coefficient by which it is another one, and the same of the fourth, which of a scheme that is no polynomial is off by 3e-3.
 pub(super) const ANOTHER: f64 = 1e-3;
+const ANOTHER_FOURTH: f64 = 0.02;
 /// Highest order whose coefficient is compared.
 const ORDER_MAX: usize = 4;
 
@@ -103,7 +104,8 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
         right /= (index + 1) as f64;
         // Known to no more digits; adding zero makes 0 of -0.
         let found = (1e9 * found).round() / 1e9 + 0.0;
-        if (found - right).abs() > ANOTHER * right {
+        let another = if index == 3 { ANOTHER_FOURTH } else { ANOTHER };
+        if (found - right).abs() > another * right {
             let tableau = tableau();
             // Without the term the force is that of V at the start; with a part of it weights may be wrong too.
             let may_lag = tableau.is_empty() && index == 1 && found < right;

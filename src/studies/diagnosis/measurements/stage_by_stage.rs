@@ -4,6 +4,9 @@
 //! threshold, the wrong passages have something in common: the simplest [`Condition`], or pair of them, that holds for all of them
 //! and for hardly any right one.
 
+mod closed_forms;
+mod terms;
+
 use std::fmt::{self, Display, Formatter};
 
 use super::super::causes::{Cause, Certainty};
@@ -58,6 +61,12 @@ struct Passage<'a> {
     /// The right end, its time since the start.
     end: State,
     way: Way,
+    /// What is found, since the start.
+    found: State,
+    /// The stage by itself, its depth since the start.
+    alone: Problem,
+    /// Whether what is wrong with the flight is only supposed to be wrong in this stage.
+    is_supposed: bool,
     /// Which of depth, time and velocity are wrong.
     wrong: [bool; 3],
     /// What is found of each over what is right.
@@ -103,6 +112,13 @@ fn terms(law: &Stage) -> [bool; 4] {
 }
 
 const TERMS: [&str; 4] = ["a static force", "a spring", "viscosity", "drag"];
+/// The cause of each, and the term itself.
+const OF_TERM: [(&str, &str); 4] = [
+    ("term:static-force", "the static force p"),
+    ("term:stiffness", "the stiffness s"),
+    ("term:viscosity", "the viscosity r"),
+    ("term:drag", "the drag q"),
+];
 
 /// A number of a passage: what it is, its unit, and itself.
 type Number = (&'static str, &'static str, fn(&Passage<'_>) -> f64);
@@ -291,7 +307,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         let never = [Content::NoSpeed, Content::Grazing, Content::Stiff];
         !never.iter().any(|content| question.contains.contains(content)) && !question.is_on_a_border()
     };
-    let mut passages = Vec::new();
+    let (mut passages, mut supposed, mut unlisted) = (Vec::new(), Vec::new(), Vec::new());
     let mut failing = Vec::new();
     let bounds = RIGHT_AND_WRONG[usize::from(found.peer.fixed_step)];
     for row in &found.questions {
@@ -305,6 +321,11 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         let asked = PeerRequest { dt_s: row.dt_s, ..request(question, TOLERANCES[TOLERANCES.len() - 1]) };
         let Ok(answer) = asking.ask(&asked) else { continue };
         passages.extend(passages_of(question, asking.reads_scene, &answer, bounds));
+        let (late, right): (Vec<_>, Vec<_>) = unlisted_passages_of(question, asking.reads_scene, &answer, bounds)
+            .into_iter()
+            .partition(|passage| passage.is_supposed);
+        unlisted.extend(right);
+        supposed.extend(late);
     }
     let count = |passages: &[Passage<'_>]| passages.iter().filter(|passage| passage.is_wrong()).count();
     let more: Vec<Vec<Question>> = if found.peer.fixed_step || count(&passages) >= ENOUGH {
@@ -321,7 +342,16 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     }
     let (wrong, right): (Vec<&Passage<'_>>, Vec<&Passage<'_>>) =
         passages.iter().partition(|passage| passage.is_wrong());
+    let all_right: Vec<&Passage<'_>> = right.iter().copied().chain(&unlisted).collect();
+    let supposed: Vec<&Passage<'_>> = supposed.iter().collect();
+    let slip = of_slip(&wrong, &all_right, &failing, found).or_else(|| of_slip(&supposed, &all_right, &failing, found));
+    if slip.is_some() {
+        return slip;
+    }
     let what_is_wrong = simplest(&wrong, &right, MOST);
+    if let Some(of_term) = of_term(&wrong, what_is_wrong.as_deref(), &failing, found) {
+        return Some(of_term);
+    }
     let is_what = what_is_wrong.is_some();
     let conditions = what_is_wrong.or_else(|| simplest(&wrong, &right, SOME))?;
     let of_condition = |passages: &[&Passage<'_>]| {
@@ -346,7 +376,6 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         said.join(" and "),
         wrong.len()
     );
-    let is_of = |question: &Question, passage: &&Passage<'_>| std::ptr::eq(passage.question, question);
     let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
     // A flight that fails, and each stage of which is right.
     let is_right = |question: &&&Question| {
@@ -370,6 +399,48 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
     let shown_by = wrong.chunk_by(|one, next| std::ptr::eq(one.question, next.question)).count();
     let is_told_apart = elsewhere >= FAR_MORE * wrong.len();
     Some(ByStages { cause: Cause { factor, ..cause }, is_of_kinds, is_told_apart, shown_by })
+}
+
+fn is_of(question: &Question, passage: &Passage<'_>) -> bool {
+    std::ptr::eq(passage.question, question)
+}
+
+/// The slip in a closed form that explains the wrong passages.
+fn of_slip(
+    wrong: &[&Passage<'_>],
+    right: &[&Passage<'_>],
+    failing: &[&Question],
+    found: &Diagnosis,
+) -> Option<ByStages> {
+    let slip = closed_forms::explained(wrong, right).filter(|slip| 2 * slip.count >= slip.of)?;
+    let closed_forms::Explained { statement, count, of } = slip;
+    let statement = format!("{statement}: {count} of {of} wrong passages");
+    let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
+    let cause = Cause::plain("closed-form", statement, Certainty::Likely, explained, found.counts.failed);
+    Some(ByStages { cause, is_of_kinds: true, is_told_apart: true, shown_by: wrong.len() })
+}
+
+/// The term of the force whose factor explains wrong passages.
+fn of_term(
+    wrong: &[&Passage<'_>],
+    conditions: Option<&[Condition]>,
+    failing: &[&Question],
+    found: &Diagnosis,
+) -> Option<ByStages> {
+    let terms::Factored { term, factor, count } = terms::factored(wrong)?;
+    let said: Vec<String> = conditions.unwrap_or_default().iter().map(ToString::to_string).collect();
+    let place = if said.is_empty() { String::new() } else { format!(" where {}", said.join(" and ")) };
+    let (id, what) = OF_TERM[term];
+    let changed = if factor == 0.0 { format!("without {what}") } else { format!("with {factor:.6} times {what}") };
+    let statement = format!(
+        "the flight through a stage, from the state listed at its start, is that {changed}{place}: {count} of {} wrong passages",
+        wrong.len()
+    );
+    let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
+    let certainty = if 2 * count >= wrong.len() { Certainty::Likely } else { Certainty::Possible };
+    let cause = Cause::plain(id, statement, certainty, explained, found.counts.failed);
+    let cause = Cause { factor: Some(factor), ..cause };
+    Some(ByStages { cause, is_of_kinds: true, is_told_apart: true, shown_by: wrong.len() })
 }
 
 /// The factor that most of `ratios` are.
@@ -413,6 +484,35 @@ fn passages_of<'a>(
     passages
 }
 
+/// The passages of a flight through several stages of which no events are listed: right ones, where all of it is right; where its time
+/// alone is wrong, each as if that were so in its stage.
+fn unlisted_passages_of<'a>(
+    question: &'a Question,
+    reads_scene: bool,
+    answer: &PeerAnswer,
+    bounds: [f64; 2],
+) -> Vec<Passage<'a>> {
+    let (problem, exact, found) = (&question.problem, question.exact.end, end_of(answer).state);
+    let off = errors(found, exact, problem.impact_speed);
+    let [is_same_depth, is_on_time, is_same_velocity] =
+        std::array::from_fn(|which| off[which].abs() <= bounds[0] * question.conditions[which]);
+    let flight = Taylor::default().solve(problem, Detail::Events).ok().filter(|flight| flight.stage > 0);
+    let Some(flight) = flight.filter(|_| answer.events.is_empty() && is_same_depth && is_same_velocity) else {
+        return Vec::new();
+    };
+    let late = if is_on_time { 0.0 } else { found.time - exact.time };
+    let scene = question.scene.as_ref().filter(|_| reads_scene);
+    let mut from = State::at_impact(problem);
+    let passages = (0..=flight.stage).filter_map(|index| {
+        let to = flight.events.get(index).filter(|_| index < flight.stage).map_or(flight.end, |event| event.state);
+        let boundary = problem.stages[index].end.min(problem.exit_depth);
+        let found = State { time: to.time + late, ..to };
+        let judged = judged(question, index, [std::mem::replace(&mut from, to), found], boundary, bounds)?;
+        (judged.is_wrong() != is_on_time).then_some(Passage { scene, is_supposed: !is_on_time, ..judged })
+    });
+    passages.collect()
+}
+
 /// The passage through stage `index` of `problem` from one state to another; `None` where it is not plain whether it is right.
 fn judged(
     question: &Question,
@@ -450,7 +550,22 @@ fn judged(
     let wrong = over.map(|over| !(over <= right));
     let of = |state: State| [state.depth, state.time, state.velocity];
     let ratios = std::array::from_fn(|which| of(passed)[which] / of(exact.end)[which]);
-    Some(Passage { question, scene: None, index, mass: problem.mass, law, from, end, way, wrong, ratios })
+    let (mass, found) = (problem.mass, passed);
+    Some(Passage {
+        question,
+        scene: None,
+        index,
+        mass,
+        law,
+        from,
+        end,
+        way,
+        found,
+        alone,
+        is_supposed: false,
+        wrong,
+        ratios,
+    })
 }
 
 /// The conditions that hold for all of `wrong` and cost least, where this `part` of the passages that they hold for is wrong.
