@@ -47,8 +47,8 @@ const BETWEEN_EXITS: f64 = 2e-3;
 const ONE_PART: f64 = 0.1;
 /// Part by which times of two exits within a step differ otherwise than the right ones.
 const ALONG: f64 = 0.02;
-/// Part by which they differ at most where they change smoothly.
-const HALF: f64 = 0.5;
+/// The same at most, where they change smoothly.
+const SMOOTH: f64 = 0.5;
 /// Second differences over the right ones that are none, and the part of them that must be none.
 const STRAIGHT: f64 = 1e-3;
 const STRAIGHT_PART: f64 = 0.75;
@@ -266,7 +266,7 @@ fn clock(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option
     };
     let rises: Vec<f64> = flights.windows(2).map(over_right).collect();
     let along = rises.iter().filter(|rise| rise.abs() <= ALONG).count() as f64;
-    let is_smooth = |pair: &&[f64]| (pair[1] - pair[0]).abs() <= ONE_PART * pair[0].abs() && pair[0].abs() <= HALF;
+    let is_smooth = |pair: &&[f64]| (pair[1] - pair[0]).abs() <= ONE_PART * pair[0].abs() && pair[0].abs() <= SMOOTH;
     let smooth = rises.windows(2).filter(is_smooth).count() as f64;
     if !flights.iter().any(is_wrong) {
         return None;

@@ -376,7 +376,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
         said.join(" and "),
         wrong.len()
     );
-    let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
+    let explained = explained_of(&failing, &wrong);
     // A flight that fails, and each stage of which is right.
     let is_right = |question: &&&Question| {
         let judged: Vec<&Passage<'_>> = passages.iter().filter(|passage| is_of(question, passage)).collect();
@@ -405,6 +405,11 @@ fn is_of(question: &Question, passage: &Passage<'_>) -> bool {
     std::ptr::eq(passage.question, question)
 }
 
+/// How many of `failing` have a wrong passage.
+fn explained_of(failing: &[&Question], wrong: &[&Passage<'_>]) -> usize {
+    failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count()
+}
+
 /// The slip in a closed form that explains the wrong passages.
 fn of_slip(
     wrong: &[&Passage<'_>],
@@ -415,7 +420,7 @@ fn of_slip(
     let slip = closed_forms::explained(wrong, right).filter(|slip| 2 * slip.count >= slip.of)?;
     let closed_forms::Explained { statement, count, of } = slip;
     let statement = format!("{statement}: {count} of {of} wrong passages");
-    let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
+    let explained = explained_of(failing, wrong);
     let cause = Cause::plain("closed-form", statement, Certainty::Likely, explained, found.counts.failed);
     Some(ByStages { cause, is_of_kinds: true, is_told_apart: true, shown_by: wrong.len() })
 }
@@ -436,7 +441,7 @@ fn of_term(
         "the flight through a stage, from the state listed at its start, is that {changed}{place}: {count} of {} wrong passages",
         wrong.len()
     );
-    let explained = failing.iter().filter(|question| wrong.iter().any(|passage| is_of(question, passage))).count();
+    let explained = explained_of(failing, wrong);
     let certainty = if 2 * count >= wrong.len() { Certainty::Likely } else { Certainty::Possible };
     let cause = Cause::plain(id, statement, certainty, explained, found.counts.failed);
     let cause = Cause { factor: Some(factor), ..cause };

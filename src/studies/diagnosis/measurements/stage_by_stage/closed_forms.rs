@@ -569,4 +569,52 @@ mod tests {
         }
         assert!(of > 60 && untold.is_empty(), "{} of {of}:\n{}", untold.len(), untold.join("\n"));
     }
+
+    /// A slip in the time of a kind of stage, and the passages that it makes wrong.
+    fn with_a_slip_in_the_time<'a>(passages: &[Passage<'a>], kind: &Kind, read: &Read) -> Vec<Passage<'a>> {
+        let index = kind.found.iter().position(|(gives, ..)| *gives == Time).unwrap();
+        let place = kind.defined.len() + index;
+        let text = format!("1.3*({})", read.formulas[place].text.replace("V0", "(V0/2)"));
+        let slip = Slip { place, formula: Formula::read(&text, &read.names).unwrap() };
+        let two = Slip { place, formula: Formula::read(&text[4..], &read.names).unwrap() };
+        // One in four by a mistake that no slip is.
+        let wrong = passages.iter().filter(|passage| passage.way != Way::Rest);
+        wrong
+            .enumerate()
+            .filter_map(|(n, passage)| slipped(kind, read, if n % 4 == 0 { &slip } else { &two }, passage))
+            .collect()
+    }
+
+    #[test]
+    fn a_slip_that_a_right_stage_contradicts_is_no_cause() {
+        let questions = questions(12, 400, false);
+        let passages = right_passages(&questions);
+        let right: Vec<&Passage<'_>> = passages.iter().collect();
+        let mut told = 0;
+        for (kind, read) in KINDS.iter().zip(READ.iter()).take(4) {
+            let wrong = with_a_slip_in_the_time(&passages, kind, read);
+            let wrong: Vec<&Passage<'_>> = wrong.iter().collect();
+            told += usize::from(explained(&wrong, &[]).is_some());
+            let found = explained(&wrong, &right).map(|found| found.statement);
+            assert!(found.is_none(), "{found:?}");
+        }
+        assert!(told > 0);
+    }
+
+    #[test]
+    fn a_slip_must_explain_nearly_all_stages_that_are_only_supposed_to_be_wrong() {
+        let questions = questions(12, 400, false);
+        let passages = right_passages(&questions);
+        let mut told = 0;
+        for (kind, read) in KINDS.iter().zip(READ.iter()).take(4) {
+            let mut wrong = with_a_slip_in_the_time(&passages, kind, read);
+            told += usize::from(explained(&wrong.iter().collect::<Vec<_>>(), &[]).is_some());
+            for passage in &mut wrong {
+                passage.is_supposed = true;
+            }
+            let found = explained(&wrong.iter().collect::<Vec<_>>(), &[]).map(|found| found.statement);
+            assert!(found.is_none(), "{found:?}");
+        }
+        assert!(told > 0);
+    }
 }

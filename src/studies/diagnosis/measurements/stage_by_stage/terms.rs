@@ -89,3 +89,51 @@ fn fitted(passage: &Passage<'_>, term: usize) -> Option<f64> {
     });
     roots.find(fits)
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::super::super::super::questions::{Content, Question, questions};
+    use super::super::{RIGHT_AND_WRONG, judged};
+    use super::*;
+
+    /// The wrong passages of a solver that has the second stage with a `term` times `factor`.
+    fn wrong_passages(questions: &[Question], term: usize, factor: f64) -> Vec<Passage<'_>> {
+        let is_plain = |question: &&Question| {
+            question.problem.stages.len() > 1
+                && ![Content::NoSpeed, Content::WeakTerm, Content::Stiff]
+                    .iter()
+                    .any(|one| question.contains.contains(one))
+        };
+        let passage = |question: &'_ Question| {
+            let mut problem = question.problem.clone();
+            let law = &mut problem.stages[1];
+            let terms = [&mut law.static_force, &mut law.stiffness, &mut law.viscosity, &mut law.drag];
+            terms.into_iter().enumerate().filter(|(at, _)| *at == term).for_each(|(_, of)| *of *= factor);
+            let flight = solve(&problem)?;
+            let state = |index: usize| flight.passed.iter().find(|(stage, _)| *stage == index).map(|(_, state)| *state);
+            Some([state(0)?, state(1).unwrap_or(flight.end)])
+        };
+        let of_plain = questions.iter().filter(is_plain);
+        let judged = of_plain.filter_map(|question| {
+            let boundary = question.problem.stages[1].end.min(question.problem.exit_depth);
+            judged(question, 1, passage(question)?, boundary, RIGHT_AND_WRONG[0])
+        });
+        judged.filter(Passage::is_wrong).collect()
+    }
+
+    #[test]
+    fn the_factor_of_each_term_is_found_in_a_stage_behind_another() {
+        let questions = questions(13, 300, false);
+        for (term, name) in TERMS.into_iter().enumerate() {
+            for factor in [0.0, 1.3] {
+                let wrong = wrong_passages(&questions, term, factor);
+                let wrong: Vec<&Passage<'_>> = wrong.iter().collect();
+                let found = factored(&wrong).unwrap();
+                assert_eq!(found.term, term);
+                assert!((found.factor - factor).abs() <= 2.0 * FITS, "{}", found.factor);
+                assert!(10 * found.count >= 7 * wrong.len(), "{name}: {} of {}", found.count, wrong.len());
+            }
+        }
+    }
+}
