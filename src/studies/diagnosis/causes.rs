@@ -24,8 +24,12 @@ const TRIED: usize = 8;
 const COARSE: usize = 4;
 /// What is so near to zero, in units of the accuracy, is a root.
 const NEAR_ROOT: f64 = 1e-4;
+/// By how much an error changes, in units of the accuracy, that a fault leaves as it is.
+const STILL: f64 = 0.01;
 /// A quantity whose distance from zero is so many times its change hardly changes.
 const FAR: f64 = 10.0;
+/// By how much farther from an answer than the right one a prediction must be to be contradicted by it.
+const FARTHER: f64 = 2.0;
 /// Width of a bracket, relative to its numbers, in which a quantity that still changes much jumps.
 const JUMP_WIDTH: f64 = 1e-7;
 /// Rounds of a search between two numbers.
@@ -169,9 +173,17 @@ impl Seen<'_> {
         (is_near && leaves_less && left <= EXPLAINED_MAX).then_some(left)
     }
 
-    /// Whether `faults` give another answer. Where none can be computed, nothing is contradicted.
+    /// Whether `faults` give another answer, and one that is farther off than the right one. Where none can be computed, nothing is
+    /// contradicted.
     fn contradicts(&self, faults: &[Fault<'static>], mask: Mask) -> bool {
-        self.predicted(faults).is_some_and(|predicted| self.explained(predicted, mask).is_none())
+        let Some(predicted) = self.predicted(faults).filter(|predicted| self.explained(*predicted, mask).is_none())
+        else {
+            return false;
+        };
+        // A right answer may be less accurate than most of this solver's.
+        let right = Predicted { end: self.question.exact.end, conditions: self.question.conditions };
+        let [here, at_right] = [predicted, right].map(|end| self.excess(end));
+        (0..3).any(|i| mask[i] && !(here[i].abs() <= FARTHER * at_right[i].abs().max(1.0)))
     }
 
     /// Whether what `faults` give is another answer than the right one.
@@ -213,8 +225,15 @@ impl Seen<'_> {
         let mut values: Vec<Option<Option<[f64; 3]>>> = vec![None; grid.len()];
         ends().for_each(|index| values[index] = Some(excess(grid[index])));
         // What does not concern this flight leaves it as it is, whatever the number.
-        let is_moved = ends().any(|index| values[index] != values[0]);
-        if grid.len() > 1 && !is_moved {
+        let is_moved = if grid.len() > 1 {
+            ends().any(|index| values[index] != values[0])
+        } else {
+            let still = self.predicted(others).map(|still| self.excess(still));
+            // Simulated, it differs by round-off.
+            let differs = |(one, other): (f64, f64)| !((one - other).abs() <= STILL);
+            values[0].flatten().zip(still).is_none_or(|(one, other)| one.into_iter().zip(other).any(differs))
+        };
+        if !is_moved {
             return None;
         }
         let crosses = |low: [f64; 3], high: [f64; 3]| (0..3).filter(move |i| mask[*i] && low[*i] * high[*i] < 0.0);
@@ -308,7 +327,7 @@ fn root(
 
 /// `number`, or the round one that it is within its accuracy.
 fn rounded(number: f64) -> impl Iterator<Item = f64> {
-    let zero = (number != 0.0 && number.abs() < 1e-6).then_some(0.0);
+    let zero = (number != 0.0 && number.abs() < 1e-4).then_some(0.0);
     let ratios = [1.0, 2.0, 3.0, 4.0, 8.0, std::f64::consts::PI];
     let ratios = ratios.into_iter().flat_map(move |by| [(number * by).round() / by, (number / by).round() * by]);
     let decimals = (0..3).map(move |digits| {

@@ -1,6 +1,7 @@
 //! Solvers that are wrong on purpose: does a diagnosis say of each what is wrong with it?
 
 mod series;
+mod several;
 mod stepping;
 mod told;
 

@@ -163,6 +163,8 @@ pub(super) enum Change {
     Force(Force),
     /// The speed (m/s) that counts as rest.
     RestSpeed(fn(&Problem, f64) -> f64),
+    /// The same as a part of V at the start of the stage: the number.
+    RestPart,
     /// The problem, by the end of the right flight.
     OfRight(fn(&mut Problem, &State, f64)),
     /// The problem, by the scene.
@@ -360,6 +362,7 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
                 rules.force = (*law, number);
             }
             Change::RestSpeed(of) => rules.rest_speed = of(&problem, number),
+            Change::RestPart => rules.rest_part = number,
             Change::EndTime(of) => rules.end_time = of(&question.problem, question.exact.end.time, number),
             Change::StageTime(of) => rules.stage_time = of(&question.problem, number),
             Change::AtStageEnd(alter) => rules.at_stage_end = Some((*alter, number)),
@@ -380,7 +383,7 @@ pub(super) fn predict(question: &Question, faults: &[Fault<'_>], how: How) -> Op
     if let Some((written, scene)) = written.zip(question.scene.as_ref())
         && let Some(square) = written.crater_speed_squared(scene, &problem)
     {
-        events::behind_crater(&problem, &mut found, square);
+        events::behind_crater(&problem, &mut found, square, written.rests_by_energy);
     }
     for (change, number) in changes() {
         if let Change::Report(alter) = change {

@@ -3,6 +3,7 @@
 //! - Asked anew: whether a solver that has just started gives other answers.
 //! - The drag, speed by speed: a short flight through drag alone loses `ln(V0/V) = Q H / M` whatever the speed, so that
 //!   the ratio of the loss to that is the ratio of the force.
+//! - How each term alone grows with mass, speed, depth and its coefficient (`scaling`).
 //! - Exits that lie close to each other, within one step: where the step is replaced by a straight line, so are the time
 //!   and the velocity as functions of the depth, and their second differences vanish.
 //! - The same flight with other units of length and speed: the relative error of a solver whose tolerance is relative
@@ -11,13 +12,15 @@
 //! - One flight in ever shorter times, and at ever tighter tolerances: a step or a tolerance that is never undercut (`bounds`).
 //! - Failing flights in ever shorter parts (`long_steps`).
 //! - What the answers that came show of clocks, of rates that have one factor, and of ends that are those of a moment beside them.
-//! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`).
+//! - One step of a scheme, of fixed steps, that lands on its exit (`one_step`), and one after another (`several_steps`).
 //! - Each stage by itself, from the state that the solver lists at its start (`stage_by_stage`).
 
 mod bounds;
 mod first_step;
 mod long_steps;
 mod one_step;
+mod scaling;
+mod several_steps;
 mod stage_by_stage;
 mod within_step;
 
@@ -40,8 +43,9 @@ const ANOTHER: f64 = 1e-9;
 /// Order expected of a scheme of fixed steps that claims none.
 const LEAST_ORDER: f64 = 2.0;
 
-/// Exits in a row, and the distance between two over the depth.
+/// Exits in a row, the impact speed (m/s) there, and the distance between two over the depth.
 const EXITS: usize = 24;
+const ROW_SPEED: f64 = 100.0;
 const BETWEEN_EXITS: f64 = 2e-3;
 /// Part by which numbers differ that are nearly one.
 const ONE_PART: f64 = 0.1;
@@ -49,6 +53,8 @@ const ONE_PART: f64 = 0.1;
 const ALONG: f64 = 0.02;
 /// The same at most, where they change smoothly.
 const SMOOTH: f64 = 0.5;
+/// Error of the time between two exits over that of the path, at least, where the time is summed otherwise.
+const OF_PATH: f64 = 100.0;
 /// Second differences over the right ones that are none, and the part of them that must be none.
 const STRAIGHT: f64 = 1e-3;
 const STRAIGHT_PART: f64 = 0.75;
@@ -157,12 +163,16 @@ pub(super) fn measured(asking: &mut Asking<'_>, all: &[Question], found: &Diagno
             return None;
         }
         let claimed = found.orders.iter().filter_map(|order| order.formal_order).reduce(f64::max);
-        return one_step::measured(asking, claimed.unwrap_or(LEAST_ORDER))
+        let claimed = claimed.unwrap_or(LEAST_ORDER);
+        return several_steps::measured(asking, claimed)
+            .or_else(|| one_step::measured(asking, claimed))
             .or_else(|| within_step::measured(asking, true));
     }
     clock(asking, all, found)
         .or_else(|| coasting(asking))
         .or_else(|| drag_by_speed(asking))
+        .or_else(|| scaling::measured(asking, all, found))
+        .or_else(|| cut_short(asking))
         .or_else(|| straight_steps(asking))
         .or_else(|| within_step::measured(asking, false))
         .or_else(|| first_step::measured(asking))
@@ -266,22 +276,28 @@ fn clock(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -> Option
     };
     let rises: Vec<f64> = flights.windows(2).map(over_right).collect();
     let along = rises.iter().filter(|rise| rise.abs() <= ALONG).count() as f64;
-    let is_smooth = |pair: &&[f64]| (pair[1] - pair[0]).abs() <= ONE_PART * pair[0].abs() && pair[0].abs() <= SMOOTH;
+    let most = rises.iter().fold(0.0_f64, |most, rise| most.max(rise.abs()));
+    // Behind the end of a step it begins anew.
+    let is_smooth = |pair: &&[f64]| (pair[1] - pair[0]).abs() <= ONE_PART * most && pair[0].abs() <= SMOOTH;
     let smooth = rises.windows(2).filter(is_smooth).count() as f64;
     if !flights.iter().any(is_wrong) {
         return None;
     }
-    if along >= STRAIGHT_PART * rises.len() as f64 {
+    // Beside the error of the path a time that is summed otherwise is far off.
+    let of_path =
+        flights.iter().map(|[found, exact]| (found.velocity - exact.velocity).abs()).fold(0.0, f64::max) / ROW_SPEED;
+    let far = rises.iter().filter(|rise| rise.abs() > OF_PATH * of_path).count() as f64;
+    if far >= STRAIGHT_PART * rises.len() as f64 && smooth >= STRAIGHT_PART * rises.len() as f64 {
         return said(
-            "the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than \
-             that of the step",
+            "the time alone is wrong, and changes smoothly from exit to exit: it is summed over the steps by a rule of a lower order than \
+             that of the path",
         );
     }
-    (smooth >= STRAIGHT_PART * rises.len() as f64).then(|| {
-        let statement = "the time alone is wrong, and changes smoothly from exit to exit: it is summed over the steps by a rule of a lower \
-                         order than that of the path";
-        Cause::plain("clock", statement.to_owned(), Certainty::Likely, alone.len(), of)
-    })
+    (along >= STRAIGHT_PART * rises.len() as f64).then_some(())?;
+    said(
+        "the time alone is wrong, by what stays the same from exit to exit within a step: the clock goes on by another length than that \
+         of the step",
+    )
 }
 
 /// Whether times of failing questions differ from tolerance to tolerance.
@@ -301,7 +317,7 @@ fn follows_steps(asking: &mut Asking<'_>, all: &[Question], found: &Diagnosis) -
 
 /// Exits in a row, found and exact, by one absolute tolerance.
 fn row_of_exits(asking: &mut Asking<'_>) -> Option<Vec<[State; 2]>> {
-    let of_depth = |depth| Problem::of_stages(1.0, 100.0, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
+    let of_depth = |depth| Problem::of_stages(1.0, ROW_SPEED, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
     // Else each flight has steps of its own.
     let atol = PeerRequest::from_problem(&of_depth(1.0), TOLERANCES[0]).atol;
     (0..EXITS)
@@ -449,6 +465,21 @@ fn drag_by_speed(asking: &mut Asking<'_>) -> Option<Cause> {
     let listed = [ratios[0], ratios[ratios.len() / 2], ratios[ratios.len() - 1], worst];
     let [a, b, c, worst] = listed.map(|(speed, ratio)| format!("{ratio:.6} at {speed:.4} m/s"));
     likely(None, format!("the drag is not q V²: over the right one it is {a}, {b} and {c}; most off is {worst}"))
+}
+
+/// Whether the time at an exit is a number times its depth over V0, whatever the force.
+fn cut_short(asking: &mut Asking<'_>) -> Option<Cause> {
+    let over_straight = |[found, _]: &[State; 2]| ROW_SPEED * found.time / found.depth;
+    let row = row_of_exits(asking)?;
+    let factor = over_straight(row.first()?);
+    let is_one = |ends: &[State; 2]| (over_straight(ends) - factor).abs() <= ONE_RATIO * factor;
+    let problem = Problem::of_stages(1.0, ROW_SPEED, [Stage::tunnel(700.0, 0.6)]).with_exit(1.0);
+    let of_more_force = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[0]))?;
+    let statement = format!(
+        "the time at an exit is {factor:.6} times its depth over V0, whatever the force: the flight is cut short there"
+    );
+    let cause = Cause::plain("flight-cut-short", statement, Certainty::Likely, EXITS + 1, EXITS + 1);
+    (is_one(&of_more_force) && row.iter().all(is_one)).then_some(Cause { factor: Some(factor), ..cause })
 }
 
 /// Whether time and velocity run along a straight line within a step.

@@ -77,6 +77,8 @@ pub(super) struct Rules {
     pub at_stage_end: Option<(AtStageEnd, f64)>,
     /// It rests once V is at most this (m/s).
     pub rest_speed: f64,
+    /// The same in parts of V at the start of the stage.
+    pub rest_part: f64,
     /// It ends at this time (s), wherever it is.
     pub end_time: f64,
     /// It ends so long (s) after the start of a stage.
@@ -86,7 +88,14 @@ pub(super) struct Rules {
 impl Default for Rules {
     fn default() -> Self {
         let never = f64::INFINITY;
-        Self { force: (right_force, 1.0), at_stage_end: None, rest_speed: 0.0, end_time: never, stage_time: never }
+        Self {
+            force: (right_force, 1.0),
+            at_stage_end: None,
+            rest_speed: 0.0,
+            rest_part: 0.0,
+            end_time: never,
+            stage_time: never,
+        }
     }
 }
 
@@ -167,7 +176,7 @@ fn first_positive(h: f64, guess: f64, g: impl Fn(f64) -> [f64; 2]) -> f64 {
 ///
 /// `None` where it does not end within some thousand steps, or leaves the range of numbers.
 pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
-    let Rules { force: (force, number), at_stage_end, rest_speed, end_time, stage_time } = rules;
+    let Rules { force: (force, number), at_stage_end, rest_speed, rest_part, end_time, stage_time } = rules;
     // Times of whoever changes them at ends of stages are not those of the flight.
     let mut elapsed = 0.0;
     let mut state = State::at_impact(problem);
@@ -180,6 +189,7 @@ pub(super) fn simulate(problem: &Problem, rules: Rules) -> Option<Simulated> {
         let start = state;
         let (impact_speed, entry_speed, mass) = (problem.impact_speed, start.velocity, problem.mass);
         let end_time = end_time.min(elapsed + stage_time);
+        let rest_speed = rest_speed.max(rest_part * entry_speed);
         while state.depth < limit {
             let State { time, depth: x, velocity: v } = state;
             // By the distance since x, not by the depth: a stage may be far shorter than it is deep.

@@ -256,7 +256,7 @@ fn is_mostly(silent: usize, failed: usize) -> bool {
 /// That questions have no answer: so many of those that fail.
 fn no_answer(rows: &[Asked], silent: usize, failed: usize) -> Cause {
     let is_silent = |row: &Asked| row.verdict == Verdict::Failed && row.answered.is_none();
-    let words = rows.iter().find(|row| row.answered.is_none()).map_or("", |row| row.reason.as_str());
+    let words = rows.iter().find(|row| is_silent(row)).map_or("", |row| row.reason.as_str());
     let statement = format!(
         "{} no answer: {words}{}",
         if silent == 1 { "1 question has".to_owned() } else { format!("{silent} questions have") },

@@ -51,6 +51,8 @@ pub(super) struct Stepping {
     pub kick: f64,
     /// Part of V0 at which it counts as at rest.
     pub rest_speed: f64,
+    /// Halvings of a step, in which an event is located.
+    pub halvings: usize,
     /// Whether it takes `dt_s`.
     pub is_fixed: bool,
 }
@@ -78,11 +80,10 @@ pub(super) const RIGHT: Stepping = Stepping {
     lag: [0.0; 2],
     kick: 0.0,
     rest_speed: 0.0,
+    halvings: 100,
     is_fixed: false,
 };
 
-/// Halvings of a step, in which an event is located.
-const HALVINGS: usize = 100;
 /// Steps of a flight at most.
 const STEPS_MAX: usize = 1_000_000;
 
@@ -112,7 +113,7 @@ impl Stepping {
                 }
                 let first_by = |scheme: Self, is_past: &dyn Fn(State) -> bool| {
                     let (mut low, mut high) = (0.0, step);
-                    for _ in 0..HALVINGS {
+                    for _ in 0..self.halvings {
                         let middle = 0.5 * (low + high);
                         if is_past(ahead_by(scheme, middle)) { high = middle } else { low = middle }
                     }
@@ -138,7 +139,7 @@ impl Stepping {
                         let slopes = [factors[0] * slope(now), factors[1] * slope(next)];
                         let is_past = |state: State| if rests { state.velocity <= 0.0 } else { state.depth >= limit };
                         let (mut low, mut high) = (0.0, 1.0);
-                        for _ in 0..HALVINGS {
+                        for _ in 0..self.halvings {
                             let middle = 0.5 * (low + high);
                             if is_past(on_cubic(now, next, slopes, middle)) { high = middle } else { low = middle }
                         }
@@ -188,7 +189,7 @@ impl Stepping {
 }
 
 /// The state at a `part` of the way from `from` to `to`, on cubics with these slopes of V.
-fn on_cubic(from: State, to: State, slopes: [f64; 2], part: f64) -> State {
+pub(super) fn on_cubic(from: State, to: State, slopes: [f64; 2], part: f64) -> State {
     let step = to.time - from.time;
     let cubic = |[a, b]: [f64; 2], [da, db]: [f64; 2]| {
         let left = 1.0 - part;

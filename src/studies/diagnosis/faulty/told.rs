@@ -15,6 +15,7 @@ use super::super::{
     questions_to,
 };
 use super::series::{RIGHT_SERIES, Series};
+use super::several::Scheme;
 use super::stepping::{CLASSICAL, Placed, RIGHT, Stepping};
 use super::{answer, failure};
 use crate::exchange::peers::{ORDER_OF_ALL, PeerAnswer, PeerFailure, PeerIdentity, PeerRequest, PeerScene};
@@ -124,6 +125,12 @@ fn by_request(
     })
 }
 
+/// Does `change` to each stage, by the depth of the exit and the impact speed.
+fn each_stage(problem: &mut Problem, change: fn(&mut Stage, f64, f64)) {
+    let (exit, speed) = (problem.exit_depth, problem.impact_speed);
+    problem.stages.iter_mut().for_each(|law| change(law, exit, speed));
+}
+
 /// A solver that is exact by other `rules`, and does `report` to the end of a flight that stops.
 fn by_rules(rules: Rules, report: fn(&mut State)) -> Answering {
     Answering::plain(move |request| {
@@ -194,6 +201,21 @@ pub(in super::super) fn by_stages(change: fn(&Staged<'_>, &mut State)) -> Answer
         None
     })
 }
+
+impl Scheme {
+    fn solver(self) -> Answering {
+        let end = move |request: &PeerRequest| {
+            let problem = request.problem(None);
+            let end = self.end(&problem, request.dt_s?)?;
+            let is_through = problem.has_exit() && end.depth >= problem.exit_depth;
+            Some(answer(if is_through { Outcome::Perforated } else { Outcome::Stopped }, end))
+        };
+        Answering::plain(end).in_fixed_steps()
+    }
+}
+
+/// The weights of Adams and Bashforth's scheme of order three.
+const ADAMS: [f64; 3] = [23.0 / 12.0, -16.0 / 12.0, 5.0 / 12.0];
 
 impl Stepping {
     fn solver(self) -> Answering {
@@ -508,6 +530,20 @@ const TOLD: &[Told] = &[
         says: "term:drag, likely: the drag is not q V²: over the right one it is 11.591808 at 0.1000 m/s, 1.100552 at 10.0000 m/s and 1.001005 at 1000.0000 m/s; most off is 11.591808 at 0.1000 m/s",
     },
     Told {
+        what: "the viscosity is divided by the depth of the exit",
+        solver: || altered(|problem| each_stage(problem, |law, exit, _| law.viscosity /= exit), |_, _| ()),
+        asked: Measured,
+        says: "term:viscosity, likely: alone, up to an exit at L, the viscosity r acts as 1.000 r L^-1 in SI units: it is not made dimensionless as the others, or depends on what it must not",
+    },
+    Told {
+        what: "the static force has half the root of the impact speed as a factor",
+        solver: || {
+            altered(|problem| each_stage(problem, |law, _, speed| law.static_force *= 0.5 * speed.sqrt()), |_, _| ())
+        },
+        asked: Measured,
+        says: "term:static-force, likely: alone, up to an exit at L, the static force p acts as 0.500 p V0^0.5 in SI units: it is not made dimensionless as the others, or depends on what it must not",
+    },
+    Told {
         what: "the exit is placed on the chord",
         solver: || Stepping { exit: Placed::OnChord, steps: |_, _| 7.0, ..RIGHT }.solver(),
         asked: Measured,
@@ -622,10 +658,75 @@ const TOLD: &[Told] = &[
         says: "drag-lagged, likely: the first step under V' = z V/h gives V the term 0.250000 z^2, where order 2 has 0.500000 z^2: the V in the force is that of another time, or a weight is wrong",
     },
     Told {
+        what: "a scheme of three steps is started by Euler's",
+        solver: || Scheme::Adams(ADAMS, true).solver(),
+        asked: Claiming(3.0),
+        says: "start-low-order, certain: the first 2 steps of a flight have order 1, and later ones 3: a scheme of several steps is started by one of too low an order",
+    },
+    Told {
+        what: "a scheme of three steps takes the slope of the last one twice",
+        solver: || Scheme::Adams([ADAMS[0], ADAMS[1] + ADAMS[2], 0.0], false).solver(),
+        asked: Claiming(3.0),
+        says: "scheme-coefficient, certain: the last slopes have the weights 1.9167, -0.9167, the newest first, where Adams and Bashforth's scheme of order 3 has 1.9167, -1.3333, 0.4167",
+    },
+    Told {
+        what: "a scheme of three steps that is right",
+        solver: || Scheme::Adams(ADAMS, false).solver(),
+        asked: Claiming(3.0),
+        says: "",
+    },
+    Told {
+        what: "an iteration ends once V changes by a thousandth",
+        solver: || Scheme::Midpoint(1e-3).solver(),
+        asked: Claiming(2.0),
+        says: "iteration-loose, certain: a step that changes V by a part of 2.0e-3 or less has order 1, and one that changes it by more has a higher order: an iteration within the step ends once it changes little",
+    },
+    Told {
+        what: "an iteration goes on until V stays",
+        solver: || Scheme::Midpoint(1e-15).solver(),
+        asked: Claiming(2.0),
+        says: "",
+    },
+    Told {
+        what: "an event is looked for by eight halvings of a step",
+        solver: || Stepping { halvings: 8, ..FIXED }.solver(),
+        asked: Claiming(4.0),
+        says: "event-loose, certain: every exit lies at a whole number of parts of a step, each 2^-8 of it: a step is halved 8 times to find it, and no more",
+    },
+    Told {
+        what: "a flight is given up after a time by V0, and its exit called reached",
+        solver: || {
+            altered(|_| (), |problem, end| end.time = end.time.min(1.25 * problem.exit_depth / problem.impact_speed))
+        },
+        asked: Measured,
+        says: "flight-cut-short, likely, 1.250000: the time at an exit is 1.250000 times its depth over V0, whatever the force: the flight is cut short there",
+    },
+    Told {
+        what: "x in s x is counted from the start of the stage, by a solver that errs more in flights through one stage",
+        solver: || {
+            altered(
+                |problem| {
+                    for index in 1..problem.stages.len() {
+                        let start = problem.start_of(index);
+                        let law = &mut problem.stages[index];
+                        law.static_force -= law.stiffness * start;
+                    }
+                },
+                |problem, end| {
+                    if problem.stages.len() == 1 {
+                        end.time *= 1.0 + 9e-10;
+                    }
+                },
+            )
+        },
+        asked: Questions(80),
+        says: "failed | stiffness-origin, certain: the depth in s x is counted from the start of the stage, not from the impact face",
+    },
+    Told {
         what: "steps go over the ends of stages",
         solver: || Stepping { stage_end: Placed::AtStepEnd, ..FIXED }.solver(),
         asked: Claiming(4.0),
-        says: "",
+        says: "stage-end-late, certain: steps do not land on the ends of stages: where the force jumps the order falls to 1",
     },
     Told {
         what: "V0 is taken for V half a step before the impact",
@@ -705,7 +806,7 @@ const TOLD: &[Told] = &[
         what: "the ends of stages are passed at the end of a step",
         solver: || Stepping { stage_end: Placed::AtStepEnd, ..FIXED }.solver(),
         asked: Questions(40),
-        says: "passed | stage-end-late, likely: the order falls to 1 where the force jumps at the end of a stage",
+        says: "passed | stage-end-late, certain: steps do not land on the ends of stages: where the force jumps the order falls to 1",
     },
     Told {
         what: "rest is taken at the end of a step",

@@ -52,13 +52,14 @@ fn stop_evenly(problem: &Problem, found: &mut Simulated, speed: f64) {
 }
 
 /// The flight where V² behind the crater is `square`, and so is the time there: the projectile rests where it is not positive, at the depth
-/// to which the spring alone takes it.
-pub(super) fn behind_crater(problem: &Problem, found: &mut Simulated, square: f64) {
+/// to which the spring alone takes it, or, `by_energy`, where it rests there rightly too.
+pub(super) fn behind_crater(problem: &Problem, found: &mut Simulated, square: f64, by_energy: bool) {
     let Stage { stiffness, end: depth, .. } = problem.stages[0];
-    if problem.crater != Some(0) || problem.exit_depth <= depth {
+    let frequency = (stiffness / problem.mass).sqrt();
+    let is_right = by_energy && problem.impact_speed <= frequency * depth;
+    if problem.crater != Some(0) || problem.exit_depth <= depth || is_right {
         return;
     }
-    let frequency = (stiffness / problem.mass).sqrt();
     if !square.is_finite() {
         found.end.time = f64::NAN;
         return;
@@ -78,6 +79,14 @@ pub(super) fn behind_crater(problem: &Problem, found: &mut Simulated, square: f6
     *found = flight;
     found.passed.iter_mut().for_each(|(_, state)| state.time += late);
     found.end.time += late;
+}
+
+/// The flight where V behind the crater is that of a force that goes on into the tunnel.
+fn crater_of_one_force(problem: &Problem, found: &mut Simulated, by_energy: bool) {
+    if problem.crater == Some(0) {
+        let at = Passage { problem, index: 0, start: State::at_impact(problem) };
+        behind_crater(problem, found, of_one_force(&at, problem.stages[0].end).powi(2), by_energy);
+    }
 }
 
 /// The velocity at `depth` in a stage, as if it had no term but those of `KEPT`: p, s, r and q are its bits from the first on.
@@ -427,6 +436,25 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         &[
             Change::RestSpeed(|p, part| part * p.impact_speed),
             Change::Report(|p, found, part| clear_speed(found, part * p.impact_speed)),
+        ],
+    ),
+    of(
+        "rest-threshold",
+        "the projectile counts as at rest below {} times V at the start of the stage, and that speed is reported",
+        Parameter::Fraction,
+        &[Change::RestPart],
+    ),
+    of(
+        "rest-threshold",
+        "the projectile counts as at rest below {} times V at the start of the stage",
+        Parameter::Fraction,
+        &[
+            Change::RestPart,
+            Change::Report(|p, found, _| {
+                if found.end.depth < p.exit_depth {
+                    found.end.velocity = 0.0;
+                }
+            }),
         ],
     ),
     of(
@@ -960,12 +988,14 @@ pub(super) static FAULTS: &[Hypothesis] = &[
         "V behind the crater, the time there by it and whether it is passed are those of a force that goes on into the tunnel, also where \
          the crater stiffness is given",
         Parameter::None,
-        &[Change::Report(|p, found, _| {
-            if p.crater == Some(0) {
-                let at = Passage { problem: p, index: 0, start: State::at_impact(p) };
-                behind_crater(p, found, of_one_force(&at, p.stages[0].end).powi(2));
-            }
-        })],
+        &[Change::Report(|p, found, _| crater_of_one_force(p, found, false))],
+    ),
+    of(
+        "stage-end-velocity",
+        "V behind the crater and the time there by it are those of a force that goes on into the tunnel, also where the crater stiffness \
+         is given",
+        Parameter::None,
+        &[Change::Report(|p, found, _| crater_of_one_force(p, found, true))],
     ),
     of(
         "stage-end-velocity",

@@ -112,6 +112,8 @@ pub(in super::super) struct Written {
     text: Formula,
     /// What stands in the place of the second number, where two are exchanged.
     exchanged: Option<(usize, Formula)>,
+    /// Whether it rests in the crater where the spring stops it, whatever V behind the crater is.
+    pub rests_by_energy: bool,
 }
 
 /// What is written otherwise.
@@ -248,16 +250,22 @@ static SLIPS: LazyLock<Vec<Hypothesis>> = LazyLock::new(|| {
         let names: Vec<&str> = names.collect();
         for text in others(&slips(&right.text, &names), right) {
             let statement = format!("{what} is formed as {}, not as {}", text.text, right.text);
-            all.push(hypothesis(id, statement, Written { of: Of::Formula(which), text, exchanged: None }));
+            all.push(hypothesis(
+                id,
+                statement,
+                Written { of: Of::Formula(which), text, exchanged: None, rests_by_energy: false },
+            ));
         }
     }
     let names = ["M", "V0", "D", "P", "Q", "c"];
     for (place, what, right) in SPEEDS {
         let Some(right) = read(right) else { continue };
-        for text in others(&slips(&right.text, &names), &right) {
-            let statement = format!("{what} is formed as {}, not as {}", text.text, right.text);
-            let written = Written { of: Of::Speed(place), text, exchanged: None };
-            all.push(hypothesis("stage-end-velocity", statement, written));
+        for rests_by_energy in [false, true] {
+            for text in others(&slips(&right.text, &names), &right) {
+                let statement = format!("{what} is formed as {}, not as {}", text.text, right.text);
+                let written = Written { of: Of::Speed(place), text, exchanged: None, rests_by_energy };
+                all.push(hypothesis("stage-end-velocity", statement, written));
+            }
         }
     }
     let names = NUMBERS.map(|(name, ..)| name);
@@ -266,12 +274,17 @@ static SLIPS: LazyLock<Vec<Hypothesis>> = LazyLock::new(|| {
         let texts = if OF_SEVERAL.contains(&name) { slips(name, &names) } else { Vec::new() };
         for text in others(&texts, &right) {
             let statement = format!("{} is taken for {name}", text.text);
-            all.push(hypothesis(id, statement, Written { of: Of::Number(place), text, exchanged: None }));
+            all.push(hypothesis(
+                id,
+                statement,
+                Written { of: Of::Number(place), text, exchanged: None, rests_by_energy: false },
+            ));
         }
         for (other, other_name) in names.into_iter().enumerate().skip(place + 1) {
             let (Some(text), Some(own)) = (read(other_name), read(name)) else { continue };
             let statement = format!("{name} and {other_name} are exchanged");
-            let written = Written { of: Of::Number(place), text, exchanged: Some((other, own)) };
+            let written =
+                Written { of: Of::Number(place), text, exchanged: Some((other, own)), rests_by_energy: false };
             all.push(hypothesis("parameters-exchanged", statement, written));
         }
     }
@@ -296,7 +309,9 @@ mod tests {
             let scene = question.scene.unwrap();
             for (which, (.., text)) in FORMULAS.iter().enumerate() {
                 let text = read(text).unwrap();
-                let problem = Written { of: Of::Formula(which), text, exchanged: None }.problem(&scene).unwrap();
+                let problem = Written { of: Of::Formula(which), text, exchanged: None, rests_by_energy: false }
+                    .problem(&scene)
+                    .unwrap();
                 let right = scene.problem().unwrap();
                 let is_near = |a: f64, b: f64| a == b || (a / b - 1.0).abs() < 1e-14;
                 assert!(is_near(problem.exit_depth, right.exit_depth), "{}: {problem:?}", question.id);
@@ -319,7 +334,7 @@ mod tests {
         let right = scene.problem().unwrap();
         let written = |of: Of, text: &str| {
             let text = read(text).unwrap();
-            Written { of, text, exchanged: None }.problem(&scene).unwrap()
+            Written { of, text, exchanged: None, rests_by_energy: false }.problem(&scene).unwrap()
         };
         let ratios = |wrong: &Problem| {
             let [(crater, tunnel), (right_crater, right_tunnel)] =

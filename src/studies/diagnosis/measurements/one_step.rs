@@ -12,6 +12,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::super::causes::{Cause, Certainty};
 use super::super::{Asking, TOLERANCES, end_of};
+use super::several_steps::{BEHIND, state_at};
 use crate::exchange::peers::PeerRequest;
 use crate::physics::{Problem, Stage, State};
 
@@ -29,6 +30,8 @@ pub(super) const SAME: f64 = 1e-6;
 /// Part of a coefficient by which it is another one, and the same of the fourth, which of a scheme that is no polynomial is off by 3e-3.
 pub(super) const ANOTHER: f64 = 1e-3;
 const ANOTHER_FOURTH: f64 = 0.02;
+/// Step (s) of a scheme that does not land.
+const NOT_LANDED: f64 = 0.1;
 /// Highest order whose coefficient is compared.
 const ORDER_MAX: usize = 4;
 
@@ -38,15 +41,24 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     let certain = |id: &str, factor, statement| {
         Some(Cause { factor, ..Cause::plain(id, statement, Certainty::Certain, asked, asked) })
     };
-    let Some(first) = constant_force(asking, 0.0, 0.0) else {
-        if let Some(part) = kick_of_step_asked(asking) {
-            let statement = format!(
-                "where a step under a constant deceleration a is shortened to land on an end, V is {part:.6} a smaller for each second \
-                 of the step asked for: part of its force acts for as long as a whole step"
-            );
-            return certain("scheme-coefficient", Some(part), statement);
+    let first = match constant_force(asking, 0.0, 0.0, landed) {
+        Some(first) => first,
+        None => {
+            if let Some(part) = kick_of_step_asked(asking) {
+                let statement = format!(
+                    "where a step under a constant deceleration a is shortened to land on an end, V is {part:.6} a smaller for each second \
+                     of the step asked for: part of its force acts for as long as a whole step"
+                );
+                return certain("scheme-coefficient", Some(part), statement);
+            }
+            let kick = start_kick(asking);
+            if kick.is_some() {
+                return kick;
+            }
+            // A first step that is wrong is so behind stages too.
+            let is_right = constant_force(asking, 0.0, 0.0, not_landed)?.first_wrong(claimed).is_none();
+            return if is_right { behind_stage_end(asking, claimed) } else { None };
         }
-        return start_kick(asking);
     };
     if lands_straight(asking) {
         let statement = "the step that lands on an end lasts the distance to it over V at the start of the step: the time and V there \
@@ -66,36 +78,8 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
         );
         return certain("scheme-coefficient", Some(found / right), statement);
     }
-    let (near, far) = (constant_force(asking, 0.1, 0.0)?, constant_force(asking, 0.25, 0.0)?);
-    if let Some((what, [found, right])) = near.first_wrong(claimed) {
-        return if near.is_same_as(&far) {
-            let statement =
-                format!("the first step behind the end of a stage has {what} with a factor {found:.6}, not {right}");
-            // Where the force is the same on both sides, part of the one before does no harm.
-            let is_stale =
-                constant_force(asking, 0.1, DECELERATION).is_none_or(|same| same.first_wrong(claimed).is_none());
-            if is_stale {
-                certain("force-stale", None, statement + ": part of its force is that of the stage before")
-            } else {
-                certain(
-                    "start-kick",
-                    None,
-                    statement + ", whatever the force before: it is not started as the first step of all is",
-                )
-            }
-        } else {
-            let statement = "steps do not land on the ends of stages: where the force jumps the order falls to 1";
-            certain("stage-end-late", None, statement.to_owned())
-        };
-    }
-    if let Some((part, is_of_before)) = kick_behind(asking) {
-        let reason = if is_of_before {
-            "where the force there is another one: a slope of the stage before is kept"
-        } else {
-            "whatever the force before: it is not started as the first step of all is"
-        };
-        let statement = format!("behind the end of a stage V is {part:.6} a h off, whatever the step h, {reason}");
-        return certain(if is_of_before { "force-stale" } else { "start-kick" }, None, statement);
+    if let Some(cause) = behind_stage_end(asking, claimed) {
+        return Some(cause);
     }
     // A scheme of Runge and Kutta that takes x rightly takes V so too: one that does not has another V in its force.
     let order = (claimed.round() as usize).min(ORDER_MAX);
@@ -132,6 +116,51 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     None
 }
 
+/// What the step behind the end of a stage shows.
+fn behind_stage_end(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
+    let asked = STEPS.len() * SIZES.len();
+    let certain = |id: &str, statement| Some(Cause::plain(id, statement, Certainty::Certain, asked, asked));
+    let mut by = |ended: Ended| {
+        Some((ended, constant_force(asking, 0.1, 0.0, ended)?, constant_force(asking, 0.25, 0.0, ended)?))
+    };
+    let (ended, near, far) = by(landed).or_else(|| by(not_landed))?;
+    if let Some((what, [found, right])) = near.first_wrong(claimed) {
+        return if near.is_same_as(&far) {
+            let statement =
+                format!("the first step behind the end of a stage has {what} with a factor {found:.6}, not {right}");
+            // Where the force is the same on both sides, part of the one before does no harm.
+            let is_stale =
+                constant_force(asking, 0.1, DECELERATION, ended).is_none_or(|same| same.first_wrong(claimed).is_none());
+            if is_stale {
+                certain("force-stale", statement + ": part of its force is that of the stage before")
+            } else {
+                certain(
+                    "start-kick",
+                    statement + ", whatever the force before: it is not started as the first step of all is",
+                )
+            }
+        } else {
+            let statement = "steps do not land on the ends of stages: where the force jumps the order falls to 1";
+            certain("stage-end-late", statement.to_owned())
+        };
+    }
+    if let Some((part, is_of_before)) = kick_behind(asking) {
+        // One that starts every stage so does it at impact too.
+        let at_impact = start_kick(asking);
+        if at_impact.is_some() {
+            return at_impact;
+        }
+        let reason = if is_of_before {
+            "where the force there is another one: a slope of the stage before is kept"
+        } else {
+            "whatever the force before: it is not started as the first step of all is"
+        };
+        let statement = format!("behind the end of a stage V is {part:.6} a h off, whatever the step h, {reason}");
+        return certain(if is_of_before { "force-stale" } else { "start-kick" }, statement);
+    }
+    None
+}
+
 /// By how much V falls with the step asked for, over the deceleration, where time and depth do not depend on it.
 fn kick_of_step_asked(asking: &mut Asking<'_>) -> Option<f64> {
     let problem = Problem::of_stages(1.0, 1.0, [Stage::tunnel(DECELERATION, 0.0)]).with_exit(0.4);
@@ -150,7 +179,7 @@ fn kick_of_step_asked(asking: &mut Asking<'_>) -> Option<f64> {
 }
 
 /// The end of a flight within one step, which is the same whatever the step asked for.
-fn landed(asking: &mut Asking<'_>, problem: &Problem) -> Option<State> {
+fn landed(asking: &mut Asking<'_>, problem: &Problem, _: f64) -> Option<State> {
     let is_same = |a: f64, b: f64| (a - b).abs() <= LANDED * a.abs();
     let ends = STEPS.map(|step| {
         let request = PeerRequest { dt_s: Some(step), ..PeerRequest::from_problem(problem, TOLERANCES[0]) };
@@ -191,19 +220,37 @@ impl Constant {
 /// The deceleration (m/s²) of flights with V0 = 1 m/s and M = 1 kg.
 const DECELERATION: f64 = 0.5;
 
+/// How the end of a first step is found: where a flight ends in it, or by the times of exits behind it.
+type Ended = fn(&mut Asking<'_>, &Problem, f64) -> Option<State>;
+
 /// The step at impact, or the one behind a first stage with the deceleration `of_first` that ends at `before` (m).
-fn constant_force(asking: &mut Asking<'_>, before: f64, of_first: f64) -> Option<Constant> {
+fn constant_force(asking: &mut Asking<'_>, before: f64, of_first: f64, ended: Ended) -> Option<Constant> {
     let braked = Stage::tunnel(DECELERATION, 0.0);
     let first = Stage::tunnel(of_first, 0.0).until(before);
     let stages = if before > 0.0 { vec![first, braked] } else { vec![braked] };
-    let exit = 0.4;
-    let end = landed(asking, &Problem::of_stages(1.0, 1.0, stages).with_exit(before + exit))?;
     let speed = (1.0 - 2.0 * of_first * before).sqrt();
-    let h = end.time - 2.0 * before / (1.0 + speed);
+    let start = 2.0 * before / (1.0 + speed);
+    let end = ended(asking, &Problem::of_stages(1.0, 1.0, stages).with_exit(before + 0.4), start)?;
+    let h = end.time - start;
     (h > 0.0).then(|| Constant {
         velocity: (speed - end.velocity) / (DECELERATION * h),
-        depth: (speed * h - exit) / (DECELERATION * h * h),
+        depth: (speed * h - (end.depth - before)) / (DECELERATION * h * h),
     })
+}
+
+/// The end of the first step after the time `start` (s) under a constant deceleration, where no step lands on an exit.
+fn not_landed(asking: &mut Asking<'_>, problem: &Problem, start: f64) -> Option<State> {
+    let before = problem.start_of(problem.stages.len() - 1);
+    let [one, other] = BEHIND.map(|part| {
+        let (time, late) = (start + (1.0 + part) * NOT_LANDED, part * NOT_LANDED);
+        let found = state_at(asking, problem, [NOT_LANDED, time, before + (1.0 + part) * NOT_LANDED])?;
+        let velocity = found.velocity + DECELERATION * late;
+        let depth = found.depth - velocity * late + 0.5 * DECELERATION * late * late;
+        Some(State { time: start + NOT_LANDED, depth, velocity })
+    });
+    let (one, other) = (one?, other?);
+    let is_same = |a: f64, b: f64| (a - b).abs() <= 0.1 * SAME * DECELERATION * NOT_LANDED * NOT_LANDED;
+    (is_same(one.depth, other.depth) && is_same(one.velocity, other.velocity)).then_some(one)
 }
 
 /// Whether the last of two steps, onto the exit, lasts the distance left over V at its start, under a constant deceleration,
@@ -235,7 +282,9 @@ fn start_kick(asking: &mut Asking<'_>) -> Option<Cause> {
     let is_one = all.iter().all(|lost| (lost - part).abs() <= ANOTHER * part.abs());
     let of_half = if (part - 0.5).abs() <= ANOTHER { ": V0 is taken for V half a step before the impact" } else { "" };
     let statement = format!(
-        "under a constant deceleration a, V is {part:.6} a h too small from the start on, whatever the step h{of_half}"
+        "under a constant deceleration a, V is {:.6} a h too {} from the start on, whatever the step h{of_half}",
+        part.abs(),
+        if part > 0.0 { "small" } else { "great" }
     );
     (part.abs() > ANOTHER && is_one)
         .then(|| Cause::plain("start-kick", statement, Certainty::Certain, STEPS.len(), STEPS.len()))
@@ -270,7 +319,7 @@ fn coefficients(asking: &mut Asking<'_>) -> Option<SVector<f64, COEFFICIENTS>> {
         // With r = M/s the step is as long as the exit is deep, nearly.
         let depth = 1.0 - (-size).exp();
         let viscous = Stage { viscosity: 1.0, ..Stage::free() };
-        let end = landed(asking, &Problem::of_stages(1.0, 1.0, [viscous]).with_exit(depth))?;
+        let end = landed(asking, &Problem::of_stages(1.0, 1.0, [viscous]).with_exit(depth), 0.0)?;
         Some((-end.time, (end.velocity - 1.0) / -end.time))
     };
     let points: Vec<(f64, f64)> = SIZES.into_iter().map(&mut step).collect::<Option<_>>()?;

@@ -107,13 +107,14 @@ impl Passage<'_> {
     }
 }
 
-fn terms(law: &Stage) -> [bool; 4] {
+/// Which terms the force of a stage has.
+pub(super) fn terms(law: &Stage) -> [bool; 4] {
     [law.static_force, law.stiffness, law.viscosity, law.drag].map(|coefficient| coefficient != 0.0)
 }
 
 const TERMS: [&str; 4] = ["a static force", "a spring", "viscosity", "drag"];
 /// The cause of each, and the term itself.
-const OF_TERM: [(&str, &str); 4] = [
+pub(super) const OF_TERM: [(&str, &str); 4] = [
     ("term:static-force", "the static force p"),
     ("term:stiffness", "the stiffness s"),
     ("term:viscosity", "the viscosity r"),
@@ -490,7 +491,7 @@ fn passages_of<'a>(
 }
 
 /// The passages of a flight through several stages of which no events are listed: right ones, where all of it is right; where its time
-/// alone is wrong, each as if that were so in its stage.
+/// alone is wrong, each as if that were so in its stage; else the last, as if the others were right.
 fn unlisted_passages_of<'a>(
     question: &'a Question,
     reads_scene: bool,
@@ -502,18 +503,23 @@ fn unlisted_passages_of<'a>(
     let [is_same_depth, is_on_time, is_same_velocity] =
         std::array::from_fn(|which| off[which].abs() <= bounds[0] * question.conditions[which]);
     let flight = Taylor::default().solve(problem, Detail::Events).ok().filter(|flight| flight.stage > 0);
-    let Some(flight) = flight.filter(|_| answer.events.is_empty() && is_same_depth && is_same_velocity) else {
-        return Vec::new();
-    };
+    let Some(flight) = flight.filter(|_| answer.events.is_empty()) else { return Vec::new() };
+    let is_same_path = is_same_depth && is_same_velocity;
+    let is_right = is_same_path && is_on_time;
     let late = if is_on_time { 0.0 } else { found.time - exact.time };
     let scene = question.scene.as_ref().filter(|_| reads_scene);
     let mut from = State::at_impact(problem);
     let passages = (0..=flight.stage).filter_map(|index| {
-        let to = flight.events.get(index).filter(|_| index < flight.stage).map_or(flight.end, |event| event.state);
+        let is_last = index == flight.stage;
+        let to = flight.events.get(index).filter(|_| !is_last).map_or(flight.end, |event| event.state);
         let boundary = problem.stages[index].end.min(problem.exit_depth);
-        let found = State { time: to.time + late, ..to };
-        let judged = judged(question, index, [std::mem::replace(&mut from, to), found], boundary, bounds)?;
-        (judged.is_wrong() != is_on_time).then_some(Passage { scene, is_supposed: !is_on_time, ..judged })
+        let as_found = if is_same_path { State { time: to.time + late, ..to } } else { found };
+        let start = std::mem::replace(&mut from, to);
+        if !(is_same_path || is_last) {
+            return None;
+        }
+        let judged = judged(question, index, [start, as_found], boundary, bounds)?;
+        (judged.is_wrong() != is_right).then_some(Passage { scene, is_supposed: !is_right, ..judged })
     });
     passages.collect()
 }

@@ -26,6 +26,9 @@ const LEAST: usize = 5;
 const OFF_MIDDLE: f64 = 0.09;
 /// Part of a step behind which the error is largest where it is that of a shortened step.
 const ALMOST_WHOLE: f64 = 0.9;
+/// Halvings of a step that are seen, the fewest too many for the clock of another step, and by how much a multiple of a part may differ from an integer.
+const HALVINGS: [i32; 2] = [4, 24];
+const MULTIPLE: f64 = 1e-6;
 /// Fixed step (s): some ten of them pass all exits.
 const STEP: f64 = 1.7e-3;
 
@@ -72,11 +75,20 @@ pub(super) fn measured(asking: &mut Asking<'_>, is_fixed: bool) -> Option<Cause>
     TOLERANCES[..2].iter().find_map(|rtol| at_setting(asking, *rtol, None))
 }
 
+/// How often a `step` (s) is halved so that all `times` are multiples of a part; none where they are those of whole steps.
+fn halvings(times: &[f64], step: f64) -> Option<i32> {
+    let are_multiples = |halvings: i32| {
+        let parts = times.iter().map(|time| time / step * 2f64.powi(halvings));
+        parts.map(|part| (part - part.round()).abs()).all(|off| off <= MULTIPLE)
+    };
+    (0..=HALVINGS[1]).find(|halvings| are_multiples(*halvings)).filter(|halvings| *halvings >= HALVINGS[0])
+}
+
 fn at_setting(asking: &mut Asking<'_>, rtol: f64, dt_s: Option<f64>) -> Option<Cause> {
     let of_depth = |depth| Problem::of_stages(1.0, 100.0, [Stage::tunnel(500.0, 0.5)]).with_exit(depth);
     // One absolute tolerance, or else each flight has steps of its own.
     let atol = PeerRequest::from_problem(&of_depth(1.0), rtol).atol;
-    let mut times = Vec::with_capacity(EXITS);
+    let (mut times, mut times_found) = (Vec::with_capacity(EXITS), Vec::with_capacity(EXITS));
     let mut off = [const { Vec::new() }; 3];
     for index in 0..EXITS {
         let [first, last] = DEPTHS;
@@ -84,8 +96,16 @@ fn at_setting(asking: &mut Asking<'_>, rtol: f64, dt_s: Option<f64>) -> Option<C
         let request = PeerRequest { atol, dt_s, ..PeerRequest::from_problem(&problem, rtol) };
         let [found, exact] = ends(asking, &problem, &request)?;
         times.push(exact.time);
+        times_found.push(found.time);
         let errors = errors(found, exact, problem.impact_speed);
         (0..3).for_each(|i| off[i].push(errors[i]));
+    }
+    if let Some(halvings) = dt_s.and_then(|step| halvings(&times_found, step)) {
+        let statement = format!(
+            "every exit lies at a whole number of parts of a step, each 2^-{halvings} of it: a step is halved {halvings} times to find it, and \
+             no more"
+        );
+        return Some(Cause::plain("event-loose", statement, Certainty::Certain, EXITS, EXITS));
     }
     // A velocity at the wrong time is wrong by that: the time first.
     [1, 2].into_iter().find_map(|which| {

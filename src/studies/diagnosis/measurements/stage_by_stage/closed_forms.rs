@@ -346,7 +346,11 @@ impl Kind {
         }
         let fits = |off: Option<f64>| off.is_some_and(|off| off <= FITS);
         let fits_all = wrong().all(|which| with[which].is_none() || fits(with[which]));
-        Some(fits_all && wrong().any(|which| fits(with[which]) && !fits(without[which])))
+        let is_explained = fits_all && wrong().any(|which| fits(with[which]) && !fits(without[which]));
+        // A depth of rest beyond the end of the stage is none: what is answered then is something else.
+        let is_at_limit = passage.found.depth >= passage.alone.exit_depth * (1.0 - FITS);
+        let is_beyond = passage.way == Way::Rest && is_at_limit && found.is_some_and(|(gives, ..)| gives == Distance);
+        if !is_explained && is_beyond { None } else { Some(is_explained) }
     }
 
     /// Whether a right passage would be another with `slip`.

@@ -1,0 +1,99 @@
+//! Schemes of fixed steps that need more than one slope of a step before, or an iteration within one.
+
+use super::stepping::on_cubic;
+use crate::physics::{Problem, Stage, State};
+
+/// Halvings of a step, in which an event is located.
+const HALVINGS: usize = 100;
+/// Steps of a flight, and iterations within one, at most.
+const STEPS_MAX: usize = 1_000_000;
+const ITERATIONS_MAX: usize = 100;
+
+/// How a step of so many seconds is made, from the states at its start and at the starts of those before it, the newest first.
+#[derive(Clone, Copy)]
+pub(super) enum Scheme {
+    /// Adams and Bashforth's, with these weights, the newest first, and whether the first two steps are Euler's.
+    Adams([f64; 3], bool),
+    /// The implicit midpoint rule, iterated until V changes by less than this part of it.
+    Midpoint(f64),
+}
+
+fn slope(law: &Stage, mass: f64, at: State) -> [f64; 2] {
+    [at.velocity, -law.force(at.depth, at.velocity) / mass]
+}
+
+fn ahead(from: State, h: f64, [dx, dv]: [f64; 2]) -> State {
+    State { time: from.time + h, depth: from.depth + h * dx, velocity: from.velocity + h * dv }
+}
+
+fn classical(law: &Stage, mass: f64, now: State, h: f64) -> State {
+    let k1 = slope(law, mass, now);
+    let k2 = slope(law, mass, ahead(now, 0.5 * h, k1));
+    let k3 = slope(law, mass, ahead(now, 0.5 * h, k2));
+    let k4 = slope(law, mass, ahead(now, h, k3));
+    ahead(now, h, std::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0))
+}
+
+fn midpoint(law: &Stage, mass: f64, now: State, h: f64, tolerance: f64) -> State {
+    let mut middle = now.velocity;
+    for _ in 0..ITERATIONS_MAX {
+        let depth = now.depth + 0.5 * h * middle;
+        let next = now.velocity - 0.5 * h * law.force(depth, middle) / mass;
+        let change = (next - std::mem::replace(&mut middle, next)).abs();
+        if change <= tolerance * now.velocity {
+            break;
+        }
+    }
+    State { time: now.time + h, depth: now.depth + h * middle, velocity: 2.0 * middle - now.velocity }
+}
+
+impl Scheme {
+    fn step(self, law: &Stage, mass: f64, states: &[State], h: f64) -> State {
+        let now = states[states.len() - 1];
+        match self {
+            Self::Midpoint(tolerance) => midpoint(law, mass, now, h, tolerance),
+            Self::Adams(_, true) if states.len() < 3 => ahead(now, h, slope(law, mass, now)),
+            Self::Adams(..) if states.len() < 3 => classical(law, mass, now, h),
+            Self::Adams(weights, _) => {
+                let slopes = || weights.into_iter().zip(states.iter().rev().map(|at| slope(law, mass, *at)));
+                ahead(now, h, std::array::from_fn(|i| slopes().map(|(weight, slope)| weight * slope[i]).sum()))
+            }
+        }
+    }
+
+    /// The end of the flight through `problem` by steps of `h` (s), each end of a stage on the cubics of its step; `None` where it takes
+    /// too many.
+    pub(super) fn end(self, problem: &Problem, h: f64) -> Option<State> {
+        let mut now = State::at_impact(problem);
+        for law in &problem.stages {
+            let limit = law.end.min(problem.exit_depth);
+            let mut states = vec![now];
+            let end = loop {
+                let next = self.step(law, problem.mass, &states, h);
+                let from = states[states.len() - 1];
+                if next.depth >= limit || next.velocity <= 0.0 {
+                    let slopes = [from, next].map(|at| slope(law, problem.mass, at)[1]);
+                    let is_past = |at: State| at.depth >= limit || at.velocity <= 0.0;
+                    let (mut low, mut high) = (0.0, 1.0);
+                    for _ in 0..HALVINGS {
+                        let middle = 0.5 * (low + high);
+                        if is_past(on_cubic(from, next, slopes, middle)) { high = middle } else { low = middle }
+                    }
+                    break on_cubic(from, next, slopes, high);
+                }
+                states.push(next);
+                if states.len() > STEPS_MAX {
+                    return None;
+                }
+            };
+            if end.velocity <= 0.0 && end.depth < limit {
+                return Some(State { velocity: 0.0, ..end });
+            }
+            now = State { depth: limit, ..end };
+            if limit == problem.exit_depth {
+                return Some(now);
+            }
+        }
+        Some(now)
+    }
+}
