@@ -41,24 +41,21 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     let certain = |id: &str, factor, statement| {
         Some(Cause { factor, ..Cause::plain(id, statement, Certainty::Certain, asked, asked) })
     };
-    let first = match constant_force(asking, 0.0, 0.0, landed) {
-        Some(first) => first,
-        None => {
-            if let Some(part) = kick_of_step_asked(asking) {
-                let statement = format!(
-                    "where a step under a constant deceleration a is shortened to land on an end, V is {part:.6} a smaller for each second \
-                     of the step asked for: part of its force acts for as long as a whole step"
-                );
-                return certain("scheme-coefficient", Some(part), statement);
-            }
-            let kick = start_kick(asking);
-            if kick.is_some() {
-                return kick;
-            }
-            // A first step that is wrong is so behind stages too.
-            let is_right = constant_force(asking, 0.0, 0.0, not_landed)?.first_wrong(claimed).is_none();
-            return if is_right { behind_stage_end(asking, claimed) } else { None };
+    let Some(first) = constant_force(asking, 0.0, 0.0, landed) else {
+        if let Some(part) = kick_of_step_asked(asking) {
+            let statement = format!(
+                "where a step under a constant deceleration a is shortened to land on an end, V is {part:.6} a smaller for each second \
+                 of the step asked for: part of its force acts for as long as a whole step"
+            );
+            return certain("scheme-coefficient", Some(part), statement);
         }
+        let kick = start_kick(asking);
+        if kick.is_some() {
+            return kick;
+        }
+        // A first step that is wrong is so behind stages too.
+        let is_right = constant_force(asking, 0.0, 0.0, not_landed)?.first_wrong(claimed).is_none();
+        return if is_right { behind_stage_end(asking, claimed) } else { None };
     };
     if lands_straight(asking) {
         let statement = "the step that lands on an end lasts the distance to it over V at the start of the step: the time and V there \

@@ -41,7 +41,7 @@ fn factor(asking: &mut Asking<'_>, term: usize, [mass, speed, depth, own]: Numbe
     let problem = Problem::of_stages(mass, speed, [law]).with_exit(depth);
     let [found, _] = ends(asking, &problem, &PeerRequest::from_problem(&problem, TOLERANCES[2]))?;
     let loss = 1.0 - found.velocity / speed;
-    (SEEN[0] <= loss && loss <= SEEN[1]).then(|| coefficient(term, [mass, speed, depth], loss) / own)
+    (SEEN[0]..=SEEN[1]).contains(&loss).then(|| coefficient(term, [mass, speed, depth], loss) / own)
 }
 
 /// The powers of its numbers that a `term` has as a factor, and the number before them.
