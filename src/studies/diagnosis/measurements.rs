@@ -467,7 +467,7 @@ fn drag_by_speed(asking: &mut Asking<'_>) -> Option<Cause> {
     likely(None, format!("the drag is not q V²: over the right one it is {a}, {b} and {c}; most off is {worst}"))
 }
 
-/// Whether the time at an exit is a number times its depth over V0, whatever the force.
+/// Whether the time at an exit is a number above one times its depth over V0, whatever the force; one is that of a formula.
 fn cut_short(asking: &mut Asking<'_>) -> Option<Cause> {
     let over_straight = |[found, _]: &[State; 2]| ROW_SPEED * found.time / found.depth;
     let row = row_of_exits(asking)?;
@@ -479,7 +479,8 @@ fn cut_short(asking: &mut Asking<'_>) -> Option<Cause> {
         "the time at an exit is {factor:.6} times its depth over V0, whatever the force: the flight is cut short there"
     );
     let cause = Cause::plain("flight-cut-short", statement, Certainty::Likely, EXITS + 1, EXITS + 1);
-    (is_one(&of_more_force) && row.iter().all(is_one)).then_some(Cause { factor: Some(factor), ..cause })
+    let is_longer = factor > 1.0 + ONE_RATIO;
+    (is_longer && is_one(&of_more_force) && row.iter().all(is_one)).then_some(Cause { factor: Some(factor), ..cause })
 }
 
 /// Whether time and velocity run along a straight line within a step.

@@ -10,7 +10,7 @@ use crate::exchange::peers::PeerRequest;
 use crate::physics::{Problem, Stage};
 use crate::studies::verdict::Verdict;
 
-/// Parts of V that a flight loses, the first that can be seen, and what can be.
+/// Parts of V that a flight loses rightly, of which the first is taken whose flight shows a loss within [`SEEN`].
 const LOSSES: [f64; 3] = [1e-3, 1e-6, 0.1];
 const SEEN: [f64; 2] = [1e-8, 0.5];
 /// By how much a power differs from the half of an integer, and a factor from another one: V is another along the flight.

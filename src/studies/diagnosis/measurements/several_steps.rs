@@ -18,19 +18,20 @@ const SIZES: [f64; 2] = [0.1, 0.05];
 /// Steps that are looked at, and the first that a start does not reach.
 const STEPS: usize = 10;
 const STARTED: usize = 4;
-/// Parts of a step by which an exit lies behind its end, and how much both states at the end may differ, over the square of the size.
+/// Parts of a step by which two exits lie behind its end: both must give one state there. Else they are tried this much nearer to it.
 pub(super) const BEHIND: [f64; 2] = [0.1, 0.15];
-const ONE_STATE: f64 = 1e-3;
 const NEARER: f64 = 0.1;
-/// The same where the last step may be one of the lowest order, which an interpolation by a chord exceeds.
-const ONE_STATE_AT_FIRST: f64 = 0.01;
+/// By how much two values of V at the end of a step may differ, over the square of its size. An interpolation by a chord exceeds both;
+/// a last step of order 1, which an iteration that ends at once makes of every step, exceeds the first alone.
+const ONE_STATE: f64 = 1e-3;
+const ONE_STATE_OF_ITERATION: f64 = 0.01;
 /// Iterations for the depth of an exit, and the part of a step by which its time may be off.
 const ITERATIONS_MAX: usize = 12;
 const ON_TIME: f64 = 1e-11;
-/// Factors that are one, and weights.
+/// Difference of two factors of V that are the same, and of two weights.
 const ONE_FACTOR: f64 = 1e-7;
 const ONE_WEIGHT: f64 = 2e-3;
-/// Slopes that a scheme may keep.
+/// Slopes from which a step is made at most, and the highest order of [`adams`].
 const KEPT_MAX: usize = 4;
 /// By how much the power of an error may differ from an integer.
 const NEAR: f64 = 0.2;
@@ -101,13 +102,14 @@ fn weights(factors: &[f64], size: f64) -> Option<Vec<f64>> {
     })
 }
 
-/// The weights of Adams and Bashforth's explicit schemes.
-fn adams(kept: usize) -> &'static [f64] {
-    match kept {
-        1 => &[1.0],
-        2 => &[1.5, -0.5],
-        3 => &[23.0 / 12.0, -16.0 / 12.0, 5.0 / 12.0],
-        _ => &[55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0],
+/// The weights of Adams and Bashforth's scheme of this order, up to four.
+fn adams(order: usize) -> Option<&'static [f64]> {
+    match order {
+        1 => Some(&[1.0]),
+        2 => Some(&[1.5, -0.5]),
+        3 => Some(&[23.0 / 12.0, -16.0 / 12.0, 5.0 / 12.0]),
+        4 => Some(&[55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0]),
+        _ => None,
     }
 }
 
@@ -130,11 +132,11 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
     }
     let [coarse_weights, fine_weights] = [weights(&coarse, SIZES[0]), weights(&fine, SIZES[1])];
     if let (Some(found), Some(fine)) = (coarse_weights, fine_weights)
+        && let Some(right) = adams(claimed.round() as usize)
         && found.len() == fine.len()
         && found.len() > 1
         && found.iter().zip(&fine).all(|(one, other)| (one - other).abs() <= ONE_WEIGHT)
     {
-        let right = adams(claimed.round() as usize);
         let is_right = right.len() == found.len()
             && found.iter().zip(right).all(|(found, right)| (found - right).abs() <= ONE_WEIGHT);
         let falls_short = (0..claimed.round() as i32).any(|power| {
@@ -167,7 +169,7 @@ pub(super) fn measured(asking: &mut Asking<'_>, claimed: f64) -> Option<Cause> {
 /// Whether steps that change V little have another order than those that change it more: an iteration within them ends too early.
 fn iteration(asking: &mut Asking<'_>) -> Option<Cause> {
     let mut second = |size: f64| {
-        let change = factors(asking, size, 1, ONE_STATE_AT_FIRST)?[0] - 1.0 + size;
+        let change = factors(asking, size, 1, ONE_STATE_OF_ITERATION)?[0] - 1.0 + size;
         Some((change / (size * size) - HALF).abs())
     };
     let sizes: Vec<f64> = (POWERS[0]..=POWERS[1]).map(|power| 10f64.powi(power)).collect();

@@ -26,8 +26,9 @@ const LEAST: usize = 5;
 const OFF_MIDDLE: f64 = 0.09;
 /// Part of a step behind which the error is largest where it is that of a shortened step.
 const ALMOST_WHOLE: f64 = 0.9;
-/// Halvings of a step that are seen, the fewest too many for the clock of another step, and by how much a multiple of a part may differ from an integer.
+/// Halvings of a step that are told, at least and at most: a time that counts half a step for a whole one is no search by halving.
 const HALVINGS: [i32; 2] = [4, 24];
+/// By how much a time over a part of the step may differ from an integer.
 const MULTIPLE: f64 = 1e-6;
 /// Fixed step (s): some ten of them pass all exits.
 const STEP: f64 = 1.7e-3;
