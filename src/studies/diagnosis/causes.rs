@@ -754,3 +754,37 @@ fn pairs(evidence: &Evidence<'_>, usable: &[&'static Hypothesis], singles: &[Exp
     }
     found
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::super::questions::questions;
+    use super::*;
+
+    /// How far a passing answer lies from the right one, in units of the accuracy.
+    const OFF: f64 = 1.9;
+
+    fn hypothesis(id: &str) -> &'static Hypothesis {
+        hypotheses().find(|hypothesis| hypothesis.id == id).unwrap()
+    }
+
+    #[test]
+    fn a_passing_answer_contradicts_no_fault_that_leaves_its_flight_as_it_is() {
+        let (accuracy, origin, drag) = (1e-9, hypothesis("stiffness-origin"), hypothesis("term:drag"));
+        let (mut left, mut contradicted) = (0, 0);
+        for question in &questions(5, 100, false) {
+            if question.problem.stages.len() > 1 || question.problem.impact_speed == 0.0 || question.is_on_a_border() {
+                continue;
+            }
+            let end = question.exact.end;
+            let answer = State { time: end.time * (1.0 + OFF * accuracy * question.conditions[1]), ..end };
+            let (how, fails, is_misnamed) = (How::Exact, false, false);
+            let seen = Seen { question, answer, how, accuracy, fails, is_misnamed };
+            assert!(!seen.contradicts(&[(origin, 1.0)], ALL_THREE), "{}", question.id);
+            assert!(seen.fit(origin, &[], ALL_THREE).is_none(), "{}", question.id);
+            left += 1;
+            contradicted += usize::from(seen.contradicts(&[(drag, 1.25)], ALL_THREE));
+        }
+        assert!(left > 5 && contradicted > 3, "{left} {contradicted}");
+    }
+}
